@@ -45,12 +45,19 @@ impl Mask {
             // Every pair is a run.
             return transitions.as_chunks().0.iter().fold(0, run);
         }
-        let row = |sum, row: &[u32]| {
-            let (runs, last) = row.as_chunks();
-            let sum = runs.iter().fold(sum, run);
-            last.iter().fold(sum, |sum, &start| run(sum, &[start, self.width()]))
-        };
-        self.rows().fold(0, row)
+        // Every pair is a run up to a row that ends white.
+        let (mut sum, mut from, mut start) = (0, 0, 0);
+        for &end in ends {
+            let end = end as usize;
+            if (end - start) % 2 == 1 {
+                let last = transitions[end - 1];
+                sum = transitions[from..end - 1].as_chunks().0.iter().fold(sum, run);
+                sum = run(sum, &[last, self.width()]);
+                from = end;
+            }
+            start = end;
+        }
+        transitions[from..].as_chunks().0.iter().fold(sum, run)
     }
 
     /// Returns true if the pixel is white. Pixels outside the image are black.
@@ -152,6 +159,8 @@ impl MaskBuilder {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -161,6 +170,23 @@ mod tests {
         assert_eq!(row, ".###..##");
         assert_eq!(mask.white_pixels(), 5);
         assert!(!mask.is_white(8, 0) && !mask.is_white(2, 1) && !mask.is_white(2, 2));
+    }
+
+    proptest! {
+        #[test]
+        fn white_pixels_are_those_that_are_white(
+            rows in prop::collection::vec(prop::collection::btree_set(0u32..20, 0..8), 0..12),
+        ) {
+            let ends = rows.iter().scan(0, |end, row| {
+                *end += row.len() as u32;
+                Some(*end)
+            });
+            let offsets = std::iter::once(0).chain(ends).collect();
+            let mask = Mask::new(20, offsets, rows.into_iter().flatten().collect()).unwrap();
+            let pixels = (0..mask.height()).flat_map(|row| (0..20).map(move |column| (column, row)));
+            let white = pixels.filter(|&(column, row)| mask.is_white(column, row)).count();
+            prop_assert_eq!(mask.white_pixels(), white as u64);
+        }
     }
 
     #[test]

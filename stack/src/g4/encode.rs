@@ -41,23 +41,26 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     // The indices of a1 and b1. Their parities agree, as both change to the same colour.
     let (mut i, mut j) = (0, 0);
     while a0 < width || !started {
-        if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
-            (i, j) = (i + 4, j + 4);
-            if i == row.len() && j == reference.len() {
-                return bits.put(code.then(VERTICAL[3]));
-            }
-            bits.put(code);
-            (a0, started) = (row[i - 1], true);
-            continue;
-        }
-        if let Some(code) = last_two_near(reference, row, i, j, width) {
-            return bits.put(code);
-        }
         let (a1, b1, b2) = (at(row, i), at(reference, j), at(reference, j + 1));
+        let is_near = a1.abs_diff(b1) <= 3;
+        if is_near {
+            if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
+                (i, j) = (i + 4, j + 4);
+                if i == row.len() && j == reference.len() {
+                    return bits.put(code.then(VERTICAL[3]));
+                }
+                bits.put(code);
+                (a0, started) = (row[i - 1], true);
+                continue;
+            }
+            if let Some(code) = last_two_near(reference, row, i, j, width) {
+                return bits.put(code);
+            }
+        }
         if b2 < a1 {
             bits.put(PASS);
             (a0, j) = (b2, j + 2);
-        } else if a1.abs_diff(b1) <= 3 {
+        } else if is_near {
             bits.put(VERTICAL[a1.wrapping_sub(b1).wrapping_add(3) as usize]);
             a0 = a1;
             i += 1;
@@ -65,9 +68,7 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
             j = if j > 0 { j - 1 } else { j + 1 };
         } else {
             let a2 = at(row, i + 1);
-            bits.put(HORIZONTAL);
-            bits.put_run(a1 - a0, i % 2 == 1);
-            bits.put_run(a2 - a1, i % 2 == 0);
+            bits.put_horizontal([a1 - a0, a2 - a1], i % 2 == 1);
             a0 = a2;
             i += 2;
         }
@@ -140,29 +141,60 @@ static FOUR_VERTICALS: LazyLock<Vec<u32>> = LazyLock::new(|| {
     (0..4096).map(|index| join(index).map_or(0, |code| code.len << 27 | code.bits)).collect()
 });
 
+/// Returns the code of a run of less than 64 pixels, or of what is left of a longer one.
+#[inline]
+fn terminating(length: u32, white: bool) -> Code {
+    let codes = if white { &TERMINATING_1 } else { &TERMINATING_0 };
+    codes[length as usize]
+}
+
 /// A writer of bits, most significant first.
 struct BitWriter {
+    /// The whole bytes, up to `end`, and room for more.
     out: Vec<u8>,
-    /// The buffered bits, left-aligned; fewer than 32 between calls.
+    end: usize,
+    /// The bits of the byte that has begun, left-aligned; fewer than 8 between calls.
     pending: u64,
     count: u32,
 }
 
 impl BitWriter {
     fn new(capacity: usize) -> Self {
-        Self { out: Vec::with_capacity(capacity), pending: 0, count: 0 }
+        Self { out: vec![0; capacity.max(8)], end: 0, pending: 0, count: 0 }
     }
 
     /// Appends a code of at most 32 bits.
+    ///
+    /// Writes all bits, whole bytes or not: a branch on their number would be mispredicted often.
     #[inline]
     fn put(&mut self, code: Code) {
         self.pending |= u64::from(code.bits) << (64 - self.count - code.len);
         self.count += code.len;
-        if self.count >= 32 {
-            self.out.extend_from_slice(&((self.pending >> 32) as u32).to_be_bytes());
-            self.pending <<= 32;
-            self.count -= 32;
+        if self.out.len() - self.end < 8 {
+            self.grow();
         }
+        self.out[self.end..][..8].copy_from_slice(&self.pending.to_be_bytes());
+        self.end += (self.count / 8) as usize;
+        self.pending <<= self.count & !7;
+        self.count %= 8;
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        self.out.resize(2 * self.out.len(), 0);
+    }
+
+    /// Appends two runs in horizontal mode, of which the first is white or the second.
+    #[inline]
+    fn put_horizontal(&mut self, [first, second]: [u32; 2], first_is_white: bool) {
+        if first < 64 && second < 64 {
+            let first = terminating(first, first_is_white);
+            let second = terminating(second, !first_is_white);
+            return self.put(HORIZONTAL.then(first).then(second));
+        }
+        self.put(HORIZONTAL);
+        self.put_run(first, first_is_white);
+        self.put_run(second, !first_is_white);
     }
 
     fn put_run(&mut self, mut length: u32, white: bool) {
@@ -170,17 +202,12 @@ impl BitWriter {
             self.put(make_up(white, LONGEST_MAKE_UP / 64));
             length -= LONGEST_MAKE_UP;
         }
-        if length >= 64 {
-            self.put(make_up(white, (length / 64).min(LONGEST_MAKE_UP / 64)));
-            length -= (length / 64 * 64).min(LONGEST_MAKE_UP);
-        }
-        let terminating = if white { &TERMINATING_1 } else { &TERMINATING_0 };
-        self.put(terminating[length as usize]);
+        let last = terminating(length % 64, white);
+        self.put(if length >= 64 { make_up(white, length / 64).then(last) } else { last });
     }
 
     fn finish(mut self) -> Vec<u8> {
-        let bytes = self.count.div_ceil(8) as usize;
-        self.out.extend_from_slice(&self.pending.to_be_bytes()[..bytes]);
+        self.out.truncate(self.end + self.count.div_ceil(8) as usize);
         self.out
     }
 }
