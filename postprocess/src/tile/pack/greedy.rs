@@ -177,7 +177,7 @@ fn insert(runs: &mut Vec<CellRun>, (mut start, mut end): CellRun) {
 }
 
 /// Moves all copies together to the middle of the area.
-fn centre(layout: &Layout, placements: &mut [CopyPlacement]) {
+pub(super) fn centre(layout: &Layout, placements: &mut [CopyPlacement]) {
     let ends = |at: &CopyPlacement| {
         let size = layout.parts()[at.part].size(at.turn);
         (at.left + size.width, at.top + size.height)

@@ -2,11 +2,12 @@
 //!
 //! Simple strategies come first: a grid, then boxes wherever they fit, then outlines,
 //! each before and after parts may be turned, and lattices of one part. A later strategy is
-//! taken only if it places more copies.
+//! taken only if it places more copies. Several parts are then brought closer by a search.
 
 mod greedy;
 mod grid;
 mod lattice;
+mod mix;
 mod no_fit;
 
 use lamp_stack::{Length, MAX_SIDE, Orientation, Size};
@@ -32,7 +33,7 @@ pub enum PackBy {
     /// The box around it.
     #[default]
     Boxes,
-    /// Its outline, if boxes do not place all copies.
+    /// Its outline, if boxes do not place all copies or parts are several.
     Outlines,
 }
 
@@ -208,6 +209,9 @@ fn pack_within(
             break;
         }
     }
+    if !alone && how.by == PackBy::Outlines {
+        best = shortened(layout, &wanted, gap, how.turns, best);
+    }
     let short = (0..counts.len()).find_map(|part| {
         let most = best.iter().filter(|placement| placement.part == part).count() as u32;
         let asked = counts[part].or((!alone).then_some(1))?;
@@ -221,6 +225,46 @@ fn pack_within(
             Err(TileError::TooMany { name, asked, most, area_mm: layout.area() })
         }
     }
+}
+
+/// Returns the copies of several parts on fewer rows, or all of them where some were left out, if
+/// that is found.
+fn shortened(
+    layout: &Layout,
+    wanted: &[u32],
+    gap: u32,
+    turns: Turns,
+    best: Vec<CopyPlacement>,
+) -> Vec<CopyPlacement> {
+    let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
+    if all > mix::MOST_COPIES {
+        return best;
+    }
+    // Where some were left out, they are placed below the area first.
+    let mut tall = layout.clone();
+    let longest = |part: usize| {
+        let PixelSize { width, height } = layout.parts()[part].size(Orientation::default());
+        (width.max(height).saturating_add(gap)).saturating_mul(wanted[part])
+    };
+    let rows = (0..wanted.len()).map(longest).fold(layout.pixels().height, u32::saturating_add);
+    tall.pixels.height = rows.min(MAX_SIDE);
+    let mut start = (best.len() == all).then(|| best.clone());
+    let mut regions = NoFitRegions::new(layout, gap, PackBy::Outlines);
+    for order in PlacingRule::ALL {
+        let found = greedy::place(&tall, &mut regions, wanted, turns, order);
+        let is_lower = |start: &Vec<_>| mix::height(&tall, &found) < mix::height(&tall, start);
+        if found.len() == all && start.as_ref().is_none_or(is_lower) {
+            start = Some(found);
+        }
+    }
+    let Some(start) = start else { return best };
+    let mut found = mix::shorten(&tall, gap, &turns.orientations(), start);
+    if mix::height(layout, &found) > layout.pixels().height {
+        return best;
+    }
+    greedy::centre(layout, &mut found);
+    found.sort_by_key(|at| (at.part, at.top, at.left));
+    found
 }
 
 fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileError> {

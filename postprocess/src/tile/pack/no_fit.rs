@@ -100,6 +100,29 @@ impl NoFitRegions {
         no_fit
     }
 
+    /// Returns the displacements by whole multiples of so many cells, in these multiples, at which
+    /// the outlines of two parts overlap or come nearer than the gap.
+    pub(super) fn no_fit_every(
+        &mut self,
+        layout: &Layout,
+        [moving, placed]: [(usize, Orientation); 2],
+        every: u32,
+    ) -> NoFitRegion {
+        let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
+        NoFitRegion::of_outlines_every(&moving, &placed, every as i32)
+    }
+
+    /// Returns whether two outlines at a displacement overlap or come nearer than the gap.
+    pub(super) fn meet(
+        &mut self,
+        layout: &Layout,
+        [moving, placed]: [(usize, Orientation); 2],
+        by: [i32; 2],
+    ) -> bool {
+        let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
+        moving.meets(&placed, by)
+    }
+
     /// Returns the number of white cells of an outline.
     pub(super) fn white(&mut self, layout: &Layout, key: (usize, Orientation)) -> i64 {
         let outline = self.outline(layout, key);
@@ -129,6 +152,22 @@ impl CellOutline {
         let grown = if gap == 0 { wide } else { offset_one_bit(&wide, -f64::from(gap)) };
         Self { rows: cells(outline, cell), grown: cells(&grown, cell), margin: margin as i32 }
     }
+
+    /// Returns whether it meets another that has been grown by the gap, from which it is so many
+    /// cells right and down.
+    fn meets(&self, placed: &Self, [right, down]: [i32; 2]) -> bool {
+        let margin = placed.margin;
+        let (above, right) = (down + margin, right + margin);
+        let hidden = (-above).max(0) as usize;
+        let others = placed.grown.iter().skip(above.max(0) as usize);
+        self.rows.iter().skip(hidden).zip(others).any(|(runs, others)| {
+            runs.iter().any(|&(from, to)| {
+                let (from, to) = (from + right, to + right);
+                let met = others.partition_point(|other| other.1 <= from);
+                others.get(met).is_some_and(|other| other.0 < to)
+            })
+        })
+    }
 }
 
 /// Returns the cells that hold a white pixel.
@@ -156,7 +195,7 @@ fn join_runs(runs: &mut Vec<CellRun>) {
 }
 
 impl NoFitRegion {
-    fn new(top: i32, rows: Vec<Rc<[CellRun]>>) -> Self {
+    pub(super) fn new(top: i32, rows: Vec<Rc<[CellRun]>>) -> Self {
         let ends = rows.iter().filter_map(|runs| Some([runs.first()?.0, runs.last()?.1]));
         let across = ends.map(|[from, to]| to.max(-from)).max().unwrap_or(0);
         let reach = [across, top.max(rows.len() as i32 - top)];
@@ -217,6 +256,49 @@ impl NoFitRegion {
                 }
             }
             join_runs(&mut runs);
+            runs.into()
+        });
+        Self::new(top, rows.collect())
+    }
+
+    /// Returns the displacements by whole multiples of some cells, in these multiples: for each row,
+    /// the union of what each two runs keep from each other.
+    fn of_outlines_every(moving: &CellOutline, placed: &CellOutline, every: i32) -> Self {
+        let margin = placed.margin;
+        let ends = |rows: &[Vec<CellRun>]| {
+            rows.iter().filter_map(|runs| Some(runs.last()?.1)).max().unwrap_or(0)
+        };
+        let up = |fine: i32| fine.div_euclid(every) + i32::from(fine.rem_euclid(every) > 0);
+        let [left, right] = [-ends(&moving.rows) - margin, ends(&placed.grown) + 1].map(up);
+        let top = (moving.rows.len() as i32 - 1 + margin) / every;
+        let bottom = up(placed.grown.len() as i32 - margin);
+        // Where runs begin less where they end, by column.
+        let mut changes = vec![0i32; (right - left + 1) as usize];
+        let rows = (-top..bottom.max(1 - top)).map(|row| {
+            changes.fill(0);
+            let above = row * every + margin;
+            let others = placed.grown.iter().skip(above.max(0) as usize);
+            for (own, others) in moving.rows.iter().skip((-above).max(0) as usize).zip(others) {
+                for &(start, end) in own {
+                    for &(from, to) in others {
+                        let run = [from - margin - end + 1, to - margin - start].map(up);
+                        if run[0] < run[1] {
+                            changes[(run[0] - left) as usize] += 1;
+                            changes[(run[1] - left) as usize] -= 1;
+                        }
+                    }
+                }
+            }
+            let mut runs: Vec<CellRun> = Vec::new();
+            let mut open = 0;
+            for (column, change) in (left..).zip(&changes) {
+                match (open, open + change) {
+                    (0, 1..) => runs.push((column, column)),
+                    (1.., 0) => runs.last_mut().expect("a run is open").1 = column,
+                    _ => {}
+                }
+                open += change;
+            }
             runs.into()
         });
         Self::new(top, rows.collect())
