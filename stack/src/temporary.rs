@@ -190,7 +190,8 @@ impl FolderBeside {
     /// Returns an error if there is something now that is not to be replaced, or renaming fails.
     pub fn persist(self) -> Result<(), StackError> {
         let (from, to) = (self.folder.path(), &self.path);
-        let replaced = self.registered.rename(|| put_in_place(from, to, self.replaces))?;
+        let replaced =
+            self.registered.rename(|| put_in_place(from, to, self.replaces, exchange))?;
         let from = self.folder.keep();
         if replaced {
             // What remains of it is removed as a dead writer's.
@@ -200,18 +201,39 @@ impl FolderBeside {
     }
 }
 
-/// Gives a folder its final name. Returns whether it has replaced one, which now has its own.
-fn put_in_place(from: &Path, to: &Path, replaces: bool) -> Result<bool, StackError> {
-    use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty};
-    loop {
-        if check_replaceable(to, replaces)? == Existing::Replaceable {
-            exchange(from, to)?;
-            return Ok(true);
+/// Waits until no other process gives a folder its name in `parent`, and has the others wait as
+/// long as the file lives. An exchange in steps must not meet another.
+///
+/// Gives up after ten seconds, and at once on a file system without locks.
+fn turn_in(parent: &Path) -> Option<File> {
+    let handle = File::open(parent).ok()?;
+    for _ in 0..1000 {
+        match handle.try_lock() {
+            Ok(()) => return Some(handle),
+            Err(fs::TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(10)),
+            Err(fs::TryLockError::Error(_)) => break,
         }
-        match fs::rename(from, to) {
+    }
+    None
+}
+
+/// Gives a folder its final name. Returns whether it has replaced one, which now has its own.
+fn put_in_place(
+    from: &Path,
+    to: &Path,
+    replaces: bool,
+    exchange: fn(&Path, &Path) -> io::Result<()>,
+) -> Result<bool, StackError> {
+    use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotFound};
+    let _turn = turn_in(folder_of(to)?);
+    loop {
+        let replaced = check_replaceable(to, replaces)? == Existing::Replaceable;
+        match if replaced { exchange(from, to) } else { fs::rename(from, to) } {
             // Another process was faster.
-            Err(error) if matches!(error.kind(), AlreadyExists | DirectoryNotEmpty) => {}
-            renamed => return Ok(renamed.map(|()| false)?),
+            Err(error)
+                if !replaced && matches!(error.kind(), AlreadyExists | DirectoryNotEmpty) => {}
+            Err(error) if replaced && error.kind() == NotFound && !to.exists() => {}
+            done => return Ok(done.map(|()| replaced)?),
         }
     }
 }
@@ -264,7 +286,13 @@ fn check_replaceable(path: &Path, replaces: bool) -> Result<Existing, StackError
         }
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if !entry.file_type()?.is_file() || !is_name_in_folders(&name) {
+        let is_file = match entry.file_type() {
+            Ok(kind) => kind.is_file(),
+            // Another process has replaced the folder meanwhile.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(error.into()),
+        };
+        if !is_file || !is_name_in_folders(&name) {
             return Err(StackError::NotReplaceable { name: one_line(&name) });
         }
         existing = Existing::Replaceable;
@@ -339,6 +367,25 @@ mod tests {
             assert!(old.join("new").exists());
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
         }
+    }
+
+    #[test]
+    fn folders_that_replace_one_at_once_do_so_in_turn() {
+        let folder = tempfile::tempdir().unwrap();
+        let to = folder.path().join("a");
+        let replace = &|writer: usize| {
+            for _ in 0..50 {
+                let from = folder.path().join(format!(".a.lamp-aaaaa{writer}.part"));
+                fs::create_dir(&from).unwrap();
+                fs::write(from.join("layer_00000.tif"), "").unwrap();
+                if put_in_place(&from, &to, true, exchange_in_steps).unwrap() {
+                    fs::remove_dir_all(from).unwrap();
+                }
+            }
+        };
+        thread::scope(|scope| (0..4).for_each(|writer| drop(scope.spawn(move || replace(writer)))));
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(Result::unwrap).collect();
+        assert_eq!(left.iter().map(fs::DirEntry::path).collect::<Vec<_>>(), [to]);
     }
 
     #[test]
