@@ -171,10 +171,14 @@ impl FolderBeside {
         let builder = builder(&start, 0o777);
         for _ in 0..ATTEMPTS {
             let (folder, registered) = Registered::made(|| builder.tempdir_in(parent))?;
-            let handle = File::open(folder.path()).ok();
-            if handle.as_ref().is_none_or(|handle| claim(handle, folder.path())) {
-                return Ok(Self { folder, registered, path, replaces, _handle: handle });
-            }
+            let handle = match File::open(folder.path()) {
+                Ok(handle) if claim(&handle, folder.path()) => Some(handle),
+                // Another process took it for a dead writer's before it was locked.
+                Ok(_) => continue,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(_) => None,
+            };
+            return Ok(Self { folder, registered, path, replaces, _handle: handle });
         }
         Err(cannot_claim().into())
     }
