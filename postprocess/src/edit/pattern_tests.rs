@@ -55,7 +55,9 @@ const SHAPES: [&str; 8] =
 
 /// Returns a shape's places in millimetres. None of its edges runs through a centre.
 fn places(shape: &str, q: [i32; 6]) -> Vec<[f64; 3]> {
-    let [x, y, z, a, b, c] = q.map(|q| f64::from(q) * 0.25 + 0.0137);
+    // Each has an offset of its own: the end of a diagonal line would run through centres.
+    let offsets = [0.0137, 0.0171, 0.0193, 0.0113, 0.0071, 0.0229];
+    let [x, y, z, a, b, c] = std::array::from_fn(|i| f64::from(q[i]) * 0.25 + offsets[i]);
     match shape {
         "box" => vec![[x, y, 0.0], [x + a, y, 0.0], [x + a, y + b, 0.0], [x, y + b, 0.0]],
         "disc" | "sphere" => vec![[x, y, z]],
