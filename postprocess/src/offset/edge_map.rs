@@ -37,6 +37,8 @@ const MAX_DEPTH: f32 = 256.0;
 /// The most by which the distance from the nearest source, middle to middle, differs from the
 /// distance from the edge between.
 const STAIR: f64 = 2.0;
+/// Half of a pixel's diagonal: how far from the middle of a pixel an edge may be that cuts it.
+const HALF_DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A run of a row of an [`EdgeMap`].
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +82,7 @@ impl EdgeMap {
     ) -> Self {
         let [least, most] = edges.range;
         let outer = if all { 0 } else { more_than(least - STAIR) };
-        let reach = most + f64::max(depth, STAIR);
+        let reach = most + f64::max(depth, STAIR + HALF_DIAGONAL);
         let discs = [outer, at_least(reach)].map(|square| Disc::below(square, region.height()));
         let mut map = Self::runs(sources, region, width, &discs);
         let is_right = sources.colour() == SourceColour::Black;
