@@ -178,6 +178,14 @@ pub(crate) fn read_passing(
     }))
 }
 
+/// Returns what decodes layers of an input that did not need it before.
+pub(crate) fn decoding(
+    input: &Input,
+) -> impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync + use<> {
+    let path = input.stack.clone();
+    move |layer| layer.decode().map_err(|error| failed_at(input_name(&path), error))
+}
+
 fn pages_of_input(
     pages: Pages,
     input: &Input,
@@ -347,10 +355,10 @@ pub(crate) fn is_packed_name(path: &Path) -> bool {
 
 /// Passes layers on. At their end `finding` may stop the work: then no file is written, and a
 /// stream ends as one that is cut off and says why.
-pub(crate) fn unless_found(
-    layers: impl Iterator<Item = Result<Layer, Exit>>,
+pub(crate) fn unless_found<L>(
+    layers: impl Iterator<Item = Result<L, Exit>>,
     finding: impl FnOnce() -> Option<Exit>,
-) -> impl Iterator<Item = Result<Layer, Exit>> {
+) -> impl Iterator<Item = Result<L, Exit>> {
     layers.chain(std::iter::once_with(finding).flatten().map(Err))
 }
 

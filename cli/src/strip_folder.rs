@@ -3,24 +3,28 @@
 use std::path::Path;
 
 use lamp_postprocess::{StripForm, StripWriter, StripsError, is_strips, join_strips};
-use lamp_stack::Layer;
+use lamp_stack::{PassingLayer, map_in_order};
 
 use crate::exit::Exit;
 use crate::options::{Input, Output};
 use crate::progress::Progress;
-use crate::stages::Layers;
 use crate::streams::{
-    extension, format, input_name, is_stream, new_folder, read_layers, write_layers,
+    decoding, extension, format, input_name, is_stream, new_folder, read_passing, takes_codes,
+    write_layers, write_passing,
 };
 
-/// Reads the wanted layers of a stack, or those of the build that a folder of strips makes.
-pub(crate) fn read_layers_or_strips(
+/// Layers in order, coded or not.
+pub(crate) type PassingLayers = Box<dyn Iterator<Item = Result<PassingLayer, Exit>>>;
+
+/// Reads the wanted layers of a stack, those that can pass undecoded, or the layers of the build
+/// that a folder of strips makes.
+pub(crate) fn read_passing_or_strips(
     input: &Input,
     progress: &Progress,
-) -> Result<Layers<'static>, Exit> {
+) -> Result<PassingLayers, Exit> {
     let folder = &input.stack;
     if !is_strips(folder) {
-        return Ok(Box::new(read_layers(input, progress)?));
+        return Ok(Box::new(read_passing(input, progress)?));
     }
     if input.layers.is_some() {
         return Err(Exit::usage(
@@ -37,20 +41,25 @@ pub(crate) fn read_layers_or_strips(
         if let Some(layers) = layer.info.stack.as_ref().and_then(|stack| stack.layers) {
             progress.expect(layers.into());
         }
-        Ok(layer)
+        Ok(layer.into())
     })))
 }
 
 /// Writes layers as a stack, or as strips if the input was a folder of them. `form` changes how
 /// they were cut.
-pub(crate) fn write_layers_or_strips(
-    layers: impl Iterator<Item = Result<Layer, Exit>>,
+pub(crate) fn write_passing_or_strips(
+    layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
     input: &Input,
     form: impl FnOnce(StripForm) -> StripForm,
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    if !is_strips(&input.stack) {
+    let is_of_strips = is_strips(&input.stack);
+    if !is_of_strips && takes_codes(output) {
+        return write_passing(layers, output, progress);
+    }
+    let layers = map_in_order(layers, decoding(input));
+    if !is_of_strips {
         return write_layers(layers, output, progress);
     }
     let cut_as = StripForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;

@@ -1,6 +1,6 @@
 //! The dithering stage: gray layers to dots.
 
-use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, map_in_order};
+use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, map_in_order};
 use thiserror::Error;
 
 use crate::diffusion::{FLOYD_STEINBERG, SIERRA_LITE};
@@ -58,13 +58,29 @@ pub fn dither<E: From<DitherError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     method: DitherMethod,
 ) -> impl Iterator<Item = Result<Layer, E>> {
-    map_in_order(layers, move |mut layer| {
-        if let Image::Gray(gray) = &*layer.image {
-            layer.image = dither_image(gray, method, layer.info.index)?.into();
-            layer.info.other.insert("dither".to_owned(), method.name().into());
-        }
-        Ok(layer)
+    map_in_order(layers, move |layer| Ok(dither_layer(layer, method)?))
+}
+
+/// Turns gray layers into masks as [`dither`] does. Only these are decoded, by `decode`.
+///
+/// # Errors
+/// Returns the errors of `layers`, of `decode` and of [`dither_image`].
+pub fn dither_passing<E: From<DitherError> + Send>(
+    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    method: DitherMethod,
+    decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,
+) -> impl Iterator<Item = Result<PassingLayer, E>> {
+    map_in_order(layers, move |layer: PassingLayer| {
+        Ok(if layer.is_gray() { dither_layer(decode(layer)?, method)?.into() } else { layer })
     })
+}
+
+fn dither_layer(mut layer: Layer, method: DitherMethod) -> Result<Layer, DitherError> {
+    if let Image::Gray(gray) = &*layer.image {
+        layer.image = dither_image(gray, method, layer.info.index)?.into();
+        layer.info.other.insert("dither".to_owned(), method.name().into());
+    }
+    Ok(layer)
 }
 
 /// Turns the gray image of a layer into dots. Level 0 stays black and level 255 white.

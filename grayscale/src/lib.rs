@@ -45,7 +45,7 @@ mod threshold;
 mod void_and_cluster;
 
 pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, excess};
-pub use dither::{DitherError, DitherMethod, dither, dither_image};
+pub use dither::{DitherError, DitherMethod, dither, dither_image, dither_passing};
 pub use homogeneity::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 pub use outline::{OutlinePiece, shared_height};
 pub use summed::SummedLine;

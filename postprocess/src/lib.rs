@@ -42,7 +42,9 @@ pub use edit::{
     EditError, EditProblem, Edits, ImageBounds, LabelList, LayerProblem, ListProblem, OtherLayers,
     OtherPicture, edit, edit_passing,
 };
-pub use fix::{Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix};
+pub use fix::{
+    Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix, fix_passing,
+};
 pub use offset::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,
     Widths, beyond_tolerance, compensate, offset, offset_one_bit, shrink,

@@ -3,11 +3,11 @@
 //! A page's JSON line ends with the key `check`:
 //!
 //! ```json
-//! "check":{"image":"9f86d081","exposed_px":20133,"dpi":1500,"text":"5d41402a"}
+//! "check":{"image":"9f86d081","exposed_px":20133,"code":"0a4d55a8","dpi":1500,"text":"5d41402a"}
 //! ```
 //!
-//! `image` is the CRC-32 of the image's runs, whatever their coding; `text` that of the line up to
-//! its own `text`. The last page also has `pages`, their number, and `chain`, the CRC-32 of the
+//! `image` is the CRC-32 of the image's runs, whatever their coding; `code` that of their coding, so
+//! that a stage that passes it on need not decode it; `text` that of the line up to its own `text`. The last page also has `pages`, their number, and `chain`, the CRC-32 of the
 //! `text` of all pages before it: it tells of pages that are missing, moved or from another stack.
 
 use crc32fast::Hasher;
@@ -23,6 +23,9 @@ use crate::runs::{Change, RunImage};
 pub(crate) struct PageCheck {
     #[serde(flatten)]
     pub(crate) image: ImageCheck,
+    /// `None` on pages of other files than TIFFs, and of older versions.
+    #[serde(flatten)]
+    pub(crate) code: Option<CodeCheck>,
     /// The resolution in dpi, if the page states one.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub(crate) dpi: Option<f64>,
@@ -49,6 +52,22 @@ pub(crate) struct ImageCheck {
     pub(crate) crc: u32,
     /// The number of pixels that are not black.
     pub(crate) exposed_px: u64,
+}
+
+/// What is computed from a coded image when it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CodeCheck {
+    /// The CRC-32 of the image's size and the page's strip.
+    #[serde(rename = "code", with = "hexadecimal")]
+    crc: u32,
+    /// The number of rows that do not end black.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(crate) ends_white: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 mod hexadecimal {
@@ -141,6 +160,41 @@ impl ImageCheck {
     }
 }
 
+impl CodeCheck {
+    /// Returns the check of an image and its strip.
+    pub(crate) fn of(image: &Image, strip: &[u8]) -> Self {
+        let is_gray = matches!(image, Image::Gray(_));
+        let crc = code_crc([image.width(), image.height()], is_gray, strip);
+        Self { crc, ends_white: rows_that_end_white(image) }
+    }
+
+    /// Returns whether an image of a size and its strip are those that the check was made of.
+    pub(crate) fn is_of(&self, size: [u32; 2], is_gray: bool, strip: &[u8]) -> bool {
+        self.crc == code_crc(size, is_gray, strip)
+    }
+}
+
+/// Returns the CRC-32 of width, height and bits of a pixel, low bytes first, and of a strip.
+fn code_crc([width, height]: [u32; 2], is_gray: bool, strip: &[u8]) -> u32 {
+    let mut hasher = Hasher::new();
+    let bits = if is_gray { 8 } else { 1 };
+    add_numbers(&mut hasher, &[width, height, bits], |number| [number]);
+    hasher.update(strip);
+    hasher.finalize()
+}
+
+/// Returns the number of rows whose last pixel is not black.
+pub(crate) fn rows_that_end_white(image: &Image) -> u32 {
+    let count = match image {
+        Image::Mask(mask) => mask.rows().filter(|row| !row.len().is_multiple_of(2)).count(),
+        Image::Gray(gray) => {
+            let rows = (0..gray.height()).map(|row| gray.row(row));
+            rows.filter(|row| row.last().is_some_and(|change| change.level > 0)).count()
+        }
+    };
+    count as u32
+}
+
 /// Returns the CRC-32 of an image's runs. The check is of these 32-bit numbers, low bytes first:
 /// width, height, bits of a pixel; for each row the number of changes up to its end; for each
 /// change its column and, in a gray image, its level.
@@ -191,9 +245,14 @@ const AFTER_TEXT: &str = "\"}}";
 pub(crate) struct OpenLine(String);
 
 impl OpenLine {
-    pub(crate) fn new(info: &PageInfo, dpi: Option<Dpi>, image: ImageCheck) -> Self {
+    pub(crate) fn new(
+        info: &PageInfo,
+        dpi: Option<Dpi>,
+        image: ImageCheck,
+        code: Option<CodeCheck>,
+    ) -> Self {
         let mut line = info.to_line();
-        let check = PageCheck { image, dpi: dpi.map(Dpi::get), end: None };
+        let check = PageCheck { image, code, dpi: dpi.map(Dpi::get), end: None };
         let check = serde_json::to_string(&check).expect("a check is numbers and texts");
         // Both objects stay open: without their last braces.
         line.pop();

@@ -1,16 +1,16 @@
 //! Defines layers that pass from one stack to another, decoded only where their image is needed.
 
+use crate::check::rows_that_end_white;
 use crate::error::StackError;
-use crate::layer::{Layer, PageInfo};
+use crate::layer::{Image, Layer, PageInfo};
 use crate::length::Dpi;
 use crate::ordered::MemorySize;
-use crate::tiff::{EncodedPage, Page};
+use crate::tiff::{EncodedPage, Page, PassedCode};
 
 /// A layer on its way to another stack: decoded, or as its page has it.
 ///
-/// A page passes as it is if it has a check and is coded as stages write it. Its code and its check
-/// then pass together, and neither is looked at: an image that is damaged fails in the first reader
-/// that decodes it, now or after it was written anew.
+/// A page passes as it is if its code is the one that its check was made of, as stages write it: then
+/// its image is that, too. Any other page is decoded, and its image is checked.
 ///
 /// ```
 /// use lamp_stack::{
@@ -35,8 +35,8 @@ pub struct PassingLayer(State);
 #[derive(Clone, Debug)]
 enum State {
     Decoded(Box<Layer>),
-    /// The page has a check and one strip in a compression that is written.
-    Coded(Box<Page>),
+    /// The page's code is the one that was written.
+    Coded(Box<Page>, PassedCode),
 }
 
 impl PassingLayer {
@@ -45,10 +45,9 @@ impl PassingLayer {
     /// # Errors
     /// Returns the errors of [`Page::decode`], of pages that are decoded.
     pub fn of_page(page: Page) -> Result<Self, StackError> {
-        Ok(Self(if page.passed().is_some() {
-            State::Coded(Box::new(page))
-        } else {
-            State::Decoded(Box::new(page.decode()?))
+        Ok(Self(match page.passed() {
+            Some(passed) => State::Coded(Box::new(page), passed),
+            None => State::Decoded(Box::new(page.decode()?)),
         }))
     }
 
@@ -56,7 +55,7 @@ impl PassingLayer {
     pub fn info(&self) -> &PageInfo {
         match &self.0 {
             State::Decoded(layer) => &layer.info,
-            State::Coded(page) => page.info(),
+            State::Coded(page, _) => page.info(),
         }
     }
 
@@ -64,7 +63,7 @@ impl PassingLayer {
     pub fn info_mut(&mut self) -> &mut PageInfo {
         match &mut self.0 {
             State::Decoded(layer) => &mut layer.info,
-            State::Coded(page) => page.info_mut(),
+            State::Coded(page, _) => page.info_mut(),
         }
     }
 
@@ -72,7 +71,7 @@ impl PassingLayer {
     pub fn dpi(&self) -> Option<Dpi> {
         match &self.0 {
             State::Decoded(layer) => layer.dpi,
-            State::Coded(page) => page.dpi(),
+            State::Coded(page, _) => page.dpi(),
         }
     }
 
@@ -80,7 +79,31 @@ impl PassingLayer {
     pub fn size(&self) -> [u32; 2] {
         match &self.0 {
             State::Decoded(layer) => [layer.image.width(), layer.image.height()],
-            State::Coded(page) => page.size(),
+            State::Coded(page, _) => page.size(),
+        }
+    }
+
+    /// Returns whether the image is gray, not a mask.
+    pub fn is_gray(&self) -> bool {
+        match &self.0 {
+            State::Decoded(layer) => matches!(*layer.image, Image::Gray(_)),
+            State::Coded(page, _) => page.is_gray(),
+        }
+    }
+
+    /// Returns whether the last pixel of every row is black.
+    pub fn rows_end_black(&self) -> bool {
+        match &self.0 {
+            State::Decoded(layer) => rows_that_end_white(&layer.image) == 0,
+            State::Coded(_, passed) => passed.code.ends_white == 0,
+        }
+    }
+
+    /// Returns the layer, if it is decoded.
+    pub fn as_decoded(&self) -> Option<&Layer> {
+        match &self.0 {
+            State::Decoded(layer) => Some(layer),
+            State::Coded(..) => None,
         }
     }
 
@@ -91,7 +114,7 @@ impl PassingLayer {
     pub fn decode(self) -> Result<Layer, StackError> {
         match self.0 {
             State::Decoded(layer) => Ok(*layer),
-            State::Coded(page) => page.decode(),
+            State::Coded(page, _) => page.decode(),
         }
     }
 }
@@ -106,7 +129,7 @@ impl From<PassingLayer> for EncodedPage {
     fn from(layer: PassingLayer) -> Self {
         match layer.0 {
             State::Decoded(layer) => Self::new(&layer),
-            State::Coded(page) => Self::passed(*page),
+            State::Coded(page, passed) => Self::passed(*page, passed),
         }
     }
 }
@@ -115,7 +138,7 @@ impl MemorySize for PassingLayer {
     fn bytes(&self) -> usize {
         match &self.0 {
             State::Decoded(layer) => layer.bytes(),
-            State::Coded(page) => page.bytes(),
+            State::Coded(page, _) => page.bytes(),
         }
     }
 }

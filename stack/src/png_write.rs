@@ -233,7 +233,7 @@ fn line(layer: &Layer) -> OpenLine {
     if let Some(dpi) = layer.dpi.filter(|&dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi)) {
         info.other.insert(EXACT_DPI.to_owned(), dpi.get().into());
     }
-    OpenLine::new(&info, layer.dpi, layer.image.check()).into_ascii()
+    OpenLine::new(&info, layer.dpi, layer.image.check(), None).into_ascii()
 }
 
 /// A writer that keeps the I/O error, which the encoder's own errors do not contain.

@@ -243,23 +243,22 @@ fn passed(bytes: &[u8]) -> Result<Vec<u8>, StackError> {
 }
 
 #[test]
-fn pages_pass_byte_for_byte_and_their_damage_stays_visible() {
+fn pages_pass_byte_for_byte_and_damaged_ones_do_not() {
     for kind in [mask_layer as fn(u32) -> Layer, gray_layer] {
-        let whole = write(&layers(kind), Format::Big);
-        assert_eq!(passed(&whole).unwrap(), whole);
-        let mut seen = 0;
+        let layers = layers(kind);
+        let whole = write(&layers, Format::Big);
+        assert!(passed(&whole).unwrap() == whole);
+        let mut refused = 0;
         for at in 0..whole.len() {
             let mut changed = whole.clone();
             changed[at] ^= 0x10;
-            // Refused at once, or by the next reader, or it was no part of a page.
-            let Ok(result) = passed(&changed) else { continue };
-            match (read(&changed), read(&result)) {
-                (Err(_), Err(_)) => seen += 1,
-                (Ok(before), Ok(after)) => assert_eq!(before, after, "byte {at}"),
-                (before, after) => panic!("byte {at}: {before:?}, then {after:?}"),
+            // What passes was no part of a page, or pads its code.
+            match passed(&changed) {
+                Ok(result) => assert_eq!(read(&result).unwrap(), layers, "byte {at}"),
+                Err(_) => refused += 1,
             }
         }
-        assert!(seen > 20, "{seen} damaged codes passed with their checks");
+        assert!(refused > whole.len() / 2, "{refused} of {} bytes", whole.len());
     }
 }
 

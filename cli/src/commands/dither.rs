@@ -6,8 +6,8 @@ use lamp_postprocess::{Seam, StripForm};
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::stages::dither::DitherSettings;
-use crate::streams::progress;
-use crate::strip_folder::{read_layers_or_strips, write_layers_or_strips};
+use crate::streams::{decoding, progress};
+use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
@@ -39,9 +39,9 @@ pub(crate) struct DitherArgs {
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
-    let layers = read_layers_or_strips(&args.input, &progress)?;
-    let dots = args.settings.layers(layers, &progress);
+    let layers = read_passing_or_strips(&args.input, &progress)?;
+    let dots = args.settings.passing(layers, decoding(&args.input), &progress);
     // Dots on ramps would be dots of each side alone.
     let by_comb = |form| StripForm { seam: Seam::Comb, ..form };
-    write_layers_or_strips(dots, &args.input, by_comb, &args.output, &progress)
+    write_passing_or_strips(dots, &args.input, by_comb, &args.output, &progress)
 }

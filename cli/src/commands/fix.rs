@@ -12,8 +12,8 @@ use crate::fix_report::whereabouts;
 use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output};
 use crate::stages::fix::{FixSettings, Fixing};
-use crate::streams::{check_beside, progress, unless_found};
-use crate::strip_folder::{read_layers_or_strips, write_layers_or_strips};
+use crate::streams::{check_beside, decoding, progress, unless_found};
+use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
@@ -69,8 +69,8 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
-    let layers = read_layers_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
-    let fixed = fixing.layers(layers, 0..u32::MAX, |fixed| {
+    let layers = read_passing_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
+    let fixed = fixing.passing(layers, decoding(&args.input), |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
         }
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     });
     let finding = || fixing.report().text_of_left().filter(|_| args.strict).map(Exit::Findings);
     let fixed = unless_found(fixed, finding);
-    let written = write_layers_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
+    let written = write_passing_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }

@@ -17,7 +17,7 @@ use crate::progress::{Notes, Progress};
 use crate::streams::{layers_of, open_pages};
 
 /// Changes when `support` makes other bytes from the same options, stack and part.
-pub(super) const SUPPORT_CODE: u32 = 2;
+pub(super) const SUPPORT_CODE: u32 = 3;
 
 /// A stage that works on a whole stack.
 #[derive(Clone)]

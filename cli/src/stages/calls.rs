@@ -17,7 +17,7 @@ use crate::exit::Exit;
 use crate::progress::{Notes, Progress};
 
 /// Change when other bytes come from the same options and stacks.
-pub(crate) const JOIN_CODE: u32 = 1;
+pub(crate) const JOIN_CODE: u32 = 2;
 pub(crate) const PACK_CODE: u32 = 2;
 const CHECK_CODE: u32 = 1;
 

@@ -20,7 +20,7 @@ use crate::options::parse_distance;
 use crate::progress::Progress;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 5;
+pub(crate) const CODE: u32 = 6;
 
 /// By what edges move and images grow.
 #[derive(Args, Clone)]

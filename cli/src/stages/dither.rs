@@ -2,14 +2,14 @@
 
 use clap::Args;
 use lamp_grayscale::{DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
-use lamp_stack::{Image, Layer, Length};
+use lamp_stack::{Dpi, Image, Layer, Length, PassingLayer};
 
 use crate::exit::Exit;
 use crate::options::one_of_described;
 use crate::progress::Progress;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 2;
+pub(crate) const CODE: u32 = 3;
 
 /// How dots are made.
 #[derive(Args, Clone)]
@@ -37,23 +37,52 @@ impl DitherSettings {
         layers: I,
         progress: &Progress,
     ) -> impl Iterator<Item = Result<Layer, Exit>> + use<I> {
-        let (method, progress) = (self.method, progress.clone());
-        let mut told = method == DitherMethod::Threshold;
+        let mut warn = self.warning(progress);
         let layers = layers.inspect(move |layer| {
-            if let Some(line) = layer.as_ref().ok().filter(|_| !told).and_then(unevenness) {
+            if let Ok(Layer { dpi: Some(dpi), image, .. }) = layer
+                && let Image::Gray(_) = **image
+            {
+                warn(*dpi);
+            }
+        });
+        lamp_grayscale::dither(layers, self.method)
+    }
+
+    /// Returns the layers as [`layers`](Self::layers) does. Masks are not decoded.
+    pub(crate) fn passing<'a>(
+        &self,
+        layers: impl Iterator<Item = Result<PassingLayer, Exit>> + 'a,
+        decode: impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync + 'a,
+        progress: &Progress,
+    ) -> impl Iterator<Item = Result<PassingLayer, Exit>> + 'a {
+        let mut warn = self.warning(progress);
+        let layers = layers.inspect(move |layer| {
+            if let Ok(layer) = layer
+                && let Some(dpi) = layer.dpi().filter(|_| layer.is_gray())
+            {
+                warn(dpi);
+            }
+        });
+        lamp_grayscale::dither_passing(layers, self.method, decode)
+    }
+
+    /// Returns what warns once if dots of the pixels of gray layers may cure unevenly.
+    fn warning(&self, progress: &Progress) -> impl FnMut(Dpi) + use<> {
+        let progress = progress.clone();
+        let mut told = self.method == DitherMethod::Threshold;
+        move |dpi| {
+            if let Some(line) = Some(dpi).filter(|_| !told).and_then(unevenness) {
                 told = true;
                 progress.say(&line);
             }
-        });
-        lamp_grayscale::dither(layers, method)
+        }
     }
 }
 
-/// Returns a warning if the pixels of a gray layer are wider than dots that are known to cure
+/// Returns a warning if the pixels of gray layers are wider than dots that are known to cure
 /// evenly.
-fn unevenness(layer: &Layer) -> Option<String> {
-    let Image::Gray(_) = *layer.image else { return None };
-    let pitch = layer.dpi?.pitch();
+fn unevenness(dpi: Dpi) -> Option<String> {
+    let pitch = dpi.pitch();
     let fear = match homogeneity(pitch) {
         Homogeneity::Even => return None,
         Homogeneity::Unknown => {
@@ -76,24 +105,17 @@ fn short(length: Length) -> String {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Dpi, GrayMask, Mask, PageInfo};
-
     use super::*;
 
-    fn told(dpi: Option<f64>, image: Image) -> Option<String> {
-        let dpi = dpi.map(|dpi| Dpi::new(dpi).unwrap());
-        unevenness(&Layer { info: PageInfo::default(), dpi, image: image.into() })
+    fn told(dpi: f64) -> Option<String> {
+        unevenness(Dpi::new(dpi).unwrap())
     }
 
     #[test]
     fn dots_that_may_cure_unevenly_are_told_of_with_the_figures() {
-        let gray = || Image::Gray(GrayMask::new(8));
-        for dpi in [None, Some(1500.0), Some(2400.0)] {
-            assert_eq!(told(dpi, gray()), None);
-        }
-        assert_eq!(told(Some(100.0), Image::Mask(Mask::black(8, 0))), None);
-        let unknown = told(Some(1000.0), gray()).unwrap();
-        let uneven = told(Some(300.0), gray()).unwrap();
+        assert_eq!([1500.0, 2400.0].map(told), [None, None]);
+        let unknown = told(1000.0).unwrap();
+        let uneven = told(300.0).unwrap();
         assert!(unknown.contains("pixels, 25.4 um; dots of 17 um cured evenly"), "{unknown}");
         assert!(unknown.contains("those of 85 um did not; sizes between"), "{unknown}");
         assert!(uneven.contains("pixels, 84.7 um") && uneven.contains("spots"), "{uneven}");

@@ -16,7 +16,7 @@ use crate::exit::Exit;
 use crate::streams::{failed_at, input_name, is_stream, layers_of, read_beside};
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 2;
+pub(crate) const CODE: u32 = 3;
 
 /// A list of edits is text of a few kilobytes.
 const MAX_LIST_BYTES: u64 = 1 << 20;

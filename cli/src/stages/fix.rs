@@ -5,14 +5,14 @@ use std::ops::Range;
 
 use clap::Args;
 use lamp_postprocess::{FixMethod, FixOptions, Fixed};
-use lamp_stack::Layer;
+use lamp_stack::{Layer, PassingLayer};
 
 use crate::exit::Exit;
 use crate::fix_report::FixReport;
 use crate::options::one_of_described;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 1;
+pub(crate) const CODE: u32 = 2;
 
 /// How rows are corrected.
 #[derive(Args, Clone)]
@@ -84,6 +84,19 @@ impl Fixing {
                 see(fixed);
                 self.report.borrow_mut().add(fixed);
             }
+        })
+    }
+
+    /// Returns the corrected layers. Those whose pages say that all rows are good are not decoded.
+    pub(crate) fn passing<'a>(
+        &'a self,
+        layers: impl Iterator<Item = Result<PassingLayer, Exit>> + 'a,
+        decode: impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync + 'a,
+        mut see: impl FnMut(&Fixed<'_>) + 'a,
+    ) -> impl Iterator<Item = Result<PassingLayer, Exit>> + 'a {
+        lamp_postprocess::fix_passing(layers, self.options, decode, move |fixed| {
+            see(fixed);
+            self.report.borrow_mut().add(fixed);
         })
     }
 

@@ -23,7 +23,7 @@ use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
 
 /// Changes when other bytes come from the same options and part.
-pub(crate) const CODE: u32 = 3;
+pub(crate) const CODE: u32 = 4;
 
 /// What is sliced, and how.
 #[derive(Args, Clone)]

@@ -1,6 +1,8 @@
 //! Tests of the correction on drawn shapes.
 
-use lamp_stack::{LevelChange, PageInfo};
+use std::io::Cursor;
+
+use lamp_stack::{EncodedPage, Format, LevelChange, PageInfo, PageWriter, Pages};
 use proptest::prelude::*;
 
 use super::*;
@@ -415,7 +417,59 @@ fn gray_rows_take_the_levels_of_the_good_rows_along_new_edges() {
     }
 }
 
+/// Layers of twelve rows: most have rows in pairs of columns, and say that their contours close.
+fn arbitrary_layers() -> impl Strategy<Value = Vec<Layer>> {
+    let rows = prop::collection::vec(prop::collection::btree_set(0u32..60, 0..5), 12);
+    let open_rows = prop::collection::vec(0u32..12, 0..3);
+    let kind = (0u8..8, 0u8..4, open_rows);
+    let layers = prop::collection::vec((rows, kind), 1..9);
+    layers.prop_map(|layers| {
+        let drawn = (0..).zip(layers).map(|(index, (rows, (stray, closed, open_rows)))| {
+            let mut mask = MaskBuilder::new(60);
+            for row in rows {
+                let mut row: Vec<_> = row.into_iter().collect();
+                row.truncate(if stray == 0 { row.len() } else { row.len() / 2 * 2 });
+                mask.push_row(&row).unwrap();
+            }
+            let mut layer = layer(index, mask.finish());
+            layer.info.closed = [None, Some(false), Some(true), Some(true)][usize::from(closed)];
+            if closed == 1 {
+                layer.info.open_rows = open_rows;
+                layer.info.open_rows.sort_unstable();
+            }
+            if stray == 1 {
+                layer.info.stray_rows = vec![5];
+            }
+            layer
+        });
+        drawn.collect()
+    })
+}
+
+/// Reads layers as pages that may pass.
+fn passing(layers: &[Layer]) -> Vec<PassingLayer> {
+    let mut pages = PageWriter::new(Vec::new(), Format::Big);
+    layers.iter().for_each(|layer| pages.push(EncodedPage::new(layer)).unwrap());
+    let pages = Pages::from_stream(Cursor::new(pages.finish().unwrap())).unwrap();
+    pages.map(|page| PassingLayer::of_page(page.unwrap()).unwrap()).collect()
+}
+
 proptest! {
+    #[test]
+    fn layers_that_pass_are_corrected_as_decoded_ones(
+        layers in arbitrary_layers(), use_neighbours: bool,
+    ) {
+        let options = FixOptions { use_neighbours, min_confidence: 0.0, ..FixOptions::default() };
+        let (expected, bands) = fixed(layers.clone(), options);
+        let mut found = Vec::new();
+        let decode = |layer: PassingLayer| Ok::<_, ()>(layer.decode().unwrap());
+        let passed = passing(&layers).into_iter().map(Ok);
+        let passed = fix_passing(passed, options, decode, |fixed| found.extend_from_slice(fixed.bands));
+        let passed: Vec<_> = passed.map(|layer| decode(layer.unwrap()).unwrap()).collect();
+        prop_assert_eq!(passed, expected);
+        prop_assert_eq!(found, bands);
+    }
+
     #[test]
     fn whatever_the_image_good_rows_stay_and_corrected_ones_end_black(
         rows in prop::collection::vec(prop::collection::btree_set(0u32..60, 0..9), 0..20),

@@ -23,7 +23,9 @@ mod window;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, map_in_order, white_in_row};
+use lamp_stack::{
+    GrayMask, Image, Layer, Mask, MaskBuilder, PassingLayer, map_in_order, white_in_row,
+};
 use serde_json::json;
 
 pub use band::{Band, BandKind, BandKinds, BandOutcome};
@@ -32,7 +34,7 @@ use combine::difference;
 use detect::{Scene, Strays};
 use gray_rows::GrayRow;
 use rebuild::Correction;
-use window::{Window, windows};
+use window::{decode_unsettled, windows};
 
 /// Bands of at least this many rows are adjusted to the neighbouring layers, if asked for.
 ///
@@ -137,25 +139,56 @@ pub struct Fixed<'a> {
 pub fn fix<E: Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     options: FixOptions,
-    mut report: impl FnMut(&Fixed<'_>),
+    report: impl FnMut(&Fixed<'_>),
 ) -> impl Iterator<Item = Result<Layer, E>> {
+    let decoded = layers.map(|layer| layer.map(PassingLayer::from));
+    fix_decoded(decoded, options, report)
+        .map(|layer| Ok(layer?.decode().expect("decoded layers stay decoded")))
+}
+
+/// Corrects stray rows as [`fix`] does. Layers whose pages say that all rows are good are decoded,
+/// by `decode`, only where they lie next to others.
+///
+/// # Errors
+/// Returns the errors of `layers` and of `decode`.
+pub fn fix_passing<E: Send>(
+    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    options: FixOptions,
+    decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,
+    report: impl FnMut(&Fixed<'_>),
+) -> impl Iterator<Item = Result<PassingLayer, E>> {
+    fix_decoded(decode_unsettled(layers, decode), options, report)
+}
+
+/// Corrects the stray rows of the layers that are decoded.
+fn fix_decoded<E: Send>(
+    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    options: FixOptions,
+    mut report: impl FnMut(&Fixed<'_>),
+) -> impl Iterator<Item = Result<PassingLayer, E>> {
     let fixed = map_in_order(windows(layers), move |window| {
-        let (layer, bands) = fix_layer(&window, &options);
+        let (layer, bands) = match window.layer.as_decoded() {
+            Some(layer) => fix_layer(layer, window.neighbours(), &options),
+            None => (None, Vec::new()),
+        };
         Ok((window.layer, layer, bands))
     });
     fixed.map(move |fixed| {
         let (before, after, bands) = fixed?;
-        if !bands.is_empty() {
-            let after = after.as_ref().unwrap_or(&before);
-            report(&Fixed { before: &before, after, bands: &bands });
+        if let Some(before) = before.as_decoded().filter(|_| !bands.is_empty()) {
+            let after = after.as_ref().unwrap_or(before);
+            report(&Fixed { before, after, bands: &bands });
         }
-        Ok(after.unwrap_or_else(|| Arc::unwrap_or_clone(before)))
+        Ok(after.map_or_else(|| Arc::unwrap_or_clone(before), PassingLayer::from))
     })
 }
 
 /// Returns the corrected layer, if anything was corrected, and the bands found.
-fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>) {
-    let layer = &*window.layer;
+fn fix_layer(
+    layer: &Layer,
+    neighbours: [Option<&Image>; 2],
+    options: &FixOptions,
+) -> (Option<Layer>, Vec<Band>) {
     let mut unbalanced = layer.info.stray_rows.clone();
     unbalanced.sort_unstable();
     let exposed = layer.image.exposed();
@@ -163,7 +196,7 @@ fn fix_layer(window: &Window, options: &FixOptions) -> (Option<Layer>, Vec<Band>
         mask: &exposed,
         unbalanced: &unbalanced,
         open_rows: layer.info.closed.map(|_| &layer.info.open_rows[..]),
-        neighbours: window.neighbours(),
+        neighbours,
     };
     let Some(strays) = scene.strays(options) else { return (None, Vec::new()) };
     let mut bands = Vec::new();

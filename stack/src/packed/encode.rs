@@ -69,7 +69,7 @@ impl CodedLayer {
             size: [image.width(), image.height()],
             changes: image.change_count() as u32,
         };
-        let line = OpenLine::new(info, *dpi, image.check());
+        let line = OpenLine::new(info, *dpi, image.check(), None);
         Self { is_key: pair.below.is_none(), shape, line, streams }
     }
 }

@@ -24,6 +24,7 @@ mod unpack;
 mod write;
 
 pub(crate) use page::PackedShape;
+pub(crate) use page::PassedCode;
 pub(crate) use page::bit_transitions;
 pub use page::{Compression, Page, PageHeader};
 pub use read::PageReader;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::check::{ChainReader, CheckFault, ImageCheck, Line, LineCheck, image_crc};
+use crate::check::{ChainReader, CheckFault, CodeCheck, ImageCheck, Line, LineCheck, image_crc};
 use crate::error::{PageFault, StackError};
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
@@ -72,6 +72,14 @@ pub struct Page {
     /// The image of a page of a packed stack, which is decoded when it is read. `pieces` holds its
     /// strip, if that was kept.
     pub(super) image: Option<Arc<Image>>,
+}
+
+/// What passes with the strip of a page: how it is coded, and its checks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PassedCode {
+    pub(crate) compression: Compression,
+    pub(crate) image: ImageCheck,
+    pub(crate) code: CodeCheck,
 }
 
 /// The size and the kind of a packed image.
@@ -206,13 +214,21 @@ impl Page {
         if self.orientation.is_across() { [height, width] } else { [width, height] }
     }
 
-    /// Returns the compression of the strip and the check of the image, if a page of another stack
-    /// may take over both.
-    pub(crate) fn passed(&self) -> Option<(Compression, ImageCheck)> {
+    /// Returns what a page of another stack takes over with the strip, if it may: the strip is the
+    /// one that was written.
+    pub(crate) fn passed(&self) -> Option<PassedCode> {
         if self.compression == Compression::Packed {
             return None;
         }
-        self.strip_compression().zip(self.image_check())
+        let check = self.check.as_ref()?.page.as_ref()?;
+        let (compression, code) = (self.strip_compression()?, check.code?);
+        let is_intact = code.is_of(self.size(), self.gray, &self.pieces[0]);
+        is_intact.then_some(PassedCode { compression, image: check.image, code })
+    }
+
+    /// Returns whether the image is gray, not a mask.
+    pub(crate) fn is_gray(&self) -> bool {
+        self.gray
     }
 
     /// Returns the compression of the image.

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde::{Deserialize, Serialize};
 
-use super::page::{Compression, Page};
+use super::page::{Compression, Page, PassedCode};
 use super::tags::{
     ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
@@ -12,7 +12,7 @@ use super::tags::{
     SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS, STRIP_OFFSETS, T6, T6_OPTIONS, X_RESOLUTION,
     Y_RESOLUTION,
 };
-use crate::check::{Chain, OpenLine};
+use crate::check::{Chain, CodeCheck, OpenLine};
 use crate::error::{GAVE_UP, StackError};
 use crate::layer::{Image, Layer};
 use crate::page_folder::PageFile;
@@ -74,23 +74,24 @@ impl EncodedPage {
             (Image::Mask(mask), None) => (Compression::G4, g4::encode(mask)),
             (Image::Gray(gray), None) => (Compression::Deflate, deflate::encode(gray)),
         };
+        let code = CodeCheck::of(&layer.image, &strip);
         Self {
             index: layer.info.index,
             width: layer.image.width(),
             height: layer.image.height(),
             compression,
             resolution: layer.dpi.map_or((0, 1), crate::Dpi::to_rational),
-            line: OpenLine::new(&layer.info, layer.dpi, layer.image.check()),
+            line: OpenLine::new(&layer.info, layer.dpi, layer.image.check(), Some(code)),
             strip,
         }
     }
 
-    /// Passes a page on with its strip and its check.
+    /// Passes a page on with its strip and its checks, [if it may](Page::passed).
     ///
     /// # Panics
-    /// Panics if the page [must be decoded](Page::passed).
-    pub(crate) fn passed(mut page: Page) -> Self {
-        let (compression, check) = page.passed().expect("only pages that may pass");
+    /// Panics if the page has no strip.
+    pub(crate) fn passed(mut page: Page, passed: PassedCode) -> Self {
+        let PassedCode { compression, image, code } = passed;
         let [width, height] = page.size();
         Self {
             index: page.info.index,
@@ -98,7 +99,7 @@ impl EncodedPage {
             height,
             compression,
             resolution: page.dpi.map_or((0, 1), crate::Dpi::to_rational),
-            line: OpenLine::new(&page.info, page.dpi, check),
+            line: OpenLine::new(&page.info, page.dpi, image, Some(code)),
             strip: page.pieces.pop().expect("pages that pass have a strip"),
         }
     }

@@ -285,8 +285,8 @@ fn what_is_no_recipe_is_refused_in_a_sentence() {
     }
     for (from, to, said) in [
         ("lamp-recipe-1", "lamp-recipe-2", "of the form lamp-recipe-1 but \"lamp-recipe-2\""),
-        ("\"code\": 4", "\"code\": 2", "by code 2"),
-        ("\"code\": 4", "\"cod\": 3", "by code 0"),
+        ("\"code\": 5", "\"code\": 2", "by code 2"),
+        ("\"code\": 5", "\"cod\": 3", "by code 0"),
         ("\"command\"", "\"comand\"", "comand"),
         ("110x84mm", "-110x84mm", "not a size"),
         ("110x84mm", "1e300x84mm", "2^26 pixels"),
