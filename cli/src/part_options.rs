@@ -60,6 +60,11 @@ impl PartOptions {
         self.placement.placement()
     }
 
+    /// Turns the part once more, before it is moved.
+    pub(crate) fn turn(&mut self, axis: Axis, degrees: f64) {
+        self.placement.turn(axis, degrees);
+    }
+
     /// Returns the part's rotations with others after them, as `--rotate` takes them.
     pub(crate) fn rotation_with(&self, turns: impl Iterator<Item = (Axis, f64)>) -> String {
         self.placement.rotation_with(turns)

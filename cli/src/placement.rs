@@ -59,6 +59,11 @@ impl PlacementOptions {
         placement.translated(self.translate.map_or([0.0; 3], |Numbers(by_mm)| by_mm))
     }
 
+    /// Turns the part once more, before it is moved.
+    pub(crate) fn turn(&mut self, axis: Axis, degrees: f64) {
+        self.rotate.push(Rotation { axis, degrees });
+    }
+
     /// Returns the rotations with others after them, as `--rotate` takes them.
     pub(crate) fn rotation_with(&self, turns: impl Iterator<Item = (Axis, f64)>) -> String {
         let more = turns.map(|(axis, degrees)| Rotation { axis, degrees });

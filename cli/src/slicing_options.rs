@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_postprocess::TurnedSlicing;
 use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
 use lamp_slicer::{
-    Bodies, GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices,
+    Axis, Bodies, GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices,
 };
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
@@ -180,8 +181,16 @@ impl SlicingOptions {
         rest.split_once(" --").map_or(rest, |(parts, _)| parts)
     }
 
+    /// Returns the options that slice a part for a plan.
+    pub(crate) fn turned(mut self, slicing: &TurnedSlicing) -> Self {
+        let TurnedSlicing { degrees, origin_mm, size } = *slicing;
+        self.solid.turn(Axis::Z, degrees);
+        (self.origin, self.size) = (Some(Numbers(origin_mm)), Some(size));
+        self
+    }
+
     /// The command as the stack records it.
-    fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
+    pub(crate) fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
         let mut options = self.clone();
         options.exposure.name(exposure);
         let usual_kernel = self.solid.brep.reader.is_usual();

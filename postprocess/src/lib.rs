@@ -55,7 +55,8 @@ pub use strips::{
 };
 pub use tile::{
     BuildFinding, BuildWanted, CellShape, Composer, CopyEntry, CopyName, CopyPlacement,
-    CuredPixels, HeightOptions, LayerAreas, Layout, LayoutError, LayoutFile, LoosePieces,
-    MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize, Recipe, RecipeError,
-    RecipePart, StrayRows, TILE_CODE, TileError, TileOptions, Turns, tile,
+    CuredPixels, FreeTurns, FreeTurnsError, HeightOptions, LayerAreas, Layout, LayoutError,
+    LayoutFile, LoosePieces, MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize,
+    PlannedStack, Recipe, RecipeError, RecipePart, StrayRows, TILE_CODE, TileError, TileOptions,
+    TurnedPlan, TurnedSlicing, Turns, tile,
 };

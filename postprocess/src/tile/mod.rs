@@ -25,6 +25,7 @@ mod testing;
 mod tile_error;
 #[cfg(test)]
 mod tile_tests;
+mod turned;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -50,6 +51,7 @@ pub use pack::{Pack, PackBy, Turns};
 pub use part_stack::PartStack;
 pub use recipe::{Composer, LoosePieces, Recipe, RecipeError, RecipePart, TILE_CODE};
 pub use tile_error::{CopyName, TileError};
+pub use turned::{FreeTurns, FreeTurnsError, PlannedStack, TurnedPlan, TurnedSlicing};
 
 /// Options to lay out one part.
 #[derive(Clone, Copy, Debug)]

@@ -85,6 +85,23 @@ impl PartStack {
         self.is_fit
     }
 
+    /// Returns it as its images at another angle show it: with another outline, in images of the
+    /// outline's size at another place.
+    pub(super) fn of_turned(&self, outline: Mask, origin_mm: [f64; 2], name: String) -> Self {
+        let image = PixelSize { width: outline.width(), height: outline.height() };
+        let frame = extents(&outline).expect("an outline has a pixel");
+        Self {
+            name,
+            dpi: self.dpi,
+            image,
+            frame,
+            is_fit: true,
+            outline: Some(outline.framed(frame)),
+            origin_mm: Some(origin_mm),
+            stack: None,
+        }
+    }
+
     /// Places another part of the images, which holds what is white.
     #[cfg(test)]
     pub(super) fn on(self, frame: Frame) -> Self {
@@ -107,6 +124,11 @@ impl PartStack {
     /// Returns the resolution.
     pub fn dpi(&self) -> Dpi {
         self.dpi
+    }
+
+    /// Returns what the first page says of the stack.
+    pub fn stack(&self) -> Option<&StackInfo> {
+        self.stack.as_ref()
     }
 
     /// Returns the part of the image that is placed: all of it, or the extents.

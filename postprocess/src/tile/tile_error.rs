@@ -69,8 +69,14 @@ pub enum TileError {
     #[error("there would be more than 10000 break lines")]
     ManyBreaks,
     /// The moat is to follow outlines, but a part was read without its outline.
-    #[error("{name}: its outline is not known, and moats by outline need it")]
+    #[error("{name}: its outline is not known, which moats by outline and turns need")]
     NoOutline {
+        /// The part.
+        name: String,
+    },
+    /// A part is to be turned, but where it is in its images is not known.
+    #[error("{name}: its pages do not say where they are on the part (origin_mm)")]
+    NoPlace {
         /// The part.
         name: String,
     },

@@ -20,6 +20,12 @@ impl TileArgs {
         if self.layout.is_some() && counted {
             return Err(Exit::usage("--layout gives the number of copies: leave out the counts"));
         }
+        if self.shares && self.stacks.len() < 2 {
+            return Err(Exit::usage(
+                "--shares is for several stacks: of one, as many copies as fit are placed anyway",
+            ));
+        }
+        self.check_plan()?;
         self.mesh.check()?;
         let inputs = || {
             self.stacks

@@ -1,19 +1,17 @@
 //! What is wrong with a build: stray rows, copies without a place, too great a height.
 
+use lamp_postprocess::StrayRows;
 use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{Layout, StrayRows};
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
 use crate::options::ranges;
 
 /// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
-pub(super) fn left_over(layout: &Layout, counts: &[Option<u32>]) -> Option<String> {
-    let parts = layout.parts().iter().zip(counts).enumerate();
-    let short = parts.filter_map(|(part, (stack, count))| {
-        let (placed, asked) = (layout.copies_of(part), (*count)? as usize);
-        let line = || format!("{}: {placed} of {asked} copies are placed", stack.name());
-        (placed < asked).then(line)
+pub(super) fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<String> {
+    let short = placed.iter().zip(counts).filter_map(|((name, placed), count)| {
+        let asked = (*count)? as usize;
+        (*placed < asked).then(|| format!("{name}: {placed} of {asked} copies are placed"))
     });
     let short: Vec<String> = short.collect();
     (!short.is_empty()).then(|| format!("{}: no more fit", short.join("; ")))

@@ -4,11 +4,13 @@ mod check;
 mod found;
 mod mesh;
 mod placing;
+mod plan;
 mod recipe;
 mod report;
 mod stacks;
 mod strips;
 mod time;
+mod turns_arg;
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -18,7 +20,7 @@ use std::rc::Rc;
 use clap::Args;
 use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
-    BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe, Turns,
+    BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe,
 };
 use lamp_stack::{Length, Size};
 
@@ -36,6 +38,7 @@ use placing::read_layout;
 use report::BuildTotals;
 use stacks::{InputStack, StackArg};
 use strips::StripArgs;
+use turns_arg::{TurnsArg, TurnsParser};
 
 /// Lay out copies of parts on a build area, in a mesh
 ///
@@ -55,6 +58,8 @@ Examples:
   tile blade.tif --mesh square --cell 4mm --clearance 500um --base-layers 10 -o build.tif
   tile blade.tif --area 200x200mm --copies 4 --mesh none -o build.tif
   tile blade.tif:120 core.tif:40 --machine beta --pack outline --layout-out layout.json -o build.tif
+  tile blade.tif:3 core.tif:1 --shares --machine beta --pack outline -o build.tif
+  tile blade.tif --machine beta --turns 15deg --layout-out layout.json -o build.tif > build.sh
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
   tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64
   tile blade.tif --machine beta --recipe build.json
@@ -83,6 +88,11 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     copies: Option<u32>,
 
+    /// Take the counts of several stacks for shares: blade.tif:3 core.tif:1 places as many as fit,
+    /// three blades for each core, to within one copy
+    #[arg(long)]
+    shares: bool,
+
     /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
     /// --mesh none]. With --layout, nearer copies cause a warning
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
@@ -107,16 +117,12 @@ pub(crate) struct TileArgs {
 
     /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
     /// outline]
-    #[arg(long, value_parser = one_of_described::<Turns>(&[
-        "Parts stay as they were sliced",
-        "By 180 degrees",
-        "By 90, 180 and 270 degrees",
-    ]))]
-    turns: Option<Turns>,
+    #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
+    turns: Option<TurnsArg>,
 
     /// Place copies as this file says, instead of packing them
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[arg(conflicts_with_all = ["copies", "edge_gap", "pack", "turns"])]
+    #[arg(conflicts_with_all = ["copies", "shares", "edge_gap", "pack", "turns"])]
     layout: Option<PathBuf>,
 
     /// Write the copies' positions, for --layout
@@ -187,6 +193,9 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         Some(output) => progress("tile", common, output),
         None => Progress::new("tile", common, true),
     };
+    if let Some(turns) = args.free_turns() {
+        return args.plan(turns, &progress);
+    }
     let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;
@@ -241,6 +250,11 @@ impl TileArgs {
     /// Checks, before there are stacks, what can be checked of the number of copies of each.
     pub(crate) fn check_for(&self, copies: &[Option<u32>]) -> Result<(), Exit> {
         self.machine()?;
+        if let Some(turns) = self.free_turns() {
+            return Err(Exit::usage(format!(
+                "--turns {turns} takes stacks that are yet to be sliced: run lamp tile by hand for it"
+            )));
+        }
         self.of(copies.iter().map(|&copies| (PathBuf::from("stack"), copies))).check()
     }
 

@@ -7,7 +7,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{
     Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, TileOptions, Turns,
 };
-use lamp_stack::Size;
+use lamp_stack::{Length, Size};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
@@ -17,6 +17,7 @@ use crate::streams::write_file;
 
 use super::TileArgs;
 use super::found::left_over;
+use super::turns_arg::TurnsArg;
 
 impl TileArgs {
     /// Places the copies.
@@ -27,28 +28,35 @@ impl TileArgs {
         machine: Option<&Machine>,
         mesh: Option<&MeshOptions>,
     ) -> Result<Layout, Exit> {
-        let plain = TileOptions::default();
-        let machine_area = machine.map(|machine| machine.area.value);
-        let file_area = file.and_then(LayoutFile::area);
-        let area = self.area.or(machine_area).or(file_area).unwrap_or(plain.area);
+        let area = self.area_of(file, machine);
         match file {
             Some(file) => place(file, parts, area, self.layout.as_deref()),
             None => {
-                let gap = self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(plain.gap);
+                let gap = self.gap_of(mesh);
                 Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
             }
         }
     }
 
+    /// Returns the build area.
+    pub(super) fn area_of(&self, file: Option<&LayoutFile>, machine: Option<&Machine>) -> Size {
+        let machine_area = machine.map(|machine| machine.area.value);
+        let file_area = file.and_then(LayoutFile::area);
+        self.area.or(machine_area).or(file_area).unwrap_or(TileOptions::default().area)
+    }
+
+    /// Returns the least distance between copies that are packed.
+    pub(super) fn gap_of(&self, mesh: Option<&MeshOptions>) -> Length {
+        self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(TileOptions::default().gap)
+    }
+
     /// Tells which copies found no place, and which stand nearer than was asked for.
     pub(super) fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
-        if self.layout.is_none()
-            && let Some(text) = left_over(layout, &self.counts())
-        {
-            if self.strict {
-                return Err(Exit::Findings(text));
-            }
-            progress.warn(&text);
+        if self.layout.is_none() {
+            let placed = layout.parts().iter().enumerate();
+            let placed =
+                placed.map(|(part, stack)| (stack.name().to_owned(), layout.copies_of(part)));
+            self.tell_left_over(&placed.collect::<Vec<_>>(), progress)?;
         }
         if let (Some(_), Some(gap)) = (&self.layout, self.gap)
             && let near = layout.nearer_than(gap)
@@ -64,16 +72,38 @@ impl TileArgs {
         Ok(())
     }
 
-    fn counts(&self) -> Vec<Option<u32>> {
+    /// Tells which copies of some parts, of which so many are placed, found no place.
+    pub(super) fn tell_left_over(
+        &self,
+        placed: &[(String, usize)],
+        progress: &Progress,
+    ) -> Result<(), Exit> {
+        let text = if self.shares { None } else { left_over(placed, &self.counts()) };
+        match text {
+            Some(text) if self.strict => Err(Exit::Findings(text)),
+            Some(text) => {
+                progress.warn(&text);
+                Ok(())
+            }
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn counts(&self) -> Vec<Option<u32>> {
         self.stacks.iter().map(|stack| stack.copies.or(self.copies)).collect()
     }
 
-    fn packing(&self) -> Pack {
+    pub(super) fn packing(&self) -> Pack {
         let usual = match self.pack {
             PackBy::Boxes => Turns::None,
             PackBy::Outlines => Turns::Quarters,
         };
-        Pack { by: self.pack, turns: self.turns.unwrap_or(usual), edge_gap: self.edge_gap }
+        let turns = match self.turns {
+            Some(TurnsArg::Images(turns)) => turns,
+            Some(TurnsArg::Free(turns)) => turns.of_images(),
+            None => usual,
+        };
+        Pack { by: self.pack, turns, edge_gap: self.edge_gap, shares: self.shares }
     }
 
     /// Writes the layout as a file and as a picture, if wanted.

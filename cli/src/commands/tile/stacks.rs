@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use lamp_postprocess::PartStack;
 use lamp_postprocess::machine::Machine;
-use lamp_stack::{Layer, Pages, StackError};
+use lamp_stack::{Layer, PageInfo, Pages, StackError};
 
 use crate::exit::Exit;
 use crate::streams::{
@@ -46,6 +46,28 @@ impl StackArg {
 
 type Layers = Box<dyn Iterator<Item = Result<Layer, Exit>>>;
 
+/// What was seen of a stack's layers when all of them were read.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ReadLayers {
+    /// The stages that changed pages, as these say.
+    pub(super) stages: Vec<&'static str>,
+    /// From the first layer to the one after the last.
+    pub(super) range: Range<u32>,
+}
+
+/// The stages that leave a key on pages that they change.
+const STAGES: [&str; 3] = ["fix", "compensate", "dither"];
+
+impl ReadLayers {
+    fn add(&mut self, info: &PageInfo) {
+        let start = if self.range.is_empty() { info.index } else { self.range.start };
+        self.range = start..info.index.saturating_add(1);
+        let is_new = |stage: &&str| !self.stages.contains(stage) && info.other.contains_key(*stage);
+        let new: Vec<&str> = STAGES.into_iter().filter(is_new).collect();
+        self.stages.extend(new);
+    }
+}
+
 /// A stack of a build.
 pub(super) struct InputStack {
     name: String,
@@ -59,6 +81,7 @@ pub(super) struct InputStack {
     /// Its layers, where they are read once.
     layers: Option<Layers>,
     layer_count: Option<u32>,
+    read_layers: ReadLayers,
 }
 
 impl InputStack {
@@ -86,6 +109,7 @@ impl InputStack {
             spool: None,
             layers: None,
             layer_count: None,
+            read_layers: ReadLayers::default(),
         };
         Ok(stacks.iter().map(stack).collect())
     }
@@ -95,6 +119,11 @@ impl InputStack {
         self.layer_count
     }
 
+    /// Returns what was seen when the part's outline was read.
+    pub(super) fn read_layers(&self) -> &ReadLayers {
+        &self.read_layers
+    }
+
     /// Reads what placing the part needs: its first layer, or all layers if it needs the outline.
     pub(super) fn part(&mut self, outline: bool) -> Result<PartStack, Exit> {
         let no_layers = failed_at(self.name.clone(), StackError::NoLayers);
@@ -102,10 +131,11 @@ impl InputStack {
             self.spool = Some(spool_stdin()?);
         }
         if outline {
-            let mut count = None;
+            let (mut count, mut seen) = (None, ReadLayers::default());
             let mut layers = self.read(self.range.clone())?.inspect(|layer| {
                 if let Ok(layer) = layer {
                     count = count.or(count_of(layer));
+                    seen.add(&layer.info);
                 }
             });
             let first = layers.next();
@@ -113,6 +143,7 @@ impl InputStack {
             let layers = first.into_iter().chain(layers);
             let part = PartStack::of_outline::<Exit>(&self.name, layers)?.ok_or(no_layers);
             self.layer_count = count;
+            self.read_layers = seen;
             return part;
         }
         let mut layers = self.read(self.range.clone())?;

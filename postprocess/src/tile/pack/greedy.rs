@@ -2,10 +2,8 @@
 
 use std::collections::HashMap;
 
-use lamp_stack::Orientation;
-
 use super::super::{CopyPlacement, Layout, PixelSize};
-use super::Turns;
+use super::Way;
 use super::no_fit::{CellRun, NoFitRegion, NoFitRegions};
 
 /// The free place that a copy takes.
@@ -21,26 +19,26 @@ impl PlacingRule {
     pub(super) const ALL: [Self; 2] = [Self::Top, Self::Bottom];
 }
 
-/// Places up to `wanted` copies of each part from the top left, large parts first, and
+/// Places up to `wanted` copies of each part in its ways from the top left, large parts first, and
 /// centres all of them.
 pub(super) fn place(
     layout: &Layout,
     regions: &mut NoFitRegions,
     wanted: &[u32],
-    turns: Turns,
+    ways: &[Vec<Way>],
     order: PlacingRule,
 ) -> Vec<CopyPlacement> {
     let mut free = FreeRoom { layout, regions, taken: HashMap::new(), placements: Vec::new() };
     let area = |part: &usize| {
-        let PixelSize { width, height } = layout.parts()[*part].size(Orientation::default());
+        let (stack, turn) = ways[*part][0];
+        let PixelSize { width, height } = layout.parts()[stack].size(turn);
         std::cmp::Reverse(u64::from(width) * u64::from(height))
     };
     let mut parts: Vec<usize> = (0..wanted.len()).collect();
     parts.sort_by_key(area);
     for part in parts {
-        let ways = turns.orientations();
         for _ in 0..wanted[part] {
-            if !free.place(part, &ways, order) {
+            if !free.place(&ways[part], order) {
                 break;
             }
         }
@@ -57,12 +55,11 @@ pub(super) fn fill(
     regions: &mut NoFitRegions,
     mut placements: Vec<CopyPlacement>,
     wanted: u32,
-    turns: Turns,
+    ways: &[Way],
 ) -> Vec<CopyPlacement> {
     placements.truncate(wanted as usize);
     let mut free = FreeRoom { layout, regions, taken: HashMap::new(), placements };
-    let ways = turns.orientations();
-    while free.placements.len() < wanted as usize && free.place(0, &ways, PlacingRule::Top) {}
+    while free.placements.len() < wanted as usize && free.place(ways, PlacingRule::Top) {}
     let mut placements = free.placements;
     centre(layout, &mut placements);
     placements.sort_by_key(|at| (at.part, at.top, at.left));
@@ -73,8 +70,8 @@ pub(super) fn fill(
 struct FreeRoom<'a> {
     layout: &'a Layout,
     regions: &'a mut NoFitRegions,
-    /// The places taken for each part and orientation.
-    taken: HashMap<(usize, Orientation), TakenPlaces>,
+    /// The places taken for each way of a part.
+    taken: HashMap<Way, TakenPlaces>,
     placements: Vec<CopyPlacement>,
 }
 
@@ -92,10 +89,10 @@ struct TakenPlaces {
 
 impl FreeRoom<'_> {
     /// Finds a place for one more copy. Returns whether there was one.
-    fn place(&mut self, part: usize, ways: &[Orientation], order: PlacingRule) -> bool {
+    fn place(&mut self, ways: &[Way], order: PlacingRule) -> bool {
         let cell = self.regions.cell;
-        let found = ways.iter().filter_map(|&turn| {
-            let (column, row) = self.first_place(part, turn)?;
+        let found = ways.iter().filter_map(|&(part, turn)| {
+            let (column, row) = self.first_place((part, turn))?;
             let placement =
                 CopyPlacement { part, turn, left: column as u32 * cell, top: row as u32 * cell };
             let rank = match order {
@@ -110,10 +107,9 @@ impl FreeRoom<'_> {
     }
 
     /// Returns the first column of the first row where an outline may begin.
-    fn first_place(&mut self, part: usize, turn: Orientation) -> Option<(i32, i32)> {
-        let key = (part, turn);
+    fn first_place(&mut self, key: Way) -> Option<(i32, i32)> {
         let (pixels, cell) = (self.layout.pixels(), self.regions.cell);
-        let size = self.layout.parts()[part].size(turn);
+        let size = self.layout.parts()[key.0].size(key.1);
         let room = PixelSize {
             width: pixels.width.checked_sub(size.width)? / cell + 1,
             height: pixels.height.checked_sub(size.height)? / cell + 1,

@@ -6,15 +6,19 @@
 
 mod greedy;
 mod grid;
+mod job;
 mod lattice;
 mod mix;
 mod no_fit;
+mod shares;
 
 use lamp_stack::{Length, MAX_SIDE, Orientation, Size};
 
 use super::{CopyPlacement, Layout, PixelSize, TileError};
-use greedy::PlacingRule;
-use no_fit::NoFitRegions;
+use job::Job;
+
+/// How a copy may lie: the stack that it takes its images from, and their turn.
+type Way = (usize, Orientation);
 
 /// Options to find places.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,6 +29,9 @@ pub struct Pack {
     pub turns: Turns,
     /// The least distance from the copies to the area's edges.
     pub edge_gap: Length,
+    /// Whether the numbers of copies of several parts are shares: as many are placed as fit, those
+    /// of each part within one of its share.
+    pub shares: bool,
 }
 
 /// What of a part keeps the gap from other parts.
@@ -64,6 +71,11 @@ impl Turns {
         }
     }
 
+    /// Returns how many are allowed.
+    pub(super) fn count(self) -> u32 {
+        self.quarters().len() as u32
+    }
+
     /// Returns them as orientations.
     fn orientations(self) -> Vec<Orientation> {
         self.quarters().iter().map(|&quarters| Orientation::new(quarters, false)).collect()
@@ -85,50 +97,6 @@ impl Pack {
         }
         options
     }
-
-    /// Returns the strategies to try, in order.
-    fn strategies(self, alone: bool) -> Vec<Strategy> {
-        let mut all = Vec::new();
-        let quarters = self.turns == Turns::Quarters;
-        if alone {
-            all.extend(
-                [Some(Strategy::Grid(0)), quarters.then_some(Strategy::Grid(1))]
-                    .into_iter()
-                    .flatten(),
-            );
-        } else {
-            all.extend(
-                PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Boxes, Turns::None, order)),
-            );
-        }
-        if quarters {
-            all.extend(
-                PlacingRule::ALL
-                    .map(|order| Strategy::Greedy(PackBy::Boxes, Turns::Quarters, order)),
-            );
-        }
-        if self.by == PackBy::Outlines {
-            let allowed = Turns::ALL.into_iter().filter(|turns| *turns <= self.turns);
-            for turns in allowed {
-                all.extend(
-                    PlacingRule::ALL.map(|order| Strategy::Greedy(PackBy::Outlines, turns, order)),
-                );
-            }
-            all.extend(alone.then_some(Strategy::Lattice(self.turns)));
-        }
-        all
-    }
-}
-
-/// A way to find places.
-#[derive(Clone, Copy, Debug)]
-enum Strategy {
-    /// Puts all copies of the only part in rows and columns, after these quarter turns.
-    Grid(u32),
-    /// Puts copy after copy where there is room.
-    Greedy(PackBy, Turns, PlacingRule),
-    /// Puts copies of the only part on a lattice, and more where there is room.
-    Lattice(Turns),
 }
 
 /// More copies than anyone builds. Parts of a pixel would otherwise fill the area with
@@ -147,6 +115,27 @@ pub(super) fn pack(
     gap: u32,
     how: Pack,
 ) -> Result<Vec<CopyPlacement>, TileError> {
+    within_edges(layout, how, |within| Job::new(within, gap, how).pack(counts))
+}
+
+/// Finds places as [`pack`] does, by outlines alone. Copies of each part may have their images from
+/// any of some of the layout's stacks, the first of which is its own.
+pub(super) fn pack_turned(
+    layout: &Layout,
+    counts: &[Option<u32>],
+    gap: u32,
+    how: Pack,
+    stacks: &[Vec<usize>],
+) -> Result<Vec<CopyPlacement>, TileError> {
+    within_edges(layout, how, |within| Job::turned(within, gap, how, stacks).pack(counts))
+}
+
+/// Finds places on the area without its edges.
+fn within_edges(
+    layout: &Layout,
+    how: Pack,
+    pack: impl FnOnce(&Layout) -> Result<Vec<CopyPlacement>, TileError>,
+) -> Result<Vec<CopyPlacement>, TileError> {
     let edge = pixels_across(how.edge_gap, layout);
     let mut within = layout.clone();
     let side = |pixels: u32| pixels.saturating_sub(edge.saturating_mul(2));
@@ -157,7 +146,7 @@ pub(super) fn pack(
     within.pixels = PixelSize { width: side(width), height: side(height) };
     let Size { width, height } = layout.area();
     within.area = Size { width: length(width), height: length(height) };
-    let mut placements = pack_within(&within, counts, gap, how)?;
+    let mut placements = pack(&within)?;
     for at in &mut placements {
         (at.left, at.top) = (at.left + edge, at.top + edge);
     }
@@ -169,116 +158,6 @@ pub(super) fn pack(
 pub(super) fn pixels_across(gap: Length, layout: &Layout) -> u32 {
     let pixels = (gap.pixels(layout.dpi()).max(0.0) - 1e-6).ceil().max(0.0) as u32;
     pixels.min(MAX_SIDE)
-}
-
-fn pack_within(
-    layout: &Layout,
-    counts: &[Option<u32>],
-    gap: u32,
-    how: Pack,
-) -> Result<Vec<CopyPlacement>, TileError> {
-    let alone = counts.len() == 1;
-    for part in 0..counts.len() {
-        check_fits(layout, part, how.turns)?;
-    }
-    // Without a count, a single part gets more copies than fit.
-    let wanted: Vec<u32> = counts
-        .iter()
-        .map(|count| count.unwrap_or(if alone { u32::MAX } else { 1 }).min(MAX_COPIES))
-        .collect();
-    let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
-    let mut best: Vec<CopyPlacement> = Vec::new();
-    let mut regions: Option<NoFitRegions> = None;
-    for strategy in how.strategies(alone) {
-        let found = match strategy {
-            Strategy::Grid(quarters) => {
-                grid::grid(layout, Orientation::new(quarters, false), wanted[0], gap)
-            }
-            Strategy::Greedy(by, turns, order) => {
-                let current = regions.take().filter(|regions| regions.are_by(by));
-                let regions =
-                    regions.insert(current.unwrap_or_else(|| NoFitRegions::new(layout, gap, by)));
-                greedy::place(layout, regions, &wanted, turns, order)
-            }
-            Strategy::Lattice(turns) => lattice::place(layout, gap, wanted[0], turns),
-        };
-        if found.len() > best.len() {
-            best = found;
-        }
-        if best.len() >= all {
-            break;
-        }
-    }
-    if !alone && how.by == PackBy::Outlines {
-        best = shortened(layout, &wanted, gap, how.turns, best);
-    }
-    let short = (0..counts.len()).find_map(|part| {
-        let most = best.iter().filter(|placement| placement.part == part).count() as u32;
-        let asked = counts[part].or((!alone).then_some(1))?;
-        let least = if alone { asked } else { 1 };
-        (most < least).then_some((part, asked, most))
-    });
-    match short {
-        None => Ok(best),
-        Some((part, asked, most)) => {
-            let name = layout.parts()[part].name().to_owned();
-            Err(TileError::TooMany { name, asked, most, area_mm: layout.area() })
-        }
-    }
-}
-
-/// Returns the copies of several parts on fewer rows, or all of them where some were left out, if
-/// that is found.
-fn shortened(
-    layout: &Layout,
-    wanted: &[u32],
-    gap: u32,
-    turns: Turns,
-    best: Vec<CopyPlacement>,
-) -> Vec<CopyPlacement> {
-    let all = wanted.iter().map(|&count| count as usize).fold(0, usize::saturating_add);
-    if all > mix::MOST_COPIES {
-        return best;
-    }
-    // Where some were left out, they are placed below the area first.
-    let mut tall = layout.clone();
-    let longest = |part: usize| {
-        let PixelSize { width, height } = layout.parts()[part].size(Orientation::default());
-        (width.max(height).saturating_add(gap)).saturating_mul(wanted[part])
-    };
-    let rows = (0..wanted.len()).map(longest).fold(layout.pixels().height, u32::saturating_add);
-    tall.pixels.height = rows.min(MAX_SIDE);
-    let mut start = (best.len() == all).then(|| best.clone());
-    let mut regions = NoFitRegions::new(layout, gap, PackBy::Outlines);
-    for order in PlacingRule::ALL {
-        let found = greedy::place(&tall, &mut regions, wanted, turns, order);
-        let is_lower = |start: &Vec<_>| mix::height(&tall, &found) < mix::height(&tall, start);
-        if found.len() == all && start.as_ref().is_none_or(is_lower) {
-            start = Some(found);
-        }
-    }
-    let Some(start) = start else { return best };
-    let mut found = mix::shorten(&tall, gap, &turns.orientations(), start);
-    if mix::height(layout, &found) > layout.pixels().height {
-        return best;
-    }
-    greedy::centre(layout, &mut found);
-    found.sort_by_key(|at| (at.part, at.top, at.left));
-    found
-}
-
-fn check_fits(layout: &Layout, part: usize, turns: Turns) -> Result<(), TileError> {
-    let area = layout.pixels();
-    let fits = turns.quarters().iter().any(|&quarters| {
-        let size = layout.parts()[part].size(Orientation::new(quarters, false));
-        size.width <= area.width && size.height <= area.height
-    });
-    if fits {
-        return Ok(());
-    }
-    let name = layout.parts()[part].name().to_owned();
-    let size = layout.parts()[part].size(Orientation::default());
-    Err(TileError::TooLarge { name, part: size, area, area_mm: layout.area() })
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use lamp_stack::{Frame, Mask, Orientation, white_runs};
 
 use super::super::{Layout, PixelSize};
-use super::PackBy;
+use super::{PackBy, Way};
 use crate::offset::offset_one_bit;
 
 /// The columns from the first up to but excluding the second.
@@ -27,8 +27,8 @@ pub(super) struct NoFitRegions {
     gap: u32,
     /// Pixels on a side of a cell.
     pub(super) cell: u32,
-    outlines: HashMap<(usize, Orientation), Rc<CellOutline>>,
-    regions: HashMap<[(usize, Orientation); 2], Rc<NoFitRegion>>,
+    outlines: HashMap<Way, Rc<CellOutline>>,
+    regions: HashMap<[Way; 2], Rc<NoFitRegion>>,
 }
 
 /// A part's oriented outline in cells.
@@ -70,18 +70,9 @@ impl NoFitRegions {
         Self { cell, ..Self::new(layout, gap, PackBy::Outlines) }
     }
 
-    pub(super) fn are_by(&self, by: PackBy) -> bool {
-        self.by == by
-    }
-
     /// Returns the displacements at which the outline of `moving` overlaps that of
     /// `placed` or comes nearer than the gap.
-    pub(super) fn no_fit(
-        &mut self,
-        layout: &Layout,
-        moving: (usize, Orientation),
-        placed: (usize, Orientation),
-    ) -> Rc<NoFitRegion> {
+    pub(super) fn no_fit(&mut self, layout: &Layout, moving: Way, placed: Way) -> Rc<NoFitRegion> {
         if let Some(known) = self.regions.get(&[moving, placed]) {
             return Rc::clone(known);
         }
@@ -93,7 +84,7 @@ impl NoFitRegions {
             }
             PackBy::Outlines => {
                 let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
-                NoFitRegion::of_outlines(&moving, &placed)
+                NoFitRegion::of_outlines(&moving, &placed, 1)
             }
         });
         self.regions.insert([moving, placed], Rc::clone(&no_fit));
@@ -105,18 +96,18 @@ impl NoFitRegions {
     pub(super) fn no_fit_every(
         &mut self,
         layout: &Layout,
-        [moving, placed]: [(usize, Orientation); 2],
+        [moving, placed]: [Way; 2],
         every: u32,
     ) -> NoFitRegion {
         let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
-        NoFitRegion::of_outlines_every(&moving, &placed, every as i32)
+        NoFitRegion::of_outlines(&moving, &placed, every as i32)
     }
 
     /// Returns whether two outlines at a displacement overlap or come nearer than the gap.
     pub(super) fn meet(
         &mut self,
         layout: &Layout,
-        [moving, placed]: [(usize, Orientation); 2],
+        [moving, placed]: [Way; 2],
         by: [i32; 2],
     ) -> bool {
         let [moving, placed] = [moving, placed].map(|key| self.outline(layout, key));
@@ -124,12 +115,12 @@ impl NoFitRegions {
     }
 
     /// Returns the number of white cells of an outline.
-    pub(super) fn white(&mut self, layout: &Layout, key: (usize, Orientation)) -> i64 {
+    pub(super) fn white(&mut self, layout: &Layout, key: Way) -> i64 {
         let outline = self.outline(layout, key);
         outline.rows.iter().flatten().map(|(from, to)| i64::from(to - from)).sum()
     }
 
-    fn outline(&mut self, layout: &Layout, key: (usize, Orientation)) -> Rc<CellOutline> {
+    fn outline(&mut self, layout: &Layout, key: Way) -> Rc<CellOutline> {
         let (gap, cell) = (self.gap, self.cell);
         let outline =
             || Rc::new(CellOutline::new(&layout.parts()[key.0].silhouette(key.1), gap, cell));
@@ -238,32 +229,9 @@ impl NoFitRegion {
         Self::new(height - 1, vec![run; rows as usize])
     }
 
-    fn of_outlines(moving: &CellOutline, placed: &CellOutline) -> Self {
-        let (high, margin) = (moving.rows.len() as i32, placed.margin);
-        let top = high - 1 + margin;
-        let rows = -top..placed.grown.len() as i32 - margin;
-        let rows = rows.map(|down| {
-            let mut runs = Vec::new();
-            for (row, across) in (down + margin..).zip(&moving.rows) {
-                let Some(others) = usize::try_from(row).ok().and_then(|row| placed.grown.get(row))
-                else {
-                    continue;
-                };
-                for &(start, end) in across {
-                    let met =
-                        |&(from, to): &CellRun| (from - margin - end + 1, to - margin - start);
-                    runs.extend(others.iter().map(met));
-                }
-            }
-            join_runs(&mut runs);
-            runs.into()
-        });
-        Self::new(top, rows.collect())
-    }
-
     /// Returns the displacements by whole multiples of some cells, in these multiples: for each row,
     /// the union of what each two runs keep from each other.
-    fn of_outlines_every(moving: &CellOutline, placed: &CellOutline, every: i32) -> Self {
+    fn of_outlines(moving: &CellOutline, placed: &CellOutline, every: i32) -> Self {
         let margin = placed.margin;
         let ends = |rows: &[Vec<CellRun>]| {
             rows.iter().filter_map(|runs| Some(runs.last()?.1)).max().unwrap_or(0)

@@ -51,8 +51,12 @@ fn check(layout: &Layout, gap: u32) {
     }
 }
 
-const OUTLINES: Pack =
-    Pack { by: PackBy::Outlines, turns: Turns::Quarters, edge_gap: Length::from_um(0.0) };
+const OUTLINES: Pack = Pack {
+    by: PackBy::Outlines,
+    turns: Turns::Quarters,
+    edge_gap: Length::from_um(0.0),
+    shares: false,
+};
 
 #[test]
 fn outlines_gain_parts_where_boxes_waste_room() {

@@ -238,8 +238,12 @@ fn composed_layers_are_those_of_the_build_in_any_order() {
     ];
     let heights = HeightOptions { settle: true, resample: true };
     for moat in [None, Some(Moat::Rising), Some(Moat::Layer)] {
-        let pack =
-            Pack { by: PackBy::Outlines, turns: Turns::Quarters, edge_gap: Length::from_mm(2.0) };
+        let pack = Pack {
+            by: PackBy::Outlines,
+            turns: Turns::Quarters,
+            edge_gap: Length::from_mm(2.0),
+            ..Pack::default()
+        };
         let plan = Plan { fit: true, heights, pack, ..Plan::of(&two, moat) };
         plan.check(folder.path());
         Plan { layers: Some(4..25), ..plan }.check(folder.path());

@@ -6,6 +6,15 @@ use super::super::super::testing::mask_of;
 use super::super::super::{Layout, Pack, PackBy, PartStack, TileError};
 use super::*;
 
+/// Places copies on lattices of the only part, and in the same ways at their edges.
+fn placed(layout: &Layout, gap: u32, wanted: u32, turns: Turns) -> Vec<CopyPlacement> {
+    place(layout, gap, wanted, 0, turns, &ways(turns), &mut HashMap::new())
+}
+
+fn ways(turns: Turns) -> Vec<Way> {
+    turns.orientations().into_iter().map(|turn| (0, turn)).collect()
+}
+
 /// An area for a part of 25.4 dpi times `scale`, so that a pixel is a millimetre or less.
 fn layout_of(mask: Mask, scale: f64, area: &str) -> Layout {
     let dpi = Dpi::new(25.4 * scale);
@@ -21,11 +30,11 @@ fn layout_of(mask: Mask, scale: f64, area: &str) -> Layout {
 fn counts(plate: Plate, area: &str, gap: u32) -> [usize; 2] {
     let layout = layout_of(plate.mask(0.25), 4.0, area);
     let gap = gap * 4;
-    let lattices = place(&layout, gap, u32::MAX, Turns::Quarters);
+    let lattices = placed(&layout, gap, u32::MAX, Turns::Quarters);
     check(&layout, &lattices, gap);
     let mut regions = NoFitRegions::new(&layout, gap, PackBy::Outlines);
-    let greedy = super::super::PlacingRule::ALL.map(|order| {
-        greedy::place(&layout, &mut regions, &[MAX_COPIES], Turns::Quarters, order).len()
+    let greedy = greedy::PlacingRule::ALL.map(|order| {
+        greedy::place(&layout, &mut regions, &[MAX_COPIES], &[ways(Turns::Quarters)], order).len()
     });
     [greedy.into_iter().max().unwrap_or(0), lattices.len()]
 }
@@ -92,11 +101,11 @@ fn right_triangles_fill_squares() {
     // Two make a square of 40 mm and a gap over the root of 2, where the legs are a gap apart:
     // three columns of 41.75 mm, in whole pixels, less the last gap.
     let layout = layout_of(Plate::Triangle.mask(0.25), 4.0, "124.5x124.5mm");
-    let placed = place(&layout, 4, u32::MAX, Turns::Half);
-    check(&layout, &placed, 4);
-    assert_eq!(placed.len(), 18);
-    assert!(place(&layout, 4, u32::MAX, Turns::None).len() < 18);
-    assert_eq!(place(&layout, 4, 7, Turns::Half).len(), 7);
+    let most = placed(&layout, 4, u32::MAX, Turns::Half);
+    check(&layout, &most, 4);
+    assert_eq!(most.len(), 18);
+    assert!(placed(&layout, 4, u32::MAX, Turns::None).len() < 18);
+    assert_eq!(placed(&layout, 4, 7, Turns::Half).len(), 7);
 }
 
 #[test]
@@ -107,7 +116,7 @@ fn lattices_have_the_least_area() {
         let white = mask.white_pixels() as i64;
         let layout = layout_of(mask, 1.0, "20x20mm");
         let mut regions = NoFitRegions::in_cells(&layout, 0, 1);
-        let motif = Motif::new(&layout, &mut regions, false, true);
+        let motif = Motif::new(&layout, &mut regions, 0, false, true);
         let densest = search::lattices(&motif).into_iter().map(|l| l.cells_of_two()).min();
         assert_eq!(densest, Some(2 * white));
     }
@@ -129,7 +138,7 @@ proptest! {
         let mask = mask_of(&rows.iter().map(String::as_str).collect::<Vec<_>>());
         let layout = layout_of(mask, 1.0, &format!("{width}x{height}mm"));
         let turns = [Turns::None, Turns::Half, Turns::Quarters][turns];
-        let placed = place(&layout, gap, u32::MAX, turns);
+        let placed = placed(&layout, gap, u32::MAX, turns);
         check(&layout, &placed, gap);
         prop_assert!(!placed.is_empty());
         prop_assert!(turns == Turns::Quarters || placed.iter().all(|at| at.turn.quarters() % 2 == 0));

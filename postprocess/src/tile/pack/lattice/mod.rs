@@ -9,11 +9,13 @@ mod area;
 mod motif;
 mod search;
 
+use std::collections::HashMap;
+
 use lamp_stack::Orientation;
 
 use super::super::{CopyPlacement, Layout, PixelSize};
 use super::no_fit::NoFitRegions;
-use super::{MAX_COPIES, Turns, greedy};
+use super::{MAX_COPIES, Turns, Way, greedy};
 use area::{Fit, Room};
 use motif::Motif;
 
@@ -50,6 +52,8 @@ impl Lattice {
 /// How the lattice lies on the area.
 #[derive(Clone, Copy, Debug)]
 struct View {
+    /// The stack that its copies take their images from.
+    stack: usize,
     /// Whether rows of the search are columns of the area.
     transposed: bool,
     /// Whether all of it is turned by a quarter.
@@ -62,20 +66,32 @@ const CLOSE_CELLS: u32 = 2048;
 /// The number of layouts whose edges are filled up.
 const FILLED: usize = 6;
 
-/// Places up to `wanted` copies of the only part.
-pub(super) fn place(layout: &Layout, gap: u32, wanted: u32, turns: Turns) -> Vec<CopyPlacement> {
-    let PixelSize { width, height } = layout.parts()[0].size(Orientation::default());
+/// Places up to `wanted` copies of the only part: lattices of one of its stacks, and others at their
+/// edges in any way. The regions are those that are known, by the pixels on a side of their cells.
+pub(super) fn place(
+    layout: &Layout,
+    gap: u32,
+    wanted: u32,
+    stack: usize,
+    turns: Turns,
+    ways: &[Way],
+    regions: &mut HashMap<u32, NoFitRegions>,
+) -> Vec<CopyPlacement> {
+    let PixelSize { width, height } = layout.parts()[stack].size(Orientation::default());
     // Regions cost the square of the runs in a row.
-    let outline = layout.parts()[0].silhouette(Orientation::default());
+    let outline = layout.parts()[stack].silhouette(Orientation::default());
     let runs = (outline.change_count() / (2 * height.max(1) as usize)).max(1) as u32;
     let cell = width.max(height).div_ceil((CLOSE_CELLS / runs).max(1)).max(1);
     let times = (width.max(height) / cell).div_ceil(SEARCH_CELLS).max(1);
-    let mut coarse = NoFitRegions::in_cells(layout, gap, cell * times);
-    let mut fine = NoFitRegions::in_cells(layout, gap, cell);
+    let mut of_cells = |cell: u32| {
+        let known = regions.remove(&cell);
+        known.unwrap_or_else(|| NoFitRegions::in_cells(layout, gap, cell))
+    };
+    let [mut coarse, mut fine] = [cell * times, cell].map(&mut of_cells);
     let mut fits: Vec<(Fit, Lattice, View)> = Vec::new();
     for transposed in [false, true] {
         let [coarse, fine] = [&mut coarse, &mut fine]
-            .map(|regions| Motif::new(layout, regions, transposed, turns >= Turns::Half));
+            .map(|regions| Motif::new(layout, regions, stack, transposed, turns >= Turns::Half));
         let found = search::lattices(&coarse).into_iter().map(|found| found.times(times as i32));
         let lattices: Vec<Lattice> =
             found.flat_map(|found| search::closer_ways(&fine, found)).collect();
@@ -83,7 +99,7 @@ pub(super) fn place(layout: &Layout, gap: u32, wanted: u32, turns: Turns) -> Vec
             if turned && turns < Turns::Quarters {
                 continue;
             }
-            let view = View { transposed, turned };
+            let view = View { stack, transposed, turned };
             let Some(room) = view.room(layout, cell) else { continue };
             fits.extend(lattices.iter().map(|lattice| (room.best(lattice), *lattice, view)));
         }
@@ -98,18 +114,20 @@ pub(super) fn place(layout: &Layout, gap: u32, wanted: u32, turns: Turns) -> Vec
         let placed = shifts.map(|(shift, half)| view.placement(shift, half, room, cell));
         let mut placements: Vec<CopyPlacement> = placed.take(MAX_COPIES as usize).collect();
         placements.sort_by_key(|at| (at.top, at.left));
-        let filled = greedy::fill(layout, &mut fine, placements, wanted, turns);
+        let filled = greedy::fill(layout, &mut fine, placements, wanted, ways);
         if filled.len() > best.len() {
             best = filled;
         }
     }
+    regions.extend([(cell * times, coarse), (cell, fine)]);
     best
 }
 
 impl View {
     /// Returns where copies may begin, in the lattice's own frame.
     fn room(self, layout: &Layout, cell: u32) -> Option<Room> {
-        let (area, part) = (layout.pixels(), layout.parts()[0].size(Orientation::default()));
+        let (area, part) =
+            (layout.pixels(), layout.parts()[self.stack].size(Orientation::default()));
         let area = if self.turned { [area.height, area.width] } else { [area.width, area.height] };
         let PixelSize { width, height } = part;
         let across = area[0].checked_sub(width)? / cell;
@@ -126,7 +144,7 @@ impl View {
         let [left, top] = if self.turned { [y, last - x] } else { [x, y] };
         let quarters = u32::from(self.turned) + if is_partner { 2 } else { 0 };
         let [left, top] = [left, top].map(|cells| cells as u32 * cell);
-        CopyPlacement { part: 0, turn: Orientation::new(quarters, false), left, top }
+        CopyPlacement { part: self.stack, turn: Orientation::new(quarters, false), left, top }
     }
 }
 

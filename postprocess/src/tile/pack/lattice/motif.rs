@@ -28,17 +28,18 @@ struct TurnedRegions {
 }
 
 impl Motif {
-    /// Creates that of the only part, as it lies or with rows for columns.
+    /// Creates that of a stack, as it lies or with rows for columns.
     pub(super) fn new(
         layout: &Layout,
         regions: &mut NoFitRegions,
+        stack: usize,
         transposed: bool,
         half: bool,
     ) -> Self {
         // Mirrored and turned by a quarter, columns are rows.
         let quarters = u32::from(transposed);
-        let [copy, turned] =
-            [quarters, quarters + 2].map(|quarters| (0, Orientation::new(quarters, transposed)));
+        let [copy, turned] = [quarters, quarters + 2]
+            .map(|quarters| (stack, Orientation::new(quarters, transposed)));
         let mut no_fit = |moving, placed| regions.no_fit(layout, moving, placed);
         Self {
             own: no_fit(copy, copy),

@@ -1,4 +1,4 @@
-use lamp_stack::{Image, Mask};
+use lamp_stack::{Image, Mask, Orientation};
 use proptest::prelude::*;
 
 use super::super::super::testing::{layer, mask_of};
@@ -66,8 +66,12 @@ proptest! {
         let counts = vec![count; parts.len()];
         let layout = Layout::empty(parts.clone(), "14x120mm".parse().unwrap()).unwrap();
         let mut regions = NoFitRegions::new(&layout, 0, PackBy::Outlines);
+        let of_part = |part| {
+            Turns::Quarters.orientations().into_iter().map(|turn| (part, turn)).collect()
+        };
+        let ways: Vec<Vec<Way>> = (0..parts.len()).map(of_part).collect();
         let greedy = PlacingRule::ALL.map(|order| {
-            let found = greedy::place(&layout, &mut regions, &counts, Turns::Quarters, order);
+            let found = greedy::place(&layout, &mut regions, &counts, &ways, order);
             assert_eq!(found.len(), parts.len() * count as usize);
             height(&layout, &found)
         });

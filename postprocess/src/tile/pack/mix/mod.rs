@@ -16,37 +16,38 @@ mod separate;
 mod slide;
 mod ways;
 
-use lamp_stack::Orientation;
-
 use super::super::{CopyPlacement, Layout};
+use super::Way;
 use board::Copy;
 use ways::Ways;
 
 /// More copies than these stay as they are.
 pub(super) const MOST_COPIES: usize = 512;
-/// More parts in more turns stay as they are, too: each two of them have depths of their own.
+/// Parts in more ways stay as they are, too: each two of them have depths of their own.
 const MOST_WAYS: usize = 256;
 
-/// Returns the copies closer to the top, as far as the search gets: never lower than they were.
+/// Returns the copies closer to the top, as far as the search gets, or until they take `enough`
+/// rows: never lower than they were.
 pub(super) fn shorten(
     layout: &Layout,
     gap: u32,
-    turns: &[Orientation],
+    ways: &[Vec<Way>],
     placements: Vec<CopyPlacement>,
+    enough: u32,
 ) -> Vec<CopyPlacement> {
-    if layout.parts().len() * turns.len() > MOST_WAYS {
+    if ways.iter().map(Vec::len).sum::<usize>() > MOST_WAYS {
         return placements;
     }
-    let ways = Ways::new(layout, gap, turns);
+    let ways = Ways::new(layout, gap, ways);
     let left = placements.iter().map(|at| at.left).min().unwrap_or(0);
     let top = placements.iter().map(|at| at.top).min().unwrap_or(0);
     let cells = |pixels: u32| ((pixels + ways.cell / 2) / ways.cell) as i32;
     let copy = |at: &CopyPlacement| {
-        let way = ways.of(layout, at);
-        Copy { part: at.part, way, at: [cells(at.left - left), cells(at.top - top)] }
+        let (part, way) = ways.of(layout, at);
+        Copy { part, way, at: [cells(at.left - left), cells(at.top - top)] }
     };
     let copies: Vec<Copy> = placements.iter().map(copy).collect();
-    let Some(found) = search::lowest(layout, &ways, &copies) else { return placements };
+    let Some(found) = search::lowest(layout, &ways, &copies, enough) else { return placements };
     let shorter = slide::up(layout, gap, &ways, &found);
     if height(layout, &shorter) < height(layout, &placements) { shorter } else { placements }
 }

@@ -29,9 +29,14 @@ struct Search<'a> {
     kept: Vec<(u64, Vec<Copy>)>,
 }
 
-/// Returns copies as close to the top as they are found to fit, or nothing if they stay apart
-/// nowhere.
-pub(super) fn lowest(layout: &Layout, ways: &Ways, copies: &[Copy]) -> Option<Vec<Copy>> {
+/// Returns copies as close to the top as they are found to fit, or as is enough, or nothing if they
+/// stay apart nowhere.
+pub(super) fn lowest(
+    layout: &Layout,
+    ways: &Ways,
+    copies: &[Copy],
+    enough: u32,
+) -> Option<Vec<Copy>> {
     let area = layout.pixels();
     let cells = |pixels: u32| u64::from(pixels.div_ceil(ways.cell));
     let cells = cells(area.width) * cells(bottom(ways, copies));
@@ -46,7 +51,7 @@ pub(super) fn lowest(layout: &Layout, ways: &Ways, copies: &[Copy]) -> Option<Ve
     let height = bottom(ways, &best);
     let step = (height / 50).max(ways.cell);
     let mut search = Search { board, random, work, best, height, step, kept: Vec::new() };
-    let least = search.least_height();
+    let least = search.least_height().max(enough.saturating_sub(ways.cell));
     while search.board.work < work && search.height >= least + ways.cell {
         search.step = search.step.min(search.height - least);
         search.go_on();

@@ -23,8 +23,9 @@ pub(super) fn up(layout: &Layout, gap: u32, ways: &Ways, copies: &[Copy]) -> Vec
     slide.copies.sort_by_key(|copy| (copy.at[1], copy.at[0]));
     while slide.pass() {}
     let placement = |copy: &Copy| {
-        let (way, [left, top]) = (ways.way(copy.way), copy.at.map(|cell| cell as u32 * ways.fine));
-        CopyPlacement { part: way.part, turn: way.turn, left, top }
+        let ((part, turn), [left, top]) =
+            (ways.way(copy.way), copy.at.map(|cell| cell as u32 * ways.fine));
+        CopyPlacement { part, turn, left, top }
     };
     slide.copies.iter().map(placement).collect()
 }
@@ -65,10 +66,7 @@ impl Slide<'_> {
         if (0..2).any(|axis| by[axis] >= other_size[axis] || -by[axis] >= own_size[axis]) {
             return false;
         }
-        let [one, two] = [own.way, other.way].map(|way| {
-            let way = self.ways.way(way);
-            (way.part, way.turn)
-        });
+        let [one, two] = [own.way, other.way].map(|way| self.ways.way(way));
         let (layout, back) = (self.layout, by.map(|cells| -cells));
         own.way <= other.way && self.regions.meet(layout, [one, two], by)
             || other.way <= own.way && self.regions.meet(layout, [two, one], back)

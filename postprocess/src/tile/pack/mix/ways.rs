@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use lamp_stack::Orientation;
 
 use super::super::super::{CopyPlacement, Layout, PixelSize};
+use super::super::Way;
 use super::super::no_fit::{NoFitRegion, NoFitRegions};
 use super::depth::DepthMap;
 
@@ -12,17 +13,9 @@ use super::depth::DepthMap;
 const CELLS: u32 = 160;
 const MOST_DEPTHS: f64 = 6e7;
 
-/// An oriented part.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
-    pub(super) part: usize,
-    pub(super) turn: Orientation,
-    size: PixelSize,
-}
-
 /// All ways of all parts.
 pub(super) struct Ways {
-    all: Vec<Way>,
+    all: Vec<(Way, PixelSize)>,
     /// The ways of each part.
     pub(super) of_part: Vec<Vec<usize>>,
     /// How deep one is in another, by both.
@@ -33,17 +26,16 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    pub(super) fn new(layout: &Layout, gap: u32, turns: &[Orientation]) -> Self {
-        let (all, of_part) = distinct(layout, turns);
+    pub(super) fn new(layout: &Layout, gap: u32, ways: &[Vec<Way>]) -> Self {
+        let (all, of_part) = distinct(layout, ways);
         let (cell, fine) = cells(layout, &all);
         let every = cell / fine;
         let mut regions = NoFitRegions::in_cells(layout, gap, fine);
-        let keys: Vec<_> = all.iter().map(|way| (way.part, way.turn)).collect();
         let count = all.len();
         let pairs =
             (0..count).flat_map(|moving| (moving..count).map(move |placed| [moving, placed]));
         let no_fits: Vec<_> = pairs
-            .map(|pair| (pair, regions.no_fit_every(layout, pair.map(|way| keys[way]), every)))
+            .map(|pair| (pair, regions.no_fit_every(layout, pair.map(|way| all[way].0), every)))
             .collect();
         let maps: Vec<_> = no_fits
             .iter()
@@ -65,12 +57,12 @@ impl Ways {
         Self { depths: in_order.collect(), all, of_part, cell, fine }
     }
 
-    pub(super) fn way(&self, way: usize) -> &Way {
-        &self.all[way]
+    pub(super) fn way(&self, way: usize) -> Way {
+        self.all[way].0
     }
 
     pub(super) fn size(&self, way: usize) -> [u32; 2] {
-        let PixelSize { width, height } = self.all[way].size;
+        let PixelSize { width, height } = self.all[way].1;
         [width, height]
     }
 
@@ -79,23 +71,27 @@ impl Ways {
         &self.depths[moving * self.all.len() + placed]
     }
 
-    /// Returns the way of a placement.
-    pub(super) fn of(&self, layout: &Layout, at: &CopyPlacement) -> usize {
-        let ways = &self.of_part[at.part];
-        let same = ways.iter().find(|&&way| self.all[way].turn == at.turn);
-        let outline = || layout.parts()[at.part].silhouette(at.turn);
-        let alike = || {
-            let outline = outline();
-            ways.iter()
-                .find(|&&way| layout.parts()[at.part].silhouette(self.all[way].turn) == outline)
+    /// Returns the part of a placement, and its way.
+    pub(super) fn of(&self, layout: &Layout, at: &CopyPlacement) -> (usize, usize) {
+        let all = || {
+            let parts = self.of_part.iter().enumerate();
+            parts.flat_map(|(part, ways)| ways.iter().map(move |&way| (part, way)))
         };
-        *same.or_else(alike).expect("it was made of them")
+        let same = all().find(|&(_, way)| self.way(way) == (at.part, at.turn));
+        let alike = || {
+            let outline = layout.parts()[at.part].silhouette(at.turn);
+            let is_alike = |(stack, turn): Way| {
+                stack == at.part && layout.parts()[stack].silhouette(turn) == outline
+            };
+            all().find(|&(_, way)| is_alike(self.way(way)))
+        };
+        same.or_else(alike).expect("it was made of them")
     }
 }
 
 /// Returns the pixels on a side of a cell, and of those that divide it.
-fn cells(layout: &Layout, all: &[Way]) -> (u32, u32) {
-    let sides = all.iter().map(|way| way.size.width.max(way.size.height));
+fn cells(layout: &Layout, all: &[(Way, PixelSize)]) -> (u32, u32) {
+    let sides = all.iter().map(|(_, size)| size.width.max(size.height));
     // Regions cost the square of the runs in a row, and depths that of the ways.
     let runs = layout.parts().iter().map(|part| {
         let outline = part.silhouette(Orientation::default());
@@ -112,23 +108,23 @@ fn cells(layout: &Layout, all: &[Way]) -> (u32, u32) {
 }
 
 /// Returns the ways that differ, and those of each part.
-fn distinct(layout: &Layout, turns: &[Orientation]) -> (Vec<Way>, Vec<Vec<usize>>) {
+fn distinct(layout: &Layout, ways: &[Vec<Way>]) -> (Vec<(Way, PixelSize)>, Vec<Vec<usize>>) {
     let mut all = Vec::new();
-    let of_part = (0..layout.parts().len()).map(|part| {
-        let stack = &layout.parts()[part];
+    let of_part = ways.iter().map(|ways| {
         let mut outlines = Vec::new();
-        let mut ways = Vec::new();
-        for &turn in turns {
-            let size = stack.size(turn);
+        let mut own = Vec::new();
+        for &way in ways {
+            let stack = &layout.parts()[way.0];
+            let size = stack.size(way.1);
             let PixelSize { width, height } = layout.pixels();
-            let outline = stack.silhouette(turn);
+            let outline = stack.silhouette(way.1);
             if size.width <= width && size.height <= height && !outlines.contains(&outline) {
                 outlines.push(outline);
-                ways.push(all.len());
-                all.push(Way { part, turn, size });
+                own.push(all.len());
+                all.push((way, size));
             }
         }
-        ways
+        own
     });
     let of_part = of_part.collect();
     (all, of_part)

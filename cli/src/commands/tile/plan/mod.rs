@@ -1,0 +1,150 @@
+//! Plans builds whose copies lie at angles at which the parts are yet to be sliced, as a script.
+
+mod sliced_from;
+mod words;
+
+use std::ffi::OsString;
+
+use clap::CommandFactory;
+use lamp_postprocess::{FreeTurns, Pack, PackBy, PartStack, PlannedStack, TurnedPlan};
+use lamp_stack::Length;
+
+use super::TileArgs;
+use super::stacks::InputStack;
+use super::turns_arg::TurnsArg;
+use crate::Lamp;
+use crate::exit::Exit;
+use crate::progress::Progress;
+use crate::streams::{input_name, is_stream, print};
+use sliced_from::SlicedFrom;
+use words::{kept, quoted};
+
+impl TileArgs {
+    /// Returns the turns of a plan, if one is asked for.
+    pub(super) fn free_turns(&self) -> Option<FreeTurns> {
+        match self.turns? {
+            TurnsArg::Free(turns) => Some(turns),
+            TurnsArg::Images(_) => None,
+        }
+    }
+
+    /// Checks, before the work, what a plan needs.
+    pub(super) fn check_plan(&self) -> Result<(), Exit> {
+        let Some(turns) = self.free_turns() else { return Ok(()) };
+        if self.layout_out.is_none() {
+            return Err(Exit::usage(format!(
+                "--turns {turns} takes stacks that are yet to be sliced: give --layout-out for where \
+                 they will stand"
+            )));
+        }
+        if self.stacks.iter().any(|stack| is_stream(&stack.path)) {
+            return Err(Exit::usage(format!(
+                "--turns {turns} names the files of stacks, and standard input has none: write it \
+                 to a file first"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Prints the commands that make a build whose copies lie at any of some angles, and writes the
+    /// layout that they need.
+    pub(super) fn plan(&self, turns: FreeTurns, progress: &Progress) -> Result<(), Exit> {
+        let machine = self.machine()?;
+        let mesh = self.mesh.options()?;
+        let mut stacks = InputStack::open_all(&self.stacks, &self.layers, false, machine.as_ref())?;
+        let parts = stacks.iter_mut().map(|stack| stack.part(true));
+        let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
+        let from = self.stacks.iter().zip(&stacks).zip(&parts);
+        let from = from.map(|((stack, input), part)| SlicedFrom::new(&stack.path, input, part));
+        let from = from.collect::<Result<Vec<_>, _>>()?;
+        let centres: Vec<[f64; 2]> = from.iter().map(SlicedFrom::centre_mm).collect();
+        let (area, gap) = (self.area_of(None, machine.as_ref()), self.gap_of(mesh.as_ref()));
+        let pack = Pack { by: PackBy::Outlines, ..self.packing() };
+        let plan = TurnedPlan::new(parts, &centres, &self.counts(), area, gap, pack, turns)?;
+        self.tell_plan(&plan, turns, progress)?;
+        for from in &from {
+            self.tell_slicing(from, &plan, progress);
+        }
+        self.tell(plan.layout())?;
+        print(&self.script(&plan, &from, turns, gap))
+    }
+
+    /// Tells what turns gain, and which copies found no place.
+    fn tell_plan(
+        &self,
+        plan: &TurnedPlan,
+        turns: FreeTurns,
+        progress: &Progress,
+    ) -> Result<(), Exit> {
+        let placed = |part: usize| {
+            let stacks = (0..plan.stacks().len()).filter(|&k| plan.stacks()[k].part == part);
+            stacks.map(|stack| plan.layout().copies_of(stack)).sum()
+        };
+        let names = self.stacks.iter().map(|stack| input_name(&stack.path)).enumerate();
+        let placed: Vec<(String, usize)> = names.map(|(part, name)| (name, placed(part))).collect();
+        self.tell_left_over(&placed, progress)?;
+        progress.say(&gain(plan, turns));
+        Ok(())
+    }
+
+    /// Warns of what a script cannot do.
+    fn tell_slicing(&self, from: &SlicedFrom, plan: &TurnedPlan, progress: &Progress) {
+        if plan.new_stacks() == 0 {
+            return;
+        }
+        if let Some(files) = &from.missing {
+            progress.warn(&format!(
+                "{files}: not found beside its stack as it was sliced: write where it is into the \
+                 script"
+            ));
+        }
+        if !from.stages.is_empty() {
+            let stages = from.stages.join(" and ");
+            progress.warn(&format!(
+                "pages went through {stages} after they were sliced: add that to the lines of slice \
+                 in the script"
+            ));
+        }
+    }
+
+    /// Returns the commands of a plan.
+    fn script(
+        &self,
+        plan: &TurnedPlan,
+        from: &[SlicedFrom],
+        turns: FreeTurns,
+        gap: Length,
+    ) -> String {
+        let mut script = format!("#!/bin/sh\n# {}\nset -e\n", gain(plan, turns));
+        for PlannedStack { name, part, slicing } in plan.stacks() {
+            if let Some(slicing) = slicing {
+                script += &from[*part].command(slicing, self.layers.is_none(), name);
+                script.push('\n');
+            }
+        }
+        let tile = crate::stage(&Lamp::command(), "tile");
+        let words: Vec<OsString> = std::env::args_os().skip(1).collect();
+        let stacks = plan.stacks().iter().map(|stack| OsString::from(&stack.name));
+        let layout = self.layout_out.iter().map(|path| path.clone().into_os_string());
+        let settled = ["--fit", "--layout"].map(OsString::from).into_iter().chain(layout);
+        let gap = ["--gap".into(), OsString::from(gap.to_string())];
+        let words = stacks.chain(settled).chain(gap).chain(kept(&words, &tile));
+        let words: Vec<String> = words.map(|word| quoted(&word.to_string_lossy())).collect();
+        script + &format!("tile {}\n", words.join(" "))
+    }
+}
+
+/// `45 copies with 2 more stacks, 41 as it is sliced`.
+fn gain(plan: &TurnedPlan, turns: FreeTurns) -> String {
+    let (copies, plain) = (plan.layout().placements().len(), plan.plain_copies());
+    let quarters = turns.of_images();
+    match plan.new_stacks() {
+        0 => format!("{copies} copies: no more fit with turns of {turns} than with {quarters}"),
+        1 => format!(
+            "{copies} copies with turns of {turns}, {plain} with {quarters}: 1 stack to slice"
+        ),
+        stacks => format!(
+            "{copies} copies with turns of {turns}, {plain} with {quarters}: {stacks} stacks to slice"
+        ),
+    }
+}

@@ -1,0 +1,101 @@
+//! How a stack was sliced, to slice its part again.
+
+use std::fs::File;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use lamp_postprocess::{PartStack, TurnedSlicing};
+use lamp_stack::{digest_of, digest_of_digests};
+
+use super::super::stacks::{InputStack, ReadLayers};
+use super::words::quoted;
+use crate::exit::Exit;
+use crate::slicing_options::SlicingOptions;
+
+/// What a stack says of how it was sliced.
+pub(super) struct SlicedFrom {
+    options: SlicingOptions,
+    /// The part's files as words, with their placements.
+    files: Vec<String>,
+    /// The part's files as the stack records them, if they were not found.
+    pub(super) missing: Option<String>,
+    /// The stages that changed pages since.
+    pub(super) stages: Vec<&'static str>,
+    layers: Range<u32>,
+}
+
+impl SlicedFrom {
+    /// Reads what a stack records, and looks for the part's files beside it and in the current
+    /// folder.
+    ///
+    /// # Errors
+    /// Returns an error if the stack does not record how it was sliced, or more than that.
+    pub(super) fn new(path: &Path, input: &InputStack, part: &PartStack) -> Result<Self, Exit> {
+        let refused = |why: String| Exit::Failed(anyhow!("{}: {why}", part.name()));
+        let stack = part.stack();
+        let commands = stack.map_or(&[][..], |stack| &stack.commands);
+        let options = commands.first().and_then(|command| SlicingOptions::of_command(command));
+        let (Some(stack), Some(options)) = (stack, options) else {
+            let why = "it does not say how it was sliced, so it cannot be sliced at other angles: \
+                       give --turns quarters";
+            return Err(refused(why.to_owned()));
+        };
+        if let Some(more) = commands.get(1) {
+            let name = more.split(' ').next().unwrap_or_default();
+            return Err(refused(format!(
+                "{name} changed it after it was sliced, which would be lost at other angles: give \
+                 the stack before it, or --turns quarters"
+            )));
+        }
+        let recorded = SlicingOptions::parts_of_command(&commands[0]);
+        let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
+        let found = folders.iter().find_map(|folder| files_in(folder, recorded, &stack.digest));
+        let missing = found.is_none().then(|| recorded.to_owned());
+        let files = found.unwrap_or_else(|| recorded.split(' ').map(ToOwned::to_owned).collect());
+        let ReadLayers { stages, range } = input.read_layers().clone();
+        Ok(Self { options, files, missing, stages, layers: range })
+    }
+
+    /// Returns the place about which the part turns, in the coordinates of its images.
+    pub(super) fn centre_mm(&self) -> [f64; 2] {
+        // It is moved after it is turned.
+        let [x, y, _] = self.options.solid.placement().at([0.0; 3]);
+        [x, y]
+    }
+
+    /// Returns the command that slices the part for a plan.
+    pub(super) fn command(&self, slicing: &TurnedSlicing, all_layers: bool, out: &str) -> String {
+        let files: Vec<String> = self.files.iter().map(|file| quoted(file)).collect();
+        let slice = self.options.clone().turned(slicing).command(&files.join(" "), None);
+        let Range { start, end } = self.layers;
+        let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
+        format!("{slice}{layers} -o {}", quoted(out))
+    }
+}
+
+/// Returns the files of a part that are in a folder, with their placements, if their digest is this.
+fn files_in(folder: &Path, recorded: &str, digest: &str) -> Option<Vec<String>> {
+    let of_names = |names: Vec<&str>| -> Option<Vec<String>> {
+        let found: Vec<(PathBuf, String)> =
+            names.into_iter().map(|name| file_in(folder, name)).collect::<Option<_>>()?;
+        let digests = found.iter().map(|(path, _)| digest_of(File::open(path).ok()?).ok());
+        let digests: Vec<String> = digests.collect::<Option<_>>()?;
+        let is_it = digest_of_digests(digests.iter().map(String::as_str)) == digest;
+        is_it.then(|| found.into_iter().map(|(_, word)| word).collect())
+    };
+    // The name of a file may hold blanks.
+    of_names(vec![recorded]).or_else(|| of_names(recorded.split(' ').collect()))
+}
+
+/// Returns the path of a file in a folder, and the word for it with its placement.
+fn file_in(folder: &Path, name: &str) -> Option<(PathBuf, String)> {
+    let is_file = |name: &str| folder.join(name).is_file();
+    let (file, placement) = match name.rsplit_once('@') {
+        Some((file, _)) if !is_file(name) => (file, &name[file.len()..]),
+        _ => (name, ""),
+    };
+    let path = folder.join(file);
+    let word = format!("{}{placement}", path.to_str()?);
+    path.is_file().then_some((path, word))
+}
