@@ -125,8 +125,9 @@ fn the_script_of_a_plan_makes_the_build_that_was_planned() {
     scratch
         .run(&format!("tile plate.tif --mesh none --gap 1mm --pack outline {area} -o quarters.tif"))
         .succeeds_quietly();
-    let quarters = &scratch.layers("quarters.tif")[0].info.stack.as_ref().unwrap().other["tile"];
-    assert!(copies > quarters["copies"].as_array().unwrap().len(), "{script}");
+    let quarters = scratch.layers("quarters.tif");
+    let quarters = &quarters[0].info.stack.as_ref().unwrap().other["tile"]["copies"];
+    assert!(copies > quarters.as_array().unwrap().len(), "{script}");
     assert_eq!(
         scratch.run(&format!("{PLAN} {area} --turns 15deg")).succeeds().stdout,
         script.as_bytes()

@@ -144,6 +144,18 @@ mod tests {
         assert!(matches!(error, Err(TileError::TooMany { asked: 1, most: 0, .. })), "{error:?}");
     }
 
+    #[test]
+    fn small_parts_fill_holes() {
+        let wall = "#......#";
+        let ring = ["########", wall, wall, wall, wall, wall, wall, "########"];
+        let parts = [part(&ring), part(&["####"; 4])];
+        let found = [PackBy::Outlines, PackBy::Boxes].map(|by| {
+            packed(&parts, &[1, 1], "8x26mm", Pack { by, shares: true, ..Pack::default() })
+        });
+        // Three rings below each other, each around one; or two rings and one below them.
+        assert_eq!(found, [Some(vec![3, 3]), Some(vec![2, 1])]);
+    }
+
     proptest! {
         #[test]
         fn all_beginnings_hold_the_shares(shares in prop::collection::vec(1u32..20, 2..6)) {
