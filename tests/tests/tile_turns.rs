@@ -181,7 +181,7 @@ fn plans_name_what_they_cannot_slice_again() {
     let told = scratch.run(line).succeeds().stderr;
     assert!(told.contains("plate.stl: not found beside its stack as it was sliced"), "{told}");
     scratch.write("cut.toml", b"[[edit]]\nrotate = 90\n");
-    scratch.run("lamp edit cut.toml plate.tif -o cut.tif").succeeds();
+    scratch.run("lamp edit plate.tif cut.toml -o cut.tif").succeeds();
     scratch
         .run(&line.replace("plate.tif", "cut.tif"))
         .is_refused_with(&["cut.tif: edit", "sliced"]);

@@ -134,17 +134,21 @@ impl TileArgs {
     }
 }
 
-/// `45 copies with 2 more stacks, 41 as it is sliced`.
+/// `45 copies with turns of 15deg, 41 with quarters: 2 stacks to slice`.
 fn gain(plan: &TurnedPlan, turns: FreeTurns) -> String {
-    let (copies, plain) = (plan.layout().placements().len(), plan.plain_copies());
+    let plain = plan.plain_copies();
     let quarters = turns.of_images();
+    let copies = match plan.layout().placements().len() {
+        1 => "1 copy".to_owned(),
+        copies => format!("{copies} copies"),
+    };
     match plan.new_stacks() {
-        0 => format!("{copies} copies: no more fit with turns of {turns} than with {quarters}"),
-        1 => format!(
-            "{copies} copies with turns of {turns}, {plain} with {quarters}: 1 stack to slice"
-        ),
-        stacks => format!(
-            "{copies} copies with turns of {turns}, {plain} with {quarters}: {stacks} stacks to slice"
-        ),
+        0 => format!("{copies}: no more fit with turns of {turns} than with {quarters}"),
+        1 => format!("{copies} with turns of {turns}, {plain} with {quarters}: 1 stack to slice"),
+        stacks => {
+            format!(
+                "{copies} with turns of {turns}, {plain} with {quarters}: {stacks} stacks to slice"
+            )
+        }
     }
 }
