@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if let Some(free) = free {
             let start = Instant::now();
             let pack = pack(free.of_images());
-            let plan = TurnedPlan::new(part.to_vec(), &[[0.0; 2]], &[None], area, gap, pack, free)?;
+            let plan = TurnedPlan::new(&part, &[[0.0; 2]], &[None], area, gap, pack, free)?;
             tell(plate, &free.to_string(), plan.layout(), start);
             continue;
         }

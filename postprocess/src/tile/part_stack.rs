@@ -87,9 +87,9 @@ impl PartStack {
 
     /// Returns it as its images at another angle show it: with another outline, in images of the
     /// outline's size at another place.
-    pub(super) fn of_turned(&self, outline: Mask, origin_mm: [f64; 2], name: String) -> Self {
+    pub(super) fn of_turned(&self, outline: &Mask, origin_mm: [f64; 2], name: String) -> Self {
         let image = PixelSize { width: outline.width(), height: outline.height() };
-        let frame = extents(&outline).expect("an outline has a pixel");
+        let frame = extents(outline).expect("an outline has a pixel");
         Self {
             name,
             dpi: self.dpi,

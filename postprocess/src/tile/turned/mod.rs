@@ -58,7 +58,7 @@ impl TurnedPlan {
     /// # Panics
     /// Panics if there are not as many counts and centres as parts, or no part.
     pub fn new(
-        parts: Vec<PartStack>,
+        parts: &[PartStack],
         centres_mm: &[[f64; 2]],
         counts: &[Option<u32>],
         area: Size,
@@ -68,7 +68,7 @@ impl TurnedPlan {
     ) -> Result<Self, TileError> {
         assert_eq!(parts.len(), centres_mm.len(), "a centre for each part");
         let pack = Pack { turns: turns.of_images(), ..pack };
-        let plain = Layout::packed(parts.clone(), counts, area, gap, pack);
+        let plain = Layout::packed(parts.to_vec(), counts, area, gap, pack);
         let is_plain = |layout: &Layout| {
             let counted = |part: usize| {
                 let usual = (parts.len() > 1 && !pack.shares).then_some(1);
@@ -82,7 +82,7 @@ impl TurnedPlan {
             return Ok(Self::of_plain(plain?));
         }
         let plain_copies = plain.as_ref().map_or(0, |layout| layout.placements().len());
-        let mut all = parts.clone();
+        let mut all = parts.to_vec();
         let mut slicings: Vec<(usize, Option<TurnedSlicing>)> =
             (0..parts.len()).map(|part| (part, None)).collect();
         let mut stacks: Vec<Vec<usize>> = (0..parts.len()).map(|part| vec![part]).collect();
@@ -175,14 +175,14 @@ impl PartStack {
             nm(origin_mm[1] - (top - MARGIN).floor() * pitch),
         ];
         let corner = [(corner_mm[0] - origin_mm[0]) / pitch, (origin_mm[1] - corner_mm[1]) / pitch];
-        let turn = turn.from_corner(corner);
+        let turn = turn.with_corner(corner);
         let side = |from: f64, to: f64| (to + MARGIN - from).ceil() as u32;
         let pixels = [side(corner[0], right), side(corner[1], bottom)];
         let frame = self.frame();
         let whole = outline::turned(outline, [frame.left, frame.top], &turn, pixels);
         let length = |pixels: u32| Length::from_mm(nm((f64::from(pixels) - 0.5) * pitch));
         let size = Size { width: length(pixels[0]), height: length(pixels[1]) };
-        let part = self.of_turned(whole, corner_mm, name_of(self.name(), degrees));
+        let part = self.of_turned(&whole, corner_mm, name_of(self.name(), degrees));
         Ok((part, TurnedSlicing { degrees, origin_mm: corner_mm, size }))
     }
 }

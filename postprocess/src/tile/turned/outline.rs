@@ -35,7 +35,7 @@ impl ImageTurn {
     }
 
     /// Returns it in an image whose corner is elsewhere.
-    pub(super) fn from_corner(self, [u, v]: [f64; 2]) -> Self {
+    pub(super) fn with_corner(self, [u, v]: [f64; 2]) -> Self {
         Self { by: [self.by[0] - u, self.by[1] - v], ..self }
     }
 

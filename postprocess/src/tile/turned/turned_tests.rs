@@ -100,7 +100,7 @@ fn a_plan_holds_when_its_stacks_are_sliced() {
     for plate in [Plate::Triangle, Plate::T, Plate::U, Plate::Crescent, Plate::Aerofoil] {
         let centre = [5.0, 2.0];
         let plan = TurnedPlan::new(
-            vec![part(plate)],
+            &[part(plate)],
             &[centre],
             &[None],
             area,
@@ -135,7 +135,7 @@ fn a_part_longer_than_the_area_lies_aslant() {
     let plan = |turns: &str| {
         let parts = vec![part(Plate::Aerofoil)];
         TurnedPlan::new(
-            parts,
+            &parts,
             &[[0.0; 2]],
             &[Some(1)],
             area,
@@ -157,7 +157,7 @@ fn what_fits_as_it_is_takes_no_other_stacks() {
     let plan = |count| {
         let parts = vec![part(Plate::L)];
         let turns = "30deg".parse().unwrap();
-        TurnedPlan::new(parts, &[[0.0; 2]], &[count], area, GAP, BY_OUTLINES, turns).unwrap()
+        TurnedPlan::new(&parts, &[[0.0; 2]], &[count], area, GAP, BY_OUTLINES, turns).unwrap()
     };
     let found = plan(Some(4));
     assert_eq!((found.plain_copies(), found.stacks().len()), (4, 1));

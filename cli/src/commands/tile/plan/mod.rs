@@ -60,7 +60,7 @@ impl TileArgs {
         let centres: Vec<[f64; 2]> = from.iter().map(SlicedFrom::centre_mm).collect();
         let (area, gap) = (self.area_of(None, machine.as_ref()), self.gap_of(mesh.as_ref()));
         let pack = Pack { by: PackBy::Outlines, ..self.packing() };
-        let plan = TurnedPlan::new(parts, &centres, &self.counts(), area, gap, pack, turns)?;
+        let plan = TurnedPlan::new(&parts, &centres, &self.counts(), area, gap, pack, turns)?;
         self.tell_plan(&plan, turns, progress)?;
         for from in &from {
             self.tell_slicing(from, &plan, progress);
