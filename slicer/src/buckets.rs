@@ -70,11 +70,12 @@ impl Buckets {
             let piece = |block: usize| model.model.place_of(block).0;
             for blocks in blocks.chunk_by(|&a, &b| piece(a) == piece(b)) {
                 let piece = piece(blocks[0]);
+                let transform = model.transform_of(piece);
                 let write = |bucket, records: &mut _| write(&writer, bucket, records, piece);
                 for &block in blocks {
                     let mut result = Ok(());
                     model.model.for_each_in_block(block, |facet| {
-                        order.for_each_bucket(&model.placed_in_piece(facet, piece), |bucket| {
+                        order.for_each_bucket(&transform.placed(facet), |bucket| {
                             let records = &mut gathered[bucket];
                             records.extend_from_slice(&record(facet));
                             if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
@@ -187,11 +188,12 @@ impl FacetSource for SlabFacets<'_> {
 
     fn for_each_in(&self, piece: usize, mut each: impl FnMut(&PlacedFacet)) -> io::Result<()> {
         let Chunk { bytes, piece } = &self.chunks[piece];
+        let transform = self.model.transform_of(*piece);
         for_each_record(self.file, bytes.clone(), |record: &[u8; RECORD_BYTES]| {
             let (numbers, _) = record.as_chunks::<4>();
             let number = |i: usize| f32::from_le_bytes(numbers[i]);
             let facet = std::array::from_fn(|c| std::array::from_fn(|axis| number(3 * c + axis)));
-            each(&self.model.placed_in_piece(&facet, *piece));
+            each(&transform.placed(&facet));
         })
     }
 

@@ -61,6 +61,33 @@ impl Crossing {
     }
 }
 
+/// A crossing in 32 bits, for small images: the row, and the column and direction below it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ShortCrossing(u32);
+
+impl ShortCrossing {
+    /// Returns whether all crossings of an image can be short.
+    fn hold(grid: &PixelGrid) -> bool {
+        grid.height <= 1 << 16 && grid.width <= 1 << 15
+    }
+
+    #[inline]
+    fn new(crossing: Crossing) -> Self {
+        Self((crossing.0 >> 16) as u32 | crossing.0 as u32)
+    }
+
+    #[inline]
+    pub(crate) fn row(self) -> usize {
+        (self.0 >> 16) as usize
+    }
+
+    /// Returns the column and direction.
+    #[inline]
+    pub(crate) fn in_row(self) -> RowCrossing {
+        RowCrossing(self.0 & 0xFFFF)
+    }
+}
+
 /// A crossing in its row: column and direction in 32 bits, to sort by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct RowCrossing(u32);
@@ -181,6 +208,8 @@ impl RowSegment {
 #[derive(Debug, Default)]
 pub(crate) struct LayerShare {
     crossings: Vec<Crossing>,
+    /// Crossings of small images, where they need not be known by body.
+    pub(crate) short: Vec<ShortCrossing>,
     /// Segments whose crossings would take more memory, where crossings need not be known by body.
     pub(crate) segments: Vec<RowSegment>,
     /// From which crossing on they are of which body; those before are of body 0.
@@ -197,6 +226,7 @@ impl LayerShare {
     /// Empties the lists, which keep their memory.
     pub(crate) fn clear(&mut self) {
         self.crossings.clear();
+        self.short.clear();
         self.segments.clear();
         self.bodies.clear();
         self.kept.clear();
@@ -213,7 +243,7 @@ impl LayerShare {
         &mut self.crossings
     }
 
-    /// Returns all crossings but those of segments.
+    /// Returns all crossings but short ones and those of segments.
     pub(crate) fn crossings(&self) -> &[Crossing] {
         &self.crossings
     }
@@ -248,31 +278,36 @@ pub(crate) struct SegmentEnd {
 impl Cutter<'_> {
     /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and returns
     /// the number of crossings that take as much memory. Segments that cross many rows are kept
-    /// as such if `keeps_segments`.
+    /// as such, and crossings of small images are short, if `needs_no_body`.
     #[inline]
     pub(crate) fn cut(
         &self,
         facet: &PlacedFacet,
         body: u32,
-        keeps_segments: bool,
+        needs_no_body: bool,
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
         const AS_MUCH: usize = size_of::<RowSegment>() / size_of::<Crossing>();
         let mut count = 0;
         let (fill, salt) = (self.rule.fill(), self.rule.salt(body));
+        let is_short = needs_no_body && ShortCrossing::hold(self.grid);
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
             share.ends.add([a, b], segment.is_reversed, fill, salt);
             let Some(segment) = self.row_segment(a, b, segment.is_reversed) else { return };
-            if keeps_segments && segment.rows().len() > AS_MUCH {
+            let (rows, crossing) = (segment.rows(), |row| segment.crossing(self.grid, row));
+            if needs_no_body && rows.len() > AS_MUCH {
                 count += AS_MUCH;
-                return share.segments.push(segment);
+                share.segments.push(segment);
+            } else if is_short {
+                count += rows.len().div_ceil(2);
+                share.short.extend(rows.map(|row| ShortCrossing::new(crossing(row))));
+            } else {
+                count += rows.len();
+                share.of_body(body).extend(rows.map(crossing));
             }
-            count += segment.rows().len();
-            let list = share.of_body(body);
-            segment.rows().for_each(|row| list.push(segment.crossing(self.grid, row)));
         });
         count
     }
@@ -328,7 +363,11 @@ impl Cutter<'_> {
         let [low, middle, high] = sorted.order;
         let long = [low, high];
         let short = [[low, middle], [middle, high]];
-        let second = self.planes.at_or_below(sorted.corners[1][Z]);
+        let second_z = sorted.corners[1][Z];
+        let second = match met.len() {
+            1 => met.start + usize::from(self.planes.z_um(met.start) <= second_z),
+            _ => self.planes.at_or_below(second_z),
+        };
         sorted.for_each_line(
             met,
             second,

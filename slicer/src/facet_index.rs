@@ -104,7 +104,7 @@ impl FacetIndex {
         for block in blocks {
             let (piece, _) = model.model.place_of(block);
             model.model.for_each_in_block(block, |facet| {
-                let met = bins.of_facet(&model.placed_in_piece(facet, piece));
+                let met = bins.of_facet(&model.transform_of(piece).placed(facet));
                 // There is room for all, unless the file changed.
                 let Some(place) = facets.put(met.start, (*facet, piece as u32)) else { return };
                 for bin in met.start + 1..met.end {
@@ -159,7 +159,7 @@ impl FacetIndex {
     }
 
     fn placed(&self, (facet, piece): &(Facet, u32)) -> PlacedFacet {
-        self.model.placed_in_piece(facet, *piece as usize)
+        self.model.transform_of(*piece as usize).placed(facet)
     }
 }
 

@@ -46,6 +46,7 @@ mod error;
 pub mod exact;
 mod facet;
 mod facet_index;
+mod file_blocks;
 mod gray;
 mod grid;
 mod image_rows;

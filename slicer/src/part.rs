@@ -10,13 +10,14 @@ use lamp_stack::{digest_of, digest_of_digests};
 use crate::bodies::{Bodies, FillRule};
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
+use crate::file_blocks::FileBlock;
 use crate::part_file::PartFile;
 use crate::placement::Placement;
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
 use crate::table::Fill;
 
 /// The facets of a block, in which they are read: 200 kB of a binary file.
-const BLOCK_FACETS: usize = 4096;
+pub(crate) const BLOCK_FACETS: usize = 4096;
 /// Facets of surfaces are fewer and cost more, and all threads should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
 
@@ -82,6 +83,14 @@ impl Facets {
         match self {
             Self::Surfaces { .. } => BLOCK_SURFACE_FACETS,
             _ => BLOCK_FACETS,
+        }
+    }
+
+    /// Returns what was seen of the block that begins with a facet when the file was opened.
+    pub(crate) fn seen_block(&self, first: usize) -> Option<&FileBlock> {
+        match self {
+            Self::Binary { file, .. } => file.seen_blocks().get(first / BLOCK_FACETS),
+            _ => None,
         }
     }
 

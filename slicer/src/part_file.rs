@@ -11,9 +11,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use lamp_stack::digest_of;
+use lamp_stack::digest_of_range;
 
 use crate::error::FileChange;
+use crate::file_blocks::{FileBlock, FileLooks};
+use crate::stl::{HEADER_BYTES, binary_facets};
 
 /// The bytes that are read at once: few enough to stay in a processor's cache.
 const READ_BYTES: usize = 1 << 15;
@@ -29,6 +31,8 @@ pub(crate) struct PartFile {
     shared: Option<(PathBuf, FileState)>,
     size: u64,
     digest: String,
+    /// What was seen of its blocks if it is a binary STL.
+    seen: Vec<FileBlock>,
 }
 
 impl PartFile {
@@ -40,9 +44,7 @@ impl PartFile {
         let state = FileState::of(&file.metadata()?);
         let size = state.size;
         let shared = Some((path.to_owned(), state));
-        let mut this = Self { file, shared, size, digest: String::new() };
-        this.digest = this.digest_now()?;
-        Ok(this)
+        Self { file, shared, size, digest: String::new(), seen: Vec::new() }.seen()
     }
 
     /// Keeps a stream in a temporary file that has no name.
@@ -52,15 +54,28 @@ impl PartFile {
     pub(crate) fn of_stream(mut stream: impl Read) -> io::Result<Self> {
         let mut file = tempfile::tempfile()?;
         let size = io::copy(&mut stream, &mut file)?;
-        let mut this = Self { file, shared: None, size, digest: String::new() };
-        this.digest = this.digest_now()?;
-        Ok(this)
+        Self { file, shared: None, size, digest: String::new(), seen: Vec::new() }.seen()
+    }
+
+    /// Reads all bytes once, for the digest and for what a survey asks.
+    fn seen(mut self) -> io::Result<Self> {
+        let Some(count) = binary_facets(self.size, &self.start(HEADER_BYTES)?) else {
+            self.digest = self.digest_now()?;
+            return Ok(self);
+        };
+        let looks = FileLooks::new(count);
+        let read_at = |to: &mut [u8], at: u64| read_exact_at(&self.file, to, at);
+        let digest = digest_of_range(self.size, |to, at| {
+            read_at(to, at)?;
+            looks.look(to, at, read_at)
+        })?;
+        Ok(Self { digest, seen: looks.blocks(), ..self })
     }
 
     /// Takes a temporary file with this one's content in another form. Its digest is
     /// this one's.
     pub(crate) fn in_other_form(&self, file: File, size: u64) -> Self {
-        Self { file, shared: None, size, digest: self.digest.clone() }
+        Self { file, shared: None, size, digest: self.digest.clone(), seen: Vec::new() }
     }
 
     /// Returns the first bytes, at most `count`.
@@ -78,6 +93,12 @@ impl PartFile {
     /// Returns the digest of all bytes.
     pub(crate) fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// Returns what was seen of the file's blocks when it was opened; nothing unless it is a binary
+    /// STL.
+    pub(crate) fn seen_blocks(&self) -> &[FileBlock] {
+        &self.seen
     }
 
     /// Returns a reader of all bytes, from the first.
@@ -122,7 +143,7 @@ impl PartFile {
     }
 
     fn digest_now(&self) -> io::Result<String> {
-        digest_of(self.reader().take(self.size))
+        digest_of_range(self.size, |to, at| read_exact_at(&self.file, to, at))
     }
 }
 

@@ -9,6 +9,7 @@ use lamp_brep::Prepared;
 
 use crate::exact::PlacedSurfaces;
 use crate::facet::{Facet, Units};
+use crate::file_blocks::FileBlock;
 use crate::part::{Part, Piece};
 
 /// An axis of part coordinates.
@@ -139,7 +140,20 @@ pub type PlacedFacet = [[f64; 3]; 3];
 #[inline]
 pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
     let [a, b, c] = facet.map(|corner| corner[2]);
-    (a.min(b).min(c), a.max(b).max(c))
+    (lesser(lesser(a, b), c), greater(greater(a, b), c))
+}
+
+/// Returns the lesser of two numbers. `f64::min` looks for those that are none, and takes several
+/// times as long.
+#[inline]
+pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// Returns the greater of two numbers.
+#[inline]
+pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
 }
 
 /// A part in its place.
@@ -245,6 +259,14 @@ impl PlacedPart {
         Some((surfaces, first as u32))
     }
 
+    /// Returns what was seen of a block when its file was opened, and the scales of its axes from
+    /// file units to the place; none unless that is all that places it.
+    pub(crate) fn seen_block(&self, block: usize) -> Option<(&FileBlock, [f64; 3])> {
+        let (piece, facets) = self.model.place_of(block);
+        let Transform::Scale(scale) = self.transform_of(piece) else { return None };
+        Some((self.model.pieces()[piece].facets.seen_block(facets.start)?, scale))
+    }
+
     /// Calls `each` with every facet of a block.
     pub(crate) fn for_each_in_block(
         &self,
@@ -253,7 +275,7 @@ impl PlacedPart {
     ) -> io::Result<()> {
         // Two loops, so that neither asks at every facet which one it is.
         let (piece, _) = self.model.place_of(block);
-        match self.transforms[self.pieces[piece].transform] {
+        match self.transform_of(piece) {
             Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {
                 each(&placed(facet, |corner| scaled(&scale, corner)));
             }),
@@ -263,10 +285,9 @@ impl PlacedPart {
         }
     }
 
-    /// Places a facet of a piece.
-    #[inline]
-    pub(crate) fn placed_in_piece(&self, facet: &Facet, piece: usize) -> PlacedFacet {
-        self.transforms[self.pieces[piece].transform].placed(facet)
+    /// Returns the transform of a piece.
+    pub(crate) fn transform_of(&self, piece: usize) -> Transform {
+        self.transforms[self.pieces[piece].transform]
     }
 }
 

@@ -35,7 +35,7 @@ pub fn ceil_clamped(value: f64, max: u32) -> u32 {
 /// are nearly even are found fast: by a guess, and a walk from there.
 #[inline]
 pub fn count_at_or_below(rising: &[f64], value: f64, guess: f64) -> usize {
-    let mut count = (guess as usize).min(rising.len());
+    let mut count = ((guess as i32).max(0) as usize).min(rising.len());
     while count < rising.len() && rising[count] <= value {
         count += 1;
     }
@@ -57,23 +57,24 @@ pub struct SortedFacet<const ALONG: usize> {
 }
 
 impl<const ALONG: usize> SortedFacet<ALONG> {
-    /// Sorts a facet's corners.
+    /// Sorts a facet's corners; equal ones stay in their order.
     #[inline]
     pub fn new(corners: [[f64; 3]; 3]) -> Self {
-        let mut sorted = Self { corners, order: [0, 1, 2], is_flipped: false };
-        sorted.order_pair(0);
-        sorted.order_pair(1);
-        sorted.order_pair(0);
-        sorted
-    }
-
-    #[inline]
-    fn order_pair(&mut self, first: usize) {
-        if self.corners[first + 1][ALONG] < self.corners[first][ALONG] {
-            self.corners.swap(first, first + 1);
-            self.order.swap(first, first + 1);
-            self.is_flipped = !self.is_flipped;
-        }
+        // By a table: facets come in any order, so a processor could not predict branches.
+        const ORDERS: [([u8; 3], bool); 8] = {
+            let impossible = ([0, 1, 2], false);
+            let mut orders = [impossible; 8];
+            orders[0b001] = ([1, 0, 2], true);
+            orders[0b010] = ([0, 2, 1], true);
+            orders[0b101] = ([1, 2, 0], false);
+            orders[0b110] = ([2, 0, 1], false);
+            orders[0b111] = ([2, 1, 0], true);
+            orders
+        };
+        let [a, b, c] = corners.map(|corner| corner[ALONG]);
+        let falls = usize::from(b < a) | usize::from(c < b) << 1 | usize::from(c < a) << 2;
+        let (order, is_flipped) = ORDERS[falls];
+        Self { corners: order.map(|corner| corners[usize::from(corner)]), order, is_flipped }
     }
 
     /// Calls `each` with each of some lines across the facet, the points of the long and

@@ -23,17 +23,29 @@ pub(crate) const FACET_BYTES: usize = 50;
 /// Returns an error if it is neither, contradicts itself or cannot be read.
 pub(crate) fn open(file: &Arc<PartFile>, start: &[u8]) -> Result<Facets, SliceError> {
     let size = file.size();
-    let declared = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
-    match declared {
-        Some(count) if HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size => {
-            Ok(Facets::Binary { file: file.clone(), count: count as usize })
-        }
+    if let Some(count) = binary_facets(size, start) {
+        return Ok(Facets::Binary { file: file.clone(), count });
+    }
+    match declared_count(start) {
         _ if ascii::looks_ascii(start, start.len() as u64 == size) => {
             Ok(Facets::Memory(Arc::new(ascii::read(BufReader::new(file.reader()))?)))
         }
         Some(declared) => Err(SliceError::Count { declared, size }),
         None => Err(SliceError::NotStl { size }),
     }
+}
+
+/// Returns the number of facets that a binary file says to have.
+fn declared_count(start: &[u8]) -> Option<u32> {
+    start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()))
+}
+
+/// Returns the number of facets of a binary file that starts with these bytes, if its size is that
+/// of one.
+pub(crate) fn binary_facets(size: u64, start: &[u8]) -> Option<usize> {
+    let count = declared_count(start)?;
+    let is_size = HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size;
+    is_size.then_some(count as usize)
 }
 
 /// Returns the corners of a binary facet.

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
-use crate::placement::{PlacedFacet, PlacedPart};
+use crate::file_blocks::FileBlock;
+use crate::placement::{PlacedFacet, PlacedPart, greater, lesser};
 use crate::planes::Planes;
 use crate::wild;
 
@@ -45,6 +46,11 @@ impl BlockSurvey {
         Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0, facets: 0, heights_um: 0.0 };
 
     fn of(model: &PlacedPart, block: usize) -> io::Result<Result<Self, SliceError>> {
+        if let Some((seen, scale)) = model.seen_block(block)
+            && seen.is_finite
+        {
+            return Ok(Ok(Self::scaled(seen, scale)));
+        }
         let mut whole = Self::EMPTY;
         let mut finite = true;
         model.for_each_in_block(block, |facet| {
@@ -61,10 +67,24 @@ impl BlockSurvey {
         Ok(if finite { Ok(whole) } else { Err(not_finite(model, block)?) })
     }
 
+    /// Places what was seen of a block of a file. Products rise with their factors, so corners of
+    /// the box are those of the placed facets.
+    fn scaled(seen: &FileBlock, scale: [f64; 3]) -> Self {
+        let ends =
+            |axis: usize| [seen.min[axis], seen.max[axis]].map(|end| f64::from(end) * scale[axis]);
+        Self {
+            min: std::array::from_fn(|axis| lesser(ends(axis)[0], ends(axis)[1])),
+            max: std::array::from_fn(|axis| greater(ends(axis)[0], ends(axis)[1])),
+            yz_area: seen.yz_area * (scale[1] * scale[2]).abs(),
+            facets: seen.facets,
+            heights_um: seen.heights * scale[2].abs(),
+        }
+    }
+
     fn joined(self, other: Self) -> Self {
         Self {
-            min: std::array::from_fn(|axis| self.min[axis].min(other.min[axis])),
-            max: std::array::from_fn(|axis| self.max[axis].max(other.max[axis])),
+            min: std::array::from_fn(|axis| lesser(self.min[axis], other.min[axis])),
+            max: std::array::from_fn(|axis| greater(self.max[axis], other.max[axis])),
             yz_area: self.yz_area + other.yz_area,
             facets: self.facets + other.facets,
             heights_um: self.heights_um + other.heights_um,
@@ -75,8 +95,8 @@ impl BlockSurvey {
 #[inline]
 fn facet_box([a, b, c]: &PlacedFacet) -> ([f64; 3], [f64; 3]) {
     (
-        std::array::from_fn(|axis| a[axis].min(b[axis]).min(c[axis])),
-        std::array::from_fn(|axis| a[axis].max(b[axis]).max(c[axis])),
+        std::array::from_fn(|axis| lesser(lesser(a[axis], b[axis]), c[axis])),
+        std::array::from_fn(|axis| greater(greater(a[axis], b[axis]), c[axis])),
     )
 }
 
@@ -238,5 +258,58 @@ impl Survey {
                 sum
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use lamp_fixtures::sphere;
+
+    use super::*;
+    use crate::facet::Units;
+    use crate::open::OpenOptions;
+    use crate::part::Part;
+    use crate::placement::{Axis, Placement};
+    use crate::stl::write_stl;
+
+    /// Facets of blocks, and pieces of the file that are hashed at once, begin and end astride.
+    #[test]
+    fn what_opening_a_file_saw_is_what_its_facets_say() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.stl");
+        for count in [8, 1_500, 20_000] {
+            let facets = sphere(10.0, count).facets;
+            let mut stl = Vec::new();
+            write_stl(facets.iter().copied(), &mut stl).unwrap();
+            fs::write(&path, &stl).unwrap();
+            let mirrored = Placement::default().scaled([-1.5, 0.3, -7.0]);
+            let turned = Placement::default().rotated(Axis::X, 40.0);
+            for placement in [Placement::default(), mirrored, turned] {
+                let [opened, held] = [
+                    Part::open(&path, &OpenOptions::default()).unwrap(),
+                    Part::from_facets("part", facets.clone()),
+                ]
+                .map(|part| Survey::of(&PlacedPart::new(part, &placement, Units::Inches)).unwrap());
+                assert_eq!((opened.min, opened.max), (held.min, held.max));
+                assert_eq!(opened.blocks.len(), held.blocks.len());
+                for (opened, held) in opened.blocks.iter().zip(&held.blocks) {
+                    assert_eq!((opened.min, opened.max), (held.min, held.max));
+                    assert_eq!(opened.facets, held.facets);
+                    for (a, b) in
+                        [(opened.yz_area, held.yz_area), (opened.heights_um, held.heights_um)]
+                    {
+                        assert!((a - b).abs() <= 1e-5 * b, "{a} {b}");
+                    }
+                }
+            }
+            stl[84 + 50 * 5 + 12..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+            fs::write(&path, &stl).unwrap();
+            let part = Part::open(&path, &OpenOptions::default()).unwrap();
+            let part = PlacedPart::new(part, &Placement::default(), Units::default());
+            let error = Survey::of(&part).unwrap_err();
+            assert!(matches!(error, SliceError::NotFinite { facet: 5, .. }), "{error}");
+        }
     }
 }

@@ -158,7 +158,7 @@ impl Table {
         self.tally = Tally::default();
         let tally = &self.tally;
         let has_surfaces = (0..facets.pieces()).any(|piece| facets.surfaces(piece).is_some());
-        let keeps_segments = !cutter.rule.has_bodies() && !has_surfaces;
+        let needs_no_body = !cutter.rule.has_bodies() && !has_surfaces;
         self.shares.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
             shares.iter_mut().for_each(LayerShare::clear);
             shares.resize_with(shares.len().max(layers.len()), LayerShare::default);
@@ -184,7 +184,7 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, body, keeps_segments, &layers, shares);
+                        unclaimed += cutter.cut(facet, body, needs_no_body, &layers, shares);
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, body, reach_um, &layers, shares);
                         }
@@ -305,6 +305,7 @@ impl Table {
         others: &[(u32, Crossing)],
     ) -> Grouped<RowCrossing> {
         const BINS: usize = 256;
+        let short = || self.shares(layer).flat_map(|share| &share.short);
         let singles = || {
             let of_facets = self.shares(layer).flat_map(LayerShare::crossings);
             of_facets.chain(others.iter().map(|(_, crossing)| crossing)).copied()
@@ -314,6 +315,7 @@ impl Table {
         let segments = || self.shares(layer).flat_map(|share| &share.segments).map(in_bin);
         let segments = Grouped::new(BINS, segments).into_items();
         let mut counts = KeyCounts::new(grid.height as usize);
+        short().for_each(|crossing| counts.add(crossing.row()));
         singles().for_each(|crossing| counts.add(crossing.row()));
         segments.iter().for_each(|segment| {
             let rows = segment.rows();
@@ -321,6 +323,9 @@ impl Table {
         });
         let mut rows = counts.into_groups();
         let fits = "as many crossings as before";
+        short().for_each(|crossing| {
+            rows.put(crossing.row(), crossing.in_row()).expect(fits);
+        });
         singles().for_each(|crossing| {
             rows.put(crossing.row(), crossing.in_row()).expect(fits);
         });

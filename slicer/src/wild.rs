@@ -96,7 +96,7 @@ fn samples(part: &PlacedPart) -> io::Result<Vec<Point>> {
         let count = piece.facets.count();
         while next < count {
             let facet: Facet = part.model.facet(number, next)?;
-            samples.extend(part.placed_in_piece(&facet, number).map(in_mm));
+            samples.extend(part.transform_of(number).placed(&facet).map(in_mm));
             next += step;
         }
         next -= count;

@@ -80,7 +80,7 @@ pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use coverage::mean_levels;
 pub use depth_levels::{DepthLevels, LevelSteps};
 pub use difference::{Difference, Overlaid};
-pub use digest::{digest_of, digest_of_digests};
+pub use digest::{digest_of, digest_of_digests, digest_of_range};
 pub use error::{PageFault, StackError, UnsupportedFeature};
 pub use fading_levels::FadingLevels;
 pub use find::stacks_in;
