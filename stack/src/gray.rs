@@ -58,6 +58,19 @@ impl GrayMask {
         Self::without_rows(width)
     }
 
+    /// Creates an image from where each row's changes start, and last where they all end, and the
+    /// changes of all rows.
+    ///
+    /// # Errors
+    /// Returns an error if they break the guarantees of [`RunImage`].
+    pub fn from_changes(
+        width: u32,
+        row_offsets: Vec<u32>,
+        changes: Vec<LevelChange>,
+    ) -> Result<Self, RunError> {
+        Self::from_arrays(width, row_offsets, changes)
+    }
+
     /// Returns the number of pixels that are not black.
     pub(crate) fn exposed_pixels(&self) -> u64 {
         let of_row = |changes: &[LevelChange]| {
@@ -135,6 +148,8 @@ pub fn gray_runs(changes: &[LevelChange], width: u32) -> impl Iterator<Item = (u
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn change(column: u32, level: u8) -> LevelChange {
@@ -156,6 +171,34 @@ mod tests {
         assert!(image.push_runs([(10, 1), (1, 0)]).is_err());
         assert!(image.push_runs([(u32::MAX, 1), (u32::MAX, 0)]).is_err());
         assert_eq!(image.height(), 4);
+    }
+
+    proptest! {
+        #[test]
+        fn changes_of_all_rows_are_checked_as_those_of_each(
+            rows in prop::collection::vec(prop::collection::vec((0u32..4, 0u8..3), 0..4), 1..4),
+            width in 1u32..10,
+        ) {
+            let mut column = 0;
+            let of_row = |row: &Vec<(u32, u8)>| {
+                column = 0;
+                let changes = row.iter().map(|&(gap, level)| {
+                    column += gap;
+                    change(column, level)
+                });
+                changes.collect::<Vec<_>>()
+            };
+            let rows: Vec<_> = rows.iter().map(of_row).collect();
+            let mut image = GrayMask::new(width);
+            let pushed = rows.iter().try_for_each(|row| image.push_row(row));
+            let ends = rows.iter().scan(0, |end, row| {
+                *end += row.len() as u32;
+                Some(*end)
+            });
+            let offsets = std::iter::once(0).chain(ends).collect();
+            let made = GrayMask::from_changes(width, offsets, rows.concat());
+            prop_assert_eq!(made, pushed.map(|()| image));
+        }
     }
 
     #[test]

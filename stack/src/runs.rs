@@ -126,8 +126,10 @@ impl<C: Change> RunImage<C> {
         if !image.has_partition() {
             return Err(RunError::Offsets);
         }
-        for (row, changes) in image.rows().enumerate() {
-            image.check_row(row, changes)?;
+        if !image.rows().all(|changes| image.is_canonical(changes)) {
+            for (row, changes) in image.rows().enumerate() {
+                image.check_row(row, changes)?;
+            }
         }
         Ok(image)
     }
@@ -287,6 +289,18 @@ impl<C: Change> RunImage<C> {
     pub(crate) fn push_black_rows(&mut self, rows: u32) {
         let end = self.changes.len() as u32;
         self.row_offsets.resize(self.row_offsets.len() + rows as usize, end);
+    }
+
+    /// Returns whether a row keeps the guarantees, in one pass.
+    #[inline]
+    fn is_canonical(&self, changes: &[C]) -> bool {
+        let (mut least, mut pixel, mut is_canonical) = (0, C::Pixel::default(), true);
+        for &change in changes {
+            let next = change.after(pixel);
+            is_canonical &= change.column() >= least && next != pixel;
+            (least, pixel) = (change.column().saturating_add(1), next);
+        }
+        is_canonical && changes.last().is_none_or(|last| last.column() < self.width)
     }
 
     fn check_row(&self, row: usize, changes: &[C]) -> Result<(), RunError> {

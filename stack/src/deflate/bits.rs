@@ -14,26 +14,29 @@ pub(super) struct BitWriter {
 }
 
 impl BitWriter {
-    /// Starts behind bytes.
-    pub(super) fn after(bytes: Vec<u8>) -> Self {
-        Self { len: bytes.len(), bytes, held: 0, count: 0 }
+    /// Starts behind some bytes, with room for about so many.
+    pub(super) fn after(first: &[u8], room: usize) -> Self {
+        let mut bytes = Vec::with_capacity(first.len() + room);
+        bytes.extend_from_slice(first);
+        bytes.resize(bytes.capacity(), 0);
+        Self { len: first.len(), bytes, held: 0, count: 0 }
     }
 
     /// Appends the lowest `count` bits of `bits`, at most [`MOST_PUT`]; those above are zero.
     #[inline]
     pub(super) fn put(&mut self, bits: u64, count: u8) {
-        self.held |= bits << self.count;
-        self.count += count;
-        let whole = self.count / 8;
-        // Eight at once is faster than as many as there are.
-        let end = self.len + 8;
+        // No more than 63 bits: fewer than eight were held.
+        self.held |= bits.wrapping_shl(self.count.into());
+        let count = self.count.wrapping_add(count);
+        // Eight bytes at once are faster than as many as there are.
+        let end = self.len.wrapping_add(8);
         if end > self.bytes.len() {
             self.make_room();
         }
         self.bytes[self.len..end].copy_from_slice(&self.held.to_le_bytes());
-        self.len += usize::from(whole);
-        self.held = self.held.unbounded_shr(8 * u32::from(whole));
-        self.count %= 8;
+        self.len = self.len.wrapping_add(usize::from(count / 8));
+        self.held = self.held.wrapping_shr((count & !7).into());
+        self.count = count % 8;
     }
 
     #[cold]

@@ -5,7 +5,7 @@ use super::huffman::{code_lengths, codes};
 use super::{
     END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, MOST_COPIED, MOST_LENGTH_BITS, SYMBOLS, copies_of,
 };
-use crate::gray::GrayMask;
+use crate::gray::{GrayMask, LevelChange};
 
 /// The number of runs in a block: enough that its codes take a hundredth of it.
 const BLOCK_RUNS: usize = 1 << 14;
@@ -14,47 +14,35 @@ const ZLIB_HEADER: [u8; 2] = [0x78, 0x9C];
 
 /// Encodes a gray mask as a zlib stream of its bytes, row by row.
 pub(crate) fn encode(image: &GrayMask) -> Vec<u8> {
-    let runs = byte_runs(image);
-    let mut out = BitWriter::after(ZLIB_HEADER.to_vec());
-    let blocks = runs.len().div_ceil(BLOCK_RUNS).max(1);
-    for block in 0..blocks {
-        let runs = &runs[block * BLOCK_RUNS..runs.len().min((block + 1) * BLOCK_RUNS)];
-        put_block(&mut out, runs, block + 1 == blocks);
-    }
-    let mut bytes = out.finish();
-    bytes.extend_from_slice(&adler32(&runs).to_be_bytes());
-    bytes
-}
-
-/// Returns the runs `(length, byte)` of all rows; they go on from row to row.
-fn byte_runs(image: &GrayMask) -> Vec<(u32, u8)> {
-    let mut runs = ByteRuns::with_room(image.change_count() + image.height() as usize + 1);
+    // Most runs take less than four bytes.
+    let mut out = BitWriter::after(&ZLIB_HEADER, 4 * image.change_count());
+    let mut runs = ByteRuns { block: Block::new(), out: &mut out, byte: 0, since: 0 };
     for (row, changes) in (0..).zip(image.rows()) {
         let start = row * u64::from(image.width());
         if changes.first().is_none_or(|first| first.column > 0) {
             runs.change_at(start, 0);
         }
         for change in changes {
-            runs.change_at(start + u64::from(change.column), change.level);
+            runs.change_at(start.wrapping_add(change.column.into()), change.level);
         }
     }
     runs.end_at(u64::from(image.width()) * u64::from(image.height()));
-    runs.runs
+    runs.block.put(runs.out, true);
+    let mut bytes = out.finish();
+    bytes.extend_from_slice(&adler32(image).to_be_bytes());
+    bytes
 }
 
-/// Runs that are made from the first pixel on.
-struct ByteRuns {
-    runs: Vec<(u32, u8)>,
+/// Runs `(length, byte)` that are made from the first pixel on; they go on from row to row.
+struct ByteRuns<'a> {
+    block: Block,
+    out: &'a mut BitWriter,
     /// The byte of the run that has begun, and its first pixel.
     byte: u8,
     since: u64,
 }
 
-impl ByteRuns {
-    fn with_room(runs: usize) -> Self {
-        Self { runs: Vec::with_capacity(runs), byte: 0, since: 0 }
-    }
-
+impl ByteRuns<'_> {
     #[inline]
     fn change_at(&mut self, pixel: u64, byte: u8) {
         if byte != self.byte {
@@ -65,47 +53,114 @@ impl ByteRuns {
 
     #[inline]
     fn end_at(&mut self, pixel: u64) {
+        match u32::try_from(pixel.wrapping_sub(self.since)) {
+            Ok(0) => {}
+            Ok(length) => self.push(length),
+            Err(_) => self.push_cut(pixel),
+        }
+    }
+
+    /// Cuts a run of a huge image where its length would not fit.
+    #[cold]
+    fn push_cut(&mut self, pixel: u64) {
         let mut length = pixel - self.since;
-        // A run of a huge image is cut where its length would not fit.
-        while length > u64::from(u32::MAX) {
-            self.runs.push((u32::MAX, self.byte));
-            length -= u64::from(u32::MAX);
+        while length > 0 {
+            let some = u32::try_from(length).unwrap_or(u32::MAX);
+            self.push(some);
+            length -= u64::from(some);
         }
-        if length > 0 {
-            self.runs.push((length as u32, self.byte));
+    }
+
+    #[inline]
+    fn push(&mut self, length: u32) {
+        if self.block.runs.len() == BLOCK_RUNS {
+            self.block.put(self.out, false);
         }
+        self.block.push(Copies::of(length), self.byte);
     }
 }
 
 /// A run as it is written: bytes, then copies of the last.
+#[derive(Clone, Copy)]
 struct Copies {
-    /// The number of bytes that are written as such: one, or up to three if no copy is left.
-    bytes: u32,
     longest: u32,
     /// The length of a last copy that is shorter than the longest, or zero.
-    last: u32,
+    last: u16,
+    /// The number of bytes that are written as such: one, or up to three if no copy is left.
+    bytes: u8,
 }
 
 impl Copies {
     #[inline]
     fn of(length: u32) -> Self {
-        let (longest, last) = ((length - 1) / MOST_COPIED, (length - 1) % MOST_COPIED);
+        let copied = length.wrapping_sub(1);
+        let (longest, last) = (copied / MOST_COPIED, (copied % MOST_COPIED) as u16);
         // No copy is shorter than three.
-        let bytes = if last < 3 { 1 + last } else { 1 };
-        Self { bytes, longest, last: if last < 3 { 0 } else { last } }
+        let is_short = last < 3;
+        let bytes = if is_short { 1 + last as u8 } else { 1 };
+        Self { longest, last: if is_short { 0 } else { last }, bytes }
     }
 }
 
-fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
-    let lengths = code_lengths(&frequencies(runs), MOST_BITS);
-    let codes = codes(&lengths);
-    out.put(u32::from(is_last).into(), 1);
-    // Codes of its own.
-    out.put(2, 2);
-    put_lengths(out, &lengths);
-    let code = |symbol: usize| Bits { bits: codes[symbol].into(), count: lengths[symbol] };
+/// Runs that share their codes, and how often each symbol occurs in them.
+struct Block {
+    runs: Vec<(Copies, u8)>,
+    bytes: [u32; 256],
+    last: [u32; MOST_COPIED as usize],
+    longest: u64,
+}
+
+impl Block {
+    fn new() -> Self {
+        let runs = Vec::with_capacity(BLOCK_RUNS);
+        Self { runs, bytes: [0; 256], last: [0; MOST_COPIED as usize], longest: 0 }
+    }
+
+    /// Adds a run. Counts of so many fit in 32 bits.
+    #[inline]
+    fn push(&mut self, copies: Copies, byte: u8) {
+        let of_byte = &mut self.bytes[usize::from(byte)];
+        *of_byte = of_byte.wrapping_add(copies.bytes.into());
+        let of_last = &mut self.last[usize::from(copies.last)];
+        *of_last = of_last.wrapping_add(1);
+        self.longest = self.longest.wrapping_add(copies.longest.into());
+        self.runs.push((copies, byte));
+    }
+
+    /// Returns how often each symbol occurs.
+    fn frequencies(&self) -> [u32; SYMBOLS] {
+        let mut frequencies = [0; SYMBOLS];
+        frequencies[..256].copy_from_slice(&self.bytes);
+        frequencies[usize::from(END_OF_BLOCK)] = 1;
+        for (length, times) in (0..).zip(self.last).skip(3) {
+            frequencies[usize::from(length_symbol(length))] += times;
+        }
+        // A block of one colour may count beyond 32 bits; codes need no more than the order.
+        let longest = self.longest + u64::from(frequencies[SYMBOLS - 1]);
+        frequencies[SYMBOLS - 1] = longest.try_into().unwrap_or(u32::MAX);
+        frequencies
+    }
+
+    /// Writes the block, and empties it.
+    fn put(&mut self, out: &mut BitWriter, is_last: bool) {
+        let lengths = code_lengths(&self.frequencies(), MOST_BITS);
+        let codes = codes(&lengths);
+        out.put(u32::from(is_last).into(), 1);
+        // Codes of its own.
+        out.put(2, 2);
+        put_lengths(out, &lengths);
+        let code = |symbol: usize| Bits { bits: codes[symbol].into(), count: lengths[symbol] };
+        put_runs(out, &self.runs, code);
+        let end = code(END_OF_BLOCK.into());
+        out.put(end.bits, end.count);
+        self.runs.clear();
+        (self.bytes, self.last, self.longest) = ([0; 256], [0; MOST_COPIED as usize], 0);
+    }
+}
+
+fn put_runs(out: &mut BitWriter, runs: &[(Copies, u8)], code: impl Fn(usize) -> Bits) {
     // Once, twice and thrice: at most 45 bits.
-    let once: [Bits; 256] = std::array::from_fn(code);
+    let once: [Bits; 256] = std::array::from_fn(&code);
     let twice = once.map(|byte| byte.then(byte));
     let bytes = [once, twice, std::array::from_fn(|byte| once[byte].then(twice[byte]))];
     // The only distance, from the byte before, is a zero bit.
@@ -120,13 +175,11 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
         let more = Bits { bits: length as u64 - u64::from(first), count };
         code(symbol.into()).then(more).then(zero)
     });
-    for &(length, byte) in runs {
-        let copies = Copies::of(length);
-        let first = bytes[copies.bytes as usize - 1][usize::from(byte)];
-        let last = last[copies.last as usize];
-        let bits = first.count + last.count;
-        if u64::from(longest.once) * u64::from(copies.longest) + u64::from(bits) <= MOST_PUT.into()
-        {
+    for &(copies, byte) in runs {
+        let first = bytes[usize::from(copies.bytes.wrapping_sub(1))][usize::from(byte)];
+        let last = last[usize::from(copies.last)];
+        let others = u64::from(first.count.wrapping_add(last.count));
+        if longest.bits_of(copies.longest).wrapping_add(others) <= MOST_PUT.into() {
             let all = first.then(longest.times(copies.longest)).then(last);
             out.put(all.bits, all.count);
         } else {
@@ -135,29 +188,6 @@ fn put_block(out: &mut BitWriter, runs: &[(u32, u8)], is_last: bool) {
             out.put(last.bits, last.count);
         }
     }
-    let end = code(END_OF_BLOCK.into());
-    out.put(end.bits, end.count);
-}
-
-/// Returns how often each symbol occurs in a block.
-fn frequencies(runs: &[(u32, u8)]) -> [u32; SYMBOLS] {
-    let (mut bytes, mut last, mut longest) = ([0; 256], [0; MOST_COPIED as usize], 0);
-    for &(length, byte) in runs {
-        let copies = Copies::of(length);
-        bytes[usize::from(byte)] += copies.bytes;
-        last[copies.last as usize] += 1;
-        longest += u64::from(copies.longest);
-    }
-    let mut frequencies = [0; SYMBOLS];
-    frequencies[..256].copy_from_slice(&bytes);
-    frequencies[usize::from(END_OF_BLOCK)] = 1;
-    for (length, times) in (0..).zip(last).skip(3) {
-        frequencies[usize::from(length_symbol(length))] += times;
-    }
-    // A block of one colour may count beyond 32 bits; codes need no more than the order.
-    let longest = longest + u64::from(frequencies[SYMBOLS - 1]);
-    frequencies[SYMBOLS - 1] = longest.try_into().unwrap_or(u32::MAX);
-    frequencies
 }
 
 /// A code, the first bit lowest.
@@ -171,7 +201,8 @@ impl Bits {
     /// Returns the bits with others behind them.
     #[inline]
     fn then(self, next: Self) -> Self {
-        Self { bits: self.bits | next.bits << self.count, count: self.count + next.count }
+        let bits = self.bits | next.bits.wrapping_shl(self.count.into());
+        Self { bits, count: self.count.wrapping_add(next.count) }
     }
 }
 
@@ -189,11 +220,17 @@ impl Often {
         Self { once: once.count, most: most.into(), all: all.bits }
     }
 
+    /// Returns the number of bits of so many times.
+    #[inline]
+    fn bits_of(&self, times: u32) -> u64 {
+        u64::from(self.once).wrapping_mul(times.into())
+    }
+
     /// Returns the bits so many times, at most `most`.
     #[inline]
     fn times(&self, times: u32) -> Bits {
-        let count = self.once * times as u8;
-        Bits { bits: self.all & ((1 << count) - 1), count }
+        let count = self.bits_of(times) as u8;
+        Bits { bits: self.all & 1u64.wrapping_shl(count.into()).wrapping_sub(1), count }
     }
 
     #[cold]
@@ -258,23 +295,42 @@ fn put_length_run(tokens: &mut Vec<(u8, u32, u8)>, length: u8, mut count: usize)
     }
 }
 
-/// Returns the Adler-32 check of bytes, in a few operations a run.
-fn adler32(runs: &[(u32, u8)]) -> u32 {
+/// Returns the Adler-32 check of an image's bytes, in a few operations a change.
+fn adler32(image: &GrayMask) -> u32 {
     const MODULUS: u64 = 65_521;
-    // So few short runs at a time overflow no sum.
-    const SHORT: u32 = 1 << 16;
-    let (mut a, mut b) = (1, 0);
-    for some in runs.chunks(64) {
-        for &(length, byte) in some {
-            let (mut length, byte) = (u64::from(length), u64::from(byte));
-            if length > u64::from(SHORT) {
-                // b grows by the sum of a + byte, a + 2 byte, ..., and that of MODULUS bytes is 0.
-                (a, b, length) = (a % MODULUS, b % MODULUS, length % MODULUS);
-            }
-            b += length * a + length * (length + 1) / 2 * byte;
-            a += length * byte;
+    let (mut a, mut b) = (1u64, 0u64);
+    for changes in image.rows() {
+        // Remainders are seldom taken: with what a row of the greatest width adds, which is below
+        // 2^60, both sums still fit.
+        if a >= 1 << 24 {
+            a %= MODULUS;
         }
-        (a, b) = (a % MODULUS, b % MODULUS);
+        if b >= 1 << 44 {
+            b %= MODULUS;
+        }
+        let (sum, weighted) = row_sums(changes, image.width());
+        // b grows by all values of a on the way: by the one before the row for each byte, and by
+        // each byte as often as there are bytes from it to the row's end.
+        b = b.wrapping_add(a.wrapping_mul(image.width().into())).wrapping_add(weighted);
+        a = a.wrapping_add(sum);
     }
-    (b << 16 | a) as u32
+    ((b % MODULUS) << 16 | a % MODULUS) as u32
+}
+
+/// Returns the sum of a row's bytes, and that of the bytes times their distance from the row's end.
+///
+/// A change to another level adds the step to all bytes up to the end. Sums wrap around on the way,
+/// but the whole ones fit: a row has no more than [`MAX_SIDE`](crate::MAX_SIDE) bytes.
+#[inline]
+fn row_sums(changes: &[LevelChange], width: u32) -> (u64, u64) {
+    let (mut sum, mut twice_weighted, mut before) = (0u64, 0u64, 0u8);
+    for change in changes {
+        let step = i64::from(change.level).wrapping_sub(before.into()) as u64;
+        let left = u64::from(width.wrapping_sub(change.column));
+        let once = step.wrapping_mul(left);
+        sum = sum.wrapping_add(once);
+        twice_weighted = twice_weighted.wrapping_add(once.wrapping_mul(left.wrapping_add(1)));
+        before = change.level;
+    }
+    (sum, twice_weighted / 2)
 }
