@@ -241,7 +241,10 @@ impl Table {
         let mut spans = Grouped::new(rows, spans);
         for row in 0..rows {
             // By all they have, so that the order of threads shows nowhere.
-            sort_by(spans.group_mut(row), |a, b| a.partial_cmp(b).expect("spans are numbers"));
+            sort_by(spans.group_mut(row), |a, b| {
+                let by_columns = (a.start, a.end).cmp(&(b.start, b.end));
+                by_columns.then_with(|| a.partial_cmp(b).expect("spans are numbers"))
+            });
         }
         spans
     }

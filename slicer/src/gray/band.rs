@@ -123,13 +123,16 @@ impl<'a> BandChooser<'a> {
         solid: &[SolidRow],
         last: Option<&ChosenRows>,
     ) -> ChosenRows {
-        let mut lists = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
+        let mut rows = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
         self.short_px = 0;
         for (in_band, solid) in (0..).zip(solid) {
+            std::mem::swap(rows.items_mut(), &mut self.changes.changes);
             self.choose_row(around, in_band, solid.columns());
-            lists.push_row(|list| self.changes.finish(list));
+            self.changes.end();
+            std::mem::swap(rows.items_mut(), &mut self.changes.changes);
+            rows.end_row();
         }
-        (lists, self.short_px)
+        (rows, self.short_px)
     }
 
     /// Chooses a row, given its number in the band and the columns that are part in all layers above.
@@ -281,7 +284,7 @@ impl<'a> BandChooser<'a> {
     }
 }
 
-/// The changes of a row that is made from the left.
+/// The changes of rows, the last of which is made from the left.
 #[derive(Default)]
 struct LevelRow {
     changes: Vec<LevelChange>,
@@ -304,12 +307,11 @@ impl LevelRow {
         self.end = end;
     }
 
-    /// Ends the row, and moves its changes to a list. The last column of images is black.
-    fn finish(&mut self, list: &mut Vec<LevelChange>) {
+    /// Ends the row. The last column of images is black.
+    fn end(&mut self) {
         if self.level > 0 {
             self.changes.push(LevelChange { column: self.end, level: 0 });
         }
-        list.append(&mut self.changes);
         (self.end, self.level) = (0, 0);
     }
 }

@@ -17,7 +17,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use lamp_stack::{GrayMask, Image};
+use lamp_stack::Image;
 use rayon::prelude::*;
 
 use super::band::{Around, BandChooser};
@@ -70,7 +70,8 @@ impl Columns {
                 let mut lists = layer_below.map_or_else(RowLists::default, RowLists::like);
                 for (in_band, row) in (0..).zip(band_rows(band, rows)) {
                     let row_below = layer_below.map(|lists| lists.row(in_band));
-                    lists.push_row(|list| push_below(light, first + k, rows, row, row_below, list));
+                    push_below(light, first + k, rows, row, row_below, lists.items_mut());
+                    lists.end_row();
                 }
                 of_layers.push_back(lists);
             }
@@ -92,16 +93,10 @@ impl Columns {
         let of_band = |band| BandChooser::new(self, light, band).choose(&around);
         let bands: Vec<_> = (0..self.below.len()).into_par_iter().map(of_band).collect();
         let whole = |k: usize| {
-            let mut image = GrayMask::new(self.depths[layers.start - self.first].width());
-            let mut short_px = 0;
-            for band in &bands {
-                let (rows, short_in_band) = &band[k];
-                (0..rows.len()).for_each(|row| {
-                    image.push_row(rows.row(row)).expect("levels change at increasing columns");
-                });
-                short_px += short_in_band;
-            }
-            ChosenLayer { image: finished(image), short_px }
+            let of_bands = bands.iter().map(|band| &band[k]);
+            let rows = RowLists::joined(of_bands.clone().map(|(rows, _)| rows));
+            let short_px = of_bands.map(|(_, short_px)| short_px).sum();
+            ChosenLayer { image: finished(self.rows(layers.start).width(), rows), short_px }
         };
         (0..layers.len()).into_par_iter().map(whole).collect()
     }

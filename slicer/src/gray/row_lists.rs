@@ -14,12 +14,35 @@ impl<T> Default for RowLists<T> {
     }
 }
 
+impl<T: Copy> RowLists<T> {
+    /// Joins rows, the first ones first.
+    pub(crate) fn joined<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Self
+    where
+        T: 'a,
+    {
+        let rows = parts.clone().map(|part| part.len() as usize).sum();
+        let items = parts.clone().map(|part| part.items.len()).sum();
+        let mut all = Self::with_room(rows, items);
+        for part in parts {
+            let moved = all.items.len() as u32;
+            all.starts.extend(part.starts[1..].iter().map(|start| start + moved));
+            all.items.extend_from_slice(&part.items);
+        }
+        all
+    }
+}
+
 impl<T> RowLists<T> {
+    /// Starts lists that will have about so many items.
+    pub(crate) fn with_room(rows: usize, items: usize) -> Self {
+        let mut starts = Vec::with_capacity(rows + 1);
+        starts.push(0);
+        Self { starts, items: Vec::with_capacity(items) }
+    }
+
     /// Starts lists that will have about as many items as others.
     pub(crate) fn like(other: &Self) -> Self {
-        let mut starts = Vec::with_capacity(other.starts.len());
-        starts.push(0);
-        Self { starts, items: Vec::with_capacity(other.items.len() + other.items.len() / 8) }
+        Self::with_room(other.starts.len(), other.items.len() + other.items.len() / 8)
     }
 
     /// Returns the number of rows.
@@ -34,9 +57,21 @@ impl<T> RowLists<T> {
         &self.items[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
 
-    /// Adds a row: the items that `make` appends.
-    pub(crate) fn push_row(&mut self, make: impl FnOnce(&mut Vec<T>)) {
-        make(&mut self.items);
+    /// Returns the items of all rows. What is added to them belongs to the row that
+    /// [`end_row`](Self::end_row) ends.
+    #[inline]
+    pub(crate) fn items_mut(&mut self) -> &mut Vec<T> {
+        &mut self.items
+    }
+
+    /// Ends a row.
+    #[inline]
+    pub(crate) fn end_row(&mut self) {
         self.starts.push(self.items.len() as u32);
+    }
+
+    /// Returns where each row's items start, and where those of the last end; and the items.
+    pub(crate) fn into_arrays(self) -> (Vec<u32>, Vec<T>) {
+        (self.starts, self.items)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use lamp_stack::{DepthLevels, GrayMask, Image, LevelChange, MaskBuilder};
+use lamp_stack::{DepthLevels, GrayMask, Image, LevelChange, Mask};
 
 use super::row_lists::RowLists;
 
@@ -23,23 +23,24 @@ pub(crate) trait ShadedRows {
 
     fn change(column: u32, pixel: Self::Pixel) -> Self::Change;
 
-    /// Adds the next row, given where its pixels change.
-    fn push_row(&mut self, changes: &[Self::Change]);
+    /// Returns the rows, to which changes from the left are to be added.
+    fn rows_mut(&mut self) -> &mut RowLists<Self::Change>;
 }
 
 /// Gray levels that cure each depth by themselves.
 pub(crate) struct LevelRows<'a> {
     levels: &'a DepthLevels,
-    image: GrayMask,
+    width: u32,
+    rows: RowLists<LevelChange>,
 }
 
 impl<'a> LevelRows<'a> {
     pub(crate) fn new(levels: &'a DepthLevels, width: u32) -> Self {
-        Self { levels, image: GrayMask::new(width) }
+        Self { levels, width, rows: RowLists::default() }
     }
 
     pub(crate) fn finish(self) -> Image {
-        finished(self.image)
+        finished(self.width, self.rows)
     }
 }
 
@@ -60,22 +61,21 @@ impl ShadedRows for LevelRows<'_> {
         LevelChange { column, level }
     }
 
-    fn push_row(&mut self, changes: &[LevelChange]) {
-        self.image.push_row(changes).expect("changes come from the left");
+    #[inline]
+    fn rows_mut(&mut self) -> &mut RowLists<LevelChange> {
+        &mut self.rows
     }
 }
 
 /// Returns an image: 1-bit if no pixel is gray.
-pub(crate) fn finished(image: GrayMask) -> Image {
-    if image.rows().flatten().any(|change| change.level % 255 != 0) {
-        return Image::Gray(image);
+pub(crate) fn finished(width: u32, rows: RowLists<LevelChange>) -> Image {
+    let (row_offsets, changes) = rows.into_arrays();
+    let rises = "levels change at increasing columns";
+    if changes.iter().any(|change| change.level % 255 != 0) {
+        return Image::Gray(GrayMask::from_changes(width, row_offsets, changes).expect(rises));
     }
-    let mut mask = MaskBuilder::new(image.width());
-    for row in image.rows() {
-        let transitions: Vec<u32> = row.iter().map(|change| change.column).collect();
-        mask.push_row(&transitions).expect("levels change at increasing columns");
-    }
-    Image::Mask(mask.finish())
+    let transitions = changes.iter().map(|change| change.column).collect();
+    Image::Mask(Mask::new(width, row_offsets, transitions).expect(rises))
 }
 
 /// The depth of the part below each pixel of a layer, in micrometres from the layer's top: zero
@@ -164,8 +164,9 @@ impl ShadedRows for DepthRows {
         (column, depth_um)
     }
 
-    fn push_row(&mut self, changes: &[(u32, f32)]) {
-        self.changes.push_row(|list| list.extend_from_slice(changes));
+    #[inline]
+    fn rows_mut(&mut self) -> &mut RowLists<(u32, f32)> {
+        &mut self.changes
     }
 }
 
@@ -176,8 +177,10 @@ mod tests {
     #[test]
     fn rows_are_pieces_of_one_depth() {
         let mut rows = DepthRows::new(20);
-        rows.push_row(&[]);
-        rows.push_row(&[(0, 5.0), (4, f32::INFINITY), (9, 7.0), (10, 0.0), (15, 3.0)]);
+        rows.changes.end_row();
+        let changes = [(0, 5.0), (4, f32::INFINITY), (9, 7.0), (10, 0.0), (15, 3.0)];
+        rows.changes.items_mut().extend(changes);
+        rows.changes.end_row();
         assert_eq!(rows.pieces(0).collect::<Vec<_>>(), [(0, 20, 0.0)]);
         let deep = f64::INFINITY;
         let all = [(0, 4, 5.0), (4, 9, deep), (9, 10, 7.0), (10, 15, 0.0), (15, 20, 3.0)];

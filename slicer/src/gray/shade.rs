@@ -20,8 +20,7 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
     /// What a pixel's line is in on its way down.
     below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
-    changes: Vec<R::Change>,
-    /// The pixel that the changes end with.
+    /// The pixel that the row ends with.
     last: R::Pixel,
     width: u32,
 }
@@ -44,7 +43,6 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             spans,
             open: Vec::new(),
             met: Vec::new(),
-            changes: Vec::new(),
             last: R::OUTSIDE,
             width,
         }
@@ -53,7 +51,6 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     /// Adds the next row, given its sorted crossings with the section's contours.
     pub(crate) fn push_row(&mut self, row: u32, places: &[impl InRow]) {
         let mut spans = self.spans.group(row as usize);
-        self.changes.clear();
         self.last = R::OUTSIDE;
         self.open.clear();
         let mut position = Position::outside(self.rule);
@@ -64,7 +61,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
                 self.shade(place.column(), end, &position, &mut spans);
             }
         }
-        self.rows.push_row(&self.changes);
+        self.rows.rows_mut().end_row();
     }
 
     /// Adds columns between two crossings of the row.
@@ -191,9 +188,10 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         None
     }
 
+    #[inline]
     fn push(&mut self, column: u32, pixel: R::Pixel) {
         if pixel != self.last {
-            self.changes.push(R::change(column, pixel));
+            self.rows.rows_mut().items_mut().push(R::change(column, pixel));
             self.last = pixel;
         }
     }
