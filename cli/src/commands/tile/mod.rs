@@ -188,14 +188,15 @@ pub(crate) struct TileArgs {
 
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
+    if let Some(turns) = args.free_turns() {
+        // Standard output takes a script, for which no stage waits.
+        return args.plan(turns, &Progress::new("tile", common, true));
+    }
     let output = args.output();
     let progress = match &output {
         Some(output) => progress("tile", common, output),
         None => Progress::new("tile", common, true),
     };
-    if let Some(turns) = args.free_turns() {
-        return args.plan(turns, &progress);
-    }
     let machine = args.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;

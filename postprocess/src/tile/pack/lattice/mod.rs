@@ -63,9 +63,8 @@ struct View {
 /// The cells along a part, at most, in which lattices are searched, and are moved closer.
 const SEARCH_CELLS: u32 = 256;
 const CLOSE_CELLS: u32 = 2048;
-/// The number of layouts whose edges are filled up, at most, and that times the ways to fill them.
+/// The number of layouts whose edges are filled up, at most.
 const FILLED: usize = 6;
-const FILLED_WAYS: usize = 24;
 
 /// Places up to `wanted` copies of the only part: lattices of one of its stacks, and others at their
 /// edges in any way. The regions are those that are known, by the pixels on a side of their cells.
@@ -109,7 +108,7 @@ pub(super) fn place(
     // The same lattice in other vectors gives nothing new.
     fits.dedup_by_key(|(fit, lattice, _)| (fit.copies, lattice.cells_of_two()));
     let mut best = Vec::new();
-    for (fit, lattice, view) in fits.into_iter().take((FILLED_WAYS / ways.len()).clamp(1, FILLED)) {
+    for (fit, lattice, view) in fits.into_iter().take(FILLED) {
         let Some(room) = view.room(layout, cell) else { continue };
         let shifts = room.shifts(&lattice, fit.start);
         let placed = shifts.map(|(shift, half)| view.placement(shift, half, room, cell));
