@@ -128,7 +128,7 @@ fn the_script_of_a_plan_makes_the_build_that_was_planned() {
         .run(&format!("tile plate.tif --mesh none --gap 1mm --pack outline {area} -o quarters.tif"))
         .is_refused_with(&["larger than the build area"]);
     assert_eq!(
-        scratch.run(&format!("{PLAN} {area} --turns 45deg")).succeeds().stdout,
+        scratch.run(&format!("{PLAN} {area} --turns 45deg -q")).succeeds().stdout,
         script.as_bytes()
     );
 }
