@@ -314,7 +314,7 @@ fn adler32(image: &GrayMask) -> u32 {
         b = b.wrapping_add(a.wrapping_mul(image.width().into())).wrapping_add(weighted);
         a = a.wrapping_add(sum);
     }
-    ((b % MODULUS) << 16 | a % MODULUS) as u32
+    (((b % MODULUS) << 16) | (a % MODULUS)) as u32
 }
 
 /// Returns the sum of a row's bytes, and that of the bytes times their distance from the row's end.
