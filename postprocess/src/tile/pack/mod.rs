@@ -16,6 +16,7 @@ use lamp_stack::{Length, MAX_SIDE, Orientation, Size};
 
 use super::{CopyPlacement, Layout, PixelSize, TileError};
 use job::Job;
+pub(super) use no_fit::join_runs;
 
 /// How a copy may lie: the stack that it takes its images from, and their turn.
 type Way = (usize, Orientation);

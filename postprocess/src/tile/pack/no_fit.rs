@@ -174,7 +174,7 @@ fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
 }
 
 /// Sorts runs and joins those that touch.
-fn join_runs(runs: &mut Vec<CellRun>) {
+pub(in crate::tile) fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
     runs.sort_unstable();
     runs.dedup_by(|next, last| {
         let touch = next.0 <= last.1;

@@ -2,6 +2,8 @@
 
 use lamp_stack::{Mask, MaskBuilder, white_runs};
 
+use crate::tile::pack::join_runs;
+
 /// How far, in pixels, what is white may reach beyond the pixels of an outline: a section that is
 /// sliced at another angle has its pixels' centres elsewhere.
 const BEYOND: f64 = 2.0;
@@ -117,14 +119,7 @@ pub(super) fn turned(
     }
     let mut mask = MaskBuilder::new(width);
     for runs in &mut rows {
-        runs.sort_unstable();
-        runs.dedup_by(|next, last| {
-            let touch = next.0 <= last.1;
-            if touch {
-                last.1 = last.1.max(next.1);
-            }
-            touch
-        });
+        join_runs(runs);
         let changes = runs.iter().flat_map(|&(start, end)| [start, end]);
         let changes: Vec<u32> = changes.filter(|&column| column < width).collect();
         mask.push_row(&changes).expect("runs are apart");
