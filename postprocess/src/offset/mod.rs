@@ -10,7 +10,7 @@
 //! all is black.
 //!
 //! [`erode`] cuts rows by the disc around each pixel of the other colour, which finds the pixels
-//! near edges ([`aligned_rows`] is faster for plain rows); [`closest`] measures them, and
+//! near edges ([`aligned_rows`] is faster for plain rows, [`grow`] where only the shape counts); [`closest`] measures them, and
 //! [`edge_map`] keeps the result. [`skeleton`] finds thin walls, unless [`wide`] tells that the
 //! image has none, or [`plain`] that a place has none, and [`walls`] measures them. Where walls
 //! are not kept, [`components`] finds those that vanish or break. [`feature_size`] gives the size
@@ -24,6 +24,7 @@ mod contours;
 mod edge_map;
 mod erode;
 mod feature_size;
+mod grow;
 mod outline;
 mod plain;
 mod row_runs;
@@ -38,8 +39,9 @@ mod widths;
 use lamp_stack::{GrayMask, Mask};
 
 use edge_map::{EdgeMap, Edges};
-use erode::{Disc, SourceColour, Sources};
+use erode::{SourceColour, Sources};
 use feature_size::MovedOutlines;
+use grow::Reach;
 use row_runs::RowRuns;
 use skeleton::Cores;
 
@@ -83,11 +85,12 @@ pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
 /// pixel. Edges are taken as the stairs that they are: of what is left, no pixel's middle is
 /// nearer than the distance and half a pixel to the middle of one of the other colour.
 pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
-    let colour = if inwards < 0.0 { SourceColour::White } else { SourceColour::Black };
-    let disc = Disc::below(erode::at_least(inwards.abs() + 0.5), mask.height());
-    let left = Sources::new(mask, colour).erode_all(&disc, &region(mask, colour));
-    let left = left.mask(mask.width());
-    if colour == SourceColour::White { left.inverted() } else { left }
+    let reach = Reach::below(erode::at_least(inwards.abs() + 0.5), mask.height());
+    let [width, height] = [mask.width() as i32, mask.height() as i32];
+    if inwards < 0.0 {
+        return reach.grown(&RowRuns::white(mask), 0, width, height).mask(mask.width());
+    }
+    reach.grown(&RowRuns::black_around(mask), -1, width, height).mask(mask.width()).inverted()
 }
 
 /// Moves the edges of a mask inwards by distances that depend on the sizes of features, and keeps

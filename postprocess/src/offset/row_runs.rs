@@ -31,6 +31,22 @@ impl RowRuns {
         rows
     }
 
+    /// Returns the black runs of a mask and of a frame of a pixel around it, so that the mask's first
+    /// row is the second.
+    pub(super) fn black_around(mask: &Mask) -> Self {
+        let whole = (-1, mask.width() as i32 + 1);
+        let white = Self::white(mask);
+        let mut rows = Self::new();
+        rows.push(&[whole]);
+        let mut black = Vec::new();
+        for row in white.rows() {
+            subtract(&[whole], row, &mut black);
+            rows.push(&black);
+        }
+        rows.push(&[whole]);
+        rows
+    }
+
     /// Adds a row below the others.
     pub(super) fn push(&mut self, row: &[Run]) {
         self.runs.extend_from_slice(row);
@@ -44,6 +60,11 @@ impl RowRuns {
     pub(super) fn row(&self, row: u32) -> &[Run] {
         let row = row as usize;
         &self.runs[self.ends[row]..self.ends[row + 1]]
+    }
+
+    /// Returns the runs of each row.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[Run]> {
+        self.ends.windows(2).map(|ends| &self.runs[ends[0]..ends[1]])
     }
 
     /// Returns the runs of a row; none outside the image.
