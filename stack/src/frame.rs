@@ -49,11 +49,10 @@ pub fn place_row<C: Change>(changes: &[C], width: u32, left: i64, into: u32, out
         change_to(first, start, into, out);
     }
     let visible = shown.partition_point(|&change| place(change) < into.into());
-    let mut pixel = first;
-    out.extend(shown[..visible].iter().map(|&change| {
-        pixel = change.after(pixel);
-        C::new(place(change) as u32, pixel)
-    }));
+    // What is visible has its place in 32 bits.
+    let right = left as u32;
+    let moved = |&change: &C| change.moved(change.column().wrapping_add(right));
+    out.extend(shown[..visible].iter().map(moved));
     if last != black && end > start {
         change_to(black, end, into, out);
     }

@@ -37,6 +37,11 @@ impl Change for LevelChange {
     }
 
     #[inline]
+    fn moved(self, column: u32) -> Self {
+        Self { column, ..self }
+    }
+
+    #[inline]
     fn column(self) -> u32 {
         self.column
     }

@@ -20,6 +20,10 @@ pub trait Change: Copy + Debug + Eq {
     /// Creates the change to `pixel` at a column. A mask needs only the column.
     fn new(column: u32, pixel: Self::Pixel) -> Self;
 
+    /// Returns the change to the same value at another column, which all changes of its row move
+    /// with.
+    fn moved(self, column: u32) -> Self;
+
     /// Returns the first column of the new value.
     fn column(self) -> u32;
 
@@ -35,6 +39,11 @@ impl Change for u32 {
 
     #[inline]
     fn new(column: u32, _: bool) -> Self {
+        column
+    }
+
+    #[inline]
+    fn moved(self, column: u32) -> Self {
         column
     }
 

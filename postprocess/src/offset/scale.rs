@@ -59,14 +59,10 @@ fn scale_rows<C: Change>(
     let (end, black) = (column(before.width()), C::last_pixel(&[]));
     let mut moved = Vec::new();
     for (row, changes) in (0..).zip(before.rows()) {
-        let mut pixel = black;
         moved.clear();
-        moved.extend(changes.iter().map(|change| {
-            pixel = change.after(pixel);
-            C::new(column(change.column()), pixel)
-        }));
+        moved.extend(changes.iter().map(|change| change.moved(column(change.column()))));
         // The last run ends where the image ended, also if the larger image is wider than that.
-        if pixel != black && end < width {
+        if C::last_pixel(changes) != black && end < width {
             moved.push(C::new(end, black));
         }
         for _ in rows.first_past(row)..rows.first_past(row + 1) {

@@ -149,11 +149,8 @@ impl<C: Change> SwathRows<C> {
         if pixel != black {
             self.changes.push(C::new(taken.start - left, pixel));
         }
-        self.changes.extend(shown.iter().map(|&change| {
-            pixel = change.after(pixel);
-            C::new(change.column() - left, pixel)
-        }));
-        if pixel != black && taken.end - left < self.width {
+        self.changes.extend(shown.iter().map(|&change| change.moved(change.column() - left)));
+        if C::last_pixel(&row[..end]) != black && taken.end - left < self.width {
             self.changes.push(C::new(taken.end - left, black));
         }
         self.ends.push(self.changes.len() as u32);
