@@ -7,8 +7,9 @@
 //! ```
 //!
 //! `image` is the CRC-32 of the image's runs, whatever their coding; `code` that of their coding, so
-//! that a stage that passes it on need not decode it; `text` that of the line up to its own `text`. The last page also has `pages`, their number, and `chain`, the CRC-32 of the
-//! `text` of all pages before it: it tells of pages that are missing, moved or from another stack.
+//! that a stage that passes it on need not decode it; `text` that of the line up to its own `text`.
+//! The last page also has `pages`, their number, and `chain`, the CRC-32 of the `text` of all pages
+//! before it: it tells of pages that are missing, moved or from another stack.
 
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
