@@ -31,16 +31,21 @@ pub(super) struct Sources {
 impl Sources {
     pub(super) fn new(mask: &Mask, colour: SourceColour) -> Self {
         let white = RowRuns::white(mask);
-        if colour == SourceColour::Black {
-            return Self { colour, between: white };
+        match colour {
+            SourceColour::Black => Self { colour, between: white },
+            SourceColour::White => Self::white_rows(white.rows()),
         }
+    }
+
+    /// Takes the runs of rows as white.
+    pub(super) fn white_rows<'a>(rows: impl Iterator<Item = &'a [Run]>) -> Self {
         let mut between = RowRuns::new();
         let mut black = Vec::new();
-        for row in 0..white.height() {
-            subtract(&EVERYTHING, white.row(row), &mut black);
+        for row in rows {
+            subtract(&EVERYTHING, row, &mut black);
             between.push(&black);
         }
-        Self { colour, between }
+        Self { colour: SourceColour::White, between }
     }
 
     pub(super) fn colour(&self) -> SourceColour {

@@ -5,39 +5,45 @@
 //! size the lower one reaches farther from some row on, so those that reach farthest are found in
 //! one pass over the ends, with a stack (the lower envelope of P. Felzenszwalb and D. Huttenlocher,
 //! Theory of Computing 8, 2012, of circles instead of parabolas).
+//!
+//! Dots make sheets of a row or two. There, rows are cut by one row of the disc after the other
+//! ([`erode`](super::erode)), which soon leaves nothing.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::row_runs::{RowRuns, Run};
+use super::erode::{Disc, Erosion, Sources};
+use super::row_runs::{RowRuns, Run, subtract};
 
 /// The fewest rows that are grown at a time.
 const BAND: i32 = 512;
+/// The fewest rows that a sheet must have on average to be worth following.
+const SHEET_ROWS: usize = 4;
+/// The most runs that sheets may have in a band, so that they take little memory.
+const MAX_RUNS: usize = 1 << 22;
 
 /// The pixels around a centre whose squared distance from it is below a limit.
 #[derive(Debug)]
 pub(super) struct Reach {
-    /// The columns that it reaches to each side, by the distance in rows from its centre.
-    halves: Vec<i32>,
-    /// The same before it is rounded down.
+    disc: Disc,
+    /// The columns that it reaches to each side, by the distance in rows, before they are rounded
+    /// down.
     exact: Vec<f64>,
 }
 
 impl Reach {
-    /// Returns the pixels whose squared distance is below `square`, at most `rows` rows away.
-    pub(super) fn below(square: u64, rows: u32) -> Self {
-        let away = (0..=u64::from(rows)).take_while(|away| away * away < square);
-        let squares: Vec<u64> = away.map(|away| square - 1 - away * away).collect();
-        Self {
-            halves: squares.iter().map(|square| square.isqrt() as i32).collect(),
-            exact: squares.iter().map(|&square| (square as f64).sqrt()).collect(),
-        }
+    /// Returns the pixels whose squared distance is below `square`, as far as an image of `height`
+    /// rows needs them.
+    pub(super) fn below(square: u64, height: u32) -> Self {
+        let disc = Disc::below(square, height);
+        let squares = (0..disc.halves().len() as u64).map(|away| square - 1 - away * away);
+        Self { exact: squares.map(|square| (square as f64).sqrt()).collect(), disc }
     }
 
     /// Returns the number of rows that it reaches to each side.
     fn rows(&self) -> i32 {
-        self.halves.len() as i32 - 1
+        self.exact.len() as i32 - 1
     }
 
     /// Returns the runs of rows `0..height` of an image of `width` columns that lie in a disc
@@ -58,11 +64,43 @@ impl Reach {
 
     /// Returns the runs of some rows of the grown image.
     fn grown_band(&self, runs: &RowRuns, top: i32, width: i32, rows: Range<i32>) -> RowRuns {
-        let mut found: Vec<Vec<Run>> = vec![Vec::new(); rows.len()];
         let from = (rows.start - self.rows() - top).max(0);
         let to = (rows.end + self.rows() - top).min(runs.height() as i32);
+        let sheets = sheets(runs, from..to);
+        let count = sheets.starts.len();
+        if count * SHEET_ROWS > sheets.runs.len() || count * rows.len() > MAX_RUNS {
+            self.band_by_rows(runs, from..to, top, width, rows)
+        } else {
+            self.band_by_sheets(&sheets, top, width, rows)
+        }
+    }
+
+    /// Grows rows `of` of `runs` by cutting each of `rows` by every row of the disc.
+    fn band_by_rows(
+        &self,
+        runs: &RowRuns,
+        of: Range<i32>,
+        top: i32,
+        width: i32,
+        rows: Range<i32>,
+    ) -> RowRuns {
+        let first = of.start + top;
+        let sources = Sources::white_rows(of.map(|row| runs.row(row as u32)));
+        let (mut left, mut row_runs) = (Erosion::default(), Vec::new());
+        let mut grown = RowRuns::new();
+        for row in rows {
+            sources.erode(&self.disc, (row - first) as u32, &[(0, width)], &mut left);
+            subtract(&[(0, width)], &left.runs, &mut row_runs);
+            grown.push(&row_runs);
+        }
+        grown
+    }
+
+    /// Grows sheets by their ends.
+    fn band_by_sheets(&self, sheets: &Sheets, top: i32, width: i32, rows: Range<i32>) -> RowRuns {
+        let mut found: Vec<Vec<Run>> = vec![Vec::new(); rows.len()];
         let mut ends = SheetEnds::default();
-        for (first_row, sheet) in sheets(runs, from..to).iter() {
+        for (first_row, sheet) in sheets.iter() {
             let at = ends.of(self, sheet, first_row + top, &rows);
             let of_rows = found[(at - rows.start) as usize..].iter_mut();
             for (found, (&start, &end)) in of_rows.zip(ends.starts.iter().zip(&ends.ends)) {
@@ -181,7 +219,7 @@ fn farthest(
     let past = arcs.iter().skip(1).map(|arc| arc.from).chain([rows.end]);
     for (arc, past) in arcs.iter().zip(past) {
         let of_arc = arc.from.max(rows.start)..past.min(rows.end);
-        out.extend(of_arc.map(|row| arc.end - reach.halves[arc.away(row)]));
+        out.extend(of_arc.map(|row| arc.end - reach.disc.halves()[arc.away(row)]));
     }
 }
 
@@ -279,6 +317,7 @@ mod tests {
     use super::super::erode::{Disc, SourceColour, Sources, at_least};
     use super::super::offset_tests::{drawn, masks};
     use super::super::{offset_one_bit, region};
+    use super::*;
 
     /// Grows or shrinks by cutting every row by every row of the disc.
     fn referee(mask: &Mask, inwards: f64) -> Mask {
@@ -304,12 +343,25 @@ mod tests {
         })
     }
 
+    /// Grows a whole mask by its sheets, and by rows of the disc.
+    fn both_ways(mask: &Mask, by: f64) -> [Mask; 2] {
+        let reach = Reach::below(at_least(by + 0.5), mask.height());
+        let runs = RowRuns::white(mask);
+        let [width, height] = [mask.width() as i32, mask.height() as i32];
+        let sheets = sheets(&runs, 0..height);
+        let by_sheets = reach.band_by_sheets(&sheets, 0, width, 0..height);
+        let by_rows = reach.band_by_rows(&runs, 0..height, 0, width, 0..height);
+        [by_sheets, by_rows].map(|rows| rows.mask(mask.width()))
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(400))]
 
         #[test]
         fn it_is_what_every_row_of_the_disc_makes(mask in masks(), by in -30.0..30.0f64) {
             prop_assert!(offset_one_bit(&mask, by) == referee(&mask, by));
+            let grown = referee(&mask, -by.abs());
+            prop_assert!(both_ways(&mask, by.abs()).iter().all(|mask| *mask == grown));
         }
     }
 
@@ -318,6 +370,16 @@ mod tests {
 
         #[test]
         fn bands_are_seamless(mask in tall_masks(), by in -200.0..60.0f64) {
+            prop_assert!(offset_one_bit(&mask, by) == referee(&mask, by));
+        }
+
+        #[test]
+        fn dots_are_grown_as_well(dots in 2..6u32, by in -90.0..9.0f64) {
+            let hash = |column: i32, row: i32| {
+                (column as u32).wrapping_mul(0x9E37_79B9) ^ (row as u32).wrapping_mul(0x85EB_CA6B)
+            };
+            let dot = |column, row| row < 700 && (hash(column, row) >> 7) % dots == 0;
+            let mask = drawn(96, 1100, |column, row| dot(column, row) || column == row / 16);
             prop_assert!(offset_one_bit(&mask, by) == referee(&mask, by));
         }
     }
