@@ -17,14 +17,19 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32]) -> Vec<CopyPlacement> {
     let mut step = u32::try_from(shares.len()).expect("parts are few");
     let mut is_growing = true;
     while step > 0 {
-        let counts = order.counts((most + step).min(MAX_COPIES));
+        let next = (most + step).min(MAX_COPIES);
+        let counts = order.counts(next);
         let found = job.simply_placed(&counts);
-        let fits = found.len() == sum(&counts);
+        let fits = found.len() == sum(&counts) && next > most;
         if fits {
-            (most, best) = (most + step, found);
+            (most, best) = (next, found);
         }
-        is_growing &= fits && most < MAX_COPIES;
-        step = if is_growing { 2 * step } else { step / 2 };
+        is_growing &= fits;
+        if is_growing {
+            step *= 2;
+        } else if !fits {
+            step /= 2;
+        }
     }
     // Then those that only the search finds room for.
     step = (most / 8).max(1);
@@ -36,6 +41,21 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32]) -> Vec<CopyPlacement> {
         } else {
             step /= 2;
         }
+    }
+    // More may fit where fewer do not, which is found for whole rounds.
+    let whole: u64 = order.shares.iter().sum();
+    loop {
+        let next = (u64::from(most) / whole + 1) * whole;
+        let Some(next) = u32::try_from(next).ok().filter(|&next| next <= MAX_COPIES) else { break };
+        let counts = order.counts(next);
+        let mut found = job.simply_placed(&counts);
+        if found.len() < sum(&counts) {
+            found = job.searched(&counts, found, job.rows());
+        }
+        if found.len() < sum(&counts) {
+            break;
+        }
+        (most, best) = (next, found);
     }
     // Where not even one of each fits, what fits of these tells which does not.
     if most > 0 { best } else { job.simply_placed(&order.counts(0)) }
