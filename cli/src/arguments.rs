@@ -4,6 +4,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::exit;
+use std::sync::OnceLock;
 
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
@@ -47,7 +48,17 @@ pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Ex
         let settings = settings_of_machine(file)?;
         arguments.fill_in(&path, of_command, &settings, file);
     }
+    // The arguments are parsed once.
+    let _ = WORDS.set(arguments.words.clone());
     Ok(arguments.parsed())
+}
+
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Returns the words of the process's command line, without the program's name, with those of the
+/// files that had a say.
+pub(crate) fn words_in_effect() -> &'static [OsString] {
+    WORDS.get().and_then(|words| words.split_first()).map_or(&[], |(_, words)| words)
 }
 
 /// The words of a command line.

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let pack = |turns| Pack { by: PackBy::Outlines, turns, ..Pack::default() };
         if let Some(free) = free {
             let start = Instant::now();
-            let pack = pack(free.of_images());
+            let pack = pack(Turns::Quarters);
             let plan = TurnedPlan::new(&part, &[[0.0; 2]], &[None], area, gap, pack, free)?;
             tell(plate, &free.to_string(), plan.layout(), start);
             continue;

@@ -39,7 +39,7 @@ fn run(scratch: &Scratch, script: &str) -> Vec<String> {
 }
 
 /// Returns the number that a script begins with.
-fn planned(script: &str) -> usize {
+fn planned_copies(script: &str) -> usize {
     let comment = script.lines().nth(1).unwrap();
     comment.strip_prefix("# ").unwrap().split(' ').next().unwrap().parse().unwrap()
 }
@@ -122,7 +122,7 @@ fn the_script_of_a_plan_makes_the_build_that_was_planned() {
     assert!(stacks.iter().any(|stack| stack.starts_with("plate-z")), "{script}");
     // A gap of 1 mm is 3.9 pixels, rounded up.
     let copies = check(&scratch, &stacks, 4);
-    assert_eq!(copies, planned(&script), "{script}");
+    assert_eq!(copies, planned_copies(&script), "{script}");
     assert!(copies > 1, "{script}");
     scratch
         .run(&format!("tile plate.tif --mesh none --gap 1mm --pack outline {area} -o quarters.tif"))
@@ -169,12 +169,26 @@ fn turns_that_gain_nothing_take_no_stacks() {
 }
 
 #[test]
+fn scripts_take_options_of_a_file_and_names_with_a_hyphen() {
+    let scratch = with_plate(Plate::Aerofoil);
+    std::fs::rename(scratch.path("plate.tif"), scratch.path("-plate.tif")).unwrap();
+    let options = "[tile]\nturns = \"45deg\"\nmesh = \"none\"\ngap = \"1mm\"\narea = \"60x60mm\"\n\
+                   layout-out = \"layout.json\"\noutput = \"build.tif\"\n";
+    scratch.write("o.toml", options.as_bytes());
+    let planned = scratch.run("tile --options o.toml -q -- -plate.tif").succeeds().stdout;
+    let script = String::from_utf8(planned).unwrap();
+    let stacks = run(&scratch, &script);
+    assert!(stacks.iter().any(|stack| stack.starts_with("./-plate-z")), "{script}");
+    assert_eq!(check(&scratch, &stacks, 4), planned_copies(&script), "{script}");
+}
+
+#[test]
 fn plans_name_what_they_cannot_slice_again() {
     let scratch = with_plate(Plate::Aerofoil);
     let line = "tile plate.tif --area 52x52mm --copies 1 --turns 45deg --layout-out l.json";
     scratch.run("tile plate.tif --turns 45deg").is_wrong_usage(&["--layout-out"]);
     scratch.run("tile --turns 45deg --layout-out l.json").is_wrong_usage(&["standard input"]);
-    scratch.run("tile plate.tif --turns 7deg").is_wrong_usage(&["7deg", "at most 72"]);
+    scratch.run("tile plate.tif --turns 7deg").is_wrong_usage(&["7deg", "at most 18"]);
     // The part has changed, or is not there.
     scratch.mesh("plate.stl", &Plate::Ring.mesh(4.0));
     let told = scratch.run(line).succeeds().stderr;

@@ -14,13 +14,14 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::erode::{Disc, Erosion, Sources};
-use super::row_runs::{RowRuns, Run, subtract};
+use super::row_runs::{RowRuns, Run, join_runs, subtract};
 
 /// The fewest rows that are grown at a time.
 const BAND: i32 = 512;
 /// The fewest rows that a sheet must have on average to be worth following.
 const SHEET_ROWS: usize = 4;
-/// The most runs that sheets may have in a band, so that they take little memory.
+/// The most runs that sheets may have in a band, so that they take 32 MiB. More of them, which
+/// only large discs have, are cut by rows.
 const MAX_RUNS: usize = 1 << 22;
 
 /// The pixels around a centre whose squared distance from it is below a limit.
@@ -33,9 +34,10 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Returns the pixels whose squared distance is below `square`, as far as an image of `height`
-    /// rows needs them.
+    /// Returns the pixels whose squared distance is below `square`, the centre at least, as far as
+    /// an image of `height` rows needs them.
     pub(super) fn below(square: u64, height: u32) -> Self {
+        let square = square.max(1);
         let disc = Disc::below(square, height);
         let squares = (0..disc.halves().len() as u64).map(|away| square - 1 - away * away);
         Self { exact: squares.map(|square| (square as f64).sqrt()).collect(), disc }
@@ -112,14 +114,7 @@ impl Reach {
         }
         let mut grown = RowRuns::new();
         for row in &mut found {
-            row.sort_unstable();
-            row.dedup_by(|next, run| {
-                let touch = next.0 <= run.1;
-                if touch {
-                    run.1 = run.1.max(next.1);
-                }
-                touch
-            });
+            join_runs(row);
             grown.push(row);
         }
         grown

@@ -10,8 +10,8 @@
 //! all is black.
 //!
 //! [`erode`] cuts rows by the disc around each pixel of the other colour, which finds the pixels
-//! near edges ([`aligned_rows`] is faster for plain rows, [`grow`] where only the shape counts); [`closest`] measures them, and
-//! [`edge_map`] keeps the result. [`skeleton`] finds thin walls, unless [`wide`] tells that the
+//! near edges ([`aligned_rows`] is faster for plain rows, [`grow`] where only the shape counts);
+//! [`closest`] measures them, and [`edge_map`] keeps the result. [`skeleton`] finds thin walls, unless [`wide`] tells that the
 //! image has none, or [`plain`] that a place has none, and [`walls`] measures them. Where walls
 //! are not kept, [`components`] finds those that vanish or break. [`feature_size`] gives the size
 //! of the feature at each edge, and [`scale`] makes up for firing.
@@ -50,6 +50,7 @@ pub use compensate::{
 };
 pub use components::Loss;
 pub(crate) use components::without_holes;
+pub(crate) use row_runs::join_runs;
 pub use tolerance::beyond_tolerance;
 pub use walls::ThinWall;
 pub use widths::Widths;

@@ -185,6 +185,7 @@ fn a_straight_edge_moves_by_exactly_the_distance() {
         assert!((f64::from(sum) / 255.0 - left).abs() < 0.005, "{by}: {sum}");
     }
     assert_eq!(offset(&bar, 1.0).to_mask(), Some(offset_one_bit(&bar, 1.0)));
+    assert_eq!(offset_one_bit(&bar, f64::NAN), bar);
     assert_eq!(offset_one_bit(&bar, 1.4).white_pixels(), 18 * 18);
     assert_eq!(offset_one_bit(&bar, 1.6).white_pixels(), 16 * 16);
 }

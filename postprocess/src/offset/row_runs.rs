@@ -165,6 +165,18 @@ pub(super) fn first_past<T>(
     place
 }
 
+/// Sorts runs and joins those that touch.
+pub(crate) fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
+    runs.sort_unstable();
+    runs.dedup_by(|next, last| {
+        let touch = next.0 <= last.1;
+        if touch {
+            last.1 = last.1.max(next.1);
+        }
+        touch
+    });
+}
+
 /// Makes `out` the parts of `runs` that are in none of `others`.
 pub(super) fn subtract(runs: &[Run], others: &[Run], out: &mut Vec<Run>) {
     out.clear();

@@ -11,8 +11,7 @@ impl Layout {
     /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.
     pub fn nearer_than(&self, gap: Length) -> Vec<[CopyName; 2]> {
         let silhouettes = self.silhouettes();
-        let farthest = self.pixels.width + self.pixels.height;
-        let margin = pack::pixels_across(gap, self).min(farthest);
+        let margin = pack::pixels_across(gap, self);
         let grown: HashMap<_, Mask> =
             silhouettes.iter().map(|(key, mask)| (*key, grown_by(mask, margin))).collect();
         let numbers: Vec<u32> = self.numbers().collect();

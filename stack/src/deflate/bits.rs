@@ -92,6 +92,12 @@ impl<'a> BitReader<'a> {
         Some(())
     }
 
+    /// Takes four whole bytes, the greatest first, after those that are begun.
+    pub(super) fn last_word(&mut self) -> Option<u32> {
+        self.skip(self.count % 8)?;
+        self.take(32).map(u32::swap_bytes)
+    }
+
     /// Takes up to 32 bits.
     #[inline]
     pub(super) fn take(&mut self, count: u8) -> Option<u32> {

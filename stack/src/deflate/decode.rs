@@ -5,7 +5,8 @@ use super::huffman::Symbols;
 use super::{END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, copies_of};
 
 /// Returns the runs `(length, byte)` of a zlib stream in which all copies are of the byte before,
-/// up to `bytes` bytes. Returns `None` for other streams, sound or not.
+/// up to `bytes` bytes. Returns `None` for other streams, sound or not, and for those whose check
+/// does not agree.
 ///
 /// Takes at most eight times as many runs as the stream has bytes.
 pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
@@ -23,9 +24,12 @@ pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
             2 => own_codes(&mut bits)?,
             _ => return None,
         };
-        reader.read_block(&mut bits, &symbols, &distances)?;
+        let is_whole = reader.read_block(&mut bits, &symbols, &distances)?;
         if is_last || reader.left == 0 {
-            return Some(reader.runs);
+            // A check that is cut off, or of more bytes than are wanted, says nothing.
+            let check = if is_last && is_whole { bits.last_word() } else { None };
+            let agrees = check.is_none_or(|check| check == adler32(&reader.runs));
+            return agrees.then_some(reader.runs);
         }
     }
 }
@@ -37,13 +41,17 @@ struct RunReader {
 }
 
 impl RunReader {
+    /// Reads a block, or as much of it as is wanted. Returns whether it is all of it.
     fn read_block(
         &mut self,
         bits: &mut BitReader<'_>,
         symbols: &Symbols,
         distances: &Symbols,
-    ) -> Option<()> {
-        while self.left > 0 {
+    ) -> Option<bool> {
+        loop {
+            if self.left == 0 {
+                return Some(symbols.read(bits) == Some(END_OF_BLOCK));
+            }
             let symbol = symbols.read(bits)?;
             if let Ok(byte) = u8::try_from(symbol) {
                 self.runs.push((1, byte));
@@ -51,7 +59,7 @@ impl RunReader {
                 continue;
             }
             if symbol == END_OF_BLOCK {
-                break;
+                return Some(true);
             }
             let (first, more) = copies_of(symbol)?;
             let length = first + bits.take(more)?;
@@ -63,8 +71,30 @@ impl RunReader {
             *before = before.checked_add(length)?;
             self.left = self.left.saturating_sub(length.into());
         }
-        Some(())
     }
+}
+
+/// Returns the Adler-32 check of runs of bytes.
+fn adler32(runs: &[(u32, u8)]) -> u32 {
+    const MODULUS: u64 = 65_521;
+    let (mut a, mut b) = (1u64, 0u64);
+    for &(length, byte) in runs {
+        let (mut left, byte) = (u64::from(length), u64::from(byte));
+        while left > 0 {
+            let part = left.min(1 << 16);
+            b += part * a + byte * (part * (part + 1) / 2);
+            a += part * byte;
+            // Remainders are seldom taken: both sums still fit.
+            if a >= 1 << 32 {
+                a %= MODULUS;
+            }
+            if b >= 1 << 60 {
+                b %= MODULUS;
+            }
+            left -= part;
+        }
+    }
+    (((b % MODULUS) << 16) | (a % MODULUS)) as u32
 }
 
 /// The codes of blocks that state none.

@@ -74,6 +74,24 @@ proptest! {
     }
 
     #[test]
+    fn a_check_that_does_not_agree_is_refused(
+        width in 1u32..70_000,
+        rows in proptest::collection::vec(
+            proptest::collection::vec((0u32..70_000, any::<u8>()), 0..12), 1..12,
+        ),
+        (place, bit) in (0usize..4, 0u8..8),
+    ) {
+        let image = image(width, &rows);
+        let (mut stream, bytes) = (encode(&image), u64::from(width) * rows.len() as u64);
+        prop_assert!(runs(&stream, bytes).is_some());
+        let end = stream.len();
+        stream[end - 4 + place] ^= 1 << bit;
+        prop_assert!(runs(&stream, bytes).is_none());
+        // One that is cut off says nothing.
+        prop_assert!(runs(&stream[..end - 1], bytes).is_some());
+    }
+
+    #[test]
     fn damaged_streams_do_not_panic(
         rows in proptest::collection::vec((0u32..900, any::<u8>()), 0..40),
         place in any::<proptest::sample::Index>(),

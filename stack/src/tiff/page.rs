@@ -222,8 +222,16 @@ impl Page {
         }
         let check = self.check.as_ref()?.page.as_ref()?;
         let (compression, code) = (self.strip_compression()?, check.code?);
-        let is_intact = code.is_of(self.size(), self.gray, &self.pieces[0]);
-        is_intact.then_some(PassedCode { compression, image: check.image, code })
+        let passed = PassedCode { compression, image: check.image, code };
+        (!self.is_coded_anew()).then_some(passed)
+    }
+
+    /// Returns whether the strip is not the one that the page's check was made of.
+    fn is_coded_anew(&self) -> bool {
+        let code = self.check.as_ref().and_then(|line| line.page.as_ref()?.code);
+        code.is_some_and(|code| {
+            self.pieces.first().is_none_or(|strip| !code.is_of(self.size(), self.gray, strip))
+        })
     }
 
     /// Returns whether the image is gray, not a mask.
@@ -322,8 +330,9 @@ impl Page {
         if check.is_some_and(|check| check.crc != image_crc(&image)) {
             return Err(StackError::Check { layer: self.info.index, fault: CheckFault::Image });
         }
-        let strip = self
-            .strip_compression()
+        // A strip that is not the one that was written may be damaged where no pixel shows it.
+        let strip = self.strip_compression().filter(|_| !self.is_coded_anew());
+        let strip = strip
             .and_then(|compression| Some(Strip { compression, bytes: self.pieces.pop()?.into() }));
         let image = LayerImage::of_page(image, strip, check);
         Ok(Layer { info: self.info, dpi: self.dpi, image })

@@ -42,10 +42,10 @@ pub(super) fn unpack(
             let length = u64::from(shape.row_bytes) * u64::from(shape.rows);
             match deflate::runs(bytes, length) {
                 Some(runs) => cut_runs(runs.into_iter(), shape, each),
-                None => cut_bytes(ZlibDecoder::new(bytes), shape, each),
+                None => cut_zlib(bytes, shape, each),
             }
         }
-        Compression::Deflate => cut_bytes(ZlibDecoder::new(bytes), shape, each),
+        Compression::Deflate => cut_zlib(bytes, shape, each),
         _ => cut_bytes(bytes, shape, each),
     }
 }
@@ -73,6 +73,18 @@ fn cut_runs(
             return Err(UnpackError::Enough);
         }
     }
+    Ok(())
+}
+
+fn cut_zlib(
+    bytes: &[u8],
+    shape: &PieceShape,
+    each: impl FnMut(&[(u32, u8)]) -> bool,
+) -> Result<(), UnpackError> {
+    let mut bytes = ZlibDecoder::new(bytes);
+    cut_bytes(&mut bytes, shape, each)?;
+    // The check is compared at the stream's end.
+    bytes.read(&mut [0]).map_err(|_| UnpackError::Damaged)?;
     Ok(())
 }
 

@@ -100,7 +100,7 @@ impl TileArgs {
         };
         let turns = match self.turns {
             Some(TurnsArg::Images(turns)) => turns,
-            Some(TurnsArg::Free(turns)) => turns.of_images(),
+            Some(TurnsArg::Free(_)) => Turns::Quarters,
             None => usual,
         };
         Pack { by: self.pack, turns, edge_gap: self.edge_gap, shares: self.shares }

@@ -46,8 +46,8 @@ impl TypedValueParser for TurnsParser {
                 return Err("write none, half, quarters or an angle, as 15deg".to_owned());
             }
             let free: FreeTurns = text.parse().map_err(|wrong| format!("{wrong}"))?;
-            let is_of_images = free.degrees().is_empty();
-            Ok(if is_of_images { TurnsArg::Images(free.of_images()) } else { TurnsArg::Free(free) })
+            let is_right = free.degrees().is_empty();
+            Ok(if is_right { TurnsArg::Images(Turns::Quarters) } else { TurnsArg::Free(free) })
         });
         parsed.parse_ref(command, option, value)
     }
@@ -59,9 +59,9 @@ impl TypedValueParser for TurnsParser {
             ("quarters", "By 90, 180 and 270 degrees"),
             (
                 "15deg",
-                "By all multiples of this or another angle that divides a full turn into at most 72, \
-                 by outlines. No build is written, but a script: it slices the parts at the angles \
-                 that this takes, and lays the build out",
+                "By all multiples of this or another angle that divides a right angle into at most \
+                 18, by outlines. No build is written, but a script: it slices the parts at the \
+                 angles that this takes, and lays the build out",
             ),
         ];
         let values = values.map(|(name, help)| PossibleValue::new(name).help(help));
@@ -82,17 +82,13 @@ mod tests {
                 matches.try_get_matches_from([text]).map_err(|error| error.to_string())?;
             Ok::<_, String>(*matches.get_one::<TurnsArg>("turns").unwrap())
         };
-        for (text, turns) in [
-            ("half", Turns::Half),
-            ("quarters", Turns::Quarters),
-            ("90deg", Turns::Quarters),
-            ("180", Turns::Half),
-            ("360deg", Turns::None),
-        ] {
+        for (text, turns) in
+            [("half", Turns::Half), ("quarters", Turns::Quarters), ("90deg", Turns::Quarters)]
+        {
             assert_eq!(parsed(text), Ok(TurnsArg::Images(turns)), "{text}");
         }
         assert_eq!(parsed("15deg"), Ok(TurnsArg::Free("15deg".parse().unwrap())));
-        assert!(parsed("7deg").unwrap_err().contains("at most 72"));
+        assert!(parsed("7deg").unwrap_err().contains("at most 18"));
         assert!(parsed("some").unwrap_err().contains("none, half, quarters or an angle"));
     }
 }

@@ -16,7 +16,6 @@ use lamp_stack::{Length, MAX_SIDE, Orientation, Size};
 
 use super::{CopyPlacement, Layout, PixelSize, TileError};
 use job::Job;
-pub(super) use no_fit::join_runs;
 
 /// How a copy may lie: the stack that it takes its images from, and their turn.
 type Way = (usize, Orientation);
@@ -70,11 +69,6 @@ impl Turns {
             Self::Half => &[0, 2],
             Self::Quarters => &[0, 2, 1, 3],
         }
-    }
-
-    /// Returns how many are allowed.
-    pub(super) fn count(self) -> u32 {
-        self.quarters().len() as u32
     }
 
     /// Returns them as orientations.
@@ -154,11 +148,13 @@ fn within_edges(
     Ok(placements)
 }
 
-/// Returns a distance in pixels, rounded up. One as wide as the area leaves room for one copy,
-/// and so does a wider one.
+/// Returns a distance in pixels, rounded up. One that no two places of the area are apart leaves
+/// room for one copy, and so does a wider one.
 pub(super) fn pixels_across(gap: Length, layout: &Layout) -> u32 {
     let pixels = (gap.pixels(layout.dpi()).max(0.0) - 1e-6).ceil().max(0.0) as u32;
-    pixels.min(MAX_SIDE)
+    // Nothing on the area is farther apart.
+    let PixelSize { width, height } = layout.pixels();
+    pixels.min(width.saturating_add(height)).min(MAX_SIDE)
 }
 
 #[cfg(test)]

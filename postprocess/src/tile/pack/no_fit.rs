@@ -11,7 +11,7 @@ use lamp_stack::{Frame, Mask, Orientation, white_runs};
 
 use super::super::{Layout, PixelSize};
 use super::{PackBy, Way};
-use crate::offset::offset_one_bit;
+use crate::offset::{join_runs, offset_one_bit};
 
 /// The columns from the first up to but excluding the second.
 pub(super) type CellRun = (i32, i32);
@@ -171,18 +171,6 @@ fn cells(mask: &Mask, cell: u32) -> Vec<Vec<CellRun>> {
     }
     rows.iter_mut().for_each(join_runs);
     rows
-}
-
-/// Sorts runs and joins those that touch.
-pub(in crate::tile) fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
-    runs.sort_unstable();
-    runs.dedup_by(|next, last| {
-        let touch = next.0 <= last.1;
-        if touch {
-            last.1 = last.1.max(next.1);
-        }
-        touch
-    });
 }
 
 impl NoFitRegion {

@@ -72,7 +72,9 @@ struct Order {
 
 impl Order {
     fn new(shares: &[u32]) -> Self {
-        let shares: Vec<u64> = shares.iter().map(|&share| share.into()).collect();
+        // A round is as short as it can be.
+        let common = shares.iter().fold(0, |common, &share| greatest_divisor(common, share));
+        let shares: Vec<u64> = shares.iter().map(|&share| (share / common).into()).collect();
         let counts = vec![0; shares.len()];
         Self { shares, parts: Vec::new(), counts }
     }
@@ -107,6 +109,11 @@ impl Order {
         self.parts.push(part);
         self.counts[part] += 1;
     }
+}
+
+/// Returns the greatest common divisor.
+fn greatest_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_divisor(b, a % b) }
 }
 
 #[cfg(test)]
@@ -145,6 +152,7 @@ mod tests {
         assert_eq!(order.counts(8), [6, 2]);
         assert_eq!(order.parts, [0, 0, 1, 0, 0, 0, 1, 0]);
         assert_eq!(order.counts(1), [1, 1]);
+        assert_eq!(Order::new(&[6, 2]).shares, [3, 1]);
     }
 
     #[test]

@@ -5,53 +5,41 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::super::Turns;
-
-/// Turns by all multiples of an angle that divides a full turn into at most 72: `15deg`.
+/// Turns by all multiples of an angle that divides a right angle into at most 18 steps: `15deg`.
+///
+/// Images turn by right angles, so a part is sliced once for each angle below that.
 ///
 /// ```
-/// use lamp_postprocess::{FreeTurns, Turns};
+/// use lamp_postprocess::FreeTurns;
 ///
 /// let turns: FreeTurns = "15deg".parse()?;
-/// // Images turn by right angles; the part is sliced at the angles between.
-/// assert_eq!(turns.of_images(), Turns::Quarters);
 /// assert_eq!(turns.degrees(), [15.0, 30.0, 45.0, 60.0, 75.0]);
 /// # Ok::<(), lamp_postprocess::FreeTurnsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeTurns {
-    /// The number of turns.
-    count: u32,
+    /// The number of steps in a right angle.
+    steps: u32,
 }
 
-/// A text is no angle that divides a full turn.
+/// A text is no angle that divides a right angle.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "`{0}` divides no full turn into whole steps, at most 72: write 5deg, 15deg, 22.5deg or 45deg"
+    "`{0}` is no number of degrees that divides a right angle into whole steps, at most 18: write \
+     5deg, 15deg, 22.5deg or 45deg"
 )]
 pub struct FreeTurnsError(String);
 
-const MOST: u32 = 72;
+const MOST: u32 = 18;
 
 impl FreeTurns {
-    /// Returns the turns of images among them.
-    pub fn of_images(self) -> Turns {
-        match self.count {
-            count if count % 4 == 0 => Turns::Quarters,
-            count if count % 2 == 0 => Turns::Half,
-            _ => Turns::None,
-        }
-    }
-
-    /// Returns the angles at which a part is sliced beside its own, in degrees, so that all turns are
-    /// those of images.
+    /// Returns the angles at which a part is sliced beside its own, in degrees.
     pub fn degrees(self) -> Vec<f64> {
-        let stacks = self.count / self.of_images().count();
-        (1..stacks).map(|stack| self.step() * f64::from(stack)).collect()
+        (1..self.steps).map(|step| self.step() * f64::from(step)).collect()
     }
 
     fn step(self) -> f64 {
-        360.0 / f64::from(self.count)
+        90.0 / f64::from(self.steps)
     }
 }
 
@@ -69,12 +57,13 @@ impl FromStr for FreeTurns {
     fn from_str(text: &str) -> Result<Self, FreeTurnsError> {
         let number = text.strip_suffix("deg").or(text.strip_suffix('\u{b0}')).unwrap_or(text);
         let degrees: Option<f64> = number.trim().parse().ok();
-        let count = degrees.map(|degrees| 360.0 / degrees);
-        let is_whole = |count: &f64| {
-            (1.0..=f64::from(MOST)).contains(count) && (count - count.round()).abs() < 1e-6
+        let steps = degrees.map(|degrees| 90.0 / degrees);
+        let is_whole = |steps: &f64| {
+            let whole = steps.round();
+            (1.0..=f64::from(MOST)).contains(&whole) && (steps - whole).abs() < 1e-6
         };
-        let count = count.filter(is_whole).ok_or_else(|| FreeTurnsError(text.to_owned()))?;
-        Ok(Self { count: count.round() as u32 })
+        let steps = steps.filter(is_whole).ok_or_else(|| FreeTurnsError(text.to_owned()))?;
+        Ok(Self { steps: steps.round() as u32 })
     }
 }
 
@@ -83,47 +72,52 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_divide_a_full_turn() {
-        let parsed = |text: &str| text.parse::<FreeTurns>().map(|turns| turns.count);
-        for (text, count) in [
-            ("5deg", 72),
-            ("15", 24),
-            ("22.5 deg", 16),
-            ("45\u{b0}", 8),
-            ("90deg", 4),
-            ("120deg", 3),
-            ("51.428571428571deg", 7),
-            ("360deg", 1),
+    fn angles_divide_a_right_angle() {
+        let parsed = |text: &str| text.parse::<FreeTurns>().map(|turns| turns.steps);
+        for (text, steps) in [
+            ("5deg", 18),
+            ("15", 6),
+            ("22.5 deg", 4),
+            ("45\u{b0}", 2),
+            ("12.857142857142858deg", 7),
+            ("90deg", 1),
         ] {
-            assert_eq!(parsed(text), Ok(count), "{text}");
+            assert_eq!(parsed(text), Ok(steps), "{text}");
         }
-        for wrong in ["", "deg", "0deg", "-15deg", "7deg", "4deg", "100deg", "inf", "nan", "15rad"]
-        {
+        for wrong in [
+            "",
+            "deg",
+            "0deg",
+            "-15deg",
+            "7deg",
+            "4deg",
+            "60deg",
+            "120deg",
+            "180deg",
+            "360deg",
+            "inf",
+            "nan",
+            "15rad",
+            "15degrees",
+        ] {
             assert!(parsed(wrong).is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn stacks_and_turns_of_images_make_all_turns() {
-        for count in 1..=MOST {
-            let turns = FreeTurns { count };
+        for steps in 1..=MOST {
+            let turns = FreeTurns { steps };
             let again: FreeTurns = turns.to_string().parse().unwrap();
             assert_eq!(again, turns);
-            let quarters = match turns.of_images() {
-                Turns::None => &[0.0][..],
-                Turns::Half => &[0.0, 180.0],
-                Turns::Quarters => &[0.0, 90.0, 180.0, 270.0],
-            };
-            let stacks = turns.degrees();
-            let stacks = std::iter::once(&0.0).chain(&stacks);
-            let mut all: Vec<f64> = stacks
-                .flat_map(|stack| quarters.iter().map(move |quarter| stack + quarter))
-                .collect();
-            all.sort_by(f64::total_cmp);
-            assert_eq!(all.len(), count as usize);
+            let stacks: Vec<f64> = std::iter::once(0.0).chain(turns.degrees()).collect();
+            let quarters = [0.0, 90.0, 180.0, 270.0];
+            let all = quarters.iter().flat_map(|quarter| stacks.iter().map(move |at| at + quarter));
+            let all: Vec<f64> = all.collect();
+            assert_eq!(all.len(), 4 * steps as usize);
             for (turn, degrees) in all.iter().enumerate() {
-                let exact = 360.0 * turn as f64 / f64::from(count);
-                assert!((degrees - exact).abs() < 1e-9, "{count}: {degrees} {exact}");
+                let exact = 90.0 * turn as f64 / f64::from(steps);
+                assert!((degrees - exact).abs() < 1e-9, "{steps}: {degrees} {exact}");
             }
         }
     }

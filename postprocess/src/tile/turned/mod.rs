@@ -9,7 +9,7 @@ mod outline;
 
 use lamp_stack::{Length, Size};
 
-use super::pack::{self, Pack};
+use super::pack::{self, Pack, Turns};
 use super::{CopyPlacement, Layout, PartStack, TileError};
 use outline::ImageTurn;
 
@@ -67,7 +67,7 @@ impl TurnedPlan {
         turns: FreeTurns,
     ) -> Result<Self, TileError> {
         assert_eq!(parts.len(), centres_mm.len(), "a centre for each part");
-        let pack = Pack { turns: turns.of_images(), ..pack };
+        let pack = Pack { turns: Turns::Quarters, ..pack };
         let plain = Layout::packed(parts.to_vec(), counts, area, gap, pack);
         let is_plain = |layout: &Layout| {
             let counted = |part: usize| {

@@ -13,11 +13,12 @@ use super::TileArgs;
 use super::stacks::InputStack;
 use super::turns_arg::TurnsArg;
 use crate::Lamp;
+use crate::arguments::words_in_effect;
 use crate::exit::Exit;
 use crate::progress::Progress;
 use crate::streams::{input_name, is_stream, print};
 use sliced_from::SlicedFrom;
-use words::{kept, quoted};
+use words::{file_word, kept, quoted};
 
 impl TileArgs {
     /// Returns the turns of a plan, if one is asked for.
@@ -123,12 +124,11 @@ impl TileArgs {
             }
         }
         let tile = crate::stage(&Lamp::command(), "tile");
-        let words: Vec<OsString> = std::env::args_os().skip(1).collect();
-        let stacks = plan.stacks().iter().map(|stack| OsString::from(&stack.name));
-        let layout = self.layout_out.iter().map(|path| path.clone().into_os_string());
+        let stacks = plan.stacks().iter().map(|stack| file_word(&stack.name).into());
+        let layout = self.layout_out.iter().map(|path| file_word(&path.to_string_lossy()).into());
         let settled = ["--fit", "--layout"].map(OsString::from).into_iter().chain(layout);
         let gap = ["--gap".into(), OsString::from(gap.to_string())];
-        let words = stacks.chain(settled).chain(gap).chain(kept(&words, &tile));
+        let words = stacks.chain(settled).chain(gap).chain(kept(words_in_effect(), &tile));
         let words: Vec<String> = words.map(|word| quoted(&word.to_string_lossy())).collect();
         script + &format!("tile {}\n", words.join(" "))
     }
@@ -137,17 +137,16 @@ impl TileArgs {
 /// `45 copies with turns of 15deg, 41 with quarters: 2 stacks to slice`.
 fn gain(plan: &TurnedPlan, turns: FreeTurns) -> String {
     let plain = plan.plain_copies();
-    let quarters = turns.of_images();
     let copies = match plan.layout().placements().len() {
         1 => "1 copy".to_owned(),
         copies => format!("{copies} copies"),
     };
     match plan.new_stacks() {
-        0 => format!("{copies}: no more fit with turns of {turns} than with {quarters}"),
-        1 => format!("{copies} with turns of {turns}, {plain} with {quarters}: 1 stack to slice"),
+        0 => format!("{copies}: no more fit with turns of {turns} than with quarters"),
+        1 => format!("{copies} with turns of {turns}, {plain} with quarters: 1 stack to slice"),
         stacks => {
             format!(
-                "{copies} with turns of {turns}, {plain} with {quarters}: {stacks} stacks to slice"
+                "{copies} with turns of {turns}, {plain} with quarters: {stacks} stacks to slice"
             )
         }
     }

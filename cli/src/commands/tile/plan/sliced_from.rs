@@ -9,7 +9,7 @@ use lamp_postprocess::{PartStack, TurnedSlicing};
 use lamp_stack::{digest_of, digest_of_digests};
 
 use super::super::stacks::{InputStack, ReadLayers};
-use super::words::quoted;
+use super::words::{file_word, quoted};
 use crate::exit::Exit;
 use crate::slicing_options::SlicingOptions;
 
@@ -66,11 +66,11 @@ impl SlicedFrom {
 
     /// Returns the command that slices the part for a plan.
     pub(super) fn command(&self, slicing: &TurnedSlicing, all_layers: bool, out: &str) -> String {
-        let files: Vec<String> = self.files.iter().map(|file| quoted(file)).collect();
+        let files: Vec<String> = self.files.iter().map(|file| quoted(&file_word(file))).collect();
         let slice = self.options.clone().turned(slicing).command(&files.join(" "), None);
         let Range { start, end } = self.layers;
         let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
-        format!("{slice}{layers} -o {}", quoted(out))
+        format!("{slice}{layers} -o {}", quoted(&file_word(out)))
     }
 }
 

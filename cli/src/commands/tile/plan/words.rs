@@ -5,11 +5,21 @@ use std::ffi::OsString;
 use clap::{Arg, Command};
 
 /// Options that a plan settles.
-const SETTLED: [&str; 9] =
-    ["turns", "pack", "copies", "shares", "gap", "edge-gap", "fit", "layout", "layout-out"];
+const SETTLED: [&str; 10] = [
+    "turns",
+    "pack",
+    "copies",
+    "shares",
+    "gap",
+    "edge-gap",
+    "fit",
+    "layout",
+    "layout-out",
+    "options",
+];
 
-/// Returns the options of a command line that `tile` was given, as they were typed, without those
-/// that a plan settles. Stacks, and the name of the command, are left out, too.
+/// Returns the options that `tile` was given, by a command line and by an options file, without
+/// those that a plan settles. Stacks, and the name of the command, are left out, too.
 pub(super) fn kept(words: &[OsString], tile: &Command) -> Vec<OsString> {
     let mut kept = Vec::new();
     let mut words = words.iter();
@@ -49,6 +59,11 @@ fn of_flags<'a>(tile: &'a Command, flags: &str) -> (Option<&'a Arg>, bool) {
         }
     }
     (last, false)
+}
+
+/// Returns a file as a word that no command takes for an option.
+pub(super) fn file_word(path: &str) -> String {
+    if path.starts_with('-') { format!("./{path}") } else { path.to_owned() }
 }
 
 /// Returns a word as a shell reads it.
@@ -95,6 +110,7 @@ mod tests {
 
     #[test]
     fn words_are_quoted_for_a_shell() {
+        assert_eq!(["-a.tif", "a.tif"].map(file_word), ["./-a.tif", "a.tif"]);
         for (word, expected) in [
             ("a/b-z15.tif", "a/b-z15.tif"),
             ("my part.stl", "'my part.stl'"),
