@@ -141,7 +141,8 @@ fn tile(error: &TileError) -> Option<String> {
             "give a larger --area, or --fit if the image is wider than the part"
         }
         TileError::TooMany { .. } => {
-            "give a larger --area, a smaller --gap or fewer copies, or try --pack outline"
+            "give a larger --area, a smaller --gap or fewer copies; --pack outline may place more than \
+             boxes do"
         }
         TileError::NoCells { .. } => "give a larger --cell or a smaller --wall",
         TileError::FineMesh => "give a larger --cell, or --mesh none",

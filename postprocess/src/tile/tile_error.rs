@@ -29,9 +29,7 @@ pub enum TileError {
         area_mm: Size,
     },
     /// Not all copies fit.
-    #[error(
-        "{name}: {asked} copies were asked for, but only {most} fit on the build area of {area_mm}"
-    )]
+    #[error("{name}: {} on the build area of {area_mm}", fewer(*asked, *most))]
     TooMany {
         /// The part.
         name: String,
@@ -263,6 +261,13 @@ pub struct CopyName {
 impl fmt::Display for CopyName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} copy {}", self.name, self.number)
+    }
+}
+
+fn fewer(asked: u32, most: u32) -> String {
+    match most {
+        0 => "no copy fits".to_owned(),
+        _ => format!("{asked} copies were asked for, but only {most} fit"),
     }
 }
 
