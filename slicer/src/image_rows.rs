@@ -6,49 +6,76 @@ use lamp_stack::{Grouped, Mask};
 
 use crate::bodies::{Position, SharedPixels};
 use crate::cut::{BodyCrossing, InRow, RowCrossing};
-use crate::gray::{ShadedRows, Shader};
 use crate::grid::PixelGrid;
 
-/// The rows of a layer's image, to be filled from the top.
-pub(crate) struct ImageRows<'a, R: ShadedRows> {
-    width: u32,
-    height: u32,
-    shader: Option<Shader<'a, R>>,
+/// What the rows of a layer become, from the top.
+pub(crate) trait RowMaker {
+    type Made;
+
+    /// Returns a list to which the row's transitions are to be added.
+    fn transitions(&mut self) -> &mut Vec<u32>;
+
+    /// Ends a row, given its sorted crossings.
+    fn end_row(&mut self, row: u32, places: &[impl InRow]);
+
+    fn finish(self) -> Self::Made;
 }
 
-impl<'a, R: ShadedRows> ImageRows<'a, R> {
-    pub(crate) fn new(grid: &PixelGrid, shader: Option<Shader<'a, R>>) -> Self {
-        Self { width: grid.width, height: grid.height, shader }
+/// Rows of a mask.
+pub(crate) struct MaskRows {
+    width: u32,
+    row_offsets: Vec<u32>,
+    transitions: Vec<u32>,
+}
+
+impl MaskRows {
+    pub(crate) fn new(grid: &PixelGrid) -> Self {
+        let mut row_offsets = Vec::with_capacity(grid.height as usize + 1);
+        row_offsets.push(0);
+        Self { width: grid.width, row_offsets, transitions: Vec::new() }
+    }
+}
+
+impl RowMaker for MaskRows {
+    type Made = Mask;
+
+    #[inline]
+    fn transitions(&mut self) -> &mut Vec<u32> {
+        &mut self.transitions
     }
 
-    /// Fills all rows with what `fill` makes of their crossings, once they are sorted. Returns the
-    /// mask, the shaded rows, and the rows for which `fill` returns false since they do not balance.
-    pub(crate) fn filled<C: InRow>(
-        mut self,
-        mut by_row: Grouped<C>,
-        mut fill: impl FnMut(&[C], &mut Vec<u32>) -> bool,
-    ) -> (Mask, Option<R>, Vec<u32>) {
-        let mut row_offsets = Vec::with_capacity(self.height as usize + 1);
-        row_offsets.push(0);
-        let mut transitions = Vec::with_capacity(by_row.items().len());
-        let mut stray_rows = Vec::new();
-        for row in 0..self.height {
-            let places = by_row.group_mut(row as usize);
-            if !places.is_empty() {
-                sort(places);
-                if !fill(places, &mut transitions) {
-                    stray_rows.push(row);
-                }
-            }
-            row_offsets.push(transitions.len() as u32);
-            if let Some(shader) = &mut self.shader {
-                shader.push_row(row, places);
+    #[inline]
+    fn end_row(&mut self, _row: u32, _places: &[impl InRow]) {
+        self.row_offsets.push(self.transitions.len() as u32);
+    }
+
+    fn finish(self) -> Mask {
+        let mask = Mask::new(self.width, self.row_offsets, self.transitions);
+        mask.expect("sorted places without pairs increase strictly")
+    }
+}
+
+/// Makes rows of what `fill` makes of their crossings, once they are sorted. Returns them, and the
+/// numbers of those for which `fill` returns false since they do not balance.
+pub(crate) fn make_rows<M: RowMaker, C: InRow>(
+    mut maker: M,
+    height: u32,
+    mut by_row: Grouped<C>,
+    mut fill: impl FnMut(&[C], &mut Vec<u32>) -> bool,
+) -> (M::Made, Vec<u32>) {
+    maker.transitions().reserve(by_row.items().len());
+    let mut stray_rows = Vec::new();
+    for row in 0..height {
+        let places = by_row.group_mut(row as usize);
+        if !places.is_empty() {
+            sort(places);
+            if !fill(places, maker.transitions()) {
+                stray_rows.push(row);
             }
         }
-        let mask = Mask::new(self.width, row_offsets, transitions);
-        let mask = mask.expect("sorted places without pairs increase strictly");
-        (mask, self.shader.map(Shader::finish), stray_rows)
+        maker.end_row(row, places);
     }
+    (maker.finish(), stray_rows)
 }
 
 /// Sorts what a row has: two or four, as most rows have, without a branch.

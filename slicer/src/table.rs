@@ -8,7 +8,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use lamp_stack::{Grouped, Image, KeyCounts, Mask};
+use lamp_stack::{Grouped, Image, KeyCounts};
 use rayon::prelude::*;
 
 use crate::bodies::{Position, SharedCounts, SharedPixels};
@@ -17,7 +17,7 @@ use crate::cut::{BodyCrossing, Crossing, Cutter, LayerShare, RowCrossing, RowSeg
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
-use crate::image_rows::{ImageRows, by_body, even_odd, non_zero, sort_by};
+use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, non_zero, sort_by};
 use crate::placement::PlacedFacet;
 
 /// The rule that tells inside from outside.
@@ -283,19 +283,19 @@ impl Table {
         let spans = spans.unwrap_or_default();
         match shading {
             Shading::White => {
-                let (mask, _, cut) = self.rows::<LevelRows<'_>>(layer, cutter, surfaces, None);
+                let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
                 cut.with(CutImage::Image(Image::Mask(mask)))
             }
             Shading::Levels(levels) => {
                 let rows = LevelRows::new(levels.of_layer(layer), width);
                 let shader = shader(rows, layer, cutter, &spans);
-                let (_, rows, cut) = self.rows(layer, cutter, surfaces, Some(shader));
-                cut.with(CutImage::Image(rows.expect("a shader makes rows").finish()))
+                let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
+                cut.with(CutImage::Image(rows.finish()))
             }
             Shading::Depths(_) => {
                 let shader = shader(DepthRows::new(width), layer, cutter, &spans);
-                let (_, rows, cut) = self.rows(layer, cutter, surfaces, Some(shader));
-                cut.with(CutImage::Depths(rows.expect("a shader makes rows")))
+                let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
+                cut.with(CutImage::Depths(rows))
             }
         }
     }
@@ -340,37 +340,37 @@ impl Table {
         rows.finish()
     }
 
-    /// Returns a layer's mask, its shaded rows, and what else is known of it.
-    fn rows<R: ShadedRows>(
+    /// Returns what a layer's rows become, and what else is known of it.
+    fn rows<M: RowMaker>(
         &self,
         layer: usize,
         cutter: Cutter<'_>,
         surfaces: &[PlacedSurfaces],
-        shader: Option<Shader<'_, R>>,
-    ) -> (Mask, Option<R>, CutFindings) {
+        maker: M,
+    ) -> (M::Made, CutFindings) {
         let Cutter { grid, rule, .. } = cutter;
         let more = self.more(layer, cutter, surfaces);
-        let rows = ImageRows::new(grid, shader);
+        let height = grid.height;
         let mut shared = SharedPixels::new(rule);
-        let (mask, shaded, stray_rows) = if rule.has_bodies() {
+        let (made, stray_rows) = if rule.has_bodies() {
             let mut position = Position::outside(rule);
             let crossings = || {
                 let all = self.by_body(layer).chain(more.iter().copied());
                 all.map(|(body, it)| (it.row(), BodyCrossing::new(body, it.in_row())))
             };
-            let by_row = Grouped::new(grid.height as usize, crossings);
-            rows.filled(by_row, |places, transitions| {
+            let by_row = Grouped::new(height as usize, crossings);
+            make_rows(maker, height, by_row, |places, transitions| {
                 by_body(places, transitions, &mut position, &mut shared)
             })
         } else {
             let by_row = self.by_row(layer, grid, &more);
             match rule.fill() {
-                Fill::EvenOdd => rows.filled(by_row, even_odd),
-                Fill::NonZero => rows.filled(by_row, non_zero),
+                Fill::EvenOdd => make_rows(maker, height, by_row, even_odd),
+                Fill::NonZero => make_rows(maker, height, by_row, non_zero),
             }
         };
         let closed = self.is_closed(layer, rule.fill());
-        (mask, shaded, CutFindings { stray_rows, closed, shared: shared.counts() })
+        (made, CutFindings { stray_rows, closed, shared: shared.counts() })
     }
 }
 

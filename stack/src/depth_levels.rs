@@ -68,8 +68,8 @@ pub struct LevelSteps {
 }
 
 impl LevelSteps {
-    /// Bins of depths, four for each step.
-    const BINS: usize = 1024;
+    /// Bins of depths, eight for each step.
+    const BINS: usize = 2048;
 
     /// Creates the steps: from the depth at `i` on, in micrometres, the level is above `i`.
     ///
@@ -95,8 +95,12 @@ impl LevelSteps {
     /// Returns the level at a depth: the number of steps at or below it.
     #[inline]
     pub fn level(&self, depth_um: f64) -> u8 {
-        let mut level = self.below[self.bin(depth_um)];
-        while level < self.count && self.steps_um[usize::from(level)] <= depth_um {
+        let level = self.below[self.bin(depth_um)];
+        // Most bins have one step or none, and which it is cannot be predicted: no branch for that.
+        let is_past =
+            |level: u8| (level < self.count) & (self.steps_um[usize::from(level)] <= depth_um);
+        let mut level = level.wrapping_add(u8::from(is_past(level)));
+        while is_past(level) {
             level += 1;
         }
         level
@@ -105,7 +109,14 @@ impl LevelSteps {
     /// Returns a depth's bin: never a lower one for a greater depth.
     #[inline]
     fn bin(&self, depth_um: f64) -> usize {
-        ((depth_um * self.bins_per_um) as u32).min(Self::BINS as u32) as usize
+        // All numbers from here to twice as many are whole, so that adding it rounds. Casts take
+        // longer.
+        const WHOLE: f64 = (1u64 << 52) as f64;
+        const LAST: f64 = LevelSteps::BINS as f64;
+        let bin = depth_um * self.bins_per_um;
+        let bin = if bin > 0.0 { bin } else { 0.0 };
+        let bin = if bin < LAST { bin } else { LAST };
+        (bin + WHOLE).to_bits() as u16 as usize
     }
 }
 

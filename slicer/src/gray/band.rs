@@ -4,11 +4,12 @@ use std::sync::{Arc, OnceLock};
 
 use lamp_stack::LevelChange;
 
+use super::above::{Above, AboveRows};
 use super::below::{Below, DEEP};
 use super::columns::{BAND_ROWS, Columns, band_rows};
 use super::print_through::{LevelsByDepth, PrintThrough};
 use super::row_lists::RowLists;
-use super::solid::SolidRow;
+use super::solid::{Intervals, SolidRow};
 
 /// A surface this far above the underside, as a share of the critical dose, is short of it.
 const SHORT: f64 = 1e-3;
@@ -21,12 +22,19 @@ pub(super) struct Around<'a> {
     end: usize,
     /// The levels under so many white layers, as far as they were asked for.
     by_depth: Vec<OnceLock<Arc<LevelsByDepth>>>,
+    /// The level under white layers alone if the underside lies in the layer itself, in the one below
+    /// it, and so on.
+    under_white: Vec<Option<u8>>,
 }
 
 impl<'a> Around<'a> {
     pub(super) fn new(light: &'a PrintThrough, layer: usize, end: usize) -> Self {
         let by_depth = (layer..end).map(|_| OnceLock::new()).collect();
-        Self { light, layer, end, by_depth }
+        let around = Self { light, layer, end, by_depth, under_white: Vec::new() };
+        let (table, first) = (around.levels_under(end - 1 - layer), light.first_in_reach(layer));
+        let of_all = |below| around.level_of_all(table, below);
+        let under_white = (first as usize..=layer).rev().map(of_all).collect();
+        Self { under_white, ..around }
     }
 
     /// Returns the levels under so many white layers.
@@ -35,6 +43,19 @@ impl<'a> Around<'a> {
             let goes_on = self.end < self.light.len() && white + 1 == self.end - self.layer;
             self.light.levels_by_depth(self.layer, if goes_on { None } else { Some(white) })
         })
+    }
+
+    /// Returns the level of all undersides in a layer, if they have one.
+    fn level_of_all(&self, table: &LevelsByDepth, below: usize) -> Option<u8> {
+        let tops_um = self.light.distance_um(self.layer, below);
+        if tops_um + self.light.step_um(below) < table.first_um {
+            // However deep it is within its layer.
+            Some(1)
+        } else if tops_um >= table.white_um && below != self.layer {
+            Some(255)
+        } else {
+            None
+        }
     }
 }
 
@@ -46,88 +67,76 @@ pub(super) struct BandChooser<'a> {
     column: ColumnLight,
     changes: LevelRow,
     short_px: u64,
-    /// Columns that are still to be looked at, the first ones last.
-    above: Vec<AbovePiece>,
-}
-
-/// Columns, and what is known of the layers above them up to the next.
-struct AbovePiece {
-    columns: (u32, u32),
-    next: usize,
-    seen: Seen,
-}
-
-/// What was seen above, from the lowest layer on.
-#[derive(Clone, Copy)]
-enum Seen {
-    /// So many white layers.
-    White(usize),
-    /// So many white layers, and black ones above these.
-    Black(usize),
-    /// Anything else.
-    Mixed,
-}
-
-impl Seen {
-    /// Goes on with a layer that is part, perhaps down to the next.
-    fn then_part(self, is_through: bool) -> Self {
-        match self {
-            Self::White(white) if is_through => Self::White(white + 1),
-            _ => Self::Mixed,
-        }
-    }
-
-    fn then_black(self) -> Self {
-        match self {
-            Self::White(white) => Self::Black(white),
-            seen => seen,
-        }
-    }
+    /// How far each layer below has been read in the row, from the layer itself down.
+    read: Vec<usize>,
+    /// The columns of each row that are part in all layers above.
+    solid: Vec<SolidRow>,
+    /// Those of the row that is made.
+    white_above: Intervals,
+    spare: Intervals,
+    above: AboveRows<'a>,
+    seen: Vec<Above>,
 }
 
 /// The rows of a layer in a band, and their pixels that are short of the underside.
 pub(super) type ChosenRows = (RowLists<LevelChange>, u64);
 
 impl<'a> BandChooser<'a> {
-    pub(super) fn new(columns: &'a Columns, light: &'a PrintThrough, band: usize) -> Self {
-        let (column, changes) = (ColumnLight::default(), LevelRow::default());
-        Self { columns, light, band, column, changes, short_px: 0, above: Vec::new() }
+    pub(super) fn new(columns: &'a Columns, light: &'a PrintThrough) -> Self {
+        Self {
+            columns,
+            light,
+            band: 0,
+            column: ColumnLight::default(),
+            changes: LevelRow::default(),
+            short_px: 0,
+            read: Vec::new(),
+            solid: Vec::new(),
+            white_above: Intervals::new(),
+            spare: Intervals::new(),
+            above: AboveRows::new(columns),
+            seen: Vec::new(),
+        }
     }
 
-    /// Chooses the rows of each layer.
-    pub(super) fn choose(mut self, layers: &[Around<'_>]) -> Vec<ChosenRows> {
+    /// Chooses the rows of each layer in a band.
+    pub(super) fn choose(&mut self, band: usize, layers: &[Around<'_>]) -> Vec<ChosenRows> {
         let (Some(lowest), Some(highest)) = (layers.first(), layers.last()) else {
             return Vec::new();
         };
-        let rows = self.columns.rows(lowest.layer);
-        let (width, band) = (rows.width(), band_rows(self.band, rows));
-        let (most_above, is_top) = (self.light.most_above(), highest.end == self.light.len());
-        let solid = |_| SolidRow::new(width, most_above, is_top);
-        let mut solid: Vec<SolidRow> = band.clone().map(solid).collect();
+        self.start(band, highest);
         let mut chosen = Vec::with_capacity(layers.len());
         for layer in (lowest.layer..highest.end).rev() {
             if let Some(around) = layers.get(layer - lowest.layer) {
-                chosen.push(self.choose_layer(around, &solid, chosen.last()));
+                chosen.push(self.choose_layer(around, chosen.last()));
             }
-            for (in_band, solid) in (0..).zip(&mut solid) {
-                solid.go_down(layer, self.below(layer, in_band));
+            let below = |in_band| self.columns.below(layer, band, in_band);
+            for (in_band, solid) in (0..).zip(&mut self.solid) {
+                solid.go_down(layer, below(in_band), &mut self.spare);
             }
         }
         chosen.reverse();
         chosen
     }
 
-    fn choose_layer(
-        &mut self,
-        around: &Around<'_>,
-        solid: &[SolidRow],
-        last: Option<&ChosenRows>,
-    ) -> ChosenRows {
+    /// Starts a band above all layers that count for the highest one.
+    fn start(&mut self, band: usize, highest: &Around<'_>) {
+        self.band = band;
+        let rows = self.columns.rows(highest.layer);
+        let (width, height) = (rows.width(), band_rows(band, rows).len());
+        let (most_above, is_top) = (self.light.most_above(), highest.end == self.light.len());
+        self.solid.resize_with(height, SolidRow::default);
+        self.solid.iter_mut().for_each(|solid| solid.start(width, most_above, is_top));
+        self.above.start(band, height);
+    }
+
+    fn choose_layer(&mut self, around: &Around<'_>, last: Option<&ChosenRows>) -> ChosenRows {
         let mut rows = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
         self.short_px = 0;
-        for (in_band, solid) in (0..).zip(solid) {
+        self.above.start_layer(around.layer, around.end);
+        for in_band in 0..self.solid.len() as u32 {
             std::mem::swap(rows.items_mut(), &mut self.changes.changes);
-            self.choose_row(around, in_band, solid.columns());
+            self.choose_row(around, in_band);
             self.changes.end();
             std::mem::swap(rows.items_mut(), &mut self.changes.changes);
             rows.end_row();
@@ -135,10 +144,19 @@ impl<'a> BandChooser<'a> {
         (rows, self.short_px)
     }
 
-    /// Chooses a row, given its number in the band and the columns that are part in all layers above.
-    fn choose_row(&mut self, around: &Around<'_>, in_band: u32, mut solid: &[(u32, u32)]) {
+    /// Chooses a row, given its number in the band.
+    fn choose_row(&mut self, around: &Around<'_>, in_band: u32) {
         let layers_above = around.end - 1 - around.layer;
-        for &Below { start, end, layer } in self.below(around.layer, in_band) {
+        self.read.clear();
+        let row = self.below(around.layer, in_band);
+        let needs_solid = row.iter().any(|below| below.layer != DEEP);
+        let mut white_above = std::mem::take(&mut self.white_above);
+        white_above.clear();
+        if needs_solid {
+            self.solid[in_band as usize].push_columns(&mut white_above);
+        }
+        let mut solid = &white_above[..];
+        for &Below { start, end, layer } in row {
             if layer == DEEP {
                 self.changes.push(start, end, 255);
                 continue;
@@ -151,14 +169,20 @@ impl<'a> BandChooser<'a> {
                 let (from, to) = solid.first().copied().unwrap_or((end, end));
                 let (from, to) = (from.clamp(column, end), to.min(end));
                 if column < from {
-                    self.choose_below_gaps(around, in_band, (column, from), layer as usize);
+                    self.choose_below_gaps(around, in_band, (column, from), layer);
                 }
                 if from < to {
-                    self.by_depth(around, in_band, (from, to), layer as usize, layers_above);
+                    let below = layer as usize;
+                    match around.under_white[around.layer - below] {
+                        Some(level) => self.changes.push(from, to, level),
+                        None => self.by_depth(around, in_band, (from, to), below, layers_above),
+                    }
                 }
                 column = to;
             }
         }
+        self.white_above = white_above;
+        self.above.end_row(in_band);
     }
 
     /// Adds the levels of columns that are not part in all layers above.
@@ -167,43 +191,23 @@ impl<'a> BandChooser<'a> {
         around: &Around<'_>,
         in_band: u32,
         columns: (u32, u32),
-        below: usize,
+        below: u32,
     ) {
-        self.above.push(AbovePiece { columns, next: around.layer + 1, seen: Seen::White(0) });
-        while let Some(piece) = self.above.pop() {
-            let (start, end) = piece.columns;
-            match piece.seen {
-                Seen::Mixed => (start..end).for_each(|column| {
+        let mut seen = std::mem::take(&mut self.seen);
+        self.above.look(in_band, columns, below, &mut seen);
+        for &Above { start, end, white_to, black_to } in &seen {
+            let (white_to, black_to) = (around.end.min(white_to as usize), black_to as usize);
+            if white_to < around.end && black_to < around.end {
+                (start..end).for_each(|column| {
                     let level = self.column_level(around, in_band, column);
                     self.changes.push(column, column + 1, level);
-                }),
-                _ if piece.next < around.end => self.look_up(in_band, piece),
-                Seen::White(white) | Seen::Black(white) => {
-                    self.by_depth(around, in_band, piece.columns, below, white);
-                }
+                });
+            } else {
+                let white = white_to - 1 - around.layer;
+                self.by_depth(around, in_band, (start, end), below as usize, white);
             }
         }
-    }
-
-    /// Cuts columns by what the next layer above is there. The pieces are left in reverse.
-    fn look_up(&mut self, in_band: u32, AbovePiece { columns, next, seen }: AbovePiece) {
-        let first = self.above.len();
-        let (mut column, end) = columns;
-        let row = self.below(next, in_band);
-        let mut rest = &row[row.partition_point(|piece| piece.end <= column)..];
-        while column < end {
-            let (to, seen) = match rest.first() {
-                Some(piece) if piece.start <= column => {
-                    rest = &rest[1..];
-                    (piece.end, seen.then_part(piece.layer != next as u32))
-                }
-                gap => (gap.map_or(end, |piece| piece.start), seen.then_black()),
-            };
-            let to = to.min(end);
-            self.above.push(AbovePiece { columns: (column, to), next: next + 1, seen });
-            column = to;
-        }
-        self.above[first..].reverse();
+        self.seen = seen;
     }
 
     fn below(&self, layer: usize, in_band: u32) -> &'a [Below] {
@@ -220,16 +224,16 @@ impl<'a> BandChooser<'a> {
         white: usize,
     ) {
         let table = around.levels_under(white);
+        if let Some(level) = around.level_of_all(table, below) {
+            return self.changes.push(start, end, level);
+        }
         let tops_um = self.light.distance_um(around.layer, below);
-        if tops_um + self.light.step_um(below) < table.first_um {
-            // However deep it is within its layer.
-            return self.changes.push(start, end, 1);
+        let (row, down) = (self.band as u32 * BAND_ROWS + in_band, around.layer - below);
+        if down >= self.read.len() {
+            self.read.resize(down + 1, 0);
         }
-        if tops_um >= table.white_um && below != around.layer {
-            return self.changes.push(start, end, 255);
-        }
-        let row = self.band as u32 * BAND_ROWS + in_band;
-        for (from, to, depth_um) in self.columns.rows(below).pieces_within(row, start, end) {
+        let pieces = self.columns.rows(below).pieces_from(row, &mut self.read[down], start, end);
+        for (from, to, depth_um) in pieces {
             let depth_um = tops_um + depth_um;
             if below == around.layer && depth_um > table.falls_short_um + 1.0 {
                 self.short_px += u64::from(to - from);

@@ -38,10 +38,7 @@ pub(crate) fn push_below(
     let step_um = light.step_um(layer);
     let first_in_reach = light.first_in_reach(layer);
     let mut rest = layer_below.unwrap_or_default();
-    for (start, end, depth_um) in rows.pieces(row) {
-        if depth_um == 0.0 {
-            continue;
-        }
+    for (start, end, depth_um) in rows.parts(row) {
         if !is_through(depth_um, step_um) {
             push_joined(list, first, Below { start, end, layer: layer as u32 });
             continue;

@@ -12,7 +12,8 @@
 //! level follows from the depth alone. Depths are told within a layer; further down, they are those
 //! of the layers below. What is below a row's pixels is carried up from layer to layer
 //! ([`below`](super::below)), and where all layers above are part is carried down
-//! ([`solid`](super::solid)). Only elsewhere, near faces that look up, each layer above is looked at.
+//! ([`solid`](super::solid)). Only elsewhere, near faces that look up, the layers above are looked at,
+//! which are for most pixels those that the layer above saw ([`above`](super::above)).
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -90,8 +91,10 @@ impl Columns {
     pub(crate) fn choose(&self, light: &PrintThrough, layers: Range<usize>) -> Vec<ChosenLayer> {
         let around = |layer| Around::new(light, layer, light.end_above(layer).min(self.end()));
         let around: Vec<Around<'_>> = layers.clone().map(around).collect();
-        let of_band = |band| BandChooser::new(self, light, band).choose(&around);
-        let bands: Vec<_> = (0..self.below.len()).into_par_iter().map(of_band).collect();
+        let chooser = || BandChooser::new(self, light);
+        let bands = (0..self.below.len()).into_par_iter();
+        let bands: Vec<_> =
+            bands.map_init(chooser, |chooser, band| chooser.choose(band, &around)).collect();
         let whole = |k: usize| {
             let of_bands = bands.iter().map(|band| &band[k]);
             let rows = RowLists::joined(of_bands.clone().map(|(rows, _)| rows));

@@ -17,6 +17,7 @@
 //! Source: 002 section 3.3.10, algorithm 15, but with depths of the facets themselves
 //! instead of a solid cut out for each layer.
 
+mod above;
 mod band;
 mod below;
 mod columns;

@@ -100,25 +100,41 @@ impl DepthRows {
         self.changes.len()
     }
 
-    /// Returns the pieces of equal depth that a row consists of, as the first column, the one after
+    /// Returns the pieces of equal depth of a row that are part, as the first column, the one after
     /// the last, and the depth.
     #[inline]
-    pub(crate) fn pieces(&self, row: u32) -> impl Iterator<Item = (u32, u32, f64)> {
-        pieces(self.changes.row(row), 0, self.width, 0.0)
+    pub(crate) fn parts(&self, row: u32) -> impl Iterator<Item = (u32, u32, f64)> {
+        let changes = self.changes.row(row);
+        (0..changes.len()).filter_map(|k| {
+            let (start, depth) = changes[k];
+            let end = changes.get(k + 1).map_or(self.width, |&(end, _)| end);
+            (depth > 0.0).then_some((start, end, depth.into()))
+        })
     }
 
-    /// Returns the pieces of equal depth of some columns of a row, as [`pieces`](Self::pieces).
+    /// Returns the pieces of equal depth of some columns of a row, as [`parts`](Self::parts) does, and
+    /// those outside.
+    /// `read` is the number of changes at or before columns that were asked for before; these must
+    /// come from the left.
     #[inline]
-    pub(crate) fn pieces_within(
+    pub(crate) fn pieces_from(
         &self,
         row: u32,
+        read: &mut usize,
         start: u32,
         end: u32,
     ) -> impl Iterator<Item = (u32, u32, f64)> {
         let changes = self.changes.row(row);
-        let before = changes.partition_point(|&(column, _)| column <= start);
-        let depth = before.checked_sub(1).map_or(0.0, |last| changes[last].1);
-        pieces(&changes[before..], start, end, depth)
+        while changes.get(*read).is_some_and(|&(column, _)| column <= start) {
+            *read += 1;
+        }
+        let depth = read.checked_sub(1).map_or(0.0, |last| changes[last].1);
+        let (mut next, mut here) = (changes[*read..].iter(), Some((start, depth)));
+        iter::from_fn(move || {
+            let (from, depth) = here?;
+            here = next.next().copied().filter(|&(column, _)| column < end);
+            Some((from, here.map_or(end, |(column, _)| column), f64::from(depth)))
+        })
     }
 
     /// Returns the depth at a pixel.
@@ -127,24 +143,6 @@ impl DepthRows {
         let before = changes.partition_point(|&(start, _)| start <= column);
         before.checked_sub(1).map_or(0.0, |last| changes[last].1.into())
     }
-}
-
-/// Returns the pieces of columns between changes, the first of which has a depth.
-#[inline]
-fn pieces(
-    changes: &[(u32, f32)],
-    start: u32,
-    end: u32,
-    depth: f32,
-) -> impl Iterator<Item = (u32, u32, f64)> {
-    let mut next = changes.iter();
-    let mut here = Some((start, depth));
-    iter::from_fn(move || {
-        let (from, depth) = here?;
-        here = next.next().copied().filter(|&(column, _)| column < end);
-        Some((from, here.map_or(end, |(column, _)| column), f64::from(depth)))
-    })
-    .filter(|(from, to, _)| from < to)
 }
 
 impl ShadedRows for DepthRows {
@@ -181,16 +179,20 @@ mod tests {
         let changes = [(0, 5.0), (4, f32::INFINITY), (9, 7.0), (10, 0.0), (15, 3.0)];
         rows.changes.items_mut().extend(changes);
         rows.changes.end_row();
-        assert_eq!(rows.pieces(0).collect::<Vec<_>>(), [(0, 20, 0.0)]);
+        assert_eq!(rows.parts(0).count(), 0);
         let deep = f64::INFINITY;
         let all = [(0, 4, 5.0), (4, 9, deep), (9, 10, 7.0), (10, 15, 0.0), (15, 20, 3.0)];
-        assert_eq!(rows.pieces(1).collect::<Vec<_>>(), all);
+        let parts = all.iter().copied().filter(|(.., depth)| *depth > 0.0);
+        assert_eq!(rows.parts(1).collect::<Vec<_>>(), parts.collect::<Vec<_>>());
         for start in 0..20 {
             for end in start + 1..=20 {
                 let within =
                     all.iter().map(|&(from, to, depth)| (from.max(start), to.min(end), depth));
                 let within: Vec<_> = within.filter(|(from, to, _)| from < to).collect();
-                assert_eq!(rows.pieces_within(1, start, end).collect::<Vec<_>>(), within);
+                for mut read in [0, 1] {
+                    let pieces = rows.pieces_from(1, &mut read, start, end);
+                    assert_eq!(pieces.collect::<Vec<_>>(), within);
+                }
             }
         }
         assert_eq!([3, 4, 12, 19].map(|column| rows.at(1, column)), [5.0, deep, 0.0, 3.0]);

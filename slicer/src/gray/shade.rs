@@ -5,6 +5,7 @@ use lamp_stack::Grouped;
 use crate::bodies::{FillRule, Position};
 use crate::cut::InRow;
 use crate::gray::{DepthSpan, ShadedRows};
+use crate::image_rows::RowMaker;
 use crate::planes::Planes;
 
 /// Shades a layer's rows, from the top.
@@ -20,6 +21,8 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
     /// What a pixel's line is in on its way down.
     below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
+    /// The columns at which the row enters and leaves the part.
+    transitions: Vec<u32>,
     /// The pixel that the row ends with.
     last: R::Pixel,
     width: u32,
@@ -43,28 +46,47 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             spans,
             open: Vec::new(),
             met: Vec::new(),
+            transitions: Vec::new(),
             last: R::OUTSIDE,
             width,
         }
     }
 
-    /// Adds the next row, given its sorted crossings with the section's contours.
-    pub(crate) fn push_row(&mut self, row: u32, places: &[impl InRow]) {
+    /// Adds the columns of a row that are part, given its sorted crossings.
+    fn shade_row(&mut self, row: u32, places: &[impl InRow], transitions: &[u32]) {
         let mut spans = self.spans.group(row as usize);
+        let mut position = Position::outside(self.rule);
+        let mut places = places;
         self.last = R::OUTSIDE;
         self.open.clear();
-        let mut position = Position::outside(self.rule);
-        for (k, place) in places.iter().enumerate() {
-            position.cross(place.turn());
-            let end = places.get(k + 1).map_or(self.width, |next| next.column());
-            if place.column() < end {
-                self.shade(place.column(), end, &position, &mut spans);
+        for ends in transitions.chunks(2) {
+            let (start, end) = (ends[0], ends.get(1).copied().unwrap_or(self.width));
+            while spans.first().is_some_and(|span| span.end <= start) {
+                spans = &spans[1..];
+            }
+            if self.open.is_empty() && spans.first().is_none_or(|span| span.start >= end) {
+                self.push(start, R::DEEP);
+            } else {
+                let mut column = start;
+                while column < end {
+                    while let Some((place, rest)) = places.split_first()
+                        && place.column() <= column
+                    {
+                        position.cross(place.turn());
+                        places = rest;
+                    }
+                    let to = places.first().map_or(end, |place| place.column().min(end));
+                    self.shade(column, to, &position, &mut spans);
+                    column = to;
+                }
+            }
+            if end < self.width {
+                self.push(end, R::OUTSIDE);
             }
         }
-        self.rows.rows_mut().end_row();
     }
 
-    /// Adds columns between two crossings of the row.
+    /// Adds columns of the part between two crossings of the row.
     fn shade(
         &mut self,
         start: u32,
@@ -72,9 +94,6 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         position: &Position<'a>,
         spans: &mut &'a [DepthSpan],
     ) {
-        if !position.is_inside() {
-            return self.push(start, R::OUTSIDE);
-        }
         let mut column = start;
         while column < end {
             if self.open.is_empty() {
@@ -195,9 +214,26 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             self.last = pixel;
         }
     }
+}
 
-    /// Returns the rows.
-    pub(crate) fn finish(self) -> R {
+impl<R: ShadedRows> RowMaker for Shader<'_, R> {
+    type Made = R;
+
+    #[inline]
+    fn transitions(&mut self) -> &mut Vec<u32> {
+        &mut self.transitions
+    }
+
+    #[inline]
+    fn end_row(&mut self, row: u32, places: &[impl InRow]) {
+        let transitions = std::mem::take(&mut self.transitions);
+        self.shade_row(row, places, &transitions);
+        self.transitions = transitions;
+        self.transitions.clear();
+        self.rows.rows_mut().end_row();
+    }
+
+    fn finish(self) -> R {
         self.rows
     }
 }

@@ -4,53 +4,58 @@
 use super::below::Below;
 
 /// Columns of a row, from each start to its end.
-type Intervals = Vec<(u32, u32)>;
+pub(super) type Intervals = Vec<(u32, u32)>;
 
 /// The columns of a row that are part in as many layers as count, or a few more, from a layer down.
 ///
 /// What is part in all layers of a window that slides down follows from blocks of half its length:
 /// from two whole blocks and the layers of a third.
+#[derive(Default)]
 pub(crate) struct SolidRow {
     width: u32,
-    solid: Intervals,
-    /// Part in all layers of the last whole block, and of the one that has begun.
+    /// Part in all layers of the last two whole blocks, of the last one, and of the one that has
+    /// begun.
+    last_two: Intervals,
     last: Intervals,
     begun: Intervals,
     /// The layers that the block still lacks.
     left: u32,
     /// The layers of each block but the first.
     block: u32,
-    spare: Intervals,
 }
 
 impl SolidRow {
     /// Starts with the layer below one of which nothing is known, or with the part's last if it
     /// `is_top`: no light comes from above that.
-    pub(crate) fn new(width: u32, most_above: u32, is_top: bool) -> Self {
-        let all = vec![(0, width)];
-        let known = if is_top { all.clone() } else { Vec::new() };
-        let block = most_above.div_ceil(2).max(1);
-        let left = if is_top { block } else { (most_above / 2).max(1) };
-        let (solid, spare) = (known.clone(), Vec::new());
-        Self { width, solid, last: known, begun: all, left, block, spare }
+    pub(crate) fn start(&mut self, width: u32, most_above: u32, is_top: bool) {
+        self.width = width;
+        self.block = most_above.div_ceil(2).max(1);
+        self.left = if is_top { self.block } else { (most_above / 2).max(1) };
+        for (columns, all) in
+            [(&mut self.last_two, is_top), (&mut self.last, is_top), (&mut self.begun, true)]
+        {
+            columns.clear();
+            columns.extend(all.then_some((0, width)));
+        }
     }
 
-    /// Returns the columns that are part in all layers above that count, but for some that are so
-    /// only in few more.
-    pub(crate) fn columns(&self) -> &[(u32, u32)] {
-        &self.solid
+    /// Adds the columns that are part in all layers above that count, but for some that are so only
+    /// in few more.
+    pub(crate) fn push_columns(&self, to: &mut Intervals) {
+        push_common(&self.last_two, self.begun.iter().copied(), to);
     }
 
-    /// Goes down through a layer, given what lies below its row.
-    pub(crate) fn go_down(&mut self, layer: usize, below: &[Below]) {
+    /// Goes down through a layer, given what lies below its row. `spare` is a list to work with.
+    pub(crate) fn go_down(&mut self, layer: usize, below: &[Below], spare: &mut Intervals) {
         let is_through = |piece: &&Below| piece.layer != layer as u32;
-        let part = || below.iter().filter(is_through).map(|piece| (piece.start, piece.end));
-        keep_within(&mut self.solid, part(), &mut self.spare);
-        keep_within(&mut self.begun, part(), &mut self.spare);
+        let part = below.iter().filter(is_through).map(|piece| (piece.start, piece.end));
+        spare.clear();
+        push_common(&self.begun, part, spare);
+        std::mem::swap(&mut self.begun, spare);
         self.left -= 1;
         if self.left == 0 {
-            self.solid.clone_from(&self.last);
-            keep_within(&mut self.solid, self.begun.iter().copied(), &mut self.spare);
+            self.last_two.clear();
+            push_common(&self.last, self.begun.iter().copied(), &mut self.last_two);
             std::mem::swap(&mut self.last, &mut self.begun);
             self.begun.clear();
             self.begun.push((0, self.width));
@@ -59,34 +64,28 @@ impl SolidRow {
     }
 }
 
-/// Leaves out columns that are not in a part, whose pieces come from the left.
-fn keep_within(
-    columns: &mut Intervals,
-    part: impl Iterator<Item = (u32, u32)>,
-    spare: &mut Intervals,
-) {
-    if columns.is_empty() {
-        return;
-    }
-    spare.clear();
-    let mut rest = &columns[..];
+/// Adds the columns that lie in a part, too, whose pieces come from the left.
+fn push_common(columns: &[(u32, u32)], part: impl Iterator<Item = (u32, u32)>, to: &mut Intervals) {
+    let mut rest = columns;
     for (start, end) in part {
-        while let Some(&(from, to)) = rest.first()
+        while let Some(&(from, until)) = rest.first()
             && from < end
         {
-            let (from, within) = (from.max(start), to.min(end));
-            match spare.last_mut() {
+            let (from, within) = (from.max(start), until.min(end));
+            match to.last_mut() {
                 _ if from >= within => {}
                 Some((_, last)) if *last == from => *last = within,
-                _ => spare.push((from, within)),
+                _ => to.push((from, within)),
             }
-            if to > end {
+            if until > end {
                 break;
             }
             rest = &rest[1..];
         }
+        if rest.is_empty() {
+            break;
+        }
     }
-    std::mem::swap(columns, spare);
 }
 
 #[cfg(test)]
@@ -127,10 +126,13 @@ mod tests {
                 let here = |piece: &&Below| (piece.start..piece.end).contains(&column);
                 layers[k].iter().find(here).is_some_and(|piece| piece.layer != layer)
             };
-            let mut row = SolidRow::new(WIDTH, most_above, is_top);
+            let mut row = SolidRow::default();
+            row.start(WIDTH, most_above, is_top);
+            let mut spare = Vec::new();
             for (done, below) in layers.iter().enumerate() {
-                row.go_down(layers.len() - 1 - done, below);
-                let solid = row.columns();
+                row.go_down(layers.len() - 1 - done, below, &mut spare);
+                let mut solid = Vec::new();
+                row.push_columns(&mut solid);
                 prop_assert!(solid.is_sorted_by(|a, b| a.1 < b.0));
                 let is_solid = |column: u32| solid.iter().any(|&(from, to)| (from..to).contains(&column));
                 // Those that count, and all that can be looked at.

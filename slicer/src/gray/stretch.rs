@@ -74,7 +74,7 @@ impl RowStretch {
         mut each: impl FnMut(usize, Range<u32>, f64),
     ) {
         let all = self.columns.clone();
-        if self.um_per_column == 0.0 {
+        if self.um_per_column == 0.0 || all.len() == 1 {
             for layer in layers {
                 let depth_um = looks.planes.top_um(layer) - self.height(all.start);
                 if looks.depths(layer).contains(&depth_um) {

@@ -76,7 +76,7 @@ impl ByteRuns<'_> {
         if self.block.runs.len() == BLOCK_RUNS {
             self.block.put(self.out, false);
         }
-        self.block.push(Copies::of(length), self.byte);
+        self.block.push(length, self.byte);
     }
 }
 
@@ -104,7 +104,8 @@ impl Copies {
 
 /// Runs that share their codes, and how often each symbol occurs in them.
 struct Block {
-    runs: Vec<(Copies, u8)>,
+    /// Lengths and bytes.
+    runs: Vec<(u32, u8)>,
     bytes: [u32; 256],
     last: [u32; MOST_COPIED as usize],
     longest: u64,
@@ -118,13 +119,14 @@ impl Block {
 
     /// Adds a run. Counts of so many fit in 32 bits.
     #[inline]
-    fn push(&mut self, copies: Copies, byte: u8) {
+    fn push(&mut self, length: u32, byte: u8) {
+        let copies = Copies::of(length);
         let of_byte = &mut self.bytes[usize::from(byte)];
         *of_byte = of_byte.wrapping_add(copies.bytes.into());
         let of_last = &mut self.last[usize::from(copies.last)];
         *of_last = of_last.wrapping_add(1);
         self.longest = self.longest.wrapping_add(copies.longest.into());
-        self.runs.push((copies, byte));
+        self.runs.push((length, byte));
     }
 
     /// Returns how often each symbol occurs.
@@ -158,7 +160,7 @@ impl Block {
     }
 }
 
-fn put_runs(out: &mut BitWriter, runs: &[(Copies, u8)], code: impl Fn(usize) -> Bits) {
+fn put_runs(out: &mut BitWriter, runs: &[(u32, u8)], code: impl Fn(usize) -> Bits) {
     // Once, twice and thrice: at most 45 bits.
     let once: [Bits; 256] = std::array::from_fn(&code);
     let twice = once.map(|byte| byte.then(byte));
@@ -175,7 +177,8 @@ fn put_runs(out: &mut BitWriter, runs: &[(Copies, u8)], code: impl Fn(usize) -> 
         let more = Bits { bits: length as u64 - u64::from(first), count };
         code(symbol.into()).then(more).then(zero)
     });
-    for &(copies, byte) in runs {
+    for &(length, byte) in runs {
+        let copies = Copies::of(length);
         let first = bytes[usize::from(copies.bytes.wrapping_sub(1))][usize::from(byte)];
         let last = last[usize::from(copies.last)];
         let others = u64::from(first.count.wrapping_add(last.count));

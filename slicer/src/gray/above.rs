@@ -1,0 +1,170 @@
+//! What lies above the columns of rows, as far as light comes from.
+//!
+//! Layers are taken from the top down. Most columns of a layer that are looked at were so in the one
+//! above, too, and what was seen there holds here: only the others are looked up, layer by layer.
+
+use super::columns::Columns;
+
+/// Columns, and the layers above them: white ones, from there on black ones, and then any.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Above {
+    pub(super) start: u32,
+    pub(super) end: u32,
+    /// The first layer that is not white down to the next.
+    pub(super) white_to: u32,
+    /// The first layer from there on that is part.
+    pub(super) black_to: u32,
+}
+
+/// Stands for a layer that was not come across.
+const NONE: u32 = u32::MAX;
+
+impl Above {
+    fn goes_on_in(&self, next: &Self) -> bool {
+        let layers = |it: &Self| (it.white_to, it.black_to);
+        self.end == next.start && layers(self) == layers(next)
+    }
+
+    /// Returns what the layer below sees, given whether the part ends within this one.
+    fn seen_below(self, layer: u32, ends_within: bool) -> Self {
+        // Such a layer is neither white nor black.
+        if ends_within { Self { white_to: layer, black_to: layer, ..self } } else { self }
+    }
+}
+
+/// Columns above which the layers are known up to the next.
+#[derive(Clone, Copy)]
+struct LookUp {
+    next: u32,
+    above: Above,
+}
+
+impl LookUp {
+    /// Goes on past the next layer, given whether that is part, and goes on into the one below.
+    #[inline]
+    fn pass(&mut self, is_part: bool, is_through: bool) {
+        let Self { next, above } = self;
+        if above.white_to == NONE && !(is_part && is_through) {
+            above.white_to = *next;
+        }
+        if is_part && above.white_to != NONE {
+            above.black_to = *next;
+        }
+        *next += 1;
+    }
+
+    fn is_done(&self, end: u32) -> bool {
+        self.above.black_to != NONE || self.next >= end
+    }
+}
+
+/// What was seen above columns in the rows of a band.
+pub(super) struct AboveRows<'a> {
+    columns: &'a Columns,
+    band: usize,
+    layer: u32,
+    /// The first layer above that does not count.
+    end: u32,
+    /// What the last layer saw in each row, as the one below sees it.
+    known: Vec<Vec<Above>>,
+    /// How much of that was read in this row.
+    read: usize,
+    /// What this row sees, as the layer below sees it.
+    next: Vec<Above>,
+    /// Columns that are still to be looked up, the first ones last.
+    unseen: Vec<LookUp>,
+}
+
+impl<'a> AboveRows<'a> {
+    pub(super) fn new(columns: &'a Columns) -> Self {
+        let (known, next, unseen) = (Vec::new(), Vec::new(), Vec::new());
+        Self { columns, band: 0, layer: 0, end: 0, known, read: 0, next, unseen }
+    }
+
+    /// Starts a band of so many rows, of which nothing is known.
+    pub(super) fn start(&mut self, band: usize, rows: usize) {
+        (self.band, self.end) = (band, 0);
+        self.known.resize_with(rows, Vec::new);
+    }
+
+    /// Starts the next layer down, given the first one above that does not count.
+    pub(super) fn start_layer(&mut self, layer: usize, end: usize) {
+        let end = end as u32;
+        if end > self.end {
+            // The last one did not look so far up.
+            self.known.iter_mut().for_each(Vec::clear);
+        }
+        (self.layer, self.end) = (layer as u32, end);
+    }
+
+    /// Tells what is above columns of a row, whose undersides lie in a layer. Columns come from the
+    /// left; [`end_row`](Self::end_row) ends them.
+    pub(super) fn look(
+        &mut self,
+        in_band: u32,
+        (start, end): (u32, u32),
+        below: u32,
+        seen: &mut Vec<Above>,
+    ) {
+        seen.clear();
+        let mut column = start;
+        while column < end {
+            let known = &self.known[in_band as usize];
+            while known.get(self.read).is_some_and(|above| above.end <= column) {
+                self.read += 1;
+            }
+            column = match known.get(self.read) {
+                Some(&above) if above.start <= column => {
+                    let to = above.end.min(end);
+                    seen.push(Above { start: column, end: to, ..above });
+                    to
+                }
+                next => {
+                    let to = next.map_or(end, |above| above.start.min(end));
+                    self.look_up(in_band, (column, to), seen);
+                    to
+                }
+            };
+        }
+        let ends_within = below == self.layer;
+        let seen = seen.iter().map(|above| above.seen_below(self.layer, ends_within));
+        self.next.extend(seen);
+    }
+
+    /// Ends a row in which columns were looked at.
+    pub(super) fn end_row(&mut self, in_band: u32) {
+        std::mem::swap(&mut self.known[in_band as usize], &mut self.next);
+        self.next.clear();
+        self.read = 0;
+    }
+
+    /// Looks up columns of which nothing is known.
+    fn look_up(&mut self, in_band: u32, (start, end): (u32, u32), seen: &mut Vec<Above>) {
+        let above = Above { start, end, white_to: NONE, black_to: NONE };
+        self.unseen.push(LookUp { next: self.layer + 1, above });
+        while let Some(mut piece) = self.unseen.pop() {
+            while !piece.is_done(self.end) {
+                let row = self.columns.below(piece.next as usize, self.band, in_band);
+                let Above { start, end, .. } = piece.above;
+                let at = row.partition_point(|below| below.end <= start);
+                match row.get(at) {
+                    Some(below) if below.start <= start && below.end >= end => {
+                        piece.pass(true, below.layer != piece.next);
+                    }
+                    Some(below) if below.start < end => {
+                        // The first columns are looked up first.
+                        let to = if below.start > start { below.start } else { below.end };
+                        let mut rest = piece;
+                        (rest.above.start, piece.above.end) = (to, to);
+                        self.unseen.push(rest);
+                    }
+                    _ => piece.pass(false, false),
+                }
+            }
+            match seen.last_mut() {
+                Some(last) if last.goes_on_in(&piece.above) => last.end = piece.above.end,
+                _ => seen.push(piece.above),
+            }
+        }
+    }
+}
