@@ -131,7 +131,8 @@ impl<'a> AboveRows<'a> {
         self.next.extend(seen);
     }
 
-    /// Ends a row in which columns were looked at.
+    /// Ends a row, in which columns may have been looked at.
+    #[inline]
     pub(super) fn end_row(&mut self, in_band: u32) {
         std::mem::swap(&mut self.known[in_band as usize], &mut self.next);
         self.next.clear();

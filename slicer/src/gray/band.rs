@@ -65,7 +65,7 @@ pub(super) struct BandChooser<'a> {
     light: &'a PrintThrough,
     band: usize,
     column: ColumnLight,
-    changes: LevelRow,
+    rows: ChangeRows,
     short_px: u64,
     /// How far each layer below has been read in the row, from the layer itself down.
     read: Vec<usize>,
@@ -88,7 +88,7 @@ impl<'a> BandChooser<'a> {
             light,
             band: 0,
             column: ColumnLight::default(),
-            changes: LevelRow::default(),
+            rows: ChangeRows::default(),
             short_px: 0,
             read: Vec::new(),
             solid: Vec::new(),
@@ -131,34 +131,32 @@ impl<'a> BandChooser<'a> {
     }
 
     fn choose_layer(&mut self, around: &Around<'_>, last: Option<&ChosenRows>) -> ChosenRows {
-        let mut rows = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
+        self.rows.lists = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
         self.short_px = 0;
         self.above.start_layer(around.layer, around.end);
         for in_band in 0..self.solid.len() as u32 {
-            std::mem::swap(rows.items_mut(), &mut self.changes.changes);
             self.choose_row(around, in_band);
-            self.changes.end();
-            std::mem::swap(rows.items_mut(), &mut self.changes.changes);
-            rows.end_row();
+            self.rows.end_row();
+            self.above.end_row(in_band);
         }
-        (rows, self.short_px)
+        (std::mem::take(&mut self.rows.lists), self.short_px)
     }
 
     /// Chooses a row, given its number in the band.
     fn choose_row(&mut self, around: &Around<'_>, in_band: u32) {
+        let row = self.below(around.layer, in_band);
+        if row.iter().all(|below| below.layer == DEEP) {
+            return row.iter().for_each(|below| self.rows.push(below.start, below.end, 255));
+        }
         let layers_above = around.end - 1 - around.layer;
         self.read.clear();
-        let row = self.below(around.layer, in_band);
-        let needs_solid = row.iter().any(|below| below.layer != DEEP);
         let mut white_above = std::mem::take(&mut self.white_above);
         white_above.clear();
-        if needs_solid {
-            self.solid[in_band as usize].push_columns(&mut white_above);
-        }
+        self.solid[in_band as usize].push_columns(&mut white_above);
         let mut solid = &white_above[..];
         for &Below { start, end, layer } in row {
             if layer == DEEP {
-                self.changes.push(start, end, 255);
+                self.rows.push(start, end, 255);
                 continue;
             }
             let mut column = start;
@@ -174,7 +172,7 @@ impl<'a> BandChooser<'a> {
                 if from < to {
                     let below = layer as usize;
                     match around.under_white[around.layer - below] {
-                        Some(level) => self.changes.push(from, to, level),
+                        Some(level) => self.rows.push(from, to, level),
                         None => self.by_depth(around, in_band, (from, to), below, layers_above),
                     }
                 }
@@ -182,7 +180,6 @@ impl<'a> BandChooser<'a> {
             }
         }
         self.white_above = white_above;
-        self.above.end_row(in_band);
     }
 
     /// Adds the levels of columns that are not part in all layers above.
@@ -200,7 +197,7 @@ impl<'a> BandChooser<'a> {
             if white_to < around.end && black_to < around.end {
                 (start..end).for_each(|column| {
                     let level = self.column_level(around, in_band, column);
-                    self.changes.push(column, column + 1, level);
+                    self.rows.push(column, column + 1, level);
                 });
             } else {
                 let white = white_to - 1 - around.layer;
@@ -225,7 +222,7 @@ impl<'a> BandChooser<'a> {
     ) {
         let table = around.levels_under(white);
         if let Some(level) = around.level_of_all(table, below) {
-            return self.changes.push(start, end, level);
+            return self.rows.push(start, end, level);
         }
         let tops_um = self.light.distance_um(around.layer, below);
         let (row, down) = (self.band as u32 * BAND_ROWS + in_band, around.layer - below);
@@ -238,7 +235,7 @@ impl<'a> BandChooser<'a> {
             if below == around.layer && depth_um > table.falls_short_um + 1.0 {
                 self.short_px += u64::from(to - from);
             }
-            self.changes.push(from, to, table.level(depth_um));
+            self.rows.push(from, to, table.level(depth_um));
         }
     }
 
@@ -288,35 +285,36 @@ impl<'a> BandChooser<'a> {
     }
 }
 
-/// The changes of rows, the last of which is made from the left.
+/// Rows of changes, the last of which is made from the left.
 #[derive(Default)]
-struct LevelRow {
-    changes: Vec<LevelChange>,
+struct ChangeRows {
+    lists: RowLists<LevelChange>,
     end: u32,
     level: u8,
 }
 
-impl LevelRow {
+impl ChangeRows {
     /// Adds columns of one level above black.
     #[inline]
     fn push(&mut self, start: u32, end: u32, level: u8) {
         if start > self.end && self.level > 0 {
-            self.changes.push(LevelChange { column: self.end, level: 0 });
+            self.lists.items_mut().push(LevelChange { column: self.end, level: 0 });
             self.level = 0;
         }
         if level != self.level {
-            self.changes.push(LevelChange { column: start, level });
+            self.lists.items_mut().push(LevelChange { column: start, level });
             self.level = level;
         }
         self.end = end;
     }
 
     /// Ends the row. The last column of images is black.
-    fn end(&mut self) {
+    fn end_row(&mut self) {
         if self.level > 0 {
-            self.changes.push(LevelChange { column: self.end, level: 0 });
+            self.lists.items_mut().push(LevelChange { column: self.end, level: 0 });
         }
         (self.end, self.level) = (0, 0);
+        self.lists.end_row();
     }
 }
 
