@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::thread;
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
@@ -59,7 +59,9 @@ impl Common {
     /// Sets up the threads. To be called once.
     pub(crate) fn apply(&self) -> Result<(), Exit> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads()?).build_global();
-        Ok(pool.context("the threads to work with")?)
+        Ok(pool.map_err(|error| {
+            anyhow!("threads cannot be started: {error}: give fewer --threads, or more memory")
+        })?)
     }
 
     /// Returns the number of threads, for which there is room within limits of memory; zero lets

@@ -307,6 +307,24 @@ fn print_through_stays_in_the_part() {
 }
 
 #[test]
+fn rows_that_end_white_get_levels_too() {
+    let scratch = Scratch::new();
+    let mut ended_white = 0;
+    for seed in 1..=4 {
+        let sample = format!("lamp sample sphere --defect drop --count 1 --seed {seed}");
+        scratch.run(&format!("{sample} -o open{seed}.stl")).succeeds();
+        let slice = format!("slice open{seed}.stl --dpi 200 --material lamp-suspension --gray");
+        scratch.run(&format!("{slice} --print-through -o summed{seed}.tif")).succeeds();
+        for Layer { image, .. } in scratch.layers(&format!("summed{seed}.tif")) {
+            let width = image.width();
+            let ends_white = |row: &u32| image.runs(*row).last().is_some_and(|run| run.1 == width);
+            ended_white += (0..image.height()).filter(ends_white).count();
+        }
+    }
+    assert!(ended_white > 0, "no row ends white");
+}
+
+#[test]
 fn a_section_needs_its_own_part() {
     let scratch = with_tower();
     scratch.part("cube.stl", Sample::Cube, 200);

@@ -266,7 +266,7 @@ impl fmt::Display for CopyName {
 
 fn fewer(asked: u32, most: u32) -> String {
     match most {
-        0 => "no copy fits".to_owned(),
+        0 => "no copy found a place".to_owned(),
         _ => format!("{asked} copies were asked for, but only {most} fit"),
     }
 }

@@ -5,14 +5,15 @@
 
 use super::columns::Columns;
 
-/// Columns, and the layers above them: white ones, from there on black ones, and then any.
+/// Columns, and what is above them: first layers that are part all the way down to the next, then
+/// layers that are not part, and then any.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Above {
     pub(super) start: u32,
     pub(super) end: u32,
-    /// The first layer that is not white down to the next.
+    /// The first layer that is not part all the way down.
     pub(super) white_to: u32,
-    /// The first layer from there on that is part.
+    /// The first layer from there on that is part again.
     pub(super) black_to: u32,
 }
 
@@ -27,7 +28,7 @@ impl Above {
 
     /// Returns what the layer below sees, given whether the part ends within this one.
     fn seen_below(self, layer: u32, ends_within: bool) -> Self {
-        // Such a layer is neither white nor black.
+        // Such a layer is part, but not all the way down.
         if ends_within { Self { white_to: layer, black_to: layer, ..self } } else { self }
     }
 }

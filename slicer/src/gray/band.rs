@@ -134,9 +134,10 @@ impl<'a> BandChooser<'a> {
         self.rows.lists = last.map_or_else(RowLists::default, |(rows, _)| RowLists::like(rows));
         self.short_px = 0;
         self.above.start_layer(around.layer, around.end);
+        let width = self.columns.rows(around.layer).width();
         for in_band in 0..self.solid.len() as u32 {
             self.choose_row(around, in_band);
-            self.rows.end_row();
+            self.rows.end_row(width);
             self.above.end_row(in_band);
         }
         (std::mem::take(&mut self.rows.lists), self.short_px)
@@ -308,9 +309,9 @@ impl ChangeRows {
         self.end = end;
     }
 
-    /// Ends the row. The last column of images is black.
-    fn end_row(&mut self) {
-        if self.level > 0 {
+    /// Ends the row of an image of some width, beyond which a row that ends white does not go on.
+    fn end_row(&mut self, width: u32) {
+        if self.level > 0 && self.end < width {
             self.lists.items_mut().push(LevelChange { column: self.end, level: 0 });
         }
         (self.end, self.level) = (0, 0);
