@@ -301,7 +301,10 @@ fn recipe(error: &RecipeError) -> Option<String> {
         RecipeError::OtherPart { .. } => {
             "bring that stack back, or write the recipe anew with tile --recipe"
         }
-        RecipeError::NoPart { .. } => "parts stand where the recipe's folder leads to",
+        RecipeError::NoPart { .. } => {
+            "a recipe names its parts from its own folder: put them there, or write it anew with \
+             tile --recipe"
+        }
         _ => return None,
     };
     Some(hint.to_owned())

@@ -96,6 +96,12 @@ impl Layout {
         (row <= last).then(|| at.top + if upside_down { last - row } else { row })
     }
 
+    /// Returns the command that made the build. A mesh has added its options.
+    fn whole_command(&self) -> String {
+        let no_mesh = if self.mesh.is_none() { " --mesh none" } else { "" };
+        format!("{}{no_mesh}", self.command)
+    }
+
     /// Returns what the first page says of the build.
     fn stack_of(&self, here: &[PartLayer<'_>]) -> StackInfo {
         if let &[(_, part, layer)] = here
@@ -103,7 +109,7 @@ impl Layout {
         {
             let of_layer = layer.info.stack.clone().or_else(|| part.stack.clone());
             let mut stack = of_layer.unwrap_or_else(|| unknown(part));
-            stack.commands.push(self.command.clone());
+            stack.commands.push(self.whole_command());
             let mut tile = self.described(0);
             tile.append(&mut self.base());
             stack.other.insert("tile".to_owned(), Value::Object(tile));
@@ -127,7 +133,7 @@ impl Layout {
         let other = [("tile".to_owned(), Value::Object(tile))];
         StackInfo {
             part: texts(|stack| &stack.part).collect::<Vec<_>>().join("+"),
-            commands: vec![self.command.clone()],
+            commands: vec![self.whole_command()],
             digest: digest_of_digests(texts(|stack| &stack.digest)),
             layers: self.layer_count(),
             other: other.into_iter().collect(),

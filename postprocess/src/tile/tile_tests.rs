@@ -186,7 +186,7 @@ fn pages_of_several_parts_say_what_holds_for_all() {
     let stack = info.stack.unwrap();
     assert_eq!((stack.part.as_str(), stack.layers), ("a+b", Some(1)));
     assert!(stack.digest.starts_with("blake3:") && stack.digest.len() == 71);
-    assert_eq!(stack.commands, ["tile --area 9x9mm --copies 2,1 --gap 1mm"]);
+    assert_eq!(stack.commands, ["tile --area 9x9mm --copies 2,1 --gap 1mm --mesh none"]);
     let parts = stack.other["tile"]["parts"].as_array().unwrap();
     assert_eq!(parts[0]["copies"].as_array().unwrap().len(), 2);
     assert_eq!((&parts[1]["part"], &parts[1]["part_pixels"]), (&json!("b"), &json!([2, 1])));
