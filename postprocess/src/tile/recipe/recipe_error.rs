@@ -53,7 +53,7 @@ pub enum RecipeError {
         max: u64,
     },
     /// A part's file cannot be opened.
-    #[error("{file} cannot be opened")]
+    #[error("{file}: {source}")]
     NoPart {
         /// The part's file.
         file: String,

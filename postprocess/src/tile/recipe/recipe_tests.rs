@@ -14,7 +14,7 @@ use super::super::{
     BuildFinding, BuildWanted, CellShape, HeightOptions, Layout, MeshOptions, MeshPattern, Moat,
     Pack, PackBy, PartStack, TileError, Turns,
 };
-use super::{Composer, Recipe, RecipeError, RecipePart};
+use super::{Composer, Recipe, RecipeError, RecipePart, TILE_CODE};
 
 /// Numbers that look random, the same each time.
 struct Numbers(u64);
@@ -287,10 +287,11 @@ fn what_is_no_recipe_is_refused_in_a_sentence() {
     for end in (0..text.len() - 2).step_by(7) {
         assert!(refused(&text[..end]).starts_with("this is not a recipe: "), "{end}");
     }
+    let code = format!("\"code\": {TILE_CODE}");
     for (from, to, said) in [
         ("lamp-recipe-1", "lamp-recipe-2", "of the form lamp-recipe-1 but \"lamp-recipe-2\""),
-        ("\"code\": 5", "\"code\": 2", "by code 2"),
-        ("\"code\": 5", "\"cod\": 3", "by code 0"),
+        (&*code, "\"code\": 2", "by code 2"),
+        (&*code, "\"cod\": 3", "by code 0"),
         ("\"command\"", "\"comand\"", "comand"),
         ("110x84mm", "-110x84mm", "not a size"),
         ("110x84mm", "1e300x84mm", "2^26 pixels"),
