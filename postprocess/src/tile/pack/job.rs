@@ -66,7 +66,7 @@ impl<'a> Job<'a> {
             shares::most(&mut self, &wanted)
         } else {
             let simple = self.simply_placed(&wanted);
-            if alone { simple } else { self.searched(&wanted, simple, 0) }
+            if alone { simple } else { self.searched_for_each(&wanted, simple) }
         };
         let short = (0..counts.len()).find_map(|part| {
             let stacks = self.stacks_of(part);
@@ -83,6 +83,31 @@ impl<'a> Job<'a> {
                 Err(TileError::TooMany { name, asked, most, area_mm: self.layout.area() })
             }
         }
+    }
+
+    /// Finds places for copies of several parts. Where the first ones leave no room for a copy of
+    /// another part, each gets its share.
+    fn searched_for_each(
+        &mut self,
+        wanted: &[u32],
+        simple: Vec<CopyPlacement>,
+    ) -> Vec<CopyPlacement> {
+        let found = self.searched(wanted, simple, 0);
+        let stacks: Vec<Vec<usize>> = (0..wanted.len()).map(|part| self.stacks_of(part)).collect();
+        let has_copy = |stacks: &Vec<usize>| found.iter().any(|at| stacks.contains(&at.part));
+        if stacks.iter().all(has_copy) || wanted.contains(&0) {
+            return found;
+        }
+        let mut shared = shares::most(self, wanted);
+        let mut left = wanted.to_vec();
+        shared.retain(|at| {
+            let part = stacks.iter().position(|stacks| stacks.contains(&at.part));
+            let left = &mut left[part.expect("each copy is of a part")];
+            let is_wanted = *left > 0;
+            *left -= u32::from(is_wanted);
+            is_wanted
+        });
+        shared
     }
 
     fn check_fits(&self, part: usize) -> Result<(), TileError> {

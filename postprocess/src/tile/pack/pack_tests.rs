@@ -102,6 +102,11 @@ fn what_finds_no_place_is_counted() {
     assert!(matches!(error, TileError::TooMany { asked: 5, most: 4, .. }), "{error}");
     let error = packed(&both, &[None, Some(9)], "4x4mm", 1, Pack::default()).unwrap_err();
     assert!(matches!(error, TileError::TooMany { asked: 1, most: 0, .. }), "{error}");
+    // Four bars would leave no dot a place.
+    let layout = packed(&both, &[Some(5), Some(4)], "9x9mm", 1, Pack::default()).unwrap();
+    check(&layout, 1);
+    let copies = [layout.copies_of(0), layout.copies_of(1)];
+    assert!((1..=5).contains(&copies[0]) && copies[1] == 3, "{copies:?}");
     // Each without a count once.
     let once = packed(&both, &[None, None], "9x11mm", 1, Pack::default()).unwrap();
     assert_eq!(once.placements().len(), 2);
