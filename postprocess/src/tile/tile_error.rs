@@ -264,6 +264,7 @@ impl fmt::Display for CopyName {
     }
 }
 
+/// Tells that fewer copies fit than were asked for.
 fn fewer(asked: u32, most: u32) -> String {
     match most {
         0 => "no copy found a place".to_owned(),

@@ -116,8 +116,7 @@ pub(crate) struct TileArgs {
     pack: PackBy,
 
     /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
-    /// outline]. An angle below 90deg makes a plan, which packs by
-    /// outlines
+    /// outline]. An angle below 90deg makes a plan, which packs by outlines
     #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
     turns: Option<TurnsArg>,
 

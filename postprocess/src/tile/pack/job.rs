@@ -63,7 +63,7 @@ impl<'a> Job<'a> {
         let wanted: Vec<u32> =
             counts.iter().map(|count| count.unwrap_or(usual).min(MAX_COPIES)).collect();
         let best = if self.how.shares && !alone {
-            shares::most(&mut self, &wanted)
+            shares::most(&mut self, &wanted, MAX_COPIES)
         } else {
             let simple = self.simply_placed(&wanted);
             if alone { simple } else { self.searched_for_each(&wanted, simple) }
@@ -93,21 +93,15 @@ impl<'a> Job<'a> {
         simple: Vec<CopyPlacement>,
     ) -> Vec<CopyPlacement> {
         let found = self.searched(wanted, simple, 0);
-        let stacks: Vec<Vec<usize>> = (0..wanted.len()).map(|part| self.stacks_of(part)).collect();
-        let has_copy = |stacks: &Vec<usize>| found.iter().any(|at| stacks.contains(&at.part));
-        if stacks.iter().all(has_copy) || wanted.contains(&0) {
+        let has_copy = |part| {
+            let stacks = self.stacks_of(part);
+            found.iter().any(|at| stacks.contains(&at.part))
+        };
+        if (0..wanted.len()).all(has_copy) || wanted.contains(&0) {
             return found;
         }
-        let mut shared = shares::most(self, wanted);
-        let mut left = wanted.to_vec();
-        shared.retain(|at| {
-            let part = stacks.iter().position(|stacks| stacks.contains(&at.part));
-            let left = &mut left[part.expect("each copy is of a part")];
-            let is_wanted = *left > 0;
-            *left -= u32::from(is_wanted);
-            is_wanted
-        });
-        shared
+        // So many copies by shares have no more of any part than is wanted.
+        shares::most(self, wanted, sum(wanted).min(MAX_COPIES as usize) as u32)
     }
 
     fn check_fits(&self, part: usize) -> Result<(), TileError> {

@@ -6,21 +6,20 @@
 //! Source: R. Tijdeman, The chairman assignment problem, Discrete Mathematics 32, 1980.
 
 use super::super::CopyPlacement;
-use super::MAX_COPIES;
 use super::job::{Job, sum};
 
-/// Places as many copies as fit, and at least one of each part if that is possible.
-pub(super) fn most(job: &mut Job<'_>, shares: &[u32]) -> Vec<CopyPlacement> {
+/// Places as many copies as fit, up to a limit, and at least one of each part if that is possible.
+pub(super) fn most(job: &mut Job<'_>, shares: &[u32], limit: u32) -> Vec<CopyPlacement> {
     let mut order = Order::new(shares);
     let (mut most, mut best) = (0, Vec::new());
     // The step grows as long as all fit, and shrinks once they do not.
     let mut step = u32::try_from(shares.len()).expect("parts are few");
     let mut is_growing = true;
-    while step > 0 {
-        let next = (most + step).min(MAX_COPIES);
+    while step > 0 && most < limit {
+        let next = (most + step).min(limit);
         let counts = order.counts(next);
         let found = job.simply_placed(&counts);
-        let fits = found.len() == sum(&counts) && next > most;
+        let fits = found.len() == sum(&counts);
         if fits {
             (most, best) = (next, found);
         }
@@ -33,11 +32,12 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32]) -> Vec<CopyPlacement> {
     }
     // Then those that only the search finds room for.
     step = (most / 8).max(1);
-    while step > 0 {
-        let counts = order.counts(most + step);
+    while step > 0 && most < limit {
+        let next = (most + step).min(limit);
+        let counts = order.counts(next);
         let found = job.searched(&counts, Vec::new(), job.rows());
         if found.len() == sum(&counts) {
-            (most, best) = (most + step, found);
+            (most, best) = (next, found);
         } else {
             step /= 2;
         }
@@ -46,7 +46,7 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32]) -> Vec<CopyPlacement> {
     let whole: u64 = order.shares.iter().sum();
     loop {
         let next = (u64::from(most) / whole + 1) * whole;
-        let Some(next) = u32::try_from(next).ok().filter(|&next| next <= MAX_COPIES) else { break };
+        let Some(next) = u32::try_from(next).ok().filter(|&next| next <= limit) else { break };
         let counts = order.counts(next);
         let mut found = job.simply_placed(&counts);
         if found.len() < sum(&counts) {
