@@ -126,11 +126,7 @@ impl PartOptions {
             let why = "a STEP or 3MF file states its own unit: leave out --units";
             return Err(Exit::usage(why));
         }
-        match model.left_out() {
-            0 => {}
-            1 => (reading.say)("1 item is left out: it is no solid"),
-            count => (reading.say)(&format!("{count} items are left out: they are no solids")),
-        }
+        model.notes().iter().for_each(|note| (reading.say)(&note.to_string()));
         for prepared in model.prepared() {
             self.check_step(prepared, tolerance, reading);
         }

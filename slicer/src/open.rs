@@ -132,7 +132,7 @@ impl Part {
             },
         };
         let part = Self::new(name, contents.pieces, digest);
-        let part = part.with(contents.left_out, options.trust_extent);
+        let part = part.with(contents.notes, options.trust_extent);
         if part.facet_count() == 0 { Err(SliceError::NoFacets) } else { Ok(part) }
     }
 
@@ -149,7 +149,7 @@ impl Part {
         let prepared = read_good(&bytes, options)?;
         let digest = digest_of(&bytes[..])?;
         let part = Self::new(name, Piece::of_bodies(prepared), digest);
-        Ok(part.with(0, options.trust_extent))
+        Ok(part.with(Vec::new(), options.trust_extent))
     }
 }
 
@@ -172,12 +172,12 @@ fn unpacked(
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
-    let of_one = |facets| Contents { pieces: vec![Piece::new(facets)], left_out: 0 };
+    let of_one = |facets| Contents { pieces: vec![Piece::new(facets)], notes: Vec::new() };
     if is_step(start) {
         let mut bytes = Vec::new();
         file.reader().read_to_end(&mut bytes)?;
         let prepared = read_good(&bytes.into(), options)?;
-        return Ok(Contents { pieces: Piece::of_bodies(prepared), left_out: 0 });
+        return Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() });
     }
     if looks_packaged(start) {
         return Ok(three_mf::read(file).map_err(Box::new)?);

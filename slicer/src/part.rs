@@ -13,6 +13,7 @@ use crate::facet::{Facet, Units};
 use crate::file_blocks::FileBlock;
 use crate::part_file::PartFile;
 use crate::placement::Placement;
+use crate::read_note::ReadNote;
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
 use crate::table::Fill;
 
@@ -33,7 +34,7 @@ pub struct Part {
     block_ends: Vec<usize>,
     digest: String,
     bodies: Bodies,
-    left_out: usize,
+    notes: Vec<ReadNote>,
     trusts_extent: bool,
 }
 
@@ -49,6 +50,19 @@ pub(crate) struct Piece {
     pub(crate) units: Option<Units>,
     /// How it stands among the other pieces.
     pub(crate) placement: Placement,
+    /// The number in the file of the object whose volume it adds to or takes from.
+    pub(crate) object: usize,
+    pub(crate) role: Role,
+}
+
+/// The way in which a piece makes its object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// It is inside.
+    #[default]
+    Solid,
+    /// It is cut out of the solids of its object, such as a negative volume of a 3MF project.
+    Negative,
 }
 
 /// Facets in file units.
@@ -116,7 +130,15 @@ impl Facets {
 impl Piece {
     pub(crate) fn new(facets: Facets) -> Self {
         let placement = Placement::default();
-        Self { facets, file: 0, first_facet: 0, units: None, placement }
+        Self {
+            facets,
+            file: 0,
+            first_facet: 0,
+            units: None,
+            placement,
+            object: 0,
+            role: Role::default(),
+        }
     }
 
     /// Returns true if the facets are read again from their file whenever they are needed.
@@ -167,13 +189,13 @@ impl Part {
         };
         let block_ends = pieces.iter().map(end).collect();
         let name = name.to_owned();
-        let bodies = Bodies::default();
-        Self { name, pieces, block_ends, digest, bodies, left_out: 0, trusts_extent: false }
+        let (bodies, notes) = (Bodies::default(), Vec::new());
+        Self { name, pieces, block_ends, digest, bodies, notes, trusts_extent: false }
     }
 
-    /// Notes how many items are no solids, and whether the part is as large as it seems.
-    pub(crate) fn with(self, left_out: usize, trusts_extent: bool) -> Self {
-        Self { left_out, trusts_extent, ..self }
+    /// Adds what was skipped in the file, and whether the part is as large as it seems.
+    pub(crate) fn with(self, notes: Vec<ReadNote>, trusts_extent: bool) -> Self {
+        Self { notes, trusts_extent, ..self }
     }
 
     /// Creates a part of facets in memory.
@@ -226,7 +248,7 @@ impl Part {
         let names: Vec<&str> = models.iter().map(Self::name).collect();
         let name = names.join("+");
         let digest = digest_of_digests(models.iter().map(Self::digest));
-        let left_out = models.iter().map(|model| model.left_out).sum();
+        let notes = models.iter().flat_map(|model| model.notes.clone()).collect();
         let trusts_extent = models.iter().any(|model| model.trusts_extent);
         let bodies = models.first().map_or_else(Bodies::default, |model| model.bodies);
         let mut pieces = Vec::new();
@@ -235,7 +257,7 @@ impl Part {
             let of_model = model.pieces.into_iter();
             pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
         }
-        Self::new(&name, pieces, digest).with(left_out, trusts_extent).with_bodies(bodies)
+        Self::new(&name, pieces, digest).with(notes, trusts_extent).with_bodies(bodies)
     }
 
     /// Places the part among others, after its file's units were taken into account.
@@ -269,10 +291,9 @@ impl Part {
         self.pieces.iter().all(|piece| piece.units.is_some())
     }
 
-    /// Returns how many items of 3MF files were left out because they are no solids, but
-    /// supports, surfaces or others.
-    pub fn left_out(&self) -> usize {
-        self.left_out
+    /// Returns what its files hold beside the solids that are sliced.
+    pub fn notes(&self) -> &[ReadNote] {
+        &self.notes
     }
 
     /// Returns true if the part is to be taken as large as it seems.

@@ -16,6 +16,7 @@ use zip::result::ZipError;
 use crate::part::{Facets, Piece};
 use crate::part_file::{FileReader, PartFile};
 use crate::placement::Placement;
+use crate::read_note::ReadNote;
 use crate::unpack::most_unpacked;
 use model::{Model, Object, Reference, Shape};
 
@@ -118,8 +119,7 @@ fn start_of(error: &quick_xml::Error) -> String {
 /// What a file holds.
 pub(crate) struct Contents {
     pub(crate) pieces: Vec<Piece>,
-    /// How many items are no solids: supports, surfaces and others.
-    pub(crate) left_out: usize,
+    pub(crate) notes: Vec<ReadNote>,
 }
 
 /// Returns true if a file that starts with these bytes is a ZIP package.
@@ -146,7 +146,8 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     if found.pieces.is_empty() && !items.is_empty() {
         return Err(ThreeMfError::NothingToBuild { items: items.len() });
     }
-    Ok(Contents { pieces: found.pieces, left_out })
+    let notes = (left_out > 0).then_some(ReadNote::NoSolids { items: left_out });
+    Ok(Contents { pieces: found.pieces, notes: notes.into_iter().collect() })
 }
 
 struct Found {
