@@ -7,6 +7,7 @@
 //! takes it away again at the first above its upper end. Its cost does not
 //! depend on the number of tops.
 
+use lamp_slicer::PLANE_TOLERANCE;
 use lamp_slicer::scan::count_at_or_below;
 
 /// From this many tops between a surface's ends on, a polynomial is cheaper than one
@@ -171,6 +172,11 @@ impl<'a> Profile<'a> {
     pub(crate) fn add(&mut self, surface: Surface) {
         let surface = surface.rising();
         let [low, high] = surface.heights;
+        if high - low < PLANE_TOLERANCE.um() {
+            // Level as far as planes tell: those within the tolerance count as touching it.
+            let end = self.first_above(low + PLANE_TOLERANCE.um());
+            return self.starts[end].add(&Polynomials::constant(surface.passed(1.0)), 1.0);
+        }
         let (first, end) = (self.first_above(low), self.first_above(high));
         if end - first < MANY_TOPS.max(self.tops.len() / SMALL_PART) {
             for top in first..end {

@@ -83,6 +83,7 @@ impl<'a> Sweep<'a> {
             return true;
         }
         let mut position = Position::outside(self.rule);
+        position.start_row(toggles.iter().map(|toggle| toggle.turn));
         toggles.iter().for_each(|toggle| position.cross(toggle.turn));
         if !position.is_balanced() {
             return false;
@@ -120,6 +121,7 @@ impl<'a> Sweep<'a> {
         self.open.clear();
         let (mut toggles, mut slopes) = (toggles.iter(), slopes.iter());
         let (mut position, mut winding) = (Position::outside(self.rule), 0);
+        position.start_row(toggles.clone().map(|toggle| toggle.turn));
         for k in 1..self.ends.len() {
             let columns = [self.ends[k - 1], self.ends[k]];
             if columns[0] == columns[1] {
@@ -310,7 +312,7 @@ mod tests {
     fn walls_lose_and_gain() {
         let toggles = [toggle(0.0, 1), toggle(5.0, -1)];
         let slopes = [slope([0.0, 4.0], [0.0, 40.0], -1), slope([5.0, 9.0], [0.0, 40.0], 1)];
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
+        for fill in [Fill::EvenOdd, Fill::Solid] {
             let found = changes(fill, &toggles, &slopes);
             assert_eq!(
                 found,
@@ -324,7 +326,7 @@ mod tests {
     #[test]
     fn columns_that_pass_several_lines_have_what_is_between() {
         let slopes = [slope([0.0, 2.0], [12.0; 2], 1), slope([0.0, 2.0], [25.0; 2], -1)];
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
+        for fill in [Fill::EvenOdd, Fill::Solid] {
             let found = changes(fill, &[], &slopes);
             assert_eq!(
                 found,

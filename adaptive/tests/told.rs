@@ -55,7 +55,7 @@ fn facets_and_few_rows_tell_what_all_rows_do() {
         ("a sphere within itself", twice(&sphere(4.0, 2_000), [0.0; 3]), upright),
         ("open tower", open, upright),
     ] {
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
+        for fill in [Fill::EvenOdd, Fill::Solid] {
             let part = part(&mesh, &placement, fill);
             for [min, max, step] in [[25.0, 100.0, 1.0], [200.0, 1000.0, 40.0]] {
                 let [min, max, step] = [min, max, step].map(Length::from_um);

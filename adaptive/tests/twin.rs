@@ -116,7 +116,7 @@ fn parts_that_lie_and_lean() {
         Placement::default().rotated(Axis::X, 33.0).rotated(Axis::Y, 21.0),
     ];
     for placement in placements {
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
+        for fill in [Fill::EvenOdd, Fill::Solid] {
             let mesh = cube_with_hole(8.0, 2.0, 400);
             Twin { mesh, placement, fill }.check(&LAYERS);
         }
@@ -127,7 +127,7 @@ fn parts_that_lie_and_lean() {
 #[test]
 fn bodies_that_pass_through_each_other() {
     let balls = [sphere(4.0, 1_000), sphere(4.0, 1_000).map(|[x, y, z]| [x + 2.0, y, z + 3.0])];
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let mesh = joined(&balls);
         Twin { mesh, placement: Placement::default(), fill }.check(&LAYERS);
     }

@@ -1,19 +1,19 @@
 //! Says how much of the bodies of one file overlaps.
 
 use lamp_slicer::brep::Prepared;
-use lamp_slicer::{Bodies, BodyOverlap, Part};
+use lamp_slicer::{BodyOverlap, Part};
 use lamp_stack::one_line;
 
 use crate::part_arg::PartArg;
 use crate::part_doubts::short;
 
 /// Returns a line on what bodies share in the layers that were made, if they share
-/// anything; the largest overlap comes first.
+/// anything; the largest overlap comes first. `cancels` if what lies in two of them is outside.
 pub(crate) fn overlap_text(
     overlaps: &[BodyOverlap],
     part: &Part,
     files: &[PartArg],
-    bodies: Bodies,
+    cancels: bool,
 ) -> Option<String> {
     let (worst, others) = overlaps.split_first()?;
     let more = match others {
@@ -24,9 +24,9 @@ pub(crate) fn overlap_text(
             format!(", and {} other pairs by {} mm³ in all", others.len(), short(volume))
         }
     };
-    let then = match bodies {
-        Bodies::Unite => "they unite",
-        Bodies::Xor => "what lies in both cancels out, or unites without --bodies xor",
+    let then = match cancels {
+        false => "they unite",
+        true => "what lies in both cancels out, or unites without --bodies xor",
     };
     let pair = pair_name(worst, part.prepared_of(worst.file));
     let place = match files {

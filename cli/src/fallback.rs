@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::anyhow;
-use lamp_slicer::{Fill, GridRule, Part, SliceError, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
 use crate::exit::Exit;
@@ -96,8 +96,6 @@ impl Fallback {
         layers: Option<Range<u32>>,
     ) -> Result<Self, Exit> {
         let grid = slices.grid();
-        // An STL does not say which facets are of which body.
-        let fill = if slices.unites_bodies() { Fill::NonZero } else { options.solid.fill };
         let brep = &options.solid.brep;
         let opening = brep.reader.for_opening(brep.tolerance(options.dpi))?;
         let options = SliceOptions {
@@ -105,7 +103,7 @@ impl Fallback {
             gray: slices.levels().cloned(),
             grid: GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
             layers,
-            fill,
+            fill: options.solid.fill,
             ..options.for_slicing()
         };
         let other = |what: String| {

@@ -94,7 +94,6 @@ fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeL
         edge,
         fault: match &facets[..] {
             [_] => "open",
-            [a, b] if a.forwards == b.forwards => "turned over",
             _ => "shared by more than two",
         },
         ends: *ends,

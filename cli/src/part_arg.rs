@@ -25,7 +25,7 @@ impl PartArg {
     }
 
     /// Takes what follows the last `@` for a placement, unless a file has the whole name.
-    fn parse(text: OsString) -> Result<Self, String> {
+    pub(crate) fn parse(text: OsString) -> Result<Self, String> {
         let split = text.to_str().and_then(|text| text.rsplit_once('@'));
         let named = |name: &str| is_stream(Path::new(name)) || Path::new(name).exists();
         match split {

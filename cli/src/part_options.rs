@@ -1,22 +1,22 @@
 //! The solid to slice: its files, units, placement and fill rule.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_slicer::brep::Prepared;
 use lamp_slicer::{
-    Axis, Bodies, FacetIndex, Fill, OpenOptions, Part, Placement, SliceError, Units,
+    Axis, Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, Units,
 };
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
 use crate::options::one_of;
-use crate::part_arg::{PartArg, PartPlacement};
+use crate::part_arg::{PartArg, PartPlacement, paths};
 use crate::part_doubts::PartSize;
 use crate::placement::PlacementOptions;
-use crate::recorded::text;
+use crate::recorded::{parts, text};
 use crate::step_options::{BrepOptions, notes};
 use crate::streams::is_stream;
 
@@ -29,17 +29,27 @@ pub(crate) struct PartOptions {
     #[serde(with = "text")]
     pub(crate) units: Units,
 
-    /// Rule for what is inside: between odd and even crossings, or wherever contours wind around
-    /// (for shells and files that overlap)
+    /// Rule for what is inside: all that shells wind around, which unites shells, bodies and files
+    /// that overlap; or between odd and even crossings, where they cut each other
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) fill: Fill,
 
-    /// How the bodies of a STEP file, or the items of a 3MF, join where they overlap: as one part,
-    /// or as even-odd fill joins files, which cut each other out
+    /// How the bodies of a STEP file, or the items of a 3MF, join where they overlap under --fill
+    /// even-odd: as one part, or as files do, which cut each other
     #[arg(long, value_parser = one_of::<Bodies>(), default_value_t)]
     #[serde(with = "text")]
     pub(crate) bodies: Bodies,
+
+    /// Cut this file out of the part, such as a core out of its mould; may be given several times
+    #[arg(long, value_name = "FILE", value_parser = PartArg::parser())]
+    #[serde(with = "parts", skip_serializing_if = "Vec::is_empty")]
+    subtract: Vec<PartArg>,
+
+    /// Keep of the part only what lies in this file, too; may be given several times
+    #[arg(long, value_name = "FILE", value_parser = PartArg::parser())]
+    #[serde(with = "parts", skip_serializing_if = "Vec::is_empty")]
+    intersect: Vec<PartArg>,
 
     #[command(flatten)]
     #[serde(flatten)]
@@ -75,6 +85,29 @@ impl PartOptions {
         PartSize::new(box_mm, (!model.states_unit()).then_some(self.units))
     }
 
+    /// Returns all files of a part, as they are numbered, and how each joins the others.
+    pub(crate) fn files(&self, parts: &[PartArg]) -> (Vec<PartArg>, Vec<Join>) {
+        let of = |parts: &[PartArg], join: Join| {
+            parts.iter().map(|part| (part.clone(), join)).collect::<Vec<_>>()
+        };
+        let all = [
+            of(parts, Join::Unite),
+            of(&self.subtract, Join::Subtract),
+            of(&self.intersect, Join::Intersect),
+        ];
+        all.into_iter().flatten().unzip()
+    }
+
+    /// Returns the files that cut the part.
+    pub(crate) fn cutters(&self) -> impl Iterator<Item = &PathBuf> {
+        paths(&self.subtract).chain(paths(&self.intersect))
+    }
+
+    /// Returns the files that cut the part, to be changed.
+    pub(crate) fn cutters_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.subtract.iter_mut().chain(&mut self.intersect).map(|part| &mut part.path)
+    }
+
     /// Returns a doubt about files that overlap: `found` are the numbers of two whose boxes do.
     pub(crate) fn overlap_doubt(
         &self,
@@ -84,7 +117,7 @@ impl PartOptions {
         let [a, b] = found.filter(|_| self.fill == Fill::EvenOdd)?.map(|file| parts[file].name());
         Some(format!(
             "the bounding boxes of {a} and {b} overlap: what lies in both cancels out, or unites \
-             with --fill nonzero"
+             with --fill solid"
         ))
     }
 
@@ -95,10 +128,13 @@ impl PartOptions {
 
     /// Opens all files of a part.
     pub(crate) fn open(&self, parts: &[PartArg], reading: &Reading<'_>) -> Result<Part, Exit> {
-        if self.bodies == Bodies::Xor && self.fill == Fill::NonZero {
-            return Err(Exit::usage("--fill nonzero unites all bodies: leave out --bodies xor"));
+        if self.bodies == Bodies::Xor && self.fill == Fill::Solid {
+            return Err(Exit::usage(
+                "--bodies xor is for --fill even-odd: solid fill unites all bodies",
+            ));
         }
-        if parts.iter().filter(|part| is_stream(&part.path)).count() > 1 {
+        let (files, joins) = self.files(parts);
+        if files.iter().filter(|part| is_stream(&part.path)).count() > 1 {
             return Err(Exit::usage("standard input can be read only once: give - for one part"));
         }
         let open = |part: &PartArg| {
@@ -107,7 +143,9 @@ impl PartOptions {
             let placement = part.placement.map(PartPlacement::placement);
             Ok(model.placed(&placement.unwrap_or_default()))
         };
-        let part = Part::joined(parts.iter().map(open).collect::<Result<_, Exit>>()?);
+        let opened = files.iter().map(open).collect::<Result<Vec<_>, Exit>>()?;
+        let joined = opened.into_iter().zip(joins).map(|(part, join)| part.with_join(join));
+        let part = Part::joined(joined.collect());
         Ok(part.with_bodies(self.bodies))
     }
 
@@ -155,7 +193,8 @@ pub(crate) struct Reading<'a> {
     pub(crate) say: &'a dyn Fn(&str),
 }
 
-/// Puts the name of the faulty facet's file, or of all files, before a message.
+/// Puts the name of the faulty facet's file, or of all files, before a message. `parts` are all
+/// files, as [`PartOptions::files`] numbers them.
 pub(crate) fn at_part(error: Exit, parts: &[PartArg]) -> Exit {
     let place = match error.cause() {
         Some(

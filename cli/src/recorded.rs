@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 /// with other paths, or with less memory, are to have the same bytes: such options are left out.
 const RECORDED: &str = "\
     dpi adaptive min max step criterion deviation cusp layers-budget time-budget layer-overhead \
-    row-pitch snap thickness plane units fill bodies scale mirror rotate translate tolerance \
+    row-pitch snap thickness plane plane-tolerance units fill bodies subtract intersect scale mirror rotate translate tolerance \
     kernel no-polish gray print-through material overcure lamp-intensity exposure-table origin size \
     margin trust-extent";
 
@@ -24,6 +24,10 @@ pub(crate) fn to_words(options: &impl Serialize, applies: impl Fn(&str) -> bool)
     let word = |key: &str| match &options[key] {
         Value::Bool(true) => format!(" --{key}"),
         Value::String(value) => format!(" --{key} {value}"),
+        Value::Array(values) => {
+            let values = values.iter().filter_map(Value::as_str);
+            values.map(|value| format!(" --{key} {value}")).collect()
+        }
         _ => String::new(),
     };
     RECORDED.split(' ').filter(|key| applies(key)).map(word).collect()
@@ -32,17 +36,53 @@ pub(crate) fn to_words(options: &impl Serialize, applies: impl Fn(&str) -> bool)
 /// Reads options from their words. Returns none if there are words of other options.
 pub(crate) fn from_words<T: DeserializeOwned>(words: &str) -> Option<T> {
     let mut options = Map::new();
-    let mut words = words.split_whitespace().peekable();
-    while let Some(word) = words.next() {
-        let key = word.strip_prefix("--").filter(|key| RECORDED.split(' ').any(|it| it == *key))?;
-        let value = words.next_if(|word| !word.starts_with("--"));
-        options.insert(key.to_owned(), value.map_or(Value::Bool(true), Value::from));
+    // Names of files may hold blanks.
+    for option in words.split(" --").map(str::trim).filter(|option| !option.is_empty()) {
+        let (key, value) = option.split_once(' ').unwrap_or((option, ""));
+        let key = key.trim_start_matches('-');
+        if !RECORDED.split(' ').any(|it| it == key) {
+            return None;
+        }
+        let value = if value.is_empty() { Value::Bool(true) } else { value.trim().into() };
+        match options.get_mut(key) {
+            None => drop(options.insert(key.to_owned(), value)),
+            Some(Value::Array(values)) => values.push(value),
+            Some(before) => *before = Value::Array(vec![before.take(), value]),
+        }
     }
     serde_json::from_value(Value::Object(options)).ok()
 }
 
 fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(text: &str) -> Result<T, D::Error> {
     text.parse().map_err(D::Error::custom)
+}
+
+/// Files with their placements as texts, for serde: a list, or a text if there is one.
+pub(crate) mod parts {
+    use super::{Deserialize, Deserializer, Error, Serializer};
+    use crate::part_arg::PartArg;
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Texts {
+        One(String),
+        Some(Vec<String>),
+    }
+
+    pub(crate) fn serialize<S: Serializer>(parts: &[PartArg], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(parts.iter().map(PartArg::recorded))
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Vec<PartArg>, D::Error> {
+        let texts = match Texts::deserialize(from)? {
+            Texts::One(text) => vec![text],
+            Texts::Some(texts) => texts,
+        };
+        let parsed = texts.into_iter().map(|text| PartArg::parse(text.into()));
+        parsed.collect::<Result<_, _>>().map_err(D::Error::custom)
+    }
 }
 
 /// A value as text, for serde.

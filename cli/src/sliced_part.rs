@@ -73,7 +73,7 @@ impl SlicedPart {
         memory: Option<u64>,
         progress: &Progress,
     ) -> Result<LayersOfPart<impl Iterator<Item = Result<Layer, Exit>> + use<>>, Exit> {
-        let parts = [self.file.clone()];
+        let (parts, _) = slicing.solid.files(std::slice::from_ref(&self.file));
         let (model, name) = (self.model.clone(), self.file.recorded());
         let slices = slicing.slices(model, &name, layers, memory, slicing.exposure()?, progress);
         let (slices, name_command) = slices.map_err(|error| at_part(error, &parts))?;

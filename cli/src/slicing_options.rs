@@ -9,7 +9,8 @@ use lamp_grayscale::resin::ExposureTime;
 use lamp_postprocess::TurnedSlicing;
 use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
 use lamp_slicer::{
-    Axis, Bodies, GridRule, LayerHeights, LayerLevels, Part, PlaneRule, SliceOptions, Slices,
+    Axis, Bodies, GridRule, LayerHeights, LayerLevels, PLANE_TOLERANCE, Part, PlaneRule,
+    SliceOptions, Slices,
 };
 use lamp_stack::{Dpi, Layer, Length, Size};
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,14 @@ pub(crate) struct SlicingOptions {
     #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
     #[serde(with = "text")]
     plane: PlaneRule,
+
+    /// How far a vertex may be from a layer's plane and still count as lying on it
+    ///
+    /// Files round heights: 0.7 mm is 0.699999988 in 32 bits. Such noise would move a flat face by
+    /// a layer. 0um compares heights as they are
+    #[arg(long, value_name = "LENGTH", default_value_t = Self::default().plane_tolerance)]
+    #[serde(with = "text")]
+    plane_tolerance: Length,
 
     #[command(flatten)]
     #[serde(flatten)]
@@ -109,6 +118,7 @@ impl Default for SlicingOptions {
             dpi: Dpi::new(1500.0).expect("it is a resolution"),
             thickness: Length::from_um(100.0),
             plane: PlaneRule::default(),
+            plane_tolerance: PLANE_TOLERANCE,
             solid: PartOptions::default(),
             no_polish: false,
             margin: 1,
@@ -129,6 +139,7 @@ impl SlicingOptions {
             dpi: self.dpi,
             thickness: self.thickness,
             plane: self.plane,
+            plane_tolerance: self.plane_tolerance,
             units: self.solid.units,
             placement: self.solid.placement(),
             fill: self.solid.fill,
@@ -204,6 +215,7 @@ impl SlicingOptions {
         match key {
             "thickness" => !self.adaptive,
             "bodies" => self.solid.bodies != Bodies::default(),
+            "plane-tolerance" => self.plane_tolerance != PLANE_TOLERANCE,
             "overcure" => self.exposure.has_material(),
             "margin" => self.origin.is_none(),
             _ => true,
@@ -220,7 +232,7 @@ impl SlicingOptions {
 
     /// Returns the files that the options name, to be changed.
     pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
-        self.exposure.files_mut()
+        self.exposure.files_mut().chain(self.solid.cutters_mut())
     }
 
     /// The layers of a part, the first naming this command; `part` is the
@@ -324,7 +336,7 @@ impl SlicingOptions {
 
     /// Returns the files that the options name.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.exposure.files()
+        self.exposure.files().chain(self.solid.cutters())
     }
 
     /// Returns the exposure of the layers, if one is given.
@@ -390,7 +402,7 @@ mod tests {
             "--dpi 1500 --thickness 100um --plane top --units mm --fill even-odd --margin 1",
             "--dpi 72.25 --adaptive --min 0.5um --step 1um --criterion cusp --cusp 10um \
              --time-budget 28800s --row-pitch 1.5mm --snap --plane top --units inch \
-             --fill nonzero --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
+             --fill solid --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
              --translate -5,0,12.7 --tolerance 1um --no-polish --gray --print-through \
              --material lamp-suspension --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
             "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \

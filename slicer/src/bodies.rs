@@ -1,14 +1,14 @@
-//! Tells inside from outside of a part that has several bodies.
+//! Tells inside from outside of a part, from the windings of its bodies.
 //!
-//! The bodies of a file are one product, so they unite: each is even-odd by itself, and a
-//! point is inside the file where it is inside one of them. Files still cut each other
-//! out, as a core cuts its mould.
+//! A body holds a point where its surface winds around it. The solids of an object unite, less its
+//! negative volumes; objects and files unite; files that cut are taken away, or all else is.
 
 use std::collections::{BTreeMap, HashMap};
 
 use crate::table::Fill;
 
-/// How the bodies of one file join: those of a STEP file, or the items of a 3MF.
+/// How the bodies of one file join under [`Fill::EvenOdd`]: those of a STEP file, or the items of a
+/// 3MF.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Bodies {
     /// What lies in one of them is inside.
@@ -19,6 +19,45 @@ pub enum Bodies {
 }
 
 lamp_stack::named!(Bodies { Unite = "unite", Xor = "xor" });
+
+/// How a file joins the others of a part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Join {
+    /// It unites with them.
+    #[default]
+    Unite,
+    /// It is cut out of those that unite.
+    Subtract,
+    /// Only what it holds is kept.
+    Intersect,
+}
+
+/// The way in which a body makes its object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// It is inside.
+    #[default]
+    Solid,
+    /// It is cut out of the solids of its object, such as a negative volume of a 3MF project.
+    Negative,
+}
+
+/// How a body counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BodyRule {
+    pub(crate) file: usize,
+    /// The number of its object in the file.
+    pub(crate) object: usize,
+    pub(crate) role: Role,
+    pub(crate) join: Join,
+}
+
+impl BodyRule {
+    /// Returns true if it only takes away.
+    pub(crate) fn is_cutter(&self) -> bool {
+        self.role == Role::Negative || self.join != Join::Unite
+    }
+}
 
 /// A step of the winding number, +1 or -1, about one of a part's bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,9 +89,12 @@ impl Turn {
 pub struct FillRule {
     fill: Fill,
     bodies: Bodies,
-    /// For each body, its file if that has several. Empty if no file has, or if winding
-    /// numbers unite all bodies anyway.
-    file_of: Vec<Option<u32>>,
+    /// Those of a part with several bodies.
+    rules: Vec<BodyRule>,
+    /// Whether a point is inside where any body holds it.
+    is_union: bool,
+    /// The number of files to which the others are cut.
+    intersections: usize,
 }
 
 impl From<Fill> for FillRule {
@@ -63,74 +105,86 @@ impl From<Fill> for FillRule {
 }
 
 impl FillRule {
-    /// Creates the rule for bodies of these files, those of a file one after another.
-    pub(crate) fn new(fill: Fill, bodies: Bodies, files: &[usize]) -> Self {
-        let of_file = |files: &[usize]| {
-            let file = (files.len() > 1).then_some(files[0] as u32);
-            vec![file; files.len()]
-        };
-        let file_of: Vec<_> = files.chunk_by(|a, b| a == b).flat_map(of_file).collect();
-        let counts_bodies = fill == Fill::EvenOdd && file_of.iter().any(Option::is_some);
-        Self { fill, bodies, file_of: if counts_bodies { file_of } else { Vec::new() } }
+    /// Creates the rule for the bodies of a part, those of a file one after another.
+    pub(crate) fn new(fill: Fill, bodies: Bodies, rules: Vec<BodyRule>) -> Self {
+        if let [rule] = &rules[..]
+            && !rule.is_cutter()
+        {
+            return fill.into();
+        }
+        let is_union = fill == Fill::Solid && !rules.iter().any(BodyRule::is_cutter);
+        let files = rules.chunk_by(|a, b| a.file == b.file);
+        let intersections = files.filter(|bodies| bodies[0].join == Join::Intersect).count();
+        Self { fill, bodies, rules, is_union, intersections }
     }
 
-    /// Returns the rule for crossings that count alike.
+    /// Returns the rule of each body by itself.
     pub fn fill(&self) -> Fill {
         self.fill
     }
 
     /// Returns true if crossings must be known by their bodies.
     pub(crate) fn has_bodies(&self) -> bool {
-        !self.file_of.is_empty()
+        !self.rules.is_empty()
     }
 
-    /// Returns true if some bodies unite, each even-odd by itself.
-    pub(crate) fn unites(&self) -> bool {
-        self.has_bodies() && self.bodies == Bodies::Unite
-    }
-
-    /// Returns the number by which a body's crossings are known: 0 if all count alike.
+    /// Returns the number by which a body's crossings are known: 0 if there is one.
     pub fn name_of(&self, body: u32) -> u32 {
         if self.has_bodies() { body } else { 0 }
     }
 
-    /// Returns the file of a body that is one of several.
-    fn file_of(&self, body: u32) -> Option<u32> {
-        self.file_of.get(body as usize).copied().flatten()
-    }
-
     /// Returns true if two bodies are of one file.
     pub(crate) fn are_of_one_file(&self, a: u32, b: u32) -> bool {
-        self.file_of(a).is_some() && self.file_of(a) == self.file_of(b)
+        self.rules[a as usize].file == self.rules[b as usize].file
     }
 
-    /// Returns true if the crossings of two bodies count alike, in one winding number.
-    #[inline]
-    pub(crate) fn counts_alike(&self, a: u32, b: u32) -> bool {
-        a == b || (self.united_file(a).is_none() && self.united_file(b).is_none())
-    }
-
-    /// Returns the file of a body that unites with others. Such a body has closed contours
-    /// of its own.
-    #[inline]
-    pub(crate) fn united_file(&self, body: u32) -> Option<u32> {
-        match self.bodies {
-            Bodies::Unite => self.file_of(body),
-            Bodies::Xor => None,
-        }
-    }
-
-    /// Returns a number that differs between bodies whose contours close by themselves, and
-    /// is 0 for all others.
+    /// Returns a number that differs between bodies, since their contours close by themselves.
     #[inline]
     pub(crate) fn salt(&self, body: u32) -> u64 {
         // Odd, so that no two bodies share one; its bits are those of the golden ratio.
         const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-        self.united_file(body).map_or(0, |_| (u64::from(body) + 1).wrapping_mul(GOLDEN))
+        (u64::from(self.name_of(body)) + u64::from(self.has_bodies())).wrapping_mul(GOLDEN)
+    }
+
+    /// Returns true if a point that some bodies hold is inside the part.
+    fn is_inside(&self, holds: impl Iterator<Item = u32> + Clone) -> bool {
+        if self.is_union {
+            return holds.clone().next().is_some();
+        }
+        let rules = holds.map(|body| (body, &self.rules[body as usize]));
+        let is_cut = |of: &BodyRule| {
+            let mut others = rules.clone().map(|(_, rule)| rule);
+            others.any(|rule| {
+                let is_there = (rule.file, rule.object) == (of.file, of.object);
+                rule.role == Role::Negative && is_there
+            })
+        };
+        let solids = rules.clone().filter(|(_, rule)| rule.role == Role::Solid && !is_cut(rule));
+        let of = |join: Join| solids.clone().filter(move |(_, rule)| rule.join == join);
+        if of(Join::Subtract).next().is_some() {
+            return false;
+        }
+        // The first of each unit: a file, or a body by itself.
+        let is_alike = |(a, rule): (u32, &BodyRule), (b, other): (u32, &BodyRule)| {
+            rule.file == other.file && (a == b || self.bodies == Bodies::Unite)
+        };
+        let units = |join: Join| {
+            let firsts = of(join).enumerate();
+            firsts.filter(move |&(k, body)| of(join).take(k).all(|other| !is_alike(body, other)))
+        };
+        let is_within = match self.fill {
+            Fill::Solid => of(Join::Unite).next().is_some(),
+            Fill::EvenOdd => units(Join::Unite).count() % 2 == 1,
+        };
+        let files = of(Join::Intersect).map(|(_, rule)| rule.file);
+        let is_first = |&(k, file): &(usize, usize)| {
+            of(Join::Intersect).take(k).all(|(_, other)| other.file != file)
+        };
+        is_within && files.enumerate().filter(is_first).count() == self.intersections
     }
 }
 
-/// What a point is inside of while it moves through a part, from crossing to crossing.
+/// The bodies that hold a point while it moves through a part, from crossing to crossing.
 ///
 /// ```
 /// use lamp_slicer::{FillRule, Position, Turn};
@@ -143,84 +197,114 @@ impl FillRule {
 #[derive(Clone, Debug)]
 pub struct Position<'a> {
     rule: &'a FillRule,
-    /// About all bodies that count alike.
+    /// About the only body.
     winding: i32,
-    /// The steps into those bodies that unite with others and hold the point.
-    within: Vec<Turn>,
-    /// Whether an odd number of files hold it by such bodies.
-    is_in_united: bool,
+    /// The windings about bodies of a part that has several, where these are not zero.
+    windings: Vec<(u32, i32)>,
+    /// The bodies whose windings do not add up in this row, so that every crossing toggles.
+    unsigned: Vec<u32>,
 }
 
 impl<'a> Position<'a> {
     /// Starts outside.
     pub fn outside(rule: &'a FillRule) -> Self {
-        Self { rule, winding: 0, within: Vec::new(), is_in_united: false }
+        Self { rule, winding: 0, windings: Vec::new(), unsigned: Vec::new() }
     }
 
-    /// Moves back outside.
-    pub(crate) fn leave_all(&mut self) {
-        (self.winding, self.is_in_united) = (0, false);
-        self.within.clear();
+    /// Moves outside, to the start of a row with these steps. A body whose steps do not add up, since
+    /// facets are missing or turned over, is filled by even-odd in this row.
+    pub fn start_row(&mut self, turns: impl Iterator<Item = Turn>) {
+        self.winding = 0;
+        self.windings.clear();
+        self.unsigned.clear();
+        if self.rule.fill == Fill::EvenOdd {
+            return;
+        }
+        turns.for_each(|turn| self.step(turn.body(), turn.winding()));
+        if self.winding != 0 {
+            self.unsigned.push(0);
+        }
+        self.unsigned.extend(self.windings.iter().map(|&(body, _)| body));
+        self.winding = 0;
+        self.windings.clear();
     }
 
-    /// Moves to where another point is.
+    /// Moves to where another point of the row is.
     pub(crate) fn move_to(&mut self, other: &Self) {
-        (self.winding, self.is_in_united) = (other.winding, other.is_in_united);
-        self.within.clone_from(&other.within);
+        self.winding = other.winding;
+        self.windings.clone_from(&other.windings);
+        self.unsigned.clone_from(&other.unsigned);
     }
 
     /// Passes the surface of a body.
     #[inline]
     pub fn cross(&mut self, turn: Turn) {
-        match self.rule.united_file(turn.body()) {
-            None => self.winding += turn.winding(),
-            Some(file) => self.cross_united(turn, file),
-        }
-    }
-
-    fn cross_united(&mut self, turn: Turn, file: u32) {
-        match self.within.iter().position(|entered| entered.body() == turn.body()) {
-            Some(at) => drop(self.within.swap_remove(at)),
-            None => self.within.push(turn),
-        }
-        let is_other = |other: &Turn| {
-            other.body() != turn.body() && self.rule.united_file(other.body()) == Some(file)
-        };
-        if !self.within.iter().any(is_other) {
-            self.is_in_united = !self.is_in_united;
-        }
+        self.step(turn.body(), turn.winding());
     }
 
     /// Passes surfaces of a body whose steps add up to `winding`.
-    pub(crate) fn cross_often(&mut self, body: u32, winding: i32) {
-        match self.rule.united_file(body) {
-            None => self.winding += winding,
-            Some(file) if winding % 2 != 0 => self.cross_united(Turn::new(body, winding), file),
-            Some(_) => {}
+    #[inline]
+    pub(crate) fn step(&mut self, body: u32, winding: i32) {
+        if !self.rule.has_bodies() {
+            self.winding += winding;
+            return;
         }
+        match self.windings.iter().position(|&(other, _)| other == body) {
+            None if winding == 0 => {}
+            None => self.windings.push((body, winding)),
+            Some(at) => {
+                self.windings[at].1 += winding;
+                if self.windings[at].1 == 0 {
+                    self.windings.swap_remove(at);
+                }
+            }
+        }
+    }
+
+    /// Returns true if a body holds the point, given the winding number about it.
+    #[inline]
+    fn holds(&self, body: u32, winding: i32) -> bool {
+        let is_unsigned = !self.unsigned.is_empty() && self.unsigned.contains(&body);
+        if is_unsigned { Fill::EvenOdd } else { self.rule.fill }.is_inside(winding)
+    }
+
+    /// Returns the bodies that hold the point, with the winding numbers about them.
+    fn all_that_hold(&self) -> impl Iterator<Item = (u32, i32)> + Clone {
+        self.windings.iter().copied().filter(|&(body, winding)| self.holds(body, winding))
     }
 
     /// Returns true if the point is inside the part.
     #[inline]
     pub fn is_inside(&self) -> bool {
-        self.rule.fill.is_inside(self.winding) != self.is_in_united
+        if !self.rule.has_bodies() {
+            return self.holds(0, self.winding);
+        }
+        self.rule.is_inside(self.all_that_hold().map(|(body, _)| body))
     }
 
-    /// Returns true if the point is outside every body, as it must be at a row's end.
+    /// Returns true if no body holds the point, as it must be at a row's end.
     #[inline]
     pub fn is_balanced(&self) -> bool {
-        !self.rule.fill.is_inside(self.winding) && self.within.is_empty()
+        !self.holds(0, self.winding) && self.all_that_hold().next().is_none()
     }
 
-    /// Returns the winding number about a body, or about all that count alike with it.
+    /// Returns the winding number about a body.
+    #[inline]
     pub(crate) fn winding_about(&self, body: u32) -> i32 {
-        match self.rule.united_file(body) {
-            None => self.winding,
-            Some(_) => {
-                let entered = self.within.iter().find(|entered| entered.body() == body);
-                entered.map_or(0, |entered| entered.winding())
-            }
+        if !self.rule.has_bodies() {
+            return self.winding;
         }
+        self.windings.iter().find(|&&(other, _)| other == body).map_or(0, |&(_, winding)| winding)
+    }
+
+    /// Returns the bodies whose windings are not zero.
+    pub(crate) fn windings(&self) -> &[(u32, i32)] {
+        &self.windings
+    }
+
+    /// Returns the bodies that this row fills by even-odd, since their steps do not add up.
+    pub(crate) fn unsigned(&self) -> &[u32] {
+        &self.unsigned
     }
 }
 
@@ -231,34 +315,33 @@ pub(crate) type SharedCounts = Vec<([u32; 2], u64)>;
 /// Counts the pixels of a layer that bodies of a file share.
 pub(crate) struct SharedPixels<'a> {
     rule: &'a FillRule,
-    /// The bodies that the row is in, and since which column.
-    within: Vec<(u32, u32)>,
+    held: Vec<(u32, i32)>,
     counts: HashMap<[u32; 2], u64>,
 }
 
 impl<'a> SharedPixels<'a> {
     pub(crate) fn new(rule: &'a FillRule) -> Self {
-        Self { rule, within: Vec::new(), counts: HashMap::new() }
+        Self { rule, held: Vec::new(), counts: HashMap::new() }
     }
 
-    /// Starts a row.
-    pub(crate) fn start_row(&mut self) {
-        self.within.clear();
-    }
-
-    /// Passes the surface of a body at a column, not left of the one before.
-    pub(crate) fn cross(&mut self, body: u32, column: u32) {
-        let Some(at) = self.within.iter().position(|(other, _)| *other == body) else {
-            return self.within.push((body, column));
-        };
-        for &(other, since) in &self.within {
-            let width = column - since.max(self.within[at].1);
-            if width > 0 && self.rule.are_of_one_file(body, other) {
-                let pair = [body.min(other), body.max(other)];
-                *self.counts.entry(pair).or_default() += u64::from(width);
+    /// Adds pixels at a position. Bodies share them if both wind around them the same way, and
+    /// voids leave more than one winding.
+    pub(crate) fn add(&mut self, position: &Position<'_>, pixels: u32) {
+        self.held.clear();
+        self.held.extend(position.all_that_hold());
+        if self.held.is_empty() || pixels == 0 {
+            return;
+        }
+        let winding: i32 = self.held.iter().map(|(_, winding)| winding.signum()).sum();
+        for (k, &(a, of_a)) in self.held.iter().enumerate() {
+            *self.counts.entry([a, a]).or_default() += u64::from(pixels);
+            for &(b, of_b) in &self.held[k + 1..] {
+                let is_shared = of_a.signum() == of_b.signum() && winding.abs() > 1;
+                if is_shared && self.rule.are_of_one_file(a, b) {
+                    *self.counts.entry([a.min(b), a.max(b)]).or_default() += u64::from(pixels);
+                }
             }
         }
-        self.within.swap_remove(at);
     }
 
     /// Returns the numbers of pixels.
@@ -324,4 +407,90 @@ pub struct BodyOverlap {
     pub bodies: [usize; 2],
     /// The pixels inside both, times the thickness of their layers.
     pub volume_mm3: f64,
+}
+
+/// Pixels and rows of a layer that the windings about a body make doubtful.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Doubts {
+    /// Rows that are filled by even-odd, since their steps do not add up.
+    pub(crate) unsigned_rows: u64,
+    /// Pixels that the surface winds around more than once.
+    pub(crate) repeated_px: u64,
+    /// Pixels that the surface winds around clockwise, seen from above.
+    pub(crate) inward_px: u64,
+}
+
+impl Doubts {
+    /// Adds pixels about which the surface winds so often.
+    #[inline]
+    pub(crate) fn add(&mut self, winding: i32, pixels: u32) {
+        if winding.abs() > 1 {
+            self.repeated_px += u64::from(pixels);
+        }
+        if winding < 0 {
+            self.inward_px += u64::from(pixels);
+        }
+    }
+}
+
+/// The doubts of a layer by body, and its white pixels.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LayerDoubts {
+    pub(crate) of_bodies: BTreeMap<u32, Doubts>,
+    pub(crate) white_px: u64,
+}
+
+/// A file whose surface is filled though its facets leave doubts, in the layers made so far.
+///
+/// A void is a shell whose facets face inwards. A shell within another that faces outwards, too, may
+/// be a body in a body, or a void that was written the wrong way round.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FillDoubt {
+    /// The file, from 0, among those joined.
+    pub file: usize,
+    /// The rows in which the signs of facets do not add up, since some are turned over or missing:
+    /// every crossing toggles there, as under [`Fill::EvenOdd`].
+    pub unsigned_rows: u64,
+    /// The volume that shells enclose more than once, in cubic millimeters.
+    pub repeated_mm3: f64,
+    /// The volume of shells that face inwards though nothing is around them, in cubic millimeters.
+    pub inward_mm3: f64,
+}
+
+/// Adds up the doubts of layers.
+#[derive(Debug, Default)]
+pub(crate) struct DoubtSum {
+    of_bodies: BTreeMap<u32, FillDoubt>,
+    /// The white volume of the layers with doubts.
+    white_mm3: f64,
+}
+
+impl DoubtSum {
+    pub(crate) fn add(&mut self, doubts: &LayerDoubts, pixel_mm3: f64) {
+        self.white_mm3 += doubts.white_px as f64 * pixel_mm3;
+        for (&body, doubts) in &doubts.of_bodies {
+            let sum = self.of_bodies.entry(body).or_default();
+            sum.unsigned_rows += doubts.unsigned_rows;
+            sum.repeated_mm3 += doubts.repeated_px as f64 * pixel_mm3;
+            sum.inward_mm3 += doubts.inward_px as f64 * pixel_mm3;
+        }
+    }
+
+    /// Returns the doubts of each file that has some. Shells that only touch leave none.
+    pub(crate) fn of_files(&self, file_of: impl Fn(u32) -> usize) -> Vec<FillDoubt> {
+        let least_mm3 = LEAST_SHARE * self.white_mm3;
+        let some = |mm3: f64| if mm3 > least_mm3 { mm3 } else { 0.0 };
+        let mut files: BTreeMap<usize, FillDoubt> = BTreeMap::new();
+        for (&body, doubt) in &self.of_bodies {
+            let file = file_of(body);
+            let sum = files.entry(file).or_insert(FillDoubt { file, ..FillDoubt::default() });
+            sum.unsigned_rows += doubt.unsigned_rows;
+            sum.repeated_mm3 += some(doubt.repeated_mm3);
+            sum.inward_mm3 += some(doubt.inward_mm3);
+        }
+        let is_doubtful = |doubt: &FillDoubt| {
+            doubt.unsigned_rows > 0 || doubt.repeated_mm3 > 0.0 || doubt.inward_mm3 > 0.0
+        };
+        files.into_values().filter(is_doubtful).collect()
+    }
 }

@@ -75,7 +75,7 @@ impl Buckets {
                 for &block in blocks {
                     let mut result = Ok(());
                     model.model.for_each_in_block(block, |facet| {
-                        order.for_each_bucket(&transform.placed(facet), |bucket| {
+                        order.for_each_bucket(&transform.placed(facet), piece as u32, |bucket| {
                             let records = &mut gathered[bucket];
                             records.extend_from_slice(&record(facet));
                             if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
@@ -129,9 +129,13 @@ impl<'a> BucketOrder<'a> {
 
     /// Calls `each` with the bucket of the lowest layer met, for each slab met.
     #[inline]
-    fn for_each_bucket(&self, facet: &PlacedFacet, mut each: impl FnMut(usize)) {
+    fn for_each_bucket(&self, facet: &PlacedFacet, body: u32, mut each: impl FnMut(usize)) {
         let (low, high) = facet_heights(facet);
-        let met = self.planes.between(low, high + self.reach_um);
+        let planes = self.planes.of_body(body);
+        let met = match self.reach_um > 0.0 {
+            true => planes.near(low, high + self.reach_um),
+            false => planes.between(low, high),
+        };
         let first = self.slabs[0].start;
         let Some(&bucket) = self.of_layer.get(met.start.saturating_sub(first)) else { return };
         if met.is_empty() || met.end <= first {
@@ -210,7 +214,7 @@ mod tests {
     use crate::facet::Units;
     use crate::part::Part;
     use crate::placement::Placement;
-    use crate::planes::PlaneRule;
+    use crate::planes::{PLANE_TOLERANCE, PlaneRule};
     use crate::survey::Survey;
 
     /// Facets all over 10 mm, of which a few stand through all of it.
@@ -229,7 +233,8 @@ mod tests {
         let model = scattered();
         let survey = Survey::of(&model).unwrap();
         let thickness = Length::from_um(50.0);
-        let planes = Planes::uniform(0.0, 10_000.0, thickness, PlaneRule::Top).unwrap();
+        let part_um = [0.0, 10_000.0];
+        let planes = Planes::uniform(part_um, thickness, PlaneRule::Top, PLANE_TOLERANCE).unwrap();
         // Slabs of one layer and of many, not all of the part.
         let slabs = [3..4, 4..5, 5..60, 60..150, 150..190];
         for memory in [0, 1 << 24] {

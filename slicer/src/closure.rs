@@ -1,40 +1,28 @@
 //! Tells whether a layer's contours close, without linking them.
 //!
 //! A contour is a chain of segments. It closes if an even number of segments ends at
-//! each of its points (even-odd rule), or as many start there as stop (non-zero rule).
+//! each of its points.
 //! Equal points have equal bits, as `cut.rs` shows; and no coordinate in pixels is -0,
 //! since 1/2 was subtracted from it. So a sum over hashes of the points, in any order,
 //! is zero if all contours close, and otherwise some other of 2^64 values.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use crate::table::Fill;
-
 /// The sum over the ends of a layer's segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct EndSum(u64);
 
 impl EndSum {
-    /// Adds the ends of a segment from the first to the second, or back if `is_reversed`.
-    /// Ends with another salt are other points.
+    /// Adds the ends of a segment. Ends with another salt are other points.
     #[inline]
-    pub(crate) fn add(&mut self, ends: [[f64; 2]; 2], is_reversed: bool, fill: Fill, salt: u64) {
+    pub(crate) fn add(&mut self, ends: [[f64; 2]; 2], salt: u64) {
         let [a, b] = ends.map(|end| hash(end, salt));
-        self.0 = match fill {
-            Fill::EvenOdd => self.0 ^ a ^ b,
-            Fill::NonZero => {
-                let along = a.wrapping_sub(b);
-                self.0.wrapping_add(if is_reversed { along.wrapping_neg() } else { along })
-            }
-        };
+        self.0 ^= a ^ b;
     }
 
     /// Returns the sum over the segments of both.
-    pub(crate) fn joined(self, other: Self, fill: Fill) -> Self {
-        Self(match fill {
-            Fill::EvenOdd => self.0 ^ other.0,
-            Fill::NonZero => self.0.wrapping_add(other.0),
-        })
+    pub(crate) fn joined(self, other: Self) -> Self {
+        Self(self.0 ^ other.0)
     }
 
     /// Returns true if every contour closes.
@@ -54,16 +42,10 @@ impl RowSums {
         Self((0..=last).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Adds an end of a segment that starts or stops there. Ends with another salt are other
-    /// points.
+    /// Adds an end of a segment. Ends with another salt are other points.
     #[inline]
-    pub(crate) fn add(&self, row: u32, point: [f64; 2], starts: bool, fill: Fill, salt: u64) {
-        let (sum, hash) = (&self.0[row as usize], hash(point, salt));
-        match fill {
-            Fill::EvenOdd => sum.fetch_xor(hash, Relaxed),
-            Fill::NonZero if starts => sum.fetch_add(hash, Relaxed),
-            Fill::NonZero => sum.fetch_sub(hash, Relaxed),
-        };
+    pub(crate) fn add(&self, row: u32, point: [f64; 2], salt: u64) {
+        self.0[row as usize].fetch_xor(hash(point, salt), Relaxed);
     }
 
     /// Returns the rows where contours break off, rising.
@@ -89,9 +71,9 @@ fn hash(point: [f64; 2], salt: u64) -> u64 {
 mod tests {
     use super::*;
 
-    fn sum(segments: &[[[f64; 2]; 2]], fill: Fill) -> EndSum {
+    fn sum(segments: &[[[f64; 2]; 2]]) -> EndSum {
         let mut sum = EndSum::default();
-        segments.iter().for_each(|&ends| sum.add(ends, false, fill, 0));
+        segments.iter().for_each(|&ends| sum.add(ends, 0));
         sum
     }
 
@@ -103,14 +85,12 @@ mod tests {
 
     #[test]
     fn a_contour_is_closed_until_a_segment_is_missing_or_comes_twice() {
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
-            for segments in [&square(7.3)[..], &[square(7.3), square(-2.1)].concat()] {
-                assert!(sum(segments, fill).is_closed());
-                for k in 0..segments.len() {
-                    let missing = [&segments[..k], &segments[k + 1..]].concat();
-                    let twice = [segments, &segments[k..=k]].concat();
-                    assert!(!sum(&missing, fill).is_closed() && !sum(&twice, fill).is_closed());
-                }
+        for segments in [&square(7.3)[..], &[square(7.3), square(-2.1)].concat()] {
+            assert!(sum(segments).is_closed());
+            for k in 0..segments.len() {
+                let missing = [&segments[..k], &segments[k + 1..]].concat();
+                let twice = [segments, &segments[k..=k]].concat();
+                assert!(!sum(&missing).is_closed() && !sum(&twice).is_closed());
             }
         }
     }
@@ -118,55 +98,43 @@ mod tests {
     #[test]
     fn contours_of_two_bodies_do_not_close_each_other() {
         let [side, ..] = square(7.3);
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
-            for (salt, is_closed) in [(0, true), (1, false)] {
-                let mut sum = EndSum::default();
-                sum.add(side, false, fill, 0);
-                sum.add(side, true, fill, salt);
-                assert_eq!(sum.is_closed(), is_closed);
-            }
+        for (salt, is_closed) in [(0, true), (1, false)] {
+            let mut sum = EndSum::default();
+            sum.add(side, 0);
+            sum.add(side, salt);
+            assert_eq!(sum.is_closed(), is_closed);
         }
     }
 
     #[test]
-    fn only_the_nonzero_rule_sees_a_segment_turned_round() {
+    fn a_segment_turned_round_leaves_no_gap() {
         let mut segments = square(7.3);
         segments[1].reverse();
-        assert!(sum(&segments, Fill::EvenOdd).is_closed());
-        assert!(!sum(&segments, Fill::NonZero).is_closed());
-        segments.iter_mut().for_each(|segment| segment.reverse());
-        segments[1].reverse();
-        assert!(sum(&segments, Fill::NonZero).is_closed());
+        assert!(sum(&segments).is_closed());
     }
 
     #[test]
     fn the_shares_of_workers_add_up() {
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
-            let (mut there, mut back) = (EndSum::default(), EndSum::default());
-            let ends = [[0.5, 1.0], [3.0, 0.0]];
-            there.add(ends, true, fill, 0);
-            back.add(ends, false, fill, 0);
-            assert!(!there.is_closed() && !back.is_closed());
-            assert!(there.joined(back, fill).is_closed());
-            assert_eq!(there.joined(there, fill).is_closed(), fill == Fill::EvenOdd);
-        }
+        let (mut there, mut back) = (EndSum::default(), EndSum::default());
+        let ends = [[0.5, 1.0], [3.0, 0.0]];
+        there.add(ends, 0);
+        back.add(ends, 0);
+        assert!(!there.is_closed() && !back.is_closed());
+        assert!(there.joined(back).is_closed());
     }
 
     #[test]
     fn rows_are_open_where_an_end_has_no_partner() {
-        for fill in [Fill::EvenOdd, Fill::NonZero] {
-            let sums = RowSums::new(9);
-            let [a, b, c] = [[0.5, 3.0], [8.25, 3.0], [1.5, 7.25]];
-            for (row, point, starts) in
-                [(3, a, true), (3, b, true), (3, a, false), (8, c, false), (8, c, true)]
-            {
-                sums.add(row, point, starts, fill, 0);
-            }
-            assert_eq!(sums.open_rows(), [3]);
-            sums.add(3, b, false, fill, 0);
-            sums.add(8, c, true, fill, 0);
-            assert_eq!(sums.open_rows(), [8]);
+        let sums = RowSums::new(9);
+        let [a, b, c] = [[0.5, 3.0], [8.25, 3.0], [1.5, 7.25]];
+        for (row, point) in [(3, a), (3, b), (3, a), (8, c), (8, c)] {
+            sums.add(row, point, 0);
         }
+        assert_eq!(sums.open_rows(), [3]);
+        sums.add(3, b, 0);
+        sums.add(8, c, 0);
+        sums.add(8, a, 0);
+        assert_eq!(sums.open_rows(), [8]);
     }
 
     /// Neighbouring whole numbers differ in one bit, and their points lie on a

@@ -103,6 +103,12 @@ impl RowCrossing {
     pub(crate) fn winding(self) -> i32 {
         (self.0 & 1) as i32 * 2 - 1
     }
+
+    /// Returns true if another one steps the other way.
+    #[inline]
+    pub(crate) fn turns_back(self, other: Self) -> bool {
+        (self.0 ^ other.0) & 1 == 1
+    }
 }
 
 /// A crossing in its row and the body that it is of, to sort by.
@@ -158,6 +164,13 @@ pub(crate) struct Cutter<'a> {
     pub(crate) grid: &'a PixelGrid,
     pub(crate) planes: &'a Planes,
     pub(crate) rule: &'a FillRule,
+}
+
+impl<'a> Cutter<'a> {
+    /// Returns the cutter of a body.
+    pub(crate) fn of_body(self, body: u32) -> Self {
+        Self { planes: self.planes.of_body(body), ..self }
+    }
 }
 
 /// A segment that crosses rows.
@@ -290,12 +303,12 @@ impl Cutter<'_> {
     ) -> usize {
         const AS_MUCH: usize = size_of::<RowSegment>() / size_of::<Crossing>();
         let mut count = 0;
-        let (fill, salt) = (self.rule.fill(), self.rule.salt(body));
+        let salt = self.rule.salt(body);
         let is_short = needs_no_body && ShortCrossing::hold(self.grid);
         self.for_each_segment(facet, layers, |layer, segment| {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
-            share.ends.add([a, b], segment.is_reversed, fill, salt);
+            share.ends.add([a, b], salt);
             let Some(segment) = self.row_segment(a, b, segment.is_reversed) else { return };
             let (rows, crossing) = (segment.rows(), |row| segment.crossing(self.grid, row));
             if needs_no_body && rows.len() > AS_MUCH {
@@ -323,7 +336,7 @@ impl Cutter<'_> {
         shares: &mut [LayerShare],
     ) -> usize {
         let (low, high) = facet_heights(facet);
-        let met = self.planes.between(low, high + reach_um);
+        let met = self.planes.near(low, high + reach_um);
         let met = met.start.max(layers.start)..met.end.min(layers.end);
         if met.is_empty() {
             return 0;
@@ -347,7 +360,7 @@ impl Cutter<'_> {
     ) {
         let (low, high) = facet_heights(facet);
         // Most facets of a part in no order lie in another slab.
-        if low >= self.planes.z_um(layers.end - 1) || high < self.planes.z_um(layers.start) {
+        if low >= self.planes.side_um(layers.end - 1) || high < self.planes.side_um(layers.start) {
             return;
         }
         let met = self.planes.between(low, high);
@@ -365,7 +378,7 @@ impl Cutter<'_> {
         let short = [[low, middle], [middle, high]];
         let second_z = sorted.corners[1][Z];
         let second = match met.len() {
-            1 => met.start + usize::from(self.planes.z_um(met.start) <= second_z),
+            1 => met.start + usize::from(self.planes.side_um(met.start) <= second_z),
             _ => self.planes.at_or_below(second_z),
         };
         sorted.for_each_line(

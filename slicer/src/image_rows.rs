@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use lamp_stack::{Grouped, Mask};
 
-use crate::bodies::{Position, SharedPixels};
+use crate::bodies::{Doubts, LayerDoubts, Position, SharedPixels};
 use crate::cut::{BodyCrossing, InRow, RowCrossing};
 use crate::grid::PixelGrid;
 
@@ -137,39 +137,75 @@ pub(crate) fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bo
     places.len().is_multiple_of(2)
 }
 
-/// Adds a row's transitions, wherever the winding number leaves or reaches zero.
-/// Returns true if it is zero at the end.
-pub(crate) fn non_zero(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
-    let mut winding = 0;
+/// Adds a row's transitions, wherever the winding number leaves or reaches zero, or at every crossing
+/// if it is not zero at the end. Returns true if the number of crossings is even.
+#[inline]
+pub(crate) fn solid(
+    places: &[RowCrossing],
+    transitions: &mut Vec<u32>,
+    doubts: &mut LayerDoubts,
+) -> bool {
+    // Nearly all rows: a clean shell is entered and left in turn.
+    let is_clean = places.is_sorted_by(|a, b| a.column() < b.column() && a.turns_back(*b))
+        && places.first().is_none_or(|first| first.winding() > 0);
+    if is_clean {
+        transitions.extend(places.iter().map(|place| place.column()));
+        return places.len().is_multiple_of(2);
+    }
+    wound(places, transitions, doubts.of_bodies.entry(0).or_default())
+}
+
+/// The same for any row. Adds to the doubts about it.
+fn wound(places: &[RowCrossing], transitions: &mut Vec<u32>, doubts: &mut Doubts) -> bool {
+    if places.iter().map(|place| place.winding()).sum::<i32>() != 0 {
+        let is_even = even_odd(places, transitions);
+        doubts.unsigned_rows += u64::from(is_even);
+        return is_even;
+    }
+    let (mut winding, mut column) = (0, 0);
     for group in places.chunk_by(|a, b| a.column() == b.column()) {
-        let before = winding;
+        let (before, here) = (winding, group[0].column());
+        doubts.add(winding, here - column);
         winding += group.iter().map(|place| place.winding()).sum::<i32>();
         if (before == 0) != (winding == 0) {
-            transitions.push(group[0].column());
+            transitions.push(here);
         }
+        column = here;
     }
-    winding == 0
+    true
 }
 
 /// Adds a row's transitions, wherever the position leaves or enters the part. Returns true
-/// if the row balances. Counts the pixels that bodies share.
+/// if the row balances. Counts the pixels that bodies share, and those that leave doubts.
 pub(crate) fn by_body(
     places: &[BodyCrossing],
     transitions: &mut Vec<u32>,
     position: &mut Position<'_>,
     shared: &mut SharedPixels<'_>,
+    doubts: &mut LayerDoubts,
 ) -> bool {
-    position.leave_all();
-    shared.start_row();
+    position.start_row(places.iter().map(|place| place.turn()));
+    let (mut is_inside, mut column) = (false, 0);
     for group in places.chunk_by(|a, b| a.column() == b.column()) {
-        let (before, column) = (position.is_inside(), group[0].column());
-        for place in group {
-            position.cross(place.turn());
-            shared.cross(place.turn().body(), column);
+        let here = group[0].column();
+        shared.add(position, here - column);
+        for &(body, winding) in position.windings() {
+            if !(0..2).contains(&winding) && !position.unsigned().contains(&body) {
+                doubts.of_bodies.entry(body).or_default().add(winding, here - column);
+            }
         }
-        if position.is_inside() != before {
-            transitions.push(column);
+        group.iter().for_each(|place| position.cross(place.turn()));
+        if position.is_inside() != is_inside {
+            is_inside = !is_inside;
+            transitions.push(here);
+        }
+        column = here;
+    }
+    let is_balanced = position.is_balanced();
+    if is_balanced {
+        for &body in position.unsigned() {
+            doubts.of_bodies.entry(body).or_default().unsigned_rows += 1;
         }
     }
-    position.is_balanced()
+    is_balanced
 }

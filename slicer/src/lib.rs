@@ -74,7 +74,7 @@ mod wild;
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
 
-pub use bodies::{Bodies, BodyOverlap, FillRule, Position, Turn};
+pub use bodies::{Bodies, BodyOverlap, FillDoubt, FillRule, Join, Position, Turn};
 pub use error::{AsciiFault, FileChange, ObjFault, SliceError};
 pub use exact::Polished;
 pub use facet::{Facet, Units};
@@ -86,7 +86,7 @@ pub use open::second_opinion;
 pub use open::{KernelName, OpenOptions, body_name, read_step};
 pub use part::Part;
 pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
-pub use planes::{LayerHeights, PlaneRule};
+pub use planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule};
 pub use read_note::ReadNote;
 pub use section::{Inside, SectionOptions, section};
 pub use section_area::{Trapezoid, section_area};

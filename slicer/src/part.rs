@@ -7,7 +7,7 @@ use std::sync::Arc;
 use lamp_brep::Prepared;
 use lamp_stack::{digest_of, digest_of_digests};
 
-use crate::bodies::{Bodies, FillRule};
+use crate::bodies::{Bodies, BodyRule, FillRule, Join, Role};
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
 use crate::file_blocks::FileBlock;
@@ -53,16 +53,8 @@ pub(crate) struct Piece {
     /// The number in the file of the object whose volume it adds to or takes from.
     pub(crate) object: usize,
     pub(crate) role: Role,
-}
-
-/// The way in which a piece makes its object.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Role {
-    /// It is inside.
-    #[default]
-    Solid,
-    /// It is cut out of the solids of its object, such as a negative volume of a 3MF project.
-    Negative,
+    /// How its file joins the others.
+    pub(crate) join: Join,
 }
 
 /// Facets in file units.
@@ -138,7 +130,14 @@ impl Piece {
             placement,
             object: 0,
             role: Role::default(),
+            join: Join::default(),
         }
+    }
+
+    /// Returns how it counts.
+    pub(crate) fn rule(&self) -> BodyRule {
+        let Self { file, object, role, join, .. } = *self;
+        BodyRule { file, object, role, join }
     }
 
     /// Returns true if the facets are read again from their file whenever they are needed.
@@ -218,7 +217,15 @@ impl Part {
         piece.surfaces().map(Arc::as_ref)
     }
 
-    /// Sets how the bodies of each file join; they unite by default.
+    /// Sets how its files join others; they unite by default. Parts that are cut out, or to which
+    /// others are cut, add nothing to the box and the layers of these.
+    #[must_use]
+    pub fn with_join(mut self, join: Join) -> Self {
+        self.pieces.iter_mut().for_each(|piece| piece.join = join);
+        self
+    }
+
+    /// Sets how the bodies of each file join under [`Fill::EvenOdd`]; they unite by default.
     #[must_use]
     pub fn with_bodies(self, bodies: Bodies) -> Self {
         Self { bodies, ..self }
@@ -226,8 +233,8 @@ impl Part {
 
     /// Returns the rule that tells inside from outside of all files together.
     pub(crate) fn fill_rule(&self, fill: Fill) -> FillRule {
-        let files: Vec<usize> = self.pieces.iter().map(|piece| piece.file).collect();
-        FillRule::new(fill, self.bodies, &files)
+        let rules = self.pieces.iter().map(Piece::rule).collect();
+        FillRule::new(fill, self.bodies, rules)
     }
 
     /// Returns the file of a body, and its number there, from 0.

@@ -1,5 +1,7 @@
 //! The planes at which a part is cut, one a layer.
 
+use std::collections::HashMap;
+use std::iter;
 use std::ops::Range;
 
 use lamp_stack::{Grouped, Length};
@@ -9,6 +11,13 @@ use crate::scan::count_at_or_below;
 
 /// More layers than any machine builds.
 const MAX_LAYERS: f64 = 4e6;
+
+/// How far a vertex may be from a plane and still count as lying on it, unless options say
+/// otherwise: a micrometre.
+///
+/// A height of 0.7 mm is 0.699999988 in 32 bits, and files of six significant digits round heights
+/// above 100 mm by half a micrometre, the part's bottom as well as the face.
+pub const PLANE_TOLERANCE: Length = Length::from_um(1.0);
 
 /// The plane of a layer at which its section is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,12 +85,25 @@ impl LayerHeights {
 /// If all layers are of one thickness, the part's height is rounded to whole layers,
 /// at least one. A plane above the part, in the layer that holds the part's top, is
 /// moved down to that top, where flat tops still have their section.
+///
+/// A vertex within the tolerance of a plane counts as lying on it: above a plane at its layer's
+/// top or middle, so that the section is the limit from below, and below one at its bottom, the
+/// limit from above. So each plane has a side height, at and above which vertices are above it.
 #[derive(Clone, Debug)]
 pub(crate) struct Planes {
+    /// The heights of sections.
     z_um: Vec<f64>,
+    /// The heights that divide vertices above planes from those below.
+    sides_um: Vec<f64>,
+    tolerance_um: f64,
     /// The layers' boundaries.
     boundaries_um: Vec<f64>,
     spacing: Spacing,
+    rule: PlaneRule,
+    /// The planes of bodies that begin or end within a layer, where these differ.
+    own: Vec<Self>,
+    /// The number among them of each body's, plus one; 0 for the others.
+    own_of: Vec<u32>,
 }
 
 /// The distances between planes.
@@ -103,10 +125,10 @@ impl Planes {
     /// # Errors
     /// Returns an error if there would be more layers than any machine builds.
     pub(crate) fn uniform(
-        bottom_um: f64,
-        top_um: f64,
+        [bottom_um, top_um]: [f64; 2],
         thickness: Length,
         rule: PlaneRule,
+        tolerance: Length,
     ) -> Result<Self, SliceError> {
         let thickness_um = thickness.um();
         let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
@@ -125,15 +147,22 @@ impl Planes {
             }
         };
         let count = count as u32;
-        Ok(Self {
-            z_um: (0..count).map(plane).collect(),
-            boundaries_um: (0..=count).map(|k| height(f64::from(k))).collect(),
-            spacing: Spacing::even(thickness_um),
-        })
+        let z_um: Vec<f64> = (0..count).map(plane).collect();
+        let boundaries_um: Vec<f64> = (0..=count).map(|k| height(f64::from(k))).collect();
+        let part_um = [bottom_um, top_um];
+        let sides_um = sides(&z_um, &boundaries_um, part_um, rule, tolerance);
+        let spacing = Spacing::even(thickness_um);
+        let tolerance_um = tolerance.um();
+        Ok(Self::common(z_um, sides_um, tolerance_um, boundaries_um, spacing, rule))
     }
 
-    /// Creates the planes of given layers, of a part that ends at `top_um`.
-    pub(crate) fn of(heights: &LayerHeights, top_um: f64, rule: PlaneRule) -> Self {
+    /// Creates the planes of given layers, of a part between two heights (micrometres).
+    pub(crate) fn of(
+        heights: &LayerHeights,
+        [bottom_um, top_um]: [f64; 2],
+        rule: PlaneRule,
+        tolerance: Length,
+    ) -> Self {
         let plane = |layer: &[f64]| {
             let [bottom, top] = [layer[0], layer[1]];
             let plane = match rule {
@@ -141,20 +170,151 @@ impl Planes {
                 PlaneRule::Middle => bottom + 0.5 * (top - bottom),
                 PlaneRule::Bottom => return bottom.next_up(),
             };
-            if bottom <= top_um { plane.min(top_um) } else { plane }
+            // A part that ends at the layer's bottom has its section in the layer below.
+            let touching_um = tolerance.um().min(0.5 * (top_um - bottom_um));
+            if bottom + touching_um < top_um { plane.min(top_um) } else { plane }
         };
         let boundaries_um = heights.boundaries_um.clone();
         let z_um: Vec<f64> = boundaries_um.windows(2).map(plane).collect();
-        Self { spacing: Spacing::Uneven(PlaneBins::new(&z_um)), z_um, boundaries_um }
+        let sides_um = sides(&z_um, &boundaries_um, [bottom_um, top_um], rule, tolerance);
+        let spacing = Spacing::Uneven(PlaneBins::new(&sides_um));
+        Self::common(z_um, sides_um, tolerance.um(), boundaries_um, spacing, rule)
     }
 
-    /// Creates a single plane.
-    pub(crate) fn one(z: Length) -> Self {
-        Self {
-            z_um: vec![z.um()],
-            boundaries_um: vec![z.um() - 1.0, z.um()],
-            spacing: Spacing::even(1.0),
+    /// Creates a single plane, whose section is the limit from below.
+    pub(crate) fn one(z: Length, tolerance: Length) -> Self {
+        let (z_um, tolerance_um) = (z.um(), tolerance.um());
+        let (sides_um, boundaries_um) = (vec![z_um - tolerance_um], vec![z_um - 1.0, z_um]);
+        let spacing = Spacing::even(1.0);
+        Self::common(vec![z_um], sides_um, tolerance_um, boundaries_um, spacing, PlaneRule::Top)
+    }
+
+    fn common(
+        z_um: Vec<f64>,
+        sides_um: Vec<f64>,
+        tolerance_um: f64,
+        boundaries_um: Vec<f64>,
+        spacing: Spacing,
+        rule: PlaneRule,
+    ) -> Self {
+        let (own, own_of) = (Vec::new(), Vec::new());
+        Self { z_um, sides_um, tolerance_um, boundaries_um, spacing, rule, own, own_of }
+    }
+
+    /// Gives each body, between two heights (micrometres), the layers that it has alone: the part's
+    /// top and bottom are not where its other bodies begin and end.
+    pub(crate) fn with_bodies(mut self, bodies_um: &[[f64; 2]]) -> Self {
+        let mut numbers: HashMap<Vec<(usize, [u64; 2])>, u32> = HashMap::new();
+        for &body_um in bodies_um {
+            let moves = self.moves_of(body_um);
+            let key = moves.iter().map(|&(layer, at)| (layer, at.map(f64::to_bits))).collect();
+            let number = match moves.is_empty() {
+                true => 0,
+                false => *numbers.entry(key).or_insert_with(|| {
+                    let (own, own_of) = (Vec::new(), Vec::new());
+                    let mut planes = Self { own, own_of, ..self.clone_common() };
+                    for &(layer, [z_um, side_um]) in &moves {
+                        planes.set(layer, z_um, side_um);
+                    }
+                    self.own.push(planes);
+                    self.own.len() as u32
+                }),
+            };
+            self.own_of.push(number);
         }
+        self
+    }
+
+    fn clone_common(&self) -> Self {
+        Self::common(
+            self.z_um.clone(),
+            self.sides_um.clone(),
+            self.tolerance_um,
+            self.boundaries_um.clone(),
+            self.spacing.clone(),
+            self.rule,
+        )
+    }
+
+    /// Returns the planes that are elsewhere for a body between two heights, with their sides.
+    fn moves_of(&self, [low_um, high_um]: [f64; 2]) -> Vec<(usize, [f64; 2])> {
+        let ends = &self.boundaries_um;
+        let holds = |layer: usize, z_um: f64| {
+            ends[layer] <= z_um && z_um <= ends[layer + 1] && layer < self.len()
+        };
+        // As the part's height is rounded to whole layers, so is a body's.
+        let whole = |z_um: f64| match self.spacing {
+            Spacing::Even { thickness_um, .. } => {
+                ((z_um - ends[0]) / thickness_um).round().max(0.0) as usize
+            }
+            Spacing::Uneven(_) => ends.partition_point(|&end| end + self.tolerance_um < z_um),
+        };
+        let tolerance_um = self.tolerance_um.min(0.5 * (high_um - low_um));
+        let at_top = [high_um, high_um - tolerance_um];
+        let at_bottom = [low_um.next_up(), low_um.next_up() + tolerance_um];
+        let mut moves = Vec::new();
+        match self.rule {
+            PlaneRule::Top => {
+                let last = whole(high_um).saturating_sub(1).min(self.len() - 1);
+                if self.sides_um[last] > high_um && holds(last, high_um) {
+                    moves.push((last, at_top));
+                }
+            }
+            PlaneRule::Middle => {}
+            PlaneRule::Bottom => {
+                let end = whole(high_um);
+                if matches!(self.spacing, Spacing::Even { .. }) && end < self.len() && end > 0 {
+                    moves.push((end, [self.z_um[end], self.sides_um[end].max(high_um.next_up())]));
+                }
+                let first = whole(low_um);
+                if first < end && self.z_um[first] < low_um && holds(first, low_um) {
+                    moves.push((first, at_bottom));
+                }
+            }
+        }
+        let is_met = !self.between(low_um, high_um).is_empty();
+        if !is_met && moves.is_empty() {
+            // At least one layer, as a part has.
+            let middle_um = 0.5 * (low_um + high_um);
+            let at = match self.rule {
+                PlaneRule::Top => at_top,
+                PlaneRule::Middle => [middle_um, middle_um],
+                PlaneRule::Bottom => at_bottom,
+            };
+            let layer = (0..self.len()).find(|&layer| holds(layer, middle_um));
+            moves.extend(layer.map(|layer| (layer, at)));
+        }
+        moves
+    }
+
+    /// Returns the planes at which a body is cut.
+    #[inline]
+    pub(crate) fn of_body(&self, body: u32) -> &Self {
+        match self.own_of.get(body as usize) {
+            None | Some(0) => self,
+            Some(&number) => &self.own[number as usize - 1],
+        }
+    }
+
+    /// Returns planes for each height at which bodies are cut in a layer.
+    pub(crate) fn each_at(&self, layer: usize) -> Vec<&Self> {
+        let mut each = vec![self];
+        for own in &self.own {
+            if each.iter().all(|other| other.z_um[layer] != own.z_um[layer]) {
+                each.push(own);
+            }
+        }
+        each
+    }
+
+    /// Returns the heights between which bodies meet the planes of some layers, or lie on them.
+    pub(crate) fn heights_um(&self, layers: &Range<usize>) -> [f64; 2] {
+        let all = || iter::once(self).chain(&self.own);
+        let low_um = all().map(|planes| planes.sides_um[layers.start]).fold(f64::MAX, f64::min);
+        let last = layers.end - 1;
+        let ends = all().flat_map(|planes| [planes.sides_um[last], planes.z_um[last]]);
+        let high_um = ends.fold(f64::MIN, f64::max);
+        [low_um, high_um]
     }
 
     /// Returns the planes with one of them moved: by no more than half of the way to its
@@ -167,12 +327,18 @@ impl Planes {
         let moved = here + by_um.clamp((below - here) / 2.0, (above - here) / 2.0);
         let [bottom, top] = part_um;
         if moved > bottom && moved <= top {
-            planes.z_um[layer] = moved;
-        }
-        if let Spacing::Uneven(bins) = &mut planes.spacing {
-            *bins = PlaneBins::new(&planes.z_um);
+            let side = planes.sides_um[layer] + (moved - here);
+            planes.set(layer, moved, side);
         }
         planes
+    }
+
+    /// Moves a plane and its side.
+    fn set(&mut self, layer: usize, z_um: f64, side_um: f64) {
+        (self.z_um[layer], self.sides_um[layer]) = (z_um, side_um);
+        if let Spacing::Uneven(bins) = &mut self.spacing {
+            *bins = PlaneBins::new(&self.sides_um);
+        }
     }
 
     /// Returns the heights of the layers.
@@ -189,6 +355,18 @@ impl Planes {
     #[inline]
     pub(crate) fn z_um(&self, layer: usize) -> f64 {
         self.z_um[layer]
+    }
+
+    /// Returns the height at and above which vertices are above a plane, in micrometres.
+    #[inline]
+    pub(crate) fn side_um(&self, layer: usize) -> f64 {
+        self.sides_um[layer]
+    }
+
+    /// Returns how far a vertex may be from a plane and count as lying on it, in micrometres.
+    #[inline]
+    pub(crate) fn tolerance_um(&self) -> f64 {
+        self.tolerance_um
     }
 
     /// Returns the height of a layer's bottom, in micrometres, to the nanometre.
@@ -221,25 +399,51 @@ impl Planes {
         self.boundaries_um[layers.end] - self.boundaries_um[layers.start]
     }
 
-    /// Returns the layers whose planes lie between two heights: above `low_um`, and at
-    /// or below `high_um`. A vertex counts as above a plane if its z is at or above the
-    /// plane's, so these are the planes with one of the heights on either side.
+    /// Returns the layers whose planes have one vertex below and one above them, of two at these
+    /// heights.
     #[inline]
     pub(crate) fn between(&self, low_um: f64, high_um: f64) -> Range<usize> {
         self.at_or_below(low_um)..self.at_or_below(high_um)
     }
 
-    /// Returns the number of planes at or below a height.
+    /// Returns the layers whose sections are at or above `low_um`, and up to `high_um`, and perhaps
+    /// one more at each end.
+    #[inline]
+    pub(crate) fn near(&self, low_um: f64, high_um: f64) -> Range<usize> {
+        self.between(low_um - self.tolerance_um, high_um)
+    }
+
+    /// Returns the number of planes that a vertex at a height is above.
     #[inline]
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         match &self.spacing {
             Spacing::Even { per_um, .. } => {
-                let guess = (z_um - self.z_um[0]) * per_um + 1.0;
-                count_at_or_below(&self.z_um, z_um, guess)
+                let guess = (z_um - self.sides_um[0]) * per_um + 1.0;
+                count_at_or_below(&self.sides_um, z_um, guess)
             }
             Spacing::Uneven(bins) => bins.at_or_below(z_um),
         }
     }
+}
+
+/// Returns the heights that divide vertices above planes from those below, at most a tolerance
+/// away. No vertex is on two planes, nor are a part's bottom and top on one.
+fn sides(
+    z_um: &[f64],
+    boundaries_um: &[f64],
+    [bottom_um, top_um]: [f64; 2],
+    rule: PlaneRule,
+    tolerance: Length,
+) -> Vec<f64> {
+    let side = |(&z, layer): (&f64, &[f64])| {
+        let room_um = match rule {
+            PlaneRule::Top | PlaneRule::Middle => z - layer[0].max(bottom_um),
+            PlaneRule::Bottom => layer[1].min(top_um) - z,
+        };
+        let tolerance_um = tolerance.um().min(0.5 * room_um.max(0.0));
+        if rule == PlaneRule::Bottom { z + tolerance_um } else { z - tolerance_um }
+    };
+    z_um.iter().zip(boundaries_um.windows(2)).map(side).collect()
 }
 
 fn to_nanometres(um: f64) -> f64 {
@@ -294,8 +498,12 @@ mod tests {
 
     use super::*;
 
+    fn uniform(height_um: f64, thickness_um: f64, rule: PlaneRule) -> Result<Planes, SliceError> {
+        Planes::uniform([0.0, height_um], Length::from_um(thickness_um), rule, PLANE_TOLERANCE)
+    }
+
     fn planes(height_um: f64, rule: PlaneRule) -> Vec<f64> {
-        Planes::uniform(0.0, height_um, Length::from_um(100.0), rule).unwrap().z_um
+        uniform(height_um, 100.0, rule).unwrap().z_um
     }
 
     #[test]
@@ -320,21 +528,22 @@ mod tests {
 
     #[test]
     fn a_vertex_on_a_plane_is_above_it() {
-        let planes = Planes::uniform(0.0, 1e5, Length::from_um(100.0), PlaneRule::Top).unwrap();
+        let planes = uniform(1e5, 100.0, PlaneRule::Top).unwrap();
         assert_eq!(planes.between(0.0, 100.0), 0..1);
         assert_eq!(planes.between(100.0, 200.0), 1..2);
-        assert_eq!(planes.between(100.0, 199.0), 1..1);
+        assert_eq!(planes.between(100.0, 199.0), 1..2);
+        assert_eq!(planes.between(99.0, 198.9), 1..1);
         assert_eq!(planes.between(-1e9, 1e9), 0..1000);
         for (k, z) in planes.z_um.iter().enumerate() {
-            assert_eq!(planes.at_or_below(*z), k + 1);
-            assert_eq!(planes.at_or_below(z.next_down()), k);
+            assert_eq!(planes.at_or_below(z - 1.0), k + 1);
+            assert_eq!(planes.at_or_below((z - 1.0).next_down()), k);
         }
     }
 
     #[test]
     fn absurd_counts_are_refused() {
         for thickness in [1e-9, -100.0, 0.0, f64::NAN] {
-            let planes = Planes::uniform(0.0, 1e5, Length::from_um(thickness), PlaneRule::Top);
+            let planes = uniform(1e5, thickness, PlaneRule::Top);
             assert!(planes.is_err(), "{thickness}");
         }
     }
@@ -346,8 +555,9 @@ mod tests {
             let heights = LayerHeights::new(boundaries(count)).unwrap();
             for rule in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
                 let thickness = Length::from_um(33.1);
-                let uniform = Planes::uniform(0.3, top_um, thickness, rule).unwrap();
-                let given = Planes::of(&heights, top_um, rule);
+                let part_um = [0.3, top_um];
+                let uniform = Planes::uniform(part_um, thickness, rule, PLANE_TOLERANCE).unwrap();
+                let given = Planes::of(&heights, part_um, rule, PLANE_TOLERANCE);
                 assert_eq!(given.boundaries_um, uniform.boundaries_um, "{top_um}");
                 for (a, b) in given.z_um.iter().zip(&uniform.z_um) {
                     assert!((a - b).abs() < 1e-12, "{top_um} {rule:?}");
@@ -363,7 +573,7 @@ mod tests {
     #[test]
     fn layers_above_the_part_keep_their_planes() {
         let heights = LayerHeights::new(vec![-10.0, 0.0, 40.0, 100.0, 150.0, 155.0]).unwrap();
-        let planes = Planes::of(&heights, 90.0, PlaneRule::Top);
+        let planes = Planes::of(&heights, [0.0, 90.0], PlaneRule::Top, PLANE_TOLERANCE);
         assert_eq!(planes.z_um, [0.0, 40.0, 90.0, 150.0, 155.0]);
         assert_eq!(planes.top_um(2), 100.0);
         assert_eq!(planes.depth_um(&(1..4)), 150.0);
@@ -397,10 +607,11 @@ mod tests {
             let height = boundaries[boundaries.len() - 1] - start;
             let heights = LayerHeights::new(boundaries).unwrap();
             for rule in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
-                let planes = Planes::of(&heights, start + 0.9 * height, rule);
-                let near = planes.z_um.iter().flat_map(|z| [*z, z.next_down(), z.next_up()]);
+                let part_um = [start, start + 0.9 * height];
+                let planes = Planes::of(&heights, part_um, rule, PLANE_TOLERANCE);
+                let near = planes.sides_um.iter().flat_map(|z| [*z, z.next_down(), z.next_up()]);
                 for z in near.chain(asked.iter().map(|share| start + share * height)) {
-                    let counted = planes.z_um.iter().filter(|plane| **plane <= z).count();
+                    let counted = planes.sides_um.iter().filter(|plane| **plane <= z).count();
                     prop_assert_eq!(planes.at_or_below(z), counted);
                 }
             }

@@ -136,7 +136,9 @@ impl<const ALONG: usize> FacetEdge<ALONG> {
         if ALONG == Z && value >= self.to[Z] {
             return [self.to[a], self.to[b]];
         }
+        // A plane may be lower than the lower end where that counts as lying on it.
         let passed = value - self.from[ALONG];
+        let passed = if ALONG == Z { passed.max(0.0) } else { passed };
         [self.from[a] + self.slopes[0] * passed, self.from[b] + self.slopes[1] * passed]
     }
 }

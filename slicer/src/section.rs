@@ -10,7 +10,7 @@ use crate::facet::Units;
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placement::{PlacedPart, Placement};
-use crate::planes::Planes;
+use crate::planes::{PLANE_TOLERANCE, Planes};
 use crate::survey::Survey;
 use crate::table::Fill;
 
@@ -82,7 +82,7 @@ impl CutPart {
         survey.check_extent(&model)?;
         let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
         let rule = model.model.fill_rule(options.fill);
-        Ok(Self { model, survey, grid, planes: Planes::one(options.z), rule })
+        Ok(Self { model, survey, grid, planes: Planes::one(options.z, PLANE_TOLERANCE), rule })
     }
 
     /// Calls `each` with every segment on the plane: its ends in pixels, whether it is reversed,
@@ -93,7 +93,7 @@ impl CutPart {
     ) -> Result<Vec<T>, SliceError> {
         let Self { model, survey, grid, planes, rule } = self;
         let cutter = Cutter { grid, planes, rule };
-        let z_um = planes.z_um(0);
+        let z_um = planes.side_um(0);
         let found = survey.blocks_between(z_um, z_um).into_par_iter().map(|block| {
             let mut list = Vec::new();
             let body = rule.name_of(model.model.place_of(block).0 as u32);
@@ -112,7 +112,7 @@ impl CutPart {
 /// Returns the stretches between the crossings of a row.
 fn inside(crossings: &[(u32, f64, Turn)], position: &mut Position<'_>) -> Inside {
     let (mut inside, mut entered) = (Inside::new(), None);
-    position.leave_all();
+    position.start_row(crossings.iter().map(|&(_, _, turn)| turn));
     for &(_, x, turn) in crossings {
         position.cross(turn);
         let is_inside = position.is_inside();

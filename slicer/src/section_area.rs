@@ -125,7 +125,7 @@ fn cut_between(
         return cut_between(sides, middle..lines.end, row_start, position, found);
     }
     let rows = [lines.start, lines.end].map(|line| (line - row_start) as f64 / PARTS as f64);
-    position.leave_all();
+    position.start_row(cut.iter().map(|&(_, turn)| turn));
     let mut entered = None;
     for (x_mm, turn) in cut {
         position.cross(turn);
@@ -219,9 +219,9 @@ mod tests {
                 .into_iter()
                 .map(move |facet| facet.map(|[x, y, z]| [x + by, y + 0.3 * by, z]))
         };
-        let one = area(Mesh { facets: shifted(0.0).collect() }, 4.0, Fill::NonZero);
+        let one = area(Mesh { facets: shifted(0.0).collect() }, 4.0, Fill::Solid);
         let both = || Mesh { facets: shifted(0.0).chain(shifted(3.0)).collect() };
-        let [even_odd, united] = [Fill::EvenOdd, Fill::NonZero].map(|fill| area(both(), 4.0, fill));
+        let [even_odd, united] = [Fill::EvenOdd, Fill::Solid].map(|fill| area(both(), 4.0, fill));
         // Common to both discs of r^2 = 24, whose centres are d apart.
         let (r, d) = (24.0_f64.sqrt(), 3.0 * 1.09_f64.sqrt());
         let common = 2.0 * 24.0 * (d / 2.0 / r).acos() - d / 2.0 * (4.0 * 24.0 - d * d).sqrt();

@@ -7,7 +7,9 @@ use std::ops::Range;
 use lamp_stack::{Dpi, FadingLevels, Image, Layer, Length, LevelChange, Mask, PageInfo, StackInfo};
 use rayon::prelude::*;
 
-use crate::bodies::{BodyOverlap, FillRule, SharedCounts, SharedVolumes};
+use crate::bodies::{
+    BodyOverlap, DoubtSum, FillDoubt, FillRule, LayerDoubts, SharedCounts, SharedVolumes,
+};
 use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
@@ -17,7 +19,7 @@ use crate::gray::{Columns, DepthRows, DepthSpan, LayerLevels, PrintThrough};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placement::{PlacedFacet, PlacedPart, Placement};
-use crate::planes::{LayerHeights, PlaneRule, Planes};
+use crate::planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule, Planes};
 use crate::survey::Survey;
 use crate::table::{CutImage, CutLayer, FacetSource, Fill, OpenRows, Shading, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
@@ -34,6 +36,8 @@ pub struct SliceOptions {
     pub heights: Option<LayerHeights>,
     /// The plane of a layer at which its section is taken.
     pub plane: PlaneRule,
+    /// How far a vertex may be from a plane and still count as lying on it.
+    pub plane_tolerance: Length,
     /// The unit of the file's coordinates.
     pub units: Units,
     /// Scaling, turns and moves of the part.
@@ -100,6 +104,7 @@ impl Default for SliceOptions {
             thickness: Length::from_um(100.0),
             heights: None,
             plane: PlaneRule::default(),
+            plane_tolerance: PLANE_TOLERANCE,
             units: Units::default(),
             placement: Placement::default(),
             fill: Fill::default(),
@@ -163,6 +168,7 @@ pub struct Slices {
     polished: Polished,
     open_rows: OpenRows,
     shared: SharedVolumes,
+    doubts: DoubtSum,
     /// The layers of the table that are still to be made into images.
     pending: Range<usize>,
     /// The layers whose levels are not chosen yet.
@@ -198,10 +204,17 @@ impl Slices {
         let rule = model.model.fill_rule(options.fill);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
-        let (bottom_um, top_um) = (survey.min[2], survey.max[2]);
+        let part_um = [survey.min[2], survey.max[2]];
         let planes = match &options.heights {
-            Some(heights) => Planes::of(heights, top_um, options.plane),
-            None => Planes::uniform(bottom_um, top_um, options.thickness, options.plane)?,
+            Some(heights) => Planes::of(heights, part_um, options.plane, options.plane_tolerance),
+            None => {
+                let SliceOptions { thickness, plane, plane_tolerance, .. } = *options;
+                Planes::uniform(part_um, thickness, plane, plane_tolerance)?
+            }
+        };
+        let planes = match model.model.pieces() {
+            [_] => planes,
+            _ => planes.with_bodies(&survey.heights_of_bodies(&model)),
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
         let print_through = options.print_through.clone();
@@ -259,6 +272,7 @@ impl Slices {
             polished: Polished::default(),
             open_rows: OpenRows::new(),
             shared: SharedVolumes::default(),
+            doubts: DoubtSum::default(),
             waiting: VecDeque::new(),
             columns: Columns::new(cut.start),
             ready: VecDeque::new(),
@@ -311,7 +325,7 @@ impl Slices {
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
-        let (mut layer, depths, _) =
+        let Made { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
         if let (Some(light), Some(depths)) = (&self.print_through, depths) {
             let mut columns = Columns::new(index);
@@ -357,21 +371,21 @@ impl Slices {
         self.survey.overlap(&self.model)
     }
 
-    /// Returns true if bodies of a file unite, each even-odd by itself.
-    pub fn unites_bodies(&self) -> bool {
-        self.rule.unites()
-    }
-
     /// Returns what bodies of the same file share in the layers made so far, the largest
     /// volumes first. Bodies that only touch share nothing: what less than 0.01 % of
-    /// the smaller body, or no two layers in a row, have in common does not count. Under
-    /// [`Fill::NonZero`] nothing is counted.
+    /// the smaller body, or no two layers in a row, have in common does not count.
     pub fn body_overlaps(&self) -> Vec<BodyOverlap> {
         let of_pair = |(bodies, volume_mm3): ([u32; 2], f64)| {
             let [(file, a), (_, b)] = bodies.map(|body| self.model.model.body_in_file(body));
             BodyOverlap { file, bodies: [a, b], volume_mm3 }
         };
         self.shared.overlaps().into_iter().map(of_pair).collect()
+    }
+
+    /// Returns the files whose surfaces left doubts in the layers made so far. Under
+    /// [`Fill::EvenOdd`] there are none.
+    pub fn fill_doubts(&self) -> Vec<FillDoubt> {
+        self.doubts.of_files(|body| self.model.model.body_in_file(body).0)
     }
 
     /// Fills the table with the next slab, as the iterator does when it needs to.
@@ -442,9 +456,12 @@ impl Slices {
         let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
         let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
         let mut new_depths = Vec::new();
-        for (index, (layer, depths, shared)) in batch.zip(made) {
+        for (index, Made { layer, depths, shared, doubts }) in batch.zip(made) {
             if self.wanted.contains(&index) {
-                self.add_shared(index, &shared);
+                let pitch_mm = self.grid.dpi.pitch().mm();
+                let pixel_mm3 = pitch_mm * pitch_mm * self.planes.thickness_um(index) / 1000.0;
+                self.shared.add(index, &shared, pixel_mm3);
+                self.doubts.add(&doubts, pixel_mm3);
             }
             match depths {
                 Some(depths) => {
@@ -478,23 +495,15 @@ impl Slices {
         }
     }
 
-    /// Adds the pixels that bodies share in a layer.
-    fn add_shared(&mut self, layer: usize, shared: &[([u32; 2], u64)]) {
-        let pitch_mm = self.grid.dpi.pitch().mm();
-        let pixel_mm3 = pitch_mm * pitch_mm * self.planes.thickness_um(layer) / 1000.0;
-        self.shared.add(layer, shared, pixel_mm3);
-    }
-
-    /// Makes a layer of a table into an image, or into depths and a black image, and counts the
-    /// pixels that bodies share.
+    /// Makes a layer of a table into an image, or into depths and a black image.
     fn image_of(
         &self,
         layer: usize,
         table: &Table,
         cutter: Cutter<'_>,
         open_rows: &OpenRows,
-    ) -> (Layer, Option<DepthRows>, SharedCounts) {
-        let CutLayer { image, stray_rows, closed, shared } =
+    ) -> Made {
+        let CutLayer { image, stray_rows, closed, shared, mut doubts } =
             table.layer(layer, cutter, self.model.surfaces(), self.shading());
         let (image, depths) = match image {
             CutImage::Image(image) => (image, None),
@@ -506,7 +515,11 @@ impl Slices {
         let open_rows = open_rows.get(&layer).cloned().unwrap_or_default();
         let closed = Some(closed);
         let info = PageInfo { closed, open_rows, stray_rows, ..self.page_info(layer) };
-        (Layer { info, dpi: Some(self.grid.dpi), image: image.into() }, depths, shared)
+        if let (Image::Mask(mask), false) = (&image, doubts.of_bodies.is_empty()) {
+            doubts.white_px = mask.white_pixels();
+        }
+        let layer = Layer { info, dpi: Some(self.grid.dpi), image: image.into() };
+        Made { layer, depths, shared, doubts }
     }
 
     /// Returns the number of layers to make into images at once: enough for all threads,
@@ -568,6 +581,14 @@ impl Iterator for Slices {
     }
 }
 
+/// A layer, its depths if its levels are still to be chosen, and what else is known of it.
+struct Made {
+    layer: Layer,
+    depths: Option<DepthRows>,
+    shared: SharedCounts,
+    doubts: LayerDoubts,
+}
+
 /// Returns what becomes of the layers' crossings.
 fn shading<'a>(gray: Option<&'a LayerLevels>, print_through: Option<&PrintThrough>) -> Shading<'a> {
     match (print_through, gray) {
@@ -602,7 +623,7 @@ fn fill(
         return Ok(None);
     }
     // A row takes as much memory as a crossing.
-    let open = table.open_layers(cutter.rule.fill());
+    let open = table.open_layers();
     let at_once = (max_crossings / cutter.grid.height as usize).max(1);
     let mut rows = OpenRows::new();
     for layers in open.chunks(at_once) {
@@ -653,7 +674,8 @@ impl FacetSource for MetBlocks<'_> {
 /// Returns the heights between which some layers look at facets: from `reach_um` below
 /// their first plane to their last.
 fn heights_of(layers: &Range<usize>, planes: &Planes, reach_um: f64) -> (f64, f64) {
-    (planes.z_um(layers.start) - reach_um, planes.z_um(layers.end - 1))
+    let [low_um, high_um] = planes.heights_um(layers);
+    (low_um - reach_um, high_um)
 }
 
 /// Estimates the memory, in crossings, that facets below sections take for each crossing

@@ -132,9 +132,15 @@ impl Survey {
         for block in blocks {
             good.push(block??);
         }
-        let whole = good.iter().copied().reduce(BlockSurvey::joined).ok_or(SliceError::NoFacets)?;
+        let pieces = model.model.pieces();
+        let is_cutter = |piece: usize| pieces[piece].rule().is_cutter();
+        let solids =
+            (0..).zip(&good).filter(|(block, _)| !is_cutter(model.model.place_of(*block).0));
+        let whole = solids.map(|(_, block)| *block).reduce(BlockSurvey::joined);
+        let whole = whole.ok_or(SliceError::NoFacets)?;
         let (mut min, mut max) = (whole.min, whole.max);
-        for [low, high] in model.surfaces().iter().filter_map(PlacedSurfaces::box_mm) {
+        let solids = model.surfaces().iter().filter(|surfaces| !is_cutter(surfaces.first_body()));
+        for [low, high] in solids.filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
                 let (low, high) = (low[axis] * unit, high[axis] * unit);
                 // Not for rounding's sake: a flat end stays where its facets are.
@@ -208,10 +214,20 @@ impl Survey {
             .collect()
     }
 
-    /// Returns the layers whose planes a block meets.
-    pub(crate) fn planes_of_block(&self, block: usize, planes: &Planes) -> Range<usize> {
+    /// Returns the layers whose planes a block of a body meets.
+    pub(crate) fn planes_of_block(&self, block: usize, body: u32, planes: &Planes) -> Range<usize> {
         let BlockSurvey { min, max, .. } = self.blocks[block];
-        planes.between(min[2], max[2])
+        planes.of_body(body).between(min[2], max[2])
+    }
+
+    /// Returns the heights (micrometres) between which each body of a part lies.
+    pub(crate) fn heights_of_bodies(&self, part: &PlacedPart) -> Vec<[f64; 2]> {
+        let mut heights_um = vec![[f64::MAX, f64::MIN]; part.model.pieces().len()];
+        for (block, survey) in self.blocks.iter().enumerate() {
+            let [low, high] = &mut heights_um[part.model.place_of(block).0];
+            (*low, *high) = (low.min(survey.min[2]), high.max(survey.max[2]));
+        }
+        heights_um
     }
 
     /// Returns true if the blocks are spread over the part so widely that sorting the

@@ -11,42 +11,44 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::{Grouped, Image, KeyCounts};
 use rayon::prelude::*;
 
-use crate::bodies::{Position, SharedCounts, SharedPixels};
+use crate::bodies::{LayerDoubts, Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
 use crate::cut::{BodyCrossing, Crossing, Cutter, LayerShare, RowCrossing, RowSegment};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
-use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, non_zero, sort_by};
+use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
 use crate::placement::PlacedFacet;
 
-/// The rule that tells inside from outside.
+/// The rule that tells inside from outside of a body.
 ///
 /// ```
 /// use lamp_slicer::Fill;
 ///
-/// // Where two bodies overlap, contours wind around a point twice.
-/// assert!(!Fill::EvenOdd.is_inside(2) && Fill::NonZero.is_inside(2));
+/// // Where two shells overlap, contours wind around a point twice.
+/// assert!(Fill::Solid.is_inside(2) && !Fill::EvenOdd.is_inside(2));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fill {
-    /// Every crossing toggles the colour, as in 002.
+    /// Pixels that contours wind around are white. The facets' orientation gives the sign, so
+    /// shells that overlap unite, and those that face inwards are voids. A row whose signs do
+    /// not add up is filled by even-odd.
     #[default]
+    Solid,
+    /// Every crossing toggles the color, as in 002 section 2.3.4. Shells and files that overlap
+    /// cut each other.
     EvenOdd,
-    /// Pixels that contours wind around are white, for bodies that overlap. The
-    /// facets' orientation gives the sign.
-    NonZero,
 }
 
-lamp_stack::named!(Fill { EvenOdd = "even-odd", NonZero = "nonzero" | "non-zero" });
+lamp_stack::named!(Fill { Solid = "solid" | "nonzero" | "non-zero", EvenOdd = "even-odd" });
 
 impl Fill {
     /// Returns true if a point with this winding number is inside.
     #[inline]
     pub fn is_inside(self, winding: i32) -> bool {
         match self {
+            Self::Solid => winding != 0,
             Self::EvenOdd => winding % 2 != 0,
-            Self::NonZero => winding != 0,
         }
     }
 }
@@ -115,6 +117,7 @@ pub(crate) struct CutLayer {
     pub(crate) closed: bool,
     /// The pixels that bodies of one file share, by pairs.
     pub(crate) shared: SharedCounts,
+    pub(crate) doubts: LayerDoubts,
 }
 
 /// A limit to the crossings that all workers make together.
@@ -168,6 +171,7 @@ impl Table {
                 if piece >= facets.pieces() {
                     return Ok(());
                 }
+                let cutter = cutter.of_body(facets.body(piece));
                 let body = cutter.rule.name_of(facets.body(piece));
                 if let Some((surfaces, first)) = facets.surfaces(piece) {
                     let layers = layers.clone();
@@ -203,13 +207,13 @@ impl Table {
     }
 
     /// Returns the layers with a contour that does not close.
-    pub(crate) fn open_layers(&self, fill: Fill) -> Vec<usize> {
-        self.layers.clone().filter(|&layer| !self.is_closed(layer, fill)).collect()
+    pub(crate) fn open_layers(&self) -> Vec<usize> {
+        self.layers.clone().filter(|&layer| !self.is_closed(layer)).collect()
     }
 
-    fn is_closed(&self, layer: usize, fill: Fill) -> bool {
+    fn is_closed(&self, layer: usize) -> bool {
         let ends = self.shares(layer).map(|share| share.ends);
-        ends.fold(EndSum::default(), |sum, ends| sum.joined(ends, fill)).is_closed()
+        ends.fold(EndSum::default(), EndSum::joined).is_closed()
     }
 
     fn shares(&self, layer: usize) -> impl Iterator<Item = &LayerShare> {
@@ -352,6 +356,7 @@ impl Table {
         let more = self.more(layer, cutter, surfaces);
         let height = grid.height;
         let mut shared = SharedPixels::new(rule);
+        let mut doubts = LayerDoubts::default();
         let (made, stray_rows) = if rule.has_bodies() {
             let mut position = Position::outside(rule);
             let crossings = || {
@@ -360,17 +365,19 @@ impl Table {
             };
             let by_row = Grouped::new(height as usize, crossings);
             make_rows(maker, height, by_row, |places, transitions| {
-                by_body(places, transitions, &mut position, &mut shared)
+                by_body(places, transitions, &mut position, &mut shared, &mut doubts)
             })
         } else {
             let by_row = self.by_row(layer, grid, &more);
             match rule.fill() {
                 Fill::EvenOdd => make_rows(maker, height, by_row, even_odd),
-                Fill::NonZero => make_rows(maker, height, by_row, non_zero),
+                Fill::Solid => make_rows(maker, height, by_row, |places, transitions| {
+                    solid(places, transitions, &mut doubts)
+                }),
             }
         };
-        let closed = self.is_closed(layer, rule.fill());
-        (made, CutFindings { stray_rows, closed, shared: shared.counts() })
+        let closed = self.is_closed(layer);
+        (made, CutFindings { stray_rows, closed, shared: shared.counts(), doubts })
     }
 }
 
@@ -379,12 +386,13 @@ struct CutFindings {
     stray_rows: Vec<u32>,
     closed: bool,
     shared: SharedCounts,
+    doubts: LayerDoubts,
 }
 
 impl CutFindings {
     fn with(self, image: CutImage) -> CutLayer {
-        let Self { stray_rows, closed, shared } = self;
-        CutLayer { image, stray_rows, closed, shared }
+        let Self { stray_rows, closed, shared, doubts } = self;
+        CutLayer { image, stray_rows, closed, shared, doubts }
     }
 }
 
@@ -416,13 +424,14 @@ pub(crate) fn open_rows(
         sums_of[layer - span.start] = Some(sums);
     }
     (0..facets.pieces()).into_par_iter().try_for_each(|piece| {
-        let (fill, salt) = (cutter.rule.fill(), cutter.rule.salt(facets.body(piece)));
+        let cutter = cutter.of_body(facets.body(piece));
+        let salt = cutter.rule.salt(facets.body(piece));
         facets.for_each_in(piece, |facet| {
             cutter.for_each_segment(facet, &span, |layer, segment| {
                 let Some(sums) = sums_of[layer - span.start] else { return };
                 let [a, b] = segment.ends.map(|end| end.at);
-                sums.add(cutter.first_row(a), a, !segment.is_reversed, fill, salt);
-                sums.add(cutter.first_row(b), b, segment.is_reversed, fill, salt);
+                sums.add(cutter.first_row(a), a, salt);
+                sums.add(cutter.first_row(b), b, salt);
             });
         })
     })?;

@@ -1,10 +1,9 @@
 //! Traces stray rows to the faulty edges of the mesh.
 //!
 //! From one row to the next, a layer's balance changes only where a contour has an
-//! open end: a point where an odd number of segments ends (see `cut.rs`), or under
-//! [`Fill::NonZero`] more of them stop than start, or fewer. A band of stray rows
-//! therefore lies between open ends, and the mesh is faulty at the edges on which
-//! these lie. A second look at the facets near the bands finds them, by the
+//! open end: a point where an odd number of segments ends (see `cut.rs`). A band of
+//! stray rows therefore lies between open ends, and the mesh is faulty at the edges on
+//! which these lie. A second look at the facets near the bands finds them, by the
 //! arithmetic that cut the layers. No plane meets a level edge; but a hole's other
 //! edges lead to it.
 
@@ -21,7 +20,6 @@ use crate::facet::Facet;
 use crate::part::Piece;
 use crate::placement::PlacedPart;
 use crate::survey::Survey;
-use crate::table::Fill;
 
 /// Neighbouring rows of a layer that do not balance.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,8 +68,7 @@ pub struct OpenEnd {
     pub edges: Vec<usize>,
 }
 
-/// An edge that does not join two facets as in a closed mesh: an odd number of facets
-/// has it, or two that face opposite ways, which matters under [`Fill::NonZero`].
+/// An edge that does not join two facets as in a closed mesh: an odd number of facets has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultyEdge {
     /// Its ends, in the file's coordinates and units.
@@ -104,7 +101,6 @@ struct Sighting {
     piece: u32,
     facet: u32,
     edge: [u8; 2],
-    starts: bool,
 }
 
 /// The bits of an edge's corners, the lesser first, which identify it in its file.
@@ -149,7 +145,8 @@ impl Tracer<'_> {
         let mut bands_of = vec![&[][..]; span.len()];
         layers.iter().for_each(|bands| bands_of[index(bands) - span.start] = bands);
         let meets_some = |block: &usize| {
-            let met = self.survey.planes_of_block(*block, self.cutter.planes);
+            let body = self.model.model.place_of(*block).0 as u32;
+            let met = self.survey.planes_of_block(*block, body, self.cutter.planes);
             let from = layers.partition_point(|bands| index(bands) < met.start);
             layers.get(from).is_some_and(|bands| index(bands) < met.end)
         };
@@ -160,15 +157,16 @@ impl Tracer<'_> {
             let (piece, mut facets) = self.model.model.place_of(block);
             let mut sightings = Vec::new();
             let salt = self.cutter.rule.salt(piece as u32);
+            let cutter = self.cutter.of_body(piece as u32);
             self.model.for_each_in_block(block, |placed| {
                 let facet = facets.next().unwrap_or_default();
                 if too_many() {
                     return;
                 }
                 let before = sightings.len();
-                self.cutter.for_each_segment(placed, &span, |layer, segment| {
+                cutter.for_each_segment(placed, &span, |layer, segment| {
                     let bands = bands_of[layer - span.start];
-                    let mut look = |end: SegmentEnd, starts| {
+                    let mut look = |end: SegmentEnd| {
                         let row = self.cutter.first_row(end.at);
                         let band = bands.partition_point(|band| band.rows.end < row);
                         if bands.get(band).is_some_and(|band| band.rows.start <= row) {
@@ -180,13 +178,10 @@ impl Tracer<'_> {
                                 piece: piece as u32,
                                 facet: facet as u32,
                                 edge: end.edge,
-                                starts,
                             });
                         }
                     };
-                    let [a, b] = segment.ends;
-                    look(a, !segment.is_reversed);
-                    look(b, segment.is_reversed);
+                    segment.ends.into_iter().for_each(&mut look);
                 });
                 if sightings.len() > before {
                     found.fetch_add(sightings.len() - before, Relaxed);
@@ -218,7 +213,7 @@ impl Tracer<'_> {
             sightings = rest;
             let mut ends = Vec::new();
             for group in near.chunk_by(|a, b| (a.point, a.salt) == (b.point, b.salt)) {
-                if self.is_open(group) {
+                if is_open(group) {
                     let [x, y] = group[0].point.map(f64::from_bits);
                     let edges = self.edges(group, &mut trace.edges, known)?;
                     ends.push(OpenEnd { at_mm: self.cutter.grid.to_mm(x, y), edges });
@@ -232,14 +227,6 @@ impl Tracer<'_> {
             trace.bands.push(TracedBand { band, plane, ends });
         }
         Ok(())
-    }
-
-    /// Returns true if the segments that meet at a point, or on an edge, leave it open.
-    fn is_open(&self, sightings: &[Sighting]) -> bool {
-        match self.cutter.rule.fill() {
-            Fill::EvenOdd => !sightings.len().is_multiple_of(2),
-            Fill::NonZero => 2 * sightings.iter().filter(|s| s.starts).count() != sightings.len(),
-        }
     }
 
     /// Returns the edges that leave a point open, as positions in `edges`.
@@ -268,7 +255,7 @@ impl Tracer<'_> {
             sightings.push(sighting);
             edge.facets.push(EdgeFacet { file, facet, corners, forwards });
         }
-        by_edge.retain(|_, (sightings, _)| self.is_open(sightings));
+        by_edge.retain(|_, (sightings, _)| is_open(sightings));
         let mut place = |(name, (_, edge)): (EdgeName, (_, FaultyEdge))| {
             *known.entry((edge.facets[0].file, salt, name)).or_insert_with(|| {
                 edges.push(edge);
@@ -277,4 +264,9 @@ impl Tracer<'_> {
         };
         Ok(by_edge.into_iter().map(&mut place).collect())
     }
+}
+
+/// Returns true if the segments that meet at a point, or on an edge, leave it open.
+fn is_open(sightings: &[Sighting]) -> bool {
+    !sightings.len().is_multiple_of(2)
 }

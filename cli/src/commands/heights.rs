@@ -82,15 +82,16 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let model =
         args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
     let body = args.solid.body(model.clone());
-    let body = body.map_err(|error| at_part(error.into(), &args.parts))?;
+    let (files, _) = args.solid.files(&args.parts);
+    let body = body.map_err(|error| at_part(error.into(), &files))?;
     let box_mm = [body.min(), body.max()].map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
     let size = args.solid.size(&model, box_mm);
-    let overlap = args.solid.overlap_doubt(&args.parts, body.overlap());
+    let overlap = args.solid.overlap_doubt(&files, body.overlap());
     size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| say(doubt));
     let part = args.heights.part(body, args.dpi, args.solid.fill)?;
     let found = args.heights.find(&part, exposure.as_ref(), &progress);
-    let found = found.map_err(|error| at_part(error, &args.parts))?;
-    let uniform = args.uniform(&part).map_err(|error| at_part(error, &args.parts))?;
+    let found = found.map_err(|error| at_part(error, &files))?;
+    let uniform = args.uniform(&part).map_err(|error| at_part(error, &files))?;
     found.warn(&say);
     found.doubts(exposure.as_ref()).iter().for_each(|doubt| say(doubt));
     if let Some(path) = &args.report {
@@ -128,7 +129,7 @@ impl HeightsArgs {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
-        let inputs = || paths(&self.parts).chain(self.exposure.files());
+        let inputs = || paths(&self.parts).chain(self.solid.cutters()).chain(self.exposure.files());
         for file in self.report.iter().chain(&self.plot) {
             check_beside(file, Path::new("-"), inputs())?;
         }

@@ -24,7 +24,7 @@ use crate::streams::{check_beside, check_not_input, progress, unless_found, writ
 Examples:
   slice blade.stl -o blade.tif
   slice blade.stl --dpi 2400 --thickness 25um --layers 100..200 | fix > part.tif
-  slice shell.stl core.stl --fill nonzero --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
+  slice shell.stl --subtract core.stl --scale 1.02 --rotate x:90,z:-12.5 -o mould.tif
   slice core.stl --units inch -o core/
   slice blade.step --dpi 2400 -o blade.tif
   slice blade.stl --adaptive --deviation 1% --material lamp-suspension -o blade.tif

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_postprocess::machine::{Machine, MachineLimit};
-use lamp_slicer::{Bodies, Part, Polished, SHORT_PX, SliceError, Slices};
+use lamp_slicer::{Bodies, Fill, FillDoubt, Part, Polished, SHORT_PX, SliceError, Slices};
 use lamp_stack::{Layer, Length, PageInfo, Size};
 
 use crate::body_overlaps::overlap_text;
@@ -17,13 +17,14 @@ use crate::fallback::Bridged;
 use crate::mesh_report::Counts;
 use crate::options::{parse_layers, parse_memory};
 use crate::part_arg::{PartArg, paths};
-use crate::part_options::{Reading, at_part, name_of_all};
+use crate::part_doubts::short;
+use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::progress::Progress;
 use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
 
 /// Changes when other bytes come from the same options and part.
-pub(crate) const CODE: u32 = 4;
+pub(crate) const CODE: u32 = 5;
 
 /// What is sliced, and how.
 #[derive(Args, Clone)]
@@ -31,7 +32,7 @@ pub(crate) struct SliceSettings {
     /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
     ///
     /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one about z and moves it
-    /// first. Where parts overlap they cancel out, or unite with --fill nonzero
+    /// first. Where they overlap they unite; --subtract and --intersect cut them
     #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
     pub(crate) parts: Vec<PartArg>,
 
@@ -130,7 +131,7 @@ impl SliceSettings {
         let (slices, name_command) = self
             .options
             .slices(part.clone(), &recorded, self.layers.clone(), self.memory, exposure, progress)
-            .map_err(|error| at_part(error, &self.parts))?;
+            .map_err(|error| at_part(error, &self.options.solid.files(&self.parts).0))?;
         if let Some(machine) = &machine {
             let name = name_of_all(&self.parts);
             check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name))?;
@@ -201,7 +202,8 @@ impl Slicing<'_> {
     }
 
     fn at_part(&self, error: SliceError) -> Exit {
-        at_part(error.into(), &self.settings.parts)
+        let SliceSettings { options, parts, .. } = self.settings;
+        at_part(error.into(), &options.solid.files(parts).0)
     }
 
     /// Returns what was counted so far.
@@ -218,7 +220,17 @@ impl Slicing<'_> {
     pub(crate) fn overlap(&self) -> Option<String> {
         let overlaps = self.bridged.borrow().slices.body_overlaps();
         let SliceSettings { options, parts, .. } = self.settings;
-        overlap_text(&overlaps, &self.part, parts, options.solid.bodies)
+        let PartOptions { fill, bodies, .. } = options.solid;
+        let cancels = fill == Fill::EvenOdd && bodies == Bodies::Xor;
+        overlap_text(&overlaps, &self.part, &options.solid.files(parts).0, cancels)
+    }
+
+    /// Returns doubts about the facets of each file, from the layers so far.
+    pub(crate) fn fill_doubts(&self) -> Vec<String> {
+        let SliceSettings { options, parts, .. } = self.settings;
+        let files = options.solid.files(parts).0;
+        let doubts = self.bridged.borrow().slices.fill_doubts();
+        doubts.iter().flat_map(|doubt| fill_doubt(doubt, &files[doubt.file].name())).collect()
     }
 
     /// Looks at the slices with `look`.
@@ -231,7 +243,8 @@ impl Slicing<'_> {
 
     /// Returns what else is to be said of the layers so far.
     pub(crate) fn remarks(&self) -> Vec<String> {
-        self.bridged.borrow().text().into_iter().chain(self.overlap()).collect()
+        let bridged = self.bridged.borrow().text();
+        bridged.into_iter().chain(self.overlap()).chain(self.fill_doubts()).collect()
     }
 
     /// Returns the number of all layers of the part, also of those that are not wanted.
@@ -253,6 +266,7 @@ impl Slicing<'_> {
             Some(text) => progress.say(&text),
             None => {}
         }
+        self.fill_doubts().iter().for_each(|doubt| progress.warn(doubt));
         if let [layers, pixels] = self.short.get()
             && pixels > 0
         {
@@ -263,6 +277,27 @@ impl Slicing<'_> {
         }
         say_stray_rows(progress, self.counts(), report);
     }
+}
+
+/// Returns sentences on facets that contradict each other.
+fn fill_doubt(doubt: &FillDoubt, name: &str) -> Vec<String> {
+    let FillDoubt { unsigned_rows, repeated_mm3, inward_mm3, .. } = *doubt;
+    let turned = format!(
+        "{name}: facets are turned over or missing in {unsigned_rows} rows of pixels: there every \
+         crossing toggles, as with --fill even-odd; lamp mesh repair turns facets"
+    );
+    let repeated = format!(
+        "{name}: {} mm³ lie in several shells whose facets face outwards: bodies that overlap are \
+         filled; if a shell within another is a void, cut it out with --fill even-odd",
+        short(repeated_mm3)
+    );
+    let inward = format!(
+        "{name}: the facets around {} mm³ face inwards: the part is filled all the same",
+        short(inward_mm3)
+    );
+    let all =
+        [(unsigned_rows > 0, turned), (repeated_mm3 > 0.0, repeated), (inward_mm3 > 0.0, inward)];
+    all.into_iter().filter_map(|(holds, text)| holds.then_some(text)).collect()
 }
 
 /// Returns what a stack calls a part by its file.

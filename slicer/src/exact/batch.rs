@@ -48,11 +48,11 @@ impl<'a> Batch<'a> {
         let flat = surfaces.is_flat(number).then(|| FlatFace::new(surfaces, number));
         let mut chart = None;
         let mut count = 0;
-        let (fill, salt) = (cutter.rule.fill(), cutter.rule.salt(self.body));
+        let salt = cutter.rule.salt(self.body);
         cutter.for_each_segment(facet, &self.layers.clone(), |layer, segment| {
             let [a, b] = segment.ends.map(|end| end.at);
             let share = &mut shares[layer - self.layers.start];
-            share.ends.add([a, b], segment.is_reversed, fill, salt);
+            share.ends.add([a, b], salt);
             let z_mm = cutter.planes.z_um(layer) / 1000.0;
             cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
                 count += 1;

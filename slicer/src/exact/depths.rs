@@ -79,7 +79,7 @@ impl<'a> Depths<'a> {
                 continue;
             }
             let z_um = 1000.0 * point.at_mm[2];
-            let met = planes.between(z_um - pixel.tie_um(), z_um + self.reach_um);
+            let met = planes.near(z_um - pixel.tie_um(), z_um + self.reach_um);
             for layer in met.start.max(self.layers.start)..met.end.min(self.layers.end) {
                 let depth_um = planes.top_um(layer) - z_um;
                 if pixel.depths(planes, layer, self.reach_um).contains(&depth_um) {

@@ -15,6 +15,7 @@ use super::placed::PlacedSurfaces;
 use super::polish::FacetPoint;
 use super::solve::{Wanted, solve};
 use crate::grid::PixelGrid;
+use crate::planes::Planes;
 use crate::scan::{FacetEdge, Y, Z, ceil_clamped};
 
 /// A grid point between a chord and its curve.
@@ -44,6 +45,8 @@ pub(super) struct Line<'a, const ALONG: usize> {
     /// In micrometres, or in rows.
     level: f64,
     level_mm: f64,
+    /// The level that divides points before the line from those past it.
+    side: f64,
 }
 
 /// A surface whose normal is smaller than this along a line does not cross it anywhere.
@@ -59,9 +62,10 @@ const NEAR: f64 = 4.0;
 const SEEDS: [f64; 5] = [0.0, 0.5, -0.5, 0.1, -0.1];
 
 impl<'a> Line<'a, Z> {
-    /// Returns the plane of a section.
-    pub(super) fn at_height(grid: &'a PixelGrid, z_um: f64) -> Self {
-        Self { grid, level: z_um, level_mm: z_um / 1000.0 }
+    /// Returns the plane of a layer's section.
+    pub(super) fn of_layer(grid: &'a PixelGrid, planes: &Planes, layer: usize) -> Self {
+        let level = planes.z_um(layer);
+        Self { grid, level, level_mm: level / 1000.0, side: planes.side_um(layer) }
     }
 }
 
@@ -69,7 +73,7 @@ impl<'a> Line<'a, Y> {
     /// Returns the plane across y through a row's centres.
     pub(super) fn at_row(grid: &'a PixelGrid, row: u32) -> Self {
         let row = f64::from(row);
-        Self { grid, level: row, level_mm: grid.to_mm(0.0, row)[1] }
+        Self { grid, level: row, level_mm: grid.to_mm(0.0, row)[1], side: row }
     }
 }
 
@@ -232,7 +236,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
     /// Returns whether a point in pixels and micrometres comes before the line, as facets
     /// see it.
     fn is_before(&self, at: [f64; 3]) -> bool {
-        if ALONG == Z { at[Z] < self.level } else { at[Y] <= self.level }
+        if ALONG == Z { at[Z] < self.side } else { at[Y] <= self.side }
     }
 
     /// Returns the first cell whose centre a place in pixels is not past.

@@ -67,6 +67,11 @@ impl PlacedSurfaces {
         Self { first_body, ..self }
     }
 
+    /// Returns the number of the first body.
+    pub(crate) fn first_body(&self) -> usize {
+        self.first_body as usize
+    }
+
     /// Returns the number of a facet's body.
     pub(crate) fn body_of(&self, facet: u32) -> u32 {
         let face = self.facet(facet).face;

@@ -73,6 +73,7 @@ impl Rims {
         self.crossings[first..end.max(first)].iter().filter_map(
             move |RimCrossing { z_um, span }| {
                 let depth_um = top_um - z_um;
+                let planes = planes.of_body(span.body());
                 let is_seen = span.depths(planes, layer, reach_um).contains(&depth_um);
                 is_seen.then(|| span.at_depth(depth_um))
             },

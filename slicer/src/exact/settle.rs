@@ -46,27 +46,33 @@ pub(crate) fn settle(
     crossings: impl Iterator<Item = (u32, Crossing)>,
     kept: impl Iterator<Item = (u32, Crossing)>,
 ) -> Vec<(u32, Crossing)> {
-    let z_mm = cutter.planes.z_um(layer) / 1000.0;
     let mut rows = UnsettledRows::new();
     let mut all_near = Vec::new();
-    for surfaces in surfaces {
-        let plane = Line::at_height(cutter.grid, cutter.planes.z_um(layer));
-        for edge in &surfaces.curved_edges().all {
-            for point in plane.lens(surfaces, edge) {
-                let body = cutter.rule.name_of(surfaces.body_of(edge.facets[0]));
-                let switch = Switch::new(surfaces, edge.facets, &point, cutter);
-                rows.entry((body, point.cell)).or_default().switches.push(switch);
+    for planes in cutter.planes.each_at(layer) {
+        let z_mm = planes.z_um(layer) / 1000.0;
+        let plane = Line::of_layer(cutter.grid, planes, layer);
+        let is_cut = |body: u32| cutter.planes.of_body(body).z_um(layer) == planes.z_um(layer);
+        for surfaces in surfaces {
+            for edge in &surfaces.curved_edges().all {
+                let body = surfaces.body_of(edge.facets[0]);
+                for point in plane.lens(surfaces, edge).iter().filter(|_| is_cut(body)) {
+                    let key = (cutter.rule.name_of(body), point.cell);
+                    let switch = Switch::new(surfaces, edge.facets, point, cutter);
+                    rows.entry(key).or_default().switches.push(switch);
+                }
             }
-        }
-        let extrema = surfaces.extrema(z_mm).into_iter();
-        let extrema = extrema.map(|extremum| Near::extremum(extremum, surfaces, cutter));
-        let saddles = surfaces.critical_points().saddles.iter();
-        let saddles = saddles.filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter));
-        for near in extrema.chain(saddles) {
-            for row in near.rows.clone() {
-                rows.entry((near.body, row)).or_default();
+            let extrema = surfaces.extrema(z_mm).into_iter();
+            let extrema = extrema.filter(|extremum| is_cut(extremum.body(surfaces)));
+            let extrema = extrema.map(|extremum| Near::extremum(extremum, surfaces, cutter));
+            let saddles = surfaces.critical_points().saddles.iter();
+            let saddles = saddles.filter(|saddle| is_cut(saddle.body(surfaces)));
+            let saddles = saddles.filter_map(|saddle| Near::saddle(saddle, surfaces, z_mm, cutter));
+            for near in extrema.chain(saddles) {
+                for row in near.rows.clone() {
+                    rows.entry((near.body, row)).or_default();
+                }
+                all_near.push((surfaces, near, z_mm));
             }
-            all_near.push((surfaces, near));
         }
     }
     for (body, crossing) in kept {
@@ -86,7 +92,7 @@ pub(crate) fn settle(
         row.unfold(tally, max_columns);
         row.switch(tally);
     }
-    for (surfaces, near) in all_near {
+    for (surfaces, near, z_mm) in all_near {
         near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
     for row in rows.values_mut() {

@@ -12,8 +12,8 @@ use crate::planes::Planes;
 pub(crate) struct Shader<'a, R: ShadedRows> {
     rows: R,
     rule: &'a FillRule,
-    /// The depth of the layer's plane below its top.
-    plane_depth_um: f64,
+    planes: &'a Planes,
+    layer: usize,
     /// The spans below the section, by row and start.
     spans: &'a Grouped<DepthSpan>,
     /// The spans over a column, in the order of their starts.
@@ -33,7 +33,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     pub(crate) fn new(
         rows: R,
         rule: &'a FillRule,
-        planes: &Planes,
+        planes: &'a Planes,
         layer: usize,
         spans: &'a Grouped<DepthSpan>,
         width: u32,
@@ -42,7 +42,8 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             rows,
             rule,
             below: Position::outside(rule),
-            plane_depth_um: planes.top_um(layer) - planes.z_um(layer),
+            planes,
+            layer,
             spans,
             open: Vec::new(),
             met: Vec::new(),
@@ -56,6 +57,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     fn shade_row(&mut self, row: u32, places: &[impl InRow], transitions: &[u32]) {
         let mut spans = self.spans.group(row as usize);
         let mut position = Position::outside(self.rule);
+        position.start_row(places.iter().map(|place| place.turn()));
         let mut places = places;
         self.last = R::OUTSIDE;
         self.open.clear();
@@ -133,7 +135,8 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             return column;
         }
         let to = span.end.min(end);
-        let near_um = self.plane_depth_um + span.tie_um();
+        let tie_um = span.tie_um().max(self.planes.tolerance_um());
+        let near_um = self.plane_depth_um(span.body()) + tie_um;
         let is_alone = spans.get(1).is_none_or(|next| next.start >= span.end);
         if !is_alone || span.depth_um(column).min(span.depth_um(to - 1)) <= near_um {
             self.open.push(span);
@@ -142,6 +145,12 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
         self.shade_over(span, column, to, position);
         to
+    }
+
+    /// Returns the depth of a body's plane below the layer's top.
+    #[inline]
+    fn plane_depth_um(&self, body: u32) -> f64 {
+        self.planes.top_um(self.layer) - self.planes.of_body(body).z_um(self.layer)
     }
 
     /// Adds columns over the same facets.
@@ -160,7 +169,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
     /// Adds columns over one facet that lies below the section.
     fn shade_over(&mut self, span: &DepthSpan, start: u32, end: u32, position: &Position<'a>) {
         self.below.move_to(position);
-        self.below.cross_often(span.body(), -span.winding());
+        self.below.step(span.body(), -span.winding());
         if self.below.is_inside() {
             return self.push(start, R::DEEP);
         }
@@ -181,27 +190,27 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         self.below.move_to(section);
         for group in self.met.chunk_by(touching) {
             let (depth, first) = group[0];
-            let is_below = depth > self.plane_depth_um + first.tie_um();
+            let plane_um = self.plane_depth_um(first.body());
+            let is_touching = depth <= plane_um + first.tie_um();
+            let is_near = depth <= plane_um + first.tie_um().max(self.planes.tolerance_um());
             for (k, (_, span)) in group.iter().enumerate() {
-                let is_alike = |(_, other): &&(f64, &DepthSpan)| {
-                    self.rule.counts_alike(span.body(), other.body())
-                };
-                // All spans that count alike at once, at the first of them.
+                let is_alike = |(_, other): &&(f64, &DepthSpan)| span.body() == other.body();
+                // All spans of a body at once, at the first of them.
                 if group[..k].iter().any(|other| is_alike(&other)) {
                     continue;
                 }
                 let alike = group[k..].iter().filter(is_alike);
                 let lost = alike.map(|(_, span)| span.winding()).sum::<i32>();
-                // The section accounts for facets within rounding of the plane that lead
-                // into what it is in, and out of what it is not in.
+                // The section accounts for facets that count as lying on the plane and lead
+                // into what it is in, or out of what it is not in.
                 let there = section.winding_about(span.body());
                 let inwards = if there == 0 { -1 } else { there.signum() };
-                if is_below || lost * inwards > 0 {
-                    self.below.cross_often(span.body(), -lost);
+                if !is_near || lost * inwards > 0 {
+                    self.below.step(span.body(), -lost);
                 }
             }
             if !self.below.is_inside() {
-                return Some(if is_below { depth } else { 0.0 });
+                return Some(if is_touching { 0.0 } else { depth });
             }
         }
         None

@@ -144,7 +144,7 @@ impl Sheet {
             // Most rows of steep facets pass between two columns.
             let Some(stretch) = self.stretch(ends, cutter.grid.width) else { return };
             let [low_um, high_um] = stretch.heights();
-            let met = planes.between(low_um - self.tie_um, high_um + reach_um);
+            let met = planes.near(low_um - self.tie_um, high_um + reach_um);
             let met = met.start.max(layers.start)..met.end.min(layers.end);
             let um_per_column = -stretch.um_per_column() as f32;
             stretch.for_each_look(&looks, met, |layer, columns, depth_um| {

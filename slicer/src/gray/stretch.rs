@@ -124,7 +124,8 @@ impl RowStretch {
                 each(layer, columns, depth_um);
                 layer += 1;
             } else {
-                layer = looks.planes.at_or_below(height(low) - looks.tie_um).max(layer + 1);
+                let low_um = height(low) - looks.tie_um;
+                layer = looks.planes.near(low_um, low_um).start.max(layer + 1);
             }
         }
     }
@@ -176,7 +177,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::planes::PlaneRule;
+    use crate::planes::{PLANE_TOLERANCE, PlaneRule};
 
     proptest! {
         #[test]
@@ -189,7 +190,7 @@ mod tests {
             low in 0usize..4,
         ) {
             let thickness = Length::from_um(thickness_um);
-            let planes = Planes::uniform(0.0, 900.0, thickness, PlaneRule::Top).unwrap();
+            let planes = Planes::uniform([0.0, 900.0], thickness, PlaneRule::Top, PLANE_TOLERANCE).unwrap();
             let looks = Looks { planes: &planes, reach_um, tie_um: 0.01 };
             let heights = if is_level { [heights[0]; 2] } else { heights };
             let ends = [[columns[0], heights[0]], [columns[1], heights[1]]];

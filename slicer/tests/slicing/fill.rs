@@ -2,7 +2,7 @@
 //! inside out.
 
 use lamp_fixtures::{Mesh, blade, sphere};
-use lamp_slicer::{Fill, Placement, SliceOptions, Slices};
+use lamp_slicer::{Fill, Join, Part, Placement, PlaneRule, SliceOptions, Slices};
 use lamp_stack::Layer;
 
 use crate::common::{
@@ -15,7 +15,7 @@ fn filled(mesh: &Mesh, fill: Fill) -> Vec<Layer> {
 }
 
 fn both(mesh: &Mesh) -> [Vec<Layer>; 2] {
-    [Fill::EvenOdd, Fill::NonZero].map(|fill| filled(mesh, fill))
+    [Fill::EvenOdd, Fill::Solid].map(|fill| filled(mesh, fill))
 }
 
 /// Checks every pixel of a part that has its low corner at the origin. Tells
@@ -51,7 +51,7 @@ fn a_cube_in_a_cube_is_a_hole_or_nothing_new() {
     let [even_odd, non_zero] = both(&joined(&[outer.clone(), cube(1.0, 2.0)]));
     assert_pixels(&even_odd, 30, |p| !within(p, 100, 200));
     assert_pixels(&non_zero, 30, |_| true);
-    assert_eq!(masks(&non_zero), masks(&filled(&outer, Fill::NonZero)));
+    assert_eq!(masks(&non_zero), masks(&filled(&outer, Fill::Solid)));
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn the_same_body_twice_is_nothing_or_itself() {
     let once = cube(0.0, 3.0);
     let [even_odd, non_zero] = both(&joined(&[once.clone(), once.clone()]));
     assert_pixels(&even_odd, 30, |_| false);
-    assert_eq!(masks(&non_zero), masks(&filled(&once, Fill::NonZero)));
+    assert_eq!(masks(&non_zero), masks(&filled(&once, Fill::Solid)));
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_part_inside_out_is_the_same_part() {
 #[test]
 fn a_blade_has_no_overlaps_so_both_fills_agree() {
     let mesh = blade(24_000);
-    let [even_odd, non_zero] = [Fill::EvenOdd, Fill::NonZero]
+    let [even_odd, non_zero] = [Fill::EvenOdd, Fill::Solid]
         .map(|fill| slice(&mesh, &SliceOptions { fill, ..options(100.0, 1000.0) }));
     assert!(even_odd.iter().all(|layer| layer.info.stray_rows.is_empty()));
     assert!(even_odd == non_zero);
@@ -105,7 +105,7 @@ fn balls_that_overlap_are_their_union() {
         ball.map(|[x, y, z]| [x + centre[0], y + centre[1], z - radius + centre[2]])
     });
     let mesh = joined(&bodies);
-    let options = SliceOptions { fill: Fill::NonZero, ..options(200.0, 100.0) };
+    let options = SliceOptions { fill: Fill::Solid, ..options(200.0, 100.0) };
     let grid = *Slices::new(model(&mesh), &options).unwrap().grid();
     let bottom_mm = mesh.bounds_mm().0[2];
     let (mut white, mut open) = (0, 0);
@@ -153,7 +153,7 @@ fn three_bodies_in_one_another_wind_as_they_face() {
                 .translated([-1.5, 0.0, 0.0])
                 .scaled(scale)
                 .translated([1.5, 0.0, 0.0]);
-            let [even_odd, non_zero] = [Fill::EvenOdd, Fill::NonZero].map(|fill| {
+            let [even_odd, non_zero] = [Fill::EvenOdd, Fill::Solid].map(|fill| {
                 slice(&mesh, &SliceOptions { fill, placement, ..options(254.0, 100.0) })
             });
             assert_pixels(&even_odd, 30, |p| !in_middle(p) || in_inner(p));
@@ -184,8 +184,94 @@ fn mirrored_bodies_that_overlap_are_their_mirrored_union() {
         let is_in = |p: [u32; 3], low, high| (0..3).all(|axis| side(axis, p[axis], low, high));
         let (first, second) = (|p| is_in(p, 0, 200), |p| is_in(p, 100, 300));
         // One faces inwards: where they overlap they cancel.
-        assert_pixels(&of(&joined(&bodies), Fill::NonZero), 30, |p| first(p) != second(p));
+        assert_pixels(&of(&joined(&bodies), Fill::Solid), 30, |p| first(p) != second(p));
         let facing = [bodies[0].clone(), inside_out(&bodies[1])];
-        assert_pixels(&of(&joined(&facing), Fill::NonZero), 30, |p| first(p) || second(p));
+        assert_pixels(&of(&joined(&facing), Fill::Solid), 30, |p| first(p) || second(p));
+    }
+}
+
+/// Joins parts, each in its way, and slices them in tenths of a millimeter.
+fn joined_by(parts: &[(&Mesh, Join)], fill: Fill) -> Vec<Layer> {
+    let parts = parts.iter().map(|&(mesh, join)| model(mesh).with_join(join));
+    let options = SliceOptions { fill, ..options(254.0, 100.0) };
+    Slices::new(Part::joined(parts.collect()), &options).unwrap().map(Result::unwrap).collect()
+}
+
+#[test]
+fn files_unite_and_cut_each_other_when_asked() {
+    let (large, small) = (cube(0.0, 3.0), cube(1.0, 2.0));
+    let beside = block([2.5, 1.0, 1.0], [9.0, 2.0, 4.0]);
+    let held = |place: [u32; 3]| within(place, 0, 300);
+    let core = |place: [u32; 3]| within(place, 100, 200);
+    let in_beside = |[x, y, z]: [u32; 3]| x >= 250 && (100..200).contains(&y) && z > 100;
+    let unite = (&large, Join::Unite);
+    assert_pixels(&joined_by(&[unite, (&small, Join::Unite)], Fill::Solid), 30, held);
+    for fill in [Fill::Solid, Fill::EvenOdd] {
+        let cut = joined_by(&[unite, (&small, Join::Subtract)], fill);
+        assert_pixels(&cut, 30, |place| held(place) && !core(place));
+        // A cutter may reach out of the part, whose box and layers it does not change.
+        let cut = joined_by(&[(&beside, Join::Subtract), unite], fill);
+        assert_pixels(&cut, 30, |place| held(place) && !in_beside(place));
+        let kept = joined_by(&[unite, (&small, Join::Intersect)], fill);
+        assert_pixels(&kept, 30, core);
+        let all = [unite, (&beside, Join::Intersect), (&small, Join::Intersect)];
+        assert_pixels(&joined_by(&all, fill), 30, |_| false);
+    }
+}
+
+/// What is known of a part's windings after all layers.
+fn doubts(mesh: &Mesh) -> [f64; 3] {
+    let mut slices = Slices::new(model(mesh), &options(254.0, 100.0)).unwrap();
+    slices.by_ref().for_each(|layer| drop(layer.unwrap()));
+    let doubts = slices.fill_doubts();
+    let sum = |of: fn(&lamp_slicer::FillDoubt) -> f64| doubts.iter().map(of).sum::<f64>();
+    [sum(|it| it.unsigned_rows as f64), sum(|it| it.repeated_mm3), sum(|it| it.inward_mm3)]
+}
+
+#[test]
+fn shells_that_contradict_each_other_are_reported() {
+    let near = |found: [f64; 3], expected: [f64; 3]| {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+    };
+    let (large, small) = (cube(0.0, 3.0), cube(1.0, 2.0));
+    near(doubts(&large), [0.0; 3]);
+    near(doubts(&joined(&[large.clone(), inside_out(&small)])), [0.0; 3]);
+    // A body in a body, or a void the wrong way round.
+    near(doubts(&joined(&[large.clone(), small.clone()])), [0.0, 1.0, 0.0]);
+    near(doubts(&joined(&[large.clone(), large.clone()])), [0.0, 27.0, 0.0]);
+    near(doubts(&inside_out(&large)), [0.0, 0.0, 27.0]);
+    // Shells that touch share nothing.
+    let beside = block([3.0, 0.0, 0.0], [5.0, 3.0, 3.0]);
+    near(doubts(&joined(&[large.clone(), beside])), [0.0; 3]);
+    // The facets of its left wall are turned over: 30 rows in each of 30 layers.
+    let mut turned = large;
+    for facet in &mut turned.facets {
+        if facet.iter().all(|corner| corner[0] == 0.0) {
+            facet.swap(1, 2);
+        }
+    }
+    near(doubts(&turned), [900.0, 0.0, 0.0]);
+    assert_pixels(&filled(&turned, Fill::Solid), 30, |_| true);
+}
+
+/// A body that ends within a layer has the layers that it has alone: its height is rounded to whole
+/// layers, and its last section is at its own top.
+#[test]
+fn bodies_have_the_layers_that_they_have_alone() {
+    for (height, expected) in [(1.06f32, 11), (1.04, 10), (0.3, 3), (0.02, 1), (2.0, 20)] {
+        for plane in [PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom] {
+            let low = block([0.0; 3], [1.0, 1.0, height]);
+            let high = block([2.0, 0.0, 0.0], [3.0, 1.0, 2.0]);
+            let options = SliceOptions { plane, ..options(254.0, 100.0) };
+            let white = |mesh: &Mesh| slice(mesh, &options).len();
+            assert_eq!(white(&low), expected, "{height} mm alone");
+            let both = Part::joined(vec![model(&low), model(&high)]);
+            let layers: Vec<Layer> =
+                Slices::new(both, &options).unwrap().map(Result::unwrap).collect();
+            let pixels: Vec<u64> = layers.iter().map(|layer| mask(layer).white_pixels()).collect();
+            let full = pixels.iter().filter(|&&pixels| pixels == 200).count();
+            assert_eq!((full, pixels.len()), (expected, 20), "{height} mm at {plane:?}");
+            assert!(pixels[full..].iter().all(|&pixels| pixels == 100));
+        }
     }
 }

@@ -6,7 +6,8 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use lamp_fixtures::{Mesh, StepSample, StepUnit, sphere, step, three_mf, three_mf_model, torus};
 use lamp_slicer::{
-    Axis, Bodies, Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units,
+    Axis, Bodies, Fill, OpenOptions, Part, Placement, ReadNote, SliceError, SliceOptions, Slices,
+    Units,
 };
 use lamp_stack::Layer;
 
@@ -112,7 +113,7 @@ fn items_and_components_stand_where_their_transforms_put_them() {
     // Files cut each other out where they overlap.
     let xor = part.clone().with_bodies(Bodies::Xor);
     assert!(layers(xor, &coarse()) == layers(expected.clone(), &coarse()));
-    let nonzero = SliceOptions { fill: Fill::NonZero, ..coarse() };
+    let nonzero = SliceOptions { fill: Fill::Solid, ..coarse() };
     assert!(layers(part, &coarse()) == layers(expected, &nonzero));
 }
 
@@ -131,7 +132,7 @@ fn mirrored_items_still_face_outwards() {
             .map(|&[a, b, c]| [a, c, b])
             .collect(),
     };
-    let nonzero = SliceOptions { fill: Fill::NonZero, ..coarse() };
+    let nonzero = SliceOptions { fill: Fill::Solid, ..coarse() };
     let expected = without_stack(slice(&joined(&[ball, mirrored]), &nonzero));
     assert!(layers(part, &nonzero) == expected);
 }
@@ -158,7 +159,7 @@ fn what_is_no_solid_is_left_out_and_counted() {
     let support = mesh.three_mf_object(2).replace("id=\"2\"", "id=\"2\" type=\"support\"");
     let items = "<item objectid=\"1\"/>\n<item objectid=\"2\"/>\n";
     let part = open(&package(&(mesh.three_mf_object(1) + &support), items)).unwrap();
-    assert_eq!((part.facet_count(), part.left_out()), (12, 1));
+    assert_eq!((part.facet_count(), part.notes()), (12, &[ReadNote::NoSolids { items: 1 }][..]));
 }
 
 #[test]
@@ -201,7 +202,8 @@ fn white_of(slices: &mut Slices) -> u64 {
 #[test]
 fn items_unite_and_what_they_share_is_counted() {
     let bar = block([0.0; 3], [2.0, 1.0, 1.0]);
-    let slices = |part: Part| Slices::new(part, &options(254.0, 100.0)).unwrap();
+    let even_odd = SliceOptions { fill: Fill::EvenOdd, ..options(254.0, 100.0) };
+    let slices = |part: Part| Slices::new(part, &even_odd).unwrap();
     let white = |bodies: Bodies| {
         let mut slices = slices(two_items(&bar, 1.5).with_bodies(bodies));
         let white = white_of(&mut slices);

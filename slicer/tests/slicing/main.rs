@@ -6,6 +6,7 @@ mod closed_forms;
 mod common;
 mod even_rows;
 mod fill;
+mod flat_faces;
 mod formats;
 mod gray;
 mod layers;

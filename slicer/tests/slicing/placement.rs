@@ -47,7 +47,7 @@ fn white_cubes(layers: &[Layer]) -> HashSet<[i32; 3]> {
 
 #[test]
 fn quarter_turns_turn_every_pixel() {
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let plain = white_cubes(&in_cubes(Placement::default(), fill));
         assert!(plain.len() > 2000);
         for quarters in (0..64).map(|k| [k % 4, k / 4 % 4, k / 16]) {
@@ -72,7 +72,7 @@ fn quarter_turns_turn_every_pixel() {
 
 #[test]
 fn mirrors_turn_every_pixel_over_and_back() {
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let plain = in_cubes(Placement::default(), fill);
         for axis in 0..3 {
             let mut factors = [1.0; 3];

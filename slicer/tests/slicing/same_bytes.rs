@@ -26,7 +26,7 @@ fn several_files_are_one_part() {
         [a, b, Part::from_facets("c", meshes[2].facets.clone())]
     };
     let whole = joined(&meshes);
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         for memory in [30_000, 1 << 30] {
             let options = SliceOptions { fill, memory, ..coarse() };
             let layers = try_layers(Part::joined(read().into()), &options).unwrap();
@@ -110,7 +110,7 @@ fn the_order_of_facets_and_corners_does_not_change_the_layers() {
         facet
     });
     let mixed = Mesh { facets: mixed.collect() };
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let options = SliceOptions { fill, memory: 50_000, ..coarse() };
         let [mesh, mixed] = [&mesh, &mixed].map(|mesh| without_stack(slice(mesh, &options)));
         assert!(mesh == mixed, "{fill:?}");

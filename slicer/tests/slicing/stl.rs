@@ -260,7 +260,7 @@ fn a_line_of_another_kind_is_named_by_its_facet() {
 /// Reads bytes and slices what they hold, if anything: a few layers only,
 /// since damaged parts may be many metres high.
 fn survive(bytes: &[u8]) {
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let layers = Some(0..2);
         let options = SliceOptions { fill, layers, memory: 100, ..options(25.4, 700.0) };
         if let Ok(model) = read(bytes) {

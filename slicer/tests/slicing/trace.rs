@@ -72,7 +72,7 @@ fn check(mesh: &Mesh, bands: &[StrayBand], trace: &Trace, options: &SliceOptions
         let forwards = faulty.facets.iter().filter(|facet| facet.forwards).count();
         match options.fill {
             Fill::EvenOdd => assert_eq!(having.len() % 2, 1),
-            Fill::NonZero => assert_ne!(2 * forwards, having.len()),
+            Fill::Solid => assert_ne!(2 * forwards, having.len()),
         }
     }
 }
@@ -92,7 +92,7 @@ proptest! {
         non_zero in any::<bool>(),
     ) {
         let mesh = broken(part, defect, count, seed);
-        let fill = if non_zero { Fill::NonZero } else { Fill::EvenOdd };
+        let fill = if non_zero { Fill::Solid } else { Fill::EvenOdd };
         let placement = Placement::default().rotated(Axis::X, degrees);
         let options = SliceOptions { placement, ..coarse(fill) };
         let (bands, trace) = traced(model(&mesh), &options);
@@ -103,7 +103,7 @@ proptest! {
 #[test]
 fn a_whole_part_has_nothing_to_trace() {
     let mesh = build(Sample::Tower, 2_000).unwrap();
-    let (bands, trace) = traced(model(&mesh), &coarse(Fill::NonZero));
+    let (bands, trace) = traced(model(&mesh), &coarse(Fill::Solid));
     assert_eq!((bands, trace), (Vec::new(), Trace::default()));
 }
 

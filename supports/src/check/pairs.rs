@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use lamp_slicer::PLANE_TOLERANCE;
 use lamp_slicer::topology::{CornerTable, Minimum, MinimumKind, minima};
 
 use super::findings::{Findings, Island, Region};
@@ -114,9 +115,10 @@ impl Grid {
         })
     }
 
-    /// Returns the first layer that is cut above a height, less what rounding may lift it by.
+    /// Returns the first layer that is cut above a height. A height within the tolerance of a plane
+    /// counts as lying on it, as in slicing.
     fn layer_above(&self, z_mm: f64) -> usize {
-        self.cuts_mm.partition_point(|&cut| cut <= z_mm + 1e-9)
+        self.cuts_mm.partition_point(|&cut| cut <= z_mm + PLANE_TOLERANCE.mm())
     }
 
     fn column(&self, x_mm: f64) -> f64 {
@@ -140,7 +142,7 @@ impl Grid {
             // A curved surface reaches below its facets.
             layers: layer as u32 - 1..=last as u32,
             first: layer as u32,
-            is_deep: minimum.depth_mm > thickness_mm,
+            is_deep: minimum.depth_mm > thickness_mm + PLANE_TOLERANCE.mm(),
             sides,
             drift: 2.0 * thickness_mm / self.pitch_mm,
         })

@@ -1,5 +1,6 @@
 //! Measures poses: islands, pits, overhangs and size.
 
+use lamp_slicer::PLANE_TOLERANCE;
 use lamp_slicer::topology::{CornerTable, Minimum, MinimumKind, Relief};
 use rayon::prelude::*;
 
@@ -91,10 +92,10 @@ impl Measured<'_> {
         let up = axes[2];
         let heights = self.relief.heights(up);
         let extents = self.extents(axes);
-        let [lowest, highest] = extents[2];
+        let [lowest, _] = extents[2];
         let minima = self.relief.minima(up, &heights, limits.thickness_mm);
-        // Heights are rounded, and whole layers common.
-        let hair = 1e-9 * (highest - lowest);
+        // Files round heights, and whole layers are common.
+        let hair = PLANE_TOLERANCE.mm().min(0.5 * limits.thickness_mm);
         let is_deep = |minimum: &&Minimum| minimum.depth_mm >= limits.thickness_mm - hair;
         let platform = lowest + limits.thickness_mm - hair;
         let (islands, pits): (Vec<_>, Vec<_>) =

@@ -67,7 +67,7 @@ pub fn three_mf(bytes: &[u8]) {
 /// where they are said to be stray, and the size of the slabs does not matter.
 fn part(bytes: &[u8]) {
     let file = file_of(bytes);
-    for fill in [Fill::EvenOdd, Fill::NonZero] {
+    for fill in [Fill::EvenOdd, Fill::Solid] {
         let [tight, roomy] = [1, 64 << 20].map(|memory| sliced(file.path(), fill, memory));
         match (tight, roomy) {
             (Ok(tight), Ok(roomy)) => {

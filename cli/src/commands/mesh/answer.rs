@@ -1,7 +1,8 @@
 //! What is found about a mesh, as JSON.
 
 use lamp_slicer::topology::{
-    Crossings, Deed, Doubled, Lump, Mass, MeshCheck, Repaired, RimLoop, ShellReport, facet_of,
+    Crossings, Deed, Doubled, Lump, Mass, MeshCheck, Repaired, RimLoop, ShellOverlap, ShellReport,
+    facet_of,
 };
 use serde_json::{Value, json};
 
@@ -12,7 +13,7 @@ pub(super) const MAX_LISTED: usize = 10_000;
 
 /// Returns the fields of an answer to `lamp mesh check`.
 pub(super) fn check_fields(name: &str, findings: &Findings) -> Value {
-    let Findings { table, check, welded, crossings } = findings;
+    let Findings { table, check, welded, crossings, overlaps } = findings;
     let crowded = table.crowded().map(|corners| {
         let ends = table.edge_ends(corners[0]).map(|vertex| table.points()[vertex as usize]);
         let facets: Vec<u32> = corners.iter().map(|&corner| facet_of(corner)).collect();
@@ -36,8 +37,14 @@ pub(super) fn check_fields(name: &str, findings: &Findings) -> Value {
         "doubled": check.doubled.iter().take(MAX_LISTED).map(doubled_fields).collect::<Vec<_>>(),
         "flat": first(&check.flat),
         "not_finite": first(&check.not_finite),
+        "overlaps": overlaps.iter().take(MAX_LISTED).map(overlap_fields).collect::<Vec<_>>(),
         "self_intersections": crossings.as_ref().map(crossing_fields),
     })
+}
+
+fn overlap_fields(overlap: &ShellOverlap) -> Value {
+    let ShellOverlap { shells, box_mm, volume_mm3 } = overlap;
+    json!({"shells": shells, "box_mm": box_mm, "volume_mm3": volume_mm3})
 }
 
 fn first(facets: &[u32]) -> &[u32] {

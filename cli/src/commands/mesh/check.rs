@@ -1,7 +1,7 @@
 //! `lamp mesh check`: finds what is wrong with a mesh.
 
 use clap::Args;
-use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck};
+use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, ShellOverlap, Shells};
 use lamp_slicer::{Placement, SliceError};
 use lamp_stack::Length;
 
@@ -17,7 +17,7 @@ use crate::streams::print;
 ///
 /// Lists shells with their Euler numbers, areas, volumes, centres of mass and inertia, and the lumps
 /// of material that they make with their voids; holes, edges of three facets and more, facets turned
-/// over, doubled, without area or not finite. Facets are numbered from 0.
+/// over, doubled, without area or not finite; shells that overlap. Facets are numbered from 0.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -53,6 +53,8 @@ pub(super) struct Findings {
     pub(super) welded: usize,
     /// Facets that pass through each other, if these were looked for.
     pub(super) crossings: Option<Crossings>,
+    /// Shells that enclose some volume more than once.
+    pub(super) overlaps: Vec<ShellOverlap>,
 }
 
 impl Findings {
@@ -68,9 +70,12 @@ pub(super) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let table = CornerTable::of_part(&part, &Placement::default(), args.part.units);
     let table = table.map_err(|error: SliceError| Exit::from(error).at(name.clone()))?;
     let (table, welded) = table.welded(args.weld.mm());
-    let check = MeshCheck::new(&table);
+    let shells = Shells::new(&table);
+    let check = MeshCheck::of_shells(&table, &shells);
+    let overlaps = ShellOverlap::all(&table, &shells, &check)
+        .map_err(|error| Exit::from(error).at(name.clone()))?;
     let crossings = args.self_intersections.then(|| Crossings::new(&table, MAX_LISTED));
-    let findings = Findings { table, check, welded: welded.len(), crossings };
+    let findings = Findings { table, check, welded: welded.len(), crossings, overlaps };
     match args.json {
         true => print_answer("lamp-mesh-1", &check_fields(&name, &findings))?,
         false => print(&check_text(&name, &findings))?,

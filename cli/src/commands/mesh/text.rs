@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use lamp_slicer::topology::{CornerTable, Lump, Mass, MeshCheck, ShellReport, facet_of};
+use lamp_slicer::topology::{
+    CornerTable, Lump, Mass, MeshCheck, ShellOverlap, ShellReport, facet_of,
+};
 
 use crate::commands::mesh::check::Findings;
 
@@ -13,7 +15,7 @@ const MAX_NAMED: usize = 5;
 
 /// Returns the answer to `lamp mesh check`.
 pub(super) fn check_text(name: &str, findings: &Findings) -> String {
-    let Findings { table, check, welded, crossings } = findings;
+    let Findings { table, check, welded, crossings, overlaps } = findings;
     let (facets, vertices, edges) = (table.facet_count(), table.points().len(), table.edge_count());
     let mut text = format!(
         "part:       {name}\nmesh:       {facets} facets, {vertices} vertices, {edges} edges\n\
@@ -38,6 +40,15 @@ pub(super) fn check_text(name: &str, findings: &Findings) -> String {
         line(&mut text, "faults", "none");
     }
     found.iter().for_each(|found| line(&mut text, "found", found));
+    for ShellOverlap { shells: [a, b], box_mm, volume_mm3 } in overlaps.iter().take(MAX_NAMED) {
+        let place = box_text(*box_mm);
+        let shells = format!("shells {} and {}", a + 1, b + 1);
+        line(&mut text, "overlap", &format!("{shells} share {volume_mm3:.3} mm3, {place}"));
+    }
+    if overlaps.len() > MAX_NAMED {
+        let more = overlaps.len() - MAX_NAMED;
+        line(&mut text, "overlap", &format!("{more} more pairs of shells are in --json"));
+    }
     for (number, shell) in (1..).zip(&check.shells).take(MAX_SHELLS) {
         text += &shell_text(number, shell);
     }

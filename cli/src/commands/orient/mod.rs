@@ -101,7 +101,7 @@ impl Compared {
 pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     if let Some(plot) = &args.plot {
         plots::check_name(plot)?;
-        check_beside(plot, Path::new("-"), paths(&args.parts))?;
+        check_beside(plot, Path::new("-"), paths(&args.parts).chain(args.solid.cutters()))?;
     }
     let say = |line: &str| {
         if !common.quiet {
@@ -113,13 +113,14 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     let limits =
         PoseLimits { thickness_mm: args.thickness.mm(), max_overhang_deg: args.max_overhang_angle };
     let table = CornerTable::of_part(&part, &args.solid.placement(), args.solid.units);
-    let table = table.map_err(|error| at_part(error.into(), &args.parts))?;
+    let (files, _) = args.solid.files(&args.parts);
+    let table = table.map_err(|error| at_part(error.into(), &files))?;
     let poses = measure(&table, &poses(args.directions, args.cone), &limits);
     drop(table);
     let pareto = pareto(&poses);
     let images = pareto.iter().take(args.best).map(|&pose| {
         let islands = args.islands_on_images(&part, &poses[pose].pose);
-        islands.map_err(|error| at_part(error, &args.parts))
+        islands.map_err(|error| at_part(error, &files))
     });
     let image_islands = images.collect::<Result<_, Exit>>()?;
     let rotations =

@@ -1,0 +1,157 @@
+//! Finds shells that overlap, and the volume that they share.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use lamp_stack::{Dpi, Length};
+
+use crate::bodies::Role;
+use crate::error::SliceError;
+use crate::part::{Facets, Part, Piece, rounded};
+use crate::slices::{SliceOptions, Slices};
+use crate::topology::{CornerTable, MeshCheck, Shells};
+
+/// Two shells that enclose some volume together, more than once.
+///
+/// A void in its body is none: its facets face inwards, so that they take away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellOverlap {
+    /// The shells, as positions in [`MeshCheck::shells`].
+    pub shells: [u32; 2],
+    /// The box that they share: the least and the greatest corner.
+    pub box_mm: [[f64; 3]; 2],
+    /// The volume that they share, from some hundred sections of some hundred rows.
+    pub volume_mm3: f64,
+}
+
+/// The rows along the longer side of what is looked at, and its layers.
+const ROWS: f64 = 800.0;
+const LAYERS: f64 = 200.0;
+
+impl ShellOverlap {
+    /// Finds all shells of a mesh that overlap, the largest volume first. Only closed shells are
+    /// looked at. Shells that touch, or share less than 0.01 % of the smaller one, do not overlap.
+    ///
+    /// # Errors
+    /// Returns an error if sections cannot be cut.
+    pub fn all(
+        table: &CornerTable,
+        shells: &Shells,
+        check: &MeshCheck,
+    ) -> Result<Vec<Self>, SliceError> {
+        let candidates = candidates(check);
+        if candidates.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut facets = vec![Vec::new(); check.shells.len()];
+        for facet in 0..table.facet_count() as u32 {
+            let shell = shells.of(facet);
+            if candidates.contains(&shell) {
+                facets[shell as usize].push(rounded(table.facet(facet)));
+            }
+        }
+        let piece = |&shell: &u32| {
+            let facets = Facets::Memory(Arc::new(std::mem::take(&mut facets[shell as usize])));
+            Piece { role: Role::Solid, ..Piece::new(facets) }
+        };
+        let pieces: Vec<Piece> = candidates.iter().map(piece).collect();
+        let part = Part::new("shells", pieces, String::new()).with(Vec::new(), true);
+        let boxes = candidates.iter().map(|&shell| check.shells[shell as usize].box_mm);
+        let [low, high] = boxes.reduce(joined).expect("there are some");
+        let [x, y, z] = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(1e-6));
+        let options = SliceOptions {
+            dpi: Dpi::new(25.4 * ROWS / x.max(y)).unwrap_or(SliceOptions::default().dpi),
+            thickness: Length::from_mm(z / LAYERS),
+            ..SliceOptions::default()
+        };
+        let mut slices = Slices::new(part, &options)?;
+        slices.by_ref().try_for_each(|layer| layer.map(drop))?;
+        let numbers: Vec<u32> = candidates.into_iter().collect();
+        let overlap = |found: crate::bodies::BodyOverlap| {
+            let shells = found.bodies.map(|body| numbers[body]);
+            let [a, b] = shells.map(|shell| check.shells[shell as usize].box_mm);
+            Self { shells, box_mm: shared(a, b), volume_mm3: found.volume_mm3 }
+        };
+        Ok(slices.body_overlaps().into_iter().map(overlap).collect())
+    }
+}
+
+fn joined([a, b]: [[f64; 3]; 2], [c, d]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    [[0, 1, 2].map(|k| a[k].min(c[k])), [0, 1, 2].map(|k| b[k].max(d[k]))]
+}
+
+fn shared([a, b]: [[f64; 3]; 2], [c, d]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    [[0, 1, 2].map(|k| a[k].max(c[k])), [0, 1, 2].map(|k| b[k].min(d[k]))]
+}
+
+/// Returns the closed shells whose boxes overlap those of others, and those around these: a shell
+/// in a void of another overlaps nothing.
+fn candidates(check: &MeshCheck) -> BTreeSet<u32> {
+    let is_closed = |shell: &u32| check.shells[*shell as usize].mass.is_some();
+    let box_mm = |shell: u32| check.shells[shell as usize].box_mm;
+    let mut order: Vec<u32> = (0..check.shells.len() as u32).filter(is_closed).collect();
+    order.sort_by(|&a, &b| box_mm(a)[0][0].total_cmp(&box_mm(b)[0][0]));
+    let is_good_void = |inner: u32, outer: u32| {
+        let report = &check.shells[inner as usize];
+        report.within == Some(outer) && report.is_void && !report.is_inside_out()
+    };
+    let mut found = BTreeSet::new();
+    for (place, &a) in order.iter().enumerate() {
+        let end = box_mm(a)[1][0];
+        for &b in order[place + 1..].iter().take_while(|&&b| box_mm(b)[0][0] < end) {
+            let [low, high] = shared(box_mm(a), box_mm(b));
+            let overlap = (0..3).all(|axis| low[axis] < high[axis]);
+            if overlap && !is_good_void(a, b) && !is_good_void(b, a) {
+                found.extend([a, b]);
+            }
+        }
+    }
+    let mut around: Vec<u32> = found.iter().copied().collect();
+    while let Some(shell) = around.pop() {
+        let outer = check.shells[shell as usize].within;
+        around.extend(outer.filter(|&outer| found.insert(outer)));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facet::Facet;
+    use crate::topology::testing::{block, table_of, turned};
+
+    fn overlaps(shells: &[Vec<Facet>]) -> Vec<ShellOverlap> {
+        let table = table_of(&shells.concat());
+        let shells = Shells::new(&table);
+        let check = MeshCheck::of_shells(&table, &shells);
+        ShellOverlap::all(&table, &shells, &check).unwrap()
+    }
+
+    fn cube(low: f32, high: f32) -> Vec<Facet> {
+        block([low; 3], [high; 3])
+    }
+
+    #[test]
+    fn boxes_share_what_their_corners_say() {
+        let beside = block([9.0, 3.0, 4.0], [12.0, 6.0, 8.0]);
+        let [found] = overlaps(&[cube(0.0, 10.0), beside])[..] else { panic!("they overlap") };
+        assert_eq!(found.shells, [0, 1]);
+        assert_eq!(found.box_mm, [[9.0, 3.0, 4.0], [10.0, 6.0, 8.0]]);
+        assert!((found.volume_mm3 / 12.0 - 1.0).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn voids_and_neighbors_share_nothing() {
+        let hollow = [cube(0.0, 10.0), turned(&cube(1.0, 9.0)), cube(3.0, 5.0)];
+        assert_eq!(overlaps(&hollow), []);
+        assert_eq!(overlaps(&[cube(0.0, 10.0), block([10.0; 3], [12.0; 3])]), []);
+        let apart = block([10.0, 0.0, 0.0], [12.0, 10.0, 10.0]);
+        assert_eq!(overlaps(&[cube(0.0, 10.0), apart]), []);
+    }
+
+    #[test]
+    fn a_void_that_faces_outwards_and_a_shell_twice_are_found() {
+        let [found] = overlaps(&[cube(0.0, 10.0), cube(2.0, 4.0)])[..] else { panic!("one pair") };
+        assert!((found.volume_mm3 / 8.0 - 1.0).abs() < 0.01, "{found:?}");
+    }
+}
