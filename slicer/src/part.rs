@@ -249,10 +249,12 @@ impl Part {
     }
 
     /// Joins parts into one, each where its own placement puts it. Its name joins theirs
-    /// with `+`; its digest is that of theirs, one after another. A single part stays
+    /// with `+`, without those of parts that only cut; its digest is that of all, one after another. A single part stays
     /// as it is.
     pub fn joined(models: Vec<Self>) -> Self {
-        let names: Vec<&str> = models.iter().map(Self::name).collect();
+        let is_cutter = |model: &Self| model.pieces.iter().all(|piece| piece.rule().is_cutter());
+        let names: Vec<&str> =
+            models.iter().filter(|model| !is_cutter(model)).map(Self::name).collect();
         let name = names.join("+");
         let digest = digest_of_digests(models.iter().map(Self::digest));
         let notes = models.iter().flat_map(|model| model.notes.clone()).collect();

@@ -49,7 +49,7 @@ fn overlapping_bodies_unite_unless_they_are_to_cancel_out() {
     let scratch = with(&overlapping());
     let united = areas_mm2(&slice(&scratch, "part.step"));
     assert_eq!(united, [[4.0; 5], [6.0; 5], [4.0; 5]].concat());
-    let apart = areas_mm2(&slice(&scratch, "part.step --bodies xor"));
+    let apart = areas_mm2(&slice(&scratch, "part.step --fill even-odd --bodies xor"));
     assert_eq!(apart, [[4.0; 5], [4.0; 5], [4.0; 5]].concat());
     let text = said(&scratch, "");
     let shared = "bodies 1 (can) and 2 (foot) overlap by 1 mm³: ";
@@ -57,22 +57,23 @@ fn overlapping_bodies_unite_unless_they_are_to_cancel_out() {
     // Only the layers that are made count.
     let text = said(&scratch, "--layers 5..7");
     assert!(text.contains("(foot) overlap by 0.4 mm³"), "{text}");
-    let text = said(&scratch, "--bodies xor --quiet");
+    let text = said(&scratch, "--fill even-odd --bodies xor --quiet");
     assert!(text.contains(shared) && text.contains("cancels out"), "{text}");
     assert_eq!(said(&scratch, "--quiet --strict"), "");
-    let ran = scratch.run(&format!("slice part.step {LINE} --bodies xor --strict -o no.tif"));
+    let ran = scratch
+        .run(&format!("slice part.step {LINE} --fill even-odd --bodies xor --strict -o no.tif"));
     assert!(ran.statuses == [Some(3)] && ran.stderr.contains(shared), "{ran:?}");
     assert!(!scratch.path("no.tif").exists());
     scratch
-        .run(&format!("slice part.step {LINE} --bodies xor --fill nonzero -o no.tif"))
-        .is_wrong_usage(&["leave out --bodies xor"]);
+        .run(&format!("slice part.step {LINE} --bodies xor -o no.tif"))
+        .is_wrong_usage(&["--bodies xor is for --fill even-odd"]);
 }
 
 #[test]
 fn the_stack_records_bodies_that_cancel_out() {
     let scratch = with(&overlapping());
     for (words, recorded) in [("", ""), ("--bodies unite", ""), ("--bodies xor", " --bodies xor")] {
-        let layers = slice(&scratch, &format!("part.step {words}"));
+        let layers = slice(&scratch, &format!("part.step --fill even-odd {words}"));
         let command = &layers[0].info.stack.as_ref().unwrap().commands[0];
         let options = format!("--units mm --fill even-odd{recorded} --margin 1");
         assert!(command.ends_with(&options), "{command}");
@@ -103,10 +104,11 @@ fn a_body_inside_another_is_no_hole_but_a_void_is() {
     let height = |at: f64| [vec![9.0; 10], vec![at; 10], vec![9.0; 10]].concat();
     let nested = with(&[("outer", Block(outer)), ("inner", Block(inner))]);
     assert_eq!(areas_mm2(&slice(&nested, "part.step")), height(9.0));
-    assert_eq!(areas_mm2(&slice(&nested, "part.step --bodies xor")), height(8.0));
+    assert_eq!(areas_mm2(&slice(&nested, "part.step --fill even-odd --bodies xor")), height(8.0));
     assert!(said(&nested, "").contains("1 (outer) and 2 (inner) overlap by 1 mm³"));
-    // An STL knows no bodies: a shell in another is a cavity.
-    assert_eq!(areas_mm2(&slice(&nested, "part.stl")), height(8.0));
+    // An STL knows no bodies: by even-odd, a shell in another is a cavity.
+    assert_eq!(areas_mm2(&slice(&nested, "part.stl")), height(9.0));
+    assert_eq!(areas_mm2(&slice(&nested, "part.stl --fill even-odd")), height(8.0));
     let hollow = with(&[("hollow", Hollow(outer, inner))]);
     assert_eq!(areas_mm2(&slice(&hollow, "part.step")), height(8.0));
     assert_eq!(said(&hollow, ""), "");
@@ -161,15 +163,19 @@ fn twelve_bodies_unite_on_their_surfaces() {
 fn a_core_of_another_file_cuts_united_bodies() {
     let scratch = with(&overlapping());
     scratch.write("core.step", step_bodies(&[("", block([0.5; 3], [2.5, 1.5, 1.0]))]).as_bytes());
+    for cut in ["part.step core.step --fill even-odd", "part.step --subtract core.step"] {
+        let areas = areas_mm2(&slice(&scratch, cut));
+        assert_eq!(areas, [[4.0; 5], [4.0; 5], [4.0; 5]].concat(), "{cut}");
+    }
     let areas = areas_mm2(&slice(&scratch, "part.step core.step"));
-    assert_eq!(areas, [[4.0; 5], [4.0; 5], [4.0; 5]].concat());
-    let areas = areas_mm2(&slice(&scratch, "part.step core.step --fill nonzero"));
     assert_eq!(areas, [[4.0; 5], [6.0; 5], [4.0; 5]].concat());
+    let areas = areas_mm2(&slice(&scratch, "part.step --intersect core.step"));
+    assert_eq!(areas, [[0.0; 5], [2.0; 5], [0.0; 5]].concat());
 }
 
-/// For bodies that face outwards, the non-zero rule unites them, too.
+/// For bodies that close by themselves, even-odd fill of each unites them, too.
 #[test]
-fn images_of_every_kind_are_those_of_the_nonzero_rule() {
+fn images_of_every_kind_are_those_of_even_odd_bodies() {
     let scratch = with(&[
         ("ball", Ball { centre: [0.0; 3], radius: 2.0 }),
         ("other", Ball { centre: [1.0, 0.5, 0.7], radius: 2.0 }),
@@ -189,33 +195,30 @@ fn images_of_every_kind_are_those_of_the_nonzero_rule() {
             format!("slice part.step {options} --dpi 254 {layers} --quiet {fill} -o {file} --force")
         };
         scratch.run(&line("", "unite.tif")).succeeds();
-        scratch.run(&line("--fill nonzero", "nonzero.tif")).succeeds();
-        let [unite, nonzero] = ["unite.tif", "nonzero.tif"].map(|name| scratch.layers(name));
-        assert_eq!(unite.len(), nonzero.len(), "{options}");
+        scratch.run(&line("--fill even-odd", "even.tif")).succeeds();
+        let [unite, even] = ["unite.tif", "even.tif"].map(|name| scratch.layers(name));
+        assert_eq!(unite.len(), even.len(), "{options}");
         let mut others = 0;
-        for (a, b) in unite.iter().zip(&nonzero) {
+        for (a, b) in unite.iter().zip(&even) {
             assert_eq!(a.info.z_um, b.info.z_um, "{options}");
             assert!(a.info.stray_rows.is_empty() && a.info.closed == Some(true));
             let rows = 0..a.image.height();
             others += rows.map(|row| differing(&a.image, &b.image, row).len()).sum::<usize>();
         }
-        // Polishing tells the crossings and depths of united bodies apart. For the non-zero
-        // rule it mistakes a few of one body for those of another.
-        let is_polished = options.contains("lamp-suspension") && !options.contains("--no-polish");
-        assert!(others <= if is_polished { 8 } else { 0 }, "{options}: {others}");
+        assert_eq!(others, 0, "{options}");
     }
     let heights = |fill: &str| {
         let line = format!("lamp heights part.step --dpi 254 {fill}");
         String::from_utf8(scratch.run(&line).succeeds().stdout).unwrap()
     };
-    assert_eq!(heights(""), heights("--fill nonzero"));
-    assert_ne!(heights(""), heights("--bodies xor"));
+    assert_eq!(heights(""), heights("--fill even-odd"));
+    assert_ne!(heights(""), heights("--fill even-odd --bodies xor"));
     let cure = |fill: &str| {
         scratch.run(&format!("slice part.step {LINE} {fill} -o out.tif --force")).succeeds();
         let line = "lamp cure out.tif --part part.step --material lamp-suspension --section y=0mm";
         String::from_utf8(scratch.run(&format!("{line} -o cure.png")).succeeds().stdout).unwrap()
     };
-    assert_eq!(cure(""), cure("--fill nonzero"));
+    assert_eq!(cure(""), cure("--fill even-odd"));
 }
 
 #[test]
@@ -251,8 +254,8 @@ fn items_of_a_3mf_unite() {
     let text = scratch.run("slice part.3mf --dpi 254 -o said.tif").succeeds().stderr;
     assert!(text.contains("meshes 1 and 2 overlap by"), "{text}");
     let unite = slice(&scratch, "part.3mf");
-    assert_eq!(masks(&unite), masks(&slice(&scratch, "part.3mf --fill nonzero")));
-    assert_ne!(masks(&unite), masks(&slice(&scratch, "part.3mf --bodies xor")));
+    assert_eq!(masks(&unite), masks(&slice(&scratch, "part.3mf --fill even-odd")));
+    assert_ne!(masks(&unite), masks(&slice(&scratch, "part.3mf --fill even-odd --bodies xor")));
 }
 
 /// Each of several files is polished as it would be alone.
@@ -266,7 +269,7 @@ fn files_side_by_side_are_each_as_exact_as_alone() {
         masks(&scratch.layers("out.tif")).iter().map(|mask| mask.white_pixels()).collect()
     };
     let doubled: Vec<u64> = white("part.step", "").iter().map(|pixels| 2 * pixels).collect();
-    for fill in ["", "--fill nonzero"] {
+    for fill in ["", "--fill even-odd"] {
         assert_eq!(white("part.step part.step@100,0", fill), doubled, "{fill}");
     }
 }

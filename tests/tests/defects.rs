@@ -72,8 +72,9 @@ fn flipped_facets_change_no_pixel_under_even_odd() {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 20k -o whole.stl").succeeds();
     scratch.run(&format!("slice whole.stl {COARSE} -o whole.tif")).succeeds_quietly();
-    let ran = sliced(&scratch, "--defect flip --count 500 --seed 3");
-    assert_eq!(ran.stderr, "");
+    sliced(&scratch, "--defect flip --count 500 --seed 3");
+    let line = format!("slice broken.stl {COARSE} --fill even-odd --force -o stray.tif");
+    scratch.run(&line).succeeds_quietly();
     let (whole, flipped) = (scratch.layers("whole.tif"), scratch.layers("stray.tif"));
     assert!(masks(&whole) == masks(&flipped));
     // The file differs, so its digest does.
@@ -87,7 +88,8 @@ fn flipped_facets_change_nothing_but_the_digest() {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 20k -o broken.stl").succeeds();
     let sliced = || {
-        scratch.run(&format!("slice broken.stl {COARSE} -o part.tif")).succeeds_quietly();
+        let line = format!("slice broken.stl {COARSE} --fill even-odd -o part.tif");
+        scratch.run(&line).succeeds_quietly();
         let mut layers = scratch.layers("part.tif");
         assert!(layers.iter().all(|layer| layer.info.closed == Some(true)));
         let digest = layers[0].info.stack.as_mut().unwrap();
@@ -103,13 +105,15 @@ fn flipped_facets_change_nothing_but_the_digest() {
 }
 
 #[test]
-fn flipped_facets_are_stray_under_nonzero() {
+fn flipped_facets_change_no_pixel_and_are_reported() {
     let scratch = Scratch::new();
     sliced(&scratch, "--defect flip --count 20 --seed 3");
-    let line = format!("slice broken.stl {COARSE} --fill nonzero -o nonzero.tif");
-    let ran = scratch.run(&line).succeeds();
-    assert!(ran.stderr.contains("do not balance"), "{ran:?}");
-    assert!(stray_rows(&scratch.layers("nonzero.tif")) > 0);
+    scratch
+        .run(&format!("slice broken.stl {COARSE} --fill even-odd -o even.tif"))
+        .succeeds_quietly();
+    let ran = scratch.run(&format!("slice broken.stl {COARSE} -o solid.tif")).succeeds();
+    assert!(ran.stderr.contains("broken.stl: facets are turned over or missing in "), "{ran:?}");
+    assert!(masks(&scratch.layers("solid.tif")) == masks(&scratch.layers("even.tif")));
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("slice cube.stl --origin 0,0 -o x.tif", &["--size"]),
         ("slice cube.stl --origin 0 --size 3x3mm -o x.tif", &["`0` is not a point", "X,Y"]),
         ("slice cube.stl --units furlong -o x.tif", &["furlong", "inch"]),
-        ("slice cube.stl --fill odd -o x.tif", &["even-odd", "nonzero"]),
+        ("slice cube.stl --fill odd -o x.tif", &["even-odd", "solid"]),
         ("slice cube.stl --scale 0 -o x.tif", &["leave nothing"]),
         ("slice cube.stl --scale -1 -o x.tif", &["below zero", "--mirror"]),
         ("slice cube.stl --scale 1,2 -o x.tif", &["`1,2` is not a scale", "X,Y,Z"]),

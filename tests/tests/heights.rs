@@ -155,7 +155,7 @@ fn steps() -> Mesh {
 fn layers_snap_to_flat_faces() {
     let scratch = Scratch::new();
     scratch.mesh("steps.stl", &steps());
-    let slice = "slice steps.stl --dpi 300 --adaptive --deviation 90% --fill nonzero";
+    let slice = "slice steps.stl --dpi 300 --adaptive --deviation 90%";
     let boundary = |options: &str| {
         scratch.run(&format!("{slice} {options} -o steps.tif")).succeeds_quietly();
         let layers = scratch.layers("steps.tif");

@@ -69,10 +69,10 @@ fn parts_are_placed_each_by_itself() {
     let ring = torus(20.0, 8.0, 2_000);
     scratch.mesh("ring.stl", &ring);
     scratch.mesh("a@b.stl", &ring.map(|[x, y, z]| [12.7 - y, x - 50.8, z]));
-    let line = format!("slice ring.stl a@b.stl {COARSE} --fill nonzero -o out.tif");
+    let line = format!("slice ring.stl a@b.stl {COARSE} -o out.tif");
     scratch.run(&line).succeeds_quietly();
     let expected = scratch.layers("out.tif");
-    let line = format!("slice ring.stl ring.stl@12.7,-2in,0,90 {COARSE} --fill nonzero -o out.tif");
+    let line = format!("slice ring.stl ring.stl@12.7,-2in,0,90 {COARSE} -o out.tif");
     scratch.run(&line).succeeds_quietly();
     let layers = scratch.layers("out.tif");
     assert!(masks(&layers) == masks(&expected));
@@ -148,10 +148,12 @@ fn a_stack_without_white_is_told() {
                 .collect(),
         },
     );
-    let ran = scratch.run(&format!("slice blank.stl {COARSE} --strict -o strict.tif"));
+    let ran =
+        scratch.run(&format!("slice blank.stl {COARSE} --fill even-odd --strict -o strict.tif"));
     assert!(ran.statuses == [Some(3)] && ran.stderr.contains("no layer has a white"), "{ran:?}");
     assert!(!scratch.path("strict.tif").exists());
-    let ran = scratch.run(&format!("slice blank.stl {COARSE} --strict | lamp info -"));
+    let ran =
+        scratch.run(&format!("slice blank.stl {COARSE} --fill even-odd --strict | lamp info -"));
     assert_eq!((ran.statuses[0], ran.statuses[1]), (Some(3), Some(1)), "{ran:?}");
 }
 
@@ -160,12 +162,12 @@ fn overlaps_are_told_unless_parts_unite() {
     let scratch = Scratch::new();
     scratch.mesh("ball.stl", &sphere(10.0, 500));
     let line = |more: &str| format!("slice ball.stl ball.stl@15,0 {COARSE} {more} -o out.tif");
-    let ran = scratch.run(&line("")).succeeds();
+    let ran = scratch.run(&line("--fill even-odd")).succeeds();
     assert!(ran.stderr.contains("boxes of ball.stl and ball.stl overlap"), "{ran:?}");
-    assert!(ran.stderr.contains("--fill nonzero"), "{ran:?}");
-    let ran = scratch.run(&line("--strict"));
+    assert!(ran.stderr.contains("--fill solid"), "{ran:?}");
+    let ran = scratch.run(&line("--strict --fill even-odd"));
     assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
-    scratch.run(&line("--strict --fill nonzero")).succeeds_quietly();
+    scratch.run(&line("--strict")).succeeds_quietly();
 }
 
 #[test]

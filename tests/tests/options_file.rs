@@ -38,7 +38,7 @@ fn one_file_serves_a_night() {
     // The options that took effect are recorded, not the file.
     assert_eq!(
         slice,
-        "slice tower.stl --dpi 100 --thickness 2mm --plane top --units mm --fill even-odd \
+        "slice tower.stl --dpi 100 --thickness 2mm --plane top --units mm --fill solid \
          --rotate x:90,z:-12.5 --margin 3"
     );
     assert!(tile.starts_with("tile --area 100x100mm "), "{tile}");
@@ -56,7 +56,7 @@ fn the_command_line_wins() {
         (
             "--thickness 4mm --rotate z:5",
             "--dpi 100 --thickness 4mm --plane top --units mm --fill \
-          even-odd --rotate z:5 --margin 3",
+          solid --rotate z:5 --margin 3",
         ),
         // What contradicts it is left out, too.
         ("--adaptive --max 4mm", "--dpi 100 --adaptive --max 4mm --plane top"),
@@ -117,7 +117,7 @@ fn a_machine_gives_slice_its_defaults() {
     let scratch = with_tower("thickness = \"2mm\"");
     scratch.write("mine.toml", MACHINE.as_bytes());
     for (options, recorded) in [
-        ("", "--dpi 50 --thickness 4mm --plane top --units mm --fill even-odd --margin 7"),
+        ("", "--dpi 50 --thickness 4mm --plane top --units mm --fill solid --margin 7"),
         // The options file goes before the machine, the command line before both.
         ("--options night.toml --margin 0", "--dpi 50 --thickness 2mm --plane top"),
         ("--dpi 60 --adaptive --max 8mm", "--dpi 60 --adaptive --max 8mm --plane top"),
