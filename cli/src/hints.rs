@@ -333,8 +333,12 @@ fn machine_limit(error: &MachineLimit) -> Option<String> {
     Some(format!("{hint}, or take another --machine"))
 }
 
-fn no_solid(_: &NoSolid) -> String {
-    "lamp mesh check names the facets, and lamp mesh repair mends what it can".to_owned()
+fn no_solid(error: &NoSolid) -> String {
+    let hint = match error {
+        NoSolid::Crossed { .. } => "lamp mesh check --self-intersections lists the facets",
+        _ => "lamp mesh check names the facets, and lamp mesh repair mends what it can",
+    };
+    hint.to_owned()
 }
 
 fn data(error: &DataError) -> Option<String> {

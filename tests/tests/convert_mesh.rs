@@ -1,6 +1,6 @@
 //! Checks the STEP files that `lamp convert` makes of meshes.
 
-use lamp_fixtures::{Defect, StepUnit, cavity_core, closed_void, cup, inject, mug, step};
+use lamp_fixtures::{Defect, Mesh, StepUnit, cavity_core, closed_void, cup, inject, mug, step};
 use lamp_stack::Layer;
 use lamp_tests::{Scratch, masks};
 
@@ -37,6 +37,38 @@ fn units_scale_the_solid() {
     let volume = said["bodies"][0]["volume_mm3"].as_f64().unwrap();
     let exact = (16.0 * 12.0 * 12.0 - 960.0) * 25.4f64.powi(3);
     assert!((volume / exact - 1.0).abs() < 1e-6, "{said}");
+}
+
+#[test]
+fn heights_are_the_decimals_that_were_meant() {
+    let scratch = Scratch::new();
+    let at = |[x, y, z]: [f32; 3]| [0.1 * x + 1.3, 0.1 * y - 0.7, 0.1 * z + 0.7];
+    let cup = Mesh { facets: cup(1).facets.into_iter().map(|facet| facet.map(at)).collect() };
+    scratch.mesh("cup.stl", &cup);
+    scratch.run("lamp convert cup.stl cup.step -q").succeeds_quietly();
+    let text = String::from_utf8(scratch.bytes("cup.step")).unwrap();
+    let points = text.lines().filter(|line| line.contains("CARTESIAN_POINT"));
+    for point in points {
+        let (_, numbers) = point.split_once("',(").unwrap();
+        let is_short = |number: &str| number.trim_end_matches(')').len() <= 5;
+        assert!(numbers.trim_end_matches(");").split(',').all(is_short), "{point}");
+    }
+}
+
+#[test]
+fn a_surface_through_itself_is_refused_with_the_place() {
+    let scratch = Scratch::new();
+    let mut folded = cup(1);
+    // The floor of the cup is pushed through its bottom.
+    let inner = folded.facets.iter().flatten().map(|p| p[2]).filter(|z| *z > 0.0);
+    let floor = inner.fold(f32::INFINITY, f32::min);
+    for point in folded.facets.iter_mut().flatten().filter(|point| point[2] == floor) {
+        point[2] = -1.0;
+    }
+    scratch.mesh("folded.stl", &folded);
+    let words = ["folded.stl", "passes through itself", "cross by", "--self-intersections"];
+    scratch.run("lamp convert folded.stl folded.step").is_refused_with(&words);
+    assert_eq!(scratch.names(), ["folded.stl"]);
 }
 
 #[test]

@@ -156,12 +156,13 @@ impl ConvertArgs {
         }
         let table = CornerTable::of_part(&part, &Placement::default(), self.units);
         let table = table.map_err(|error| Exit::from(error).at(name.clone()))?;
-        let solids = StepSolids::new(&table).map_err(|error| Exit::from(error).at(name))?;
+        let facets = table.facet_count();
+        let solids = StepSolids::new(table).map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
             say(&format!(
                 "convert: {}: {} facets as {} faces; solids: {}",
                 step.display(),
-                table.facet_count(),
+                facets,
                 solids.faces(),
                 solids.solids()
             ));

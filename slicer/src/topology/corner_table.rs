@@ -75,6 +75,12 @@ impl CornerTable {
         (self.points, self.vertices, self.body_ends)
     }
 
+    /// Returns the table with each coordinate changed. Vertices stay as many as they are.
+    pub(crate) fn with_points(mut self, changed: impl Fn(f64) -> f64) -> Self {
+        self.points.as_flattened_mut().iter_mut().for_each(|c| *c = changed(*c));
+        self
+    }
+
     /// Returns the number of facets.
     pub fn facet_count(&self) -> usize {
         self.vertices.len() / 3

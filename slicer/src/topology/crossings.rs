@@ -1,5 +1,6 @@
 //! Finds facets that pass through each other.
 
+use lamp_brep::vector::{Vec3, add, cross as cross_product, dot, scale, sub, unit};
 use robust::{Coord3D, orient3d};
 use rstar::RTree;
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -31,6 +32,15 @@ impl Crossings {
     /// point between is inside the facet or on its border; signs are exact. Facets with a common
     /// edge, facets that only touch, and facets in one plane do not count.
     pub fn new(table: &CornerTable, most: usize) -> Self {
+        Self::of_pairs(table, most, |_, _| true)
+    }
+
+    /// As [`new`](Self::new), of those pairs that count.
+    pub(crate) fn of_pairs(
+        table: &CornerTable,
+        most: usize,
+        counts: impl Fn(u32, u32) -> bool,
+    ) -> Self {
         let mut found = Self::default();
         for facets in table.bodies() {
             let busy = facets.filter(|&facet| !table.is_idle(facet));
@@ -47,7 +57,7 @@ impl Crossings {
                     found.is_partial = true;
                     break;
                 }
-                if a.data < b.data && cross(table, a.data, b.data) {
+                if a.data < b.data && cross(table, a.data, b.data) && counts(a.data, b.data) {
                     found.count += 1;
                     found.pairs.push([a.data, b.data]);
                     if found.pairs.len() / 2 > most {
@@ -96,6 +106,35 @@ fn pierces(table: &CornerTable, edges: [u32; 3], facet: [u32; 3]) -> bool {
         let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
         turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
     })
+}
+
+/// Returns where one of two facets that cross enters the other, and how deep: how far the nearest of
+/// the edge's ends and of the facet's sides is from there. That far, at least, coordinates must move
+/// until the facets are apart.
+pub(crate) fn deepest(table: &CornerTable, a: u32, b: u32) -> (Vec3, f64) {
+    let entries = [[a, b], [b, a]].into_iter().flat_map(|[of_edges, facet]| {
+        let corners = table.facet(facet);
+        let normal = unit(cross_product(sub(corners[1], corners[0]), sub(corners[2], corners[0])));
+        let points = table.facet(of_edges);
+        let ends = [[0, 1], [1, 2], [2, 0]].map(|side| side.map(|k| points[k]));
+        ends.into_iter().filter_map(move |ends| entry(ends, corners, normal?))
+    });
+    entries.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((table.point(3 * a), 0.0))
+}
+
+/// Returns where an edge enters a facet with a normal, and how deep, if it does.
+fn entry([p, q]: [Vec3; 2], corners: [Vec3; 3], normal: Vec3) -> Option<(Vec3, f64)> {
+    let [above, below] = [p, q].map(|end| dot(sub(end, corners[0]), normal));
+    if above * below >= 0.0 {
+        return None;
+    }
+    let at = add(p, scale(sub(q, p), above / (above - below)));
+    let inside = (0..3).map(|k| {
+        let side = sub(corners[(k + 1) % 3], corners[k]);
+        unit(cross_product(normal, side)).map_or(0.0, |inwards| dot(sub(at, corners[k]), inwards))
+    });
+    let depth = inside.fold(above.abs().min(below.abs()), f64::min);
+    (depth >= 0.0).then_some((at, depth))
 }
 
 #[cfg(test)]

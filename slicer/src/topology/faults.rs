@@ -1,6 +1,6 @@
 //! Facets that repeat, have no area or are not finite.
 
-use lamp_brep::vector::{cross, dot, sub};
+use lamp_brep::vector::{Vec3, cross, dot, sub};
 
 use crate::topology::CornerTable;
 use crate::topology::corner_table::facet_of;
@@ -60,7 +60,11 @@ fn is_same_way(table: &CornerTable, a: u32, b: u32) -> bool {
 /// Returns true if a facet has no area: two corners in one vertex, or all on a line, as exactly as
 /// 64 bits tell.
 pub(crate) fn is_flat(table: &CornerTable, facet: u32) -> bool {
-    let [a, b, c] = table.facet(facet);
+    is_flat_between(table.facet(facet))
+}
+
+/// As [`is_flat`], of three points.
+pub(crate) fn is_flat_between([a, b, c]: [Vec3; 3]) -> bool {
     let (to_b, to_c) = (sub(b, a), sub(c, a));
     let across = cross(to_b, to_c);
     // Squares, for roots cost time.

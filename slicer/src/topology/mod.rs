@@ -45,6 +45,7 @@ mod repair;
 mod rims;
 mod shell_report;
 mod shells;
+mod slivers;
 mod step;
 #[cfg(test)]
 mod testing;

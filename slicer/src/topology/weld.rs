@@ -6,7 +6,40 @@ use lamp_brep::vector::{Vec3, distance};
 
 use crate::topology::CornerTable;
 
+/// Steps of 32-bit numbers at the greatest coordinate, within which rounding alone may part corners.
+const STEPS: f64 = 4.0;
+
+/// The usual tolerance, at most, as a share of the diagonal of the box: 5 um for 100 mm. Writers of
+/// few digits keep five of them.
+const OF_SIZE: f64 = 5e-5;
+
+/// The same, as a share of the shortest side at a rim.
+const OF_SIDES: f64 = 0.25;
+
 impl CornerTable {
+    /// Returns how far apart vertices at rims may lie that are meant to be one, in the unit of the
+    /// points: 1/20 000 of the diagonal of the box, but at most a quarter of the shortest side at a
+    /// rim, so that no facet collapses, and at least four steps of a 32-bit number at the greatest
+    /// coordinate. Sides as short as these steps do not count.
+    pub fn usual_weld(&self) -> f64 {
+        let finite = self.points().iter().filter(|point| point.iter().all(|c| c.is_finite()));
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for point in finite {
+            low = [0, 1, 2].map(|axis| point[axis].min(low[axis]));
+            high = [0, 1, 2].map(|axis| point[axis].max(high[axis]));
+        }
+        let greatest = low.into_iter().chain(high).map(f64::abs).fold(0.0, f64::max);
+        let least = STEPS * f64::from(f32::EPSILON) * greatest;
+        let rims = (0..self.corner_count()).filter(|&corner| self.is_rim(corner));
+        let sides = rims.map(|corner| {
+            let [a, b] = self.edge_ends(corner).map(|vertex| self.points()[vertex as usize]);
+            distance(a, b)
+        });
+        let shortest = sides.filter(|side| *side > least).fold(f64::INFINITY, f64::min);
+        let usual = (OF_SIZE * distance(low, high)).min(OF_SIDES * shortest).max(least);
+        if usual.is_finite() { usual } else { 0.0 }
+    }
+
     /// Joins vertices at rims with the nearest vertex at a rim, among those numbered before, that
     /// lies within a tolerance in millimetres. Returns the table and the corners that moved.
     ///
@@ -108,6 +141,34 @@ mod tests {
 
     fn good_facet(mesh: &lamp_fixtures::Mesh, facet: u32) -> [[f64; 3]; 3] {
         mesh.facets[facet as usize].map(|corner| corner.map(f64::from))
+    }
+
+    #[test]
+    fn the_usual_tolerance_follows_the_part() {
+        let good = sphere(10.0, 5_000);
+        // The same part in every size and place: gaps of 1/100 000 of it close, no detail does.
+        for (scale, shift) in [(1.0, 0.0), (1e-3, 0.0), (50.0, 0.0), (1.0, 90.0), (1.0, -1e4)] {
+            let mut mesh = good.clone();
+            let gap = if shift < -1e3 { 0.003 } else { 2e-4 };
+            inject(&mut mesh, Defect::Nudge { by_mm: gap }, 12, 5);
+            let mesh = mesh.map(|point| point.map(|c| c * scale + shift));
+            let table = table_of(&mesh.facets);
+            let within = table.usual_weld();
+            let (table, moved) = table.welded(within);
+            assert!(MeshCheck::new(&table).is_clean() && !moved.is_empty(), "{scale} {shift}");
+            let size = 20.0 * 3f64.sqrt() * scale;
+            let steps = 4.0 * 2f64.powi(-23) * (f64::abs(shift) + 21.0);
+            assert!(within <= f64::max(size / 19_900.0, steps), "{within}");
+        }
+        // Steps of a comb, 1 um wide on a part of a meter, are no gaps.
+        let tooth = |k: usize| [k as f32 * 1e-3, 0.0, 0.0f32];
+        let far = [1000.0, 1000.0, 0.0f32];
+        let comb: Vec<_> = (0..50).map(|k| [tooth(k), tooth(k + 1), far]).collect();
+        let table = table_of(&comb);
+        let within = table.usual_weld();
+        assert!(within < 5e-4, "{within}");
+        assert!(table.welded(within).1.is_empty());
+        assert_eq!(table_of(&[[[f32::NAN; 3]; 3]]).usual_weld(), 0.0);
     }
 
     #[test]

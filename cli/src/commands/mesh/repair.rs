@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use lamp_slicer::topology::{CornerTable, RepairOptions, Repaired, repair};
+use lamp_slicer::topology::{CornerTable, Deed, RepairOptions, Repaired, repair};
 use lamp_slicer::{SliceError, write_stl};
 use lamp_stack::Length;
 use serde_json::{Map, Value, json};
@@ -39,9 +39,10 @@ pub(super) struct RepairArgs {
     #[arg(short, long, value_name = "OUT.stl")]
     output: PathBuf,
 
-    /// Make vertices of open edges one if they are no farther apart
-    #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_distance)]
-    weld: Length,
+    /// Make vertices of open edges one if they are no farther apart [default: 1/20000 of the part's
+    /// diagonal, at most a quarter of the shortest open edge, at least what 32 bits tell apart]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    weld: Option<Length>,
 
     /// Close holes no wider than this: the width is the diagonal of the box around a hole's edges
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_distance)]
@@ -66,8 +67,13 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let failed = |error: SliceError| Exit::from(error).at(name.clone());
     let (part, bytes) = args.part.open("mesh repair", common)?;
     let unit = if part.states_unit() { 1.0 } else { args.part.units.mm() };
-    let options = RepairOptions { weld: args.weld.mm() / unit, close: args.close.mm() / unit };
-    let repaired = part.facets().and_then(|facets| repair(facets, &options)).map_err(failed)?;
+    let facets = part.facets().map_err(failed)?;
+    let weld = match args.weld {
+        Some(weld) => weld.mm() / unit,
+        None => CornerTable::of_facets(&facets).map_err(failed)?.usual_weld(),
+    };
+    let options = RepairOptions { weld, close: args.close.mm() / unit };
+    let repaired = repair(facets, &options).map_err(failed)?;
     let output = &args.output;
     match repaired.touched.is_empty() && is_stl(input, &bytes)? {
         true => write_mesh(output, |out| {
@@ -78,7 +84,7 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     }
     let left = faults_left(&repaired).map_err(failed)?;
     if !common.quiet {
-        tell(&repaired, &left);
+        tell(&repaired, &left, weld * unit);
     }
     if let Some(report) = &args.report {
         write_report(report, &name, &repaired)?;
@@ -124,13 +130,16 @@ fn faults_left(repaired: &Repaired) -> Result<Vec<String>, SliceError> {
     }
 }
 
-fn tell(repaired: &Repaired, left: &[String]) {
+fn tell(repaired: &Repaired, left: &[String], weld_mm: f64) {
     let done: Vec<String> = deeds(repaired)
         .map(|(deed, count)| format!("{count} {}", deed.replace('-', " ")))
         .collect();
     match done.is_empty() {
         true => say("mesh repair: no facet was touched"),
         false => say(&format!("mesh repair: facets: {}", done.join(", "))),
+    }
+    if repaired.touched.iter().any(|it| it.deed == Deed::Moved) {
+        say(&format!("mesh repair: vertices of open edges within {:.3}um are one", weld_mm * 1e3));
     }
     left.iter().for_each(|fault| say(&format!("mesh repair: left: {fault}")));
 }

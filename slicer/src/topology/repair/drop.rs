@@ -36,31 +36,139 @@ pub(super) fn dropped(table: &CornerTable, close: f64) -> Vec<(u32, Deed)> {
     dropped
 }
 
-/// Returns facets that repeat others. Copies that face the same way come first; if there are none,
-/// two facets back to back go together if all their edges have an even number of facets, and one of
-/// them otherwise.
+/// Returns facets that repeat others and go, so that no edge of an even number of facets is left
+/// with an odd one.
+///
+/// Of an odd number of facets between three vertices one stays. Of an even number, one stays or
+/// none: as the edges ask for on which all other facets are known, and in groups that hang together
+/// by edges. Where none asks, one stays if more face one way than the other: of a surface that the
+/// file holds twice. Facets back to back bound nothing, and none stays.
 fn doubled(table: &CornerTable) -> Vec<u32> {
+    let groups = groups(table);
+    let edges = GroupEdges::new(table, &groups);
+    let mut keeps: Vec<Option<bool>> =
+        groups.iter().map(|group| (group.facets.len() % 2 == 1).then_some(true)).collect();
+    for first in 0..groups.len() {
+        if keeps[first].is_none() {
+            edges.decide(first, &groups, &mut keeps);
+        }
+    }
+    if edges.was_even && !edges.are_even(&keeps) {
+        // To drop facets in pairs leaves every edge as even as it was.
+        for (keep, group) in keeps.iter_mut().zip(&groups) {
+            *keep = Some(group.facets.len() % 2 == 1);
+        }
+    }
+    let of_group = |(group, keep): (&Group, &Option<bool>)| {
+        let kept = (*keep == Some(true)).then_some(group.kept);
+        group.facets.iter().copied().filter(move |&facet| Some(facet) != kept).collect::<Vec<u32>>()
+    };
+    groups.iter().zip(&keeps).flat_map(of_group).collect()
+}
+
+/// All facets between the same three vertices.
+struct Group {
+    facets: Vec<u32>,
+    /// The first of those that face as most of them do.
+    kept: u32,
+    /// Whether as many face one way as the other.
+    is_balanced: bool,
+}
+
+fn groups(table: &CornerTable) -> Vec<Group> {
     let mut doubled = Doubled::all(table);
     doubled.sort_unstable_by_key(|it| (it.of, it.facet));
-    let mut copies = Vec::new();
-    for group in doubled.chunk_by(|a, b| a.of == b.of) {
-        let same = group.iter().filter(|it| it.is_same_way);
-        let other = group.iter().filter(|it| !it.is_same_way).skip(1);
-        copies.extend(same.chain(other).map(|it| it.facet));
-    }
-    if !copies.is_empty() {
-        return copies;
-    }
-    let on_edge = |corner: u32| table.edge(corner);
-    let crowded: HashMap<Option<u32>, usize> =
-        table.crowded().map(|corners| (on_edge(corners[0]), corners.len())).collect();
-    let is_even = |corner: u32| {
-        let facets = crowded.get(&on_edge(corner)).copied();
-        facets.unwrap_or(2).is_multiple_of(2)
+    let group = |group: &[Doubled]| {
+        let of = group[0].of;
+        let turned = group.iter().find(|it| !it.is_same_way).map(|it| it.facet);
+        let others = group.iter().filter(|it| !it.is_same_way).count();
+        let same = 1 + group.len() - others;
+        Group {
+            facets: std::iter::once(of).chain(group.iter().map(|it| it.facet)).collect(),
+            kept: turned.filter(|_| others > same).unwrap_or(of),
+            is_balanced: others == same,
+        }
     };
-    let goes = |it: &Doubled| {
-        let both = (3 * it.of..3 * it.of + 3).all(is_even);
-        [Some(it.facet), both.then_some(it.of)].into_iter().flatten()
-    };
-    doubled.iter().flat_map(goes).collect()
+    doubled.chunk_by(|a, b| a.of == b.of).map(group).collect()
+}
+
+/// The edges of groups of facets.
+struct GroupEdges {
+    /// By group, its edges.
+    of_group: Vec<[u32; 3]>,
+    /// By edge, its groups, and whether it has an odd number of facets besides theirs.
+    groups_at: HashMap<u32, (Vec<usize>, bool)>,
+    /// Whether every edge of the mesh has an even number of facets.
+    was_even: bool,
+}
+
+impl GroupEdges {
+    fn new(table: &CornerTable, groups: &[Group]) -> Self {
+        let facets_at: HashMap<Option<u32>, usize> =
+            table.crowded().map(|corners| (table.edge(corners[0]), corners.len())).collect();
+        let edges = |group: &Group| {
+            let corner = 3 * group.facets[0];
+            // Facets between three vertices are on edges.
+            [corner, corner + 1, corner + 2].map(|corner| table.edge(corner).unwrap_or(u32::MAX))
+        };
+        let of_group: Vec<[u32; 3]> = groups.iter().map(edges).collect();
+        let mut groups_at: HashMap<u32, (Vec<usize>, bool)> = HashMap::new();
+        for (number, edges) in of_group.iter().enumerate() {
+            for &edge in edges {
+                let facets = facets_at.get(&Some(edge)).copied().unwrap_or(2);
+                let start = || (Vec::new(), facets % 2 == 1);
+                let (at, is_odd) = groups_at.entry(edge).or_insert_with(start);
+                at.push(number);
+                *is_odd ^= groups[number].facets.len() % 2 == 1;
+            }
+        }
+        let was_even = facets_at.values().all(|facets| facets % 2 == 0)
+            && !(0..table.corner_count()).any(|corner| table.is_rim(corner));
+        Self { of_group, groups_at, was_even }
+    }
+
+    /// Returns true if all edges of groups have an even number of facets, of those that stay.
+    fn are_even(&self, keeps: &[Option<bool>]) -> bool {
+        self.groups_at.values().all(|(at, is_odd)| {
+            let kept = at.iter().filter(|&&group| keeps[group] == Some(true)).count();
+            *is_odd == (kept % 2 == 1)
+        })
+    }
+
+    /// Decides on a group, and on those that hang together with it by edges on which all others
+    /// are known.
+    fn decide(&self, first: usize, groups: &[Group], keeps: &mut [Option<bool>]) {
+        // Whether each group stays if the first does.
+        let mut as_first = HashMap::from([(first, true)]);
+        let (mut cluster, mut next) = (vec![first], 0);
+        let (mut stay, mut go) = (0, 0);
+        while let Some(&group) = cluster.get(next) {
+            next += 1;
+            for edge in self.of_group[group] {
+                let (at, is_odd) = &self.groups_at[&edge];
+                let open: Vec<usize> =
+                    at.iter().copied().filter(|&group| keeps[group].is_none()).collect();
+                let kept = at.iter().filter(|&&group| keeps[group] == Some(true)).count();
+                let is_odd = is_odd ^ (kept % 2 == 1);
+                match open[..] {
+                    // It makes an odd number even, or an even one odd.
+                    [_] if is_odd == as_first[&group] => stay += 1,
+                    [_] => go += 1,
+                    [a, b] => {
+                        let other = if a == group { b } else { a };
+                        let with_first = as_first[&group] ^ is_odd;
+                        if as_first.insert(other, with_first).is_none() {
+                            cluster.push(other);
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let usual = as_first[&first] != groups[first].is_balanced;
+        let first_stays = if stay == go { usual } else { stay > go };
+        for group in cluster {
+            keeps[group] = Some(as_first[&group] == first_stays);
+        }
+    }
 }

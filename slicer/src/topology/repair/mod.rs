@@ -6,6 +6,7 @@ mod fill;
 use crate::error::SliceError;
 use crate::facet::Facet;
 use crate::topology::corner_table::facet_of;
+use crate::topology::slivers::without_slivers;
 use crate::topology::{CornerTable, MeshCheck, Shells};
 
 /// How far a repair may go, in the unit of the facets.
@@ -76,7 +77,9 @@ const MAX_ROUNDS: usize = 32;
 /// was repaired with the same options.
 ///
 /// Round by round it welds rims, drops facets, turns over those that face the other way than their
-/// neighbours, closes holes, and turns over shells that face into the material.
+/// neighbours, gives the corners of facets without area to their neighbours, closes holes, and turns
+/// over shells that face into the material. A mesh whose edges all have an even number of facets
+/// keeps them so.
 ///
 /// # Errors
 /// Returns an error if there are no facets, too many, or none would be left.
@@ -133,6 +136,15 @@ impl Work {
         let check = MeshCheck::of_shells(&table, &shells);
         if !check.turned.is_empty() {
             check.turned.iter().for_each(|&facet| self.turn(facet));
+            return Ok(true);
+        }
+        let mended = without_slivers(&table);
+        if !mended.is_empty() {
+            for (facet, vertices) in mended {
+                let point = |vertex: u32| table.points()[vertex as usize].map(|c| c as f32);
+                self.facets[facet as usize] = vertices.map(point);
+                self.origins[facet as usize].is_moved = true;
+            }
             return Ok(true);
         }
         let added = fill::closing(&table, &check.loops, options.close);
@@ -301,6 +313,123 @@ mod tests {
         assert_eq!(repaired(&twice, &USUAL).facets, cube);
         let both_ways = [cube.clone(), turned(&cube)].concat();
         assert!(matches!(repair(both_ways, &USUAL), Err(SliceError::NothingLeft { facets: 24 })));
+    }
+
+    /// How many edges have an odd number of facets.
+    fn odd_edges(facets: &[Facet]) -> usize {
+        let mut counts = std::collections::HashMap::new();
+        for &[a, b, c] in facets {
+            for side in [[a, b], [b, c], [c, a]] {
+                let mut ends = side.map(|end| end.map(|c| (c + 0.0).to_bits()));
+                ends.sort_unstable();
+                *counts.entry(ends).or_insert(0) += 1;
+            }
+        }
+        counts.values().filter(|&&count| count % 2 == 1).count()
+    }
+
+    fn volume(facets: &[Facet]) -> f64 {
+        Mesh { facets: facets.to_vec() }.volume_mm3()
+    }
+
+    /// A square of facets that stands on the lid of a block of 10 mm, in `steps` steps each way.
+    fn fin(steps: usize) -> Vec<Facet> {
+        let at = |i: usize, j: usize| [i, i, j].map(|k| 10.0 * k as f32 / steps as f32);
+        let up = |[x, y, z]: [f32; 3]| [x, y, z + 10.0];
+        let squares = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
+        squares
+            .flat_map(|(i, j)| {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)].map(up);
+                [[a, b, c], [a, c, d]]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn fins_held_twice_go_and_patches_held_twice_stay_once() {
+        let cube = block([0.0; 3], [10.0; 3]);
+        for steps in [1, 2, 5, 9] {
+            let fin = fin(steps);
+            for copies in [vec![fin.clone(), fin.clone()], vec![fin.clone(), turned(&fin)]] {
+                let facets = [cube.clone(), copies.concat()].concat();
+                assert_eq!(odd_edges(&facets), 0);
+                let done = repaired(&facets, &USUAL);
+                assert_eq!((&done.facets, done.touched.len()), (&cube, 2 * fin.len()));
+            }
+            // Held three times, it stays once: its rim was open.
+            let thrice = [cube.clone(), fin.clone(), fin.clone(), fin.clone()].concat();
+            let done = repair(thrice, &RepairOptions { weld: 0.0, close: 0.0 }).unwrap();
+            assert_eq!(done.facets.len(), cube.len() + fin.len());
+        }
+        let ball = sphere(10.0, 2_000).facets;
+        let patch = ball[100..400].to_vec();
+        for extra in [patch.clone(), turned(&patch), [patch.clone(), turned(&patch)].concat()] {
+            let done = repaired(&[ball.clone(), extra].concat(), &USUAL);
+            assert!(done.left.is_clean());
+            assert!((volume(&done.facets) / volume(&ball) - 1.0).abs() < 1e-9);
+        }
+        // Where a hole has doubled facets around it, they stay.
+        let mut holed = ball.clone();
+        holed.remove(200);
+        let done = repaired(&[holed.clone(), holed[150..250].to_vec()].concat(), &USUAL);
+        assert!(done.left.is_clean() && done.facets.len() == ball.len());
+    }
+
+    #[test]
+    fn even_meshes_stay_even_and_keep_their_volume() {
+        let mut numbers = SplitMix(31);
+        for round in 0..120 {
+            let mut facets = match round % 3 {
+                0 => sphere(10.0, 300).facets,
+                1 => block([0.0; 3], [10.0; 3]),
+                _ => [block([0.0; 3], [10.0; 3]), fin(3), turned(&fin(3))].concat(),
+            };
+            let good = volume(&facets);
+            // Pairs of facets, the same way or back to back, between any vertices.
+            for _ in 0..1 + numbers.below(30) {
+                let mut corner = || facets[numbers.below(facets.len())][numbers.below(3)];
+                let facet = [corner(), corner(), corner()];
+                let known = facets[numbers.below(facets.len())];
+                let [a, b, c] = if numbers.below(2) == 0 { facet } else { known };
+                if a != b && b != c && c != a {
+                    let other = if numbers.below(3) == 0 { [a, b, c] } else { [a, c, b] };
+                    facets.extend([[a, b, c], other]);
+                }
+            }
+            assert_eq!(odd_edges(&facets), 0);
+            let done = repaired(&facets, &USUAL);
+            assert_eq!(odd_edges(&done.facets), 0, "round {round}");
+            let kept = volume(&done.facets);
+            assert!((kept / good - 1.0).abs() < 1e-6, "round {round}: {kept} for {good}");
+        }
+    }
+
+    #[test]
+    fn slivers_and_vertices_on_sides_are_mended() {
+        // A block whose lid knows a vertex in the middle of each side, its walls not.
+        let lid = |with_slivers: bool| {
+            let mut facets = block([0.0; 3], [10.0; 3]);
+            facets.drain(2..4);
+            let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0f32]];
+            let up = |[x, y]: [f32; 2]| [x, y, 10.0];
+            let middle = |k: usize| [0, 1].map(|n| (corners[k][n] + corners[(k + 1) % 4][n]) / 2.0);
+            for k in 0..4 {
+                let [from, to] = [k, (k + 1) % 4].map(|k| up(corners[k]));
+                let [half, centre] = [up(middle(k)), up([5.0, 5.0])];
+                facets.extend([[from, half, centre], [half, to, centre]]);
+                if with_slivers {
+                    facets.push([from, to, half]);
+                }
+            }
+            facets
+        };
+        for with_slivers in [true, false] {
+            let facets = lid(with_slivers);
+            let options = RepairOptions { weld: 0.001, close: 20.0 };
+            let done = repaired(&facets, &options);
+            assert!(done.left.is_clean(), "{with_slivers} {:?}", done.left);
+            assert!((volume(&done.facets) - 1000.0).abs() < 1e-9);
+        }
     }
 
     #[test]

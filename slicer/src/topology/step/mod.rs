@@ -1,5 +1,6 @@
 //! Writes a mesh as a STEP file: a faceted B-rep of its lumps.
 
+mod decimals;
 mod entities;
 mod flat_faces;
 mod outline;
@@ -10,13 +11,16 @@ use lamp_brep::vector::{Vec3, add, cross, sub, unit};
 use lamp_stack::Grouped;
 use thiserror::Error;
 
-use crate::topology::{CornerTable, Lump, MeshCheck, Shells};
+use crate::topology::crossings::deepest;
+use crate::topology::slivers::without_slivers;
+use crate::topology::{CornerTable, Crossings, Lump, MeshCheck, Shells};
+use decimals::{meant, unit_mm};
 use entities::{EntityWriter, text};
 use flat_faces::FlatFaces;
 use outline::{Dropped, outer_first, outlines};
 
 /// A reason that a mesh is no solid that a STEP file could hold.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoSolid {
     /// It has holes.
@@ -43,19 +47,41 @@ pub enum NoSolid {
         /// The shells that face into the material, or have one side only.
         shells: usize,
     },
+    /// Its surface passes through itself.
+    #[error(
+        "the surface passes through itself at {pairs} pairs of facets: facets {} and {} cross by \
+         {depth_mm:.6} mm at ({:.3}, {:.3}, {:.3}) mm; mend the part where it was made, or slice the \
+         mesh itself",
+        facets[0], facets[1], at_mm[0], at_mm[1], at_mm[2]
+    )]
+    Crossed {
+        /// The pairs of facets that cross.
+        pairs: usize,
+        /// The facets that cross deepest, of the first pairs.
+        facets: [u32; 2],
+        /// Where they cross, in millimetres.
+        at_mm: [f64; 3],
+        /// How deep, in millimetres.
+        depth_mm: f64,
+    },
 }
 
 /// A mesh as solids with flat faces, to be written as a STEP file (ISO 10303-21, AP214).
 ///
 /// Facets in one plane are one face, with loops inside it where it has holes; vertices are in one
-/// plane if they lie within 1e-9 of the part's size of it. Vertices exactly on a straight side of
-/// two faces are left out. All others keep their coordinates to the last bit.
+/// plane if they lie within 1e-9 of the part's size of it. Vertices on a straight side of
+/// two faces, as exactly as 64 bits tell, are left out.
+///
+/// Coordinates of 32 bits become the shortest decimals that mean the same 32-bit numbers: those
+/// that the part was made with, as 1.3 for 1.2999999523162842. Faces are found with these decimals.
+/// Facets without area along a straight side give that side's vertices to their neighbours.
+/// Should decimals make facets cross that do not, coordinates stay as they are to the last bit.
 ///
 /// Each lump of the mesh is a `FACETED_BREP`, and one with voids a `BREP_WITH_VOIDS`. Faces
 /// are bounded by `POLY_LOOP`s, which need neither edges nor curves, and so little text.
 #[derive(Debug)]
-pub struct StepSolids<'a> {
-    table: &'a CornerTable,
+pub struct StepSolids {
+    table: CornerTable,
     lumps: Vec<Lump>,
     /// The faces of each shell.
     of_shell: Grouped<u32>,
@@ -63,18 +89,30 @@ pub struct StepSolids<'a> {
     dropped: Dropped,
 }
 
-impl<'a> StepSolids<'a> {
-    /// Finds the solids and faces of a mesh. It takes some 40 bytes a facet.
+impl StepSolids {
+    /// Finds the solids and faces of a mesh. Besides the table, it takes as much as the table, and
+    /// some 40 bytes a facet.
     ///
     /// # Errors
-    /// Returns an error if the mesh is open, or has any other fault of [`MeshCheck`].
-    pub fn new(table: &'a CornerTable) -> Result<Self, NoSolid> {
-        let shells = Shells::new(table);
-        let check = MeshCheck::of_shells(table, &shells);
+    /// Returns an error if the mesh is open, has any other fault of [`MeshCheck`] than facets
+    /// without area along a side, or passes through itself. Solids may pass through each other.
+    pub fn new(table: CornerTable) -> Result<Self, NoSolid> {
+        let unit_mm = unit_mm(table.points());
+        let decimal = table.clone().with_points(|c| meant(c, unit_mm));
+        Self::of_exact(decimal).or_else(|_| Self::of_exact(table))
+    }
+
+    /// As [`new`](Self::new), with all digits of the coordinates.
+    fn of_exact(table: CornerTable) -> Result<Self, NoSolid> {
+        let changed = without_slivers(&table);
+        let table = if changed.is_empty() { table } else { table.with_facets(&changed) };
+        let shells = Shells::new(&table);
+        let check = MeshCheck::of_shells(&table, &shells);
         check_solid(&check)?;
-        let mut faces = FlatFaces::new(table);
-        faces.split_where(|faces, facets| outlines(table, facets, faces).is_none());
-        let dropped = Dropped::new(table, &faces);
+        check_apart(&table, &shells, &check.lumps)?;
+        let mut faces = FlatFaces::new(&table);
+        faces.split_where(|faces, facets| outlines(&table, facets, faces).is_none());
+        let dropped = Dropped::new(&table, &faces);
         let shell_of = |face: u32| shells.of(faces.facets(face)[0]) as usize;
         let of_shell =
             Grouped::new(shells.count(), || (0..faces.count()).map(|face| (shell_of(face), face)));
@@ -158,11 +196,11 @@ impl<'a> StepSolids<'a> {
         file: &mut EntityWriter<'_>,
     ) -> io::Result<u64> {
         let facets = self.faces.facets(face);
-        let normal = normal(self.table, facets);
-        let outlines = outlines(self.table, facets, &self.faces).unwrap_or_default();
+        let normal = normal(&self.table, facets);
+        let outlines = outlines(&self.table, facets, &self.faces).unwrap_or_default();
         let mut outlines: Vec<Vec<u32>> =
             outlines.into_iter().map(|outline| self.dropped.without(&outline)).collect();
-        outer_first(self.table, normal, &mut outlines);
+        outer_first(&self.table, normal, &mut outlines);
         let plane = file.plane(points[outlines[0][0] as usize], normal)?;
         let mut bounds = Vec::with_capacity(outlines.len());
         for (number, outline) in outlines.iter().enumerate() {
@@ -189,6 +227,32 @@ fn check_solid(check: &MeshCheck) -> Result<(), NoSolid> {
         }),
         sides => Err(NoSolid::Open { sides }),
     }
+}
+
+/// How deep facets may cross, as a share of the greatest coordinate: the rounding of 32 bits moves
+/// coordinates by up to 2^-24 of themselves.
+const ROUNDED: f64 = 1e-6;
+
+/// How many pairs of facets that cross are looked at for the deepest one.
+const PAIRS: usize = 1000;
+
+/// Refuses a mesh in which facets of one solid cross.
+fn check_apart(table: &CornerTable, shells: &Shells, lumps: &[Lump]) -> Result<(), NoSolid> {
+    let mut lump_of = vec![0; shells.count()];
+    for (number, lump) in (0..).zip(lumps) {
+        lump_of[lump.outer as usize] = number;
+        lump.voids.iter().for_each(|&void| lump_of[void as usize] = number);
+    }
+    let greatest = table.points().iter().flatten().fold(0.0, |most, c| f64::max(most, c.abs()));
+    let lump = |facet: u32| lump_of[shells.of(facet) as usize];
+    let found = Crossings::of_pairs(table, PAIRS, |a, b| {
+        lump(a) == lump(b) && deepest(table, a, b).1 > ROUNDED * greatest
+    });
+    let depth = |pair: &[u32; 2]| (deepest(table, pair[0], pair[1]), *pair);
+    let worst = found.pairs.iter().map(depth).max_by(|a, b| a.0.1.total_cmp(&b.0.1));
+    worst.map_or(Ok(()), |((at_mm, depth_mm), facets)| {
+        Err(NoSolid::Crossed { pairs: found.count, facets, at_mm, depth_mm })
+    })
 }
 
 /// Returns the unit normal of facets in one plane.

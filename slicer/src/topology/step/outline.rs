@@ -4,6 +4,7 @@ use lamp_brep::vector::{Vec3, cross, dot, sub};
 
 use super::flat_faces::FlatFaces;
 use crate::topology::CornerTable;
+use crate::topology::faults::is_flat_between;
 
 /// Returns the loops of vertices around facets of one face, with the face to the left as seen from
 /// outside; none if a vertex is on them twice, so that they touch.
@@ -90,7 +91,7 @@ impl Dropped {
             let [before, vertex, after] = [k + count - 1, k, k + 1].map(|k| outline[k % count]);
             let [a, p, b] = [before, vertex, after].map(|vertex| table.points()[vertex as usize]);
             let (way, on) = (sub(p, a), sub(b, p));
-            let is_straight = cross(way, on) == [0.0; 3] && dot(way, on) > 0.0;
+            let is_straight = is_flat_between([a, p, b]) && dot(way, on) > 0.0;
             if self.faces_at[vertex as usize] == 2 && is_straight {
                 self.is_dropped[vertex as usize] = true;
             }

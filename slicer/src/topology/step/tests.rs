@@ -30,7 +30,7 @@ fn fit(points: &[[f64; 2]]) -> [f64; 2] {
 
 fn step(mesh: &Mesh) -> (String, usize) {
     let table = table_of(&mesh.facets);
-    let solids = StepSolids::new(&table).unwrap();
+    let solids = StepSolids::new(table).unwrap();
     let mut text = Vec::new();
     solids.write("part", &mut text).unwrap();
     (String::from_utf8(text).unwrap(), solids.faces())
@@ -149,7 +149,7 @@ fn a_face_that_touches_itself_stays_in_facets() {
 
 #[test]
 fn what_is_no_solid_is_refused() {
-    let refused = |mesh: &Mesh| StepSolids::new(&table_of(&mesh.facets)).unwrap_err();
+    let refused = |mesh: &Mesh| StepSolids::new(table_of(&mesh.facets)).unwrap_err();
     for (defect, is_open) in [(Defect::Drop, true), (Defect::Flip, false)] {
         let mut mesh = parts::sphere(5.0, 500);
         inject(&mut mesh, defect, 3, 1);
@@ -160,6 +160,144 @@ fn what_is_no_solid_is_refused() {
     let mut nan = parts::sphere(5.0, 500);
     nan.facets.push([[f32::NAN; 3]; 3]);
     assert!(matches!(refused(&nan), NoSolid::Faulty { flat: 1.., .. }));
+}
+
+/// All coordinates of a file, by axis, sorted and each once.
+fn coordinates(text: &str) -> [Vec<f64>; 3] {
+    let points = text.lines().filter_map(|line| line.split_once("CARTESIAN_POINT('',("));
+    let points: Vec<Vec<f64>> = points
+        .map(|(_, numbers)| {
+            let numbers = numbers.trim_end_matches(|c| c == ')' || c == ';');
+            numbers.split(',').map(|number| number.parse().unwrap()).collect()
+        })
+        .collect();
+    [0, 1, 2].map(|axis| {
+        let mut along: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        along.dedup();
+        along
+    })
+}
+
+/// The volume of the one body of a file, by its surfaces.
+fn exact_volume(text: &str) -> f64 {
+    let read = lamp_brep::prepare(text.as_bytes(), lamp_brep::read_step, 0.01).unwrap();
+    assert!(read.is_good() && read.reports.len() == 1, "{:?}", read.reports);
+    read.reports[0].exact_volume_mm3
+}
+
+/// A stair of blocks as one shell: an outline of steps in x and z, as wide as `y`.
+fn stair(x: &[f64], y: [f64; 2], z: &[f64]) -> Mesh {
+    let mut facets: Vec<Facet> = Vec::new();
+    let mut quad = |corners: [[f64; 3]; 4]| {
+        let [a, b, c, d] = corners.map(|corner| corner.map(|c| c as f32));
+        facets.extend([[a, b, c], [a, c, d]]);
+    };
+    let steps = z.len() - 1;
+    // Column k reaches from the lowest height up to z[steps - k].
+    let is_in = |k: usize, row: usize| k < steps && row < steps - k;
+    for k in 0..steps {
+        for row in 0..steps - k {
+            let ([x0, x1], [z0, z1]) = ([x[k], x[k + 1]], [z[row], z[row + 1]]);
+            quad([[x0, y[0], z0], [x1, y[0], z0], [x1, y[0], z1], [x0, y[0], z1]]);
+            quad([[x0, y[1], z0], [x0, y[1], z1], [x1, y[1], z1], [x1, y[1], z0]]);
+            if row == 0 {
+                quad([[x0, y[0], z0], [x0, y[1], z0], [x1, y[1], z0], [x1, y[0], z0]]);
+            }
+            if k == 0 {
+                quad([[x0, y[0], z0], [x0, y[0], z1], [x0, y[1], z1], [x0, y[1], z0]]);
+            }
+            if !is_in(k, row + 1) {
+                quad([[x0, y[0], z1], [x1, y[0], z1], [x1, y[1], z1], [x0, y[1], z1]]);
+            }
+            if !is_in(k + 1, row) {
+                quad([[x1, y[0], z0], [x1, y[1], z0], [x1, y[1], z1], [x1, y[0], z1]]);
+            }
+        }
+    }
+    Mesh { facets }
+}
+
+#[test]
+fn files_hold_the_decimals_that_were_meant() {
+    let mut numbers = lamp_fixtures::SplitMix(23);
+    // Whole micrometres, up to a metre from the origin: 32 bits tell them apart up to 8 m.
+    for _ in 0..40 {
+        let steps = 2 + numbers.below(6);
+        let mut along = |most: usize| -> Vec<f64> {
+            let mut at = numbers.below(most) as f64 / 1e3 - most as f64 / 2e3;
+            (0..=steps)
+                .map(|_| {
+                    at += (1 + numbers.below(3000)) as f64 / 1e3;
+                    (at * 1e3).round() / 1e3
+                })
+                .collect()
+        };
+        let [x, y, z] = [along(2_000_000), along(100_000), along(1_000)];
+        let y = [y[0], y[1]];
+        let mesh = stair(&x, y, &z);
+        let (text, faces) = step(&mesh);
+        assert_eq!(coordinates(&text), [x.clone(), y.to_vec(), z.clone()]);
+        assert_eq!(faces, 2 * steps + 4);
+        let areas = (0..steps).map(|k| (x[k + 1] - x[k]) * (z[steps - k] - z[0]));
+        let meant = areas.sum::<f64>() * (y[1] - y[0]);
+        let found = exact_volume(&text);
+        assert!((found / meant - 1.0).abs() < 1e-10, "{found} {meant}");
+    }
+}
+
+#[test]
+fn slanted_sides_stay_flat_and_slivers_join_their_neighbours() {
+    // A wedge whose slanted side has vertices that only decimals put on one line.
+    let [a, b, c] = [[0.0, 0.0, 0.1f32], [7.0, 0.0, 0.1], [0.0, 0.0, 2.2]];
+    let back = |[x, _, z]: [f32; 3]| [x, 5.0, z];
+    let on = [[2.0, 0.0, 1.6f32], [4.0, 0.0, 1.0], [6.0, 0.0, 0.4]];
+    let line: Vec<_> = [c].into_iter().chain(on).chain([b]).collect();
+    let [d, e, f] = [a, b, c].map(back);
+    let mut facets = vec![[d, f, e], [a, e, b], [a, d, e], [a, f, d], [a, c, f], [a, b, c]];
+    // The slanted side meets the vertices, the front has slivers along its edge.
+    facets.extend(line.windows(2).map(|side| [side[0], side[1], e]));
+    facets.push([c, e, f]);
+    facets.extend((1..4).map(|k| [b, line[k], line[k - 1]]));
+    let mesh = Mesh { facets };
+    let table = table_of(&mesh.facets);
+    assert_eq!(MeshCheck::new(&table).loops.len(), 0);
+    let (text, faces) = step(&mesh);
+    assert_eq!((faces, text.matches("CARTESIAN_POINT").count()), (5, 6));
+    // Normals have eleven digits.
+    assert!((exact_volume(&text) - 0.5 * 7.0 * 2.1 * 5.0).abs() < 1e-8);
+}
+
+#[test]
+fn a_surface_through_itself_is_refused_and_solids_through_each_other_are_not() {
+    // A tower that leans through the floor that it stands on.
+    let cube = block([0.0; 3], [4.0; 3]);
+    let bar = block([1.0, 1.0, -1.0], [2.0, 2.0, 5.0]);
+    let both = Mesh { facets: [cube.clone(), bar].concat() };
+    let (text, _) = step(&both);
+    assert_eq!(text.matches("FACETED_BREP('',").count(), 2);
+    // The lid's middle is pushed through the floor.
+    let push = |depth: f32| {
+        let mut facets = cube.clone();
+        let lid: Vec<Facet> = facets.drain(2..4).collect();
+        let middle = [2.0, 2.0, depth];
+        let [p, q, r, s] = [lid[0][0], lid[0][1], lid[0][2], lid[1][2]];
+        facets.extend([[p, q, middle], [q, r, middle], [r, s, middle], [s, p, middle]]);
+        StepSolids::new(table_of(&facets))
+    };
+    assert!(push(0.5).is_ok());
+    assert!(push(-1e-6).is_ok(), "the rounding of 32 bits is no crossing");
+    for depth in [-0.01, -1.0] {
+        let NoSolid::Crossed { at_mm: [x, y, z], depth_mm, pairs, .. } = push(depth).unwrap_err()
+        else {
+            panic!("the surface passes through itself")
+        };
+        let is_there = (x - 2.0).abs() < 0.5 && (y - 2.0).abs() < 0.5 && z.abs() < 1e-6;
+        assert!(is_there && depth_mm > 0.001 && pairs > 0, "{x} {y} {z} {depth_mm}");
+    }
+    // A cavity that leaves its block is no solid either.
+    let cavity = turned(&block([1.0, 1.0, 1.0], [3.0, 3.0, 5.0]));
+    assert!(StepSolids::new(table_of(&[cube, cavity].concat())).is_err());
 }
 
 #[test]
