@@ -42,6 +42,7 @@ mod bodies;
 mod buckets;
 mod closure;
 mod cut;
+mod decimal_mesh;
 mod error;
 pub mod exact;
 mod facet;
@@ -69,6 +70,7 @@ mod three_mf;
 pub mod topology;
 mod trace;
 mod unpack;
+mod utf8_text;
 mod wild;
 
 /// B-rep models: kernels, and reports of what they read.

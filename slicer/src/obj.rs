@@ -2,8 +2,9 @@
 
 use std::io::BufRead;
 
+use crate::decimal_mesh::DecimalMesh;
 use crate::error::{ObjFault, SliceError};
-use crate::facet::Facet;
+use crate::part::Piece;
 use crate::text_lines::{TextLines, without_mark};
 
 /// A face of a hundred thousand corners takes this much.
@@ -33,7 +34,7 @@ pub(crate) fn looks_obj(start: &[u8]) -> bool {
 
 /// Reads the faces of all objects, as fans of facets. A face that is not convex has
 /// facets that overlap, but the same sections by either rule of filling.
-pub(crate) fn read(text: impl BufRead) -> Result<Vec<Facet>, SliceError> {
+pub(crate) fn read(text: impl BufRead) -> Result<Piece, SliceError> {
     let mut lines = TextLines::new(text, MAX_LINE_BYTES);
     let mut mesh = ObjMesh::default();
     while lines.advance()? {
@@ -51,15 +52,14 @@ pub(crate) fn read(text: impl BufRead) -> Result<Vec<Facet>, SliceError> {
         };
         added.map_err(failed)?;
     }
-    Ok(mesh.facets)
+    Ok(mesh.mesh.into_piece())
 }
 
 #[derive(Default)]
 struct ObjMesh {
-    vertices: Vec<[f32; 3]>,
-    facets: Vec<Facet>,
+    mesh: DecimalMesh,
     /// The corners of the face at hand.
-    face: Vec<[f32; 3]>,
+    face: Vec<u32>,
 }
 
 impl ObjMesh {
@@ -68,7 +68,7 @@ impl ObjMesh {
         let text = str::from_utf8(values).map_err(|_| ObjFault::Number)?;
         let mut numbers = text.split_whitespace().map(str::parse);
         let mut number = || numbers.next().and_then(Result::ok).ok_or(ObjFault::Number);
-        self.vertices.push([number()?, number()?, number()?]);
+        self.mesh.add_vertex([number()?, number()?, number()?]);
         Ok(())
     }
 
@@ -86,24 +86,34 @@ impl ObjMesh {
         if others.len() < 2 {
             return Err(ObjFault::FewCorners);
         }
-        self.facets.extend(others.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        others.windows(2).for_each(|pair| self.mesh.add_facet([*first, pair[0], pair[1]]));
         Ok(())
     }
 
-    /// Returns a vertex by its number, from 1; or from -1, the last one, backwards.
-    fn vertex(&self, number: i64) -> Option<[f32; 3]> {
+    /// Returns the index of a vertex by its number, from 1; or from -1, the last one, backwards.
+    fn vertex(&self, number: i64) -> Option<u32> {
+        let count = self.mesh.vertex_count();
         let index = if number < 0 {
-            self.vertices.len().checked_sub(number.unsigned_abs().try_into().ok()?)?
+            count.checked_sub(number.unsigned_abs().try_into().ok()?)?
         } else {
             usize::try_from(number).ok()?.checked_sub(1)?
         };
-        self.vertices.get(index).copied()
+        u32::try_from(index).ok().filter(|_| index < count)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::facet::Facet;
+    use crate::part::Facets;
+
+    fn read_facets(text: &str) -> Vec<Facet> {
+        match read(text.as_bytes()).unwrap().facets {
+            Facets::Memory(facets) => facets.to_vec(),
+            _ => panic!("text is read into memory"),
+        }
+    }
 
     const TETRA: &str = "\
 # a tetrahedron
@@ -130,7 +140,7 @@ f 2 3 4
         let expected = [[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
         for text in [TETRA.to_owned(), TETRA.replace('\n', "\r\n"), format!("\u{FEFF}{TETRA}")] {
             assert!(looks_obj(text.as_bytes()));
-            assert_eq!(read(text.as_bytes()).unwrap(), expected);
+            assert_eq!(read_facets(&text), expected);
         }
     }
 
@@ -138,7 +148,7 @@ f 2 3 4
     fn faces_are_fans() {
         let [o, x, y, z] = CORNERS;
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4 2\n";
-        assert_eq!(read(text.as_bytes()).unwrap(), [[o, x, y], [o, y, z], [o, z, x]]);
+        assert_eq!(read_facets(text), [[o, x, y], [o, y, z], [o, z, x]]);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use lamp_stack::{Length, digest_of, one_line};
 
 use crate::error::SliceError;
 use crate::obj::{self, looks_obj};
-use crate::part::{Facets, Part, Piece};
+use crate::part::{Part, Piece};
 use crate::part_file::PartFile;
 use crate::stl;
 use crate::three_mf::{self, Contents, looks_packaged};
@@ -172,24 +172,23 @@ fn unpacked(
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
-    let of_one = |facets| Contents { pieces: vec![Piece::new(facets)], notes: Vec::new() };
+    let of_one = |piece| Contents { pieces: vec![piece], notes: Vec::new() };
     if is_step(start) {
         let mut bytes = Vec::new();
         file.reader().read_to_end(&mut bytes)?;
         let prepared = read_good(&bytes.into(), options)?;
         return Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() });
     }
-    if looks_packaged(start) {
+    if looks_packaged(file, start)? {
         return Ok(three_mf::read(file).map_err(Box::new)?);
     }
     if let Some(format) = other_format(start) {
         return Err(SliceError::OtherFormat(format));
     }
     if looks_obj(start) {
-        let facets = obj::read(BufReader::new(file.reader()))?;
-        return Ok(of_one(Facets::Memory(Arc::new(facets))));
+        return Ok(of_one(obj::read(BufReader::new(file.reader()))?));
     }
-    Ok(of_one(stl::open(file, start)?))
+    Ok(of_one(Piece::new(stl::open(file, start)?)))
 }
 
 /// Returns the format of a file that was given by mistake, if it is known.

@@ -48,6 +48,9 @@ pub(crate) struct Piece {
     pub(crate) first_facet: usize,
     /// The unit that the file states, if it does.
     pub(crate) units: Option<Units>,
+    /// The point, in units of the file, that its facets are relative to: the origin, but for
+    /// facets so far from it that 32 bits cannot tell their corners apart.
+    pub(crate) offset: [f64; 3],
     /// How it stands among the other pieces.
     pub(crate) placement: Placement,
     /// The number in the file of the object whose volume it adds to or takes from.
@@ -127,6 +130,7 @@ impl Piece {
             file: 0,
             first_facet: 0,
             units: None,
+            offset: [0.0; 3],
             placement,
             object: 0,
             role: Role::default(),

@@ -218,7 +218,9 @@ impl PlacedPart {
         let mut file_before = None;
         let mut place = |(body, piece): (u32, &Piece)| {
             let units = piece.units.unwrap_or(units);
-            let placement = piece.placement.then(placement);
+            let from_corner =
+                Placement::default().translated(piece.offset.map(|offset| offset * units.mm()));
+            let placement = from_corner.then(&piece.placement).then(placement);
             let transform = Transform::new(&placement, units);
             // Pieces that stand alike follow each other.
             if transforms.last() != Some(&transform) {

@@ -174,7 +174,11 @@ impl Survey {
         let files = pieces.last().map_or(0, |last| last.file + 1);
         let mut boxes = vec![([f64::MAX; 3], [f64::MIN; 3]); files];
         for (block, survey) in self.blocks.iter().enumerate() {
-            let (low, high) = &mut boxes[pieces[part.model.place_of(block).0].file];
+            let piece = &pieces[part.model.place_of(block).0];
+            if piece.rule().is_cutter() {
+                continue;
+            }
+            let (low, high) = &mut boxes[piece.file];
             for axis in 0..3 {
                 low[axis] = low[axis].min(survey.min[axis]);
                 high[axis] = high[axis].max(survey.max[axis]);

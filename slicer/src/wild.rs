@@ -177,6 +177,7 @@ fn first_beyond(
     let (piece, facet, corner) = found.unwrap_or_default();
     let corner = part.model.facet(piece, facet)?[corner];
     let of_file = &part.model.pieces()[piece];
+    let corner = std::array::from_fn(|axis| corner[axis] + of_file.offset[axis] as f32);
     let (file, facet) = (of_file.file, of_file.first_facet + facet);
     Ok(SliceError::WildVertex { file, facet, corner, reaching, facets: part.model.facet_count() })
 }

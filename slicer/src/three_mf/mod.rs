@@ -2,36 +2,42 @@
 //!
 //! An item stands where its transform puts it. Its object is a mesh, or is put together
 //! of other objects, each with a transform of its own. Every mesh that is reached becomes
-//! a piece; pieces of one mesh share its facets.
+//! a piece; pieces of one mesh share its facets. Projects of slicers have meshes that are cut out
+//! of others, and some that are no solids.
 
 mod model;
+mod package;
+mod project;
+mod slices;
+#[cfg(test)]
+mod tests;
+mod xml;
 
-use std::collections::BTreeMap;
-use std::io::{self, BufRead, BufReader, Read};
+use std::collections::{BTreeMap, BTreeSet};
 
 use thiserror::Error;
-use zip::ZipArchive;
 use zip::result::ZipError;
 
+use crate::bodies::Role;
 use crate::part::{Facets, Piece};
-use crate::part_file::{FileReader, PartFile};
+use crate::part_file::PartFile;
 use crate::placement::Placement;
 use crate::read_note::ReadNote;
-use crate::unpack::most_unpacked;
 use model::{Model, Object, Reference, Shape};
+use package::{Package, without_root};
+use project::{PROJECT_FILES, Project, UNREAD_FILES, VolumeKind};
+use slices::Prisms;
+
+pub(crate) use package::looks_packaged;
 
 /// Objects within objects, so that a few lines of text may stand for more meshes than
 /// there are atoms.
 const MAX_DEPTH: usize = 32;
 /// Objects that are visited in all.
 const MAX_VISITS: usize = 1 << 14;
-/// The longest tag, comment or text in XML.
-const MAX_XML_BYTES: usize = 4 << 20;
-
-/// The relationship that names the model of a package.
-const MODEL_RELATIONSHIP: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
-/// Where nearly all programs put the model.
-const USUAL_MODEL: &str = "3D/3dmodel.model";
+/// A mesh whose volume differs from that of its slices by a larger share is a stand-in: often it is
+/// their bounding box. Slices are as coarse as their layers.
+const SAME_VOLUME: f64 = 0.05;
 
 /// Why a 3MF file cannot be read.
 #[derive(Debug, Error)]
@@ -61,6 +67,33 @@ pub enum ThreeMfError {
         /// The object's number.
         id: u32,
     },
+    /// An object whose shape is made in a way that is not read.
+    #[error(
+        "object {id} of its {model} is made by {feature}, which is not read: export it as a plain mesh"
+    )]
+    Unread {
+        /// The name of the model in the package.
+        model: String,
+        /// The object's number.
+        id: u32,
+        /// The way in which it is made.
+        feature: &'static str,
+    },
+    /// Slices that cannot be read.
+    #[error("object {id} of its {model} has {fault}")]
+    Slices {
+        /// The name of the model in the package.
+        model: String,
+        /// The object's number.
+        id: u32,
+        /// The fault of its slices.
+        fault: &'static str,
+    },
+    /// A model that only those who have its key can read.
+    #[error(
+        "its {0} is encrypted, and encrypted models are not read: export it without protection"
+    )]
+    Encrypted(String),
     /// An object that holds itself, or very many objects.
     #[error("its objects hold themselves, or more than {MAX_VISITS} objects in all")]
     Endless,
@@ -93,13 +126,21 @@ pub enum ModelFault {
         /// The attribute's name.
         attribute: &'static str,
     },
-    /// A triangle at a vertex that does not stand before it.
-    #[error("a triangle names vertex {vertex} of {count}")]
+    /// A triangle at a vertex that does not stand before it, or a segment of a slice.
+    #[error("a {of} names vertex {vertex} of {count}")]
     NoVertex {
+        /// The element.
+        of: &'static str,
         /// The vertex, from 0.
         vertex: u32,
         /// How many there are.
         count: usize,
+    },
+    /// Volumes of a project that a mesh does not have.
+    #[error("the project's volumes of object {object} overlap, or are not in its mesh")]
+    Volumes {
+        /// The object's number.
+        object: u32,
     },
     /// An extension that must be understood, and is not.
     #[error("it needs the extension {0}, which is not read")]
@@ -122,45 +163,123 @@ pub(crate) struct Contents {
     pub(crate) notes: Vec<ReadNote>,
 }
 
-/// Returns true if a file that starts with these bytes is a ZIP package.
-pub(crate) fn looks_packaged(start: &[u8]) -> bool {
-    start.starts_with(b"PK\x03\x04")
-}
-
 /// Reads a file's items.
 pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     let mut package = Package::open(file)?;
-    let path = package.model_path()?;
-    let mut models = Models { package, models: BTreeMap::new(), facets: 0 };
-    let items = models.get(&path)?.items.clone();
-    let mut found = Found { pieces: Vec::new(), visits: 0, facets: 0 };
-    let mut left_out = 0;
-    for item in items.iter().filter(|item| item.is_built) {
-        let path = item.model.as_ref().unwrap_or(&path).clone();
-        if models.object(&path, item.object)?.is_solid {
-            models.expand(&path, item, Placement::default(), 0, &mut found)?;
-        } else {
-            left_out += 1;
+    let (root, encrypted) = package.model_path()?;
+    let mut project = Project::default();
+    for name in PROJECT_FILES {
+        if let Some(name) = package.find(name, "").map(str::to_owned) {
+            let outcome = package.read(&name, |text| project.read(text))?;
+            outcome.map_err(|(at, fault)| ThreeMfError::Model { model: name, at, fault })?;
         }
     }
+    let mut models = Models {
+        package,
+        root: root.clone(),
+        encrypted,
+        project,
+        models: BTreeMap::new(),
+        sliced: BTreeMap::new(),
+        facets: 0,
+    };
+    let items = models.get(&root)?.items.clone();
+    let mut found = Found::default();
+    for item in items.iter() {
+        if item.is_built {
+            models.expand(&root, item, &Place::default(), &mut found)?;
+        } else {
+            found.left_out.not_printable += 1;
+        }
+    }
+    found.drop_lone_negatives();
     if found.pieces.is_empty() && !items.is_empty() {
         return Err(ThreeMfError::NothingToBuild { items: items.len() });
     }
-    let notes = (left_out > 0).then_some(ReadNote::NoSolids { items: left_out });
-    Ok(Contents { pieces: found.pieces, notes: notes.into_iter().collect() })
+    let mut notes = found.left_out.notes();
+    let unread = UNREAD_FILES.iter().filter(|(name, _)| models.package.find(name, "").is_some());
+    notes.extend(unread.map(|(_, what)| ReadNote::ProjectData { what }));
+    if models.project.plates > 1 {
+        notes.push(ReadNote::Plates { plates: models.project.plates });
+    }
+    Ok(Contents { pieces: found.pieces, notes })
 }
 
+/// What was found of the items.
+#[derive(Default)]
 struct Found {
     pieces: Vec<Piece>,
     visits: usize,
     /// The facets of all pieces.
     facets: u64,
+    /// The placed objects whose solids and negative volumes belong together.
+    objects: usize,
+    left_out: LeftOut,
+}
+
+impl Found {
+    /// Leaves out negative volumes whose objects have no solids.
+    fn drop_lone_negatives(&mut self) {
+        let solid = self.pieces.iter().filter(|piece| piece.role == Role::Solid);
+        let solid: BTreeSet<usize> = solid.map(|piece| piece.object).collect();
+        let before = self.pieces.len();
+        self.pieces.retain(|piece| solid.contains(&piece.object));
+        self.left_out.lone_negatives = before - self.pieces.len();
+    }
+}
+
+/// What items hold and is not built.
+#[derive(Default)]
+struct LeftOut {
+    no_solids: usize,
+    not_printable: usize,
+    lone_negatives: usize,
+    /// The volumes by their kind.
+    volumes: BTreeMap<String, usize>,
+    /// Objects of which the slices are left out, and those of which the mesh is.
+    slices: BTreeSet<(String, u32)>,
+    stand_ins: BTreeSet<(String, u32)>,
+    extensions: BTreeSet<String>,
+}
+
+impl LeftOut {
+    fn notes(self) -> Vec<ReadNote> {
+        let counted = [
+            (self.no_solids, ReadNote::NoSolids { items: self.no_solids }),
+            (self.not_printable, ReadNote::NotPrintable { items: self.not_printable }),
+            (self.lone_negatives, ReadNote::LoneNegatives { volumes: self.lone_negatives }),
+            (self.slices.len(), ReadNote::Slices { objects: self.slices.len() }),
+            (self.stand_ins.len(), ReadNote::StandIns { objects: self.stand_ins.len() }),
+        ];
+        let counted = counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, note)| note);
+        let volumes = self.volumes.into_iter();
+        let volumes = volumes.map(|(kind, volumes)| ReadNote::Volumes { kind, volumes });
+        let extensions = self.extensions.into_iter().map(|name| ReadNote::Extension { name });
+        counted.chain(volumes).chain(extensions).collect()
+    }
+}
+
+/// Where an object stands and what it is there.
+#[derive(Default)]
+struct Place {
+    placement: Placement,
+    depth: usize,
+    /// The number of the placed object that it is a part of, and whether its project lists it.
+    object: usize,
+    is_in_project: bool,
+    kind: VolumeKind,
 }
 
 /// The models of a package, each read when it is first asked for.
 struct Models<'a> {
     package: Package<'a>,
+    /// The name of the one that the package is about.
+    root: String,
+    encrypted: Vec<String>,
+    project: Project,
     models: BTreeMap<String, Model>,
+    /// What stands for objects that have slices: those, unless it is their mesh.
+    sliced: BTreeMap<(String, u32), Option<Piece>>,
     /// How many facets they have so far.
     facets: usize,
 }
@@ -168,21 +287,25 @@ struct Models<'a> {
 impl Models<'_> {
     fn get(&mut self, path: &str) -> Result<&Model, ThreeMfError> {
         if !self.models.contains_key(path) {
-            let failed = |at, fault| ThreeMfError::Model { model: path.to_owned(), at, fault };
-            let (entry, most) = self.package.entry(path)?;
-            let mut text = BoundedText::new(BufReader::new(entry.take(most + 1)));
-            let model = Model::read(&mut text, self.facets);
-            let read = text.read;
-            drop(text);
-            if read > most {
-                return Err(ThreeMfError::Inflated(most));
+            if self.encrypted.iter().any(|encrypted| encrypted == path) {
+                return Err(ThreeMfError::Encrypted(path.to_owned()));
             }
-            self.package.unpacked += read;
-            let model = model.map_err(|(at, fault)| failed(at, fault))?;
+            let none = Project::default();
+            let project = if path == self.root { &self.project } else { &none };
+            let facets = self.facets;
+            let model = self.package.read(path, |text| Model::read(text, facets, project))?;
+            let failed = |(at, fault)| ThreeMfError::Model { model: path.to_owned(), at, fault };
+            let model = model.map_err(failed)?;
             self.facets = model.facets_end;
             self.models.insert(path.to_owned(), model);
         }
         Ok(&self.models[path])
+    }
+
+    /// Returns the name of a model that another one names.
+    fn path_of(&self, target: &str, from: &str) -> Result<String, ThreeMfError> {
+        let found = self.package.find(target, from);
+        found.map(str::to_owned).ok_or_else(|| ThreeMfError::NoModel(without_root(target)))
     }
 
     fn object(&mut self, path: &str, id: u32) -> Result<&Object, ThreeMfError> {
@@ -193,113 +316,174 @@ impl Models<'_> {
     /// Adds the pieces of an object as it stands in others.
     fn expand(
         &mut self,
-        path: &str,
+        from: &str,
         reference: &Reference,
-        outer: Placement,
-        depth: usize,
+        outer: &Place,
         found: &mut Found,
     ) -> Result<(), ThreeMfError> {
         found.visits += 1;
-        if depth > MAX_DEPTH || found.visits > MAX_VISITS {
+        if outer.depth > MAX_DEPTH || found.visits > MAX_VISITS {
             return Err(ThreeMfError::Endless);
         }
-        let placement = reference.placement.then(&outer);
-        let (units, most) = (self.get(path)?.units, self.package.most);
-        let components = match &self.object(path, reference.object)?.shape {
-            Shape::Mesh { facets, first } => {
-                found.facets += facets.len() as u64;
-                if found.facets > most {
-                    return Err(ThreeMfError::Copies(most));
-                }
-                let facets = Facets::Memory(facets.clone());
-                let units = Some(units);
-                let piece = Piece { first_facet: *first, units, placement, ..Piece::new(facets) };
-                found.pieces.push(piece);
-                return Ok(());
+        let path = match &reference.model {
+            Some(target) => self.path_of(target, from)?,
+            None => from.to_owned(),
+        };
+        let id = reference.object;
+        let is_listed = path == self.root && self.project.volumes(id).is_some();
+        let object = self.object(&path, id)?;
+        let kind = outer.kind.of_part(&object.kind);
+        if !object.is_solid {
+            found.left_out.no_solids += 1;
+            return Ok(());
+        }
+        if let VolumeKind::LeftOut(name) = kind {
+            *found.left_out.volumes.entry(name).or_default() += 1;
+            return Ok(());
+        }
+        if let Some(feature) = object.unread {
+            return Err(ThreeMfError::Unread { model: path, id, feature });
+        }
+        found.left_out.extensions.extend(object.unknown.iter().cloned());
+        let mut place = Place {
+            placement: reference.placement.then(&outer.placement),
+            depth: outer.depth + 1,
+            object: outer.object,
+            is_in_project: outer.is_in_project || is_listed,
+            kind,
+        };
+        if outer.depth == 0 || (is_listed && !outer.is_in_project) {
+            place.object = found.objects;
+            found.objects += 1;
+        }
+        if let Some(piece) = self.sliced(&path, id, &mut found.left_out)? {
+            return self.add(&piece, &VolumeKind::Solid, &place, found);
+        }
+        let components = match &self.object(&path, id)?.shape {
+            Shape::Mesh(volumes) => {
+                let volumes = volumes.clone();
+                return volumes
+                    .iter()
+                    .try_for_each(|(kind, piece)| self.add(piece, kind, &place, found));
             }
             Shape::Components(components) => components.clone(),
         };
-        for component in components.iter() {
-            let path = component.model.as_deref().unwrap_or(path);
-            self.expand(path, component, placement, depth + 1, found)?;
+        let kind = place.kind.clone();
+        for (number, component) in components.iter().enumerate() {
+            let is_same = |other: &&Reference| other.object == component.object;
+            let before = components[..number].iter().filter(is_same).count();
+            if is_listed {
+                let of_part = self.project.kind_of_component(id, component.object, before);
+                place.kind = kind.of_part(&of_part);
+            }
+            self.expand(&path, component, &place, found)?;
         }
         Ok(())
     }
-}
 
-/// A ZIP package.
-struct Package<'a> {
-    archive: ZipArchive<BufReader<FileReader<'a>>>,
-    /// The most bytes that are unpacked in all, and those so far.
-    most: u64,
-    unpacked: u64,
-}
-
-impl<'a> Package<'a> {
-    fn open(file: &'a PartFile) -> Result<Self, ThreeMfError> {
-        let archive = ZipArchive::new(BufReader::new(file.reader()))?;
-        Ok(Self { archive, most: most_unpacked(file.size()), unpacked: 0 })
-    }
-
-    /// Opens a file of the package, of which no more bytes are to be read than these.
-    fn entry(&mut self, path: &str) -> Result<(impl Read, u64), ThreeMfError> {
-        let most = self.most - self.unpacked;
-        match self.archive.by_name(path) {
-            Ok(entry) => Ok((entry, most)),
-            Err(ZipError::FileNotFound) => Err(ThreeMfError::NoModel(path.to_owned())),
-            Err(error) => Err(error.into()),
+    /// Adds a piece of a kind that stands at a place.
+    fn add(
+        &self,
+        piece: &Piece,
+        kind: &VolumeKind,
+        place: &Place,
+        found: &mut Found,
+    ) -> Result<(), ThreeMfError> {
+        let role = match place.kind.of_part(kind) {
+            VolumeKind::Solid => Role::Solid,
+            VolumeKind::Negative => Role::Negative,
+            VolumeKind::LeftOut(name) => {
+                *found.left_out.volumes.entry(name).or_default() += 1;
+                return Ok(());
+            }
+        };
+        found.facets += piece.facets.count() as u64;
+        if found.facets > self.package.most {
+            return Err(ThreeMfError::Copies(self.package.most));
         }
+        let Place { placement, object, .. } = *place;
+        found.pieces.push(Piece { placement, object, role, ..piece.clone() });
+        Ok(())
     }
 
-    /// Returns the name of the model that the package is about.
-    fn model_path(&mut self) -> Result<String, ThreeMfError> {
-        let path = "_rels/.rels";
-        let Ok((entry, _)) = self.entry(path) else { return Ok(USUAL_MODEL.to_owned()) };
-        let mut text = BoundedText::new(BufReader::new(entry.take(MAX_XML_BYTES as u64)));
-        let failed = |(at, fault)| ThreeMfError::Model { model: path.to_owned(), at, fault };
-        let target = model::relationship(&mut text, MODEL_RELATIONSHIP).map_err(failed)?;
-        Ok(target.unwrap_or_else(|| USUAL_MODEL.to_owned()))
-    }
-}
-
-/// Text of which no tag, comment or text between tags is read into memory beyond a
-/// limit.
-struct BoundedText<R> {
-    text: R,
-    /// The bytes that were read in all, and since the last event.
-    read: u64,
-    of_event: usize,
-}
-
-impl<R: BufRead> BoundedText<R> {
-    fn new(text: R) -> Self {
-        Self { text, read: 0, of_event: 0 }
-    }
-
-    fn begin_event(&mut self) {
-        self.of_event = 0;
-    }
-}
-
-impl<R: BufRead> Read for BoundedText<R> {
-    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        let length = self.fill_buf()?.read(to)?;
-        self.consume(length);
-        Ok(length)
-    }
-}
-
-impl<R: BufRead> BufRead for BoundedText<R> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.of_event > MAX_XML_BYTES {
-            return Err(io::Error::other("a tag or text is longer than four megabytes"));
+    /// Returns the slices of an object, if they stand for it and its mesh does not.
+    fn sliced(
+        &mut self,
+        path: &str,
+        id: u32,
+        left_out: &mut LeftOut,
+    ) -> Result<Option<Piece>, ThreeMfError> {
+        let key = (path.to_owned(), id);
+        if let Some(piece) = self.sliced.get(&key) {
+            return Ok(piece.clone());
         }
-        self.text.fill_buf()
+        let object = self.object(path, id)?;
+        let (stack, is_stand_in) = (object.slices, object.is_stand_in);
+        let failed = |fault| ThreeMfError::Slices { model: path.to_owned(), id, fault };
+        let piece = match stack {
+            None if is_stand_in => return Err(failed("a coarse mesh and no slices instead of it")),
+            None => None,
+            Some(stack) => {
+                let prisms = self.prisms(path, stack)?.map_err(failed)?;
+                let is_mesh = !is_stand_in && self.has_volume(path, id, prisms.volume)?;
+                let of_kind = if is_mesh { &mut left_out.slices } else { &mut left_out.stand_ins };
+                of_kind.insert(key.clone());
+                (!is_mesh).then(|| Piece {
+                    first_facet: self.facets,
+                    units: Some(self.models[path].units),
+                    ..prisms.mesh.into_piece()
+                })
+            }
+        };
+        self.facets += piece.as_ref().map_or(0, |piece| piece.facets.count());
+        self.sliced.insert(key, piece.clone());
+        Ok(piece)
     }
 
-    fn consume(&mut self, length: usize) {
-        self.read += length as u64;
-        self.of_event += length;
-        self.text.consume(length);
+    /// Returns the slices of a stack and of those that it names, or why there are none.
+    fn prisms(
+        &mut self,
+        path: &str,
+        stack: u32,
+    ) -> Result<Result<Prisms, &'static str>, ThreeMfError> {
+        const LOST: &str = "slices that are not there";
+        let most = self.package.most;
+        let mut prisms = Prisms::default();
+        let Some(stack) = self.get(path)?.slice_stacks.get(&stack) else { return Ok(Err(LOST)) };
+        if let Err(fault) = prisms.add(stack, most) {
+            return Ok(Err(fault));
+        }
+        for (target, number) in stack.references.clone() {
+            let path = self.path_of(&target, path)?;
+            let Some(stack) = self.get(&path)?.slice_stacks.get(&number) else {
+                return Ok(Err(LOST));
+            };
+            if let Err(fault) = prisms.add(stack, most) {
+                return Ok(Err(fault));
+            }
+        }
+        Ok(if prisms.volume > 0.0 { Ok(prisms) } else { Err("slices without area") })
+    }
+
+    /// Returns true if an object has about this volume, in units of its file, or is made of others,
+    /// whose volume is not known.
+    fn has_volume(&mut self, path: &str, id: u32, volume: f64) -> Result<bool, ThreeMfError> {
+        let Shape::Mesh(volumes) = &self.object(path, id)?.shape else { return Ok(true) };
+        let facets = volumes.iter().flat_map(|(_, piece)| match &piece.facets {
+            Facets::Memory(facets) => facets.as_slice(),
+            _ => &[],
+        });
+        let six_times: f64 = facets
+            .map(|facet| {
+                let [a, b, c] = facet.map(|corner| corner.map(f64::from));
+                (0..3)
+                    .map(|k| {
+                        let [i, j] = [(k + 1) % 3, (k + 2) % 3];
+                        a[k] * (b[i] * c[j] - b[j] * c[i])
+                    })
+                    .sum::<f64>()
+            })
+            .sum();
+        Ok((six_times / 6.0 - volume).abs() <= SAME_VOLUME * volume)
     }
 }

@@ -1,31 +1,60 @@
 //! Reads a model of a 3MF package: its meshes, its other objects and its items.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::sync::Arc;
 
-use quick_xml::Reader;
-use quick_xml::events::{BytesStart, Event};
+use quick_xml::events::BytesStart;
 
-use super::{BoundedText, ModelFault};
-use crate::facet::{Facet, Units};
+use super::ModelFault;
+use super::project::{Project, Volume, VolumeKind};
+use super::slices::{SliceReader, SliceStack};
+use super::xml::{
+    BoundedText, Located, Xml, attribute, for_each_piece, missing, number, numbers,
+    prefixed_attribute,
+};
+use crate::decimal_mesh::DecimalMesh;
+use crate::facet::Units;
+use crate::part::{Facets, Piece};
 use crate::placement::Placement;
 
-/// Extensions whose elements may be passed over: they leave meshes as they are. That
-/// for production adds models in other files of the package, which are read.
-const KNOWN_EXTENSIONS: [&str; 3] = [
-    "http://schemas.microsoft.com/3dmanufacturing/production/2015/06",
-    "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
-    "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07",
+/// What an extension of 3MF does to what is built.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Effect {
+    /// It leaves meshes as they are, or adds objects that are read.
+    None,
+    /// It has slices, which are read.
+    Slices,
+    /// Its elements in an object make another shape of it.
+    Shape(&'static str),
+}
+
+/// Words of the namespaces of extensions, whose years differ, and what these do.
+const EXTENSIONS: [(&str, Effect); 12] = [
+    ("/3dmanufacturing/production/alternatives/", Effect::None),
+    ("/3dmanufacturing/production/", Effect::None),
+    ("/3dmanufacturing/material/", Effect::None),
+    ("/3dmanufacturing/trianglesets/", Effect::None),
+    ("/3dmanufacturing/slice/", Effect::Slices),
+    ("/3dmanufacturing/beamlattice/balls/", Effect::Shape("a beam lattice")),
+    ("/3dmanufacturing/beamlattice/", Effect::Shape("a beam lattice")),
+    ("/3dmanufacturing/booleanoperations/", Effect::Shape("boolean operations")),
+    ("/3dmanufacturing/displacement/", Effect::Shape("a displaced surface")),
+    ("/3dmanufacturing/volumetric/", Effect::Shape("volumetric data")),
+    ("/3dmanufacturing/implicit/", Effect::Shape("implicit functions")),
+    ("/3dmanufacturing/securecontent/", Effect::None),
 ];
 
-/// A fault and the byte near it.
-type Located = (u64, ModelFault);
+/// Returns what the extension of a namespace does, if it is known.
+fn effect_of(namespace: &str) -> Option<Effect> {
+    EXTENSIONS.iter().find(|(words, _)| namespace.contains(words)).map(|(_, effect)| *effect)
+}
 
 /// A model: a file of a package.
 pub(super) struct Model {
     pub(super) units: Units,
     pub(super) objects: BTreeMap<u32, Object>,
+    pub(super) slice_stacks: BTreeMap<u32, SliceStack>,
     /// What is built.
     pub(super) items: Arc<Vec<Reference>>,
     /// The number of facets of the package up to its end.
@@ -35,15 +64,22 @@ pub(super) struct Model {
 pub(super) struct Object {
     /// Whether it is part of what is built, not a support, a surface or anything else.
     pub(super) is_solid: bool,
+    /// What a setting of its project makes of it.
+    pub(super) kind: VolumeKind,
     pub(super) shape: Shape,
+    /// The stack of its slices, if it has some.
+    pub(super) slices: Option<u32>,
+    /// Whether its shape stands for a finer one that is elsewhere.
+    pub(super) is_stand_in: bool,
+    /// What makes another shape of it and is not read.
+    pub(super) unread: Option<&'static str>,
+    /// Names of extensions that are not known and have elements in it.
+    pub(super) unknown: BTreeSet<String>,
 }
 
 pub(super) enum Shape {
-    /// A mesh, and the number in the package of its first facet.
-    Mesh {
-        facets: Arc<Vec<Facet>>,
-        first: usize,
-    },
+    /// The volumes of a mesh.
+    Mesh(Vec<(VolumeKind, Piece)>),
     Components(Arc<Vec<Reference>>),
 }
 
@@ -59,160 +95,151 @@ pub(super) struct Reference {
 }
 
 impl Model {
-    /// Reads a model whose facets are counted from `first_facet`.
+    /// Reads a model whose facets are counted from `first_facet`, and the volumes of whose objects
+    /// are those of a project.
     pub(super) fn read(
         text: &mut BoundedText<impl BufRead>,
         first_facet: usize,
+        project: &Project,
     ) -> Result<Self, Located> {
-        let mut state = ModelReader::new(first_facet);
-        for_each_element(text, |element| match element {
-            Element::Start(tag) => state.start(tag),
-            Element::End(name) => {
-                state.end(name);
+        let mut state = ModelReader::new(first_facet, project);
+        for_each_piece(text, |piece| match piece {
+            Xml::Start(namespace, tag) => state.start(namespace, tag),
+            Xml::Text(text) => {
+                state.text(text);
                 Ok(())
             }
+            Xml::End(namespace, name) => state.end(namespace, name),
         })?;
         Ok(Self {
             units: state.units,
             objects: state.objects,
+            slice_stacks: state.slices.stacks,
             items: Arc::new(state.items),
             facets_end: state.first_facet,
         })
     }
 }
 
-/// Returns the target of the first relationship of a kind.
-pub(super) fn relationship(
-    text: &mut BoundedText<impl BufRead>,
-    kind: &str,
-) -> Result<Option<String>, Located> {
-    let mut target = None;
-    for_each_element(text, |element| {
-        if let Element::Start(tag) = element
-            && tag.local_name().as_ref() == "Relationship"
-            && attribute(tag, "Type")?.as_deref() == Some(kind)
-            && target.is_none()
-        {
-            target = attribute(tag, "Target")?.map(|path| in_package(&path));
-        }
-        Ok(())
-    })?;
-    Ok(target)
-}
-
-/// Returns the name of a file in its package, which paths begin with a slash.
-fn in_package(path: &str) -> String {
-    path.trim_start_matches('/').to_owned()
-}
-
-enum Element<'a> {
-    Start(&'a BytesStart<'a>),
-    /// The name of the element that ends.
-    End(&'a str),
-}
-
-/// Calls `each` at the start and the end of every element.
-fn for_each_element(
-    text: &mut BoundedText<impl BufRead>,
-    mut each: impl FnMut(Element<'_>) -> Result<(), ModelFault>,
-) -> Result<(), Located> {
-    let mut reader = Reader::from_reader(text);
-    let mut buffer = Vec::new();
-    let mut open = 0usize;
-    loop {
-        buffer.clear();
-        reader.get_mut().begin_event();
-        let event = reader.read_event_into(&mut buffer);
-        let at = reader.buffer_position();
-        let failed = |fault| (at, fault);
-        match event.map_err(|error| failed(ModelFault::Xml(error)))? {
-            Event::Start(tag) => {
-                open += 1;
-                each(Element::Start(&tag)).map_err(failed)?;
-            }
-            Event::Empty(tag) => {
-                each(Element::Start(&tag)).map_err(failed)?;
-                each(Element::End(tag.name().as_ref())).map_err(failed)?;
-            }
-            Event::End(tag) => {
-                open = open.saturating_sub(1);
-                each(Element::End(tag.name().as_ref())).map_err(failed)?;
-            }
-            Event::Eof if open > 0 => return Err(failed(ModelFault::CutOff)),
-            Event::Eof => return Ok(()),
-            _ => {}
-        }
-    }
-}
-
 /// A model as far as it was read.
-struct ModelReader {
+struct ModelReader<'a> {
+    project: &'a Project,
     units: Units,
     objects: BTreeMap<u32, Object>,
+    slices: SliceReader,
     items: Vec<Reference>,
     first_facet: usize,
-    /// What stands before the names of 3MF's own elements; those of extensions have
-    /// other prefixes.
-    prefix: Option<String>,
-    /// The number of the object at hand, and whether it is a solid.
-    object: Option<(u32, bool)>,
-    vertices: Vec<[f32; 3]>,
-    facets: Vec<Facet>,
+    /// The namespace of 3MF's own elements.
+    own: Option<String>,
+    /// The object at hand and its number.
+    object: Option<(u32, Object)>,
+    mesh: DecimalMesh,
+    /// Volumes that the model lists itself.
+    volumes: Vec<Volume>,
     components: Vec<Reference>,
+    /// The key of the setting at hand.
+    setting: Option<String>,
 }
 
-impl ModelReader {
-    fn new(first_facet: usize) -> Self {
+impl<'a> ModelReader<'a> {
+    fn new(first_facet: usize, project: &'a Project) -> Self {
         Self {
+            project,
             units: Units::Millimetres,
             objects: BTreeMap::new(),
+            slices: SliceReader::default(),
             items: Vec::new(),
             first_facet,
-            prefix: None,
+            own: None,
             object: None,
-            vertices: Vec::new(),
-            facets: Vec::new(),
+            mesh: DecimalMesh::default(),
+            volumes: Vec::new(),
             components: Vec::new(),
+            setting: None,
         }
     }
 
-    /// Returns an element's name, if it is one of 3MF's own.
-    fn own_name<'a>(&self, name: &'a str) -> Option<&'a str> {
-        let (prefix, local) = split_name(name);
-        (Some(prefix) == self.prefix.as_deref()).then_some(local)
-    }
-
-    fn start(&mut self, tag: &BytesStart<'_>) -> Result<(), ModelFault> {
-        let name = tag.name();
-        if self.prefix.is_none() {
-            let (prefix, local) = split_name(name.as_ref());
-            if local == "model" {
-                self.prefix = Some(prefix.to_owned());
-                return self.begin_model(tag);
+    fn start(&mut self, namespace: &str, tag: &BytesStart<'_>) -> Result<(), ModelFault> {
+        let name = tag.local_name();
+        let Some(own) = &self.own else {
+            if name.as_ref() == "model" {
+                self.own = Some(namespace.to_owned());
+                self.begin_model(tag)?;
             }
+            return Ok(());
+        };
+        if namespace != own {
+            return self.start_of_extension(namespace, tag);
         }
-        match self.own_name(name.as_ref()) {
-            Some("object") => {
-                let kind = attribute(tag, "type")?;
-                let is_solid = matches!(kind.as_deref(), None | Some("model" | "solidsupport"));
-                self.object = Some((number(tag, "id")?, is_solid));
-            }
-            Some("vertex") => {
-                self.vertices.push([number(tag, "x")?, number(tag, "y")?, number(tag, "z")?]);
-            }
-            Some("triangle") => {
-                let corners = [number(tag, "v1")?, number(tag, "v2")?, number(tag, "v3")?];
-                let mut facet = Facet::default();
-                for (corner, vertex) in facet.iter_mut().zip(corners) {
-                    let count = self.vertices.len();
-                    let found = self.vertices.get(vertex as usize);
-                    *corner = *found.ok_or(ModelFault::NoVertex { vertex, count })?;
+        match name.as_ref() {
+            "vertex" => self.mesh.add_vertex(numbers(tag, ["x", "y", "z"])?),
+            "triangle" => {
+                let corners: [u32; 3] = numbers(tag, ["v1", "v2", "v3"])?;
+                let count = self.mesh.vertex_count();
+                if let Some(&vertex) = corners.iter().find(|&&corner| corner as usize >= count) {
+                    return Err(ModelFault::NoVertex { of: "triangle", vertex, count });
                 }
-                self.facets.push(facet);
+                self.mesh.add_facet(corners);
             }
-            Some("component") => self.components.push(self.reference(tag)?),
-            Some("item") => self.items.push(self.reference(tag)?),
+            "object" => self.begin_object(tag)?,
+            "component" => self.components.push(self.reference(tag)?),
+            "item" => self.items.push(self.reference(tag)?),
+            "metadata" if self.object.is_some() => self.setting = attribute(tag, "name")?,
             _ => {}
+        }
+        Ok(())
+    }
+
+    fn begin_object(&mut self, tag: &BytesStart<'_>) -> Result<(), ModelFault> {
+        let kind = attribute(tag, "type")?;
+        let slices = prefixed_attribute(tag, "slicestackid")?;
+        let mut object = Object {
+            is_solid: matches!(kind.as_deref(), None | Some("model" | "solidsupport")),
+            kind: VolumeKind::Solid,
+            shape: Shape::Mesh(Vec::new()),
+            slices: None,
+            is_stand_in: prefixed_attribute(tag, "meshresolution")?.as_deref() == Some("lowres"),
+            unread: None,
+            unknown: BTreeSet::new(),
+        };
+        if let Some(id) = slices {
+            object.slices = Some(id.trim().parse().map_err(|_| missing(tag, "slicestackid"))?);
+        }
+        let resolution = prefixed_attribute(tag, "modelresolution")?;
+        if matches!(resolution.as_deref(), Some("lowres" | "obfuscated")) {
+            object.unread = Some("an alternative to a coarse mesh");
+        }
+        self.object = Some((number(tag, "id")?, object));
+        Ok(())
+    }
+
+    /// Reads the start of an element that is not 3MF's own.
+    fn start_of_extension(
+        &mut self,
+        namespace: &str,
+        tag: &BytesStart<'_>,
+    ) -> Result<(), ModelFault> {
+        let effect = effect_of(namespace);
+        if effect == Some(Effect::Slices) {
+            return self.slices.start(tag);
+        }
+        let Some((_, object)) = &mut self.object else { return Ok(()) };
+        match (effect, tag.local_name().as_ref()) {
+            (Some(Effect::Shape(what)), _) => object.unread = Some(what),
+            (Some(_), _) => {}
+            // Slic3r lists the volumes of a mesh behind its triangles.
+            (None, "volume") if attribute(tag, "ts")?.is_some() => {
+                let mut volume = Volume::of_triangles(tag, ["ts", "te"])?;
+                volume.set("modifier", &attribute(tag, "modifier")?.unwrap_or_default());
+                self.volumes.push(volume);
+            }
+            // Cura has settings of objects.
+            (None, "setting") => self.setting = attribute(tag, "key")?,
+            (None, "settings" | "volumes" | "metadata") => {}
+            (None, _) => {
+                let namespace = namespace.chars().filter(|c| !c.is_control()).take(100);
+                object.unknown.insert(namespace.collect());
+            }
         }
         Ok(())
     }
@@ -229,7 +256,7 @@ impl ModelReader {
         };
         for prefix in attribute(tag, "requiredextensions")?.unwrap_or_default().split_whitespace() {
             let name = attribute(tag, &format!("xmlns:{prefix}"))?;
-            if !name.as_deref().is_some_and(|name| KNOWN_EXTENSIONS.contains(&name)) {
+            if name.as_deref().and_then(effect_of).is_none() {
                 let name: String = name.unwrap_or_else(|| prefix.to_owned());
                 return Err(ModelFault::Extension(name.chars().take(100).collect()));
             }
@@ -237,21 +264,39 @@ impl ModelReader {
         Ok(())
     }
 
-    fn end(&mut self, name: &str) {
-        if self.own_name(name) != Some("object") {
-            return;
+    fn text(&mut self, text: &str) {
+        if let (Some(key), Some((_, object))) = (&self.setting, &mut self.object) {
+            object.kind = object.kind.of_part(&VolumeKind::of_cura(key, text));
+        }
+    }
+
+    fn end(&mut self, namespace: &str, name: &str) -> Result<(), ModelFault> {
+        self.setting = None;
+        if Some(namespace) != self.own.as_deref() {
+            if effect_of(namespace) == Some(Effect::Slices) {
+                self.slices.end(name);
+            }
+            return Ok(());
+        }
+        if name != "object" {
+            return Ok(());
         }
         let components = std::mem::take(&mut self.components);
-        let facets = std::mem::take(&mut self.facets);
-        self.vertices.clear();
-        let Some((id, is_solid)) = self.object.take() else { return };
-        let first = self.first_facet;
-        self.first_facet += facets.len();
-        let shape = match components.is_empty() {
-            true => Shape::Mesh { facets: Arc::new(facets), first },
-            false => Shape::Components(Arc::new(components)),
+        let mesh = std::mem::take(&mut self.mesh).into_piece();
+        let own_volumes = std::mem::take(&mut self.volumes);
+        let Some((id, mut object)) = self.object.take() else { return Ok(()) };
+        object.shape = if components.is_empty() {
+            let piece = Piece { first_facet: self.first_facet, units: Some(self.units), ..mesh };
+            self.first_facet += piece.facets.count();
+            object.kind = object.kind.of_part(&self.project.kind_of_mesh(id));
+            let volumes = self.project.volumes(id).unwrap_or(&own_volumes);
+            let volumes = volumes_of(&piece, volumes);
+            Shape::Mesh(volumes.ok_or(ModelFault::Volumes { object: id })?)
+        } else {
+            Shape::Components(Arc::new(components))
         };
-        self.objects.insert(id, Object { is_solid, shape });
+        self.objects.insert(id, object);
+        Ok(())
     }
 
     /// Reads an item or a component.
@@ -260,13 +305,54 @@ impl ModelReader {
             Some(text) => transform(&text, self.units).ok_or_else(|| missing(tag, "transform"))?,
             None => Placement::default(),
         };
+        let printable = attribute(tag, "printable")?;
         Ok(Reference {
-            model: prefixed_attribute(tag, "path")?.map(|path| in_package(&path)),
+            model: prefixed_attribute(tag, "path")?,
             object: number(tag, "objectid")?,
             placement,
-            is_built: attribute(tag, "printable")?.as_deref() != Some("0"),
+            is_built: !matches!(printable.as_deref().map(str::trim), Some("0" | "false")),
         })
     }
+}
+
+/// Splits a mesh into volumes; triangles of none are a solid. Returns none if it has no such
+/// volumes.
+fn volumes_of(mesh: &Piece, volumes: &[Volume]) -> Option<Vec<(VolumeKind, Piece)>> {
+    let count = mesh.facets.count();
+    let mut ranges: Vec<_> = volumes
+        .iter()
+        .filter_map(|volume| Some((volume.triangles.clone()?, &volume.kind)))
+        .filter(|(range, _)| range.start != range.end)
+        .collect();
+    ranges.sort_by_key(|(range, _)| range.start);
+    let Facets::Memory(facets) = &mesh.facets else { return None };
+    let mut pieces = Vec::new();
+    let mut add = |range: std::ops::Range<usize>, kind: &VolumeKind| {
+        let first_facet = mesh.first_facet + range.start;
+        let facets = match range.len() == count {
+            true => facets.clone(),
+            false => Arc::new(facets[range].to_vec()),
+        };
+        pieces.push((
+            kind.clone(),
+            Piece { facets: Facets::Memory(facets), first_facet, ..mesh.clone() },
+        ));
+    };
+    let mut end = 0;
+    for (range, kind) in ranges {
+        if range.start < end || range.end < range.start || range.end > count {
+            return None;
+        }
+        if end < range.start {
+            add(end..range.start, &VolumeKind::Solid);
+        }
+        end = range.end;
+        add(range, kind);
+    }
+    if end < count || count == 0 {
+        add(end..count, &VolumeKind::Solid);
+    }
+    Some(pieces)
 }
 
 /// Reads twelve numbers: where x, y and z go, and a shift.
@@ -277,42 +363,4 @@ fn transform(text: &str, units: Units) -> Option<Placement> {
     let is_finite = m.iter().all(|number| number.is_finite());
     let row = |k: usize| [m[k], m[3 + k], m[6 + k], m[9 + k] * units.mm()];
     is_finite.then(|| Placement::of_rows([row(0), row(1), row(2)]))
-}
-
-/// Splits a name into its prefix, which may be empty, and the rest.
-fn split_name(name: &str) -> (&str, &str) {
-    name.split_once(':').unwrap_or(("", name))
-}
-
-fn attribute(tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ModelFault> {
-    find_attribute(tag, |key| key == name)
-}
-
-/// Returns an attribute of an extension, whatever its prefix.
-fn prefixed_attribute(tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ModelFault> {
-    find_attribute(tag, |key| key.split_once(':').is_some_and(|(_, local)| local == name))
-}
-
-fn find_attribute(
-    tag: &BytesStart<'_>,
-    is_it: impl Fn(&str) -> bool,
-) -> Result<Option<String>, ModelFault> {
-    for attribute in tag.attributes().with_checks(false) {
-        let attribute = attribute.map_err(|error| ModelFault::Xml(error.into()))?;
-        if is_it(attribute.key.as_ref()) {
-            return Ok(Some(attribute.value.into_owned()));
-        }
-    }
-    Ok(None)
-}
-
-fn number<T: std::str::FromStr>(tag: &BytesStart<'_>, name: &'static str) -> Result<T, ModelFault> {
-    let value = tag.try_get_attribute(name).map_err(|error| ModelFault::Xml(error.into()))?;
-    let value = value.and_then(|value| value.value.trim().parse().ok());
-    value.ok_or_else(|| missing(tag, name))
-}
-
-fn missing(tag: &BytesStart<'_>, attribute: &'static str) -> ModelFault {
-    let element = tag.name().as_ref().chars().take(40).collect();
-    ModelFault::Attribute { element, attribute }
 }

@@ -1,0 +1,161 @@
+//! Reads the slices of the slice extension: polygons that stand for an object from one height to
+//! the next.
+
+use std::collections::BTreeMap;
+
+use quick_xml::events::BytesStart;
+
+use super::ModelFault;
+use super::xml::{attribute, number, numbers};
+use crate::decimal_mesh::DecimalMesh;
+
+/// Slices, from below.
+#[derive(Debug, Default)]
+pub(super) struct SliceStack {
+    bottom: f64,
+    slices: Vec<Slice>,
+    /// Stacks in other files of the package that follow.
+    pub(super) references: Vec<(String, u32)>,
+}
+
+#[derive(Debug, Default)]
+struct Slice {
+    top: f64,
+    vertices: Vec<[f64; 2]>,
+    /// Numbers of vertices, each polygon's first one again at its end.
+    polygons: Vec<Vec<u32>>,
+}
+
+/// The slices of a model, as far as they were read.
+#[derive(Debug, Default)]
+pub(super) struct SliceReader {
+    pub(super) stacks: BTreeMap<u32, SliceStack>,
+    stack: Option<(u32, SliceStack)>,
+}
+
+impl SliceReader {
+    /// Reads the start of an element of the extension.
+    pub(super) fn start(&mut self, tag: &BytesStart<'_>) -> Result<(), ModelFault> {
+        let local = tag.local_name();
+        if local.as_ref() == "slicestack" {
+            let bottom = match attribute(tag, "zbottom")? {
+                Some(_) => number(tag, "zbottom")?,
+                None => 0.0,
+            };
+            self.stack = Some((number(tag, "id")?, SliceStack { bottom, ..SliceStack::default() }));
+        }
+        let Some((_, stack)) = &mut self.stack else { return Ok(()) };
+        match (local.as_ref(), stack.slices.last_mut()) {
+            ("sliceref", _) => {
+                let path = attribute(tag, "slicepath")?.unwrap_or_default();
+                stack.references.push((path, number(tag, "slicestackid")?));
+            }
+            ("slice", _) => {
+                stack.slices.push(Slice { top: number(tag, "ztop")?, ..Slice::default() });
+            }
+            ("vertex", Some(slice)) => slice.vertices.push(numbers(tag, ["x", "y"])?),
+            ("polygon", Some(slice)) => {
+                let start = slice.vertex(number(tag, "startv")?)?;
+                slice.polygons.push(vec![start]);
+            }
+            ("segment", Some(slice)) => {
+                let vertex = slice.vertex(number(tag, "v2")?)?;
+                if let Some(polygon) = slice.polygons.last_mut() {
+                    polygon.push(vertex);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Reads the end of an element of the extension.
+    pub(super) fn end(&mut self, name: &str) {
+        if name == "slicestack"
+            && let Some((id, stack)) = self.stack.take()
+        {
+            self.stacks.insert(id, stack);
+        }
+    }
+}
+
+impl Slice {
+    fn vertex(&self, vertex: u32) -> Result<u32, ModelFault> {
+        let count = self.vertices.len();
+        if (vertex as usize) < count {
+            Ok(vertex)
+        } else {
+            Err(ModelFault::NoVertex { of: "segment", vertex, count })
+        }
+    }
+
+    /// Adds the area between a line and the y axis, and so on around each polygon.
+    fn area(&self) -> f64 {
+        let sides = self.polygons.iter().flat_map(|polygon| polygon.windows(2));
+        let twice = sides.map(|side| {
+            let [a, b] = [side[0], side[1]].map(|number| self.vertices[number as usize]);
+            a[0] * b[1] - b[0] * a[1]
+        });
+        0.5 * twice.sum::<f64>()
+    }
+}
+
+/// Slices as a solid: a prism for each polygon.
+#[derive(Debug, Default)]
+pub(super) struct Prisms {
+    pub(super) mesh: DecimalMesh,
+    pub(super) volume: f64,
+    facets: u64,
+    top: Option<f64>,
+}
+
+impl Prisms {
+    /// Adds the slices of a stack. Returns the reason if that cannot be.
+    pub(super) fn add(&mut self, stack: &SliceStack, most_facets: u64) -> Result<(), &'static str> {
+        let mut bottom = stack.bottom;
+        for slice in &stack.slices {
+            let rises = slice.top > bottom && self.top.is_none_or(|top| bottom >= top);
+            if !rises || !slice.top.is_finite() {
+                return Err("slices whose heights do not rise");
+            }
+            if slice.polygons.iter().any(|polygon| polygon.first() != polygon.last()) {
+                return Err("slices of lines that are not closed");
+            }
+            self.volume += slice.area() * (slice.top - bottom);
+            for polygon in &slice.polygons {
+                self.facets += 4 * polygon.len() as u64;
+                if self.facets > most_facets.min(u64::from(u32::MAX)) {
+                    return Err("more slices than a package of its size explains");
+                }
+                self.add_prism(slice, &polygon[1..], [bottom, slice.top]);
+            }
+            bottom = slice.top;
+            self.top = Some(slice.top);
+        }
+        Ok(())
+    }
+
+    /// Adds a polygon between two heights. Its ends are fans of facets, which may overlap and still
+    /// have an odd number above each point within.
+    fn add_prism(&mut self, slice: &Slice, polygon: &[u32], heights: [f64; 2]) {
+        if polygon.len() < 3 {
+            return;
+        }
+        let base = self.mesh.vertex_count() as u32;
+        for &vertex in polygon {
+            let [x, y] = slice.vertices[vertex as usize];
+            heights.iter().for_each(|&z| self.mesh.add_vertex([x, y, z]));
+        }
+        let count = polygon.len() as u32;
+        let [low, high] = [0, 1].map(|end| move |corner: u32| base + 2 * (corner % count) + end);
+        for corner in 0..count {
+            let next = corner + 1;
+            self.mesh.add_facet([low(corner), low(next), high(next)]);
+            self.mesh.add_facet([low(corner), high(next), high(corner)]);
+            if 0 < corner && next < count {
+                self.mesh.add_facet([low(0), low(next), low(corner)]);
+                self.mesh.add_facet([high(0), high(corner), high(next)]);
+            }
+        }
+    }
+}
