@@ -10,6 +10,7 @@ use lamp_stack::{Image, Layer, Length, PageInfo};
 
 use crate::exit::Exit;
 use crate::options::ranges;
+use crate::part_options::part_notes;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::input_name;
 
@@ -42,16 +43,19 @@ struct Fallback {
 }
 
 impl Bridged {
-    /// `fallback` is an STL of the same part, in millimetres.
+    /// `fallback` is an STL of the same part, in millimetres; `say` takes notes about it.
     pub(crate) fn new(
         slices: Slices,
         fallback: Option<&Path>,
         options: &SlicingOptions,
         layers: Option<Range<u32>>,
+        say: &dyn Fn(&str),
     ) -> Result<Self, Exit> {
         let open = |path: &Path| {
-            let opened = Fallback::open(path, &slices, options, layers);
-            opened.map_err(|error| error.at(input_name(path)))
+            let name = input_name(path);
+            let say = |note: &str| say(&format!("{name}: {note}"));
+            let opened = Fallback::open(path, &slices, options, layers, &say);
+            opened.map_err(|error| error.at(name.clone()))
         };
         let fallback = fallback.map(open).transpose()?;
         Ok(Self { slices, fallback })
@@ -94,6 +98,7 @@ impl Fallback {
         slices: &Slices,
         options: &SlicingOptions,
         layers: Option<Range<u32>>,
+        say: &dyn Fn(&str),
     ) -> Result<Self, Exit> {
         let grid = slices.grid();
         let brep = &options.solid.brep;
@@ -109,11 +114,12 @@ impl Fallback {
         let other = |what: String| {
             Exit::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
         };
-        let fallback =
-            Slices::new(Part::open(path, &opening)?, &options).map_err(|error| match error {
-                SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
-                error => Exit::from(error),
-            })?;
+        let part = Part::open(path, &opening)?;
+        part_notes(&part).iter().for_each(|note| say(note));
+        let fallback = Slices::new(part, &options).map_err(|error| match error {
+            SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
+            error => Exit::from(error),
+        })?;
         let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
         let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let apart = |k: usize| (others[0][k] - low[k]).abs().max((others[1][k] - high[k]).abs());

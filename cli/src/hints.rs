@@ -22,7 +22,7 @@ use lamp_postprocess::{
 use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
-use lamp_stack::{CatalogueError, Length, StackError};
+use lamp_stack::{CatalogueError, FileFormat, Length, PartFormat, StackError};
 use lamp_supports::SupportError;
 use lamp_view::SurfaceError;
 
@@ -66,7 +66,15 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::Changed { .. } => "slice it again once nothing writes to it",
         SliceError::Packed(_) => "pack it again",
         SliceError::Inflated { .. } => "unpack it first",
-        SliceError::OtherFormat(_) => "export the part as one of these",
+        SliceError::OtherFormat(format) => return other_format(*format),
+        SliceError::OtherArchive { .. } => "unpack it first, and name the part in it",
+        SliceError::NotStep(FileFormat::Part(PartFormat::Gzip)) => "unpack it first",
+        SliceError::NotStep(FileFormat::Part(PartFormat::Zip)) => {
+            "slice and lamp mesh check read it if it is a 3MF"
+        }
+        SliceError::NotStep(FileFormat::Part(_)) => "slice and lamp mesh check read it",
+        SliceError::NotStep(format) => return other_format(*format),
+        SliceError::NotStl { .. } => "export the part as STL, STEP, 3MF or OBJ",
         SliceError::WildVertex { .. } => {
             "repair or export the part again, or give --trust-extent if it is like that"
         }
@@ -99,6 +107,28 @@ fn slicing(error: &SliceError) -> Option<String> {
             ));
         }
         _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+/// Returns what to do about a file of another format than a part has.
+fn other_format(format: FileFormat) -> Option<String> {
+    let hint = match format {
+        FileFormat::Layers(_) => {
+            "lamp info describes layers; slice the part that they were made of"
+        }
+        FileFormat::Archive(_) => "unpack it first",
+        FileFormat::PrintJob(_) => "slice the part that it was made of",
+        FileFormat::WebPage => "download the file itself, not the page that shows it",
+        FileFormat::Pointer("a Git LFS pointer") => {
+            "it stands for the file: run git lfs pull to get that"
+        }
+        FileFormat::Pointer("a git-annex pointer") => {
+            "it stands for the file: run git annex get to get that"
+        }
+        FileFormat::Pointer("a DVC pointer") => "it stands for the file: run dvc pull to get that",
+        FileFormat::Pointer(_) => "name the file that it stands for",
+        _ => "export the part as STL, STEP, 3MF or OBJ",
     };
     Some(hint.to_owned())
 }
@@ -355,6 +385,15 @@ fn stack(error: &StackError) -> Option<String> {
         | StackError::MissingPages { .. } => {
             "make the stack again, or take it as it is with lamp convert --ignore-checks"
         }
+        StackError::NotTiff {
+            format: Some(FileFormat::Part(PartFormat::Zip | PartFormat::Gzip)),
+            ..
+        } => "if a part is in it, slice it first; if it holds pages, unpack it first",
+        StackError::NotTiff { format: Some(FileFormat::Part(_)), .. } => "slice it first",
+        StackError::NotTiff { format: Some(format), .. } => match other_format(*format) {
+            Some(hint) if hint.starts_with("export") => return Some(hint + ", and slice it first"),
+            hint => return hint,
+        },
         StackError::NotTiff { .. } => "if it is a part, slice it first",
         StackError::Exists => "--force replaces a folder of an earlier run",
         StackError::NotReplaceable { .. } => "choose another name, or remove the folder yourself",

@@ -1,7 +1,7 @@
 //! Writes JSON: answers of commands (`--json`), and reports that people can read, too, with a
 //! list item on each line.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -55,13 +55,4 @@ fn json(value: &impl Serialize) -> String {
 /// Rounds to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
 pub(crate) fn to_nm(mm: f64) -> f64 {
     (mm * 1e6).round() / 1e6 + 0.0
-}
-
-/// Parses the name of a report. Standard output is for the stack.
-pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
-    match text {
-        "-" => Err("standard output is for the stack: name a file, as report.json".to_owned()),
-        "" => Err("name a file, as report.json".to_owned()),
-        name => Ok(PathBuf::from(name)),
-    }
 }

@@ -10,6 +10,7 @@ mod body_overlaps;
 mod catalogue;
 mod commands;
 mod compensate_report;
+mod endings;
 mod exit;
 mod exposure;
 mod fallback;

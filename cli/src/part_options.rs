@@ -4,11 +4,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_slicer::brep::Prepared;
 use lamp_slicer::{
     Axis, Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, Units,
 };
-use lamp_stack::{Dpi, Length};
+use lamp_stack::Dpi;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
@@ -164,23 +163,21 @@ impl PartOptions {
             let why = "a STEP or 3MF file states its own unit: leave out --units";
             return Err(Exit::usage(why));
         }
-        model.notes().iter().for_each(|note| (reading.say)(&note.to_string()));
-        for prepared in model.prepared() {
-            self.check_step(prepared, tolerance, reading);
-        }
-        Ok(model)
-    }
-
-    /// Passes notes about a STEP file on.
-    fn check_step(&self, prepared: &Prepared, tolerance: Length, reading: &Reading<'_>) {
-        if tolerance.um() > reading.dpi.pitch().um() {
+        if model.prepared().next().is_some() && tolerance.um() > reading.dpi.pitch().um() {
             (reading.say)(&format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
                  meet or run along rows"
             ));
         }
-        notes(prepared).iter().for_each(|note| (reading.say)(note));
+        part_notes(&model).iter().for_each(|note| (reading.say)(note));
+        Ok(model)
     }
+}
+
+/// Returns notes about how a part was read, for people. Every command that opens one prints them.
+pub(crate) fn part_notes(part: &Part) -> Vec<String> {
+    let of_file = part.notes().iter().map(ToString::to_string);
+    of_file.chain(part.prepared().flat_map(notes)).collect()
 }
 
 /// The purpose that files are read for.

@@ -27,12 +27,17 @@ impl<'a> RecordedSlicing<'a> {
         Some(Self { options, files, digest: &stack.digest })
     }
 
-    /// Opens the part. `name` is the stack's.
+    /// Opens the part. `name` is the stack's; `say` takes notes about the part.
     ///
     /// # Errors
     /// Returns an error if the stack was not sliced from these files as they are and stand.
-    pub(crate) fn open(&self, parts: &[PartArg], name: &str) -> Result<Part, Exit> {
-        let reading = Reading { dpi: self.options.dpi, may_be_open: false, say: &|_| () };
+    pub(crate) fn open(
+        &self,
+        parts: &[PartArg],
+        name: &str,
+        say: &dyn Fn(&str),
+    ) -> Result<Part, Exit> {
+        let reading = Reading { dpi: self.options.dpi, may_be_open: false, say };
         let model = self.options.solid.open(parts, &reading)?;
         if model.digest() != self.digest {
             let part = name_of_all(parts);

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use lamp_slicer::brep::{Finding, Prepared};
-use lamp_slicer::{KernelName, OpenOptions, SliceError};
+use lamp_slicer::{KernelName, OpenOptions, SliceError, step_bytes};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
@@ -178,13 +178,15 @@ pub(crate) fn length(mm: f64) -> String {
     format!("{}{unit}", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Returns the bytes of a file, or of standard input.
+/// Returns the bytes of a STEP file, or of standard input, which gzip may have packed.
 pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, SliceError> {
     let mut bytes = Vec::new();
-    let read = match is_stream(path) {
-        true => io::stdin().lock().read_to_end(&mut bytes),
-        false => File::open(path).and_then(|mut file| file.read_to_end(&mut bytes)),
-    };
-    read?;
-    Ok(bytes.into())
+    if is_stream(path) {
+        io::stdin().lock().read_to_end(&mut bytes)?;
+    } else if path.is_dir() {
+        return Err(SliceError::Folder);
+    } else {
+        File::open(path)?.read_to_end(&mut bytes)?;
+    }
+    step_bytes(bytes)
 }

@@ -1,6 +1,5 @@
 //! Reads and writes stacks: files, folders, pipes and what stands beside them.
 
-use std::ffi::OsStr;
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -12,10 +11,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, anyhow};
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, Layer, PackLevel, Page, PageInfo, PageWriter,
-    Pages, PassingLayer, PictureFormat, StackError, StackInfo, map_in_order, write_packed,
-    write_stack,
+    Pages, PassingLayer, StackError, StackInfo, map_in_order, write_packed, write_stack,
 };
 
+use crate::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::progress::Progress;
@@ -348,11 +347,6 @@ pub(crate) fn packed_destination(output: &Output) -> Result<Destination, Exit> {
     destination(output)
 }
 
-/// Returns true if a name is that of a packed stack.
-pub(crate) fn is_packed_name(path: &Path) -> bool {
-    extension(path) == "lamp"
-}
-
 /// Passes layers on. At their end `finding` may stop the work: then no file is written, and a
 /// stream ends as one that is cut off and says why.
 pub(crate) fn unless_found<L>(
@@ -381,6 +375,17 @@ pub(crate) fn written_to(
     })
 }
 
+/// Refuses to write a stack under the name of another kind of file.
+pub(crate) fn check_stack_name(path: &Path) -> Result<(), Exit> {
+    check_ending(path, &STACK).map_err(|error| match &*extension(path) {
+        "png" => {
+            let path = path.display();
+            Exit::usage(format!("{path}: a stack is a TIFF; lamp convert turns it into PNGs"))
+        }
+        _ => error,
+    })
+}
+
 fn destination(output: &Output) -> Result<Destination, Exit> {
     let path = output.output.as_path();
     if is_stream(path) {
@@ -396,55 +401,16 @@ fn destination(output: &Output) -> Result<Destination, Exit> {
     if is_folder(path) {
         return Ok(Destination::Folder(new_folder(path, output.force)?));
     }
-    let extension = extension(path);
-    if extension == "png" {
-        return Err(Exit::usage(format!(
-            "{}: a stack is a TIFF; lamp convert turns it into PNGs",
-            path.display()
-        )));
-    }
-    if PictureFormat::of_extension(&extension).is_some() {
-        let path = path.display();
-        return Err(Exit::usage(format!("{path}: a stack is a TIFF: end its name in .tif")));
-    }
+    check_stack_name(path)?;
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
         None => Destination::File(behind_links(path)),
     })
 }
 
-/// Refuses to write a PNG under the name of another kind of picture.
-pub(crate) fn check_png_name(path: &Path) -> Result<(), Exit> {
-    let extension = extension(path);
-    let is_other = matches!(&*extension, "tif" | "tiff" | "svg")
-        || PictureFormat::of_extension(&extension).is_some();
-    if is_other {
-        let path = path.display();
-        return Err(Exit::usage(format!("{path}: the picture is a PNG: end its name in .png")));
-    }
-    Ok(())
-}
-
-/// Refuses to write a mesh under the name of another kind of file.
-pub(crate) fn check_stl_name(path: &Path) -> Result<(), Exit> {
-    match &*extension(path) {
-        "" | "stl" => Ok(()),
-        _ => {
-            let path = path.display();
-            Err(Exit::usage(format!("{path}: meshes are written as STL: name a .stl file")))
-        }
-    }
-}
-
 /// Returns what a file's name ends in, in small letters.
 pub(crate) fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
-}
-
-/// Returns true if a name is that of a STEP file.
-pub(crate) fn is_step_name(path: &Path) -> bool {
-    let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
-    path.extension().is_some_and(is_step)
 }
 
 /// Returns whether an output names a folder.
@@ -458,6 +424,9 @@ pub(crate) fn new_folder(path: &Path, force: bool) -> Result<FolderBeside, Exit>
     let name = || path.display().to_string();
     if path.file_name().is_none() || is_stream(path) {
         return Err(Exit::usage(format!("{}: name the folder to write to", name())));
+    }
+    if !is_folder(path) {
+        check_ending(path, &FOLDER)?;
     }
     let folder =
         if force { FolderBeside::replacing(path) } else { FolderBeside::over_nothing(path) };
@@ -482,7 +451,8 @@ pub(crate) fn check_beside<'a>(
     if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
         return Err(Exit::usage(format!("{}: the stack is written there", beside.display())));
     }
-    check_not_input(beside, inputs)
+    check_not_input(beside, inputs)?;
+    check_no_stack(beside)
 }
 
 /// Checks, before the work, that an output does not replace an input.

@@ -14,6 +14,8 @@ use lamp_stack::{Catalogued, Length};
 
 use crate::exit::Exit;
 use crate::options::{one_of, parse_thickness};
+use crate::part_options::part_notes;
+use crate::progress::Progress;
 
 /// How a target's file is read.
 #[derive(Args, Clone, Debug)]
@@ -47,8 +49,12 @@ pub(crate) struct TargetArg {
 
 impl TargetArg {
     /// Returns the target, which the projector's light must cover.
-    pub(crate) fn open(&self, projector: &Projector) -> Result<GivenTarget, Exit> {
-        self.reading.open(&self.target, projector)
+    pub(crate) fn open(
+        &self,
+        projector: &Projector,
+        progress: &Progress,
+    ) -> Result<GivenTarget, Exit> {
+        self.reading.open(&self.target, projector, progress)
     }
 }
 
@@ -91,8 +97,14 @@ impl GivenTarget {
 impl TargetReading {
     /// Returns the built-in target of a name, or that of a file, which the projector's light must
     /// cover.
-    pub(crate) fn open(&self, path: &Path, projector: &Projector) -> Result<GivenTarget, Exit> {
+    pub(crate) fn open(
+        &self,
+        path: &Path,
+        projector: &Projector,
+        progress: &Progress,
+    ) -> Result<GivenTarget, Exit> {
         let target = self.read(path)?;
+        target.part().map(part_notes).iter().flatten().for_each(|note| progress.say(note));
         if self.pixel.is_some() && !target.is_picture() {
             return Err(Exit::usage("--pixel and --full are for height maps: leave them out"));
         }

@@ -1,127 +1,298 @@
-//! Reads ASCII STL: any number of solids, in any case, however long their lines.
+//! Reads ASCII STL as words: any number of solids, in any case, however their lines break.
 
-use std::io::{self, BufRead, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 
 use crate::error::{AsciiFault, SliceError};
 use crate::facet::Facet;
-use crate::text_lines::{TextLines, without_mark};
+use crate::number::{NumberFault, Numbers};
+use crate::read_note::ReadNote;
+use crate::words::Words;
 
-/// More bytes than any line of a facet has.
-const MAX_LINE_BYTES: usize = 4096;
+/// The facets of a text, and notes on what is left out.
+pub(crate) type Facets = (Vec<Facet>, Vec<ReadNote>);
 
-/// Returns true if a file that starts with these bytes is ASCII STL: text that begins
-/// with `solid` and goes on with a facet, or ends at once, or has a first line
-/// longer than these bytes.
-pub(crate) fn looks_ascii(start: &[u8], is_whole: bool) -> bool {
-    let text = without_mark(start).to_ascii_lowercase();
-    let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
-    let is_text = !text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
-    text.trim_ascii_start().starts_with(b"solid")
-        && is_text
-        && (holds(b"facet") || holds(b"endsolid") || !is_whole)
-}
-
-/// Reads the facets of all solids of an ASCII file.
-pub(crate) fn read(text: impl BufRead) -> Result<Vec<Facet>, SliceError> {
-    let mut facets = Vec::new();
-    let mut lines = TextLines::new(text, MAX_LINE_BYTES);
-    while lines.advance()? {
-        let is_solid = |line: &[u8]| line.len() >= 5 && line[..5].eq_ignore_ascii_case(b"solid");
-        if !is_solid(without_mark(lines.line())) {
-            return Err(SliceError::Ascii { facet: facets.len(), fault: AsciiFault::NoSolid });
+/// Reads the facets of all solids of an ASCII file, which `open` opens.
+///
+/// # Errors
+/// Returns an error if it ends within a facet, has other words in one, or cannot be read.
+pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<Facets, SliceError> {
+    match AsciiReader::new(open(), Numbers::default())?.read() {
+        // Only all numbers together say how commas are meant.
+        Err(SliceError::Ascii { fault: AsciiFault::Comma, .. }) => {
+            AsciiReader::new(open(), Numbers::with_commas())?.read()
         }
-        read_solid(&mut lines, &mut facets)?;
+        read => read,
     }
-    Ok(facets)
 }
 
-fn read_solid(
-    lines: &mut TextLines<impl BufRead>,
-    facets: &mut Vec<Facet>,
-) -> Result<(), SliceError> {
-    let failed = |facet, error| SliceError::Ascii { facet, fault: AsciiFault::Line(error) };
-    let mut source = PlainText::new(lines);
-    let triangles =
-        stl_io::create_stl_reader(&mut source).map_err(|error| failed(facets.len(), error))?;
-    for triangle in triangles {
-        let triangle = triangle.map_err(|error| failed(facets.len(), error))?;
-        facets.push(triangle.vertices.map(|corner| corner.0));
-    }
-    Ok(())
+/// A word with a meaning in STL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Keyword {
+    Solid,
+    EndSolid,
+    Facet,
+    EndFacet,
+    Normal,
+    Outer,
+    Loop,
+    EndLoop,
+    Vertex,
+    /// It begins `end loop` and others that are two words.
+    End,
 }
 
-/// A solid as stl_io reads it, line by line: in lower case, and without names, which
-/// may not be UTF-8, and normals, which may be no numbers. It would refuse both, though
-/// facets need neither.
-struct PlainText<'a, R> {
-    /// The lines behind the solid's first.
-    lines: &'a mut TextLines<R>,
-    line: Cursor<Vec<u8>>,
-    has_begun: bool,
-    has_ended: bool,
+impl Keyword {
+    #[inline]
+    fn of(word: &[u8]) -> Option<Self> {
+        let mut lower = [0; 8];
+        let lower = lower.get_mut(..word.len())?;
+        lower.copy_from_slice(word);
+        lower.make_ascii_lowercase();
+        Some(match &*lower {
+            b"solid" => Self::Solid,
+            b"endsolid" => Self::EndSolid,
+            b"facet" => Self::Facet,
+            b"endfacet" => Self::EndFacet,
+            b"normal" => Self::Normal,
+            b"outer" => Self::Outer,
+            b"loop" => Self::Loop,
+            b"endloop" => Self::EndLoop,
+            b"vertex" => Self::Vertex,
+            b"end" => Self::End,
+            _ => return None,
+        })
+    }
 }
 
-impl<'a, R: BufRead> PlainText<'a, R> {
-    fn new(lines: &'a mut TextLines<R>) -> Self {
-        Self { lines, line: Self::header(), has_begun: false, has_ended: false }
+/// Words that begin a property of a solid or a facet; words and numbers follow.
+const PROPERTIES: [&[u8]; 5] = [b"color", b"colour", b"rgb", b"material", b"attribute"];
+
+fn begins_with(word: &[u8], beginning: &[u8]) -> bool {
+    word.len() >= beginning.len() && word[..beginning.len()].eq_ignore_ascii_case(beginning)
+}
+
+fn is_property(word: &[u8]) -> bool {
+    PROPERTIES.iter().any(|property| word.eq_ignore_ascii_case(property))
+}
+
+fn is_comment(word: &[u8]) -> bool {
+    matches!(word, [b'#' | b';' | b'!', ..] | [b'/', b'/', ..])
+}
+
+struct AsciiReader<R> {
+    words: Words<R>,
+    numbers: Numbers,
+    facets: Vec<Facet>,
+    notes: Vec<ReadNote>,
+    /// Whether a solid has begun and not ended.
+    is_in_solid: bool,
+}
+
+impl<R: Read> AsciiReader<R> {
+    fn new(text: R, numbers: Numbers) -> io::Result<Self> {
+        let (facets, notes) = (Vec::new(), Vec::new());
+        Ok(Self { words: Words::new(text)?, numbers, facets, notes, is_in_solid: false })
     }
 
-    /// Returns a first line, whatever the text's is.
-    fn header() -> Cursor<Vec<u8>> {
-        Cursor::new(b"solid part\n".to_vec())
+    fn read(mut self) -> Result<Facets, SliceError> {
+        while self.words.advance()? {
+            match Keyword::of(self.words.word()) {
+                Some(Keyword::Facet) => self.facet()?,
+                Some(Keyword::Solid) => self.solid()?,
+                Some(Keyword::EndSolid) => self.end_solid()?,
+                Some(Keyword::End) => match self.next_keyword()? {
+                    Some(Keyword::Solid) => self.end_solid()?,
+                    _ if self.words.word().is_empty() => {}
+                    _ => return Err(self.unexpected("`facet` or `endsolid`")),
+                },
+                Some(_) => return Err(self.unexpected("`facet` or `endsolid`")),
+                None => self.other_statement()?,
+            }
+        }
+        if self.numbers.is_ambiguous() {
+            return Err(self.failed(AsciiFault::Comma));
+        }
+        if self.numbers.has_commas {
+            self.notes.push(ReadNote::DecimalCommas);
+        }
+        if self.is_in_solid && !self.facets.is_empty() {
+            self.notes.push(ReadNote::NoEnd);
+        }
+        Ok((self.facets, self.notes))
     }
 
-    /// Takes the next line off the text.
-    fn next_line(&mut self) -> io::Result<()> {
-        self.has_begun = true;
-        if self.lines.advance()? {
-            let mut line = std::mem::take(&mut self.line).into_inner();
-            line.clear();
-            plain(self.lines.line(), &mut line);
-            self.has_ended = line == END;
-            self.line = Cursor::new(line);
+    fn failed(&self, fault: AsciiFault) -> SliceError {
+        SliceError::Ascii { facet: self.facets.len(), fault }
+    }
+
+    /// Returns the fault of a word that stands where another should.
+    fn unexpected(&self, expected: &'static str) -> SliceError {
+        let found = self.words.word();
+        self.failed(if found.is_empty() {
+            AsciiFault::CutOff
         } else {
-            self.has_ended = true;
+            AsciiFault::Unexpected { found: AsciiFault::start_of(found), expected }
+        })
+    }
+
+    fn next_keyword(&mut self) -> Result<Option<Keyword>, SliceError> {
+        self.words.advance()?;
+        Ok(Keyword::of(self.words.word()))
+    }
+
+    fn solid(&mut self) -> Result<(), SliceError> {
+        self.is_in_solid = true;
+        self.name()
+    }
+
+    fn end_solid(&mut self) -> Result<(), SliceError> {
+        self.is_in_solid = false;
+        self.name()
+    }
+
+    /// Passes over the name of a solid: the rest of the line, or all before a facet on it.
+    fn name(&mut self) -> Result<(), SliceError> {
+        while self.words.advance()? {
+            if self.words.begins_line() {
+                self.words.hold();
+                break;
+            }
+            if Keyword::of(self.words.word()) != Some(Keyword::Facet) {
+                continue;
+            }
+            let behind = self.next_keyword()?;
+            let is_facet =
+                matches!(behind, Some(Keyword::Normal | Keyword::Outer | Keyword::Vertex))
+                    && !self.words.begins_line();
+            self.words.hold();
+            if is_facet {
+                self.is_in_solid = true;
+                return self.facet();
+            }
         }
         Ok(())
     }
-}
 
-impl<R: BufRead> Read for PlainText<'_, R> {
-    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        if self.line.fill_buf()?.is_empty() && !self.has_ended {
-            self.next_line()?;
+    /// Reads a facet behind its first word.
+    fn facet(&mut self) -> Result<(), SliceError> {
+        if self.next_keyword()? == Some(Keyword::Normal) {
+            // A normal means nothing, and may be no number.
+            for _ in 0..3 {
+                if self.next_keyword()?.is_some() {
+                    break;
+                }
+            }
+            if Keyword::of(self.words.word()).is_some() {
+                self.words.hold();
+            }
+        } else {
+            self.words.hold();
         }
-        self.line.read(to)
-    }
-}
-
-impl<R: BufRead> Seek for PlainText<'_, R> {
-    /// Only to the start, as stl_io does once it knows the format from the first line.
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if to != SeekFrom::Start(0) || self.has_begun {
-            return Err(io::ErrorKind::Unsupported.into());
+        let mut facet = Facet::default();
+        let (mut corners, mut has_loop, mut has_ended) = (0, false, false);
+        loop {
+            let mut keyword = self.next_keyword()?;
+            if keyword == Some(Keyword::End) {
+                keyword = match self.next_keyword()? {
+                    Some(Keyword::Loop) => Some(Keyword::EndLoop),
+                    Some(Keyword::Facet) => Some(Keyword::EndFacet),
+                    _ => return Err(self.unexpected("`endloop` or `endfacet`")),
+                };
+            }
+            match keyword {
+                Some(Keyword::Vertex) if corners < 3 && !has_ended => {
+                    facet[corners] = self.corner()?;
+                    corners += 1;
+                }
+                Some(Keyword::Outer | Keyword::Loop) if corners == 0 && !has_loop => {
+                    has_loop = true;
+                    if keyword == Some(Keyword::Outer)
+                        && self.next_keyword()? != Some(Keyword::Loop)
+                    {
+                        return Err(self.unexpected("`loop`"));
+                    }
+                }
+                Some(Keyword::EndLoop) if corners == 3 && !has_ended => has_ended = true,
+                Some(Keyword::EndFacet) if corners == 3 => {
+                    self.facets.push(facet);
+                    return Ok(());
+                }
+                None if is_comment(self.words.word()) => self.words.skip_line()?,
+                None if is_property(self.words.word()) => self.property()?,
+                _ if corners < 3 => return Err(self.unexpected("a `vertex`")),
+                _ if has_ended => return Err(self.unexpected("`endfacet`")),
+                _ => return Err(self.unexpected("`endloop`")),
+            }
         }
-        self.line = Self::header();
-        Ok(0)
     }
-}
 
-/// The last line of a solid.
-const END: &[u8] = b"endsolid\n";
+    #[inline]
+    fn corner(&mut self) -> Result<[f32; 3], SliceError> {
+        let mut corner = [0.0; 3];
+        for number in &mut corner {
+            self.words.advance()?;
+            let word = self.words.word();
+            *number = match self.numbers.parse(word) {
+                Ok(number) => number,
+                Err(NumberFault::Comma) => return Err(self.failed(AsciiFault::Comma)),
+                Err(NumberFault::NoNumber) => return Err(self.unexpected("a number")),
+            };
+        }
+        Ok(corner)
+    }
 
-/// Writes a line as stl_io reads it.
-fn plain(line: &[u8], plain: &mut Vec<u8>) {
-    let mut words = line.split(|&byte| byte == b' ');
-    let mut is = |name: &str| words.next().is_some_and(|w| w.eq_ignore_ascii_case(name.as_bytes()));
-    if line.len() >= 8 && line[..8].eq_ignore_ascii_case(b"endsolid") {
-        plain.extend_from_slice(END);
-    } else if is("facet") && is("normal") && words.count() == 3 {
-        plain.extend_from_slice(b"facet normal 0 0 0\n");
-    } else {
-        plain.extend_from_slice(line);
-        plain.make_ascii_lowercase();
-        plain.push(b'\n');
+    /// Passes over a property behind its first word: the rest of the line, or all before a word of
+    /// STL's on it.
+    fn property(&mut self) -> Result<(), SliceError> {
+        ReadNote::count_statement(&mut self.notes, self.words.word());
+        while self.words.advance()? {
+            if self.words.begins_line() || Keyword::of(self.words.word()).is_some() {
+                self.words.hold();
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Passes over a statement between facets that STL does not have.
+    fn other_statement(&mut self) -> Result<(), SliceError> {
+        if let Some(bytes) = self.words.padding()? {
+            self.notes.push(ReadNote::BytesAfter { bytes });
+            return Ok(());
+        }
+        let word = self.words.word();
+        if begins_with(word, b"solid") {
+            return self.solid();
+        }
+        if begins_with(word, b"endsolid") {
+            return self.end_solid();
+        }
+        if is_comment(word) {
+            return Ok(self.words.skip_line()?);
+        }
+        if is_property(word) {
+            return self.property();
+        }
+        if self.words.ends_text() && b"facet".starts_with(&word.to_ascii_lowercase()) {
+            return Err(self.failed(AsciiFault::CutOff));
+        }
+        let is_cut_end =
+            self.words.ends_text() && b"endsolid".starts_with(&word.to_ascii_lowercase());
+        if !is_cut_end {
+            ReadNote::count_statement(&mut self.notes, word);
+        }
+        while self.words.advance()? {
+            let keyword = Keyword::of(self.words.word());
+            if self.words.begins_line() {
+                self.words.hold();
+                break;
+            }
+            // Facets are not passed over.
+            if !matches!(keyword, None | Some(Keyword::Solid | Keyword::EndSolid | Keyword::End)) {
+                return Err(self.unexpected("a line of another kind"));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -138,44 +309,146 @@ mod tests {
 
     const FACET: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.5, -2.0]];
 
-    #[test]
-    fn several_solids_in_any_case_are_one_part() {
-        let text = solid("") + &solid(" Two Words").to_uppercase() + "\r\n" + &solid(" c");
-        assert!(looks_ascii(text.as_bytes(), true));
-        assert_eq!(read(text.as_bytes()).unwrap(), [FACET; 3]);
+    fn read_text(text: &str) -> Result<Facets, String> {
+        read(|| text.as_bytes()).map_err(|error| error.to_string())
+    }
+
+    fn facets_of(text: &str) -> Vec<Facet> {
+        read_text(text).unwrap_or_else(|error| panic!("{error}: {text}")).0
+    }
+
+    fn notes_of(text: &str) -> Vec<String> {
+        read_text(text).unwrap().1.iter().map(ToString::to_string).collect()
     }
 
     #[test]
-    fn marks_long_names_and_old_line_ends_are_read() {
-        let long = solid(&format!(" {}", "a".repeat(3000)));
-        for text in [format!("\u{FEFF}{}", solid("")), solid(" a").replace('\n', "\r"), long] {
-            let bytes = text.as_bytes();
-            assert!(looks_ascii(&bytes[..bytes.len().min(1024)], bytes.len() <= 1024));
-            assert_eq!(read(bytes).unwrap(), [FACET]);
+    fn several_solids_in_any_case_are_one_part() {
+        let text = solid("") + &solid(" Two Words").to_uppercase() + "\r\n" + &solid(" c");
+        assert_eq!(read_text(&text).unwrap(), (vec![FACET; 3], vec![]));
+    }
+
+    #[test]
+    fn lines_break_anywhere() {
+        let text = solid(" a facet endsolid") + &solid(" b");
+        for text in [
+            text.replace('\n', "\r"),
+            text.replace('\n', "\r\n"),
+            text.replace("\n vertex", " vertex"),
+            text.replace("\n outer", " outer"),
+            text.replace("1e0 0 0", "1e0\n0\n0"),
+            text.replace(' ', "\t").replace("facet\tnormal", "facet\n\nnormal"),
+            text.replace('\n', " "),
+        ] {
+            assert_eq!(facets_of(&text), [FACET; 2], "{text}");
         }
     }
 
     #[test]
-    fn a_cut_file_names_its_facet() {
+    fn words_may_be_missing_or_apart() {
+        let text = solid(" a");
+        for text in [
+            text.replace("endloop", "end loop").replace("endfacet", "end facet"),
+            text.replace("endsolid", "END SOLID"),
+            text.replace(" normal 0 0 1", ""),
+            text.replace("normal 0 0 1", "normal"),
+            text.replace("normal 0 0 1", "normal -nan(ind) 1.#QNAN"),
+            text.replace(" outer loop\n", ""),
+            text.replace(" outer", ""),
+            text.replace(" endloop\n", ""),
+            text.replace("solid a\n", ""),
+            text.replace("endsolid a", "endsolid"),
+            text.replace("solid a", "solid"),
+            text.replace("solid a", "solid_a"),
+            text.replace("1.5", "+15.0D-01").replace("1e0", "1,"),
+        ] {
+            assert_eq!(read_text(&text), Ok((vec![FACET], vec![])), "{text}");
+        }
+        let open = text.replace("endsolid a\n", "");
+        assert_eq!(read_text(&open), Ok((vec![FACET], vec![ReadNote::NoEnd])));
+    }
+
+    #[test]
+    fn comments_say_nothing_and_properties_are_noted() {
+        let text = solid(" a");
+        for comment in ["# a vertex 1", "// facet", "; x", "!"] {
+            let text = text.replace('\n', &format!(" {comment}\n{comment}\n"));
+            let text = format!("{comment}\n{text}");
+            assert_eq!(read_text(&text), Ok((vec![FACET], vec![])), "{text}");
+        }
+        let colors = text.replace('\n', "\ncolor 0.1 0.2 red\n");
+        assert_eq!(facets_of(&colors), [FACET]);
+        assert_eq!(notes_of(&colors), ["9 statements that begin with `color` are left out"]);
+        let colors = text.replace("1 0 0", "1 0 0 COLOR 1 2 3").replace('\n', " ");
+        assert_eq!(facets_of(&colors), [FACET]);
+        let more = text + "made by a program\n";
+        assert_eq!(notes_of(&more), ["1 statement that begins with `made` is left out"]);
+    }
+
+    #[test]
+    fn padding_is_counted() {
+        for (padding, note) in [
+            ("\0\0\0\0 \n\0", "5 bytes after the last facet are left out"),
+            ("\u{1a}", "1 byte after the last facet is left out"),
+        ] {
+            let text = solid(" a") + padding;
+            assert_eq!(facets_of(&text), [FACET]);
+            assert_eq!(notes_of(&text), [note]);
+            let within = text + &solid(" b");
+            assert!(read_text(&within).is_err(), "{within:?}");
+        }
+    }
+
+    #[test]
+    fn decimal_commas_are_read_where_nothing_else_is_meant() {
+        let text = solid(" a").replace("1.5", "1,5");
+        assert_eq!(facets_of(&text), [FACET]);
+        assert_eq!(notes_of(&text), ["commas in its numbers are read as decimal points"]);
+        let ambiguous = text.replace("1,5", "1,500");
+        assert!(read_text(&ambiguous).unwrap_err().contains("commas"));
+        assert!(read_text(&text.replace("-2", "-2.0")).is_err());
+    }
+
+    #[test]
+    fn a_text_cut_within_a_facet_is_refused() {
         let text = solid(" a") + &solid(" b");
-        let cut = &text[..text.len() - 30];
-        let message = read(cut.as_bytes()).unwrap_err().to_string();
-        assert!(message.starts_with("facet 1 "), "{message}");
+        let end = text.rfind("endfacet").unwrap() + "endfacet".len();
+        let begin = text.rfind("facet normal").unwrap();
+        for length in begin + 1..end {
+            let message = read_text(&text[..length]).unwrap_err();
+            assert!(message.starts_with("facet 1 "), "{length}: {message}");
+        }
+        for length in end..text.rfind("endsolid").unwrap() + "endsolid".len() - 1 {
+            assert_eq!(read_text(&text[..length]), Ok((vec![FACET; 2], vec![ReadNote::NoEnd])));
+        }
     }
 
     #[test]
     fn a_refusal_is_short_however_long_the_line() {
         for bad in ["endloop\u{8}".repeat(90), "endloop ".repeat(9000), "9".repeat(9000)] {
             let text = solid(" a").replace("endloop", &bad);
-            let message = read(text.as_bytes()).unwrap_err().to_string();
+            let message = read_text(&text).unwrap_err();
             assert!(message.starts_with("facet 0 ") && message.len() < 300, "{message}");
         }
     }
 
     #[test]
-    fn other_text_is_refused() {
-        assert!(!looks_ascii(b"solid state physics", true));
-        assert!(!looks_ascii(b"solid facet\0", true));
-        assert!(read((solid(" a") + "more").as_bytes()).is_err());
+    fn other_words_in_facets_are_refused() {
+        let text = solid(" a");
+        for (from, to) in [
+            ("outer", "inner"),
+            ("vertex 1", "corner 1"),
+            ("vertex 1", "vertex x"),
+            ("vertex 1e0 0 0", "vertex 1e0 0"),
+            ("vertex 1e0 0 0", "vertex 1e0 0 0 0"),
+            ("endloop", "vertex 0 0 0 endloop"),
+            (" endfacet\n", ""),
+            ("facet normal 0 0 1", "facet 0 0 1"),
+            ("solid a\n facet", "solid a\n x facet"),
+            ("solid a\n", "solid a\n vertex 0 0 0\n"),
+        ] {
+            let broken = text.replacen(from, to, 1);
+            assert_ne!(broken, text);
+            assert!(read_text(&broken).is_err(), "{broken}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use lamp_brep::{BodyFault, BrepError, Difference, Finding};
-use lamp_stack::Length;
+use lamp_stack::{FileFormat, Length, one_line};
 use thiserror::Error;
 
 use crate::three_mf::ThreeMfError;
@@ -37,9 +37,25 @@ pub enum SliceError {
         /// The file's size in bytes.
         size: u64,
     },
-    /// A file of a known format that is not read.
-    #[error("this is a {0} file, not an STL, STEP, 3MF or OBJ file")]
-    OtherFormat(&'static str),
+    /// A file of another format.
+    #[error("this is {0}, not an STL, STEP, 3MF or OBJ file")]
+    OtherFormat(FileFormat),
+    /// A ZIP archive that is no 3MF package.
+    #[error(
+        "this is a ZIP archive of {files} file{} ({}{}), not a 3MF package",
+        if *files == 1 { "" } else { "s" },
+        if *files == 1 { "" } else { "one is " },
+        one_line(name)
+    )]
+    OtherArchive {
+        /// The number of files in it.
+        files: usize,
+        /// The name of a file in it, of a part if there is one.
+        name: String,
+    },
+    /// A file that is read, where only STEP files are.
+    #[error("this is {0}, not a STEP file")]
+    NotStep(FileFormat),
     /// A packed file that is damaged.
     #[error("it cannot be unpacked")]
     Packed(#[source] io::Error),
@@ -295,33 +311,44 @@ pub enum ObjFault {
     /// A corner at a vertex that does not stand before it.
     #[error("names a vertex that does not stand before it: there is no vertex {0}")]
     NoVertex(i64),
-    /// A face that is none.
-    #[error("is a face with fewer than three corners")]
-    FewCorners,
-    /// A line that is longer than any face.
-    #[error("is longer than a megabyte")]
-    LongLine,
+    /// A face that is no face of a part.
+    #[error("is a face with more corners than 500000")]
+    ManyCorners,
+    /// Numbers with commas.
+    #[error("has commas in its numbers, which may be decimal points or stand between thousands")]
+    Comma,
     /// Curves and surfaces instead of faces.
     #[error("is a free-form curve or surface, which is not read: only faces are")]
     FreeForm,
 }
 
 /// A fault of an ASCII STL.
-#[derive(Debug, Error)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum AsciiFault {
-    /// A solid that does not begin as one.
-    #[error("a line stands where `solid` should")]
-    NoSolid,
-    /// A line that the parser refuses.
-    #[error("{}", start_of(.0))]
-    Line(#[source] io::Error),
+    /// The text ends within a facet.
+    #[error("the file ends within it: it was cut off")]
+    CutOff,
+    /// A word where another one should be.
+    #[error("`{found}` stands where {expected} should")]
+    Unexpected {
+        /// The start of the word.
+        found: String,
+        /// The words that should be there.
+        expected: &'static str,
+    },
+    /// Numbers with commas.
+    #[error("commas in its numbers may be decimal points or stand between thousands")]
+    Comma,
 }
 
-/// Returns the start of an error's text, which may quote all of a long line.
-fn start_of(error: &io::Error) -> String {
-    const MAX_CHARACTERS: usize = 150;
-    error.to_string().chars().take(MAX_CHARACTERS).collect()
+impl AsciiFault {
+    /// Returns the start of a word, which may be long and anything, for messages.
+    pub(crate) fn start_of(word: &[u8]) -> String {
+        const MAX_CHARACTERS: usize = 40;
+        let text = String::from_utf8_lossy(word);
+        text.chars().take(MAX_CHARACTERS).flat_map(char::escape_debug).collect()
+    }
 }
 
 /// Says which layers were asked for.

@@ -37,6 +37,7 @@
 //! # Ok::<(), lamp_slicer::SliceError>(())
 //! ```
 
+mod archive;
 mod ascii;
 mod bodies;
 mod buckets;
@@ -51,6 +52,7 @@ mod file_blocks;
 mod gray;
 mod grid;
 mod image_rows;
+mod number;
 mod obj;
 mod open;
 mod part;
@@ -65,13 +67,13 @@ mod slices;
 mod stl;
 mod survey;
 mod table;
-mod text_lines;
 mod three_mf;
 pub mod topology;
 mod trace;
 mod unpack;
 mod utf8_text;
 mod wild;
+mod words;
 
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
@@ -85,7 +87,7 @@ pub use gray::LayerLevels;
 pub use grid::PixelGrid;
 #[cfg(feature = "occt")]
 pub use open::second_opinion;
-pub use open::{KernelName, OpenOptions, body_name, read_step};
+pub use open::{KernelName, OpenOptions, body_name, read_step, step_bytes};
 pub use part::Part;
 pub use placement::{Axis, PlacedFacet, Placement, facet_heights};
 pub use planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule};

@@ -1,58 +1,182 @@
 //! Reads OBJ: the vertices and faces of Wavefront's text format.
 
-use std::io::BufRead;
+use std::io::{self, Read};
 
 use crate::decimal_mesh::DecimalMesh;
 use crate::error::{ObjFault, SliceError};
+use crate::number::{NumberFault, Numbers};
 use crate::part::Piece;
-use crate::text_lines::{TextLines, without_mark};
+use crate::read_note::ReadNote;
+use crate::words::Words;
 
-/// A face of a hundred thousand corners takes this much.
-const MAX_LINE_BYTES: usize = 1 << 20;
+/// More corners than any face has.
+const MAX_CORNERS: usize = 1 << 19;
 
-/// First words of the lines that begin files.
-const FIRST_WORDS: [&str; 12] =
-    ["v", "vn", "vt", "vp", "f", "o", "g", "s", "l", "p", "mtllib", "usemtl"];
+/// First words of lines that say nothing about the shape: normals, texture, names, groups,
+/// materials and how to draw.
+const PASSED_OVER: [&[u8]; 30] = [
+    b"vn",
+    b"vt",
+    b"vp",
+    b"g",
+    b"o",
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"usemtl",
+    b"newmtl",
+    b"maplib",
+    b"usemap",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ka",
+    b"kd",
+    b"ks",
+    b"ke",
+    b"tf",
+    b"ns",
+    b"ni",
+    b"d",
+    b"tr",
+    b"illum",
+    b"map_kd",
+    b"map_ka",
+];
 
-/// Returns true if a file that starts with these bytes is OBJ: text whose first line
-/// that is no comment is one of the format's.
-pub(crate) fn looks_obj(start: &[u8]) -> bool {
-    let is_text = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
-    let mut lines = TextLines::new(without_mark(start), MAX_LINE_BYTES);
-    let mut has_lines = false;
-    while let Ok(true) = lines.advance() {
-        has_lines = true;
-        let mut words = lines.words();
-        let first = words.next().unwrap_or_default();
-        if !first.starts_with(b"#") {
-            let is_known = FIRST_WORDS.iter().any(|word| word.as_bytes() == first);
-            return is_known && words.next().is_some() && start.iter().all(is_text);
+/// Reads the faces of all objects of a file, which `open` opens, as fans of facets. A face that is
+/// not convex has facets that overlap, but the same sections by either rule of filling.
+///
+/// # Errors
+/// Returns an error if a vertex or a face cannot be read, or the file.
+pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<(Piece, Vec<ReadNote>), SliceError> {
+    match ObjReader::new(open(), Numbers::default())?.read() {
+        // Only all numbers together say how commas are meant.
+        Err(SliceError::Obj { fault: ObjFault::Comma, .. }) => {
+            ObjReader::new(open(), Numbers::with_commas())?.read()
         }
+        read => read,
     }
-    has_lines && start.iter().all(is_text)
 }
 
-/// Reads the faces of all objects, as fans of facets. A face that is not convex has
-/// facets that overlap, but the same sections by either rule of filling.
-pub(crate) fn read(text: impl BufRead) -> Result<Piece, SliceError> {
-    let mut lines = TextLines::new(text, MAX_LINE_BYTES);
-    let mut mesh = ObjMesh::default();
-    while lines.advance()? {
-        let failed = |fault| SliceError::Obj { line: lines.number(), fault };
-        let is_first = lines.number() == 1;
-        let line = if is_first { without_mark(lines.line()) } else { lines.line() };
-        let (keyword, values) =
-            line.split_at(line.iter().position(|b| *b == b' ').unwrap_or(line.len()));
-        let added = match keyword {
-            b"v" | b"f" if lines.is_cut() => Err(ObjFault::LongLine),
-            b"v" => mesh.add_vertex(values),
-            b"f" => mesh.add_face(values),
-            b"curv" | b"curv2" | b"surf" => Err(ObjFault::FreeForm),
-            _ => Ok(()),
-        };
-        added.map_err(failed)?;
+struct ObjReader<R> {
+    words: Words<R>,
+    numbers: Numbers,
+    mesh: ObjMesh,
+    notes: Vec<ReadNote>,
+    few_corners: u64,
+}
+
+impl<R: Read> ObjReader<R> {
+    fn new(text: R, numbers: Numbers) -> io::Result<Self> {
+        let (mesh, notes) = (ObjMesh::default(), Vec::new());
+        Ok(Self { words: Words::new(text)?, numbers, mesh, notes, few_corners: 0 })
     }
-    Ok(mesh.mesh.into_piece())
+
+    fn read(mut self) -> Result<(Piece, Vec<ReadNote>), SliceError> {
+        while self.words.advance()? {
+            let line = self.words.line();
+            let failed = |fault| SliceError::Obj { line, fault };
+            match self.words.word() {
+                [b'v' | b'V'] => self.vertex()?.map_err(failed)?,
+                [b'f' | b'F'] | b"fo" => self.face()?.map_err(failed)?,
+                [b'#', ..] => self.words.skip_line()?,
+                _ => self.other_line()?.map_err(failed)?,
+            }
+        }
+        if self.numbers.is_ambiguous() {
+            return Err(SliceError::Obj { line: self.words.line(), fault: ObjFault::Comma });
+        }
+        if self.numbers.has_commas {
+            self.notes.push(ReadNote::DecimalCommas);
+        }
+        if self.few_corners > 0 {
+            self.notes.push(ReadNote::FewCorners { faces: self.few_corners });
+        }
+        Ok((self.mesh.mesh.into_piece(), self.notes))
+    }
+
+    /// Moves to the next word of the line at hand, which a `\` at its end continues. Returns false
+    /// at its end.
+    #[inline]
+    fn advance(&mut self) -> io::Result<bool> {
+        let continues = u64::from(self.words.word().ends_with(b"\\"));
+        let mut line = self.words.line() + continues;
+        loop {
+            if !self.words.advance()? {
+                return Ok(false);
+            }
+            if self.words.begins_line() && self.words.line() != line {
+                self.words.hold();
+                return Ok(false);
+            }
+            match self.words.word() {
+                b"\\" => line = self.words.line() + 1,
+                [b'#', ..] => {
+                    self.words.skip_line()?;
+                    return Ok(false);
+                }
+                _ => return Ok(true),
+            }
+        }
+    }
+
+    /// Adds `x y z`; a weight or colors may follow.
+    fn vertex(&mut self) -> io::Result<Result<(), ObjFault>> {
+        let mut vertex = [0.0; 3];
+        for number in &mut vertex {
+            let has_word = self.advance()?;
+            let word = if has_word { self.words.word() } else { b"" };
+            let word = word.strip_suffix(b"\\").unwrap_or(word);
+            *number = match self.numbers.parse(word) {
+                Ok(number) => number,
+                Err(NumberFault::Comma) => return Ok(Err(ObjFault::Comma)),
+                Err(NumberFault::NoNumber) => return Ok(Err(ObjFault::Number)),
+            };
+        }
+        self.mesh.mesh.add_vertex(vertex);
+        self.pass_over()?;
+        Ok(Ok(()))
+    }
+
+    /// Adds a face of corners `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    fn face(&mut self) -> io::Result<Result<(), ObjFault>> {
+        self.mesh.face.clear();
+        while self.advance()? {
+            let word = self.words.word();
+            let corner = word.strip_suffix(b"\\").unwrap_or(word);
+            if let Err(fault) = self.mesh.add_corner(corner) {
+                return Ok(Err(fault));
+            }
+        }
+        self.few_corners += u64::from(!self.mesh.add_face());
+        Ok(Ok(()))
+    }
+
+    /// Passes over a line of another kind.
+    fn other_line(&mut self) -> io::Result<Result<(), ObjFault>> {
+        if let Some(bytes) = self.words.padding()? {
+            self.notes.push(ReadNote::BytesAfter { bytes });
+            return Ok(Ok(()));
+        }
+        let word = self.words.word().to_ascii_lowercase();
+        if matches!(&*word, b"curv" | b"curv2" | b"surf") {
+            return Ok(Err(ObjFault::FreeForm));
+        }
+        if !PASSED_OVER.contains(&&*word) {
+            ReadNote::count_statement(&mut self.notes, &word);
+        }
+        self.pass_over()?;
+        Ok(Ok(()))
+    }
+
+    fn pass_over(&mut self) -> io::Result<()> {
+        while self.advance()? {}
+        Ok(())
+    }
 }
 
 #[derive(Default)]
@@ -63,31 +187,22 @@ struct ObjMesh {
 }
 
 impl ObjMesh {
-    /// Adds `x y z`; a weight or colours may follow.
-    fn add_vertex(&mut self, values: &[u8]) -> Result<(), ObjFault> {
-        let text = str::from_utf8(values).map_err(|_| ObjFault::Number)?;
-        let mut numbers = text.split_whitespace().map(str::parse);
-        let mut number = || numbers.next().and_then(Result::ok).ok_or(ObjFault::Number);
-        self.mesh.add_vertex([number()?, number()?, number()?]);
+    fn add_corner(&mut self, corner: &[u8]) -> Result<(), ObjFault> {
+        if self.face.len() == MAX_CORNERS {
+            return Err(ObjFault::ManyCorners);
+        }
+        let vertex = corner.split(|&byte| byte == b'/').next().unwrap_or_default();
+        let number = str::from_utf8(vertex).ok().and_then(|text| text.parse().ok());
+        let number: i64 = number.ok_or(ObjFault::Number)?;
+        self.face.push(self.vertex(number).ok_or(ObjFault::NoVertex(number))?);
         Ok(())
     }
 
-    /// Adds a face of corners `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn add_face(&mut self, values: &[u8]) -> Result<(), ObjFault> {
-        self.face.clear();
-        for corner in values.split(|&byte| byte == b' ').filter(|corner| !corner.is_empty()) {
-            let vertex = corner.split(|&byte| byte == b'/').next().unwrap_or_default();
-            let number = str::from_utf8(vertex).ok().and_then(|text| text.parse().ok());
-            let number: i64 = number.ok_or(ObjFault::Number)?;
-            let vertex = self.vertex(number).ok_or(ObjFault::NoVertex(number))?;
-            self.face.push(vertex);
-        }
-        let [first, others @ ..] = &self.face[..] else { return Err(ObjFault::FewCorners) };
-        if others.len() < 2 {
-            return Err(ObjFault::FewCorners);
-        }
+    /// Adds the face at hand. Returns false if it has fewer than three corners.
+    fn add_face(&mut self) -> bool {
+        let [first, others @ ..] = &self.face[..] else { return false };
         others.windows(2).for_each(|pair| self.mesh.add_facet([*first, pair[0], pair[1]]));
-        Ok(())
+        others.len() > 1
     }
 
     /// Returns the index of a vertex by its number, from 1; or from -1, the last one, backwards.
@@ -108,13 +223,6 @@ mod tests {
     use crate::facet::Facet;
     use crate::part::Facets;
 
-    fn read_facets(text: &str) -> Vec<Facet> {
-        match read(text.as_bytes()).unwrap().facets {
-            Facets::Memory(facets) => facets.to_vec(),
-            _ => panic!("text is read into memory"),
-        }
-    }
-
     const TETRA: &str = "\
 # a tetrahedron
 mtllib none.mtl
@@ -134,13 +242,32 @@ f 2 3 4
 
     const CORNERS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
+    fn read_text(text: &str) -> Result<(Vec<Facet>, Vec<ReadNote>), String> {
+        let (piece, notes) = read(|| text.as_bytes()).map_err(|error| error.to_string())?;
+        let Facets::Memory(facets) = piece.facets else { panic!("they are in memory") };
+        Ok((facets.to_vec(), notes))
+    }
+
     #[test]
-    fn corners_are_found_however_they_are_named() {
+    fn corners_are_found_however_they_are_written() {
         let [o, x, y, z] = CORNERS;
-        let expected = [[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
-        for text in [TETRA.to_owned(), TETRA.replace('\n', "\r\n"), format!("\u{FEFF}{TETRA}")] {
-            assert!(looks_obj(text.as_bytes()));
-            assert_eq!(read_facets(&text), expected);
+        let expected = vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
+        for text in [
+            TETRA.to_owned(),
+            TETRA.replace('\n', "\r\n"),
+            TETRA.replace('\n', "\r"),
+            format!("\u{FEFF}{TETRA}"),
+            TETRA.replace('\n', " # and more\n"),
+            TETRA.replace(" 3/1/1", " \\\n 3/1/1"),
+            TETRA.replace("1/1/1 3", "1/1/1\\\n3"),
+            TETRA.replace("0 0 1\n", "0 \\\r\n0 1\n"),
+            TETRA.replace("f 2 3 4", "f 2 3 4 \\\n\n"),
+            TETRA.replace("0.5 0.5 0.5", "nan"),
+            TETRA.replace("o tetra", "o"),
+            TETRA.replace("o tetra", "g\ns off\nnewmtl a\nKd 1 1 1"),
+            TETRA.replace("1 0 0 1.0", "10.0D-1 0.0d0 0 1.0"),
+        ] {
+            assert_eq!(read_text(&text), Ok((expected.clone(), vec![])), "{text}");
         }
     }
 
@@ -148,7 +275,30 @@ f 2 3 4
     fn faces_are_fans() {
         let [o, x, y, z] = CORNERS;
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4 2\n";
-        assert_eq!(read_facets(text), [[o, x, y], [o, y, z], [o, z, x]]);
+        assert_eq!(read_text(text).unwrap().0, [[o, x, y], [o, y, z], [o, z, x]]);
+    }
+
+    #[test]
+    fn lines_that_are_left_out_are_noted() {
+        for (line, note) in [
+            ("f 1 2", "1 face with fewer than three corners is left out"),
+            ("f 1 2\nf 3\nf", "3 faces with fewer than three corners are left out"),
+            ("l 1 2 3\nl 2 3", "2 statements that begin with `l` are left out"),
+            ("p 1", "1 statement that begins with `p` is left out"),
+            ("\0\0\0", "3 bytes after the last facet are left out"),
+        ] {
+            let (facets, notes) = read_text(&format!("{TETRA}{line}\n")).unwrap();
+            let notes: Vec<String> = notes.iter().map(ToString::to_string).collect();
+            assert_eq!((facets.len(), notes), (4, vec![note.to_owned()]));
+        }
+    }
+
+    #[test]
+    fn decimal_commas_are_read_where_nothing_else_is_meant() {
+        let text = TETRA.replace("v 1 0 0 1.0", "v 1,0 0,0 0").replace("0.5 ", "0,5 ");
+        let (facets, notes) = read_text(&text).unwrap();
+        assert_eq!((facets[3][0], notes), (CORNERS[1], vec![ReadNote::DecimalCommas]));
+        assert!(read_text(&TETRA.replace("v 1 0", "v 1,000 0")).unwrap_err().contains("commas"));
     }
 
     #[test]
@@ -156,8 +306,6 @@ f 2 3 4
         for (line, words) in [
             ("v 1 2", "three numbers"),
             ("v 1 2 x", "three numbers"),
-            ("f 1 2", "fewer than three"),
-            ("f", "fewer than three"),
             ("f 1 2 9", "no vertex 9"),
             ("f 0 1 2", "no vertex 0"),
             ("f -9 1 2", "no vertex -9"),
@@ -165,17 +313,10 @@ f 2 3 4
             ("f 1 2 a", "three numbers"),
             ("surf 0 1 0 1 1 2 3 4", "free-form"),
         ] {
-            let message = read(format!("{TETRA}\n{line}\n").as_bytes()).unwrap_err().to_string();
+            let message = read_text(&format!("{TETRA}\n{line}\n")).unwrap_err();
             assert!(message.starts_with("line 16 ") && message.contains(words), "{message}");
         }
         let long = format!("{TETRA}f{}", " 1".repeat(1 << 20));
-        assert!(read(long.as_bytes()).unwrap_err().to_string().contains("longer than"));
-    }
-
-    #[test]
-    fn other_text_is_no_obj() {
-        for text in ["", "s", "solid part\nfacet", "v\0", "value 1 2 3", "{\"v\": 1}"] {
-            assert!(!looks_obj(text.as_bytes()), "{text}");
-        }
+        assert!(read_text(&long).unwrap_err().contains("more corners"));
     }
 }

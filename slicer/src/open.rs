@@ -1,7 +1,7 @@
 //! Opens parts from files and streams, in the format that their content says.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,16 +10,18 @@ use std::time::Duration;
 
 #[cfg(feature = "occt")]
 use lamp_brep::Comparison;
-use lamp_brep::{BodyFault, BrepError, Prepared, ReadFn, is_step, prepare};
-use lamp_stack::{Length, digest_of, one_line};
+use lamp_brep::{BodyFault, BrepError, Prepared, ReadFn, prepare};
+use lamp_stack::{FORMAT_BYTES, FileFormat, Length, PartFormat, digest_of, one_line};
 
+use crate::archive::not_three_mf;
+use crate::ascii;
 use crate::error::SliceError;
-use crate::obj::{self, looks_obj};
-use crate::part::{Part, Piece};
+use crate::obj;
+use crate::part::{Facets, Part, Piece};
 use crate::part_file::PartFile;
 use crate::stl;
 use crate::three_mf::{self, Contents, looks_packaged};
-use crate::unpack::{is_gzip, unpack};
+use crate::unpack::{is_gzip, unpack, unpack_bytes};
 
 /// The program that reads STEP files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,9 +79,6 @@ impl Default for OpenOptions {
         }
     }
 }
-
-/// The bytes at a file's start that tell its format.
-const FORMAT_BYTES: u64 = 4096;
 
 impl Part {
     /// Opens an STL, STEP, 3MF or OBJ file, or one of these packed by gzip. Which one it
@@ -155,7 +154,7 @@ impl Part {
 
 /// Reads what a file holds.
 fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, SliceError> {
-    let start = file.start(FORMAT_BYTES)?;
+    let start = file.start(FORMAT_BYTES as u64)?;
     if start.is_empty() {
         return Err(SliceError::EmptyFile);
     }
@@ -163,7 +162,7 @@ fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, Sli
         return unpacked(file, &start, options);
     }
     let file = Arc::new(unpack(file)?);
-    let start = file.start(FORMAT_BYTES)?;
+    let start = file.start(FORMAT_BYTES as u64)?;
     unpacked(&file, &start, options)
 }
 
@@ -172,36 +171,52 @@ fn unpacked(
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
-    let of_one = |piece| Contents { pieces: vec![piece], notes: Vec::new() };
-    if is_step(start) {
-        let mut bytes = Vec::new();
-        file.reader().read_to_end(&mut bytes)?;
-        let prepared = read_good(&bytes.into(), options)?;
-        return Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() });
-    }
+    let of_one = |piece, notes| Contents { pieces: vec![piece], notes };
     if looks_packaged(file, start)? {
-        return Ok(three_mf::read(file).map_err(Box::new)?);
+        return three_mf::read(file).map_err(|error| not_three_mf(file, error));
     }
-    if let Some(format) = other_format(start) {
-        return Err(SliceError::OtherFormat(format));
+    let of_facets = |facets, notes| of_one(Piece::new(facets), notes);
+    match FileFormat::of_start(start, Some(file.size())) {
+        Some(FileFormat::Part(PartFormat::Step)) => {
+            let mut bytes = Vec::new();
+            file.reader().read_to_end(&mut bytes)?;
+            let prepared = read_good(&bytes.into(), options)?;
+            Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() })
+        }
+        Some(FileFormat::Part(PartFormat::Obj)) => {
+            let (piece, notes) = obj::read(|| file.reader())?;
+            Ok(of_one(piece, notes))
+        }
+        Some(FileFormat::Part(PartFormat::AsciiStl)) => {
+            let (facets, notes) = ascii::read(|| file.reader())?;
+            Ok(of_facets(Facets::Memory(Arc::new(facets)), notes))
+        }
+        Some(FileFormat::Part(PartFormat::BinaryStl)) | None => {
+            let (facets, notes) = stl::open(file, start)?;
+            Ok(of_facets(facets, notes))
+        }
+        Some(FileFormat::Part(PartFormat::Gzip)) => {
+            Err(SliceError::OtherFormat(FileFormat::Archive("a doubly packed file")))
+        }
+        Some(FileFormat::Text) if file.size() < stl::HEADER_BYTES => {
+            Err(SliceError::NotStl { size: file.size() })
+        }
+        Some(format) => Err(SliceError::OtherFormat(format)),
     }
-    if looks_obj(start) {
-        return Ok(of_one(obj::read(BufReader::new(file.reader()))?));
-    }
-    Ok(of_one(Piece::new(stl::open(file, start)?)))
 }
 
-/// Returns the format of a file that was given by mistake, if it is known.
-fn other_format(start: &[u8]) -> Option<&'static str> {
-    const FORMATS: [(&[u8], &str); 6] = [
-        (b"II*\0", "TIFF"),
-        (b"II+\0", "TIFF"),
-        (b"MM\0*", "TIFF"),
-        (b"\x1F\x8B", "doubly packed"),
-        (b"ply", "PLY"),
-        (b"\x89PNG", "PNG"),
-    ];
-    FORMATS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| *name)
+/// Returns the bytes of a STEP file, which gzip may have packed.
+///
+/// # Errors
+/// Returns an error if they begin as another format does, or cannot be unpacked.
+pub fn step_bytes(bytes: Vec<u8>) -> Result<Arc<[u8]>, SliceError> {
+    let bytes = if is_gzip(&bytes) { unpack_bytes(&bytes)? } else { bytes };
+    let start = &bytes[..bytes.len().min(FORMAT_BYTES)];
+    match FileFormat::of_start(start, Some(bytes.len() as u64)) {
+        _ if bytes.is_empty() => Err(SliceError::EmptyFile),
+        Some(FileFormat::Part(PartFormat::Step)) | None => Ok(bytes.into()),
+        Some(format) => Err(SliceError::NotStep(format)),
+    }
 }
 
 /// Files nest entities as deep as they like.

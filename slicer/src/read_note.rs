@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// Something that a part's file holds and slicing does not use. As text it is one sentence.
+/// Something that a part's file holds and slicing does not use, or that was read in another way
+/// than its format says. As text it is one sentence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReadNote {
@@ -53,6 +54,63 @@ pub enum ReadNote {
         /// How many there are.
         plates: usize,
     },
+    /// Bytes after the last facet.
+    BytesAfter {
+        /// The number of bytes.
+        bytes: u64,
+    },
+    /// A binary STL with more facets than its header counts, as programs write it that do not know
+    /// the number when they begin.
+    WrongCount {
+        /// The number of facets in the header.
+        declared: u32,
+        /// The number of facets in the file, which are read.
+        held: usize,
+    },
+    /// An ASCII STL without an end, which may be cut off between two facets.
+    NoEnd,
+    /// Numbers with commas for decimal points.
+    DecimalCommas,
+    /// Statements of a text that are neither facets nor around them.
+    Statements {
+        /// The word that they begin with; empty for several other words.
+        word: String,
+        /// The number of statements.
+        count: u64,
+    },
+    /// Faces of an OBJ with one or two corners.
+    FewCorners {
+        /// The number of faces.
+        faces: u64,
+    },
+}
+
+/// The number of words whose statements are counted each by itself.
+const MAX_WORDS: usize = 8;
+/// The characters of a word that a note quotes.
+const MAX_CHARACTERS: usize = 40;
+
+impl ReadNote {
+    /// Counts a statement that is skipped.
+    pub(crate) fn count_statement(notes: &mut Vec<Self>, statement: &[u8]) {
+        let quoted = String::from_utf8_lossy(statement);
+        let mut quoted: String = quoted.chars().take(MAX_CHARACTERS).collect();
+        let words = notes.iter().filter(|note| matches!(note, Self::Statements { .. })).count();
+        let is_known =
+            |note: &Self| matches!(note, Self::Statements { word, .. } if *word == quoted);
+        if words >= MAX_WORDS && !notes.iter().any(is_known) {
+            quoted.clear();
+        }
+        for note in &mut *notes {
+            if let Self::Statements { word, count } = note
+                && *word == quoted
+            {
+                *count += 1;
+                return;
+            }
+        }
+        notes.push(Self::Statements { word: quoted, count: 1 });
+    }
 }
 
 impl fmt::Display for ReadNote {
@@ -103,6 +161,45 @@ impl fmt::Display for ReadNote {
             Self::ProjectData { what } => write!(f, "the project's {what} are left out"),
             Self::Plates { plates } => {
                 write!(f, "the project has {plates} plates, which are built side by side")
+            }
+            Self::BytesAfter { bytes: 1 } => {
+                write!(f, "1 byte after the last facet is left out")
+            }
+            Self::BytesAfter { bytes } => {
+                write!(f, "{bytes} bytes after the last facet are left out")
+            }
+            Self::WrongCount { declared, held } => write!(
+                f,
+                "the header declares {declared} facets, and the file holds {held}: all of these \
+                 are read"
+            ),
+            Self::NoEnd => write!(
+                f,
+                "the file ends after a facet, without `endsolid`: check that it is complete"
+            ),
+            Self::DecimalCommas => {
+                write!(f, "commas in its numbers are read as decimal points")
+            }
+            Self::Statements { word, count } => {
+                let [statements, are] = match count {
+                    1 => ["statement", "is"],
+                    _ => ["statements", "are"],
+                };
+                match &**word {
+                    "" => write!(f, "{count} other {statements} {are} left out"),
+                    word => write!(
+                        f,
+                        "{count} {statements} that begin{} with `{}` {are} left out",
+                        if *count == 1 { "s" } else { "" },
+                        word.escape_debug()
+                    ),
+                }
+            }
+            Self::FewCorners { faces: 1 } => {
+                write!(f, "1 face with fewer than three corners is left out")
+            }
+            Self::FewCorners { faces } => {
+                write!(f, "{faces} faces with fewer than three corners are left out")
             }
         }
     }

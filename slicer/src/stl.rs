@@ -1,38 +1,145 @@
 //! Reads STL files, and writes parts as binary ones.
 
-use std::io::{self, BufReader, Write};
+use std::io::{self, Write};
+use std::ops::Range;
 use std::sync::Arc;
 
 use stl_io::{Normal, Triangle, Vertex};
 
-use crate::ascii;
 use crate::error::SliceError;
 use crate::facet::Facet;
 use crate::part::{Facets, Part};
 use crate::part_file::PartFile;
+use crate::read_note::ReadNote;
 
 /// Header and count of a binary STL.
 pub(crate) const HEADER_BYTES: u64 = 84;
 /// A facet of a binary STL: normal, three corners, attributes.
 pub(crate) const FACET_BYTES: usize = 50;
 
-/// Opens an STL file that starts with these bytes, binary or ASCII. Which one it is
-/// follows from its size and content: many binary files begin with `solid`, too.
+/// The facets at a file's start that say whether it is a binary STL.
+const FIRST_FACETS: u64 = 64;
+/// No part reaches so far in any unit.
+const MAX_COORDINATE: f32 = 1e8;
+/// From here on a count stands for an unknown number: programs that write facets as they make them
+/// begin with the greatest one.
+const UNKNOWN_COUNT: u32 = i32::MAX as u32;
+
+/// Opens a binary STL that starts with these bytes, and returns notes about it.
+///
+/// Where the size contradicts the count, the bytes decide:
+///
+/// - Facets behind the counted ones belong to the part if they close its surface. Bytes that are
+///   no facets are left out.
+/// - A program that does not know the count when it begins writes zero or the greatest number. All
+///   bytes are facets then.
+/// - Any other file with fewer facets than are counted was cut off.
 ///
 /// # Errors
-/// Returns an error if it is neither, contradicts itself or cannot be read.
-pub(crate) fn open(file: &Arc<PartFile>, start: &[u8]) -> Result<Facets, SliceError> {
+/// Returns an error if the file is no STL, contradicts itself, was cut off or cannot be read.
+pub(crate) fn open(
+    file: &Arc<PartFile>,
+    start: &[u8],
+) -> Result<(Facets, Vec<ReadNote>), SliceError> {
     let size = file.size();
     if let Some(count) = binary_facets(size, start) {
-        return Ok(Facets::Binary { file: file.clone(), count });
+        return Ok((Facets::Binary { file: file.clone(), count }, Vec::new()));
     }
-    match declared_count(start) {
-        _ if ascii::looks_ascii(start, start.len() as u64 == size) => {
-            Ok(Facets::Memory(Arc::new(ascii::read(BufReader::new(file.reader()))?)))
+    let declared = declared_count(start).ok_or(SliceError::NotStl { size })?;
+    let contradiction = || SliceError::Count { declared, size };
+    let held = (size - HEADER_BYTES) / FACET_BYTES as u64;
+    let counted = held.min(declared.into());
+    let first = tally(file, 0..counted.min(FIRST_FACETS))?;
+    if 2 * first.plausible < first.records || (held == 0 && declared >= UNKNOWN_COUNT / 16) {
+        return Err(SliceError::NotStl { size });
+    }
+    let count = if declared == 0 || declared >= UNKNOWN_COUNT {
+        let all = tally(file, 0..held)?;
+        // With neither a count nor a whole last facet, nothing says that the file is whole.
+        let is_whole = declared == 0 || byte_of(held) == size;
+        if held > 0 && all.facets == all.records && is_whole { held } else { 0 }
+    } else if u64::from(declared) > held {
+        0
+    } else {
+        let further = tally(file, counted..held)?;
+        if further.records == 0 || further.facets < further.records {
+            counted
+        } else {
+            let edges = tally(file, 0..counted)?.edges;
+            let closes = [edges == 0, edges.wrapping_add(further.edges) == 0];
+            match closes {
+                [true, false] => counted,
+                [false, true] => held,
+                _ => 0,
+            }
         }
-        Some(declared) => Err(SliceError::Count { declared, size }),
-        None => Err(SliceError::NotStl { size }),
+    };
+    if count == 0 {
+        return Err(contradiction());
     }
+    let (after, held) = (size - byte_of(count), count as usize);
+    let mut notes = Vec::new();
+    notes.extend((count != u64::from(declared)).then_some(ReadNote::WrongCount { declared, held }));
+    notes.extend((after > 0).then_some(ReadNote::BytesAfter { bytes: after }));
+    Ok((Facets::Binary { file: file.clone(), count: held }, notes))
+}
+
+fn byte_of(facet: u64) -> u64 {
+    HEADER_BYTES + facet * FACET_BYTES as u64
+}
+
+/// Counts of the records of a file that could be facets.
+#[derive(Default)]
+struct Tally {
+    records: u64,
+    plausible: u64,
+    facets: u64,
+    /// A sum over their edges. It is zero if each edge runs as often one way as the other, as the
+    /// edges of a closed surface do. Other surfaces have a sum of zero with a chance of 2^-64.
+    edges: u64,
+}
+
+fn tally(file: &PartFile, records: Range<u64>) -> io::Result<Tally> {
+    let mut tally = Tally::default();
+    file.for_each_record(byte_of(records.start)..byte_of(records.end), |record| {
+        tally.records += 1;
+        tally.plausible += u64::from(is_plausible(record));
+        tally.facets += u64::from(is_facet(record));
+        let [a, b, c] = parse(record).map(point_hash);
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            let edge = |from: u64, to: u64| mixed(from.wrapping_add(to.rotate_left(32)));
+            tally.edges = tally.edges.wrapping_add(edge(from, to)).wrapping_sub(edge(to, from));
+        }
+    })?;
+    Ok(tally)
+}
+
+fn point_hash(point: [f32; 3]) -> u64 {
+    // Both zeros are one place.
+    point.iter().fold(0, |hash, &c| mixed(hash ^ u64::from((c + 0.0).to_bits())))
+}
+
+/// Mixes all bits (S. Vigna's splitmix64, public domain).
+fn mixed(bits: u64) -> u64 {
+    let bits = bits.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    bits ^ (bits >> 31)
+}
+
+/// Returns true if a record has numbers that coordinates can be.
+fn is_plausible(record: &[u8; FACET_BYTES]) -> bool {
+    parse(record).iter().flatten().all(|number| number.abs() <= MAX_COORDINATE)
+}
+
+/// Returns true if a record is a facet: plausible, with corners that differ and a normal of length
+/// one or none.
+fn is_facet(record: &[u8; FACET_BYTES]) -> bool {
+    let [a, b, c] = parse(record);
+    let normal = [0, 4, 8]
+        .map(|at| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]));
+    let length = normal.iter().map(|n| n * n).sum::<f32>().sqrt();
+    is_plausible(record) && (a != b || b != c) && (length < 0.01 || (length - 1.0).abs() < 0.01)
 }
 
 /// Returns the number of facets that a binary file says to have.

@@ -38,3 +38,14 @@ pub(crate) fn unpack(file: &PartFile) -> Result<PartFile, SliceError> {
     }
     Ok(file.in_other_form(unpacked, size))
 }
+
+/// Unpacks bytes in memory, as [`unpack`] does.
+pub(crate) fn unpack_bytes(bytes: &[u8]) -> Result<Vec<u8>, SliceError> {
+    let most = most_unpacked(bytes.len() as u64);
+    let mut unpacked = Vec::new();
+    let size = MultiGzDecoder::new(bytes).take(most + 1).read_to_end(&mut unpacked);
+    match size.map_err(SliceError::Packed)? as u64 > most {
+        true => Err(SliceError::Inflated { most }),
+        false => Ok(unpacked),
+    }
+}

@@ -5,6 +5,7 @@ use std::io;
 use thiserror::Error;
 
 use crate::check::CheckFault;
+use crate::file_format::FileFormat;
 use crate::g4::G4Error;
 use crate::picture_page::PictureFormat;
 
@@ -19,8 +20,16 @@ pub enum StackError {
     #[error("the input is empty: no stack arrived")]
     Empty,
     /// The input starts as neither a TIFF nor a picture that is read.
-    #[error("this is neither a TIFF stack nor a picture (it starts with \"{}\")", start.escape_ascii())]
+    #[error(
+        "this is neither a TIFF stack nor a picture{}",
+        match format {
+            Some(format) => format!(", but {format}"),
+            None => format!(" (it starts with \"{}\")", start.escape_ascii()),
+        }
+    )]
     NotTiff {
+        /// Its format, if that is known.
+        format: Option<FileFormat>,
         /// The first bytes of the input.
         start: Vec<u8>,
     },

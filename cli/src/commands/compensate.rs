@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output};
 use crate::stages::compensate::{CompensateSettings, Compensating, is_of_stage};
 use crate::streams::{

@@ -1,22 +1,24 @@
 //! `lamp convert`: writes a stack in another form, a STEP part as STL, or a mesh as STEP.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_slicer::brep::{START_BYTES, is_step};
 use lamp_slicer::topology::{CornerTable, StepSolids};
 use lamp_slicer::{OpenOptions, Part, Placement, Units};
-use lamp_stack::{Format, Layer, Length, StackError, png_of_layer, write_png_folder};
+use lamp_stack::{
+    FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
+};
 
+use crate::endings::is_step_name;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output, one_of};
+use crate::part_options::part_notes;
 use crate::progress::say;
-use crate::step_options::{HEADING, ReaderOptions, bytes_of, notes, parse_tolerance};
+use crate::step_options::{HEADING, ReaderOptions, bytes_of, parse_tolerance};
 use crate::streams::{
-    check_beside, for_tiffs, input_name, is_folder, is_step_name, is_stream, layers_of_input,
+    check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
     new_folder, open_pages, progress, write_file, write_layers, written_to,
 };
 
@@ -73,19 +75,17 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         Some(part) => return args.write_step(part, common),
         None => {}
     }
-    let mut start = Vec::new();
     let path = &args.input.stack;
-    let file = if is_stream(path) { None } else { File::open(path).ok() };
-    if file.is_some_and(|file| file.take(START_BYTES).read_to_end(&mut start).is_ok())
-        && is_step(&start)
-    {
-        let name = input_name(path);
-        return Err(Exit::usage(format!("{name} is a STEP part: name a .stl after it")));
-    }
     let output = args.output.output.as_path();
     let progress = progress("convert", common, &args.output);
     let shape = args.shape()?;
-    let mut pages = open_pages(path)?;
+    let mut pages = open_pages(path).map_err(|error| match error.cause() {
+        Some(StackError::NotTiff { format: Some(FileFormat::Part(PartFormat::Step)), .. }) => {
+            let name = input_name(path);
+            Exit::usage(format!("{name} is a STEP part: name a .stl after it"))
+        }
+        _ => error,
+    })?;
     if args.ignore_checks {
         pages = pages.without_checks();
     }
@@ -159,6 +159,7 @@ impl ConvertArgs {
         let facets = table.facet_count();
         let solids = StepSolids::new(table).map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
+            part_notes(&part).iter().for_each(|note| say(&format!("convert: {note}")));
             say(&format!(
                 "convert: {}: {} facets as {} faces; solids: {}",
                 step.display(),
@@ -179,8 +180,7 @@ impl ConvertArgs {
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
         let model = model.map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
-            let notes = model.prepared().flat_map(notes);
-            notes.for_each(|note| say(&format!("convert: {note}")));
+            part_notes(&model).iter().for_each(|note| say(&format!("convert: {note}")));
         }
         write_file(stl, |out| model.write_stl(out))
     }
@@ -194,7 +194,8 @@ impl ConvertArgs {
             (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
             (false, _) if named_png => Ok(OutputKind::Png),
             (false, true) => Err(Exit::usage("PNGs go into a folder: name it, as -o pictures/")),
-            (_, false) => Ok(OutputKind::Tiff),
+            (true, false) => Ok(OutputKind::Tiff),
+            (false, false) => check_stack_name(output).map(|()| OutputKind::Tiff),
         }
     }
 }

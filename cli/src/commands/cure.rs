@@ -11,6 +11,7 @@ use lamp_planning::{Light, SampleHeight};
 use lamp_stack::StackInfo;
 
 use crate::catalogue::entry;
+use crate::endings::{PNG, check_ending};
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
 use crate::measured_doses::MeasuredDoses;
@@ -22,7 +23,7 @@ use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
 use crate::section::{CureRule, Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
 use crate::stack_part::RecordedSlicing;
-use crate::streams::{check_beside, check_png_name, input_name, print, read_layers, write_file};
+use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
@@ -111,7 +112,7 @@ impl CureArgs {
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
-    check_png_name(&args.output)?;
+    check_ending(&args.output, &PNG)?;
     let (material, lamp_doubt) = args.lamp.material(entry(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
@@ -150,7 +151,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let exposures = exposures.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
     let outline = match &args.part[..] {
         [] => None,
-        parts => Some(outline(parts, &exposures.course, stack.as_ref(), &name)?),
+        parts => Some(outline(parts, &exposures.course, stack.as_ref(), &name, &progress)?),
     };
     let panels = SectionPicture::new(&exposures, outline, args.along.as_ref()).map_err(failed)?;
     panels.check_size(args.scale).map_err(failed)?;
@@ -164,11 +165,12 @@ fn outline(
     course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
+    progress: &Progress,
 ) -> Result<Vec<Vec<OutlinePiece>>, Exit> {
     let sliced = RecordedSlicing::of(stack).with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;
-    let model = sliced.open(parts, name)?;
+    let model = sliced.open(parts, name, &|note| progress.say(note))?;
     let part = name_of_all(parts);
     course.outline(model, &sliced.options).map_err(|error| Exit::from(error).at(part))
 }

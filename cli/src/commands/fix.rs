@@ -7,9 +7,9 @@ use lamp_postprocess::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::band_pictures::BandPictures;
+use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::fix_report::whereabouts;
-use crate::json_report::parse_report;
 use crate::options::{Common, Input, Output};
 use crate::stages::fix::{FixSettings, Fixing};
 use crate::streams::{check_beside, decoding, progress, unless_found};

@@ -12,6 +12,7 @@ use lamp_stack::{Dpi, Length};
 use serde::Serialize;
 use serde_json::json;
 
+use crate::endings::parse_table;
 use crate::exit::Exit;
 use crate::exposure::{Exposure, ExposureOptions};
 use crate::height_options::{FoundHeights, HeightOptions, Measure, significant, time_text};
@@ -42,7 +43,7 @@ pub(crate) struct HeightsArgs {
 
     /// Write a table of the layers: height, thickness, volume lost and gained, and the error by
     /// every criterion
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
     report: Option<PathBuf>,
 
     /// Plot thickness, deviation, and the volume lost and gained over z: a file that ends in .svg or

@@ -6,12 +6,12 @@ use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
 use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
 
+use crate::endings::is_packed_name;
 use crate::exit::Exit;
 use crate::options::{Common, Output};
 use crate::progress::Progress;
 use crate::streams::{
-    format, input_name, is_packed_name, is_stream, packed_destination, progress, write_layers,
-    written_to,
+    format, input_name, is_stream, packed_destination, progress, write_layers, written_to,
 };
 
 /// Join stacks of consecutive layers into one stack

@@ -9,12 +9,11 @@ use lamp_slicer::write_stl;
 use lamp_stack::{IndexedStack, StackError};
 use lamp_view::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
 
+use crate::endings::{STL, check_ending};
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::streams::{
-    check_not_input, check_stl_name, failed_at, input_name, is_stream, spool_stdin, write_mesh,
-};
+use crate::streams::{check_not_input, failed_at, input_name, is_stream, spool_stdin, write_mesh};
 
 /// Write the surface of a stack as a mesh
 ///
@@ -53,7 +52,7 @@ fn parse_cells(text: &str) -> Result<NonZeroU32, String> {
 
 pub(crate) fn run(args: &MeshOutArgs, common: &Common) -> Result<(), Exit> {
     check_not_input(&args.output, [&args.stack])?;
-    check_stl_name(&args.output)?;
+    check_ending(&args.output, &STL)?;
     let stack = open(&args.stack)?;
     let progress = Progress::new("mesh-out", common, true);
     let surface = surface_of(&stack, args, &progress);

@@ -5,12 +5,11 @@ use std::path::Path;
 use clap::Args;
 use lamp_stack::{Format, PackLevel};
 
+use crate::endings::{PACKED_STACK, check_ending};
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::progress::say;
-use crate::streams::{
-    is_packed_name, is_stream, layers_of_input, open_pages, progress, write_packed_layers,
-};
+use crate::streams::{is_stream, layers_of_input, open_pages, progress, write_packed_layers};
 
 /// Pack a stack: each layer as what differs from the one below
 ///
@@ -39,10 +38,7 @@ pub(crate) struct PackArgs {
 
 pub(crate) fn run(args: &PackArgs, common: &Common) -> Result<(), Exit> {
     let output = args.output.output.as_path();
-    if !is_stream(output) && output.extension().is_some() && !is_packed_name(output) {
-        let name = output.display();
-        return Err(Exit::usage(format!("{name}: end the name of a packed stack in .lamp")));
-    }
+    check_ending(output, &PACKED_STACK)?;
     let progress = progress("pack", common, &args.output);
     let path = &args.input.stack;
     let pages = open_pages(path)?;

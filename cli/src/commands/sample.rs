@@ -8,10 +8,11 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_fixtures::{Defect, Mesh, Sample, StepSample, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
+use crate::endings::{SAMPLE, check_ending, is_step_name};
 use crate::exit::Exit;
 use crate::options::{Common, parse_count};
 use crate::progress::Progress;
-use crate::streams::{is_step_name, is_stream, write_file};
+use crate::streams::{is_stream, write_file};
 
 /// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
 #[derive(Args)]
@@ -65,6 +66,7 @@ fn parts() -> impl TypedValueParser<Value = Sample> {
 
 pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Exit> {
     let part = args.part;
+    check_ending(&args.output, &SAMPLE)?;
     if is_step_name(&args.output) {
         return args.write_step(part);
     }

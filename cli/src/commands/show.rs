@@ -8,12 +8,11 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order};
 
+use crate::endings::{PNG, check_ending};
 use crate::exit::Exit;
 use crate::options::EveryNth;
 use crate::picture::{Picture, PictureScale, Region};
-use crate::streams::{
-    check_png_name, failed_at, input_name, is_stream, learning_part, open_pages, write_file,
-};
+use crate::streams::{failed_at, input_name, is_stream, learning_part, open_pages, write_file};
 use crate::terminal_picture::TerminalForm;
 use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
 
@@ -100,7 +99,7 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
                 "a PNG is not for terminals: name a file with -o, pipe it on, or give --ascii or --sixel",
             ));
         }
-        check_png_name(&args.output)?;
+        check_ending(&args.output, &PNG)?;
     }
     match &args.shown.layers {
         Some(layers) => show_many(args, layers),

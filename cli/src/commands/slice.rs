@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_slicer::{Bodies, PixelGrid, StrayBand};
 
+use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::mesh_report::{MeshReport, RowPositions};
 use crate::options::{Common, Output};
 use crate::part_arg::PartArg;

@@ -137,7 +137,8 @@ impl SliceSettings {
             check_part(machine, &slices).map_err(|limit| Exit::from(limit).at(name))?;
         }
         let layers = self.layers.clone();
-        let bridged = Bridged::new(slices, self.fallback.as_deref(), &self.options, layers)?;
+        let fallback = self.fallback.as_deref();
+        let bridged = Bridged::new(slices, fallback, &self.options, layers, &note)?;
         let part_name = name.map(|name| stem(Path::new(name)));
         let name_command = move |layer: &mut Layer| {
             name_command(layer);

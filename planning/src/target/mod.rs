@@ -23,6 +23,7 @@ mod picture;
 mod round;
 mod shapes;
 
+use lamp_slicer::Part;
 use lamp_stack::{Catalogued, Length};
 
 pub use error::TargetError;
@@ -60,7 +61,15 @@ impl Target {
         match &self.0 {
             Source::Shapes(shapes) => &shapes.name,
             Source::Picture(picture) => picture.name(),
-            Source::Part(part) => part.name(),
+            Source::Part(columns) => columns.part().name(),
+        }
+    }
+
+    /// Returns the part that it was read from, if it is one.
+    pub fn part(&self) -> Option<&Part> {
+        match &self.0 {
+            Source::Part(columns) => Some(columns.part()),
+            _ => None,
         }
     }
 

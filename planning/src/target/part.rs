@@ -19,7 +19,7 @@ const MOST_CROSSINGS: usize = 64;
 /// A part, its lowest point on the glass and the middle of its box on the axis.
 #[derive(Debug)]
 pub(super) struct PartColumns {
-    name: String,
+    part: Part,
     facets: FacetIndex,
 }
 
@@ -34,12 +34,11 @@ struct Crossing {
 
 impl PartColumns {
     pub(super) fn new(part: Part, units: Units) -> Result<Self, TargetError> {
-        let name = part.name().to_owned();
-        Ok(Self { name, facets: FacetIndex::new(part, &Placement::default(), units)? })
+        Ok(Self { facets: FacetIndex::new(part.clone(), &Placement::default(), units)?, part })
     }
 
-    pub(super) fn name(&self) -> &str {
-        &self.name
+    pub(super) fn part(&self) -> &Part {
+        &self.part
     }
 
     pub(super) fn size_um(&self) -> [f64; 2] {

@@ -57,6 +57,6 @@ pub use kernel::{
     Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Matter, Notice, Tessellation,
 };
 pub use prepare::{Attempt, OpenedModel, Prepared, ReadFn, prepare};
-pub use step::{START_BYTES, StepError, StepModel, check_syntax, is_step, read_step};
+pub use step::{StepError, StepModel, check_syntax, read_step};
 pub use tessellate::MAX_FACETS;
 pub use validate::{BodyFault, BodyReport, check};

@@ -167,7 +167,7 @@ fn open(mesh: &Mesh, format: Format, units: Units) -> Option<Part> {
             }
             let table = CornerTable::of_facets(&mesh.facets).unwrap();
             // Boxes that touch along an edge alone are no solid.
-            let solids = StepSolids::new(&table).ok()?;
+            let solids = StepSolids::new(table).ok()?;
             let mut text = Vec::new();
             solids.write("part", &mut text).unwrap();
             fs::write(&path, text).unwrap();

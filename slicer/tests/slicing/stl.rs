@@ -55,31 +55,83 @@ fn a_binary_file_may_call_itself_solid() {
     }
 }
 
-#[test]
-fn counts_that_lie_are_told_with_bytes_and_facets() {
-    let good = with_header(binary(&cube(0.0, 3.0)), b"solid facet");
-    for (count, bytes, advice) in [
-        (13, 734, "it was cut off after facet 12"),
-        (11, 634, "bytes follow the last facet"),
-        (0, 84, "bytes follow the last facet"),
-        (u32::MAX, 214_748_364_834u64, "it was cut off after facet 12"),
-    ] {
-        let message = refusal(&with_count(good.clone(), count));
-        let says = format!(
-            "declares {count} facets, which take {bytes} bytes, but the file has 684: {advice}"
-        );
-        assert!(message.contains(&says), "{message}");
-    }
+fn notes_of(bytes: &[u8]) -> Vec<String> {
+    read(bytes).unwrap().notes().iter().map(ToString::to_string).collect()
 }
 
 #[test]
-fn bytes_behind_the_last_facet_are_refused() {
-    for extra in [1, 49, 50, 1000] {
-        let mut bytes = binary(&cube(0.0, 3.0));
-        bytes.resize(bytes.len() + extra, 7);
-        let message = refusal(&bytes);
-        assert!(message.contains("bytes follow the last facet"), "{message}");
+fn counts_that_lie_are_told_with_bytes_and_facets() {
+    let good = with_header(binary(&cube(0.0, 3.0)), b"solid facet");
+    let message = refusal(&with_count(good.clone(), 13));
+    let says = "declares 13 facets, which take 734 bytes, but the file has 684: it was cut off after facet 12";
+    assert!(message.contains(says), "{message}");
+    // A program that did not know the number, and was cut off on top of that.
+    let message = refusal(&with_count(good[..680].to_vec(), u32::MAX));
+    assert!(message.contains("declares 4294967295 facets"), "{message}");
+    assert!(message.contains("cut off after facet 11"), "{message}");
+}
+
+/// Programs that write facets as they make them cannot count them before.
+#[test]
+fn facets_that_are_not_counted_are_read() {
+    let mesh = cube(0.0, 3.0);
+    for count in [0, 1, 11, i32::MAX as u32, u32::MAX] {
+        for after in [&b""[..], b"xy"] {
+            let bytes = [&with_count(binary(&mesh), count), after].concat();
+            let is_whole = after.is_empty() || count < 12;
+            assert_eq!(read(&bytes).is_ok(), is_whole, "{count}");
+            if is_whole {
+                assert!(reads_as(&bytes, &mesh), "{count}");
+                let notes = notes_of(&bytes);
+                let says = format!("the header declares {count} facets, and the file holds 12");
+                assert!(notes[0].starts_with(&says), "{notes:?}");
+                assert_eq!(notes.len(), 1 + after.len() / 2);
+            }
+        }
     }
+}
+
+/// Whether facets behind those that are counted belong to the part, the surface says.
+#[test]
+fn facets_behind_a_closed_surface_are_left_out_or_refused() {
+    let [mesh, other] = [cube(0.0, 3.0), cube(5.0, 6.0)];
+    let both = crate::common::joined(&[mesh.clone(), other]);
+    // Half of what stood in the file before.
+    let stale = &with_count(binary(&both), 12)[..84 + 50 * 18];
+    assert!(reads_as(stale, &mesh));
+    assert_eq!(notes_of(stale), ["300 bytes after the last facet are left out"]);
+    let message = refusal(&with_count(binary(&both), 12));
+    assert!(message.contains("declares 12 facets"), "{message}");
+    assert!(message.contains("bytes follow the last facet"), "{message}");
+}
+
+#[test]
+fn bytes_behind_the_last_facet_are_noted() {
+    let mesh = cube(0.0, 3.0);
+    for extra in [1, 2, 49, 50, 1000] {
+        for byte in [0, 7, b' ', 0xFF] {
+            for header in [&b""[..], b"solid part"] {
+                let mut bytes = with_header(binary(&mesh), header);
+                bytes.resize(bytes.len() + extra, byte);
+                assert!(reads_as(&bytes, &mesh), "{extra} times {byte}");
+                let notes = notes_of(&bytes);
+                let says =
+                    if extra == 1 { "1 byte after" } else { &format!("{extra} bytes after") };
+                assert!(notes.len() == 1 && notes[0].starts_with(says), "{notes:?}");
+            }
+        }
+    }
+    let text = "Lorem ipsum dolor sit amet, consectetur adipiscing elit, sed do eiusmod tempor.";
+    let bytes = [&binary(&mesh), text.as_bytes()].concat();
+    assert!(reads_as(&bytes, &mesh));
+}
+
+#[test]
+fn unknown_bytes_are_no_stl() {
+    let bytes: Vec<u8> =
+        (0..2000u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let message = refusal(&bytes);
+    assert!(message.contains("not an STL file"), "{message}");
 }
 
 #[test]
@@ -105,8 +157,13 @@ fn a_text_file_cut_anywhere_is_refused() {
     let good = text(&cube(0.0, 3.0));
     let end = good.find("endsolid").unwrap() + "endsolid".len();
     for length in 0..end {
-        let message = refusal(&good.as_bytes()[..length]);
         let facets = good[..length].matches("endfacet").count();
+        if good[..length].trim_end().ends_with("endfacet") || facets == 12 {
+            let notes = notes_of(&good.as_bytes()[..length]);
+            assert!(notes.len() == 1 && notes[0].contains("without `endsolid`"), "{notes:?}");
+            continue;
+        }
+        let message = refusal(&good.as_bytes()[..length]);
         let named = format!("facet {facets} of the ASCII file");
         let plain = ["the file is empty", "not an STL file", "the header declares"];
         let told = message.starts_with(&named) || plain.iter().any(|p| message.contains(p));
@@ -136,7 +193,11 @@ fn other_files_are_not_stl() {
 
 #[test]
 fn a_file_of_another_format_is_named() {
-    for (bytes, format) in [(b"II*\0\x08\0\0\0".as_slice(), "TIFF"), (b"\x89PNG\r\n", "PNG")] {
+    for (bytes, format) in [
+        (b"II*\0\x08\0\0\0".as_slice(), "TIFF"),
+        (b"\x89PNG\r\n", "PNG"),
+        (b"ply\nformat ascii 1.0\n", "PLY"),
+    ] {
         let message = refusal(bytes);
         assert!(message.contains(&format!("a {format} file, not an STL")), "{message}");
     }
@@ -206,8 +267,26 @@ fn text_comes_in_many_styles() {
         good.replace("solid part", "solid"),
         good.replace("solid part", "solid facet endsolid loop"),
         good.replace("e0", ".0e+00"),
+        good.replace("e0", ".0D+00"),
+        good.replace('\n', "\r"),
+        good.replace('\n', " "),
+        good.replace("endloop", "end loop").replace("endfacet", "end\nfacet"),
+        good.replace("solid part\n", ""),
+        good.replace('\n', " # so\n"),
+        format!("\u{feff}{good}"),
     ] {
         assert!(reads_as(styled.as_bytes(), &mesh), "{styled}");
+    }
+}
+
+#[test]
+fn text_may_be_in_two_bytes_a_character() {
+    let mesh = cube(0.0, 3.0);
+    for mark in ["", "\u{feff}"] {
+        let units: Vec<u16> = format!("{mark}{}", text(&mesh)).encode_utf16().collect();
+        let bytes = |of: fn(u16) -> [u8; 2]| units.iter().flat_map(|&u| of(u)).collect::<Vec<u8>>();
+        assert!(reads_as(&bytes(u16::to_le_bytes), &mesh));
+        assert!(reads_as(&bytes(u16::to_be_bytes), &mesh));
     }
 }
 

@@ -10,6 +10,7 @@ use super::source::Source;
 use super::tags::{FILL_ORDER, type_size};
 use super::write::{Format, Notice};
 use crate::error::{PageFault, StackError};
+use crate::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
 use crate::packed::{self, Unpacker};
 use crate::picture_page::{self, PictureFormat};
@@ -33,6 +34,16 @@ pub struct PageReader {
     last_whole: Option<u32>,
     /// The offsets of the directories read, to detect a loop of links.
     seen: HashSet<u64>,
+}
+
+/// Returns the error of an input that starts with these bytes of no stack.
+fn not_tiff(start: Vec<u8>, mut source: Source) -> StackError {
+    let size = source.length().ok().flatten();
+    let more = source.read_up_to(start.len() as u64, (FORMAT_BYTES - start.len()) as u64);
+    let bytes = [&start[..], &more.unwrap_or_default()].concat();
+    // Without its size, a text that ends early is whole.
+    let size = size.or((bytes.len() < FORMAT_BYTES).then_some(bytes.len() as u64));
+    StackError::NotTiff { format: FileFormat::of_start(&bytes, size), start }
 }
 
 impl PageReader {
@@ -92,7 +103,7 @@ impl PageReader {
             {
                 return Err(StackError::CutOff { last_whole: None });
             }
-            _ => return Err(StackError::NotTiff { start }),
+            _ => return Err(not_tiff(start, source)),
         };
         let next = if matches!(kind, FileKind::Tiff) {
             if big {

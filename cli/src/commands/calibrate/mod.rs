@@ -17,6 +17,7 @@ use lamp_grayscale::resin::Intensity;
 use lamp_stack::CatalogueError;
 
 use crate::catalogue::{entry, read_text};
+use crate::endings::parse_toml;
 use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
@@ -68,7 +69,7 @@ struct CalibrationFiles {
     material: Option<PathBuf>,
 
     /// Material file to write
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", value_parser = parse_toml)]
     output: Option<PathBuf>,
 
     /// Name of the material [default: that of --material, or of the file]

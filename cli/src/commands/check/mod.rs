@@ -21,8 +21,8 @@ use lamp_supports::{
 use serde_json::{Value, json};
 
 use crate::catalogue::{canonical_word, entry};
+use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
 use crate::part_options::at_part;

@@ -10,13 +10,12 @@ use std::str::FromStr;
 use clap::Args;
 use lamp_stack::{Dpi, IndexedStack, Length, Pairing};
 
+use crate::endings::{PNG, check_ending};
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::{Common, parse_distance};
 use crate::progress::Progress;
-use crate::streams::{
-    check_beside, check_png_name, failed_at, input_name, is_stream, print, spool_stdin,
-};
+use crate::streams::{check_beside, failed_at, input_name, is_stream, print, spool_stdin};
 
 use picture::write_picture;
 use report::{Comparison, answer, text};
@@ -113,7 +112,7 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
     if let Some(picture) = &args.picture {
-        check_png_name(picture)?;
+        check_ending(picture, &PNG)?;
         check_beside(picture, Path::new("-"), paths)?;
     }
     let [a, b] = [opened(&args.a)?, opened(&args.b)?];

@@ -15,8 +15,8 @@ use lamp_planning::SampleHeight;
 use lamp_planning::learn::Law;
 use lamp_planning::speed::{Platform, Speed};
 
+use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::lamp_option::LampOption;
 use crate::memory;
 use crate::options::{Common, one_of_described, parse_memory};
@@ -76,7 +76,7 @@ pub(crate) struct LearnArgs {
     step: f64,
 
     /// Write the layers' times for the next print
-    #[arg(short, long, value_name = "NEXT.csv", requires = "measured")]
+    #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
     output: Option<PathBuf>,
 
     /// Write the errors of all prints and what is told of the next as JSON

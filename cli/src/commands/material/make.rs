@@ -6,6 +6,7 @@ use clap::Args;
 use lamp_grayscale::material::Composition;
 
 use crate::catalogue::read_file;
+use crate::endings::parse_toml;
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
@@ -27,6 +28,7 @@ pub(super) struct MakeArgs {
 
     /// Material file to write [default: standard output]
     #[arg(short, long, value_name = "OUT", default_value = "-", hide_default_value = true)]
+    #[arg(value_parser = parse_toml)]
     output: PathBuf,
 }
 

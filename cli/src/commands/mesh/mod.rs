@@ -14,8 +14,9 @@ use lamp_stack::Length;
 
 use crate::exit::Exit;
 use crate::options::{Common, one_of};
+use crate::part_options::part_notes;
 use crate::progress::say;
-use crate::step_options::{HEADING, ReaderOptions, notes, parse_tolerance};
+use crate::step_options::{HEADING, ReaderOptions, parse_tolerance};
 use crate::streams::{input_name, is_stream};
 
 /// Check or repair the mesh of a part
@@ -86,8 +87,7 @@ impl MeshPart {
             return Err(Exit::usage(why).at(self.name()));
         }
         if !common.quiet {
-            let notes = part.prepared().flat_map(notes);
-            notes.for_each(|note| say(&format!("{command}: {note}")));
+            part_notes(&part).iter().for_each(|note| say(&format!("{command}: {note}")));
         }
         Ok((part, bytes))
     }

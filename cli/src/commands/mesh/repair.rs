@@ -14,11 +14,12 @@ use serde_json::{Map, Value, json};
 use crate::commands::mesh::MeshPart;
 use crate::commands::mesh::answer::{counts, deeds};
 use crate::commands::mesh::text::faults;
+use crate::endings::{STL, check_ending, parse_report};
 use crate::exit::Exit;
-use crate::json_report::{JsonReport, parse_report};
+use crate::json_report::JsonReport;
 use crate::options::{Common, parse_distance};
 use crate::progress::say;
-use crate::streams::{check_beside, check_not_input, check_stl_name, is_stream, write_mesh};
+use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
 
 /// Mend a mesh: weld, drop, turn over and add facets, and list each
 ///
@@ -60,7 +61,7 @@ pub(super) struct RepairArgs {
 pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let (name, input) = (args.part.name(), &args.part.part);
     check_not_input(&args.output, [input])?;
-    check_stl_name(&args.output)?;
+    check_ending(&args.output, &STL)?;
     if let Some(report) = &args.report {
         check_beside(report, &args.output, [input])?;
     }

@@ -140,7 +140,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     let material: Material = entry(&args.material)?;
     let curve = HeightCurve::of(&material).map_err(anyhow::Error::new)?;
     let progress = Progress::new("plan", common, true);
-    let target = args.target.open(&projector)?;
+    let target = args.target.open(&projector, &progress)?;
     let (map, light) = args.light(&projector, &target)?;
     if let Some(text) = doubt(&map, &curve, &material) {
         progress.warn(&text);

@@ -70,7 +70,7 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let material: Material = entry(&args.material)?;
     let setting = setting_of(&projector, &material)?;
     let progress = Progress::new("plan", common, true);
-    let target = args.target.open(&projector)?;
+    let target = args.target.open(&projector, &progress)?;
     let round = target.profile()?;
     let planned = plan(setting, round.radius_um(), |r| round.height_um(r), args.method)
         .map_err(|error| failed(error).at(args.target.target.display().to_string()))?;

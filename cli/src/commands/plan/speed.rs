@@ -10,8 +10,8 @@ use lamp_stack::Layer;
 
 use super::speed_plot::plots_of;
 use super::speed_report::{Planned, lines_of, write_report};
+use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
 use crate::measured_doses::MeasuredDoses;
 use crate::memory;
@@ -48,7 +48,7 @@ pub(super) struct SpeedArgs {
     platform: PlatformOptions,
 
     /// Write the height, thickness, exposure time and platform speed of each layer
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
     profile: Option<PathBuf>,
 
     /// Write what the plan reaches, by layer, as JSON

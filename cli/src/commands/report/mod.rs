@@ -18,6 +18,7 @@ use lamp_stack::{IndexedStack, stacks_in};
 use serde_json::json;
 
 use crate::catalogue::entry;
+use crate::endings::{HTML, check_ending};
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::Common;
@@ -120,6 +121,7 @@ impl Work<'_> {
                 return Err(Exit::usage("a page is not for terminals: name a file with -o"));
             }
             check_beside(output, Path::new("-"), [&args.stack])?;
+            check_ending(output, &HTML)?;
         }
         let mut answers = Vec::new();
         for path in stacks {

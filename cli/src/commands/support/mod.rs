@@ -20,8 +20,8 @@ use lamp_supports::{
 use serde_json::Value;
 
 use crate::catalogue::entry;
+use crate::endings::{parse_report, parse_toml};
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, Output, parse_distance, parse_thickness};
 use crate::part_arg::{PartArg, paths};
@@ -68,7 +68,7 @@ pub(crate) struct SupportArgs {
     pub(crate) part: Vec<PartArg>,
 
     /// Write the supports as a list of edits, with alternatives, for people to change
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
     plan: Option<PathBuf>,
 
     /// Write the supports as an STL
@@ -159,7 +159,7 @@ impl SupportArgs {
         let machine: Machine = entry(&self.machine)?;
         let first = first_page(stack)?;
         let name = input_name(&self.stack);
-        let surface = self.surface(&first, &name)?;
+        let surface = self.surface(&first, &name, &progress)?;
         let found = self.check(stack, progress)?;
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
         let plans = plan_supports(layers, &found, &surface, &self.options());
@@ -221,7 +221,7 @@ impl SupportArgs {
     }
 
     /// Opens the part, where it lay when it was sliced. `first` is the stack's first page.
-    fn surface(&self, first: &PageInfo, name: &str) -> Result<Surface, Exit> {
+    fn surface(&self, first: &PageInfo, name: &str, progress: &Progress) -> Result<Surface, Exit> {
         let sliced = RecordedSlicing::of(first.stack.as_ref()).with_context(|| {
             format!("{name} does not record how its part was sliced: slice it with lamp")
         })?;
@@ -230,7 +230,7 @@ impl SupportArgs {
                 "{name} {why}, so it does not lie as its part: support it before"
             )));
         }
-        let part = sliced.open(&self.part, name)?;
+        let part = sliced.open(&self.part, name, &|note| progress.say(note))?;
         let facets = sliced.options.solid.body(part);
         Ok(Surface::new(facets.map_err(|error| Exit::from(error).at(name_of_all(&self.part)))?))
     }

@@ -25,8 +25,8 @@ use lamp_postprocess::{
 use lamp_stack::{Length, Size};
 
 use crate::catalogue::{canonical_word, entry, is_file};
+use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::parse_report;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::progress::Progress;
 use crate::stages::Layers;
@@ -121,7 +121,7 @@ pub(crate) struct TileArgs {
     turns: Option<TurnsArg>,
 
     /// Place copies as this file says, instead of packing them
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[arg(long, value_name = "FILE.json")]
     #[arg(conflicts_with_all = ["copies", "shares", "edge_gap", "pack", "turns"])]
     layout: Option<PathBuf>,
 

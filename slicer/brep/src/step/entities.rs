@@ -58,6 +58,8 @@ const COMBINED: [&str; 6] = [
 impl Entities {
     /// Reads a whole file.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, StepError> {
+        // Some editors put a mark of the order of bytes before a text.
+        let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
         let mut reader = EntityReader { tokens: Tokens::new(bytes) };
         match reader.next() {
             Ok(Token::Word(word)) if word.starts_with("ISO-10303-21") => {}

@@ -123,14 +123,6 @@ pub enum StepError {
     },
 }
 
-/// The number of bytes that [`is_step`] needs.
-pub const START_BYTES: u64 = 256;
-
-/// Returns whether a file's first bytes have the signature of STEP.
-pub fn is_step(start: &[u8]) -> bool {
-    start.trim_ascii_start().starts_with(b"ISO-10303-21")
-}
-
 /// Checks the syntax of a STEP file, but not the meaning of its entities.
 ///
 /// # Errors

@@ -122,7 +122,7 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("plan", common, true);
     let projector: Projector = entry(&args.projector)?;
     let target = match &args.target {
-        Some(path) => Some(args.reading.open(path, &projector)?),
+        Some(path) => Some(args.reading.open(path, &projector, &progress)?),
         None => None,
     };
     let shown = Shown {

@@ -1,0 +1,195 @@
+//! What the ending of a file's name says, and which endings an output may have.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use crate::exit::Exit;
+use crate::streams::extension;
+
+/// What a command writes to a file or a folder. A name may have no ending, one that says nothing,
+/// or one of these.
+pub(crate) struct Writes {
+    /// The sentence for a name with the ending of another format.
+    sentence: &'static str,
+    endings: &'static [&'static str],
+}
+
+/// A stack, as a TIFF or packed.
+pub(crate) const STACK: Writes = Writes {
+    sentence: "a stack is a TIFF: end its name in .tif",
+    endings: &["tif", "tiff", "btf", "tf8", "lamp"],
+};
+
+/// A packed stack.
+pub(crate) const PACKED_STACK: Writes =
+    Writes { sentence: "end the name of a packed stack in .lamp", endings: &["lamp"] };
+
+/// A picture.
+pub(crate) const PNG: Writes =
+    Writes { sentence: "the picture is a PNG: end its name in .png", endings: &["png"] };
+
+/// A mesh.
+pub(crate) const STL: Writes =
+    Writes { sentence: "meshes are written as STL: name a .stl file", endings: &["stl"] };
+
+/// A sample part.
+pub(crate) const SAMPLE: Writes = Writes {
+    sentence: "a sample is an STL or a STEP file: end its name in .stl or .step",
+    endings: &["stl", "step", "stp"],
+};
+
+const JSON: Writes =
+    Writes { sentence: "it is written as JSON: end its name in .json", endings: &["json"] };
+
+const TABLE: Writes =
+    Writes { sentence: "a table is CSV: end its name in .csv", endings: &["csv", "txt"] };
+
+const TOML: Writes =
+    Writes { sentence: "it is written as TOML: end its name in .toml", endings: &["toml"] };
+
+/// A report that browsers show.
+pub(crate) const HTML: Writes =
+    Writes { sentence: "a report is a web page: end its name in .html", endings: &["html", "htm"] };
+
+/// A folder.
+pub(crate) const FOLDER: Writes =
+    Writes { sentence: "a folder is written: end its name in /", endings: &[] };
+
+/// Endings that name a format, and what it is. All others say nothing.
+const FORMATS: [(&[&str], &str); 13] = [
+    (&["tif", "tiff", "btf", "tf8"], "a TIFF"),
+    (&["lamp"], "a packed stack"),
+    (&["png", "apng"], "a PNG"),
+    (&["svg", "svgz"], "an SVG"),
+    (
+        &[
+            "bmp", "gif", "jpg", "jpeg", "jp2", "jxl", "webp", "avif", "heic", "pbm", "pgm", "ppm",
+            "pnm", "pam", "pcx", "tga", "psd", "exr", "ico", "eps", "ps",
+        ],
+        "another picture",
+    ),
+    (&["pdf", "doc", "docx", "odt", "ppt", "pptx", "rtf", "md", "tex"], "a document"),
+    (&["html", "htm", "xhtml"], "a web page"),
+    (
+        &[
+            "stl", "step", "stp", "obj", "3mf", "ply", "off", "amf", "gltf", "glb", "wrl", "vrml",
+            "x3d", "dae", "fbx", "3ds", "3dm", "blend", "usd", "usda", "usdz", "dxf", "dwg", "igs",
+            "iges", "sat", "sab", "x_t", "x_b", "jt", "brep", "brp", "fcstd", "f3d", "sldprt",
+            "sldasm", "ipt", "iam", "catpart", "prt", "scad", "skp", "vtk", "msh",
+        ],
+        "a model",
+    ),
+    (
+        &[
+            "sl1", "sl1s", "goo", "ctb", "cbddlp", "photon", "photons", "phz", "pws", "pw0", "pwx",
+            "pwmx", "pwmo", "pwms", "pwmb", "pwma", "pm3", "pm3n", "pm5", "dlp", "cws", "cxdlp",
+            "cxdlpv4", "fdg", "lgs", "lgs30", "mdlp", "osla", "prz", "qdt", "rgb", "slc", "cli",
+            "svgx", "zcode", "zcodex", "nanodlp", "gcode", "bgcode", "gco", "nc", "ufp", "x3g",
+        ],
+        "a job of a printer",
+    ),
+    (&["zip", "gz", "tgz", "tar", "xz", "bz2", "zst", "7z", "rar", "lz4"], "a packed file"),
+    (&["json", "jsonl", "xml", "yaml", "yml", "toml", "ini"], "structured text"),
+    (&["csv", "tsv", "xls", "xlsx", "ods", "txt"], "a table or text"),
+    (&["mp4", "avi", "mov", "mkv", "webm", "npy", "npz", "h5", "nrrd", "mat", "exe"], "other data"),
+];
+
+/// Refuses to write to a name that ends as those of another format.
+///
+/// # Errors
+/// Returns wrong usage: a sentence that names the ending and what is written.
+pub(crate) fn check_ending(path: &Path, writes: &Writes) -> Result<(), Exit> {
+    let ending = extension(path);
+    let format = FORMATS.iter().find(|(endings, _)| endings.contains(&&*ending));
+    match format {
+        Some((_, format)) if !writes.endings.contains(&&*ending) => {
+            let (path, sentence) = (path.display(), writes.sentence);
+            Err(Exit::usage(format!("{path}: {sentence} (.{ending} names {format})")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses the name of a stack for a file beside one.
+///
+/// # Errors
+/// As [`check_ending`].
+pub(crate) fn check_no_stack(path: &Path) -> Result<(), Exit> {
+    let ending = extension(path);
+    if !STACK.endings.contains(&&*ending) {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(Exit::usage(format!("{path}: no stack is written there: leave out .{ending}")))
+}
+
+/// Parses the name of a JSON file. Standard output is for the stack.
+pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
+    match text {
+        "-" => Err("standard output is for the stack: name a file, as report.json".to_owned()),
+        "" => Err("name a file, as report.json".to_owned()),
+        name => parse(name, &JSON),
+    }
+}
+
+/// Parses the name of a CSV file.
+pub(crate) fn parse_table(text: &str) -> Result<PathBuf, String> {
+    parse(text, &TABLE)
+}
+
+/// Parses the name of a TOML file.
+pub(crate) fn parse_toml(text: &str) -> Result<PathBuf, String> {
+    parse(text, &TOML)
+}
+
+fn parse(text: &str, writes: &Writes) -> Result<PathBuf, String> {
+    let path = Path::new(text);
+    // Those of stacks are refused once it is known whether that stack is written or read.
+    if STACK.endings.contains(&&*extension(path)) {
+        return Ok(path.to_owned());
+    }
+    match check_ending(path, writes) {
+        Ok(()) => Ok(path.to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Returns true if a name is that of a packed stack.
+pub(crate) fn is_packed_name(path: &Path) -> bool {
+    extension(path) == "lamp"
+}
+
+/// Returns true if a name is that of a STEP file.
+pub(crate) fn is_step_name(path: &Path) -> bool {
+    let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
+    path.extension().is_some_and(is_step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_ending_is_in_two_formats() {
+        let mut all: Vec<&str> =
+            FORMATS.iter().flat_map(|(endings, _)| *endings).copied().collect();
+        let count = all.len();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), count);
+        let known = |writes: &Writes| writes.endings.iter().all(|end| all.contains(end));
+        let kinds = [&STACK, &PACKED_STACK, &PNG, &STL, &SAMPLE, &JSON, &TABLE, &TOML, &HTML];
+        assert!(kinds.into_iter().all(known));
+    }
+
+    #[test]
+    fn endings_that_say_nothing_are_no_matter() {
+        for name in ["-", "x", "x.part", "blade.v2", "x.out", "x.7", ".hidden", "a.b/x", "x.TIF"] {
+            assert!(check_ending(Path::new(name), &STACK).is_ok(), "{name}");
+        }
+        for name in ["x.sl1", "x.PNG", "a.tif.gz", "x.obj", "x.json"] {
+            let message = check_ending(Path::new(name), &STACK).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("{name}: a stack is a TIFF")), "{message}");
+        }
+    }
+}
