@@ -114,7 +114,7 @@ fn defects() -> Vec<(String, Defect, Fill)> {
     let others = [
         ("drop".to_owned(), Defect::Drop, Fill::EvenOdd),
         ("duplicate".to_owned(), Defect::Duplicate, Fill::EvenOdd),
-        ("flip, non-zero".to_owned(), Defect::Flip, Fill::Solid),
+        ("flip".to_owned(), Defect::Flip, Fill::Solid),
     ];
     GAPS_PIXELS.map(gap).into_iter().chain(others).collect()
 }

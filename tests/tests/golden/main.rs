@@ -75,7 +75,7 @@ fn overlap() -> Images {
     scratch.mesh("balls.stl", &Mesh { facets: [ball.facets, moved.facets].concat() });
     let filled = |fill: &str| {
         let line = format!("slice balls.stl --dpi 150 --thickness 1mm --layers 6 --fill {fill}");
-        let layers = read_stack(scratch.run(&line).succeeds_quietly().stdout);
+        let layers = read_stack(scratch.run(&line).succeeds().stdout);
         (format!("overlap_{fill}"), mask(&layers[0]).clone())
     };
     vec![filled("even-odd"), filled("nonzero")]
