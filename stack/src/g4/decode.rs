@@ -49,7 +49,7 @@ pub(crate) fn decode_rows(
         }
         decode_row(&mut bits, &above, &mut row, width)
             .map_err(|fault| G4Error { row: index, fault })?;
-        mask.push_padded(&row.places, row.len);
+        row.push_to(mask);
         if mask.change_count() > max_runs {
             return Err(G4Error { row: index, fault: G4Fault::TooManyRuns });
         }
@@ -66,7 +66,7 @@ pub(super) fn decode_row(
     row: &mut CodedRow,
     width: u32,
 ) -> Result<(), G4Fault> {
-    row.len = 0;
+    row.clear();
     let (mut a0, mut started) = (0, false);
     let mut white = false;
     // The index of b1; its parity is that of the colour.
@@ -105,7 +105,9 @@ pub(super) fn decode_row(
             }
         }
         started = true;
-        while j < above.len && above.places[j] <= a0 {
+        // libtiff does not look for the next b1 before the row has a run. Without runs of length
+        // zero above, b1 is past a0 then.
+        while row.len > 0 && j < above.len && above.places[j] <= a0 {
             j += 2;
         }
     }

@@ -45,7 +45,7 @@ pub(crate) fn decode_group3_rows(
         } else {
             rows.runs(&mut row, width).map_err(failed)?;
         }
-        mask.push_padded(&row.places, row.len);
+        row.push_to(mask);
         if mask.change_count() > max_runs {
             return Err(failed(G4Fault::TooManyRuns));
         }
@@ -98,7 +98,7 @@ impl Group3Rows<'_> {
 
     /// Decodes a row of run lengths, black (T.4's white) first.
     fn runs(&mut self, row: &mut CodedRow, width: u32) -> Result<(), G4Fault> {
-        row.len = 0;
+        row.clear();
         let (mut column, mut white) = (0, false);
         while column < width {
             column += self.bits.run(white, width - column)?;
