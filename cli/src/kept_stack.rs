@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use lamp_stack::{Pages, StackError};
 
 use crate::exit::Exit;
+use crate::stack_notes::noting;
 use crate::streams::{failed_at, input_name, is_stream, open_pages, spool_stdin};
 
 /// A stack that can be read again.
@@ -34,6 +35,6 @@ impl KeptStack {
         let file = self.spooled.take().map_or_else(spool_stdin, Ok)?;
         let pages = reopened(&file).map_err(|error| failed_at(input_name(&self.path), error));
         self.spooled = Some(file);
-        pages
+        Ok(noting(pages?, &self.path))
     }
 }

@@ -48,6 +48,7 @@ mod signals;
 mod sliced_part;
 mod slicing_options;
 mod stack_facts;
+mod stack_notes;
 mod stack_part;
 mod stages;
 mod step_options;
@@ -69,6 +70,7 @@ use options::Common;
 use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
+use stack_notes::print_notes_of;
 use streams::give_up;
 use usage::refuse;
 
@@ -143,6 +145,7 @@ fn programs() -> Vec<clap::Command> {
 
 fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit> {
     note_command(name);
+    print_notes_of(name, common.quiet);
     keep_freed_memory();
     clean_up_on_signals()?;
     #[cfg(feature = "occt")]

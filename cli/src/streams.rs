@@ -10,14 +10,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, anyhow};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, Layer, PackLevel, Page, PageInfo, PageWriter,
-    Pages, PassingLayer, StackError, StackInfo, map_in_order, write_packed, write_stack,
+    Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
+    PageWriter, Pages, PassingLayer, StackError, StackInfo, map_in_order, write_packed,
+    write_stack,
 };
 
 use crate::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
 use crate::progress::Progress;
+use crate::stack_notes::{noting, print_note};
 
 /// Returns whether a path means standard input or output.
 pub(crate) fn is_stream(path: &Path) -> bool {
@@ -79,7 +81,19 @@ pub(crate) fn open_pages(path: &Path) -> Result<Pages, Exit> {
     } else {
         Pages::open(path)
     };
-    pages.map_err(|error| failed_at(input_name(path), error))
+    let pages = pages.map_err(|error| failed_at(input_name(path), error))?;
+    Ok(noting(pages, path))
+}
+
+/// Opens a stack of which any page can be read; standard input is kept in a temporary file.
+pub(crate) fn open_indexed(path: &Path) -> Result<IndexedStack, Exit> {
+    let stack = match is_stream(path) {
+        true => IndexedStack::from_file(spool_stdin()?),
+        false => IndexedStack::open(path),
+    };
+    let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
+    stack.notes().iter().for_each(|note| print_note(path, note));
+    Ok(stack)
 }
 
 fn refuse_terminal() -> Result<(), Exit> {

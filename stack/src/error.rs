@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::check::CheckFault;
 use crate::file_format::FileFormat;
 use crate::g4::G4Error;
+use crate::note::ImagesBeside;
 use crate::picture_page::PictureFormat;
 
 /// What stands before the reason of a stage that gave up.
@@ -59,6 +60,27 @@ pub enum StackError {
         page: u32,
         /// The feature.
         feature: UnsupportedFeature,
+    },
+    /// The pixels of a page are not square.
+    #[error(
+        "page {page}: its pixels are not square (its resolution is {across} across and {down} down), so heights and areas would be wrong: resample the image to square pixels, or correct its resolution"
+    )]
+    RectangularPixels {
+        /// The page, from 0.
+        page: u32,
+        /// The resolution along rows, in the file's unit.
+        across: f64,
+        /// The resolution along columns, in the same unit.
+        down: f64,
+    },
+    /// No image of a TIFF is a layer.
+    #[error("it holds no layer, but {0}")]
+    NoLayerImage(ImagesBeside),
+    /// Two files of a folder have one page number.
+    #[error("{} and {} have one page number: keep one of them in the folder", files[0], files[1])]
+    SamePage {
+        /// The files' names.
+        files: [String; 2],
     },
     /// The parts of a TIFF are in an order that cannot be read from a stream.
     #[error(
@@ -222,6 +244,9 @@ pub enum PageFault {
     /// The strips or tiles have more bytes than any coding of the image needs.
     #[error("its strips claim {0} bytes, more than its pixels can take")]
     PieceBytes(u64),
+    /// Strips or tiles without data make up more rows than the reader's limits.
+    #[error("it claims {0} rows without data")]
+    Unwritten(u64),
     /// Strips or tiles share bytes.
     #[error("its strips overlap")]
     Overlap,
@@ -303,14 +328,9 @@ pub enum UnsupportedFeature {
     /// An unsupported compression of TIFF.
     #[error("TIFF compression {0}")]
     Compression(u64),
-    /// A predictor that is unsupported for these pixels.
-    #[error("predictor {predictor} of {bits}-bit pixels")]
-    Predictor {
-        /// The predictor's number in TIFF.
-        predictor: u64,
-        /// Bits per pixel.
-        bits: u8,
-    },
+    /// An unsupported predictor of TIFF.
+    #[error("predictor {0}")]
+    Predictor(u64),
     /// An interlaced PNG.
     #[error("an interlaced PNG")]
     Interlaced,

@@ -6,7 +6,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
-use crate::input::{Pages, page_files};
+use crate::input::Pages;
+use crate::note::StackNote;
+use crate::page_names::PageFiles;
 
 /// Returns the stacks at a path, by name: the path itself if it is a file or a folder of pages,
 /// otherwise every stack in the folder and in the folders below it. Hidden files are left out.
@@ -56,14 +58,18 @@ fn is_stack_name(path: &Path) -> bool {
 
 /// Returns whether a folder's files are the pages of one stack. The first file that tells decides.
 fn is_stack(folder: &Path) -> bool {
-    let Ok(mut files) = page_files(folder) else { return false };
-    // The first file is the last of the list.
-    files.reverse();
-    !files.is_empty() && files.iter().find_map(|file| is_page(file, files.len())).unwrap_or(true)
+    let PageFiles { files, left_out, .. } = match PageFiles::of(folder) {
+        Ok(found) => found,
+        // The folder's stack is refused when it is opened.
+        Err(StackError::SamePage { .. }) => return true,
+        Err(_) => return false,
+    };
+    let is_alone = files.len() == 1 && !left_out.iter().any(StackNote::is_doubt);
+    !files.is_empty() && files.iter().find_map(|file| is_page(file, is_alone)).unwrap_or(true)
 }
 
-/// Returns whether a file of several is a page and not a stack of its own, if it tells.
-fn is_page(file: &Path, files: usize) -> Option<bool> {
+/// Returns whether a file is a page and not a stack of its own, if it says so. A file alone is.
+fn is_page(file: &Path, is_alone: bool) -> Option<bool> {
     let mut headers = Pages::open(file).ok()?.headers();
     let first = headers.next()?.ok()?;
     match headers.next() {
@@ -71,7 +77,7 @@ fn is_page(file: &Path, files: usize) -> Option<bool> {
         Some(Err(StackError::EndedEarly { .. } | StackError::MissingPages { .. })) => Some(true),
         // Several pages, or a stack that was cut off.
         Some(_) => Some(false),
-        None if files == 1 => Some(true),
+        None if is_alone => Some(true),
         None => first.pages.map(|pages| pages > 1),
     }
 }

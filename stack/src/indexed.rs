@@ -9,6 +9,7 @@ use std::time::SystemTime;
 use crate::error::StackError;
 use crate::input::{PagePlace, Pages, only_page};
 use crate::layer::Layer;
+use crate::note::StackNote;
 use crate::tiff::{Page, PageHeader, PageReader};
 
 /// A stack whose pages can be read in any order, from several threads.
@@ -36,6 +37,7 @@ use crate::tiff::{Page, PageHeader, PageReader};
 pub struct IndexedStack {
     headers: Vec<PageHeader>,
     end: Option<StackError>,
+    notes: Vec<StackNote>,
     source: Source,
 }
 
@@ -116,7 +118,7 @@ impl IndexedStack {
                 None => break,
             }
         }
-        Ok(Self { headers, end, source: source(places)? })
+        Ok(Self { headers, end, notes: pages.notes().to_vec(), source: source(places)? })
     }
 
     /// Returns what the pages say, bottom first: at least one.
@@ -127,6 +129,11 @@ impl IndexedStack {
     /// Returns why no pages follow the last, if that is not the stack's end.
     pub fn end(&self) -> Option<&StackError> {
         self.end.as_ref()
+    }
+
+    /// Returns what was found beside the layers.
+    pub fn notes(&self) -> &[StackNote] {
+        &self.notes
     }
 
     /// Returns the stack if it is not cut off or damaged.
@@ -162,7 +169,7 @@ impl IndexedStack {
                 let (path, stamp) = &files[position];
                 let file = File::open(path)?;
                 stamp.check(&file.metadata()?)?;
-                only_page(PageReader::from_file(file)?.numbered(number, before))
+                only_page(&mut PageReader::from_file(file)?.numbered(number, before))
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Reads stacks from a file, a folder of pages or a stream.
 
-use std::fs::{self, File};
+use std::fmt;
+use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -8,8 +9,9 @@ use crate::check::ChainReader;
 use crate::error::StackError;
 use crate::layer::Layer;
 use crate::limits::Limits;
+use crate::note::{ImagesBeside, StackNote};
 use crate::ordered::map_in_order;
-use crate::picture_page::PictureFormat;
+use crate::page_names::PageFiles;
 use crate::tiff::{Format, Page, PageHeader, PageReader};
 
 /// An iterator over the pages of a stack, bottom first.
@@ -25,12 +27,28 @@ pub struct Pages {
     chain: Option<ChainReader>,
     images: bool,
     ended: bool,
+    /// What the names in a folder let doubt, until the first page shows whether its text proves
+    /// more.
+    doubts: Vec<StackNote>,
+    /// Images of a folder's files that are no layers.
+    beside: ImagesBeside,
+    notes: Vec<StackNote>,
+    listener: Option<Listener>,
+}
+
+/// Takes notes as they are found.
+struct Listener(Box<dyn FnMut(StackNote) + Send>);
+
+impl fmt::Debug for Listener {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Listener")
+    }
 }
 
 #[derive(Debug)]
 enum Source {
     /// A file or a stream.
-    One(PageReader),
+    One(Box<PageReader>),
     /// A folder: the unread files, last first.
     Folder(Vec<PathBuf>),
 }
@@ -38,22 +56,22 @@ enum Source {
 impl Pages {
     /// Opens a TIFF file, a picture file, or a folder of single-page TIFF files or of pictures
     /// of one format. Files of a folder are ordered by name, with numbers in names compared as
-    /// numbers.
+    /// numbers. Pictures whose names are not those of pages are left out, with a
+    /// [note](Self::notes).
     ///
     /// # Errors
     /// Returns an error if the input cannot be read or is of no such format, or if a folder
-    /// holds pages of several.
+    /// holds pages of several formats, or two with one number.
     pub fn open(path: &Path) -> Result<Self, StackError> {
-        let source = if path.is_dir() {
-            let files = page_files(path)?;
-            if files.is_empty() {
-                return Err(StackError::NoPages);
-            }
-            Source::Folder(files)
-        } else {
-            Source::One(PageReader::from_file(File::open(path)?)?)
-        };
-        Ok(Self::new(source))
+        if !path.is_dir() {
+            return Self::from_file(File::open(path)?);
+        }
+        let PageFiles { mut files, doubts, left_out } = PageFiles::of(path)?;
+        if files.is_empty() {
+            return Err(StackError::NoPages);
+        }
+        files.reverse();
+        Ok(Self { doubts, notes: left_out, ..Self::new(Source::Folder(files)) })
     }
 
     /// Reads an open TIFF or picture file from its start.
@@ -61,7 +79,7 @@ impl Pages {
     /// # Errors
     /// Returns an error if the file cannot be read or is of no such format.
     pub fn from_file(file: File) -> Result<Self, StackError> {
-        Ok(Self::new(Source::One(PageReader::from_file(file)?)))
+        Ok(Self::new(Source::One(Box::new(PageReader::from_file(file)?))))
     }
 
     /// Reads a stack from a stream, such as standard input.
@@ -69,7 +87,7 @@ impl Pages {
     /// # Errors
     /// Returns an error if the stream is empty or is neither a TIFF nor a picture.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
-        Ok(Self::new(Source::One(PageReader::from_stream(stream)?)))
+        Ok(Self::new(Source::One(Box::new(PageReader::from_stream(stream)?))))
     }
 
     fn new(source: Source) -> Self {
@@ -82,13 +100,36 @@ impl Pages {
             chain: Some(ChainReader::default()),
             images: true,
             ended: false,
+            doubts: Vec::new(),
+            beside: ImagesBeside::default(),
+            notes: Vec::new(),
+            listener: None,
+        }
+    }
+
+    /// Has `listener` take the notes, each as it is found, instead of [`Self::notes`].
+    pub fn with_listener(mut self, mut listener: impl FnMut(StackNote) + Send + 'static) -> Self {
+        self.notes.drain(..).for_each(&mut listener);
+        Self { listener: Some(Listener(Box::new(listener))), ..self }
+    }
+
+    /// Returns what was found beside the layers so far, unless a listener took it. Only the end of
+    /// the stack completes it.
+    pub fn notes(&self) -> &[StackNote] {
+        &self.notes
+    }
+
+    fn note(&mut self, note: StackNote) {
+        match &mut self.listener {
+            Some(Listener(listener)) => listener(note),
+            None => self.notes.push(note),
         }
     }
 
     /// Replaces the default limits of the reader.
     pub fn with_limits(self, limits: Limits) -> Self {
         let source = match self.source {
-            Source::One(reader) => Source::One(reader.with_limits(limits)),
+            Source::One(reader) => Source::One(Box::new(reader.with_limits(limits))),
             folder @ Source::Folder(_) => folder,
         };
         Self { source, limits, ..self }
@@ -130,7 +171,7 @@ impl Pages {
     pub(crate) fn without_images(mut self) -> Self {
         self.images = false;
         self.source = match self.source {
-            Source::One(reader) => Source::One(reader.without_images()),
+            Source::One(reader) => Source::One(Box::new(reader.without_images())),
             folder @ Source::Folder(_) => folder,
         };
         self
@@ -159,10 +200,36 @@ impl Pages {
     }
 
     /// Reads the single page of a folder's file.
-    fn page_of_file(&self, file: &Path) -> Result<Page, StackError> {
+    fn page_of_file(&mut self, file: &Path) -> Result<Page, StackError> {
         let reader = PageReader::from_file(File::open(file)?)?;
         let reader = reader.with_limits(self.limits).numbered(self.count, self.last_whole);
-        only_page(if self.images { reader } else { reader.without_images() })
+        let mut reader = if self.images { reader } else { reader.without_images() };
+        let page = only_page(&mut reader);
+        self.beside.add(reader.beside());
+        page
+    }
+
+    /// Notes what names let doubt, unless the first page has a text of ours: that says which layers
+    /// there are.
+    fn note_doubts(&mut self, first: &Page) {
+        let info = first.info();
+        let is_ours = info.stack.is_some() || info.z_um.is_some() || first.image_check().is_some();
+        for doubt in std::mem::take(&mut self.doubts) {
+            if !is_ours {
+                self.note(doubt);
+            }
+        }
+    }
+
+    /// Notes the images of TIFFs that are no layers.
+    fn note_images(&mut self) {
+        let mut beside = self.beside;
+        if let Source::One(reader) = &self.source {
+            beside.add(reader.beside());
+        }
+        if beside.count() > 0 {
+            self.note(StackNote::Images(beside));
+        }
     }
 
     /// Checks that a page follows the page before it.
@@ -220,11 +287,15 @@ impl Iterator for Pages {
             Some(page) => page.and_then(|page| self.check(&page).map(|()| page)),
             None => {
                 self.ended = true;
+                self.note_images();
                 return self.check_end().err().map(Err);
             }
         };
         match page {
             Ok(page) => {
+                if self.count == 0 {
+                    self.note_doubts(&page);
+                }
                 self.count += 1;
                 self.last_whole = Some(page.info().index);
                 Some(Ok(if self.chain.is_some() { page } else { page.without_check() }))
@@ -246,90 +317,10 @@ pub(crate) enum PagePlace {
 }
 
 /// Reads the page of a folder's file, which must have one alone.
-pub(crate) fn only_page(mut reader: PageReader) -> Result<Page, StackError> {
+pub(crate) fn only_page(reader: &mut PageReader) -> Result<Page, StackError> {
     let page = reader.next().unwrap_or(Err(StackError::Empty))?;
-    if reader.is_at_end() { Ok(page) } else { Err(StackError::SeveralPages) }
-}
-
-/// Lists the pages of a folder, last name first: its TIFFs or PNGs, or where there are none its
-/// other pictures.
-pub(crate) fn page_files(folder: &Path) -> Result<Vec<PathBuf>, StackError> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        files.extend(page_format(&path).map(|format| (format, path)));
-    }
-    let is_usual = |format: &str| matches!(format, "TIFF" | "PNG");
-    if files.iter().any(|(format, _)| is_usual(format)) {
-        files.retain(|(format, _)| is_usual(format));
-    }
-    if let Some(pair) = files.windows(2).find(|pair| pair[0].0 != pair[1].0) {
-        let mut formats = [pair[0].0, pair[1].0];
-        formats.sort_unstable();
-        return Err(StackError::MixedPages { formats });
-    }
-    let mut files: Vec<PathBuf> = files.into_iter().map(|(_, path)| path).collect();
-    files.sort_by_cached_key(|path| name_key(&path.to_string_lossy()));
-    files.reverse();
-    Ok(files)
-}
-
-/// Returns the format of a folder's file by its name, if it is one of pages.
-fn page_format(file: &Path) -> Option<&'static str> {
-    let extension = file.extension()?.to_string_lossy().to_ascii_lowercase();
-    match extension.as_str() {
-        "tif" | "tiff" => Some("TIFF"),
-        "png" => Some("PNG"),
-        extension => PictureFormat::of_extension(extension).map(PictureFormat::name),
-    }
-}
-
-/// Splits a name into pairs of a text and the number after it, so that `page10` sorts after
-/// `page9`.
-fn name_key(name: &str) -> Vec<(String, u64)> {
-    let mut pieces = vec![(String::new(), 0u64)];
-    let mut in_number = false;
-    for c in name.chars() {
-        if in_number && !c.is_ascii_digit() {
-            pieces.push((String::new(), 0));
-        }
-        in_number = c.is_ascii_digit();
-        let (text, number) = pieces.last_mut().expect("there is a first piece");
-        match c.to_digit(10) {
-            Some(digit) => *number = number.saturating_mul(10).saturating_add(digit.into()),
-            None => text.push(c),
-        }
-    }
-    pieces
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_in_names_count_as_numbers() {
-        let mut names = [
-            "p10.tif",
-            "p9.tif",
-            "p100.tif",
-            "a.tif",
-            "p9b.tif",
-            "layer_100000.tif",
-            "layer_99999.tif",
-        ];
-        names.sort_by_cached_key(|name| name_key(name));
-        assert_eq!(
-            names,
-            [
-                "a.tif",
-                "layer_99999.tif",
-                "layer_100000.tif",
-                "p9.tif",
-                "p9b.tif",
-                "p10.tif",
-                "p100.tif"
-            ]
-        );
+    match reader.next() {
+        None => Ok(page),
+        Some(_) => Err(StackError::SeveralPages),
     }
 }

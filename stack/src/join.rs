@@ -8,6 +8,7 @@ use thiserror::Error;
 use crate::error::StackError;
 use crate::input::Pages;
 use crate::layer::{Layer, StackInfo};
+use crate::note::StackNote;
 use crate::ordered::map_in_order;
 use crate::tiff::Page;
 
@@ -70,6 +71,8 @@ pub enum JoinError {
 
 /// Returns the layers of several stacks (files or folders), one stack after the other.
 ///
+/// `listener` takes what is found beside the layers of each stack.
+///
 /// The result has the first stack's metadata. Its layer count is the sum of the counts, if
 /// all stacks state one. Joining all parts of a split stack restores it byte for byte.
 ///
@@ -77,11 +80,15 @@ pub enum JoinError {
 /// Returns an error if a stack cannot be opened, or differs from the first in part, size,
 /// resolution or commands. The iterator yields an error if a layer cannot be read, or if a
 /// stack does not continue the one before it.
-pub fn join(
+pub fn join<F>(
     stacks: Vec<PathBuf>,
-) -> Result<impl Iterator<Item = Result<Layer, JoinError>> + use<>, JoinError> {
+    listener: F,
+) -> Result<impl Iterator<Item = Result<Layer, JoinError>> + use<F>, JoinError>
+where
+    F: Fn(&Path, StackNote) + Send + Sync + 'static,
+{
     let stack = survey(&stacks)?;
-    let pages = Joined::new(stacks, stack);
+    let pages = Joined::new(stacks, stack, Arc::new(listener));
     Ok(map_in_order(pages, |(page, origin): (Page, PageOrigin)| {
         let mut layer = page.decode().map_err(|source| in_stack(&origin.path, source))?;
         layer.info.stack = origin.stack;
@@ -158,7 +165,11 @@ pub(crate) struct Joined {
     last: Option<(u32, Arc<Path>)>,
     /// The joined stack's metadata, until the first page takes it.
     stack: Option<StackInfo>,
+    listener: Arc<JoinListener>,
 }
+
+/// Takes what is found beside the layers of a stack.
+type JoinListener = dyn Fn(&Path, StackNote) + Send + Sync;
 
 /// A page's source and the stack metadata that it will carry.
 pub(crate) struct PageOrigin {
@@ -168,8 +179,12 @@ pub(crate) struct PageOrigin {
 
 impl Joined {
     /// Starts with the first page, which carries `stack`.
-    pub(crate) fn new(stacks: Vec<PathBuf>, stack: Option<StackInfo>) -> Self {
-        Self { stacks: stacks.into_iter(), images: true, open: None, last: None, stack }
+    pub(crate) fn new(
+        stacks: Vec<PathBuf>,
+        stack: Option<StackInfo>,
+        listener: Arc<JoinListener>,
+    ) -> Self {
+        Self { stacks: stacks.into_iter(), images: true, open: None, last: None, stack, listener }
     }
 
     /// Passes over the data of images: the pages cannot be decoded.
@@ -182,6 +197,8 @@ impl Joined {
         Some(match Pages::open(&path) {
             Ok(pages) => {
                 let pages = if self.images { pages } else { pages.without_images() };
+                let (listener, of) = (Arc::clone(&self.listener), Arc::clone(&path));
+                let pages = pages.with_listener(move |note| listener(&of, note));
                 self.open = Some((path, pages));
                 Ok(())
             }

@@ -205,6 +205,14 @@ impl Dpi {
     }
 }
 
+/// Returns whether pixels are as wide as they are high by their resolutions across and down: up to
+/// a thousandth, or `rounding` if that is more. A resolution that is not above zero says nothing.
+pub(crate) fn has_square_pixels(resolutions: [f64; 2], rounding: f64) -> bool {
+    let [across, down] = resolutions;
+    let are_stated = resolutions.iter().all(|side| side.is_finite() && *side > 0.0);
+    !are_stated || (across - down).abs() <= (across.max(down) * 1e-3).max(rounding)
+}
+
 impl FromStr for Dpi {
     type Err = LengthError;
 

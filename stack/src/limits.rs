@@ -32,7 +32,8 @@ pub struct Limits {
     pub runs: usize,
     /// The greatest width of a page that is stored on its side. Its columns
     /// become rows, and unlike a row that is stored, such a row costs memory
-    /// without any data behind it.
+    /// without any data behind it. Also the greatest height of a page with
+    /// strips or tiles that were never written.
     pub rows_from_columns: u32,
     /// The greatest number of entries of a TIFF directory.
     pub directory_entries: u64,

@@ -14,6 +14,7 @@ use image::{AnimationDecoder, ColorType, ExtendedColorType, ImageDecoder, ImageE
 use crate::error::{PageFault, StackError, UnsupportedFeature};
 use crate::gray::GrayMask;
 use crate::layer::Image;
+use crate::length::has_square_pixels;
 use crate::limits::Limits;
 use crate::png_page::Header;
 use crate::text::one_line;
@@ -81,6 +82,8 @@ impl fmt::Display for PictureFormat {
 pub(crate) enum PictureFault {
     Unsupported(UnsupportedFeature),
     Malformed(PageFault),
+    /// The pixels are not square: the resolution across and down.
+    Rectangular([f64; 2]),
 }
 
 impl PictureFault {
@@ -88,6 +91,9 @@ impl PictureFault {
         match self {
             Self::Unsupported(feature) => StackError::Unsupported { page, feature },
             Self::Malformed(fault) => StackError::Malformed { page, fault },
+            Self::Rectangular([across, down]) => {
+                StackError::RectangularPixels { page, across, down }
+            }
         }
     }
 }
@@ -123,8 +129,12 @@ pub(crate) fn header(
     file: &[u8],
     limits: &Limits,
 ) -> Result<Header, PictureFault> {
-    let mut file = Cursor::new(file);
-    let (width, height) = decoder(format, &mut file, limits)?.dimensions();
+    let (width, height) = decoder(format, &mut Cursor::new(file), limits)?.dimensions();
+    if let Some(resolutions) = resolutions(format, file)
+        && !has_square_pixels(resolutions, 1.0)
+    {
+        return Err(PictureFault::Rectangular(resolutions));
+    }
     Ok(Header { width, height, gray: true, dpi: None, line: None })
 }
 
@@ -255,6 +265,44 @@ fn gray_mask(
 fn bits_of_bmp(file: &[u8]) -> u8 {
     let is_old = file.get(14) == Some(&12);
     file.get(if is_old { 24 } else { 28 }).copied().unwrap_or(0)
+}
+
+/// Returns the resolution across and down, or only their ratio, as the file's header states it.
+fn resolutions(format: PictureFormat, file: &[u8]) -> Option<[f64; 2]> {
+    match format {
+        PictureFormat::Bmp => {
+            let is_old = file.get(14) == Some(&12);
+            let at = |from: usize| Some(i32::from_le_bytes(*file.get(from..)?.first_chunk()?));
+            Some([at(38).filter(|_| !is_old)?.into(), at(42)?.into()])
+        }
+        PictureFormat::Jpeg => jfif_density(file),
+        // The width of a pixel for its height is (n + 15) / 64 (GIF89a, section 18).
+        PictureFormat::Gif => match *file.get(12)? {
+            0 => None,
+            n => Some([6400.0, 100.0 * (f64::from(n) + 15.0)]),
+        },
+        PictureFormat::Pnm | PictureFormat::WebP => None,
+    }
+}
+
+/// Returns the density of a JPEG from its JFIF segment, if it has one.
+fn jfif_density(file: &[u8]) -> Option<[f64; 2]> {
+    let mut rest = file.get(2..)?;
+    // Segments before the image's data (ITU-T T.81, annex B).
+    while let [0xFF, marker @ 0xC0..=0xFE, high, low, ..] = *rest
+        && marker != 0xDA
+    {
+        let segment = rest.get(4..2 + usize::from(u16::from_be_bytes([high, low])))?;
+        if let (0xE0, [b'J', b'F', b'I', b'F', 0, _, _, unit, x1, x0, y1, y0, ..]) =
+            (marker, segment)
+        {
+            let sides = [[*x1, *x0], [*y1, *y0]].map(|side| f64::from(u16::from_be_bytes(side)));
+            // Without a unit the numbers are a ratio, which rounding does not excuse.
+            return Some(if *unit == 0 { sides.map(|side| 1e4 * side) } else { sides });
+        }
+        rest = &rest[4 + segment.len()..];
+    }
+    None
 }
 
 /// Returns whether a file lacks its end in a way that its decoder does not notice: that of JPEG

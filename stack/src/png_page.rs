@@ -8,7 +8,7 @@ use crate::check::Line;
 use crate::error::{PageFault, UnsupportedFeature};
 use crate::gray::GrayMask;
 use crate::layer::{Image, PageInfo};
-use crate::length::Dpi;
+use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
 use crate::mask::Mask;
 use crate::picture_page::{PictureFault, check_runs, gray_level};
@@ -45,6 +45,14 @@ type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFault> {
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
+    if let Some(dims) = info.pixel_dims {
+        // Whole pixels a metre are rounded; a ratio is not.
+        let rounding = if dims.unit == Unit::Meter { 1.0 } else { 0.0 };
+        let sides = [dims.xppu, dims.yppu].map(f64::from);
+        if !has_square_pixels(sides, rounding) {
+            return Err(PictureFault::Rectangular(sides));
+        }
+    }
     let mut line = description(info).and_then(|text| Line::parse(text.as_bytes()));
     Ok(Header {
         width: info.width,

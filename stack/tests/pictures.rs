@@ -260,3 +260,46 @@ fn runs_are_limited() {
     let expected = StackError::Malformed { page: 0, fault: PageFault::TooManyRuns };
     assert_eq!(error.to_string(), expected.to_string());
 }
+
+#[test]
+fn pictures_whose_pixels_are_not_square_are_refused() {
+    let gray = DynamicImage::from(gray());
+    let refused = |file: &[u8]| match read(file) {
+        Ok(_) => false,
+        Err(StackError::RectangularPixels { .. }) => true,
+        Err(error) => panic!("{error}"),
+    };
+    let bmp = encoded(&gray, ImageFormat::Bmp);
+    for (sides, is_refused) in [
+        ([11_811u32, 11_811], false),
+        ([11_811, 11_812], false),
+        ([0, 0], false),
+        ([8031, 3858], true),
+    ] {
+        let mut bmp = bmp.clone();
+        bmp[38..46].copy_from_slice(&sides.map(u32::to_le_bytes).concat());
+        assert_eq!(refused(&bmp), is_refused, "{sides:?}");
+    }
+    let jpeg = encoded(&gray, ImageFormat::Jpeg);
+    let jfif =
+        jpeg.windows(5).position(|window| window == b"JFIF\0").expect("it has a JFIF segment");
+    for (unit, sides, is_refused) in [
+        (1, [300u16, 300], false),
+        (1, [204, 98], true),
+        (0, [1, 1], false),
+        (0, [2, 1], true),
+        (2, [80, 80], false),
+        (0, [0, 0], false),
+    ] {
+        let mut jpeg = jpeg.clone();
+        jpeg[jfif + 7] = unit;
+        jpeg[jfif + 8..jfif + 12].copy_from_slice(&sides.map(u16::to_be_bytes).concat());
+        assert_eq!(refused(&jpeg), is_refused, "{unit} {sides:?}");
+    }
+    let gif = encoded(&coloured([0; 4]).into(), ImageFormat::Gif);
+    for (ratio, is_refused) in [(0, false), (49, false), (113, true)] {
+        let mut gif = gif.clone();
+        gif[12] = ratio;
+        assert_eq!(refused(&gif), is_refused, "{ratio}");
+    }
+}

@@ -207,7 +207,7 @@ fn a_folder_of_pngs_is_a_stack() {
         assert_eq!((layer.info.index, layer.image), (index, mask.finish().into()));
     }
 
-    fs::write(folder.path().join("page.tif"), "").unwrap();
+    fs::write(folder.path().join("layer3.tif"), "").unwrap();
     let error = Pages::open(folder.path()).unwrap_err();
     assert!(matches!(error, StackError::MixedPages { formats: ["PNG", "TIFF"] }), "{error}");
 }
@@ -219,4 +219,29 @@ fn a_png_is_known_by_its_bytes() {
     fs::write(&path, bits()).unwrap();
     let layers: Vec<_> = Pages::open(&path).unwrap().layers().map(Result::unwrap).collect();
     assert_eq!(picture(&layers[0].image), ["#..#.#...#", ".........."]);
+}
+
+#[test]
+fn pixels_that_are_not_square_are_refused() {
+    for (sides, unit, is_read) in [
+        ([59_055, 59_055], Unit::Meter, true),
+        ([2834, 2835], Unit::Meter, true),
+        ([393, 394], Unit::Meter, true),
+        ([8031, 3858], Unit::Meter, false),
+        ([59_055, 59_155], Unit::Meter, false),
+        ([1, 1], Unit::Unspecified, true),
+        ([2, 1], Unit::Unspecified, false),
+        ([100, 101], Unit::Unspecified, false),
+        ([0, 2835], Unit::Meter, true),
+    ] {
+        let [xppu, yppu] = sides;
+        let file = png(10, BITS, &ROWS, 2, |encoder| {
+            encoder.set_pixel_dims(Some(PixelDimensions { xppu, yppu, unit }));
+        });
+        match read(file) {
+            Ok(_) => assert!(is_read, "{sides:?}"),
+            Err(StackError::RectangularPixels { .. }) => assert!(!is_read, "{sides:?}"),
+            Err(error) => panic!("{error}"),
+        }
+    }
 }

@@ -333,3 +333,159 @@ for k, (mask, gray) in enumerate(zip(pages("masks.tif"), pages("grays.tif"))):
         assert_eq!(scratch.layers("mask_0.png")[0].dpi, Dpi::new(1500.0));
     }
 }
+
+/// Writes strips of Group 4 with runs of length zero, as some programs do, and has Pillow, and so
+/// libtiff, decode them. The encoder keeps the rows above as libtiff does.
+#[test]
+fn group_4_with_runs_of_length_zero_is_read_as_pillow_reads_it() {
+    let scratch = Scratch::new();
+    let script = r#"
+import random, struct
+ZERO = "00110101 000111 0111 1000 1011 1100 1110 1111 10011 10100 00111 01000 001000 000011 110100 110101 101010 101011 0100111 0001100 0001000 0010111 0000011 0000100 0101000 0101011 0010011 0100100 0011000 00000010 00000011 00011010 00011011".split()
+ONE = "0000110111 010 11 10 011 0011 0010 00011 000101 000100 0000100 0000101 0000111 00000100 00000111 000011000 0000010111 0000011000 0000001000 00001100111 00001101000 00001101100 00000110111 00000101000 00000010111 00000011000 000011001010 000011001011 000011001100 000011001101 000001101000 000001101001 000001101010".split()
+VERTICAL = "0000010 000010 010 1 011 000011 0000011".split()
+WIDTH, HEIGHT = 32, 24
+
+def coded(row, above, dice):
+    bits, raw, a0, white, passes, added, k = "", [], 0, 0, 0, 0, 0
+    run = lambda colour, length: (ONE if colour else ZERO)[length]
+    at = lambda i: above[i] if i < len(above) else WIDTH
+    while a0 < WIDTH:
+        i = next((i for i in range(white, len(above), 2) if above[i] > a0), len(above)) if raw else 2 * passes
+        a1 = row[k] if k < len(row) else WIDTH
+        a2 = row[k + 1] if k + 1 < len(row) else WIDTH
+        b1, b2, shift = at(i), at(i + 1), a1 - at(i)
+        choice = dice.random()
+        if choice < 0.3 and added < 3:
+            part = dice.randrange(a1 - a0 + 1)
+            bits += "001" + run(white, part) + run(1 - white, 0)
+            a0 += part; raw += [a0, a0]; added += 1
+        elif choice < 0.4 and b1 - a0 <= 3 and a1 < WIDTH:
+            bits += VERTICAL[3 - (b1 - a0)] + "001" + run(1 - white, 0) + run(white, a1 - a0)
+            raw += [a0, a0, a1]; a0 = a1; white = 1 - white; k += 1
+        elif b2 < a1:
+            bits += "0001"; a0 = b2; passes += 1
+        elif abs(shift) <= 3 and choice < 0.95:
+            bits += VERTICAL[shift + 3]; raw.append(a1); a0 = a1; white = 1 - white; k += 1
+        else:
+            bits += "001" + run(white, a1 - a0) + run(1 - white, a2 - a1)
+            raw += [a1, a2]; a0 = a2; k += 2
+    return bits, [column for column in raw if column < WIDTH]
+
+def tiff(strip):
+    fields = [(256, 3, WIDTH), (257, 3, HEIGHT), (258, 3, 1), (259, 3, 4), (262, 3, 1), (273, 4, 122), (277, 3, 1), (278, 3, HEIGHT), (279, 4, len(strip))]
+    entries = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in fields)
+    return b"II*\0\x08\0\0\0" + struct.pack("<H", len(fields)) + entries + b"\0" * 4 + strip
+
+for seed in range(40):
+    dice = random.Random(seed)
+    rows, above, bits = [], [], ""
+    for _ in range(HEIGHT):
+        row = list(rows[-1]) if rows and dice.random() < 0.7 else []
+        row = [min(max(column + dice.randrange(-2, 3), 0), WIDTH - 1) for column in row]
+        row = sorted(set(row + [dice.randrange(WIDTH) for _ in range(dice.randrange(3))]))
+        rows.append(row)
+        code, above = coded(row, above, dice)
+        bits += code
+    bits += "000000000001" * 2
+    bits += "0" * (-len(bits) % 8)
+    strip = bytes(int(bits[i:i + 8], 2) for i in range(0, len(bits), 8))
+    name = f"runs_{seed}.tif"
+    open(name, "wb").write(tiff(strip))
+    image = Image.open(name)
+    pixels = b"".join(
+        sum(1 << WIDTH - 1 - c for c in range(WIDTH) if sum(t <= c for t in row) % 2).to_bytes(WIDTH // 8, "big")
+        for row in rows
+    )
+    assert image.tobytes() == pixels, f"Pillow reads {name} otherwise"
+    tell(name, image)
+"#;
+    python_writes(&scratch, script);
+}
+
+/// Writes a folder of PNGs of these names, one gray level each, from 1.
+fn folder_of(scratch: &Scratch, folder: &str, names: &[&str]) {
+    fs::create_dir(scratch.path(folder)).unwrap();
+    for (level, name) in (1u8..).zip(names) {
+        let picture = image::GrayImage::from_pixel(9, 4, [level].into());
+        picture
+            .save_with_format(scratch.path(&format!("{folder}/{name}")), image::ImageFormat::Png)
+            .unwrap();
+    }
+}
+
+#[test]
+fn every_command_warns_of_a_folder_that_lacks_a_page() {
+    let scratch = Scratch::new();
+    folder_of(&scratch, "pages", &["00001.png", "00002.png", "00004.png", "00005.png"]);
+    folder_of(&scratch, "steps", &["10.png", "20.png", "30.png", "40.png"]);
+    let warning = "pages: page 00003.png is missing (00004.png follows 00002.png)";
+    let commands = [
+        "lamp convert IN -o out.tif",
+        "lamp info IN",
+        "lamp show IN --layer 2 -o layer.png",
+        "lamp verify IN",
+        "lamp check IN",
+        "lamp compare IN IN",
+        "lamp report IN -o report.html",
+        "lamp mesh-out IN -o mesh.stl",
+        "lamp pack IN -o packed.lamp",
+        "lamp join IN -o joined.tif",
+        "lamp split IN --every 3 -o split/",
+        "lamp edit IN --difference IN -o edited.tif",
+        "dither IN --method threshold -o dithered.tif",
+        "fix IN -o fixed.tif",
+    ];
+    for command in commands {
+        let name = command.split(' ').find(|word| *word != "lamp").unwrap();
+        let said = scratch.run(&command.replace("IN", "pages")).stderr;
+        assert_eq!(said.matches(&format!("{name}: {warning}\n")).count(), 1, "{command}: {said}");
+        let said = scratch.run(&command.replace("IN", "steps").replace("-o ", "-o s_")).stderr;
+        assert!(!said.contains("missing"), "{command}: {said}");
+    }
+    for command in ["fix pages --strict -o x.tif", "lamp check pages --strict"] {
+        let ran = scratch.run(command);
+        assert_eq!(ran.statuses, [Some(3)], "{command}: {}", ran.stderr);
+        assert!(ran.stderr.contains("page 00003.png is missing"), "{}", ran.stderr);
+        assert!(!scratch.path("x.tif").exists());
+    }
+    scratch.run("fix steps --strict -o y.tif").succeeds_quietly();
+}
+
+#[test]
+fn pictures_that_are_no_pages_are_left_out_of_a_folder() {
+    let scratch = Scratch::new();
+    let names = ["00001.png", "00002.png", "00003.png", "thumb.png", "._00001.png"];
+    folder_of(&scratch, "pages", &names);
+    fs::write(scratch.path("pages/Thumbs.db"), b"x").unwrap();
+    let said = scratch.run("lamp convert pages -o out.tif").succeeds().stderr;
+    assert!(said.contains("._00001.png, thumb.png are no pages by name and left out"), "{said}");
+    assert!(said.contains("Thumbs.db is no picture and left out"), "{said}");
+    assert_eq!(scratch.layers("out.tif").len(), 3);
+    assert_eq!(scratch.run("fix pages --strict -o x.tif").statuses, [Some(3)]);
+
+    fs::rename(scratch.path("pages/thumb.png"), scratch.path("pages/2.png")).unwrap();
+    let words = ["pages: ", "00002.png", "2.png", "have one page number"];
+    scratch.run("lamp convert pages -o x.tif").is_refused_with(&words);
+}
+
+#[test]
+fn a_folder_of_ours_that_lacks_pages_is_refused_under_any_name() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Sample::Cube, 64);
+    scratch.run("slice cube.stl --dpi 50 --thickness 2mm -o cube/").succeeds();
+    let names = scratch.names();
+    assert!(names.iter().any(|name| name == "cube"), "{names:?}");
+    // Names that jump lack no page: the texts of ours say so.
+    fs::rename(scratch.path("cube/layer_00009.tif"), scratch.path("cube/layer_00019.tif")).unwrap();
+    scratch.run("fix cube --strict -o fixed.tif").succeeds_quietly();
+    for (lost, words) in [
+        ("cube/layer_00004.tif", "the folder lacks a page: layer 5"),
+        ("cube/layer_00019.tif", "was written with more layers"),
+        ("cube/layer_00000.tif", "the folder lacks a page: layer 1"),
+    ] {
+        fs::rename(scratch.path(lost), scratch.path("lost.tif")).unwrap();
+        scratch.run("fix cube -o x.tif").is_refused_with(&[words]);
+        fs::rename(scratch.path("lost.tif"), scratch.path(lost)).unwrap();
+    }
+}

@@ -11,6 +11,7 @@ use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::fix_report::whereabouts;
 use crate::options::{Common, Input, Output};
+use crate::stack_notes::doubts;
 use crate::stages::fix::{FixSettings, Fixing};
 use crate::streams::{check_beside, decoding, progress, unless_found};
 use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
@@ -49,8 +50,8 @@ pub(crate) struct FixArgs {
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 
-    /// Give up with status 3 if a band was left as it is: no stack is written, and the next stage
-    /// of a pipe fails, too
+    /// Give up with status 3 if a band was left as it is, or if pages of a folder may be missing: no
+    /// stack is written, and the next stage of a pipe fails, too
     #[arg(long)]
     strict: bool,
 
@@ -78,7 +79,10 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
             evidence.add(fixed);
         }
     });
-    let finding = || fixing.report().text_of_left().filter(|_| args.strict).map(Exit::Findings);
+    let finding = || {
+        let left = fixing.report().text_of_left().or_else(doubts);
+        left.filter(|_| args.strict).map(Exit::Findings)
+    };
     let fixed = unless_found(fixed, finding);
     let written = write_passing_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {

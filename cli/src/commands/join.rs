@@ -10,6 +10,7 @@ use crate::endings::is_packed_name;
 use crate::exit::Exit;
 use crate::options::{Common, Output};
 use crate::progress::Progress;
+use crate::stack_notes::print_note;
 use crate::streams::{
     format, input_name, is_stream, packed_destination, progress, write_layers, written_to,
 };
@@ -62,7 +63,8 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
     if is_packed_name(&args.output.output) && args.stacks.iter().all(|stack| is_packed(stack)) {
         return join_frames(&args.stacks, &args.output, &progress);
     }
-    let layers = join(args.stacks.clone())?.map(|layer| Ok(layer?));
+    let layers =
+        join(args.stacks.clone(), |path, note| print_note(path, &note))?.map(|layer| Ok(layer?));
     write_layers(counted(layers, &progress), &args.output, &progress)
 }
 

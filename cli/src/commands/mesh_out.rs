@@ -1,19 +1,18 @@
 //! `lamp mesh-out`: writes the surface of a stack.
 
-use std::io::Seek;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_slicer::write_stl;
-use lamp_stack::{IndexedStack, StackError};
+use lamp_stack::IndexedStack;
 use lamp_view::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
 
 use crate::endings::{STL, check_ending};
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::streams::{check_not_input, failed_at, input_name, is_stream, spool_stdin, write_mesh};
+use crate::streams::{check_not_input, failed_at, input_name, open_indexed, write_mesh};
 
 /// Write the surface of a stack as a mesh
 ///
@@ -69,16 +68,8 @@ pub(crate) fn run(args: &MeshOutArgs, common: &Common) -> Result<(), Exit> {
 
 /// Opens a stack that is whole.
 fn open(path: &Path) -> Result<IndexedStack, Exit> {
-    let opened = match is_stream(path) {
-        true => {
-            let mut file = spool_stdin()?;
-            file.rewind().map_err(StackError::from).and_then(|()| IndexedStack::from_file(file))
-        }
-        false => IndexedStack::open(path),
-    };
-    let failed = |error: StackError| failed_at(input_name(path), error);
-    let stack = opened.map_err(failed)?;
-    stack.into_whole().map_err(failed)
+    let whole = open_indexed(path)?.into_whole();
+    whole.map_err(|error| failed_at(input_name(path), error))
 }
 
 fn surface_of(

@@ -16,7 +16,7 @@ use crate::options::{Common, parse_memory};
 use crate::progress::Progress;
 use crate::sliced_part::{SlicedPart, check_slicing};
 use crate::slicing_options::SlicingOptions;
-use crate::streams::{failed_at, input_name, is_stream, print, spool_stdin};
+use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
 
 /// Look at layers in a browser
 ///
@@ -116,8 +116,7 @@ fn opened(path: &Path, args: &ViewArgs, common: &Common) -> Result<ViewedStack, 
     let part = SlicedPart::open(path, &args.slicing, &|line| progress.say(line))?;
     let pages = match part {
         Some(part) => IndexedStack::from_file(sliced(&part, args, &progress)?).map_err(failed)?,
-        None if is_stream(path) => IndexedStack::from_file(spool_stdin()?).map_err(failed)?,
-        None => IndexedStack::open(path).map_err(failed)?,
+        None => open_indexed(path)?,
     };
     if let Some(end) = pages.end() {
         progress.warn(&format!("{name}: {end}; the layers before are shown"));

@@ -13,6 +13,7 @@ use lamp_stack::{Layer, Limits, Op, PageInfo, Pages, PassingLayer, digest_of};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
+use crate::stack_notes::noting;
 use crate::streams::{failed_at, input_name, is_stream, layers_of, read_beside};
 
 /// Changes when other bytes come from the same options and layers.
@@ -212,5 +213,6 @@ fn open_picture(path: &Path) -> Result<OtherPicture<Exit>, Exit> {
     };
     let (copy, digest) = copied().with_context(|| name.clone())?;
     let pages = Pages::from_file(copy).map_err(|error| failed_at(name.clone(), error))?;
-    Ok(OtherPicture { name, digest, pages: Box::new(layers_of(pages, path, None)) })
+    let layers = layers_of(noting(pages, path), path, None);
+    Ok(OtherPicture { name, digest, pages: Box::new(layers) })
 }

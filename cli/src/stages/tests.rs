@@ -91,7 +91,8 @@ impl Bench {
             files.push(file);
         }
         let whole = self.path("joined.tif");
-        write_stack(join(files).unwrap(), Destination::File(whole.clone()), Format::Big).unwrap();
+        write_stack(join(files, |_, _| {}).unwrap(), Destination::File(whole.clone()), Format::Big)
+            .unwrap();
         let found = found.into_iter().reduce(RangeFindings::joined).unwrap();
         (fs::read(whole).unwrap(), found)
     }

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::blocks::Packer;
 use super::frame::{FramePage, IndexEntry, KEY_FRAME, START_BYTES, head_of, part};
@@ -32,7 +33,8 @@ pub fn join_packed(
     format: Format,
     level: PackLevel,
 ) -> Result<(), JoinError> {
-    let mut pages = Joined::new(stacks.to_vec(), survey(stacks)?).without_images();
+    let mut pages =
+        Joined::new(stacks.to_vec(), survey(stacks)?, Arc::new(|_, _| {})).without_images();
     let mut joined = Frames::new(to, format, level)?;
     for path in stacks {
         let failed = |source| in_stack(path, source);

@@ -5,17 +5,18 @@ use std::collections::BTreeMap;
 use super::layout::Layout;
 use super::page::{Compression, Page};
 use super::tags::{
-    BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
-    IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, LZW, MODIFIED_HUFFMAN, OLD_DEFLATE, ORIENTATION,
-    PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC, PLANAR_CONFIGURATION, PREDICTOR, RATIONAL,
-    RESOLUTION_UNIT, ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, SHORT, STRIP_BYTE_COUNTS,
+    BITS_PER_SAMPLE, BLACK_IS_ZERO, BYTE, COMPRESSION, DEFLATE, DOUBLE, FILL_ORDER, FLOAT, IFD,
+    IFD8, IMAGE_DESCRIPTION, IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, LZW, MODIFIED_HUFFMAN,
+    OLD_DEFLATE, ORIENTATION, PACK_BITS, PER_CENTIMETRE, PER_INCH, PHOTOMETRIC,
+    PLANAR_CONFIGURATION, PREDICTOR, RATIONAL, RESOLUTION_UNIT, ROWS_PER_STRIP, SAMPLE_FORMAT,
+    SAMPLES_PER_PIXEL, SBYTE, SHORT, SLONG, SLONG8, SRATIONAL, SSHORT, STRIP_BYTE_COUNTS,
     STRIP_OFFSETS, T4, T4_OPTIONS, T6, T6_OPTIONS, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS,
     TILE_WIDTH, TWO_DIMENSIONAL, UNCOMPRESSED, UNCOMPRESSED_MODE, WHITE_IS_ZERO, X_RESOLUTION,
     Y_RESOLUTION, type_size,
 };
 use crate::check::{CheckFault, Line};
 use crate::error::{PageFault, StackError, UnsupportedFeature};
-use crate::length::Dpi;
+use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
 use crate::orientation::Orientation;
 
@@ -61,7 +62,9 @@ impl Fields {
         let (kind, bytes) =
             self.values.get(&tag).ok_or_else(|| malformed(self.page, PageFault::NoTag(tag)))?;
         match *kind {
-            SHORT | LONG | LONG8 => Ok(bytes
+            // Some writers use other types than the tag's; libtiff takes them, too. A negative
+            // number reads as one that is too large.
+            BYTE | SHORT | LONG | LONG8 | SBYTE | SSHORT | SLONG | SLONG8 | IFD | IFD8 => Ok(bytes
                 .chunks_exact(type_size(*kind) as usize)
                 .map(|value| number(value, self.little_endian))
                 .collect()),
@@ -86,14 +89,38 @@ impl Fields {
     }
 
     fn dpi(&self) -> Option<Dpi> {
-        let (kind, bytes) = self.values.get(&X_RESOLUTION)?;
-        let [num, den] = [bytes.get(..4)?, bytes.get(4..8)?].map(|b| number(b, self.little_endian));
-        let value = num as f64 / den as f64;
+        let value = self.resolution(X_RESOLUTION)?;
         match self.number_or(RESOLUTION_UNIT, PER_INCH).ok()? {
-            _ if *kind != RATIONAL => None,
             PER_INCH => Dpi::new(value),
             PER_CENTIMETRE => Dpi::new(value * 2.54),
             _ => None,
+        }
+    }
+
+    /// Returns a resolution, in any of the types that libtiff reads.
+    fn resolution(&self, tag: u16) -> Option<f64> {
+        let (kind, bytes) = self.values.get(&tag)?;
+        let size = type_size(*kind) as usize;
+        let long = |bytes: &[u8]| number(bytes, self.little_endian) as u32;
+        let first = bytes.get(..size).filter(|_| size > 0)?;
+        Some(match *kind {
+            RATIONAL => f64::from(long(&first[..4])) / f64::from(long(&first[4..])),
+            SRATIONAL => f64::from(long(&first[..4]) as i32) / f64::from(long(&first[4..]) as i32),
+            FLOAT => f32::from_bits(long(first)).into(),
+            DOUBLE => f64::from_bits(number(first, self.little_endian)),
+            _ => self.number(tag).ok()? as f64,
+        })
+    }
+
+    /// Refuses pixels that are not as wide as they are high. The unit does not matter: where there
+    /// is none, the numbers still say how wide a pixel is for its height.
+    fn check_pixels(&self) -> Result<(), StackError> {
+        let sides = self.resolution(X_RESOLUTION).zip(self.resolution(Y_RESOLUTION));
+        match sides.filter(|&(across, down)| !has_square_pixels([across, down], 0.0)) {
+            Some((across, down)) => {
+                Err(StackError::RectangularPixels { page: self.page, across, down })
+            }
+            None => Ok(()),
         }
     }
 
@@ -111,6 +138,7 @@ impl Fields {
     pub(super) fn page(&self) -> Result<Page, StackError> {
         let gray = self.is_gray()?;
         let compression = self.compression(gray)?;
+        // Programs disagree on images without this tag: libtiff's zero is white, GDAL's black.
         let white_is_zero = match self.number(PHOTOMETRIC)? {
             WHITE_IS_ZERO => true,
             BLACK_IS_ZERO => false,
@@ -132,6 +160,7 @@ impl Fields {
             let (layer, fault) = (info.index, CheckFault::Directory);
             return Err(StackError::Check { layer, fault });
         }
+        self.check_pixels()?;
         Ok(Page {
             number: self.page,
             limits: self.limits,
@@ -143,7 +172,7 @@ impl Fields {
             white_is_zero,
             orientation,
             compression,
-            differences: self.has_differences(gray, compression)?,
+            differences: self.has_differences(compression)?,
             layout: self.layout(width, height)?,
             pieces: Vec::new(),
             data_bytes: 0,
@@ -193,17 +222,14 @@ impl Fields {
         })
     }
 
-    /// Returns whether bytes are stored as differences from the byte before. The tag applies
+    /// Returns whether pixels are stored as differences from the pixel before. The tag applies
     /// only to LZW and Deflate.
-    fn has_differences(&self, gray: bool, compression: Compression) -> Result<bool, StackError> {
+    fn has_differences(&self, compression: Compression) -> Result<bool, StackError> {
         match self.number_or(PREDICTOR, 1)? {
             1 => Ok(false),
             _ if !matches!(compression, Compression::Lzw | Compression::Deflate) => Ok(false),
-            2 if gray => Ok(true),
-            predictor => {
-                let bits = if gray { 8 } else { 1 };
-                Err(self.unsupported(UnsupportedFeature::Predictor { predictor, bits }))
-            }
+            2 => Ok(true),
+            predictor => Err(self.unsupported(UnsupportedFeature::Predictor(predictor))),
         }
     }
 
@@ -212,20 +238,30 @@ impl Fields {
             let tile = (self.side(TILE_WIDTH)?, self.side(TILE_LENGTH)?);
             return Ok(Layout::tiles(width, height, tile));
         }
-        let rows = self.number_or(ROWS_PER_STRIP, u64::from(height))?;
-        Ok(Layout::strips(width, height, rows.clamp(1, u64::from(height)) as u32))
+        // Zero rows stand for all of them, as 2^32 - 1 does.
+        let rows = match self.number_or(ROWS_PER_STRIP, 0)? {
+            0 => height,
+            rows => rows.min(height.into()) as u32,
+        };
+        Ok(Layout::strips(width, height, rows))
     }
 
-    /// Returns the offset and length in bytes of each strip or tile.
+    /// Returns the offset and length in bytes of each strip or tile. The length is 0 where the
+    /// directory does not state it.
     pub(super) fn places(&self, layout: &Layout) -> Result<Vec<(u64, u64)>, StackError> {
-        let (pieces, offsets, counts) = if layout.tiled {
-            ("tiles", TILE_OFFSETS, TILE_BYTE_COUNTS)
-        } else {
-            ("strips", STRIP_OFFSETS, STRIP_BYTE_COUNTS)
+        // Some writers list tiles under the tags of strips, which libtiff reads as one.
+        let tags = match layout.tiled && self.values.contains_key(&TILE_OFFSETS) {
+            true => (TILE_OFFSETS, TILE_BYTE_COUNTS),
+            false => (STRIP_OFFSETS, STRIP_BYTE_COUNTS),
         };
-        let (offsets, counts) = (self.numbers(offsets)?, self.numbers(counts)?);
+        let offsets = self.numbers(tags.0)?;
+        let counts = match self.values.contains_key(&tags.1) {
+            true => self.numbers(tags.1)?,
+            false => vec![0; offsets.len()],
+        };
         let wanted = layout.count();
         if offsets.len() as u64 != wanted || counts.len() as u64 != wanted {
+            let pieces = if layout.tiled { "tiles" } else { "strips" };
             let found = offsets.len();
             return Err(malformed(self.page, PageFault::PieceCount { pieces, found, wanted }));
         }

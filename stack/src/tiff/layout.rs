@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use crate::error::PageFault;
+use crate::limits::Limits;
+
 /// The division of a page into strips or tiles, in row order. A strip has the page's width.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
@@ -28,6 +31,27 @@ impl Layout {
     /// Returns the number of pieces.
     pub(super) fn count(&self) -> u64 {
         self.across as u64 * u64::from(self.page_height.div_ceil(self.rows))
+    }
+
+    /// Returns the number of bytes of piece `i` without compression.
+    pub(super) fn plain_bytes(&self, i: usize, gray: bool) -> u64 {
+        let row = if gray { self.width } else { self.width.div_ceil(8) };
+        let top = (i / self.across) as u64 * u64::from(self.rows);
+        let rows = match self.tiled {
+            true => self.rows.into(),
+            false => u64::from(self.rows).min(u64::from(self.page_height).saturating_sub(top)),
+        };
+        rows * u64::from(row)
+    }
+
+    /// Refuses pieces without data if their rows would cost much memory or time.
+    pub(super) fn check_unwritten(&self, pieces: usize, limits: &Limits) -> Result<(), PageFault> {
+        let rows = pieces as u64 * u64::from(self.rows.min(self.page_height));
+        let is_high = self.page_height > limits.rows_from_columns;
+        if pieces > 0 && (is_high || rows > limits.side.into()) {
+            return Err(PageFault::Unwritten(rows));
+        }
+        Ok(())
     }
 
     /// Returns an upper bound of the pieces' bytes in any coding: less than two per pixel, and

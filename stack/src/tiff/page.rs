@@ -62,10 +62,10 @@ pub struct Page {
     /// The orientation that turns the image upright.
     pub(super) orientation: Orientation,
     pub(super) compression: Compression,
-    /// True if gray levels are stored as differences from the left neighbour.
+    /// True if pixels are stored as differences from the left neighbour.
     pub(super) differences: bool,
     pub(super) layout: Layout,
-    /// The strips or tiles, row by row.
+    /// The strips or tiles, row by row. One without bytes has pixels of zero.
     pub(super) pieces: Vec<Vec<u8>>,
     /// The number of bytes of all strips or tiles.
     pub(super) data_bytes: u64,
@@ -386,7 +386,7 @@ impl Page {
 
     /// Returns the compression of the strip, if a page that this crate writes may hold it.
     fn strip_compression(&self) -> Option<Compression> {
-        let is_ours = self.pieces.len() == 1
+        let is_ours = matches!(&*self.pieces, [strip] if !strip.is_empty())
             && !self.layout.tiled
             // Its codes would mean the image inverted.
             && !self.white_is_zero
@@ -413,6 +413,10 @@ impl Page {
         mask: &mut Mask,
     ) -> Result<(), StackError> {
         let (width, height) = (self.layout.width, rows.end - rows.start);
+        if piece.is_empty() {
+            mask.push_black_rows(height);
+            return Ok(());
+        }
         let max_runs = self.limits.runs;
         let group3 =
             |kind, mask: &mut _| g4::decode_group3_rows(kind, piece, width, height, max_runs, mask);
@@ -423,7 +427,11 @@ impl Page {
             Compression::G4 => g4::decode_rows(piece, width, height, max_runs, mask),
             _ => {
                 return self.unpack(piece, width.div_ceil(8), height, |row| {
-                    mask.push(&bit_transitions(row, width));
+                    if self.differences {
+                        mask.push(&set_bits(row, width));
+                    } else {
+                        mask.push(&bit_transitions(row, width));
+                    }
                     mask.change_count() <= max_runs
                 });
             }
@@ -437,6 +445,13 @@ impl Page {
     /// Decodes `height` rows of an 8-bit strip or tile.
     fn gray_rows(&self, piece: &[u8], height: u32, gray: &mut GrayMask) -> Result<(), StackError> {
         let flip = if self.white_is_zero { 0xFF } else { 0 };
+        if piece.is_empty() {
+            for _ in 0..height {
+                gray.push_runs([(self.layout.width, flip)])
+                    .expect("the run is as long as the width");
+            }
+            return Ok(());
+        }
         self.unpack(piece, self.layout.width, height, |row| {
             let levels = row.iter().map(|&(length, byte)| (length, byte ^ flip));
             gray.push_runs(levels).expect("rows are cut to the width");
@@ -453,7 +468,8 @@ impl Page {
         each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
         let name = if self.layout.tiled { "tile" } else { "strip" };
-        let shape = PieceShape { row_bytes, rows, differences: self.differences };
+        let differences = self.differences && self.gray;
+        let shape = PieceShape { row_bytes, rows, differences };
         unpack(self.compression, piece, &shape, each).map_err(|fault| match fault {
             UnpackError::TooShort => malformed(self.number, PageFault::TooShort(name)),
             UnpackError::Damaged => malformed(self.number, PageFault::Damaged(name)),
@@ -468,6 +484,23 @@ impl Page {
     fn too_many_runs(&self) -> StackError {
         malformed(self.number, PageFault::TooManyRuns)
     }
+}
+
+/// Returns the columns of the set bits in a row, given as runs of bytes: the transitions of a row
+/// whose bits are stored as differences.
+fn set_bits(row: &[(u32, u8)], width: u32) -> Vec<u32> {
+    let mut columns = Vec::new();
+    let mut column = 0;
+    for &(length, byte) in row {
+        if byte != 0 {
+            let starts = (column..).step_by(8).take(length as usize);
+            let set = (0..8).filter(|bit| byte << bit & 0x80 != 0);
+            columns.extend(starts.flat_map(|start| set.clone().map(move |bit| start + bit)));
+        }
+        column += 8 * length;
+    }
+    columns.truncate(columns.partition_point(|&column| column < width));
+    columns
 }
 
 /// Returns the transitions of a row of bits, given as runs of bytes.

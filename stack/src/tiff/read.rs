@@ -7,11 +7,15 @@ use std::io::{BufReader, Read};
 use super::fields::{Fields, KNOWN, malformed, number};
 use super::page::{Compression, Page};
 use super::source::Source;
-use super::tags::{FILL_ORDER, type_size};
+use super::tags::{
+    BYTE, FILL_ORDER, LONG, MASK, NEW_SUBFILE_TYPE, OLD_REDUCED, REDUCED, SHORT, SUB_IFDS,
+    SUBFILE_TYPE, type_size,
+};
 use super::write::{Format, Notice};
 use crate::error::{PageFault, StackError};
 use crate::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
+use crate::note::ImagesBeside;
 use crate::packed::{self, Unpacker};
 use crate::picture_page::{self, PictureFormat};
 use crate::png_page;
@@ -32,6 +36,10 @@ pub struct PageReader {
     next: u64,
     number: u32,
     last_whole: Option<u32>,
+    /// The images passed over.
+    beside: ImagesBeside,
+    /// Whether a layer was read.
+    has_layer: bool,
     /// The offsets of the directories read, to detect a loop of links.
     seen: HashSet<u64>,
 }
@@ -128,6 +136,8 @@ impl PageReader {
             next,
             number: 0,
             last_whole: None,
+            beside: ImagesBeside::default(),
+            has_layer: false,
             seen: HashSet::new(),
         })
     }
@@ -176,9 +186,9 @@ impl PageReader {
         self.last_whole = last_whole;
     }
 
-    /// Returns whether no page follows.
-    pub(crate) fn is_at_end(&self) -> bool {
-        self.next == 0
+    /// Returns the images passed over, which are no layers.
+    pub(crate) fn beside(&self) -> &ImagesBeside {
+        &self.beside
     }
 
     /// Returns the format of a TIFF, or of the one that was packed.
@@ -198,7 +208,11 @@ impl PageReader {
                     None => return Ok(None),
                 }
             }
-            FileKind::Tiff => self.read_tiff_page()?,
+            FileKind::Tiff => match self.read_tiff_page()? {
+                Some(page) => page,
+                None if self.has_layer => return Ok(None),
+                None => return Err(StackError::NoLayerImage(self.beside)),
+            },
             FileKind::Png => (self.read_png()?, 0),
             FileKind::Picture { format, start } => {
                 let (format, start) = (*format, start.clone());
@@ -208,20 +222,49 @@ impl PageReader {
         self.next = next;
         self.number += 1;
         self.last_whole = Some(page.info.index);
+        self.has_layer = true;
         Ok(Some(page))
     }
 
-    /// Reads the next page and the link after it.
-    fn read_tiff_page(&mut self) -> Result<(Page, u64), StackError> {
-        if !self.seen.insert(self.next) {
-            return Err(malformed(self.number, PageFault::Loop));
+    /// Reads the next page that is a layer and the link after it.
+    fn read_tiff_page(&mut self) -> Result<Option<(Page, u64)>, StackError> {
+        while self.next != 0 {
+            if !self.seen.insert(self.next) {
+                return Err(malformed(self.number, PageFault::Loop));
+            }
+            let (entries, next) = self.read_directory()?;
+            if self.is_beside(&entries) {
+                self.next = next;
+                continue;
+            }
+            let fields = self.read_values(&entries)?;
+            if let Some(reason) = fields.description().and_then(given_up) {
+                return Err(StackError::GivenUp { reason });
+            }
+            return Ok(Some((self.read_pieces(&fields, next)?, next)));
         }
-        let (entries, next) = self.read_directory()?;
-        let fields = self.read_values(&entries)?;
-        if let Some(reason) = fields.description().and_then(given_up) {
-            return Err(StackError::GivenUp { reason });
+        Ok(None)
+    }
+
+    /// Counts the images that are no layers: that of a directory, or those below it.
+    fn is_beside(&mut self, entries: &[Entry]) -> bool {
+        let value = |tag| {
+            let entry = entries.iter().find(|entry| entry.tag == tag)?;
+            let is_number = matches!(entry.kind, BYTE | SHORT | LONG) && entry.count == 1;
+            let value = entry.value.get(..type_size(entry.kind) as usize)?;
+            is_number.then(|| number(value, self.little_endian))
+        };
+        let kind = value(NEW_SUBFILE_TYPE).unwrap_or(0);
+        let is_mask = kind & MASK != 0;
+        let is_reduced = kind & REDUCED != 0 || value(SUBFILE_TYPE) == Some(OLD_REDUCED);
+        if is_mask {
+            self.beside.masks += 1;
+        } else if is_reduced {
+            self.beside.reduced += 1;
+        } else if let Some(below) = entries.iter().find(|entry| entry.tag == SUB_IFDS) {
+            self.beside.sub_images = self.beside.sub_images.saturating_add(below.count);
         }
-        Ok((self.read_pieces(&fields)?, next))
+        is_mask || is_reduced
     }
 
     /// Reads exactly `length` bytes at `offset`.
@@ -290,18 +333,26 @@ impl PageReader {
         Ok(fields)
     }
 
-    fn read_pieces(&mut self, fields: &Fields) -> Result<Page, StackError> {
+    fn read_pieces(&mut self, fields: &Fields, next: u64) -> Result<Page, StackError> {
         let mut page = fields.page()?;
-        let mut places: Vec<_> = fields.places(&page.layout)?.into_iter().enumerate().collect();
-        let bytes = places.iter().fold(0u64, |sum, (_, (_, length))| sum.saturating_add(*length));
+        let mut places = fields.places(&page.layout)?;
+        self.find_lengths(&mut places, &page, next)?;
+        let bytes = places.iter().fold(0u64, |sum, (_, length)| sum.saturating_add(*length));
         if bytes > page.layout.most_bytes() {
             return Err(malformed(self.number, PageFault::PieceBytes(bytes)));
         }
         page.data_bytes = bytes;
+        let count = places.len();
+        page.layout
+            .check_unwritten(places.iter().filter(|place| **place == (0, 0)).count(), &self.limits)
+            .map_err(|fault| malformed(self.number, fault))?;
+        // A piece without a place was not written: its pixels are zero.
+        let places = places.into_iter().enumerate().filter(|(_, place)| *place != (0, 0));
+        let mut places: Vec<_> = places.collect();
         if !self.images {
             return self.skip_pieces(&places).map(|()| page);
         }
-        page.pieces = vec![Vec::new(); places.len()];
+        page.pieces = vec![Vec::new(); count];
         // Offsets in increasing order can be read from a stream.
         places.sort_by_key(|(_, (offset, _))| *offset);
         let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
@@ -319,6 +370,43 @@ impl PageReader {
             page.pieces[i] = piece;
         }
         Ok(page)
+    }
+
+    /// Finds the lengths that a directory does not state: of plain pixels by their number, of others
+    /// up to what comes next in the file.
+    fn find_lengths(
+        &self,
+        places: &mut [(u64, u64)],
+        page: &Page,
+        next: u64,
+    ) -> Result<(), StackError> {
+        if places.iter().all(|&(offset, length)| length > 0 || offset == 0) {
+            return Ok(());
+        }
+        let mut starts: Vec<u64> = places.iter().map(|(offset, _)| *offset).collect();
+        starts.extend([self.next, next]);
+        if page.compression() != Compression::Uncompressed {
+            let end = self.source.length()?;
+            starts.push(end.ok_or(StackError::NotForward { page: self.number })?);
+        }
+        starts.sort_unstable();
+        let stated = places.iter().fold(0u64, |sum, (_, length)| sum.saturating_add(*length));
+        let mut most = page.layout.most_bytes().saturating_sub(stated);
+        for (i, (offset, length)) in places.iter_mut().enumerate() {
+            if *length > 0 || *offset == 0 {
+                continue;
+            }
+            *length = match page.compression() {
+                Compression::Uncompressed => page.layout.plain_bytes(i, page.is_gray()),
+                _ => {
+                    let end = starts.get(starts.partition_point(|start| *start <= *offset));
+                    end.ok_or(StackError::CutOff { last_whole: self.last_whole })? - *offset
+                }
+            };
+            *length = (*length).min(most);
+            most -= *length;
+        }
+        Ok(())
     }
 
     /// Passes over strips or tiles, in the order of their offsets. They must be there.

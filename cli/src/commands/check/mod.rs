@@ -29,6 +29,7 @@ use crate::part_options::at_part;
 use crate::progress::{Progress, printable};
 use crate::sliced_part::{SlicedPart, check_slicing};
 use crate::slicing_options::SlicingOptions;
+use crate::stack_notes::doubts;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 
 pub(crate) use lines::FindingLine;
@@ -113,7 +114,7 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     force: bool,
 
-    /// End with status 3 if there are findings
+    /// End with status 3 if there are findings, or if pages of a folder may be missing
     #[arg(long)]
     strict: bool,
 
@@ -174,13 +175,12 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         write_pictures(&mut checked, args, common, folder)?;
     }
     let found: usize = checked.iter().map(CheckedInput::found).sum();
-    if args.strict && found > 0 {
-        return Err(Exit::Findings(match found {
-            1 => "1 finding".to_owned(),
-            found => format!("{found} findings"),
-        }));
-    }
-    Ok(())
+    let found = match found {
+        0 => doubts(),
+        1 => Some("1 finding".to_owned()),
+        found => Some(format!("{found} findings")),
+    };
+    found.filter(|_| args.strict).map_or(Ok(()), |found| Err(Exit::Findings(found)))
 }
 
 /// Finds what `lamp check` finds with its usual options, and what it says of each. The blade is

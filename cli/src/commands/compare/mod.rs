@@ -15,7 +15,7 @@ use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::{Common, parse_distance};
 use crate::progress::Progress;
-use crate::streams::{check_beside, failed_at, input_name, is_stream, print, spool_stdin};
+use crate::streams::{check_beside, failed_at, input_name, is_stream, open_indexed, print};
 
 use picture::write_picture;
 use report::{Comparison, answer, text};
@@ -155,13 +155,8 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
 
 /// Opens a whole stack, of which any page can be read.
 fn opened(path: &Path) -> Result<IndexedStack, Exit> {
-    let stack = if is_stream(path) {
-        IndexedStack::from_file(spool_stdin()?)
-    } else {
-        IndexedStack::open(path)
-    };
-    let stack = stack.and_then(IndexedStack::into_whole);
-    stack.map_err(|error| failed_at(input_name(path), error))
+    let whole = open_indexed(path)?.into_whole();
+    whole.map_err(|error| failed_at(input_name(path), error))
 }
 
 #[cfg(test)]

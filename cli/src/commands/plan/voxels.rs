@@ -18,6 +18,7 @@ use crate::options::{Common, Input, Output, one_of_described, parse_memory};
 use crate::planning_options::PlanningOptions;
 use crate::plots;
 use crate::progress::Progress;
+use crate::stack_notes::doubts;
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
@@ -88,7 +89,8 @@ pub(super) struct VoxelsArgs {
     #[command(flatten)]
     map: MapOptions,
 
-    /// Fail (status 3) and write no stack if white light cannot cure all wanted voxels
+    /// Fail (status 3) and write no stack if white light cannot cure all wanted voxels, or if pages of
+    /// a folder may be missing
     #[arg(long)]
     strict: bool,
 
@@ -280,12 +282,14 @@ impl VoxelsArgs {
         let layers = planned.by_ref().map(|layer| layer.map_err(Exit::from));
         let layers = layers.inspect(|layer| layer.iter().for_each(|layer| map.after(layer)));
         let finding = || {
-            let uncurable = outcome.uncurable();
-            let found = self.strict && uncurable > 0;
-            found.then(|| {
-                let name = input_name(&self.input.stack);
-                Exit::Findings(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
-            })
+            let found = match outcome.uncurable() {
+                0 => doubts(),
+                uncurable => {
+                    let name = input_name(&self.input.stack);
+                    Some(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
+                }
+            };
+            found.filter(|_| self.strict).map(Exit::Findings)
         };
         write_layers(unless_found(layers, finding), &self.output, progress)
     }

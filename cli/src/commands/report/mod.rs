@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_postprocess::machine::Machine;
-use lamp_stack::{IndexedStack, stacks_in};
+use lamp_stack::stacks_in;
 use serde_json::json;
 
 use crate::catalogue::entry;
@@ -24,7 +24,7 @@ use crate::json_report::print_answer;
 use crate::options::Common;
 use crate::progress::Progress;
 use crate::streams::{
-    check_beside, failed_at, input_name, is_folder, is_stream, new_folder, print, spool_stdin,
+    check_beside, failed_at, input_name, is_folder, is_stream, new_folder, open_indexed, print,
     write_file,
 };
 
@@ -97,12 +97,7 @@ impl Work<'_> {
     /// Reports on a stack.
     fn report(&self, path: &Path) -> Result<StackReport, Exit> {
         let progress = Progress::new("report", self.common, true);
-        let stack = if is_stream(path) {
-            IndexedStack::from_file(spool_stdin()?)
-        } else {
-            IndexedStack::open(path)
-        };
-        let stack = stack.and_then(IndexedStack::into_whole);
+        let stack = open_indexed(path)?.into_whole();
         let stack = stack.map_err(|error| failed_at(shown_name(path), error))?;
         let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
         progress.done();

@@ -27,6 +27,7 @@ use crate::options::{Common, Output, parse_distance, parse_thickness};
 use crate::part_arg::{PartArg, paths};
 use crate::part_options::name_of_all;
 use crate::progress::Progress;
+use crate::stack_notes::doubts;
 use crate::stack_part::RecordedSlicing;
 use crate::stages::Layers;
 use crate::streams::{
@@ -79,8 +80,8 @@ pub(crate) struct SupportArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Give up with status 3 if islands are left: no stack is written, and the next stage of a pipe
-    /// fails, too
+    /// Give up with status 3 if islands are left, or if pages of a folder may be missing: no stack
+    /// is written, and the next stage of a pipe fails, too
     #[arg(long)]
     strict: bool,
 
@@ -180,6 +181,9 @@ impl SupportArgs {
                 return Err(Exit::Findings(left));
             }
             progress.warn(&left);
+        }
+        if let Some(doubts) = doubts().filter(|_| self.strict) {
+            return Err(Exit::Findings(doubts));
         }
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
         Ok(match supports(&plans).next() {

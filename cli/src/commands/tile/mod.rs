@@ -29,6 +29,7 @@ use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::progress::Progress;
+use crate::stack_notes::doubts;
 use crate::stages::Layers;
 use crate::streams::{progress, unless_found, write_file};
 
@@ -156,8 +157,8 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     resample: bool,
 
-    /// Give up with status 3 if a part's pages list stray rows, or not all copies fit: no build is
-    /// written
+    /// Give up with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
+    /// folder may be missing: no build is written
     #[arg(long)]
     strict: bool,
 
@@ -201,7 +202,10 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;
     let Build { layers, layout, stray_rows, no_mesh, recipe, totals } = built;
-    let finding = || stray_rows.borrow().text().filter(|_| args.strict).map(Exit::Findings);
+    let finding = || {
+        let found = stray_rows.borrow().text().or_else(doubts);
+        found.filter(|_| args.strict).map(Exit::Findings)
+    };
     strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
     if let Some(text) = stray_rows.borrow().text() {
         progress.warn(&text);

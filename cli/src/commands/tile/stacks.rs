@@ -11,6 +11,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, PageInfo, Pages, StackError};
 
 use crate::exit::Exit;
+use crate::stack_notes::noting;
 use crate::streams::{
     failed_at, input_name, is_stream, layers_of, open_pages, piped_part, spool_stdin,
 };
@@ -185,7 +186,8 @@ impl InputStack {
                     spool.try_clone()
                 };
                 let file = again(spool).with_context(|| self.name.clone())?;
-                Pages::from_file(file).map_err(|error| failed_at(self.name.clone(), error))?
+                let pages = Pages::from_file(file);
+                noting(pages.map_err(|error| failed_at(self.name.clone(), error))?, &self.path)
             }
             None => open_pages(&self.path)?,
         };
