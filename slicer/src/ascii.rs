@@ -256,8 +256,9 @@ impl<R: Read> AsciiReader<R> {
 
     /// Passes over a statement between facets that STL does not have.
     fn other_statement(&mut self) -> Result<(), SliceError> {
-        if let Some(bytes) = self.words.padding()? {
-            self.notes.push(ReadNote::BytesAfter { bytes });
+        if self.words.begins_padding() {
+            let bytes = self.words.padding()?.ok_or_else(|| self.failed(AsciiFault::Zeros));
+            self.notes.push(ReadNote::BytesAfter { bytes: bytes? });
             return Ok(());
         }
         let word = self.words.word();

@@ -314,6 +314,9 @@ pub enum ObjFault {
     /// A face that is no face of a part.
     #[error("is a face with more corners than 500000")]
     ManyCorners,
+    /// Bytes of zero before further words.
+    #[error("holds bytes of zero, so the file is damaged")]
+    Zeros,
     /// Numbers with commas.
     #[error("has commas in its numbers, which may be decimal points or stand between thousands")]
     Comma,
@@ -337,6 +340,9 @@ pub enum AsciiFault {
         /// The words that should be there.
         expected: &'static str,
     },
+    /// Bytes of zero before further words.
+    #[error("bytes of zero stand before it: the file is damaged")]
+    Zeros,
     /// Numbers with commas.
     #[error("commas in its numbers may be decimal points or stand between thousands")]
     Comma,

@@ -158,7 +158,8 @@ impl<R: Read> ObjReader<R> {
 
     /// Passes over a line of another kind.
     fn other_line(&mut self) -> io::Result<Result<(), ObjFault>> {
-        if let Some(bytes) = self.words.padding()? {
+        if self.words.begins_padding() {
+            let Some(bytes) = self.words.padding()? else { return Ok(Err(ObjFault::Zeros)) };
             self.notes.push(ReadNote::BytesAfter { bytes });
             return Ok(Ok(()));
         }
@@ -191,9 +192,7 @@ impl ObjMesh {
         if self.face.len() == MAX_CORNERS {
             return Err(ObjFault::ManyCorners);
         }
-        let vertex = corner.split(|&byte| byte == b'/').next().unwrap_or_default();
-        let number = str::from_utf8(vertex).ok().and_then(|text| text.parse().ok());
-        let number: i64 = number.ok_or(ObjFault::Number)?;
+        let number = vertex_number(corner).ok_or(ObjFault::Number)?;
         self.face.push(self.vertex(number).ok_or(ObjFault::NoVertex(number))?);
         Ok(())
     }
@@ -215,6 +214,21 @@ impl ObjMesh {
         };
         u32::try_from(index).ok().filter(|_| index < count)
     }
+}
+
+/// Returns the number before the first `/`. Most are digits alone, for which text need not be
+/// checked.
+#[inline]
+fn vertex_number(corner: &[u8]) -> Option<i64> {
+    let digits = corner.iter().take_while(|byte| byte.is_ascii_digit());
+    let (length, number) = digits.fold((0, 0), |(length, number): (usize, i64), digit| {
+        (length + 1, number.wrapping_mul(10).wrapping_add(i64::from(digit - b'0')))
+    });
+    if (1..=18).contains(&length) && matches!(corner.get(length), None | Some(b'/')) {
+        return Some(number);
+    }
+    let vertex = corner.split(|&byte| byte == b'/').next()?;
+    str::from_utf8(vertex).ok()?.parse().ok()
 }
 
 #[cfg(test)]
@@ -311,6 +325,7 @@ f 2 3 4
             ("f -9 1 2", "no vertex -9"),
             ("f 1 -9223372036854775808 2", "no vertex -9223372036854775808"),
             ("f 1 2 a", "three numbers"),
+            ("\0\0 v 1 2 3", "bytes of zero"),
             ("surf 0 1 0 1 1 2 3 4", "free-form"),
         ] {
             let message = read_text(&format!("{TETRA}\n{line}\n")).unwrap_err();

@@ -106,15 +106,16 @@ impl<R: Read> Words<R> {
         Ok(())
     }
 
-    /// If this word and all behind it are zeros or Ctrl-Z, with which some programs fill up files,
-    /// moves behind them and returns their number.
+    /// Returns true if the word begins with a zero or a Ctrl-Z, with which some programs fill up
+    /// files.
+    pub(crate) fn begins_padding(&self) -> bool {
+        matches!(self.word(), [0 | 0x1A, ..])
+    }
+
+    /// Moves behind all such bytes and returns their number, or none if words follow.
     pub(crate) fn padding(&mut self) -> io::Result<Option<u64>> {
-        let is_padding = |word: &[u8]| word.iter().all(|byte| matches!(byte, 0 | 0x1A));
-        if !is_padding(self.word()) {
-            return Ok(None);
-        }
         let mut bytes = 0;
-        while is_padding(self.word()) {
+        while self.word().iter().all(|byte| matches!(byte, 0 | 0x1A)) {
             bytes += self.word().len() as u64;
             if !self.advance()? {
                 return Ok(Some(bytes));

@@ -48,8 +48,12 @@ impl<R: Read> Read for PlainText<R> {
             let (whole, rest) = pairs[..held + read].as_chunks::<2>();
             self.half = rest.first().copied().filter(|_| read > 0);
             for (to, pair) in to.iter_mut().zip(whole) {
-                let is_ascii = pair[1 - ascii_byte] == 0 && pair[ascii_byte].is_ascii();
-                *to = if is_ascii { pair[ascii_byte] } else { b'?' };
+                *to = match [pair[1 - ascii_byte], pair[ascii_byte]] {
+                    [0, byte] if byte.is_ascii() => byte,
+                    // Programs that join texts leave marks within them.
+                    [0xFE, 0xFF] => b' ',
+                    _ => b'?',
+                };
             }
             if read == 0 || !whole.is_empty() || to.is_empty() {
                 return Ok(whole.len());

@@ -181,7 +181,6 @@ fn files_that_are_no_parts_are_named() {
             "lamp check part.stl",
             "lamp info part.stl",
             "fix part.stl -o x.tif",
-            "lamp verify part.stl",
             "lamp view part.stl",
         ] {
             let ran = scratch.run(command);

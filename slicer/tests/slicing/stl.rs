@@ -282,7 +282,7 @@ fn text_comes_in_many_styles() {
 #[test]
 fn text_may_be_in_two_bytes_a_character() {
     let mesh = cube(0.0, 3.0);
-    for mark in ["", "\u{feff}"] {
+    for mark in ["", "\u{feff}", "\u{feff}\u{feff}"] {
         let units: Vec<u16> = format!("{mark}{}", text(&mesh)).encode_utf16().collect();
         let bytes = |of: fn(u16) -> [u8; 2]| units.iter().flat_map(|&u| of(u)).collect::<Vec<u8>>();
         assert!(reads_as(&bytes(u16::to_le_bytes), &mesh));
