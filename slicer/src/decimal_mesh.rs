@@ -31,8 +31,8 @@ impl DecimalMesh {
         self.facets.push(corners);
     }
 
-    /// Returns a piece of the facets in 32 bits. Those of a mesh far from the origin are relative
-    /// to its corner, since what 32 bits cut off grows with the distance.
+    /// Returns a piece of the facets in 32 bits. A mesh far from the origin is measured from its
+    /// own corner, since rounding to 32 bits errs in proportion to the distance.
     pub(crate) fn into_piece(self) -> Piece {
         let offset = self.offset();
         let rounded = |number: u32| {

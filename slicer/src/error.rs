@@ -157,6 +157,11 @@ pub enum SliceError {
         /// How many facets the part has.
         facets: usize,
     },
+    /// A part with volumes that are cut out of others, where its surface is asked for.
+    #[error(
+        "the project has negative volumes, which are cut out of layers only: cut them out of its solids and export one mesh"
+    )]
+    NegativeVolumes,
     /// A mesh of facets that a repair drops.
     #[error(
         "a repair would drop all of its last {facets} facets: none has an area, or they cancel each other out"

@@ -48,8 +48,8 @@ pub(crate) struct Piece {
     pub(crate) first_facet: usize,
     /// The unit that the file states, if it does.
     pub(crate) units: Option<Units>,
-    /// The point, in units of the file, that its facets are relative to: the origin, but for
-    /// facets so far from it that 32 bits cannot tell their corners apart.
+    /// The point, in units of the file, that its facets are relative to. It is the origin, except
+    /// where a mesh is so far away that 32 bits would move its corners.
     pub(crate) offset: [f64; 3],
     /// How it stands among the other pieces.
     pub(crate) placement: Placement,
@@ -328,6 +328,14 @@ impl Part {
             }
         }
         Ok(())
+    }
+
+    /// Refuses a part whose facets are not its surface, because negative volumes cut into it.
+    pub(crate) fn refuse_negatives(&self) -> Result<(), SliceError> {
+        match self.pieces.iter().any(|piece| piece.role == Role::Negative) {
+            true => Err(SliceError::NegativeVolumes),
+            false => Ok(()),
+        }
     }
 
     /// Returns the reason for an error: a file that changed, if reading it failed.

@@ -35,8 +35,8 @@ pub(crate) use package::looks_packaged;
 const MAX_DEPTH: usize = 32;
 /// Objects that are visited in all.
 const MAX_VISITS: usize = 1 << 14;
-/// A mesh whose volume differs from that of its slices by a larger share is a stand-in: often it is
-/// their bounding box. Slices are as coarse as their layers.
+/// A mesh whose volume differs by a larger share from its slices' is a stand-in, often their
+/// bounding box. Slices are coarse: each has the height of a layer.
 const SAME_VOLUME: f64 = 0.05;
 
 /// Why a 3MF file cannot be read.
@@ -89,7 +89,7 @@ pub enum ThreeMfError {
         /// The fault of its slices.
         fault: &'static str,
     },
-    /// A model that only those who have its key can read.
+    /// A model that cannot be read without its key.
     #[error(
         "its {0} is encrypted, and encrypted models are not read: export it without protection"
     )]
@@ -168,11 +168,9 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     let mut package = Package::open(file)?;
     let (root, encrypted) = package.model_path()?;
     let mut project = Project::default();
-    for name in PROJECT_FILES {
-        if let Some(name) = package.find(name, "").map(str::to_owned) {
-            let outcome = package.read(&name, |text| project.read(text))?;
-            outcome.map_err(|(at, fault)| ThreeMfError::Model { model: name, at, fault })?;
-        }
+    for name in package.ending(&PROJECT_FILES) {
+        let outcome = package.read(&name, |text| project.read(text))?;
+        outcome.map_err(|(at, fault)| ThreeMfError::Model { model: name, at, fault })?;
     }
     let mut models = Models {
         package,
@@ -205,7 +203,7 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     Ok(Contents { pieces: found.pieces, notes })
 }
 
-/// What was found of the items.
+/// The pieces of the items that were read so far.
 #[derive(Default)]
 struct Found {
     pieces: Vec<Piece>,
@@ -228,7 +226,7 @@ impl Found {
     }
 }
 
-/// What items hold and is not built.
+/// Counts of the content that is not built.
 #[derive(Default)]
 struct LeftOut {
     no_solids: usize,
@@ -236,7 +234,7 @@ struct LeftOut {
     lone_negatives: usize,
     /// The volumes by their kind.
     volumes: BTreeMap<String, usize>,
-    /// Objects of which the slices are left out, and those of which the mesh is.
+    /// Objects whose slices are left out, and objects whose mesh is.
     slices: BTreeSet<(String, u32)>,
     stand_ins: BTreeSet<(String, u32)>,
     extensions: BTreeSet<String>,
@@ -278,7 +276,7 @@ struct Models<'a> {
     encrypted: Vec<String>,
     project: Project,
     models: BTreeMap<String, Model>,
-    /// What stands for objects that have slices: those, unless it is their mesh.
+    /// The solids of objects that have slices; none where the mesh is read.
     sliced: BTreeMap<(String, u32), Option<Piece>>,
     /// How many facets they have so far.
     facets: usize,
@@ -440,7 +438,7 @@ impl Models<'_> {
         Ok(piece)
     }
 
-    /// Returns the slices of a stack and of those that it names, or why there are none.
+    /// Returns the slices of a stack and of the stacks that it names, or the fault of these.
     fn prisms(
         &mut self,
         path: &str,

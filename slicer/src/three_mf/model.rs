@@ -18,7 +18,7 @@ use crate::facet::Units;
 use crate::part::{Facets, Piece};
 use crate::placement::Placement;
 
-/// What an extension of 3MF does to what is built.
+/// The effect of an extension of 3MF on the objects that use it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Effect {
     /// It leaves meshes as they are, or adds objects that are read.
@@ -29,7 +29,7 @@ enum Effect {
     Shape(&'static str),
 }
 
-/// Words of the namespaces of extensions, whose years differ, and what these do.
+/// Words of the namespaces of extensions, whose years differ, and the effects of these.
 const EXTENSIONS: [(&str, Effect); 12] = [
     ("/3dmanufacturing/production/alternatives/", Effect::None),
     ("/3dmanufacturing/production/", Effect::None),
@@ -64,14 +64,14 @@ pub(super) struct Model {
 pub(super) struct Object {
     /// Whether it is part of what is built, not a support, a surface or anything else.
     pub(super) is_solid: bool,
-    /// What a setting of its project makes of it.
+    /// Its kind by the settings of its project.
     pub(super) kind: VolumeKind,
     pub(super) shape: Shape,
     /// The stack of its slices, if it has some.
     pub(super) slices: Option<u32>,
     /// Whether its shape stands for a finer one that is elsewhere.
     pub(super) is_stand_in: bool,
-    /// What makes another shape of it and is not read.
+    /// An extension that gives it another shape and is not read.
     pub(super) unread: Option<&'static str>,
     /// Names of extensions that are not known and have elements in it.
     pub(super) unknown: BTreeSet<String>,
@@ -95,8 +95,8 @@ pub(super) struct Reference {
 }
 
 impl Model {
-    /// Reads a model whose facets are counted from `first_facet`, and the volumes of whose objects
-    /// are those of a project.
+    /// Reads a model whose facets are counted from `first_facet`. A project lists the volumes of
+    /// its objects.
     pub(super) fn read(
         text: &mut BoundedText<impl BufRead>,
         first_facet: usize,

@@ -47,6 +47,15 @@ impl<'a> Package<'a> {
         self.files.get(&plain(target)).or_else(beside).map(|(_, name)| name.as_str())
     }
 
+    /// Returns the names of files whose plain forms have one of these ends, in order.
+    pub(super) fn ending(&self, ends: &[&str]) -> Vec<String> {
+        let has_end = |plain: &str| ends.iter().any(|end| plain.ends_with(end));
+        let found = self.files.iter().filter(|(plain, _)| has_end(plain));
+        let mut names: Vec<String> = found.map(|(_, (_, name))| name.clone()).collect();
+        names.sort_unstable();
+        names
+    }
+
     /// Reads a file's text with `read`. It may be in UTF-8 or UTF-16.
     pub(super) fn read<T>(
         &mut self,
@@ -68,8 +77,7 @@ impl<'a> Package<'a> {
         Ok(outcome)
     }
 
-    /// Returns the name of the model that the package is about, and those of files that are
-    /// encrypted.
+    /// Returns the name of the model that the package is about, and the names of encrypted files.
     pub(super) fn model_path(&mut self) -> Result<(String, Vec<String>), ThreeMfError> {
         let (mut model, mut keystore) = (None, None);
         if let Some(path) = self.find(RELATIONSHIPS, "").map(str::to_owned) {

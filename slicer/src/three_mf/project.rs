@@ -13,9 +13,9 @@ use quick_xml::events::BytesStart;
 use super::ModelFault;
 use super::xml::{BoundedText, Located, Xml, attribute, for_each_piece, number};
 
-/// The files that have the kinds of volumes.
-pub(super) const PROJECT_FILES: [&str; 2] =
-    ["Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"];
+/// The ends of the names of files that list the kinds of volumes: `Slic3r_PE_model.config` of
+/// PrusaSlicer, `model_settings.config` of Bambu Studio.
+pub(super) const PROJECT_FILES: [&str; 2] = ["_model.config", "/model_settings.config"];
 
 /// Files of projects that are for printers of resin, and what they have.
 pub(super) const UNREAD_FILES: [(&str, &str); 2] = [
@@ -113,14 +113,18 @@ pub(super) struct Project {
 }
 
 impl Project {
-    /// Adds what a file of the project has.
+    /// Adds the objects of a file of the project that no other file had.
     pub(super) fn read(&mut self, text: &mut BoundedText<impl BufRead>) -> Result<(), Located> {
+        let known: Vec<u32> = self.objects.keys().copied().collect();
         let mut object = None;
         let mut is_in_volume = false;
         for_each_piece(text, |piece| {
             match piece {
                 Xml::Start(_, tag) => match tag.local_name().as_ref() {
-                    "object" => object = Some(number::<u32>(tag, "id")?),
+                    "object" => {
+                        let id = number(tag, "id")?;
+                        object = Some(id).filter(|id| !known.contains(id));
+                    }
                     "plate" => self.plates += 1,
                     name @ ("volume" | "part") => {
                         let Some(object) = object else { return Ok(()) };

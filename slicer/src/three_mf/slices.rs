@@ -26,7 +26,7 @@ struct Slice {
     polygons: Vec<Vec<u32>>,
 }
 
-/// The slices of a model, as far as they were read.
+/// Reads the slices of a model.
 #[derive(Debug, Default)]
 pub(super) struct SliceReader {
     pub(super) stacks: BTreeMap<u32, SliceStack>,

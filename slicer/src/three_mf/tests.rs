@@ -1,4 +1,4 @@
-//! What is read of packages, which are made here as programs write them.
+//! Packages as programs write them: the pieces and the notes that are read of each.
 
 use std::io::{Cursor, Write};
 
@@ -8,11 +8,14 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use crate::bodies::Role;
+use crate::facet::Units;
 use crate::open::OpenOptions;
 use crate::part::Part;
+use crate::placement::Placement;
 use crate::planes::PlaneRule;
 use crate::read_note::ReadNote;
 use crate::slices::{SliceOptions, Slices};
+use crate::topology::CornerTable;
 
 const ITEM: &str = "<item objectid=\"1\"/>\n";
 
@@ -276,7 +279,7 @@ fn negative_volumes_without_a_solid_are_left_out() {
     assert!(modifier.contains("of its 1 items none is"), "{modifier}");
 }
 
-/// The part's box is that of its solids, and so are its layers.
+/// The part's box holds its solids and no more.
 #[test]
 fn negative_volumes_do_not_make_a_part_larger() {
     let config = prusa(1, &[&of_type("ModelPart"), &of_type("NegativeVolume")]);
@@ -284,6 +287,17 @@ fn negative_volumes_do_not_make_a_part_larger() {
     let part = open(&three_mf(&xml, &[("Metadata/Slic3r_PE_model.config", &config)]));
     let slices = Slices::new(part, &SliceOptions::default()).unwrap();
     assert_eq!(slices.box_mm(), [[0.0; 3], [6.0, 5.0, 2.0]]);
+}
+
+/// Its facets are not the surface of the part.
+#[test]
+fn a_mesh_with_negative_volumes_is_refused() {
+    let kinds = ["ModelPart", "NegativeVolume"].map(of_type);
+    let part = open(&prusa_project(ITEM, &kinds.each_ref().map(String::as_str)));
+    let table = CornerTable::of_part(&part, &Placement::default(), Units::default());
+    for error in [table.err(), part.facets().err()] {
+        assert!(error.unwrap().to_string().contains("has negative volumes"));
+    }
 }
 
 #[test]
@@ -653,7 +667,7 @@ fn packages_are_read_however_they_are_packed() {
             }
         }
     }
-    // Other files that end like a package are none.
+    // A file of another kind may end like a package.
     let facets = block([0.0; 3], [1.0; 3]);
     let mut stl = Vec::new();
     facets.write_stl("part", &mut stl).unwrap();
@@ -707,4 +721,34 @@ fn meshes_far_away_keep_their_shape() {
         assert!((corner - expected).abs() < 1e-9, "{:?}", slices.box_mm());
     }
     assert_eq!(white(part), white(open(&three_mf(&model(&slab, ITEM), &[]))));
+}
+
+/// The numbers of pixels are those of rectangles: two slabs of 30 mm2 share half.
+#[test]
+fn volumes_unite_and_modifiers_have_no_pixels() {
+    let second = block([3.0, 0.0, 0.0], [9.0, 5.0, 2.0]);
+    for (mesh, kind, pixels) in [
+        (second, "ModelPart", 4_500),
+        (post(), "ParameterModifier", 3_000),
+        (post(), "SupportBlocker", 3_000),
+    ] {
+        let config = prusa(1, &[&of_type("ModelPart"), &of_type(kind)]);
+        let xml = model(&object(1, &[slab(), mesh]), ITEM);
+        let part = open(&three_mf(&xml, &[("Metadata/Slic3r_PE_model.config", &config)]));
+        assert_eq!(white(part), [pixels; 20], "{kind}");
+    }
+}
+
+/// A ball 500 m away has the pixels that it has at the origin.
+#[test]
+fn a_ball_far_away_keeps_its_edges() {
+    let near = lamp_fixtures::sphere(3.0, 5_000).obj();
+    let moved = |line: &str| match line.strip_prefix("v ") {
+        Some(numbers) => numbers.split(' ').fold("v".to_owned(), |text, number| {
+            format!("{text} {:.9}", number.parse::<f64>().unwrap() + 500_000.0)
+        }),
+        None => line.to_owned(),
+    };
+    let far: Vec<String> = near.lines().map(moved).collect();
+    assert_eq!(white(open(far.join("\n").as_bytes())), white(open(near.as_bytes())));
 }

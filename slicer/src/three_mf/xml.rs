@@ -4,8 +4,8 @@ use std::io::{self, BufRead, Read};
 use std::str::FromStr;
 
 use quick_xml::events::{BytesStart, Event};
-use quick_xml::name::{QName, ResolveResult};
-use quick_xml::{NsReader, XmlVersion};
+use quick_xml::name::{NamespaceResolver, QName, ResolveResult};
+use quick_xml::{Reader, XmlVersion};
 
 use super::ModelFault;
 
@@ -29,7 +29,12 @@ pub(super) fn for_each_piece(
     text: &mut BoundedText<impl BufRead>,
     mut each: impl FnMut(Xml<'_>) -> Result<(), ModelFault>,
 ) -> Result<(), Located> {
-    let mut reader = NsReader::from_reader(text);
+    let mut reader = Reader::from_reader(text);
+    let mut resolver = NamespaceResolver::default();
+    // How many elements were open at each one that declares namespaces. Vertices and triangles do
+    // not, and looking into all of their attributes takes a quarter of the time.
+    let mut scopes = Vec::new();
+    let declares = |tag: &BytesStart<'_>| tag.contains("xmlns");
     let mut buffer = Vec::new();
     let mut open = 0usize;
     loop {
@@ -38,23 +43,35 @@ pub(super) fn for_each_piece(
         let event = reader.read_event_into(&mut buffer);
         let at = reader.buffer_position();
         let failed = |fault| (at, fault);
-        let resolver = reader.resolver();
         match event.map_err(|error| failed(ModelFault::Xml(error)))? {
             Event::Start(tag) => {
                 open += 1;
+                if declares(&tag) {
+                    resolver.push(&tag).map_err(|error| failed(ModelFault::Xml(error.into())))?;
+                    scopes.push(open);
+                }
                 let namespace = resolver.resolve_element(tag.name()).0;
                 each(Xml::Start(name_of(&namespace), &tag)).map_err(failed)?;
             }
             Event::Empty(tag) => {
+                if declares(&tag) {
+                    resolver.push(&tag).map_err(|error| failed(ModelFault::Xml(error.into())))?;
+                }
                 let (namespace, local) = resolver.resolve_element(tag.name());
                 let namespace = name_of(&namespace);
                 each(Xml::Start(namespace, &tag)).map_err(failed)?;
                 each(Xml::End(namespace, local.as_ref())).map_err(failed)?;
+                if declares(&tag) {
+                    resolver.pop();
+                }
             }
             Event::End(tag) => {
-                open = open.saturating_sub(1);
                 let (namespace, local) = resolver.resolve_element(tag.name());
                 each(Xml::End(name_of(&namespace), local.as_ref())).map_err(failed)?;
+                if scopes.pop_if(|scope| *scope == open).is_some() {
+                    resolver.pop();
+                }
+                open = open.saturating_sub(1);
             }
             Event::Text(text) => each(Xml::Text(&text)).map_err(failed)?,
             Event::Eof if open > 0 => return Err(failed(ModelFault::CutOff)),

@@ -19,9 +19,11 @@ impl CornerTable {
     /// numbers that errors give them.
     ///
     /// # Errors
-    /// Returns an error if there are no facets, or more than 1431655764, or they cannot be read.
+    /// Returns an error if there are no facets, or more than 1431655764, if some are of negative
+    /// volumes, or if they cannot be read.
     pub fn of_part(part: &Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
         check_count(part.facet_count())?;
+        part.refuse_negatives()?;
         let table = Self::read(&PlacedPart::new(part.clone(), placement, units).on_facets());
         let table = table.map_err(|error| part.reason(error))?;
         part.check_unchanged()?;
@@ -72,8 +74,9 @@ impl Part {
     /// unit. Those of several items or files stand as these are placed.
     ///
     /// # Errors
-    /// Returns an error if they cannot be read.
+    /// Returns an error if some are of negative volumes, or if they cannot be read.
     pub fn facets(&self) -> Result<Vec<Facet>, SliceError> {
+        self.refuse_negatives()?;
         let placed = PlacedPart::new(self.clone(), &Placement::default(), Units::Millimetres);
         let mut facets = Vec::with_capacity(self.facet_count());
         for block in 0..self.block_count() {
