@@ -63,7 +63,8 @@ fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
             };
             if facets[other].face != facet.face {
                 let ends = [a, b].map(|point| mesh.points[point as usize]);
-                let place = meeting(ends, [middles[number][side], middles[other][of_other]]);
+                let jets = [middles[number][side], middles[other][of_other]];
+                let place = meeting(ends, jets, mesh.chord_mm);
                 middles[number][side].point = place;
                 middles[other][of_other].point = place;
             }
@@ -73,7 +74,11 @@ fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
 
 /// Returns the point halfway between the ends of a side where the planes that touch two
 /// surfaces meet; between their points where the surfaces touch each other.
-fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2]) -> Vec3 {
+///
+/// An edge is within the chord of its side, so the meeting is some chords away, and as far as the
+/// surfaces lie off the side. Surfaces that nearly touch, with an edge off one of them, meet far
+/// beside it: that place would add a fin as long as it is away to both, in each side of the edge.
+fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2], chord_mm: f64) -> Vec3 {
     let [p, q] = jets.map(|jet| jet.point);
     let between = middle(p, q);
     let normals = jets.map(|jet| unit(cross(jet.du, jet.dv)));
@@ -82,18 +87,21 @@ fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2]) -> Vec3 {
     };
     let volume = dot(n, cross(m, way));
     let about = middle(start, end);
-    let sum = add(
-        scale(cross(m, way), dot(n, sub(p, about))),
-        scale(cross(way, n), dot(m, sub(q, about))),
-    );
+    let off = [dot(n, sub(p, about)), dot(m, sub(q, about))];
+    let sum = add(scale(cross(m, way), off[0]), scale(cross(way, n), off[1]));
     let step = scale(sum, 1.0 / volume);
+    let most = MOST_CHORDS * chord_mm + MOST_OFF * (off[0].abs() + off[1].abs());
     // Surfaces that nearly touch each other meet anywhere.
-    let is_sure = volume.abs() > LEAST_SINE && length(step) < length(sub(end, start));
+    let is_sure = volume.abs() > LEAST_SINE && length(step) < most.min(length(sub(end, start)));
     if is_sure { add(about, step) } else { between }
 }
 
 /// The least sine of the angle between surfaces that meet.
 const LEAST_SINE: f64 = 0.05;
+
+/// How far from a side its surfaces may meet, in chords, and as a multiple of how far they are off it.
+const MOST_CHORDS: f64 = 4.0;
+const MOST_OFF: f64 = 2.0;
 
 /// Quadrature points of a triangle, and their weights (Strang and Fix, six points,
 /// exact to the fourth degree).
@@ -135,4 +143,36 @@ fn six_volumes(corners: [Vec3; 3], middles: [Vec3; 3]) -> f64 {
         dot(place, cross(along_s, along_t))
     };
     GAUSS.iter().map(|(at, weight)| weight * flux(*at)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::distance;
+
+    /// A plane through a point that leans by an angle about the x axis.
+    fn leaning(point: Vec3, degrees: f64) -> Jet {
+        let (s, c) = degrees.to_radians().sin_cos();
+        Jet { point, du: [1.0, 0.0, 0.0], dv: [0.0, c, s] }
+    }
+
+    #[test]
+    fn surfaces_meet_near_the_side_or_between() {
+        let side = [[0.0; 3], [1.0, 0.0, 0.0]];
+        let at = |jets: [Jet; 2]| meeting(side, jets, 0.001);
+        let near = |a: Vec3, b: Vec3| distance(a, b) < 1e-12;
+        // The edge bulges by a chord in the plane that both share there: found, also at 4 degrees.
+        for degrees in [4.0f64, 30.0, 90.0] {
+            let edge = [0.5, 0.001, 0.0];
+            let on = [0.2, 0.001 + degrees.to_radians().cos(), degrees.to_radians().sin()];
+            let place = at([leaning([0.7, 0.4, 0.0], 0.0), leaning(on, degrees)]);
+            assert!(near(place, edge), "{degrees}: {place:?}");
+        }
+        // An edge 0.05 mm off one of two surfaces that meet in a right angle: they are right.
+        let right = at([leaning([0.5, 0.0, 0.0], 0.0), leaning([0.5, 0.05, 0.0], 90.0)]);
+        assert!(near(right, [0.5, 0.05, 0.0]), "{right:?}");
+        // The same at 4 degrees: they meet 0.7 mm beside the edge, which no longer says anything.
+        let flat = at([leaning([0.5, 0.0, 0.0], 0.0), leaning([0.5, 0.0, 0.05], 4.0)]);
+        assert!(near(flat, [0.5, 0.0, 0.025]), "{flat:?}");
+    }
 }
