@@ -1,8 +1,9 @@
 //! Validates that the facets of bodies are closed and enclose the surfaces' volume.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use crate::kernel::{Facet, Fault, Kernel, Tessellation};
+use crate::geometry::HORN_TORUS;
+use crate::kernel::{Facet, Fault, Finding, Kernel, Tessellation};
 use crate::nest::crossed;
 use crate::vector::{Vec3, cross, length, scale, sub};
 use crate::volume::{facet_volume, surface_volume};
@@ -65,6 +66,15 @@ pub enum BodyFault {
         entity: u64,
         /// A place on that face, in millimetres.
         at_mm: [f64; 3],
+    },
+    /// As [`Crossed`](Self::Crossed), of a body with a face on a torus whose radii are equal.
+    #[error(
+        "#{entity} lies on a torus whose tube touches itself in its center (R = r), and the side of \
+         its loops cannot be told there, or the body crosses itself"
+    )]
+    Horn {
+        /// The entity of the face.
+        entity: u64,
     },
     /// A face on a closed surface contradicts its neighbours.
     #[error(
@@ -159,7 +169,7 @@ fn faults(
         return vec![BodyFault::Empty];
     }
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
-    faults.extend(off(mesh, facets, report));
+    faults.extend(off(kernel, mesh, facets, report));
     faults.extend(outside(kernel, mesh, facets));
     if let Some(fault) = apart(report, mesh.chord_mm) {
         faults.push(fault);
@@ -169,7 +179,13 @@ fn faults(
         faults.push(BodyFault::InsideOut { volume_mm3: report.volume_mm3 });
     }
     if faults.is_empty() {
-        faults.extend(crossed(kernel, mesh, facets));
+        let crossed = crossed(kernel, mesh, facets);
+        let faces = facets[0].face..=facets[facets.len() - 1].face;
+        let horn = faces.map(|face| kernel.face(face)).find(|face| face.kind == HORN_TORUS);
+        faults.extend(crossed.map(|crossed| match horn {
+            Some(face) => BodyFault::Horn { entity: face.entity },
+            None => crossed,
+        }));
     }
     faults
 }
@@ -221,22 +237,70 @@ pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
 
 /// Returns a fault if an edge or facets lie off their surface by more than numbers of another
 /// part would explain: nothing else tells that the edge is another surface's.
-fn off(mesh: &Tessellation, facets: &[Facet], report: &BodyReport) -> Option<BodyFault> {
+///
+/// Facets may lie some chords off. For edges the chord does not count: what the file is off, it is
+/// off at any tolerance.
+fn off(
+    kernel: &dyn Kernel,
+    mesh: &Tessellation,
+    facets: &[Facet],
+    report: &BodyReport,
+) -> Option<BodyFault> {
     let sides = sub(report.box_mm[1], report.box_mm[0]);
-    let most_mm = f64::max(4.0 * mesh.chord_mm, MOST_OFF * sides.into_iter().fold(0.0, f64::max));
+    let longest_mm = sides.into_iter().fold(0.0, f64::max);
+    // What a file says of its own accuracy counts, but no file may say everything.
+    let stated_mm = kernel.uncertainty_mm().unwrap_or(0.0).min(LOCAL_OFF * longest_mm);
+    let most_mm = f64::max(MOST_OFF * longest_mm, stated_mm);
     let faces = facets.first()?.face..=facets.last()?.face;
-    let of_body = mesh.findings.iter().filter(|finding| faces.contains(&finding.face));
-    let off = of_body.filter_map(|finding| match finding.fault {
-        Fault::Off { off_mm } | Fault::Rebuilt { off_mm } => Some((finding, "edges", off_mm)),
-        Fault::Coarse { off_mm } => Some((finding, "facets", off_mm)),
+    let of_body = || mesh.findings.iter().filter(|finding| faces.contains(&finding.face));
+    let off = of_body().filter_map(|finding| match finding.fault {
+        Fault::Off { off_mm } | Fault::Rebuilt { off_mm } => {
+            (off_mm > most_mm).then_some((finding, "edges", off_mm))
+        }
+        Fault::Coarse { off_mm } => {
+            (off_mm > f64::max(4.0 * mesh.chord_mm, most_mm)).then_some((finding, "facets", off_mm))
+        }
         _ => None,
     });
-    let worst = off.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., off_mm)| *off_mm > most_mm);
-    worst.map(|(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
+    let off: Vec<_> = off.collect();
+    let alone = |face: u32| {
+        !neighbours(facets, face).iter().any(|near| {
+            off.iter().any(|(it, ..)| it.face == *near && matches!(it.fault, Fault::Off { .. }))
+        })
+    };
+    let is_local = |(finding, what, off_mm): &(&Finding, &str, f64)| {
+        *what == "edges"
+            && *off_mm <= LOCAL_OFF * longest_mm
+            && face_mm2(mesh, facets, finding.face) * off_mm <= LOCAL_VOLUME * report.volume_mm3
+            && (matches!(finding.fault, Fault::Rebuilt { .. }) || alone(finding.face))
+    };
+    let worst = off.iter().filter(|off| !is_local(off)).max_by(|a, b| a.2.total_cmp(&b.2));
+    worst.map(|&(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
 }
 
 /// How far edges and facets may lie off their surface, as a part of the body's longest side.
-const MOST_OFF: f64 = 1e-3;
+pub(crate) const MOST_OFF: f64 = 1e-3;
+/// The same, for edges of a face whose neighbours hold their edges, or where the surfaces meet
+/// near the edge, and that is small: its area times the distance is below a share of the volume.
+const LOCAL_OFF: f64 = 4e-3;
+const LOCAL_VOLUME: f64 = 1e-4;
+
+/// Returns the area of a face's facets.
+fn face_mm2(mesh: &Tessellation, facets: &[Facet], face: u32) -> f64 {
+    let of_face = facets.iter().filter(|facet| facet.face == face);
+    of_face.map(|facet| length(doubled(mesh, facet)) / 2.0).sum()
+}
+
+/// Returns the faces that share an edge of facets with a face.
+fn neighbours(facets: &[Facet], face: u32) -> Vec<u32> {
+    let own = facets.iter().filter(|facet| facet.face == face);
+    let edges: HashSet<[u32; 2]> = own.flat_map(sides).map(|[a, b]| [b, a]).collect();
+    let others = facets.iter().filter(|facet| facet.face != face);
+    let near = others.filter(|facet| sides(facet).iter().any(|side| edges.contains(side)));
+    let mut near: Vec<u32> = near.map(|facet| facet.face).collect();
+    near.dedup();
+    near
+}
 
 /// Returns how far edges of a face lie off its surface, if further than facets may.
 fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {

@@ -59,6 +59,11 @@ pub(crate) enum TorusPart {
     Lemon,
 }
 
+/// A torus whose tube touches itself in its center.
+pub(crate) const HORN_TORUS: &str = "horn torus";
+/// How far its radii may differ, as a share.
+const HORN: f64 = 1e-9;
+
 /// Points closer than this are equal, in millimetres.
 pub(super) const SAME_MM: f64 = 1e-6;
 
@@ -70,6 +75,7 @@ impl Surface {
             Self::Cylinder { .. } => "cylinder",
             Self::Cone { .. } => "cone",
             Self::Sphere { .. } => "sphere",
+            Self::Torus { major, minor, .. } if (major - minor).abs() <= HORN * minor => HORN_TORUS,
             Self::Torus { .. } => "torus",
             Self::Extrusion { .. } => "extrusion",
             Self::Revolution { .. } => "revolution",

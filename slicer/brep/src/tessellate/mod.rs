@@ -21,7 +21,8 @@ use crate::error::BrepError;
 use crate::geometry::edge_range;
 use crate::kernel::{Facet, Fault, Finding, Tessellation};
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
-use crate::vector::{Vec3, distance};
+use crate::validate::MOST_OFF;
+use crate::vector::{Vec3, distance, sub};
 
 /// A corner in a face's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +104,9 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
         }
     }
     let shared = points.len();
-    let outlines = outlines(model, &chains, chord_mm, &mut points);
+    let sure_mm: Vec<f64> =
+        sure_mm(model).into_iter().map(|of_body| f64::min(chord_mm, of_body)).collect();
+    let outlines = outlines(model, &chains, chord_mm, &sure_mm, &mut points);
     let cells: Vec<f64> = outlines.iter().map(Outline::cells).collect();
     let all: f64 = cells.iter().sum();
     let largest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
@@ -164,11 +167,13 @@ fn outlines(
     model: &BrepModel,
     chains: &[Vec<u32>],
     chord_mm: f64,
+    sure_mm: &[f64],
     points: &mut [Vec3],
 ) -> Vec<Outline> {
     let made = |numbers: &[usize], points: &[Vec3]| -> Vec<Outline> {
-        let numbers = numbers.par_iter();
-        numbers.map(|&face| outline(&model.faces[face], chains, points, chord_mm)).collect()
+        let of_face =
+            |&face: &usize| outline(&model.faces[face], chains, points, chord_mm, sure_mm[face]);
+        numbers.par_iter().map(of_face).collect()
     };
     let mut outlines = made(&(0..model.faces.len()).collect::<Vec<_>>(), points);
     let is_off = |face: &usize| outlines[*face].off_mm().is_some();
@@ -184,12 +189,42 @@ fn outlines(
     outlines
 }
 
-fn outline(face: &Face, chains: &[Vec<u32>], shared: &[Vec3], chord_mm: f64) -> Outline {
+/// Returns for each face how far its edges may lie off its surface without a finding, whatever the
+/// chord: as far as validation does not look into it.
+fn sure_mm(model: &BrepModel) -> Vec<f64> {
+    let mut sure = vec![f64::INFINITY; model.faces.len()];
+    for body in &model.bodies {
+        let faces = body.faces.start as usize..body.faces.end as usize;
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for around in model.faces[faces.clone()].iter().flat_map(|face| &face.loops) {
+            let Loop::Edges(edges) = around else { continue };
+            for vertex in edges.iter().flat_map(|(edge, _)| model.edges[*edge].ends) {
+                let point = model.vertices[vertex];
+                low = [0, 1, 2].map(|k| f64::min(low[k], point[k]));
+                high = [0, 1, 2].map(|k| f64::max(high[k], point[k]));
+            }
+        }
+        let longest = sub(high, low).into_iter().fold(0.0, f64::max);
+        // Bodies with a single vertex, or none, have no edges that say more than their surfaces.
+        if longest > 0.0 {
+            sure[faces].fill(MOST_OFF * longest);
+        }
+    }
+    sure
+}
+
+fn outline(
+    face: &Face,
+    chains: &[Vec<u32>],
+    shared: &[Vec3],
+    chord_mm: f64,
+    sure_mm: f64,
+) -> Outline {
     let mut points = FacePoints { shared, own: Vec::new() };
     let mut faults = Vec::new();
     let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm);
     let inner = polygons.map(|polygons| {
-        faults.extend(off(face, &polygons, &points, chord_mm));
+        faults.extend(off(face, &polygons, &points, sure_mm));
         let scale = CellScale::new(&face.surface, &polygons, chord_mm);
         (polygons, scale)
     });
@@ -260,10 +295,10 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     rings.collect()
 }
 
-/// Returns a fault if the points of the edges lie further off the surface than facets may.
-fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, chord_mm: f64) -> Option<Fault> {
+/// Returns a fault if the points of the edges lie further off the surface than they may.
+fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, sure_mm: f64) -> Option<Fault> {
     let apart =
         |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));
     let off_mm = polygons.iter().flatten().map(apart).fold(0.0, f64::max);
-    (off_mm > chord_mm).then_some(Fault::Off { off_mm })
+    (off_mm > sure_mm).then_some(Fault::Off { off_mm })
 }
