@@ -50,7 +50,7 @@ const METHODS: [(&str, Method); 4] = [
 /// Corrects every band, however wide or doubtful.
 const UNRESTRAINED: FixOptions = FixOptions {
     method: FixMethod::Spline,
-    max_width: u32::MAX,
+    max_width: None,
     min_confidence: 0.0,
     use_neighbours: false,
 };
@@ -169,7 +169,7 @@ const MAX_CONFIDENCE: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
 
 /// Adds the bands of up to 15 rows to their classes of confidence.
 fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MAX_CONFIDENCE.len()]) {
-    let options = FixOptions { max_width: 15, ..UNRESTRAINED };
+    let options = FixOptions { max_width: Some(15), ..UNRESTRAINED };
     let layers = stray.iter().cloned().map(Ok::<_, Infallible>);
     let first = clean[0].info.index;
     let fixed = fix(layers, options, |fixed| {

@@ -25,7 +25,7 @@ pub(crate) struct FixReport {
 #[derive(Serialize)]
 struct Head {
     method: &'static str,
-    max_width: u32,
+    max_width: Option<u32>,
     min_confidence: f64,
     use_neighbours: bool,
     layers: usize,

@@ -43,7 +43,8 @@ pub use edit::{
     OtherPicture, edit, edit_passing,
 };
 pub use fix::{
-    Band, BandKind, BandKinds, BandOutcome, FixMethod, FixOptions, Fixed, fix, fix_passing,
+    Band, BandKind, BandKinds, BandOutcome, FIX_REACH, FixMethod, FixOptions, Fixed, fix,
+    fix_passing,
 };
 pub use offset::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,

@@ -22,7 +22,8 @@ use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 /// that its crossings do not balance. Where `slice` found that contours break off, a row is also
 /// stray if it lacks crossings that the rows above and below have, or has a run that they lack.
 /// Missing crossings are added; existing ones stay unless they contradict the contours around them.
-/// A band of rows that is too wide, or whose correction is too uncertain, is left and reported.
+/// A band of any width is corrected if the rows and layers around it show how; if they do not, it is
+/// left and reported.
 /// Changes are recorded on their pages, and summed up in two lines; --verbose and --report list them
 /// all. All other layers pass byte for byte. Gray layers are corrected by their outlines.
 ///
@@ -32,7 +33,7 @@ use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 Examples:
   slice blade.stl | fix > blade.tif
   fix stack.tif --report fix.json --evidence pictures/ -o fixed.tif
-  fix stack.tif --strict --max-width 8 --use-neighbours -o fixed.tif
+  fix stack.tif --strict --min-confidence 0.8 -o fixed.tif
   fix pages/ --layers 100..200 --method nearest -o fixed/")]
 pub(crate) struct FixArgs {
     #[command(flatten)]
@@ -117,7 +118,10 @@ fn describe(fixed: &Fixed<'_>, options: &FixOptions) -> Vec<String> {
     for band in fixed.bands {
         let why = match band.outcome {
             BandOutcome::Corrected => continue,
-            BandOutcome::TooWide => format!("{} rows wide, limit {}", band.rows, options.max_width),
+            BandOutcome::TooWide => {
+                let limit = options.max_width.unwrap_or(u32::MAX);
+                format!("{} rows wide, limit {limit}", band.rows)
+            }
             BandOutcome::Doubtful => {
                 format!("confidence {:.2}, limit {:.2}", band.confidence, options.min_confidence)
             }

@@ -68,7 +68,7 @@ impl Stage {
 
     /// Returns how many layers on each side it looks at.
     fn reach(&self) -> u32 {
-        u32::from(matches!(self, Self::Fix(_)))
+        if matches!(self, Self::Fix(_)) { lamp_postprocess::FIX_REACH } else { 0 }
     }
 
     pub(super) fn start(&self, notes: &Notes) -> Result<Working<'_>, Exit> {

@@ -12,7 +12,7 @@ use crate::fix_report::FixReport;
 use crate::options::one_of_described;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 2;
+pub(crate) const CODE: u32 = 3;
 
 /// How rows are corrected.
 #[derive(Args, Clone)]
@@ -24,9 +24,9 @@ pub(crate) struct FixSettings {
     ]))]
     method: FixMethod,
 
-    /// Leave bands of more rows as they are; half the part's smallest feature is a good limit
-    #[arg(long, value_name = "ROWS", default_value_t = FixOptions::default().max_width)]
-    max_width: u32,
+    /// Leave bands of more rows as they are, however certain their correction is [default: no limit]
+    #[arg(long, value_name = "ROWS")]
+    max_width: Option<u32>,
 
     /// Leave bands whose correction is less certain than this as they are, from 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = FixOptions::default().min_confidence)]
@@ -51,11 +51,9 @@ impl FixSettings {
     /// Returns the options as one text, defaults filled in.
     pub(crate) fn canonical(&self) -> String {
         let Self { method, max_width, min_confidence, use_neighbours } = self;
+        let width = max_width.map(|rows| format!(" --max-width {rows}")).unwrap_or_default();
         let neighbours = if *use_neighbours { " --use-neighbours" } else { "" };
-        format!(
-            "fix --method {method} --max-width {max_width} --min-confidence {min_confidence}\
-             {neighbours}"
-        )
+        format!("fix --method {method}{width} --min-confidence {min_confidence}{neighbours}")
     }
 }
 

@@ -230,7 +230,7 @@ fn the_same_options_have_one_text_whatever_their_form() {
         assert_eq!(canonical(&[a]), canonical(&[b]), "{a}");
     }
     for (a, b) in [
-        ("fix", "fix --method spline --max-width 15"),
+        ("fix", "fix --method spline --min-confidence 0.35"),
         ("dither", "dither --method blue-noise"),
         ("compensate --uniform 25um", "compensate --uniform 0.025mm"),
         ("compensate --shrinkage 2%", "compensate --shrinkage x:2%,y:2%"),

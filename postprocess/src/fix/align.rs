@@ -8,6 +8,15 @@ const MAX_STEPS: usize = 1 << 22;
 /// The cost of a contour that closes, in pixels, in addition to its width.
 const CLOSING: f64 = 2.0;
 
+/// How the crossings of two rows go together.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Alignment {
+    /// The crossing of the second row on the same contour, for each of the first.
+    pub(super) partners: Vec<Option<usize>>,
+    /// The crossings of each row whose contour breaks off between the rows.
+    pub(super) broken: [Vec<usize>; 2],
+}
+
 /// Returns the crossing of `b` on the same contour for each crossing of `a`, if there is one.
 /// Both are sorted and even in number.
 ///
@@ -15,15 +24,21 @@ const CLOSING: f64 = 2.0;
 /// pairs: the two sides of a contour that ends or begins between the rows. Of all such matchings
 /// this is the cheapest, by dynamic programming: partners cost their distance, pairs without a
 /// partner their width.
-pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
+pub(super) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
+    align_broken(a, b, f64::INFINITY).partners
+}
+
+/// Matches crossings as [`align`] does, but of rows between which contours may break off: a
+/// crossing alone may lack a partner, at the cost `breaking`.
+pub(super) fn align_broken(a: &[f64], b: &[f64], breaking: f64) -> Alignment {
     if a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2.0) {
-        return (0..a.len()).map(Some).collect();
+        return Alignment { partners: (0..a.len()).map(Some).collect(), ..Alignment::default() };
     }
     let more = b.len() as isize - a.len() as isize;
     let (low, high) = (more.min(0) - REACH, more.max(0) + REACH);
     let stride = (high - low + 1) as usize;
     if (a.len() + 1).saturating_mul(stride) > MAX_STEPS {
-        return vec![None; a.len()];
+        return Alignment { partners: vec![None; a.len()], ..Alignment::default() };
     }
     // cost[i][j - i - low]: the cheapest matching of the first i and j crossings. Only a strip
     // along the diagonal is kept, as rows may have thousands of crossings.
@@ -50,6 +65,12 @@ pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
         if j > 1 {
             offer(known(i, j - 2) + closing(b, j), 0, 2);
         }
+        if i > 0 {
+            offer(known(i - 1, j) + breaking, 1, 0);
+        }
+        if j > 0 {
+            offer(known(i, j - 1) + breaking, 0, 1);
+        }
         best
     };
     for i in 0..=a.len() {
@@ -62,16 +83,22 @@ pub(crate) fn align(a: &[f64], b: &[f64]) -> Vec<Option<usize>> {
             }
         }
     }
-    let mut partners = vec![None; a.len()];
+    let mut aligned = Alignment { partners: vec![None; a.len()], ..Alignment::default() };
     let (mut i, mut j) = (a.len(), b.len());
     while (i, j) != (0, 0) {
         let (_, back_a, back_b) = steps(&cost, i, j);
-        if (back_a, back_b) == (1, 1) {
-            partners[i - 1] = Some(j - 1);
+        match (back_a, back_b) {
+            (1, 1) => aligned.partners[i - 1] = Some(j - 1),
+            (1, 0) => aligned.broken[0].push(i - 1),
+            (0, 1) => aligned.broken[1].push(j - 1),
+            // Rows that differ in parity have no matching unless contours may break off.
+            (0, 0) => break,
+            _ => {}
         }
         (i, j) = (i - back_a, j - back_b);
     }
-    partners
+    aligned.broken.iter_mut().for_each(|broken| broken.reverse());
+    aligned
 }
 
 #[cfg(test)]

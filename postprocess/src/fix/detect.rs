@@ -29,8 +29,8 @@ pub(super) struct Scene<'a> {
     pub(super) unbalanced: &'a [u32],
     /// The rows at which contours break off, increasing, if that is known.
     pub(super) open_rows: Option<&'a [u32]>,
-    /// The images of the layers below and above, if they are there.
-    pub(super) neighbours: [Option<&'a Image>; 2],
+    /// The images of the layers below and above, the nearest first.
+    pub(super) neighbours: &'a [Vec<&'a Image>; 2],
 }
 
 /// The stray rows of an image.
@@ -96,7 +96,9 @@ impl Scene<'_> {
             }
         }
         if !is_closed {
-            self.find_pairs(&mut strays, &crossings, options.max_width.min(MAX_PAIRED_ROWS));
+            let widest =
+                options.max_width.map_or(MAX_PAIRED_ROWS, |most| most.min(MAX_PAIRED_ROWS));
+            self.find_pairs(&mut strays, &crossings, widest);
             self.find_slivers(&mut strays, &crossings);
             strays.doubtful.sort_unstable();
         }
@@ -198,7 +200,7 @@ impl Scene<'_> {
         let width = self.mask.width();
         let differ = difference(had, mended);
         let pixels = white_in_row(&differ, width) as f64;
-        self.neighbours.into_iter().flatten().any(|image| {
+        self.neighbours.iter().filter_map(|side| side.first()).any(|image| {
             let as_mended = difference(&image.exposed_row(row), had);
             let share = white_in_both(&differ, &as_mended, width) as f64 / pixels;
             share <= 1.0 - MIN_AGREEMENT

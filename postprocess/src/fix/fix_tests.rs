@@ -84,7 +84,7 @@ fn spline(mask: &Mask) -> (Mask, Vec<Band>) {
 fn nearest(mask: &Mask) -> (Mask, Vec<Band>) {
     let options = FixOptions {
         method: FixMethod::Nearest,
-        max_width: u32::MAX,
+        max_width: None,
         min_confidence: 0.0,
         use_neighbours: false,
     };
@@ -301,22 +301,76 @@ fn a_band_at_the_edge_goes_on_from_its_good_side() {
 #[test]
 fn what_is_too_wide_is_left_and_its_gap_is_named() {
     let stray = drawn(bars, |row| if (100..116).contains(&row) { &[3] } else { &[] });
-    let (mended, bands) = spline(&stray);
+    let narrow = FixOptions { max_width: Some(15), ..FixOptions::default() };
+    let (mended, bands) = fixed_mask(&stray, narrow);
     assert_eq!(mended, stray);
     assert_eq!((bands[0].outcome, bands[0].rows), (BandOutcome::TooWide, 16));
     let gap = bands[0].gap.clone().unwrap();
     assert!(gap.start.abs_diff(397) <= 1 && gap.end.abs_diff(404) <= 1, "{gap:?}");
-    let wider = FixOptions { max_width: 16, ..FixOptions::default() };
-    assert!(off(&fixed_mask(&stray, wider).0, &whole(bars)).1 <= 1);
+    for max_width in [Some(16), None] {
+        let wider = FixOptions { max_width, ..FixOptions::default() };
+        assert!(off(&fixed_mask(&stray, wider).0, &whole(bars)).1 <= 1);
+    }
+}
+
+/// A body whose right side is missed over many rows, in which fins and a slot begin and end.
+fn finned(row: f64) -> Vec<f64> {
+    let mut columns = vec![100.0, 300.0 + 0.2 * row];
+    for (rows, fin) in
+        [(160..201, [40.0, 70.0]), (215..218, [420.0, 500.0]), (240..241, [600.0, 700.0])]
+    {
+        if rows.contains(&(row as u32)) {
+            columns.extend(fin);
+        }
+    }
+    if (250..262).contains(&(row as u32)) {
+        columns.extend([150.0, 220.0]);
+    }
+    columns.sort_by(f64::total_cmp);
+    columns
+}
+
+#[test]
+fn a_band_of_any_width_is_corrected_and_what_lies_in_it_stays() {
+    for rows in [120..130, 130..270, 155..300, 210..222] {
+        let mut stray = MaskBuilder::new(WIDTH);
+        for row in 0..HEIGHT {
+            let side = 300.0 + 0.2 * f64::from(row);
+            let is_missed = |&column: &f64| rows.contains(&row) && column == side;
+            let columns = finned(row.into()).into_iter().filter(|column| !is_missed(column));
+            stray.push_row(&columns.map(|c| c.ceil() as u32).collect::<Vec<_>>()).unwrap();
+        }
+        let stray = with_open_rows(layer(0, stray.finish()), &[rows.start, rows.end]);
+        let (layers, bands) = fixed(vec![stray], FixOptions::default());
+        let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
+        assert_eq!((band.outcome, band.first_row..band.end()), (BandOutcome::Corrected, rows));
+        let Image::Mask(mended) = &*layers[0].image else { unreachable!() };
+        assert!(off(mended, &whole(finned)).1 <= 1, "{band:?}");
+    }
+}
+
+/// A fin whose tip is missed looks in its own layer like a wall without it.
+#[test]
+fn layers_further_off_show_what_the_nearest_lack() {
+    let fin: ShapeCrossings =
+        |row| vec![100.0, if (200.0..230.0).contains(&row) { 420.0 } else { 300.0 }];
+    let stray = || drawn(fin, |row| if (200..230).contains(&row) { &[1] } else { &[] });
+    let layers = |damaged: std::ops::Range<u32>| -> Vec<Layer> {
+        let drawn = |k| layer(k, if damaged.contains(&k) { stray() } else { whole(fin) });
+        (0..9).map(drawn).collect()
+    };
+    for damaged in [4..5, 3..6, 1..6] {
+        for layer in fixed(layers(damaged), FixOptions::default()).0 {
+            let Image::Mask(mended) = &*layer.image else { unreachable!() };
+            assert_eq!(off(mended, &whole(fin)).0, 0);
+        }
+    }
 }
 
 #[test]
 fn an_image_without_a_good_row_is_left() {
     let stray = drawn(|_| vec![100.0, 200.0], |_| &[1]);
-    for (mended, bands) in [
-        fixed_mask(&stray, FixOptions { max_width: u32::MAX, ..FixOptions::default() }),
-        nearest(&stray),
-    ] {
+    for (mended, bands) in [spline(&stray), nearest(&stray)] {
         let [band] = &bands[..] else { panic!("one band, not {bands:?}") };
         assert_eq!((band.outcome, band.confidence), (BandOutcome::Doubtful, 0.0));
         assert_eq!(mended, stray);
@@ -331,16 +385,15 @@ fn neighbours_hold_a_wide_band_between_them() {
         vec![100.0, 300.0 - dent]
     };
     let stray = drawn(notched, |row| if (244..257).contains(&row) { &[1] } else { &[] });
-    let layers = vec![layer(0, whole(notched)), layer(1, stray), layer(2, whole(notched))];
-    let with = |use_neighbours| {
+    let layers = vec![layer(0, whole(notched)), layer(1, stray.clone()), layer(2, whole(notched))];
+    for use_neighbours in [true, false] {
         let options = FixOptions { use_neighbours, ..FixOptions::default() };
         let Image::Mask(mended) = &*fixed(layers.clone(), options).0[1].image else {
             unreachable!()
         };
-        off(mended, &whole(notched)).0
-    };
-    assert_eq!(with(true), 0);
-    assert!(with(false) > 0);
+        assert_eq!(off(mended, &whole(notched)).0, 0);
+    }
+    assert!(off(&spline(&stray).0, &whole(notched)).0 > 0);
 }
 
 #[test]

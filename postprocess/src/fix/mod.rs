@@ -18,6 +18,7 @@ mod mend;
 mod nearest;
 mod polynomial;
 mod rebuild;
+mod trace;
 mod window;
 
 use std::ops::Range;
@@ -34,6 +35,7 @@ use combine::difference;
 use detect::{Scene, Strays};
 use gray_rows::GrayRow;
 use rebuild::Correction;
+pub use window::FIX_REACH;
 use window::{decode_unsettled, windows};
 
 /// Bands of at least this many rows are adjusted to the neighbouring layers, if asked for.
@@ -51,8 +53,8 @@ const SLIVER_CONFIDENCE: f64 = 0.9;
 pub struct FixOptions {
     /// How corrected rows are made.
     pub method: FixMethod,
-    /// Bands of more rows stay as they are.
-    pub max_width: u32,
+    /// Bands of more rows stay as they are, if there is a limit.
+    pub max_width: Option<u32>,
     /// Bands whose correction has a lower confidence, from 0 to 1, stay as they are.
     pub min_confidence: f64,
     /// Whether added crossings of bands of three rows and more are kept between those of the
@@ -61,15 +63,14 @@ pub struct FixOptions {
 }
 
 impl Default for FixOptions {
-    /// Returns the spline method with a limit of 15 rows, half the smallest feature of 002's
-    /// blades at 1500 dpi, and a confidence of 0.35.
+    /// Returns the spline method with a confidence of 0.35, for bands of any width.
     ///
     /// Corrections below that confidence left a tenth of the wrong pixels of broken sample
     /// parts, the others at most 0.2 % (`benches/README.md`).
     fn default() -> Self {
         Self {
             method: FixMethod::Spline,
-            max_width: 15,
+            max_width: None,
             min_confidence: 0.35,
             use_neighbours: false,
         }
@@ -168,7 +169,7 @@ fn fix_decoded<E: Send>(
 ) -> impl Iterator<Item = Result<PassingLayer, E>> {
     let fixed = map_in_order(windows(layers), move |window| {
         let (layer, bands) = match window.layer.as_decoded() {
-            Some(layer) => fix_layer(layer, window.neighbours(), &options),
+            Some(layer) => fix_layer(layer, &window.neighbours(), &options),
             None => (None, Vec::new()),
         };
         Ok((window.layer, layer, bands))
@@ -186,7 +187,7 @@ fn fix_decoded<E: Send>(
 /// Returns the corrected layer, if anything was corrected, and the bands found.
 fn fix_layer(
     layer: &Layer,
-    neighbours: [Option<&Image>; 2],
+    neighbours: &[Vec<&Image>; 2],
     options: &FixOptions,
 ) -> (Option<Layer>, Vec<Band>) {
     let mut unbalanced = layer.info.stray_rows.clone();
@@ -258,7 +259,7 @@ fn fix_band(
     if band.clone().any(|row| strays.doubtful.binary_search(&row).is_ok()) {
         confidence = confidence.min(DOUBTFUL_CONFIDENCE);
     }
-    let outcome = if band.len() as u32 > options.max_width {
+    let outcome = if options.max_width.is_some_and(|most| band.len() as u32 > most) {
         BandOutcome::TooWide
     } else if confidence < options.min_confidence || rows.is_empty() {
         BandOutcome::Doubtful
@@ -287,7 +288,7 @@ fn correct(
     } else {
         let is_good = |row| !band.contains(&row) && strays.is_good(row);
         let is_ended = |row| strays.is_ended(mask, row);
-        let neighbours = match scene.neighbours {
+        let neighbours = match scene.neighbours.each_ref().map(|side| side.first().copied()) {
             [Some(below), Some(above)]
                 if options.use_neighbours && band.len() as u32 >= MIN_ADJUSTED_ROWS =>
             {
@@ -295,7 +296,22 @@ fn correct(
             }
             _ => None,
         };
-        rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, neighbours)?
+        let rebuilt = rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, neighbours);
+        let traced = trace::trace(mask, band, is_good, is_ended, scene.open_rows, scene.neighbours);
+        match (rebuilt, traced) {
+            (Some(rebuilt), Some(traced)) => {
+                // Without open rows, rows of a band may miss different contours.
+                let is_known =
+                    scene.open_rows.is_some() || rebuilt.confidence < options.min_confidence;
+                let is_shown = traced.is_shown && traced.confidence >= options.min_confidence;
+                if is_shown || is_known && traced.confidence > rebuilt.confidence {
+                    traced
+                } else {
+                    rebuilt
+                }
+            }
+            (rebuilt, traced) => rebuilt.or(traced)?,
+        }
     };
     if options.method == FixMethod::Nearest {
         // The gap and what touches are known from the contours, whatever the method.

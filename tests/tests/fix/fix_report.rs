@@ -115,7 +115,7 @@ fn kinds_outcomes_and_limits_are_named() {
     }
     assert_eq!(outcomes.len(), 3, "each outcome is met");
     let (by_default, _) = report(&scratch, "");
-    assert_eq!(head(&by_default), [json!("spline"), json!(15), json!(0.35), json!(false)]);
+    assert_eq!(head(&by_default), [json!("spline"), Value::Null, json!(0.35), json!(false)]);
 }
 
 #[test]

@@ -87,7 +87,7 @@ fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
     {
         let slicing = format!("--dpi 600 --thickness 50um --translate {dx},{dy},0");
         let (scratch, facets) = broken_ball(1, seed, &slicing);
-        let (report, ran) = report(&scratch, "--strict --verbose");
+        let (report, ran) = report(&scratch, "--max-width 15 --strict --verbose");
         let left: Vec<_> = bands(&report).iter().filter(|band| !is_corrected(band)).collect();
         assert_eq!(ran.statuses, [Some(if left.is_empty() { 0 } else { 3 })]);
         let stray = scratch.layers("stray.tif");
