@@ -159,9 +159,10 @@ pub enum SliceError {
     },
     /// A part with volumes that are cut out of others, where its surface is asked for.
     #[error(
-        "the project has negative volumes, which are cut out of layers only: cut them out of its solids and export one mesh"
+        "volumes are cut out of it (negative volumes of a project, --subtract or --intersect), which \
+         layers have and the mesh does not: cut them in CAD and export one mesh"
     )]
-    NegativeVolumes,
+    Cut,
     /// A mesh of facets that a repair drops.
     #[error(
         "a repair would drop all of its last {facets} facets: none has an area, or they cancel each other out"

@@ -330,12 +330,14 @@ impl Part {
         Ok(())
     }
 
-    /// Refuses a part whose facets are not its surface, because negative volumes cut into it.
-    pub(crate) fn refuse_negatives(&self) -> Result<(), SliceError> {
-        match self.pieces.iter().any(|piece| piece.role == Role::Negative) {
-            true => Err(SliceError::NegativeVolumes),
-            false => Ok(()),
-        }
+    /// Returns true if its facets are not its surface, because volumes are cut out of it.
+    pub fn is_cut(&self) -> bool {
+        self.pieces.iter().any(|piece| piece.rule().is_cutter())
+    }
+
+    /// Refuses a part whose facets are not its surface.
+    pub(crate) fn refuse_cut(&self) -> Result<(), SliceError> {
+        if self.is_cut() { Err(SliceError::Cut) } else { Ok(()) }
     }
 
     /// Returns the reason for an error: a file that changed, if reading it failed.

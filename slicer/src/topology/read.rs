@@ -23,7 +23,7 @@ impl CornerTable {
     /// volumes, or if they cannot be read.
     pub fn of_part(part: &Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
         check_count(part.facet_count())?;
-        part.refuse_negatives()?;
+        part.refuse_cut()?;
         let table = Self::read(&PlacedPart::new(part.clone(), placement, units).on_facets());
         let table = table.map_err(|error| part.reason(error))?;
         part.check_unchanged()?;
@@ -76,7 +76,7 @@ impl Part {
     /// # Errors
     /// Returns an error if some are of negative volumes, or if they cannot be read.
     pub fn facets(&self) -> Result<Vec<Facet>, SliceError> {
-        self.refuse_negatives()?;
+        self.refuse_cut()?;
         let placed = PlacedPart::new(self.clone(), &Placement::default(), Units::Millimetres);
         let mut facets = Vec::with_capacity(self.facet_count());
         for block in 0..self.block_count() {

@@ -326,7 +326,7 @@ impl CheckArgs {
     /// Returns the minima of a part's mesh, if islands are told.
     fn minima(&self, input: &Input) -> Result<Vec<IslandMinimum>, Exit> {
         let Input::Part(part) = input else { return Ok(Vec::new()) };
-        if !self.tells(Kind::Islands) {
+        if !self.tells(Kind::Islands) || part.model.is_cut() {
             return Ok(Vec::new());
         }
         let solid = &self.slicing.solid;
@@ -343,7 +343,9 @@ impl CheckArgs {
         findings: &Findings,
         common: &Common,
     ) -> Result<Disagreements, Exit> {
-        if !matches!(input, Input::Part(_)) || !self.tells(Kind::Islands) {
+        // The mesh of a part that is cut by others is not its surface.
+        let has_mesh = matches!(input, Input::Part(part) if !part.model.is_cut());
+        if !has_mesh || !self.tells(Kind::Islands) {
             return Ok(Disagreements::default());
         }
         let mut found = findings.compare_minima(minima, self.slicing.cut());
