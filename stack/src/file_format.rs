@@ -259,7 +259,7 @@ fn has_words(text: &[u8], words: &[u8]) -> bool {
     text.windows(words.len()).any(|window| window == words)
 }
 
-/// Returns the format of a text, [`Text`](FileFormat::Text) at least; none of other bytes.
+/// Returns the format of a text; `None` of other bytes.
 fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     let is_whole = size.is_none_or(|size| size == start.len() as u64);
     let mut text = Vec::new();
@@ -267,13 +267,15 @@ fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     text.make_ascii_lowercase();
     let padding = |byte: &u8| matches!(byte, 0 | 0x1A) || byte.is_ascii_whitespace();
     let end = text.iter().rposition(|byte| !padding(byte))? + 1;
+    let has_zeros = text.contains(&0);
     let text = &text[..end];
     if text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) {
         return None;
     }
     let of_format = of_xml(text).or_else(|| of_phrases(text)).or_else(|| of_columns(text));
     let of_format = of_format.or_else(|| of_part(text, is_whole)).or_else(|| of_lines(text));
-    Some(of_format.unwrap_or(FileFormat::Text))
+    // The header of a binary file that was cut off may be text, too.
+    of_format.or((!has_zeros).then_some(FileFormat::Text))
 }
 
 fn of_phrases(text: &[u8]) -> Option<FileFormat> {
