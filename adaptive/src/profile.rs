@@ -10,6 +10,8 @@
 use lamp_slicer::PLANE_TOLERANCE;
 use lamp_slicer::scan::count_at_or_below;
 
+use crate::layered_part::LEVEL_UM;
+
 /// From this many tops between a surface's ends on, a polynomial is cheaper than one
 /// sum for each top.
 const MANY_TOPS: usize = 6;
@@ -172,8 +174,8 @@ impl<'a> Profile<'a> {
     pub(crate) fn add(&mut self, surface: Surface) {
         let surface = surface.rising();
         let [low, high] = surface.heights;
-        if high - low < PLANE_TOLERANCE.um() {
-            // Level as far as planes tell: those within the tolerance count as touching it.
+        if high - low <= LEVEL_UM {
+            // A level face within the tolerance of a plane counts as lying on it.
             let end = self.first_above(low + PLANE_TOLERANCE.um());
             return self.starts[end].add(&Polynomials::constant(surface.passed(1.0)), 1.0);
         }
@@ -246,7 +248,7 @@ mod tests {
             let mut expected = ProfileChange::default();
             for surface in surfaces.map(Surface::rising) {
                 let [low, high] = surface.heights;
-                let passed = if tops[k] <= low {
+                let passed = if tops[k] <= low || (low == high && tops[k] <= low + 1.0) {
                     0.0
                 } else if tops[k] > high {
                     1.0

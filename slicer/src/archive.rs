@@ -32,13 +32,13 @@ pub(crate) fn not_three_mf(file: &PartFile, error: ThreeMfError) -> SliceError {
     let names = archive.file_names().filter_map(Result::ok);
     let names: Vec<String> = names.map(|name| name.to_ascii_lowercase()).collect();
     let names: Vec<&String> = names.iter().filter(|name| !name.ends_with('/')).collect();
-    // Another model may be missing.
-    if names.iter().any(|name| name.ends_with(".model")) {
-        return Box::new(error).into();
-    }
     let find = |end: &str| names.iter().find(|name| name.ends_with(end));
     if let Some((_, format)) = NAMES.iter().find(|(end, _)| find(end).is_some()) {
         return SliceError::OtherFormat(*format);
+    }
+    // A package of 3MF that lacks its model, or another one.
+    if find(".model").or(find("_rels/.rels")).is_some() {
+        return Box::new(error).into();
     }
     match PARTS.iter().find_map(|end| find(end)).or(names.first()) {
         Some(name) => SliceError::OtherArchive { files: names.len(), name: (*name).clone() },

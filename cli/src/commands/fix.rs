@@ -202,8 +202,10 @@ mod tests {
         let origin_mm = Some([20.0, 120.0]);
         let info = PageInfo { index: 812, z_um: Some(81_200.0), origin_mm, ..PageInfo::default() };
         let bands = [band(1034, 38, BandOutcome::TooWide), band(1080, 1, BandOutcome::Doubtful)];
+        let layer = Layer { info, dpi: Dpi::new(254.0), image: Mask::black(500, 2000).into() };
+        let fixed = Fixed { before: &layer, after: &layer, bands: &bands };
         assert_eq!(
-            described(&bands, info),
+            describe(&fixed, &FixOptions { max_width: Some(15), ..FixOptions::default() }),
             [
                 "layer 812 (z 81.20 mm) rows 1034-1071: 38 rows wide, limit 15; repair the CAD \
                  model near x 32.0-33.0 y 12.8-16.6 mm",
