@@ -23,7 +23,7 @@ const STRIPES: u32 = 16;
 
 /// Facets of less height count as level: far more than rounding, far less than a
 /// step.
-pub(crate) const LEVEL_UM: f64 = 0.05;
+const LEVEL_UM: f64 = 0.05;
 
 /// More rows than any image has.
 const MAX_ROWS: f64 = 16_777_216.0;

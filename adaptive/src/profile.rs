@@ -10,8 +10,6 @@
 use lamp_slicer::PLANE_TOLERANCE;
 use lamp_slicer::scan::count_at_or_below;
 
-use crate::layered_part::LEVEL_UM;
-
 /// From this many tops between a surface's ends on, a polynomial is cheaper than one
 /// sum for each top.
 const MANY_TOPS: usize = 6;
@@ -36,6 +34,10 @@ impl ProfileChange {
         self.gained += other.gained;
     }
 }
+
+/// Surfaces that rise by no more are level, however rounding left them. Rows over slopes have as short
+/// pieces, which must add what their facets do.
+const LEVEL_UM: f64 = 1e-4;
 
 /// A piece of surface. Between its ends, what it changes once tops are past it goes evenly
 /// from one value to the other.

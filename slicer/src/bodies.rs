@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::placement::Placement;
 use crate::table::Fill;
 
 /// How the bodies of one file join under [`Fill::EvenOdd`]: those of a STEP file, or the items of a
@@ -95,6 +96,8 @@ pub struct FillRule {
     is_union: bool,
     /// The number of files to which the others are cut.
     intersections: usize,
+    /// Whether the part's placement mirrors it, so that facets that face outwards wind the other way.
+    is_mirrored: bool,
 }
 
 impl From<Fill> for FillRule {
@@ -115,7 +118,18 @@ impl FillRule {
         let is_union = fill == Fill::Solid && !rules.iter().any(BodyRule::is_cutter);
         let files = rules.chunk_by(|a, b| a.file == b.file);
         let intersections = files.filter(|bodies| bodies[0].join == Join::Intersect).count();
-        Self { fill, bodies, rules, is_union, intersections }
+        Self { fill, bodies, rules, is_union, intersections, is_mirrored: false }
+    }
+
+    /// Returns the rule for a part in its place.
+    pub(crate) fn placed(self, placement: &Placement) -> Self {
+        Self { is_mirrored: placement.is_mirror(), ..self }
+    }
+
+    /// Returns the winding number of a point within a body that faces outwards.
+    #[inline]
+    pub(crate) fn outward(&self) -> i32 {
+        if self.is_mirrored { -1 } else { 1 }
     }
 
     /// Returns the rule of each body by itself.
@@ -416,12 +430,12 @@ pub(crate) struct Doubts {
     pub(crate) unsigned_rows: u64,
     /// Pixels that the surface winds around more than once.
     pub(crate) repeated_px: u64,
-    /// Pixels that the surface winds around clockwise, seen from above.
+    /// Pixels around which the surface winds as one that faces inwards does.
     pub(crate) inward_px: u64,
 }
 
 impl Doubts {
-    /// Adds pixels about which the surface winds so often.
+    /// Adds pixels with this winding number, which is above zero in a body that faces outwards.
     #[inline]
     pub(crate) fn add(&mut self, winding: i32, pixels: u32) {
         if winding.abs() > 1 {
@@ -440,7 +454,8 @@ pub(crate) struct LayerDoubts {
     pub(crate) white_px: u64,
 }
 
-/// A file whose surface is filled though its facets leave doubts, in the layers made so far.
+/// A file whose surface is filled though its facets leave doubts, in the layers made so far whose
+/// contours close.
 ///
 /// A void is a shell whose facets face inwards. A shell within another that faces outwards, too, may
 /// be a body in a body, or a void that was written the wrong way round.
@@ -448,8 +463,8 @@ pub(crate) struct LayerDoubts {
 pub struct FillDoubt {
     /// The file, from 0, among those joined.
     pub file: usize,
-    /// The rows in which the signs of facets do not add up, since some are turned over or missing:
-    /// every crossing toggles there, as under [`Fill::EvenOdd`].
+    /// The rows in which the signs of facets do not add up, since some are turned over: every
+    /// crossing toggles there, as under [`Fill::EvenOdd`].
     pub unsigned_rows: u64,
     /// The volume that shells enclose more than once, in cubic millimeters.
     pub repeated_mm3: f64,

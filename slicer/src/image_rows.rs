@@ -143,20 +143,26 @@ pub(crate) fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bo
 pub(crate) fn solid(
     places: &[RowCrossing],
     transitions: &mut Vec<u32>,
+    outward: i32,
     doubts: &mut LayerDoubts,
 ) -> bool {
     // Nearly all rows: a clean shell is entered and left in turn.
     let is_clean = places.is_sorted_by(|a, b| a.column() < b.column() && a.turns_back(*b))
-        && places.first().is_none_or(|first| first.winding() > 0);
+        && places.first().is_none_or(|first| first.winding() == outward);
     if is_clean {
         transitions.extend(places.iter().map(|place| place.column()));
         return places.len().is_multiple_of(2);
     }
-    wound(places, transitions, doubts.of_bodies.entry(0).or_default())
+    wound(places, transitions, outward, doubts.of_bodies.entry(0).or_default())
 }
 
 /// The same for any row. Adds to the doubts about it.
-fn wound(places: &[RowCrossing], transitions: &mut Vec<u32>, doubts: &mut Doubts) -> bool {
+fn wound(
+    places: &[RowCrossing],
+    transitions: &mut Vec<u32>,
+    outward: i32,
+    doubts: &mut Doubts,
+) -> bool {
     if places.iter().map(|place| place.winding()).sum::<i32>() != 0 {
         let is_even = even_odd(places, transitions);
         doubts.unsigned_rows += u64::from(is_even);
@@ -165,7 +171,7 @@ fn wound(places: &[RowCrossing], transitions: &mut Vec<u32>, doubts: &mut Doubts
     let (mut winding, mut column) = (0, 0);
     for group in places.chunk_by(|a, b| a.column() == b.column()) {
         let (before, here) = (winding, group[0].column());
-        doubts.add(winding, here - column);
+        doubts.add(outward * winding, here - column);
         winding += group.iter().map(|place| place.winding()).sum::<i32>();
         if (before == 0) != (winding == 0) {
             transitions.push(here);
@@ -182,6 +188,7 @@ pub(crate) fn by_body(
     transitions: &mut Vec<u32>,
     position: &mut Position<'_>,
     shared: &mut SharedPixels<'_>,
+    outward: i32,
     doubts: &mut LayerDoubts,
 ) -> bool {
     position.start_row(places.iter().map(|place| place.turn()));
@@ -190,8 +197,9 @@ pub(crate) fn by_body(
         let here = group[0].column();
         shared.add(position, here - column);
         for &(body, winding) in position.windings() {
-            if !(0..2).contains(&winding) && !position.unsigned().contains(&body) {
-                doubts.of_bodies.entry(body).or_default().add(winding, here - column);
+            if winding != outward && !position.unsigned().contains(&body) {
+                let doubts = doubts.of_bodies.entry(body).or_default();
+                doubts.add(outward * winding, here - column);
             }
         }
         group.iter().for_each(|place| position.cross(place.turn()));

@@ -201,7 +201,7 @@ impl Slices {
         survey.check_extent(&model)?;
         let model = if options.polish { model } else { model.on_facets() };
         model.surfaces().iter().for_each(PlacedSurfaces::examine);
-        let rule = model.model.fill_rule(options.fill);
+        let rule = model.model.fill_rule(options.fill).placed(&options.placement);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
         let part_um = [survey.min[2], survey.max[2]];

@@ -356,7 +356,7 @@ impl Table {
         let more = self.more(layer, cutter, surfaces);
         let height = grid.height;
         let mut shared = SharedPixels::new(rule);
-        let mut doubts = LayerDoubts::default();
+        let (mut doubts, outward) = (LayerDoubts::default(), rule.outward());
         let (made, stray_rows) = if rule.has_bodies() {
             let mut position = Position::outside(rule);
             let crossings = || {
@@ -365,18 +365,22 @@ impl Table {
             };
             let by_row = Grouped::new(height as usize, crossings);
             make_rows(maker, height, by_row, |places, transitions| {
-                by_body(places, transitions, &mut position, &mut shared, &mut doubts)
+                by_body(places, transitions, &mut position, &mut shared, outward, &mut doubts)
             })
         } else {
             let by_row = self.by_row(layer, grid, &more);
             match rule.fill() {
                 Fill::EvenOdd => make_rows(maker, height, by_row, even_odd),
                 Fill::Solid => make_rows(maker, height, by_row, |places, transitions| {
-                    solid(places, transitions, &mut doubts)
+                    solid(places, transitions, outward, &mut doubts)
                 }),
             }
         };
         let closed = self.is_closed(layer);
+        if !closed {
+            // Where facets are missing, signs say nothing of those that are there.
+            doubts = LayerDoubts::default();
+        }
         (made, CutFindings { stray_rows, closed, shared: shared.counts(), doubts })
     }
 }

@@ -251,6 +251,8 @@ fn of_bytes(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
             Model("a Parasolid file")
         }
         None if has(257, b"ustar") => Archive("a tar archive"),
+        // Its numbers may be binary.
+        None if has(0, b"ply\n") || has(0, b"ply\r") => Model("a PLY file"),
         None => return None,
     })
 }

@@ -95,7 +95,7 @@ fn what_cannot_be_composed_is_said() {
         ("tile - --recipe r.json", &["standard input has none"]),
         ("tile tower.tif --classic --recipe r.json", &["--classic is for a stack"]),
         ("tile tower.tif --recipe -", &["name a file, as report.json"]),
-        ("tile tower.tif --recipe tower.tif", &["tower.tif: that is an input"]),
+        ("tile tower.tif --recipe tower.tif", &["tower.tif: no stack is written there"]),
         ("tile tower.tif --recipe r.json -o r.json", &["the stack is written there"]),
     ] {
         scratch.run(line).is_wrong_usage(words);

@@ -42,7 +42,8 @@ fn units_scale_the_solid() {
 #[test]
 fn heights_are_the_decimals_that_were_meant() {
     let scratch = Scratch::new();
-    let at = |[x, y, z]: [f32; 3]| [0.1 * x + 1.3, 0.1 * y - 0.7, 0.1 * z + 0.7];
+    let meant = |tenths: f32, mm: f64| (0.1 * f64::from(tenths) + mm) as f32;
+    let at = |[x, y, z]: [f32; 3]| [meant(x, 1.3), meant(y, -0.7), meant(z, 0.7)];
     let cup = Mesh { facets: cup(1).facets.into_iter().map(|facet| facet.map(at)).collect() };
     scratch.mesh("cup.stl", &cup);
     scratch.run("lamp convert cup.stl cup.step -q").succeeds_quietly();

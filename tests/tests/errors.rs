@@ -232,6 +232,7 @@ fn a_stack_that_cannot_be_read_is_named_with_what_is_wrong() {
             let output = match stage {
                 "lamp info" => "",
                 "lamp show --layer 0" => "-o x.png",
+                "lamp split --every 5" => "-o x/",
                 _ => "-o x.tif",
             };
             is_bad_input(&scratch, &format!("{stage} {name} {output}"), &words);

@@ -196,7 +196,8 @@ fn no_input_is_overwritten() {
         &format!("{cure} -o tower.stl"),
         &format!("{cure} -o gray.tif"),
     ] {
-        is_wrong_usage(&scratch.run(line), "that is an input");
+        // Where an ending names another format, that comes first.
+        assert_eq!(scratch.run(line).statuses, [Some(2)], "{line}");
     }
     scratch.run(&format!("{cure} -o s.png")).succeeds();
 }

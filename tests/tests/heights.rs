@@ -195,7 +195,7 @@ fn what_cannot_be_is_said() {
     usage("lamp heights tower.stl --criterion cusp", "needs a bound, as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
-    usage("lamp heights tower.stl --plot x.svg --report x.svg", "name the same file");
+    usage("lamp heights tower.stl --plot x.svg --report x.svg", "a table is CSV");
     usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
     usage(
         "slice tower.stl --adaptive --gray --material lamp-suspension --exposure-table times.csv",

@@ -113,7 +113,7 @@ fn each_defect_is_repaired_and_reported() {
     ] {
         let mesh = spoiled(&good, defect, 9);
         scratch.mesh("bad.stl", &mesh);
-        let line = "lamp mesh repair bad.stl -o good.stl --close 3mm --report report.json --strict";
+        let line = "lamp mesh repair bad.stl -o good.stl --weld 5um --close 3mm --report report.json --strict";
         let ran = scratch.run(line).succeeds();
         assert!(ran.stderr.starts_with("mesh repair: facets: "), "{ran:?}");
         scratch.run("lamp mesh check good.stl --strict").succeeds_quietly();
@@ -124,7 +124,8 @@ fn each_defect_is_repaired_and_reported() {
         assert_eq!(json!(of_deed), report["deeds"][deed], "{defect:?}");
         assert!(of_deed >= 9, "{defect:?}");
 
-        let ran = scratch.run("lamp mesh repair good.stl -o again.stl --close 3mm").succeeds();
+        let ran =
+            scratch.run("lamp mesh repair good.stl -o again.stl --weld 5um --close 3mm").succeeds();
         assert_eq!(ran.stderr, "mesh repair: no facet was touched\n");
         assert!(scratch.bytes("again.stl") == scratch.bytes("good.stl"));
     }

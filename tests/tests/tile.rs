@@ -343,7 +343,7 @@ fn what_cannot_be_meant_is_wrong_usage() {
         ("tile tower.tif:3 --layout l.json", &["leave out the counts"]),
         ("tile tower.tif --layout l.json --edge-gap 2mm", &["--layout"]),
         ("tile tower.tif --layout-picture p.jpg", &[".svg or .png"]),
-        ("tile tower.tif --layout-out tower.tif", &["that is an input"]),
+        ("tile tower.tif --layout-out tower.tif", &["no stack is written there"]),
         ("tile tower.tif --pack tight", &["box", "outline"]),
     ] {
         scratch.run(&line.replacen("tile", "tile -o x.tif", 1)).is_wrong_usage(words);

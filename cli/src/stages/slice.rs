@@ -284,8 +284,8 @@ impl Slicing<'_> {
 fn fill_doubt(doubt: &FillDoubt, name: &str) -> Vec<String> {
     let FillDoubt { unsigned_rows, repeated_mm3, inward_mm3, .. } = *doubt;
     let turned = format!(
-        "{name}: facets are turned over or missing in {unsigned_rows} rows of pixels: there every \
-         crossing toggles, as with --fill even-odd; lamp mesh repair turns facets"
+        "{name}: facets are turned over in {unsigned_rows} rows of pixels: there every crossing \
+         toggles, as with --fill even-odd; lamp mesh repair turns them back"
     );
     let repeated = format!(
         "{name}: {} mm³ lie in several shells whose facets face outwards: bodies that overlap are \
