@@ -147,9 +147,10 @@ impl FillRule {
         if self.has_bodies() { body } else { 0 }
     }
 
-    /// Returns true if two bodies are of one file.
-    pub(crate) fn are_of_one_file(&self, a: u32, b: u32) -> bool {
-        self.rules[a as usize].file == self.rules[b as usize].file
+    /// Returns true if two bodies are of one file, and neither is cut out.
+    pub(crate) fn may_share(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|body| &self.rules[body as usize]);
+        a.file == b.file && !a.is_cutter() && !b.is_cutter()
     }
 
     /// Returns a number that differs between bodies, since their contours close by themselves.
@@ -311,6 +312,11 @@ impl<'a> Position<'a> {
         self.windings.iter().find(|&&(other, _)| other == body).map_or(0, |&(_, winding)| winding)
     }
 
+    /// Returns true if a body is cut out of others, however its facets face.
+    pub(crate) fn is_cut_out(&self, body: u32) -> bool {
+        self.rule.rules[body as usize].is_cutter()
+    }
+
     /// Returns the bodies whose windings are not zero.
     pub(crate) fn windings(&self) -> &[(u32, i32)] {
         &self.windings
@@ -351,7 +357,7 @@ impl<'a> SharedPixels<'a> {
             *self.counts.entry([a, a]).or_default() += u64::from(pixels);
             for &(b, of_b) in &self.held[k + 1..] {
                 let is_shared = of_a.signum() == of_b.signum() && winding.abs() > 1;
-                if is_shared && self.rule.are_of_one_file(a, b) {
+                if is_shared && self.rule.may_share(a, b) {
                     *self.counts.entry([a.min(b), a.max(b)]).or_default() += u64::from(pixels);
                 }
             }

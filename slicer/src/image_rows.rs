@@ -197,7 +197,8 @@ pub(crate) fn by_body(
         let here = group[0].column();
         shared.add(position, here - column);
         for &(body, winding) in position.windings() {
-            if winding != outward && !position.unsigned().contains(&body) {
+            let is_doubtful = winding != outward && !position.is_cut_out(body);
+            if is_doubtful && !position.unsigned().contains(&body) {
                 let doubts = doubts.of_bodies.entry(body).or_default();
                 doubts.add(outward * winding, here - column);
             }

@@ -237,54 +237,62 @@ impl Planes {
     }
 
     /// Returns the planes that are elsewhere for a body between two heights, with their sides.
+    ///
+    /// Alone, a body's height is rounded to whole layers, and its last section is at its own top. If
+    /// the planes that it meets are fewer, the layer beyond them is cut at its end; if it begins at
+    /// the bottom of a layer and meets one more, that one is left out.
     fn moves_of(&self, [low_um, high_um]: [f64; 2]) -> Vec<(usize, [f64; 2])> {
         let ends = &self.boundaries_um;
         let holds = |layer: usize, z_um: f64| {
-            ends[layer] <= z_um && z_um <= ends[layer + 1] && layer < self.len()
-        };
-        // As the part's height is rounded to whole layers, so is a body's.
-        let whole = |z_um: f64| match self.spacing {
-            Spacing::Even { thickness_um, .. } => {
-                ((z_um - ends[0]) / thickness_um).round().max(0.0) as usize
-            }
-            Spacing::Uneven(_) => ends.partition_point(|&end| end + self.tolerance_um < z_um),
+            layer < self.len() && ends[layer] <= z_um && z_um <= ends[layer + 1]
         };
         let tolerance_um = self.tolerance_um.min(0.5 * (high_um - low_um));
         let at_top = [high_um, high_um - tolerance_um];
         let at_bottom = [low_um.next_up(), low_um.next_up() + tolerance_um];
-        let mut moves = Vec::new();
-        match self.rule {
-            PlaneRule::Top => {
-                let last = whole(high_um).saturating_sub(1).min(self.len() - 1);
-                if self.sides_um[last] > high_um && holds(last, high_um) {
-                    moves.push((last, at_top));
-                }
+        let met = self.between(low_um, high_um);
+        let wanted = match self.spacing {
+            Spacing::Even { thickness_um, .. } => {
+                ((high_um - low_um) / thickness_um).round().max(1.0) as usize
             }
-            PlaneRule::Middle => {}
-            PlaneRule::Bottom => {
-                let end = whole(high_um);
-                if matches!(self.spacing, Spacing::Even { .. }) && end < self.len() && end > 0 {
-                    moves.push((end, [self.z_um[end], self.sides_um[end].max(high_um.next_up())]));
+            // A top within a given layer has its section there.
+            Spacing::Uneven(_) => match self.rule {
+                PlaneRule::Top
+                    if ends.get(met.end).is_some_and(|&end| end + tolerance_um < high_um) =>
+                {
+                    met.len() + 1
                 }
-                let first = whole(low_um);
-                if first < end && self.z_um[first] < low_um && holds(first, low_um) {
-                    moves.push((first, at_bottom));
-                }
+                _ => met.len().max(1),
+            },
+        };
+        if met.len() < wanted {
+            if met.is_empty() {
+                let middle_um = 0.5 * (low_um + high_um);
+                let at = match self.rule {
+                    PlaneRule::Top => at_top,
+                    PlaneRule::Middle => [middle_um, middle_um],
+                    PlaneRule::Bottom => at_bottom,
+                };
+                let layer = (0..self.len()).find(|&layer| holds(layer, middle_um));
+                return layer.map(|layer| (layer, at)).into_iter().collect();
             }
-        }
-        let is_met = !self.between(low_um, high_um).is_empty();
-        if !is_met && moves.is_empty() {
-            // At least one layer, as a part has.
-            let middle_um = 0.5 * (low_um + high_um);
-            let at = match self.rule {
-                PlaneRule::Top => at_top,
-                PlaneRule::Middle => [middle_um, middle_um],
-                PlaneRule::Bottom => at_bottom,
+            return match self.rule {
+                PlaneRule::Top | PlaneRule::Middle if holds(met.end, high_um) => {
+                    vec![(met.end, at_top)]
+                }
+                PlaneRule::Bottom if met.start > 0 && holds(met.start - 1, low_um) => {
+                    vec![(met.start - 1, at_bottom)]
+                }
+                _ => Vec::new(),
             };
-            let layer = (0..self.len()).find(|&layer| holds(layer, middle_um));
-            moves.extend(layer.map(|layer| (layer, at)));
         }
-        moves
+        let begins_with_layer = (ends[met.start] - low_um).abs() <= self.tolerance_um;
+        match self.rule {
+            PlaneRule::Bottom if met.len() > wanted && begins_with_layer => {
+                let last = met.end - 1;
+                vec![(last, [self.z_um[last], self.sides_um[last].max(high_um.next_up())])]
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Returns the planes at which a body is cut.

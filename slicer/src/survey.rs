@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
 use crate::file_blocks::FileBlock;
+use crate::part::Piece;
 use crate::placement::{PlacedFacet, PlacedPart, greater, lesser};
 use crate::planes::Planes;
 use crate::wild;
@@ -224,11 +225,21 @@ impl Survey {
         planes.of_body(body).between(min[2], max[2])
     }
 
-    /// Returns the heights (micrometres) between which each body of a part lies.
+    /// Returns the heights (micrometres) between which each body of a part lies. Bodies that are cut
+    /// out have the planes of the part.
     pub(crate) fn heights_of_bodies(&self, part: &PlacedPart) -> Vec<[f64; 2]> {
-        let mut heights_um = vec![[f64::MAX, f64::MIN]; part.model.pieces().len()];
+        let of_part = [self.min[2], self.max[2]];
+        let start = |piece: &Piece| match piece.rule().is_cutter() {
+            true => of_part,
+            false => [f64::MAX, f64::MIN],
+        };
+        let mut heights_um: Vec<_> = part.model.pieces().iter().map(start).collect();
         for (block, survey) in self.blocks.iter().enumerate() {
-            let [low, high] = &mut heights_um[part.model.place_of(block).0];
+            let piece = part.model.place_of(block).0;
+            if part.model.pieces()[piece].rule().is_cutter() {
+                continue;
+            }
+            let [low, high] = &mut heights_um[piece];
             (*low, *high) = (low.min(survey.min[2]), high.max(survey.max[2]));
         }
         heights_um

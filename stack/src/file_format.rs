@@ -268,8 +268,12 @@ fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     PlainText::new(start).ok()?.read_to_end(&mut text).ok()?;
     text.make_ascii_lowercase();
     let padding = |byte: &u8| matches!(byte, 0 | 0x1A) || byte.is_ascii_whitespace();
-    let end = text.iter().rposition(|byte| !padding(byte))? + 1;
     let has_zeros = text.contains(&0);
+    let Some(last) = text.iter().rposition(|byte| !padding(byte)) else {
+        // Blank lines are no header.
+        return (!has_zeros && !text.is_empty()).then_some(FileFormat::Text);
+    };
+    let end = last + 1;
     let text = &text[..end];
     if text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) {
         return None;

@@ -189,7 +189,7 @@ fn layouts_and_reports_that_cannot_be_meant_are_refused() {
     }
     for (line, words) in [
         ("tile box.tif --report box.tif -o b.tif", "box.tif: no stack is written there"),
-        ("tile box.tif --report b.tif -o b.tif", "the stack is written there"),
+        ("tile box.tif --report b.tif -o b.tif", "no stack is written there"),
         ("tile box.tif --report r.json --layout-out r.json -o b.tif", "r.json"),
         ("tile box.tif --report r.json --recipe r.json", "r.json"),
     ] {

@@ -177,8 +177,8 @@ fn parts_that_lie(scratch: &Scratch) {
         (&b"solid "[..], &b"a"[..], "facet 0 "),
         (b"solid a\nfacet ", b"b ", "facet 0 "),
         (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 1 ", b"9", "facet 0 "),
-        (b"solid a\r", b" \r", "facet 0 "),
-        (b"", b"solid\nendsolid\n", "`solid` should"),
+        (b"solid a\r", b" \r", "holds no facets"),
+        (b"", b"solid\nendsolid\n", "holds no facets"),
     ] {
         let bytes = [start, &middle.repeat((8 << 20) / middle.len()), b"\nx"].concat();
         fs::write(scratch.path("long.stl"), &bytes).unwrap();

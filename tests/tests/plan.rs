@@ -313,7 +313,7 @@ fn wrong_options_are_status_2() {
         ("--min-level 256", "--min-level"),
         ("--exposure 0s", "takes some time"),
         ("--plot plan.pdf", ".svg or .png"),
-        ("--report stairs.tif", "no stack is written there"),
+        ("--report stairs.tif", "that is an input"),
         ("--report p.svg --plot p.svg", "written as JSON"),
         ("--map m.svg", "--map-layer"),
         ("--map m.svg --map-layer 30 --map-region 90,0,2,2", "outside the image"),

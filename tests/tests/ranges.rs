@@ -25,7 +25,7 @@ fn ranges_sliced_apart_join_to_the_whole() {
         scratch.run(&format!("{slice} -o pages{k}/")).succeeds_quietly();
         // A mesh depends on the layers below, which are not in these stacks.
         let tiled = format!("{slice} | dither | tile --mesh none --classic -o tiled{k}.tif");
-        scratch.run(&tiled).succeeds_quietly();
+        scratch.run(&tiled).succeeds();
     }
     let slice = format!("slice t.stl {COARSE}");
     for (joined, whole) in [
@@ -36,7 +36,7 @@ fn ranges_sliced_apart_join_to_the_whole() {
         ("lamp join 0.tif 1.tif 2.tif 3.tif | fix -q | tile", "| fix -q | tile"),
     ] {
         let whole = scratch.run(&format!("{slice} {whole}")).succeeds().stdout;
-        assert!(scratch.run(joined).succeeds_quietly().stdout == whole, "{joined}");
+        assert!(scratch.run(joined).succeeds().stdout == whole, "{joined}");
     }
     scratch.run("lamp join 0.tif 1.tif 2.tif 3.tif -o pages/").succeeds_quietly();
     let pages = scratch.run("lamp convert pages").succeeds_quietly().stdout;

@@ -16,10 +16,11 @@ use crate::exit::Exit;
 use crate::options::{Common, Input, Output, one_of};
 use crate::part_options::part_notes;
 use crate::progress::say;
+use crate::stack_notes::doubts;
 use crate::step_options::{HEADING, ReaderOptions, bytes_of, parse_tolerance};
 use crate::streams::{
     check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
-    new_folder, open_pages, progress, write_file, write_layers, written_to,
+    new_folder, open_pages, progress, unless_found, write_file, write_layers, written_to,
 };
 
 /// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
@@ -67,6 +68,11 @@ pub(crate) struct ConvertArgs {
     /// Take pages that another program has changed as they are, and make new checks
     #[arg(long)]
     ignore_checks: bool,
+
+    /// Stop with status 3 and no output if the pages may not be one whole stack, such as a folder
+    /// that lacks a number
+    #[arg(long)]
+    strict: bool,
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
@@ -100,6 +106,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         }
         Ok(layer)
     });
+    let layers = unless_found(layers, || doubts().filter(|_| args.strict).map(Exit::Findings));
     match shape {
         OutputKind::Tiff => write_layers(layers, &to, &progress),
         OutputKind::Pngs => {

@@ -285,15 +285,16 @@ fn fill_doubt(doubt: &FillDoubt, name: &str) -> Vec<String> {
     let FillDoubt { unsigned_rows, repeated_mm3, inward_mm3, .. } = *doubt;
     let turned = format!(
         "{name}: facets are turned over in {unsigned_rows} rows of pixels: there every crossing \
-         toggles, as with --fill even-odd; lamp mesh repair turns them back"
+         toggles, as with --fill even-odd, and shells that overlap cut each other; lamp mesh \
+         repair turns them back"
     );
     let repeated = format!(
-        "{name}: {} mm³ lie in several shells whose facets face outwards: bodies that overlap are \
-         filled; if a shell within another is a void, cut it out with --fill even-odd",
+        "{name}: {} mm³ lie in several shells whose facets face outwards: bodies that overlap, or \
+         stand twice, are filled; a void within another shell is cut out by --fill even-odd",
         short(repeated_mm3)
     );
     let inward = format!(
-        "{name}: the facets around {} mm³ face inwards: the part is filled all the same",
+        "{name}: the facets around {} mm³ face inwards, or voids overlap there: all of it is filled",
         short(inward_mm3)
     );
     let all =

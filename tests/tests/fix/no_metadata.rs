@@ -3,7 +3,7 @@
 use lamp_stack::{Image, Layer};
 use lamp_tests::{Scratch, at_least, mask, stripped, with_soft_edges};
 
-use crate::{COARSE, bands, broken_ball, images, is_corrected, number, report};
+use crate::{COARSE, bands, broken_ball, is_corrected, number, pixels_off, report};
 
 #[test]
 fn a_stack_without_metadata_is_corrected_to_the_same_pixels() {
@@ -12,9 +12,13 @@ fn a_stack_without_metadata_is_corrected_to_the_same_pixels() {
         scratch.run("fix stray.tif --max-width 40 -o fixed.tif").succeeds();
         scratch.stack("bare.tif", stripped(&scratch.layers("stray.tif")));
         scratch.run("fix bare.tif --max-width 40 -o bare_fixed.tif").succeeds();
-        let (fixed, bare) = (scratch.layers("fixed.tif"), scratch.layers("bare_fixed.tif"));
-        assert!(images(&fixed) == images(&bare), "seed {seed}");
-        assert!(images(&fixed) != images(&scratch.layers("stray.tif")));
+        scratch.run(&format!("slice whole.stl {COARSE} -o whole.tif")).succeeds();
+        let whole = scratch.layers("whole.tif");
+        // Rows alone leave open where contours break off, so a pixel may differ here and there.
+        let wrong = |name: &str| pixels_off(&scratch.layers(name), &whole);
+        let [stray, fixed, bare] = ["stray.tif", "fixed.tif", "bare_fixed.tif"].map(wrong);
+        let most = stray / 50;
+        assert!(stray > 1000 && fixed <= most && bare <= most, "{seed}: {stray} {fixed} {bare}");
     }
 }
 
