@@ -174,7 +174,7 @@ fn parts_that_lie(scratch: &Scratch) {
     });
     // Lines that do not end, and a file that is all empty solids but the last.
     for (start, middle, words) in [
-        (&b"solid "[..], &b"a"[..], "facet 0 "),
+        (&b"solid "[..], &b"a"[..], "holds no facets"),
         (b"solid a\nfacet ", b"b ", "facet 0 "),
         (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 1 ", b"9", "facet 0 "),
         (b"solid a\r", b" \r", "holds no facets"),
