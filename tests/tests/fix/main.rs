@@ -10,7 +10,7 @@ mod thin;
 mod untouched;
 
 use lamp_fixtures::{Defect, Facet, inject};
-use lamp_stack::{Image, Layer};
+use lamp_stack::Layer;
 use lamp_tests::{Ran, Scratch, differing, tilted_ball};
 use serde_json::Value;
 
@@ -51,10 +51,6 @@ fn is_corrected(band: &Value) -> bool {
 fn layer_of<'a>(layers: &'a [Layer], band: &Value) -> &'a Layer {
     let index = number(&band["layer"]);
     layers.iter().find(|layer| layer.info.index == index).expect("such a layer")
-}
-
-fn images(layers: &[Layer]) -> Vec<&Image> {
-    layers.iter().map(|layer| &*layer.image).collect()
 }
 
 /// How many pixels differ between two stacks.

@@ -160,7 +160,7 @@ impl SupportArgs {
         let machine: Machine = entry(&self.machine)?;
         let first = first_page(stack)?;
         let name = input_name(&self.stack);
-        let surface = self.surface(&first, &name, &progress)?;
+        let surface = self.surface(&first, &name, progress)?;
         let found = self.check(stack, progress)?;
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
         let plans = plan_supports(layers, &found, &surface, &self.options());
