@@ -167,7 +167,7 @@ fn coordinates(text: &str) -> [Vec<f64>; 3] {
     let points = text.lines().filter_map(|line| line.split_once("CARTESIAN_POINT('',("));
     let points: Vec<Vec<f64>> = points
         .map(|(_, numbers)| {
-            let numbers = numbers.trim_end_matches(|c| c == ')' || c == ';');
+            let numbers = numbers.trim_end_matches([')', ';']);
             numbers.split(',').map(|number| number.parse().unwrap()).collect()
         })
         .collect();
