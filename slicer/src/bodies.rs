@@ -451,6 +451,13 @@ impl Doubts {
             self.inward_px += u64::from(pixels);
         }
     }
+
+    /// Adds others.
+    pub(crate) fn join(&mut self, other: Self) {
+        self.unsigned_rows += other.unsigned_rows;
+        self.repeated_px += other.repeated_px;
+        self.inward_px += other.inward_px;
+    }
 }
 
 /// The doubts of a layer by body, and its white pixels.

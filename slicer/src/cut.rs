@@ -103,12 +103,6 @@ impl RowCrossing {
     pub(crate) fn winding(self) -> i32 {
         (self.0 & 1) as i32 * 2 - 1
     }
-
-    /// Returns true if another one steps the other way.
-    #[inline]
-    pub(crate) fn turns_back(self, other: Self) -> bool {
-        (self.0 ^ other.0) & 1 == 1
-    }
 }
 
 /// A crossing in its row and the body that it is of, to sort by.

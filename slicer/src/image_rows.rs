@@ -146,14 +146,25 @@ pub(crate) fn solid(
     outward: i32,
     doubts: &mut LayerDoubts,
 ) -> bool {
-    // Nearly all rows: a clean shell is entered and left in turn.
-    let is_clean = places.is_sorted_by(|a, b| a.column() < b.column() && a.turns_back(*b))
-        && places.first().is_none_or(|first| first.winding() == outward);
+    // Nearly all rows: a clean shell is entered and left in turn. One pass, without a branch.
+    let start = transitions.len();
+    let (mut is_clean, mut least, mut winding) = (true, 0, outward);
+    transitions.extend(places.iter().map(|place| {
+        let column = place.column();
+        is_clean &= (column >= least) & (place.winding() == winding);
+        (least, winding) = (column + 1, -winding);
+        column
+    }));
     if is_clean {
-        transitions.extend(places.iter().map(|place| place.column()));
         return places.len().is_multiple_of(2);
     }
-    wound(places, transitions, outward, doubts.of_bodies.entry(0).or_default())
+    transitions.truncate(start);
+    let mut of_row = Doubts::default();
+    let is_even = wound(places, transitions, outward, &mut of_row);
+    if of_row != Doubts::default() {
+        doubts.of_bodies.entry(0).or_default().join(of_row);
+    }
+    is_even
 }
 
 /// The same for any row. Adds to the doubts about it.
@@ -163,22 +174,31 @@ fn wound(
     outward: i32,
     doubts: &mut Doubts,
 ) -> bool {
-    if places.iter().map(|place| place.winding()).sum::<i32>() != 0 {
-        let is_even = even_odd(places, transitions);
-        doubts.unsigned_rows += u64::from(is_even);
-        return is_even;
-    }
-    let (mut winding, mut column) = (0, 0);
-    for group in places.chunk_by(|a, b| a.column() == b.column()) {
-        let (before, here) = (winding, group[0].column());
-        doubts.add(outward * winding, here - column);
-        winding += group.iter().map(|place| place.winding()).sum::<i32>();
+    let start = transitions.len();
+    let (mut winding, mut column, mut rest) = (0, 0, places);
+    while let Some(first) = rest.first() {
+        let (before, here) = (winding, first.column());
+        while let Some((place, others)) = rest.split_first()
+            && place.column() == here
+        {
+            winding += place.winding();
+            rest = others;
+        }
+        if before != 0 && before != outward {
+            doubts.add(outward * before, here - column);
+        }
         if (before == 0) != (winding == 0) {
             transitions.push(here);
         }
         column = here;
     }
-    true
+    if winding == 0 {
+        return true;
+    }
+    transitions.truncate(start);
+    let is_even = even_odd(places, transitions);
+    *doubts = Doubts { unsigned_rows: u64::from(is_even), ..Doubts::default() };
+    is_even
 }
 
 /// Adds a row's transitions, wherever the position leaves or enters the part. Returns true
