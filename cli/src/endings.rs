@@ -154,12 +154,12 @@ fn parse(text: &str, writes: &Writes) -> Result<PathBuf, String> {
     }
 }
 
-/// Returns true if a name is that of a packed stack.
+/// Returns true if a name ends as a packed stack does.
 pub(crate) fn is_packed_name(path: &Path) -> bool {
     extension(path) == "lamp"
 }
 
-/// Returns true if a name is that of a STEP file.
+/// Returns true if a name ends as a STEP file does.
 pub(crate) fn is_step_name(path: &Path) -> bool {
     let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
     path.extension().is_some_and(is_step)

@@ -9,7 +9,7 @@ use lamp_stack::{Pages, StackNote};
 use crate::progress::say;
 use crate::streams::input_name;
 
-/// What was printed.
+/// The notes that were printed.
 #[derive(Default)]
 struct Printed {
     command: String,

@@ -1,4 +1,4 @@
-//! Tells inside from outside of a part, from the windings of its bodies.
+//! Decides what is inside a part, from the windings of its bodies.
 //!
 //! A body holds a point where its surface winds around it. The solids of an object unite, less its
 //! negative volumes; objects and files unite; files that cut are taken away, or all else is.
@@ -27,7 +27,7 @@ pub enum Join {
     /// It unites with them.
     #[default]
     Unite,
-    /// It is cut out of those that unite.
+    /// It is cut out of the files that unite.
     Subtract,
     /// Only what it holds is kept.
     Intersect,
@@ -90,7 +90,7 @@ impl Turn {
 pub struct FillRule {
     fill: Fill,
     bodies: Bodies,
-    /// Those of a part with several bodies.
+    /// One for each body of a part that has several.
     rules: Vec<BodyRule>,
     /// Whether a point is inside where any body holds it.
     is_union: bool,

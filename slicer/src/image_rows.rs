@@ -202,7 +202,7 @@ fn wound(
 }
 
 /// Adds a row's transitions, wherever the position leaves or enters the part. Returns true
-/// if the row balances. Counts the pixels that bodies share, and those that leave doubts.
+/// if the row balances. Counts the pixels that bodies share, and doubtful pixels.
 pub(crate) fn by_body(
     places: &[BodyCrossing],
     transitions: &mut Vec<u32>,

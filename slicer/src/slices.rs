@@ -383,7 +383,7 @@ impl Slices {
     }
 
     /// Returns the files whose surfaces left doubts in the layers made so far. Under
-    /// [`Fill::EvenOdd`] there are none.
+    /// [`Fill::EvenOdd`] the list is empty.
     pub fn fill_doubts(&self) -> Vec<FillDoubt> {
         self.doubts.of_files(|body| self.model.model.body_in_file(body).0)
     }

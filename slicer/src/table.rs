@@ -20,7 +20,7 @@ use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
 use crate::placement::PlacedFacet;
 
-/// The rule that tells inside from outside of a body.
+/// The rule that decides what is inside a body.
 ///
 /// ```
 /// use lamp_slicer::Fill;
@@ -378,7 +378,7 @@ impl Table {
         };
         let closed = self.is_closed(layer);
         if !closed {
-            // Where facets are missing, signs say nothing of those that are there.
+            // Where facets are missing, the signs of the others say nothing.
             doubts = LayerDoubts::default();
         }
         (made, CutFindings { stray_rows, closed, shared: shared.counts(), doubts })

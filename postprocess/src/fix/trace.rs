@@ -114,7 +114,7 @@ pub(super) fn trace(
     open_rows: Option<&[u32]>,
     neighbours: &[Vec<&Image>; 2],
 ) -> Option<Correction> {
-    // `tile` adds a crossing where it ends a row, so lines tell nothing of what is missing.
+    // `tile` adds a crossing where it ends a row, so lines do not show what is missing.
     if band.start == 0 || band.end == mask.height() || band.clone().any(is_ended) {
         return None;
     }

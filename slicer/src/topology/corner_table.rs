@@ -75,7 +75,7 @@ impl CornerTable {
         (self.points, self.vertices, self.body_ends)
     }
 
-    /// Returns the table with each coordinate changed. Vertices stay as many as they are.
+    /// Returns the table with each coordinate changed. The number of vertices stays.
     pub(crate) fn with_points(mut self, changed: impl Fn(f64) -> f64) -> Self {
         self.points.as_flattened_mut().iter_mut().for_each(|c| *c = changed(*c));
         self

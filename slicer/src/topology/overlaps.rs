@@ -13,7 +13,7 @@ use crate::topology::{CornerTable, MeshCheck, Shells};
 
 /// Two shells that enclose some volume together, more than once.
 ///
-/// A void in its body is none: its facets face inwards, so that they take away.
+/// A void in its body does not count: its facets face inwards, so that they take away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellOverlap {
     /// The shells, as positions in [`MeshCheck::shells`].
