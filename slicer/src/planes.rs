@@ -204,15 +204,15 @@ impl Planes {
     /// Gives each body, between two heights (micrometres), the layers that it has alone: the part's
     /// top and bottom are not where its other bodies begin and end.
     pub(crate) fn with_bodies(mut self, bodies_um: &[[f64; 2]]) -> Self {
+        let alone = self.clone();
         let mut numbers: HashMap<Vec<(usize, [u64; 2])>, u32> = HashMap::new();
         for &body_um in bodies_um {
-            let moves = self.moves_of(body_um);
+            let moves = alone.moves_of(body_um);
             let key = moves.iter().map(|&(layer, at)| (layer, at.map(f64::to_bits))).collect();
             let number = match moves.is_empty() {
                 true => 0,
                 false => *numbers.entry(key).or_insert_with(|| {
-                    let (own, own_of) = (Vec::new(), Vec::new());
-                    let mut planes = Self { own, own_of, ..self.clone_common() };
+                    let mut planes = alone.clone();
                     for &(layer, [z_um, side_um]) in &moves {
                         planes.set(layer, z_um, side_um);
                     }
@@ -223,17 +223,6 @@ impl Planes {
             self.own_of.push(number);
         }
         self
-    }
-
-    fn clone_common(&self) -> Self {
-        Self::common(
-            self.z_um.clone(),
-            self.sides_um.clone(),
-            self.tolerance_um,
-            self.boundaries_um.clone(),
-            self.spacing.clone(),
-            self.rule,
-        )
     }
 
     /// Returns the planes that are elsewhere for a body between two heights, with their sides.
