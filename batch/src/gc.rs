@@ -105,8 +105,8 @@ mod tests {
         let high = graph.add(task("high", Kind::Join, &[b]));
         let publish = |key: Key| {
             let recipe = graph.task(key).recipe.clone();
-            let mut result = store.begin(key).unwrap();
-            io::Write::write_all(result.file(), b"layers").unwrap();
+            let result = store.begin(key).unwrap();
+            io::Write::write_all(&mut result.file(), b"layers").unwrap();
             let result = Some(result.finish().unwrap());
             store.publish(&Manifest { recipe, result, facts: Map::new() }).unwrap();
         };

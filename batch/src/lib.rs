@@ -22,7 +22,7 @@
 //! let key = recipe.key();
 //! assert!(store.manifest(key).is_none());
 //!
-//! let mut result = store.begin(key)?;
+//! let result = store.begin(key)?;
 //! result.file().write_all(b"layers")?;
 //! let written = Some(result.finish()?);
 //! store.publish(&Manifest { recipe, result: written, facts: Default::default() })?;
@@ -38,6 +38,7 @@ mod key;
 mod ledger;
 mod named;
 mod night;
+pub mod path_bytes;
 mod store;
 mod task;
 

@@ -8,6 +8,7 @@ use std::time::{Duration, SystemTime};
 use serde::{Deserialize, Serialize};
 
 use crate::key::Key;
+use crate::path_bytes;
 use crate::store::{Store, StoreError, sealed};
 use crate::task::Graph;
 
@@ -15,6 +16,7 @@ use crate::task::Graph;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NamedTasks {
     /// The night file, as an absolute path.
+    #[serde(with = "path_bytes")]
     pub night: PathBuf,
     /// The tasks whose results are wanted.
     pub goals: Vec<Key>,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::key::{Key, Recipe};
+use crate::path_bytes;
 
 /// A piece of work with one result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +32,7 @@ pub struct Task {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
     /// Where it is now, as an absolute path.
+    #[serde(with = "path_bytes")]
     pub path: PathBuf,
     /// `blake3:` and 64 hexadecimal digits.
     pub digest: String,

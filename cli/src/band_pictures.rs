@@ -1,7 +1,6 @@
 //! Draws a picture of each band that `fix` corrected or left, for `--evidence`.
 
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use lamp_postprocess::{Band, BandOutcome, Fixed};
@@ -73,8 +72,7 @@ impl BandPictures {
             if corrected { "" } else { "_left" },
         );
         let (width, height) = (rows[0].len() as u32 / 3, rows.len() as u32);
-        let file = File::create_new(self.folder.path().join(name))?;
-        write_rgb_png(BufWriter::new(file), width, height, rows.into_iter())
+        self.folder.add(&name, |out| write_rgb_png(out, width, height, rows.into_iter()))
     }
 }
 

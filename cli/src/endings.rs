@@ -3,6 +3,8 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use lamp_stack::STACK_ENDINGS;
+
 use crate::exit::Exit;
 use crate::streams::extension;
 
@@ -15,10 +17,8 @@ pub(crate) struct Writes {
 }
 
 /// A stack, as a TIFF or packed.
-pub(crate) const STACK: Writes = Writes {
-    sentence: "a stack is a TIFF: end its name in .tif",
-    endings: &["tif", "tiff", "btf", "tf8", "lamp"],
-};
+pub(crate) const STACK: Writes =
+    Writes { sentence: "a stack is a TIFF: end its name in .tif", endings: &STACK_ENDINGS };
 
 /// A packed stack.
 pub(crate) const PACKED_STACK: Writes =

@@ -19,9 +19,9 @@ use lamp_postprocess::{
     CompensateError, CompensateProblem, EditError, EditProblem, LayerProblem, LayoutError,
     RecipeError, StripsError, TileError,
 };
-use lamp_slicer::SliceError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
+use lamp_slicer::{SliceError, ThreeMfError};
 use lamp_stack::{CatalogueError, FileFormat, Length, PartFormat, StackError};
 use lamp_supports::SupportError;
 use lamp_view::SurfaceError;
@@ -82,7 +82,13 @@ fn slicing(error: &SliceError) -> Option<String> {
             "check --units, --dpi and --thickness, or give --trust-extent if the part is so large"
         }
         SliceError::TooManyCrossings { .. } => "check it for facets that repeat, and --dpi",
-        SliceError::ThreeMf(_) | SliceError::Obj { .. } => "export the part again",
+        SliceError::ThreeMf(error) => match **error {
+            ThreeMfError::Unread { .. } => "export it as a plain mesh",
+            ThreeMfError::Encrypted(_) => "export it without protection",
+            ThreeMfError::NothingToBuild { .. } => "mark what is to be built as a part",
+            _ => "export the part again",
+        },
+        SliceError::Obj { .. } => "export the part again",
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::NothingLeft { .. } => "export the part again",
         SliceError::TooManyFacets { .. } => "export it with fewer facets",
@@ -396,7 +402,9 @@ fn stack(error: &StackError) -> Option<String> {
         },
         StackError::NotTiff { .. } => "if it is a part, slice it first",
         StackError::Exists => "--force replaces a folder of an earlier run",
-        StackError::NotReplaceable { .. } => "choose another name, or remove the folder yourself",
+        StackError::NotOurs | StackError::NotReplaceable { .. } => {
+            "choose another name, or remove the folder yourself"
+        }
         // It is transparent, so that it is no cause of its own.
         StackError::Io(error) => return input_output(error),
         _ => return None,

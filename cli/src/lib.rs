@@ -71,7 +71,7 @@ use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
 use stack_notes::print_notes_of;
-use streams::give_up;
+use streams::{give_up, settle_output};
 use usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
@@ -154,6 +154,7 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
     }
     common.apply()?;
     command.run(common)?;
+    settle_output()?;
     Ok(ExitCode::SUCCESS)
 }
 

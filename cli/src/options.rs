@@ -10,7 +10,7 @@ use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
-use lamp_stack::{Length, LengthError, Named};
+use lamp_stack::{Length, LengthError, Named, skip_sync};
 
 use crate::exit::Exit;
 use crate::memory::{in_words, within_limits};
@@ -34,6 +34,14 @@ pub(crate) struct Common {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 
+    /// Do not wait until the disk has what is written
+    ///
+    /// Commands end once the disk has the bytes and the names of their outputs. Without that, a loss
+    /// of power or a disk that fails late may take an output that was reported as written. For disks
+    /// whose files can be made again
+    #[arg(long, global = true, help_heading = GENERAL, hide_short_help = true)]
+    no_sync: bool,
+
     /// Take further options from a TOML file
     ///
     /// Keys are the long options, as thickness = "50um" or gray = true; a table, as [slice], is for
@@ -48,7 +56,7 @@ const THREAD_BYTES: u64 = 8 << 20;
 impl Common {
     /// Returns options of a command that runs as a part of another one.
     pub(crate) fn quiet() -> Self {
-        Self { quiet: true, verbose: false, threads: None, options: None }
+        Self { quiet: true, verbose: false, threads: None, no_sync: false, options: None }
     }
 
     /// Returns the options file.
@@ -58,6 +66,9 @@ impl Common {
 
     /// Sets up the threads. To be called once.
     pub(crate) fn apply(&self) -> Result<(), Exit> {
+        if self.no_sync {
+            skip_sync();
+        }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads()?).build_global();
         Ok(pool.map_err(|error| {
             anyhow!("threads cannot be started: {error}: give fewer --threads, or more memory")

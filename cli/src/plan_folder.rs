@@ -1,6 +1,5 @@
 //! The folder that planners on a fixed glass write: bitmaps in order, a report and pictures.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -69,7 +68,7 @@ impl PlanFolder {
 
     fn put(&self, file: &str, bytes: &[u8]) -> Result<(), Exit> {
         let place = || self.name.join(file).display().to_string();
-        Ok(fs::write(self.folder.path().join(file), bytes).with_context(place)?)
+        Ok(self.folder.add(file, |out| out.write_all(bytes)).with_context(place)?)
     }
 
     fn write_bitmaps(&self, files: &PlanFiles<'_>) -> Result<(), Exit> {

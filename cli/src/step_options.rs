@@ -1,6 +1,5 @@
 //! Options for reading STEP files, and notes about what was read.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::mem::discriminant;
 use std::path::Path;
@@ -10,7 +9,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use lamp_slicer::brep::{Finding, Prepared};
 use lamp_slicer::{KernelName, OpenOptions, SliceError, step_bytes};
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Dpi, Length, open_ending};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
@@ -186,7 +185,7 @@ pub(crate) fn bytes_of(path: &Path) -> Result<Arc<[u8]>, SliceError> {
     } else if path.is_dir() {
         return Err(SliceError::Folder);
     } else {
-        File::open(path)?.read_to_end(&mut bytes)?;
+        open_ending(path)?.read_to_end(&mut bytes)?;
     }
     step_bytes(bytes)
 }

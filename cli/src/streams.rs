@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, anyhow};
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
-    PageWriter, Pages, PassingLayer, StackError, StackInfo, map_in_order, write_packed,
-    write_stack,
+    PageWriter, Pages, PassingLayer, StackError, StackInfo, close, map_in_order, sync,
+    write_packed, write_stack,
 };
 
 use crate::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
@@ -136,26 +136,28 @@ pub(crate) fn give_up(error: &Exit) {
 /// Returns the progress of a command that writes to `output`.
 pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
     IS_AWAITED.store(is_stream(&output.output) && !io::stdout().is_terminal(), Ordering::Relaxed);
-    let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_is_file();
+    let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_file().is_some();
     Progress::new(command, common, last)
 }
 
-/// Returns whether standard output goes to a file, so that no stage follows.
-fn stdout_is_file() -> bool {
-    #[cfg(unix)]
-    {
-        stdout_metadata().is_some_and(|metadata| metadata.is_file())
-    }
-    #[cfg(not(unix))]
-    false
-}
-
-/// Returns the metadata of the file or pipe behind standard output.
+/// Returns what is behind standard output, unless that is closed.
 #[cfg(unix)]
-fn stdout_metadata() -> Option<fs::Metadata> {
+fn stdout_handle() -> Option<(File, fs::Metadata)> {
     use std::os::fd::AsFd;
     let stdout = File::from(io::stdout().as_fd().try_clone_to_owned().ok()?);
-    stdout.metadata().ok()
+    let metadata = stdout.metadata().ok()?;
+    Some((stdout, metadata))
+}
+
+/// Other systems say nothing of it.
+#[cfg(not(unix))]
+fn stdout_handle() -> Option<(File, fs::Metadata)> {
+    None
+}
+
+/// Returns the file that standard output goes to, if it is one, so that no stage follows.
+fn stdout_file() -> Option<File> {
+    stdout_handle().filter(|(_, metadata)| metadata.is_file()).map(|(file, _)| file)
 }
 
 /// Reads the wanted layers of a stack, decoded, in order.
@@ -498,7 +500,7 @@ fn is_stdout(path: &Path) -> bool {
     {
         use std::os::unix::fs::MetadataExt;
         let same = |a: fs::Metadata, b: fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
-        stdout_metadata().zip(fs::metadata(path).ok()).is_some_and(|(a, b)| same(a, b))
+        stdout_handle().zip(fs::metadata(path).ok()).is_some_and(|((_, a), b)| same(a, b))
     }
     #[cfg(not(unix))]
     {
@@ -546,7 +548,7 @@ pub(crate) fn write_file(
     }
     let path = &behind_links(path);
     let whole = || -> io::Result<()> {
-        let mut file = FileBeside::new(path)?;
+        let file = FileBeside::new(path)?;
         let mut out = BufWriter::with_capacity(1 << 18, file.file());
         write(&mut out)?;
         out.flush()?;
@@ -554,6 +556,17 @@ pub(crate) fn write_file(
         file.persist()
     };
     Ok(whole().with_context(|| path.display().to_string())?)
+}
+
+/// Waits until the disk has standard output, if that is a file.
+pub(crate) fn settle_output() -> Result<(), Exit> {
+    let settle = || -> io::Result<()> {
+        io::stdout().flush()?;
+        let Some(file) = stdout_file() else { return Ok(()) };
+        sync(&file)?;
+        close(file)
+    };
+    settle().map_err(|error| Exit::output(error, "standard output"))
 }
 
 /// Writes a mesh to a file, as [`write_file`] does, or to standard output.

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use lamp_postprocess::{StripForm, StripWriter, StripsError, is_strips, join_strips};
-use lamp_stack::{PassingLayer, map_in_order};
+use lamp_stack::{PassingLayer, is_stack_name, map_in_order};
 
 use crate::exit::Exit;
 use crate::options::{Input, Output};
 use crate::progress::Progress;
 use crate::streams::{
-    decoding, extension, format, input_name, is_stream, new_folder, read_passing, takes_codes,
-    write_layers, write_passing,
+    decoding, format, input_name, is_stream, new_folder, read_passing, takes_codes, write_layers,
+    write_passing,
 };
 
 /// Layers in order, coded or not.
@@ -83,11 +83,6 @@ pub(crate) fn write_passing_or_strips(
     }
     progress.done();
     strips.finish().map_err(|error| failed(to, error))
-}
-
-/// Returns whether a name is that of a stack in one file.
-fn is_stack_name(path: &Path) -> bool {
-    matches!(extension(path).as_str(), "tif" | "tiff" | "lamp")
 }
 
 fn failed(folder: &Path, error: StripsError) -> Exit {

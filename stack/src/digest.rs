@@ -1,6 +1,8 @@
 //! Digests of inputs: BLAKE3, as `blake3:` and 64 hexadecimal digits.
 
+use std::fs::File;
 use std::io::{self, Read};
+use std::path::Path;
 
 use blake3::hazmat::{
     ChainingValue, HasherExt, Mode, merge_subtrees_non_root, merge_subtrees_root,
@@ -100,6 +102,23 @@ impl StackInfo {
         (!whole.is_empty() && self.digest == whole)
             || parts.is_some_and(|parts| !parts.is_empty() && parts.iter().all(is_given))
     }
+}
+
+/// Opens a file or a pipe to be read to its end.
+///
+/// # Errors
+/// Returns an error if it cannot be opened, or is a device: some have no end, as `/dev/zero`.
+pub fn open_ending(path: &Path) -> io::Result<File> {
+    let file = File::open(path)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = file.metadata()?.file_type();
+        if kind.is_block_device() || kind.is_char_device() {
+            return Err(io::Error::other("this is a device, not a file"));
+        }
+    }
+    Ok(file)
 }
 
 #[cfg(test)]

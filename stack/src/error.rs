@@ -9,6 +9,7 @@ use crate::file_format::FileFormat;
 use crate::g4::G4Error;
 use crate::note::ImagesBeside;
 use crate::picture_page::PictureFormat;
+use crate::temporary::FOLDER_LIST;
 
 /// What stands before the reason of a stage that gave up.
 pub(crate) const GAVE_UP: &str = "the stage before gave up: ";
@@ -176,10 +177,21 @@ pub enum StackError {
     /// There is no layer to write.
     #[error("there is no layer to write")]
     NoLayers,
+    /// A page's name is that of a pipe or a device.
+    #[error("{name} is a pipe or a device, not a page")]
+    NoFile {
+        /// Its name.
+        name: String,
+    },
     /// The output folder is not empty.
     #[error("a folder is not written over what is there")]
     Exists,
-    /// The folder to be replaced holds what no command writes into folders.
+    /// The folder to be replaced has no list of what this workspace wrote into it.
+    #[error(
+        "only what an earlier run wrote is replaced, and this folder has no {FOLDER_LIST} of one"
+    )]
+    NotOurs,
+    /// The folder to be replaced holds what its list does not name.
     #[error("only what an earlier run wrote is replaced, and this folder holds {name}")]
     NotReplaceable {
         /// The name of such a file or folder.

@@ -1,19 +1,31 @@
 //! Finds the stacks in a folder.
 
 use std::collections::HashSet;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
+use crate::file_format::{FORMAT_BYTES, FileFormat};
 use crate::input::Pages;
 use crate::note::StackNote;
 use crate::page_names::PageFiles;
 
+/// The endings of names of stacks in one file, in small letters.
+pub const STACK_ENDINGS: [&str; 5] = ["tif", "tiff", "btf", "tf8", "lamp"];
+
+/// Returns whether a file's name ends as that of a stack in one file.
+pub fn is_stack_name(path: &Path) -> bool {
+    let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
+    extension.is_some_and(|end| STACK_ENDINGS.contains(&&*end))
+}
+
 /// Returns the stacks at a path, by name: the path itself if it is a file or a folder of pages,
 /// otherwise every stack in the folder and in the folders below it. Hidden files are left out.
 ///
-/// A file that is a whole stack of its own is no page of the folder's stack.
+/// A file is a stack by its name or by its first bytes, so that neither a damaged one nor one of
+/// another name is passed over. A file that is a whole stack of its own is no page of the folder's
+/// stack.
 ///
 /// # Errors
 /// Returns an error if a folder cannot be read.
@@ -29,9 +41,13 @@ fn add_stacks(
     seen: &mut HashSet<PathBuf>,
     stacks: &mut Vec<PathBuf>,
 ) -> io::Result<()> {
-    if !path.is_dir() || is_stack(path) {
+    if !path.is_dir() {
         stacks.push(path.to_owned());
         return Ok(());
+    }
+    let is_stack = is_stack(path);
+    if is_stack {
+        stacks.push(path.to_owned());
     }
     if !seen.insert(path.canonicalize()?) {
         return Ok(());
@@ -41,19 +57,36 @@ fn add_stacks(
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {
         let path = entry.path();
-        if path.is_dir() {
-            add_stacks(&path, seen, stacks)?;
-        } else if is_stack_name(&path) {
-            stacks.push(path);
+        match path.is_dir() {
+            true if is_stack => {}
+            true => add_stacks(&path, seen, stacks)?,
+            // Beside pages there may be packed stacks, which are none.
+            false if is_stack && is_packed(&path) => stacks.push(path),
+            false if !is_stack && is_stack_file(&path) => stacks.push(path),
+            false => {}
         }
     }
     Ok(())
 }
 
-/// Returns whether a file has the extension of a stack.
-fn is_stack_name(path: &Path) -> bool {
-    let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
-    matches!(extension.as_deref(), Some("tif" | "tiff" | "png"))
+/// Returns whether a file is a stack by its name or its first bytes.
+fn is_stack_file(path: &Path) -> bool {
+    let is_picture = || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    is_stack_name(path) || is_picture() || matches!(format(path), Some(FileFormat::Layers(_)))
+}
+
+/// Returns whether a file is a packed stack by its name or its first bytes.
+fn is_packed(path: &Path) -> bool {
+    let is_named = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("lamp"));
+    is_named || format(path) == Some(FileFormat::Layers("a packed stack"))
+}
+
+fn format(path: &Path) -> Option<FileFormat> {
+    let mut start = Vec::new();
+    // A pipe would wait for a writer.
+    let file = path.is_file().then(|| File::open(path).ok())??;
+    file.take(FORMAT_BYTES as u64).read_to_end(&mut start).ok()?;
+    FileFormat::of_start(&start, None)
 }
 
 /// Returns whether a folder's files are the pages of one stack. The first file that tells decides.

@@ -107,13 +107,15 @@ impl IndexedStack {
     ) -> Result<Self, StackError> {
         let mut pages = pages.without_images();
         let (mut headers, mut places, mut end) = (Vec::new(), Vec::new(), None);
-        while let Some(place) = pages.next_place() {
+        loop {
+            let place = pages.next_place();
             match pages.next() {
                 Some(Ok(page)) => {
                     headers.push(page.header());
-                    places.push(place);
+                    places.extend(place);
                 }
                 Some(Err(error)) if headers.is_empty() => return Err(error),
+                // Also where the files are at an end, and the stack is not.
                 Some(Err(error)) => end = Some(error),
                 None => break,
             }
@@ -255,6 +257,20 @@ mod tests {
                 }
                 Err(error) => assert!(matches!(error, StackError::CutOff { .. }), "{error}"),
             }
+        }
+    }
+
+    #[test]
+    fn a_folder_without_its_last_pages_is_cut_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pages");
+        written(Destination::Folder(FolderBeside::over_nothing(&path).unwrap()));
+        for (last, left) in [("layer_00004.tif", 4), ("layer_00003.tif", 3)] {
+            fs::remove_file(path.join(last)).unwrap();
+            let stack = IndexedStack::open(&path).unwrap();
+            assert_eq!(stack.headers().len(), left);
+            assert!(matches!(stack.end(), Some(StackError::EndedEarly { .. })));
+            assert!(stack.into_whole().is_err());
         }
     }
 

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::error::StackError;
 use crate::ordered::{MemorySize, map_in_order};
@@ -51,7 +52,7 @@ where
 }
 
 enum Sink {
-    File { pages: PageWriter<BufWriter<File>>, temporary: FileBeside },
+    File { pages: PageWriter<BufWriter<Arc<File>>>, temporary: FileBeside },
     Folder { pages: PageFolder<(EncodedPage, Format)>, format: Format },
     Stream(PageWriter<BufWriter<Box<dyn Write>>>),
 }
@@ -66,8 +67,8 @@ impl Sink {
                 Self::Stream(PageWriter::new(BufWriter::with_capacity(BUFFER_BYTES, out), format))
             }
             Destination::File(path) => {
-                let mut temporary = FileBeside::new(&path)?;
-                let out = BufWriter::with_capacity(BUFFER_BYTES, temporary.file().try_clone()?);
+                let temporary = FileBeside::new(&path)?;
+                let out = BufWriter::with_capacity(BUFFER_BYTES, temporary.file());
                 Self::File { pages: PageWriter::new(out, format), temporary }
             }
             Destination::Folder(folder) => Self::Folder { pages: PageFolder::new(folder), format },
@@ -94,7 +95,7 @@ impl Sink {
         match self {
             Self::Stream(pages) => drop(pages.finish()?),
             Self::File { pages, temporary } => {
-                pages.finish()?;
+                drop(pages.finish()?);
                 temporary.persist()?;
             }
             Self::Folder { pages, .. } => pages.finish()?,

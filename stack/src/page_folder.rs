@@ -1,7 +1,6 @@
 //! Writes folders of single-page files.
 
-use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 
 use crate::check::Chain;
 use crate::error::StackError;
@@ -44,7 +43,7 @@ impl<P: PageFile> PageFolder<P> {
     }
 
     fn write(&mut self, page: &P, is_last: bool) -> io::Result<()> {
-        let path = self.folder.path().join(page.name());
-        File::create_new(path)?.write_all(&page.bytes(&mut self.chain, is_last))
+        let bytes = page.bytes(&mut self.chain, is_last);
+        self.folder.add(&page.name(), |out| out.write_all(&bytes))
     }
 }

@@ -9,6 +9,8 @@ use crate::error::StackError;
 use crate::input::Pages;
 use crate::note::{PageGap, StackNote};
 use crate::picture_page::PictureFormat;
+use crate::temporary::FOLDER_LIST;
+use crate::text::one_line;
 
 /// The pages of a folder, and what the names in it show.
 #[derive(Debug)]
@@ -35,10 +37,14 @@ impl PageFiles {
             let entry = entry?;
             let name = entry.file_name().to_string_lossy().into_owned();
             match page_format(&entry.path()) {
-                _ if entry.file_type()?.is_dir() => {}
+                _ if entry.path().is_dir() || name == FOLDER_LIST => {}
                 None => files.push(name),
                 // macOS and other systems put pictures of their own beside files.
                 Some(_) if name.starts_with('.') => pictures.push(name),
+                // A pipe would wait for a writer.
+                Some(_) if entry.path().metadata().is_ok_and(|it| !it.is_file()) => {
+                    return Err(StackError::NoFile { name: one_line(&name) });
+                }
                 Some(format) => pages.push(Picture::new(entry.path(), name, format)),
             }
         }

@@ -162,7 +162,7 @@ impl Folder {
     /// Completes the file and names it after its layers.
     fn close(&mut self) -> Result<(), StackError> {
         if let Some(OpenFile { pages, first, last }) = self.open.take() {
-            pages.finish()?;
+            pages.close()?;
             let name = format!("layers_{first:05}-{last:05}.tif");
             fs::rename(self.unnamed(), self.temporary.path().join(name))?;
         }

@@ -1,15 +1,17 @@
 //! Creates files and folders that get their name only when they are complete.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::Duration;
 
-use tempfile::{Builder, NamedTempFile, TempDir};
+use tempfile::{Builder, TempDir, TempPath};
 
+use crate::durable::{close, sync, sync_all_in, sync_folder};
 use crate::error::StackError;
 use crate::leftovers::{END, RANDOM_LETTERS, claim, remove_leftovers, start_of_name};
 use crate::text::one_line;
@@ -89,7 +91,8 @@ impl Drop for Registered {
 ///
 /// [`persist`]: Self::persist
 pub struct FileBeside {
-    file: NamedTempFile,
+    file: Arc<File>,
+    temporary: TempPath,
     registered: Registered,
     path: PathBuf,
 }
@@ -112,23 +115,40 @@ impl FileBeside {
             if let Ok(before) = fs::metadata(path) {
                 file.as_file().set_permissions(before.permissions())?;
             }
-            return Ok(Self { file, registered, path: path.to_owned() });
+            let (file, temporary) = file.into_parts();
+            return Ok(Self { file: file.into(), temporary, registered, path: path.to_owned() });
         }
         Err(cannot_claim())
     }
 
-    /// Returns the file, for writing.
-    pub fn file(&mut self) -> &mut File {
-        self.file.as_file_mut()
+    /// Returns the file, for writing. All that write to it must be gone before it gets its name.
+    pub fn file(&self) -> Arc<File> {
+        self.file.clone()
     }
 
-    /// Renames the file to its final name.
+    /// Renames the file to its final name once the disk has all of it, and waits until the disk has
+    /// the name.
     ///
     /// # Errors
-    /// Returns an error if renaming fails.
+    /// Returns an error if the disk cannot take it, or renaming fails.
     pub fn persist(self) -> io::Result<()> {
-        let Self { file, registered, path } = self;
-        registered.rename(|| file.persist(path).map(drop).map_err(|error| error.error))
+        sync(&self.file)?;
+        let path = self.path.clone();
+        self.persist_lightly()?;
+        sync_folder(folder_of(&path)?)
+    }
+
+    /// Renames the file to its final name. A loss of power may take it, so that it must be one which
+    /// can be made again.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be closed, or renaming fails.
+    pub fn persist_lightly(self) -> io::Result<()> {
+        let Self { file, temporary, registered, path } = self;
+        // Its lock lasts as long as this does.
+        let _lock = file.try_clone()?;
+        close(Arc::into_inner(file).ok_or_else(|| io::Error::other("it is still written to"))?)?;
+        registered.rename(|| temporary.persist(path).map_err(|error| error.error))
     }
 }
 
@@ -151,9 +171,8 @@ impl FolderBeside {
         Self::new(path, false)
     }
 
-    /// Creates a folder that will become `path`, and then replaces a folder there. That may only
-    /// hold files with the names of pages, ranges of layers, strips, targets, plans or pictures, as this
-    /// workspace writes them. It stays until the new one is complete.
+    /// Creates a folder that will become `path`, and then replaces a folder there. That may hold no
+    /// files but those which its [`FOLDER_LIST`] names. It stays until the new one is complete.
     ///
     /// # Errors
     /// Returns an error if `path` is anything else, or no folder can be created there.
@@ -188,14 +207,35 @@ impl FolderBeside {
         self.folder.path()
     }
 
-    /// Renames the folder to its final name, and removes the one that it replaces.
+    /// Adds a file.
     ///
     /// # Errors
-    /// Returns an error if there is something now that is not to be replaced, or renaming fails.
+    /// Returns an error if the file is there, or cannot be written.
+    pub fn add<E: From<io::Error>>(
+        &self,
+        name: &str,
+        write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let file = File::create_new(self.path().join(name))?;
+        let mut out = BufWriter::with_capacity(1 << 16, file);
+        write(&mut out)?;
+        Ok(close(out.into_inner().map_err(IntoInnerError::into_error)?)?)
+    }
+
+    /// Lists the folder's files in it, waits until the disk has them, renames the folder to its final
+    /// name, and removes the one that it replaces.
+    ///
+    /// # Errors
+    /// Returns an error if the disk cannot take it, there is something now that is not to be replaced,
+    /// or renaming fails.
     pub fn persist(self) -> Result<(), StackError> {
         let (from, to) = (self.folder.path(), &self.path);
+        let list = list_of(from)?;
+        self.add(FOLDER_LIST, |out| out.write_all(list.as_bytes()))?;
+        sync_all_in(from)?;
         let replaced =
             self.registered.rename(|| put_in_place(from, to, self.replaces, exchange))?;
+        sync_folder(folder_of(to)?)?;
         let from = self.folder.keep();
         if replaced {
             // What remains of it is removed as a dead writer's.
@@ -283,43 +323,41 @@ fn check_replaceable(path: &Path, replaces: bool) -> Result<Existing, StackError
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Existing::Nothing),
         Err(_) => return Err(StackError::Exists),
     };
-    let mut existing = Existing::Nothing;
-    for entry in entries {
-        if !replaces {
-            return Err(StackError::Exists);
-        }
-        let entry = entry?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let is_file = match entry.file_type() {
-            Ok(kind) => kind.is_file(),
-            // Another process has replaced the folder meanwhile.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-            Err(error) => return Err(error.into()),
-        };
-        if !is_file || !is_name_in_folders(&name) {
-            return Err(StackError::NotReplaceable { name: one_line(&name) });
-        }
-        existing = Existing::Replaceable;
+    let names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>()?;
+    if names.is_empty() {
+        return Ok(Existing::Nothing);
     }
-    Ok(existing)
+    if !replaces {
+        return Err(StackError::Exists);
+    }
+    let list = match fs::read_to_string(path.join(FOLDER_LIST)) {
+        Ok(list) => list,
+        // Another process has replaced the folder meanwhile.
+        Err(_) if !path.exists() => return Ok(Existing::Nothing),
+        Err(_) => return Err(StackError::NotOurs),
+    };
+    let listed: BTreeSet<&str> = list.lines().skip(1).chain([FOLDER_LIST]).collect();
+    let is_listed = |name: &&OsString| name.to_str().is_some_and(|name| listed.contains(name));
+    match names.iter().find(|name| !is_listed(name)) {
+        Some(name) => Err(StackError::NotReplaceable { name: one_line(&name.to_string_lossy()) }),
+        None => Ok(Existing::Replaceable),
+    }
 }
 
-/// Returns whether commands give that name to files in the folders that they write.
-fn is_name_in_folders(name: &str) -> bool {
-    const STARTS: [&str; 5] = ["check_", "layer_", "layers_", "strip_", "squares_"];
-    let numbered = |start: &&str| {
-        name.strip_prefix(start).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
-    };
-    let is_image = name.ends_with(".tif") || name.ends_with(".png");
-    let is_of_plan = matches!(
-        name,
-        "bitmaps.tif" | "report.json" | "section.svg" | "residual.png" | "times.png"
-    );
-    let is_report = name == "index.html" || name.ends_with(".html") && numbered(&"report_");
-    matches!(name, "strips.json" | "squares.csv")
-        || is_of_plan
-        || is_report
-        || is_image && STARTS.iter().any(numbered)
+/// The file in a folder that lists the others, so that it is known who made them.
+pub const FOLDER_LIST: &str = ".lamp-folder";
+
+/// Returns a line on what the list of a folder is for, and the names of its files.
+fn list_of(folder: &Path) -> io::Result<String> {
+    let names = fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name()));
+    let mut names = names.collect::<io::Result<Vec<_>>>()?;
+    names.sort_unstable();
+    let first = "lamp wrote the files below. With --force it replaces a folder of no others.";
+    let lines = names.iter().map(|name| name.to_string_lossy());
+    Ok([first.into()]
+        .into_iter()
+        .chain(lines)
+        .fold(String::new(), |text, line| text + &line + "\n"))
 }
 
 /// Returns the parent folder of `path`.
@@ -381,7 +419,7 @@ mod tests {
             for _ in 0..50 {
                 let from = folder.path().join(format!(".a.lamp-aaaaa{writer}.part"));
                 fs::create_dir(&from).unwrap();
-                fs::write(from.join("layer_00000.tif"), "").unwrap();
+                fs::write(from.join(FOLDER_LIST), "\n").unwrap();
                 if put_in_place(&from, &to, true, exchange_in_steps).unwrap() {
                     fs::remove_dir_all(from).unwrap();
                 }
@@ -393,20 +431,29 @@ mod tests {
     }
 
     #[test]
-    fn only_folders_of_numbered_images_are_replaced() {
-        for ours in ["layer_00812.tif", "layer_00812.png", "layers_00500-00999.tif"] {
-            assert!(is_name_in_folders(ours), "{ours}");
+    fn only_a_folder_of_listed_files_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let site = folder.path().join("site");
+        let write = |text: &str| {
+            let new = FolderBeside::replacing(&site)?;
+            new.add("index.html", |out| out.write_all(text.as_bytes()))?;
+            new.persist()
+        };
+        fs::create_dir(&site).unwrap();
+        fs::write(site.join("index.html"), "mine").unwrap();
+        assert!(matches!(write("ours"), Err(StackError::NotOurs)));
+        fs::remove_file(site.join("index.html")).unwrap();
+        write("first").unwrap();
+        write("second").unwrap();
+        for name in ["notes", "layer_00001.tif"] {
+            fs::write(site.join(name), "mine").unwrap();
+            let refused = write("third").unwrap_err();
+            assert!(matches!(refused, StackError::NotReplaceable { name: of } if of == name));
+            fs::remove_file(site.join(name)).unwrap();
         }
-        for ours in ["layer_00007_rows_00001-00002_left.png", "strip_000.tif", "strips.json"] {
-            assert!(is_name_in_folders(ours), "{ours}");
-        }
-        assert!(
-            ["bitmaps.tif", "report.json", "times.png"].iter().all(|name| is_name_in_folders(name))
-        );
-        assert!(["squares_00025px.tif", "squares.csv"].iter().all(|name| is_name_in_folders(name)));
-        for other in ["thesis.doc", "layer.png", "layer_a.png", "img_0001.png", "layer_1.stl", ""] {
-            assert!(!is_name_in_folders(other), "{other}");
-        }
+        assert_eq!(fs::read(site.join("index.html")).unwrap(), b"second");
+        fs::create_dir(site.join("more")).unwrap();
+        assert!(matches!(write("third"), Err(StackError::NotReplaceable { .. })));
     }
 
     #[test]
@@ -415,7 +462,7 @@ mod tests {
         let path = folder.path().join("build.tif");
         let file = FileBeside::new(&path).unwrap();
         // As a signal does, but for this one alone: other tests run in this process.
-        live().as_mut().unwrap().remove(file.file.path());
+        live().as_mut().unwrap().remove(&*file.temporary);
         assert_eq!(file.persist().unwrap_err().kind(), io::ErrorKind::Interrupted);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }

@@ -1,6 +1,7 @@
 //! Processes of tasks.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -22,11 +23,11 @@ pub struct Launcher {
 
 impl Launcher {
     /// Returns the words of the command, after the program.
-    pub fn words(&self, key: Key, store: &Store, engine: &str, threads: usize) -> Vec<String> {
-        let store = store.root().display().to_string();
-        let words = ["batch", "task", &key.to_string(), "--store", &store, "--engine", engine];
-        let threads = ["--threads".to_owned(), threads.to_string()];
-        words.into_iter().map(str::to_owned).chain(threads).collect()
+    pub fn words(&self, key: Key, store: &Store, engine: &str, threads: usize) -> Vec<OsString> {
+        let (key, threads) = (key.to_string(), threads.to_string());
+        let before = ["batch", "task", &key, "--store"].map(OsString::from);
+        let after = ["--engine", engine, "--threads", &threads].map(OsString::from);
+        before.into_iter().chain([store.root().into()]).chain(after).collect()
     }
 }
 

@@ -5,11 +5,14 @@
 //! its line in the journal. What a round leaves undone goes into the next one.
 
 use std::collections::HashMap;
+use std::ffi::OsString;
 use std::io;
 use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use lamp_stack::one_line;
 use thiserror::Error;
 
 use super::{Attempt, EngineError, Work};
@@ -25,6 +28,8 @@ const LOOKS: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(5)
 const SILENCE: Duration = Duration::from_secs(30 * 60);
 /// How long a result may take to be seen from another machine.
 const LATE: Duration = Duration::from_secs(2);
+/// How long a program of a scheduler may take for an answer. Busy ones take seconds.
+const ANSWER_TIME: Duration = Duration::from_secs(120);
 
 /// A task of a round.
 #[derive(Clone, Debug)]
@@ -76,6 +81,22 @@ pub enum SchedulerError {
         /// Why.
         source: io::Error,
     },
+    /// A path that schedulers cannot be given.
+    #[error(
+        "schedulers take names in UTF-8 only, and {path} is none: rename it, or leave --engine out"
+    )]
+    NoText {
+        /// The path.
+        path: String,
+    },
+    /// A program of the scheduler is silent.
+    #[error("{program} has not answered for {seconds} s: see whether the scheduler is well")]
+    Silent {
+        /// The program.
+        program: &'static str,
+        /// How long it had.
+        seconds: u64,
+    },
     /// A program of the scheduler failed.
     #[error("{program} failed: {why}")]
     Failed {
@@ -119,18 +140,24 @@ fn round<S: Scheduler>(
     let mut keys = ledger.keys();
     keys.retain(|&key| ledger.state(key) == State::Waiting);
     let places: HashMap<Key, usize> = keys.iter().copied().zip(0..).collect();
-    let program = work.launcher.program.display().to_string();
+    let in_text = |word: OsString| {
+        word.into_string().map_err(|word| {
+            let path = one_line(&word.to_string_lossy());
+            EngineError::from(SchedulerError::NoText { path })
+        })
+    };
     let task = |&key: &Key| {
         let task = work.graph.task(key);
         work.store.write_task(task)?;
         let words = work.launcher.words(key, work.store, S::NAME, 1);
+        let words = std::iter::once(work.launcher.program.clone().into()).chain(words);
         Ok(RoundTask {
             key,
             kind: task.recipe.kind,
             subject: task.subject.clone(),
             needs: task.needs.iter().filter_map(|need| places.get(need).copied()).collect(),
             cost: task.cost,
-            command: std::iter::once(program.clone()).chain(words).collect(),
+            command: words.map(in_text).collect::<Result<_, _>>()?,
         })
     };
     keys.iter().map(task).collect()
@@ -251,6 +278,15 @@ pub(super) fn answer_of(
     arguments: &[&str],
     input: Option<&str>,
 ) -> Result<String, SchedulerError> {
+    answer_within(ANSWER_TIME, program, arguments, input)
+}
+
+fn answer_within(
+    patience: Duration,
+    program: &'static str,
+    arguments: &[&str],
+    input: Option<&str>,
+) -> Result<String, SchedulerError> {
     let start = |source| SchedulerError::Start { program, source };
     let stdin = if input.is_some() { Stdio::piped() } else { Stdio::null() };
     let mut child = Command::new(program)
@@ -260,11 +296,22 @@ pub(super) fn answer_of(
         .stderr(Stdio::piped())
         .spawn()
         .map_err(start)?;
-    if let (Some(input), Some(mut stdin)) = (input, child.stdin.take()) {
-        // A program that does not read to the end says why below.
-        let _ = io::Write::write_all(&mut stdin, input.as_bytes());
-    }
-    let output = child.wait_with_output().map_err(start)?;
+    let (sender, answer) = channel();
+    let (stdin, text) = (child.stdin.take(), input.map(str::to_owned));
+    let pid = child.id();
+    // A thread of its own, which is left behind if the program hangs.
+    thread::spawn(move || {
+        if let (Some(text), Some(mut stdin)) = (text, stdin) {
+            // A program that does not read to the end says why below.
+            let _ = io::Write::write_all(&mut stdin, text.as_bytes());
+        }
+        let _ = sender.send(child.wait_with_output());
+    });
+    let Ok(output) = answer.recv_timeout(patience) else {
+        kill(pid);
+        return Err(SchedulerError::Silent { program, seconds: patience.as_secs() });
+    };
+    let output = output.map_err(start)?;
     if !output.status.success() {
         let text = [output.stderr, output.stdout].concat();
         let text = String::from_utf8_lossy(&text);
@@ -275,9 +322,38 @@ pub(super) fn answer_of(
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
+/// Ends a program that hangs.
+#[cfg(target_os = "linux")]
+fn kill(pid: u32) {
+    use rustix::process::{Pid, Signal, kill_process};
+    if let Some(pid) = Pid::from_raw(pid as i32) {
+        // It may have ended meanwhile.
+        let _ = kill_process(pid, Signal::KILL);
+    }
+}
+
+/// Elsewhere it goes on, unheard.
+#[cfg(not(target_os = "linux"))]
+fn kill(_: u32) {}
+
 /// Returns an error that shows how an answer begins.
 pub(super) fn not_understood(program: &'static str, answer: &str) -> SchedulerError {
     SchedulerError::Answer { program, answer: answer.trim().chars().take(80).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_hangs_is_ended() {
+        let start = Instant::now();
+        let answer = answer_within(Duration::from_millis(100), "sleep", &["60"], None);
+        assert!(matches!(answer, Err(SchedulerError::Silent { program: "sleep", .. })));
+        assert!(start.elapsed() < Duration::from_secs(30));
+        let answer = answer_within(Duration::from_secs(30), "cat", &[], Some("blade"));
+        assert_eq!(answer.unwrap(), "blade");
+    }
 }
 
 #[cfg(test)]

@@ -3,12 +3,15 @@
 mod read;
 #[cfg(test)]
 mod tests;
+mod walk;
 mod words;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+
+use walk::Walk;
 
 /// What a night file asks for.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +33,10 @@ pub struct Night {
 pub struct Part {
     /// The name that builds and results have.
     pub name: String,
-    /// The part's file.
+    /// The part's file, or a folder that it may be in.
     pub file: PathBuf,
+    /// Why no file can be had, if that is known already.
+    pub fault: Option<String>,
     /// The stages, the slicing first.
     pub stages: Vec<Stage>,
     /// The `check` command, with its options.

@@ -1,6 +1,7 @@
 //! Reads night files, so that every error has its place.
 
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use lamp_stack::one_line;
@@ -8,8 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, did_you_mean, twice,
-    words,
+    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, Walk, did_you_mean,
+    twice, words,
 };
 
 type Value<'a> = Spanned<DeValue<'a>>;
@@ -52,6 +53,7 @@ struct PartTable {
 /// A part, as far as it has been read.
 struct Draft {
     file: PathBuf,
+    fault: Option<String>,
     place: Place,
     table: PartTable,
 }
@@ -257,43 +259,46 @@ impl Reader<'_> {
         let mut files = Vec::new();
         for value in self.list(file)? {
             let place = self.place(value.span().start);
-            files.extend(self.files(value)?.into_iter().map(|file| (file, place)));
+            let found = self.files(value)?;
+            files.extend(found.into_iter().map(|(file, fault)| (file, fault, place)));
         }
         if let (Some((_, place)), true) = (&read.name, files.len() > 1) {
             let problem = format!("there are {} files: a name is for one", files.len());
             return Err(NightError { place: *place, problem });
         }
-        for (file, place) in files {
+        for (file, fault, place) in files {
             match drafts.places.get(&real(&file)) {
                 Some(&place) => drafts.list[place].table.change(read.clone()),
-                None => drafts.add(Draft { file, place, table: read.clone() }),
+                None => drafts.add(Draft { file, fault, place, table: read.clone() }),
             }
         }
         Ok(())
     }
 
-    /// Returns the files that a text names: one, or those that a pattern matches.
-    fn files(&self, value: &Value<'_>) -> Read<Vec<PathBuf>> {
+    /// Returns the files that a text names: one, or those that a pattern matches, and folders in which
+    /// they may be, with why these cannot be read.
+    fn files(&self, value: &Value<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
         let name = self.text(value)?;
         let path = self.folder.join(name);
         if path.exists() || !name.contains(['*', '?', '[']) {
-            return Ok(vec![path]);
+            return Ok(vec![(path, None)]);
         }
-        let folder = glob::Pattern::escape(&self.folder.display().to_string());
-        let pattern = if Path::new(name).is_absolute() {
-            name.to_owned()
-        } else {
-            format!("{folder}/{name}")
-        };
         let wrong = |error: glob::PatternError| self.at(value, format!("{name}: {}", error.msg));
-        let found = glob::glob(&pattern).map_err(wrong)?;
-        let files: Vec<_> = found.flatten().filter(|path| path.is_file()).collect();
-        if files.is_empty() {
+        let Walk { files, closed } = Walk::new(self.folder, name).map_err(wrong)?;
+        if files.is_empty() && closed.is_empty() {
             return Err(
                 self.at(value, format!("no file matches {name}: check its folder and its end"))
             );
         }
-        Ok(files)
+        let fault = |(folder, error): (PathBuf, io::Error)| {
+            let fault = format!("{}: not all files in it can be found: {error}", folder.display());
+            (folder, Some(fault))
+        };
+        Ok(files
+            .into_iter()
+            .map(|file| (file, None))
+            .chain(closed.into_iter().map(fault))
+            .collect())
     }
 
     fn build(&self, value: &Value<'_>, parts: &[Part]) -> Read<Build> {
@@ -408,7 +413,7 @@ impl PartTable {
 
 /// Puts together what is said of a part.
 fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
-    let Draft { file, place, table } = draft;
+    let Draft { file, fault, place, table } = draft;
     let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (name, name_place) = table.name.unwrap_or((stem, place));
     if let Some(problem) = bad_name(&name) {
@@ -454,7 +459,7 @@ fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
     let ranges = table.ranges.or(defaults.ranges);
     let plain = || Stage { words: vec!["check".to_owned()], place };
     let check = table.check.or(defaults.check.clone()).unwrap_or_else(plain);
-    Ok(Part { name, file, stages, check, ranges, place })
+    Ok(Part { name, file, fault, stages, check, ranges, place })
 }
 
 fn stem_of(file: &Path) -> String {

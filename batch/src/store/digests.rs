@@ -53,7 +53,12 @@ impl Digests {
     /// # Errors
     /// Returns an error if it cannot be read.
     pub fn digest(&mut self, path: &Path) -> io::Result<String> {
-        let stamp = Stamp::of(&path.metadata()?);
+        let metadata = path.metadata()?;
+        if !metadata.is_file() {
+            // A pipe would wait for a writer, and a device may have no end.
+            return Err(io::Error::other("it is no file"));
+        }
+        let stamp = Stamp::of(&metadata);
         let name = path.display().to_string();
         if let Some(known) = self.known.get(&name).filter(|known| known.stamp == stamp) {
             return Ok(known.digest.clone());

@@ -1,6 +1,6 @@
 //! Small files that prove themselves whole: a line of JSON, and a line with its digest.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -8,31 +8,12 @@ use lamp_stack::FileBeside;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Writes a file that is whole or not there, also after a loss of power: beside its place, synced,
-/// renamed, its folder synced.
+/// Writes a file that is whole or not there, also after a loss of power.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     make_folder_of(path)?;
-    let mut beside = FileBeside::new(path)?;
+    let beside = FileBeside::new(path)?;
     beside.file().write_all(bytes)?;
-    put_in_place(beside, path)
-}
-
-/// Gives a file its name for good.
-pub(crate) fn put_in_place(mut beside: FileBeside, path: &Path) -> io::Result<()> {
-    beside.file().sync_all()?;
-    beside.persist()?;
-    sync_folder_of(path)
-}
-
-#[cfg(unix)]
-fn sync_folder_of(path: &Path) -> io::Result<()> {
-    File::open(path.parent().unwrap_or(Path::new(".")))?.sync_all()
-}
-
-/// Other systems keep names by themselves.
-#[cfg(not(unix))]
-fn sync_folder_of(_: &Path) -> io::Result<()> {
-    Ok(())
+    beside.persist()
 }
 
 /// Makes the folder that a file will be in.
@@ -48,9 +29,9 @@ pub(crate) fn write(path: &Path, value: &impl Serialize) -> io::Result<()> {
 /// Writes a value, sealed, that can be made again: a loss of power may take it.
 pub(crate) fn write_lightly(path: &Path, value: &impl Serialize) -> io::Result<()> {
     make_folder_of(path)?;
-    let mut beside = FileBeside::new(path)?;
+    let beside = FileBeside::new(path)?;
     beside.file().write_all(&sealed(value))?;
-    beside.persist()
+    beside.persist_lightly()
 }
 
 fn sealed(value: &impl Serialize) -> Vec<u8> {

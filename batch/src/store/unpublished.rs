@@ -2,26 +2,25 @@
 
 use std::fs::File;
 use std::io::{self, Seek};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 use lamp_stack::{FileBeside, digest_of};
 
 use super::manifest::Written;
-use super::sealed::put_in_place;
 
 /// A result that is being written, under a temporary name and locked. Dropped, it is removed.
 pub struct Unpublished {
     beside: FileBeside,
-    path: PathBuf,
 }
 
 impl Unpublished {
     pub(super) fn new(path: &Path) -> io::Result<Self> {
-        Ok(Self { beside: FileBeside::new(path)?, path: path.to_owned() })
+        Ok(Self { beside: FileBeside::new(path)? })
     }
 
     /// Returns the file, for writing.
-    pub fn file(&mut self) -> &mut File {
+    pub fn file(&self) -> Arc<File> {
         self.beside.file()
     }
 
@@ -29,15 +28,16 @@ impl Unpublished {
     ///
     /// # Errors
     /// Returns an error if it cannot be read, synced or renamed.
-    pub fn finish(mut self) -> io::Result<Written> {
-        let file = self.beside.file();
+    pub fn finish(self) -> io::Result<Written> {
+        let mut file = self.beside.file();
         file.rewind()?;
         let digest = digest_of(&*file)?;
         let metadata = file.metadata()?;
         let mut permissions = metadata.permissions();
         permissions.set_readonly(true);
         file.set_permissions(permissions)?;
-        put_in_place(self.beside, &self.path)?;
+        drop(file);
+        self.beside.persist()?;
         Ok(Written { digest, bytes: metadata.len() })
     }
 }

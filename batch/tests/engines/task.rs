@@ -39,7 +39,7 @@ pub(crate) fn run(key: Key, store: &Path, engine: &str) -> ! {
     let task = store.task(key).unwrap();
     let work: Work = serde_json::from_value(task.work).unwrap();
     thread::sleep(Duration::from_secs_f64(work.seconds));
-    let mut result = store.begin(key).unwrap();
+    let result = store.begin(key).unwrap();
     let been_here = store.root().parent().unwrap().join("killed once");
     if work.fault == Fault::Killed && !been_here.exists() {
         fs::write(been_here, "").unwrap();

@@ -1,13 +1,12 @@
 //! `lamp verify`: proves that stacks are whole.
 
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use lamp_postprocess::{is_strips, join_strips};
-use lamp_stack::{StackTotals, VerifyError, digest_of, stacks_in, verify};
+use lamp_stack::{StackTotals, VerifyError, digest_of, open_ending, stacks_in, verify};
 use serde::Serialize;
 
 use crate::exit::Exit;
@@ -74,7 +73,7 @@ pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
 }
 
 fn digest_of_part(part: &Path) -> Result<String, Exit> {
-    let digest = || digest_of(File::open(part)?);
+    let digest = || digest_of(open_ending(part)?);
     Ok(digest().with_context(|| part.display().to_string())?)
 }
 

@@ -1,6 +1,6 @@
 //! A build's layers written as a folder of strips.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufWriter;
 use std::ops::Range;
 
@@ -124,9 +124,10 @@ impl StripWriter {
         let open = self.open.ok_or(StackError::NoLayers)?;
         let index = StripIndex::new(&open.name, open.size(), open.layers, &open.swaths);
         for file in open.files {
-            file.finish()?;
+            file.close()?;
         }
-        fs::write(self.folder.path().join(INDEX), index.to_json()).map_err(StackError::from)?;
+        let index = index.to_json();
+        self.folder.add::<StackError>(INDEX, |out| Ok(out.write_all(index.as_bytes())?))?;
         Ok(self.folder.persist()?)
     }
 }

@@ -1,7 +1,6 @@
 //! Writes packed stacks.
 
 use std::fmt::Display;
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::ops::RangeInclusive;
 
@@ -108,9 +107,8 @@ impl Sink {
         let (out, temporary): (Box<dyn Write>, _) = match to {
             Destination::Stream(out) => (out, None),
             Destination::File(path) => {
-                let mut temporary = FileBeside::new(&path)?;
-                let file: File = temporary.file().try_clone()?;
-                (Box::new(file), Some(temporary))
+                let temporary = FileBeside::new(&path)?;
+                (Box::new(temporary.file()), Some(temporary))
             }
             Destination::Folder(_) => return Err(StackError::PackedFolder),
         };

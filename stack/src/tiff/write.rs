@@ -1,6 +1,7 @@
 //! Encodes layers as pages and writes pages to a stream.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, IntoInnerError, Write};
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,7 @@ use super::tags::{
     Y_RESOLUTION,
 };
 use crate::check::{Chain, CodeCheck, OpenLine};
+use crate::durable::close;
 use crate::error::{GAVE_UP, StackError};
 use crate::layer::{Image, Layer};
 use crate::page_folder::PageFile;
@@ -223,6 +225,17 @@ pub struct PageWriter<W> {
     offset: u64,
     chain: Chain,
     held: Option<EncodedPage>,
+}
+
+impl PageWriter<BufWriter<File>> {
+    /// Completes the stack as [`PageWriter::finish`] does, and closes its file.
+    ///
+    /// # Errors
+    /// Returns an error if there is no page, or writing or closing fails.
+    pub fn close(self) -> Result<(), StackError> {
+        let file = self.finish()?.into_inner().map_err(IntoInnerError::into_error)?;
+        Ok(close(file)?)
+    }
 }
 
 impl<W: Write> PageWriter<W> {

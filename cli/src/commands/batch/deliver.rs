@@ -8,6 +8,7 @@ use std::thread::{Scope, ScopedJoinHandle};
 use std::time::UNIX_EPOCH;
 
 use anyhow::Context;
+use lamp_batch::path_bytes::WrittenPath;
 use lamp_batch::{Damage, Key, Night, NightFormat, NightOutput, Store};
 use lamp_stack::{Destination, digest_of};
 use serde::{Deserialize, Serialize};
@@ -143,7 +144,7 @@ pub(super) fn check_files(night: &Night, store: &Store) -> Result<(usize, Vec<St
 }
 
 fn note(path: &Path) -> Key {
-    Key::of_note("delivered", &path.display().to_string())
+    Key::of_note("delivered", &WrittenPath(path))
 }
 
 /// Returns the size of a file and when it was changed.

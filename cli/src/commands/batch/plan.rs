@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use lamp_batch::{
     Build, Cost, Digests, Graph, InputFile, Key, Kind, Part, Recipe, Stage, Store, Task,
 };
@@ -200,6 +200,9 @@ impl Planner<'_> {
 
     /// Adds the tasks of a part.
     fn part(&mut self, part: &Part) -> Result<Wanted, Exit> {
+        if let Some(fault) = &part.fault {
+            return Err(Exit::Failed(anyhow!("{fault}")));
+        }
         let chained = self.stages(&part.stages)?;
         let input = self.input(&part.file)?;
         let survey = self.survey(&chained, &input)?;

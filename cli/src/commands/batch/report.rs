@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::Context;
+use lamp_batch::path_bytes::WrittenPath;
 use lamp_batch::{Event, Key, Store, events};
 use lamp_stack::digest_of;
 use maud::{Markup, PreEscaped, html};
@@ -92,7 +93,7 @@ pub(super) fn is_written(path: &Path, store: &Store, summary: &Summary) -> Resul
 }
 
 fn note(path: &Path) -> Key {
-    Key::of_note("report", &path.display().to_string())
+    Key::of_note("report", &WrittenPath(path))
 }
 
 fn digest(summary: &Summary) -> Result<String, Exit> {

@@ -233,10 +233,10 @@ impl Doing<'_> {
         facts: &mut Map<String, Value>,
     ) -> Result<Written, Exit> {
         let stages = parsed(stages)?;
-        let mut result = self.begin()?;
+        let result = self.begin()?;
         let mut count = 0;
         let findings = stages.chain.run(part, stored_name, layers, |layers| {
-            write(&mut layers.inspect(|_| count += 1), &mut result)
+            write(&mut layers.inspect(|_| count += 1), &result)
         })?;
         facts.insert(STAGES.to_owned(), value(&findings));
         facts.insert(LAYERS.to_owned(), count.into());
@@ -245,8 +245,8 @@ impl Doing<'_> {
 
     /// Joins ranges of a part.
     fn join(&self, ranges: &[PathBuf]) -> Result<Written, Exit> {
-        let mut result = self.begin()?;
-        join_packed(ranges, stream(&mut result)?, Format::Big, PackLevel::default())?;
+        let result = self.begin()?;
+        join_packed(ranges, stream(&result), Format::Big, PackLevel::default())?;
         finish(result)
     }
 
@@ -256,9 +256,9 @@ impl Doing<'_> {
         facts: &mut Map<String, Value>,
         make: impl FnOnce(&mut Write<'_>) -> Result<Vec<String>, Exit>,
     ) -> Result<Written, Exit> {
-        let mut result = self.begin()?;
+        let result = self.begin()?;
         let mut count = 0;
-        let notes = make(&mut |layers| write(&mut layers.inspect(|_| count += 1), &mut result))?;
+        let notes = make(&mut |layers| write(&mut layers.inspect(|_| count += 1), &result))?;
         facts.insert(LAYERS.to_owned(), count.into());
         if !notes.is_empty() {
             facts.insert("notes".to_owned(), value(&notes));
@@ -278,7 +278,7 @@ impl Doing<'_> {
         facts.insert(ISLANDS.to_owned(), islands.into());
         facts.insert(FINDINGS.to_owned(), found.found().into());
         let checked = Checked { picture: Some(middle(stack)?), lines: found.lines };
-        let mut result = self.begin()?;
+        let result = self.begin()?;
         let written = serde_json::to_writer(result.file(), &checked);
         written.map_err(|error| Exit::Output(io::Error::from(error).into()))?;
         finish(result)
@@ -286,13 +286,12 @@ impl Doing<'_> {
 }
 
 /// Writes layers as the store has them.
-fn write(layers: &mut Layers<'_>, result: &mut Unpublished) -> Result<(), Exit> {
-    write_packed(layers, stream(result)?, Format::Big, PackLevel::default())
+fn write(layers: &mut Layers<'_>, result: &Unpublished) -> Result<(), Exit> {
+    write_packed(layers, stream(result), Format::Big, PackLevel::default())
 }
 
-fn stream(result: &mut Unpublished) -> Result<Destination, Exit> {
-    let out = result.file().try_clone().map_err(|error| Exit::output(error, "the store"))?;
-    Ok(Destination::Stream(Box::new(out)))
+fn stream(result: &Unpublished) -> Destination {
+    Destination::Stream(Box::new(result.file()))
 }
 
 fn finish(result: Unpublished) -> Result<Written, Exit> {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use lamp_batch::path_bytes;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::report::Picture;
@@ -11,6 +12,7 @@ use crate::commands::report::Picture;
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Work {
     /// The folder that names of files are from.
+    #[serde(with = "path_bytes")]
     pub(super) folder: PathBuf,
     pub(super) what: What,
 }
@@ -21,6 +23,7 @@ pub(super) struct Work {
 pub(super) enum What {
     /// Makes layers of a part.
     Range {
+        #[serde(with = "path_bytes")]
         part: PathBuf,
         /// The name that stands for the part's in the store.
         stored_name: String,
@@ -30,7 +33,12 @@ pub(super) enum What {
     /// Joins ranges.
     Join,
     /// Applies a stage to a whole stack: which of those that need one.
-    Whole { part: PathBuf, stages: Vec<Vec<String>>, which: usize },
+    Whole {
+        #[serde(with = "path_bytes")]
+        part: PathBuf,
+        stages: Vec<Vec<String>>,
+        which: usize,
+    },
     /// Finds what needs a person.
     Check { words: Vec<String> },
     /// Lays out copies.

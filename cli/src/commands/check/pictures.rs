@@ -1,8 +1,7 @@
 //! Pictures of the worst findings, for `--evidence`.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::Range;
 
 use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, white_runs};
@@ -62,13 +61,10 @@ pub(super) fn write_pictures(
         let is_wanted = |position| drawings.contains_key(&position);
         args.for_each_layer(input, common, is_wanted, |position, below, layer| {
             for (name, shown) in drawings.get(&position).into_iter().flatten() {
-                let path = folder.path().join(format!("check_{prefix}{name}"));
-                let draw = || {
-                    let mut out = BufWriter::new(File::create_new(&path)?);
-                    draw(&mut out, below, layer, shown)?;
-                    out.flush()
-                };
-                draw().map_err(|error| failed_at(name.clone(), error.into()))?;
+                let file = format!("check_{prefix}{name}");
+                folder
+                    .add(&file, |out| draw(out, below, layer, shown))
+                    .map_err(|error: io::Error| failed_at(name.clone(), error.into()))?;
             }
             Ok(())
         })?;

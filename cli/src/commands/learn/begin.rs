@@ -1,6 +1,5 @@
 //! Begins a job.
 
-use std::fs::{self, File};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
@@ -77,12 +76,12 @@ pub(super) fn begin(
         max_change: platform.max_change,
     };
     let texts = || -> anyhow::Result<()> {
-        fs::write(new.path().join(JOB), toml::to_string(&job)?)?;
-        fs::write(new.path().join(MATERIAL), material.to_toml()?)?;
+        let [job, material] = [toml::to_string(&job)?, material.to_toml()?];
+        new.add(JOB, |out| out.write_all(job.as_bytes()))?;
+        new.add(MATERIAL, |out| out.write_all(material.as_bytes()))?;
         let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
         let times: Vec<ExposureTime> = times.collect();
-        write_profile(&part_pages, &times, &mut File::create(new.path().join(profile_name(0)))?)?;
-        Ok(())
+        Ok(new.add(&profile_name(0), |out| write_profile(&part_pages, &times, out))?)
     };
     texts().with_context(|| folder.display().to_string())?;
     new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;

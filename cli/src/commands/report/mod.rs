@@ -7,7 +7,6 @@ mod measure;
 mod page;
 mod pictures;
 
-use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
@@ -159,7 +158,7 @@ impl Work<'_> {
                 Ok(report) => {
                     let file = index::file_name(number, &name);
                     let html = page::html(&report, Some("index.html"));
-                    let written = fs::write(folder.path().join(&file), html);
+                    let written = folder.add(&file, |out| out.write_all(html.as_bytes()));
                     written.map_err(|error| Exit::Output(error.into()).at(file.clone()))?;
                     answers.push(report.json());
                     index::Entry::of(&report, file)
@@ -171,7 +170,8 @@ impl Work<'_> {
             };
             entries.push(entry);
         }
-        let written = fs::write(folder.path().join("index.html"), index::html(&entries));
+        let html = index::html(&entries);
+        let written = folder.add("index.html", |out| out.write_all(html.as_bytes()));
         written.map_err(|error| Exit::Output(error.into()).at("index.html"))?;
         folder.persist().map_err(|error| Exit::Failed(error.into()))?;
         if args.json {
