@@ -147,6 +147,11 @@ impl FillRule {
         if self.has_bodies() { body } else { 0 }
     }
 
+    /// Returns true if a body only takes away.
+    pub(crate) fn is_cutter(&self, body: u32) -> bool {
+        self.rules[body as usize].is_cutter()
+    }
+
     /// Returns true if two bodies are of one file, and neither is cut out.
     pub(crate) fn may_share(&self, a: u32, b: u32) -> bool {
         let [a, b] = [a, b].map(|body| &self.rules[body as usize]);
@@ -314,7 +319,7 @@ impl<'a> Position<'a> {
 
     /// Returns true if a body is cut out of others, however its facets face.
     pub(crate) fn is_cut_out(&self, body: u32) -> bool {
-        self.rule.rules[body as usize].is_cutter()
+        self.rule.is_cutter(body)
     }
 
     /// Returns the bodies whose windings are not zero.
@@ -345,7 +350,7 @@ impl<'a> SharedPixels<'a> {
     }
 
     /// Adds pixels at a position. Bodies share them if both wind around them the same way, and
-    /// voids leave more than one winding.
+    /// voids leave more than one winding. A body that cuts shares all that it takes away or keeps.
     pub(crate) fn add(&mut self, position: &Position<'_>, pixels: u32) {
         self.held.clear();
         self.held.extend(position.all_that_hold());
@@ -357,7 +362,8 @@ impl<'a> SharedPixels<'a> {
             *self.counts.entry([a, a]).or_default() += u64::from(pixels);
             for &(b, of_b) in &self.held[k + 1..] {
                 let is_shared = of_a.signum() == of_b.signum() && winding.abs() > 1;
-                if is_shared && self.rule.may_share(a, b) {
+                let is_cut = self.rule.is_cutter(a) != self.rule.is_cutter(b);
+                if is_cut || (is_shared && self.rule.may_share(a, b)) {
                     *self.counts.entry([a.min(b), a.max(b)]).or_default() += u64::from(pixels);
                 }
             }
@@ -404,17 +410,31 @@ impl SharedVolumes {
     ///
     /// Pairs that only touch are left out: bodies on top of each other may share the layer
     /// whose plane they touch in.
-    pub(crate) fn overlaps(&self) -> Vec<([u32; 2], f64)> {
+    pub(crate) fn overlaps(&self, rule: &FillRule) -> Vec<([u32; 2], f64)> {
         let own_mm3 = |body: u32| self.0.get(&[body, body]).map_or(0.0, |own| own.mm3);
         let is_overlap = |(pair, shared): &(&[u32; 2], &SharedVolume)| {
             let [a, b] = **pair;
             let least_mm3 = LEAST_SHARE * own_mm3(a).min(own_mm3(b));
-            a != b && shared.lasts && shared.mm3 > least_mm3
+            a != b && rule.may_share(a, b) && shared.lasts && shared.mm3 > least_mm3
         };
         let overlaps = self.0.iter().filter(is_overlap);
         let mut overlaps: Vec<_> = overlaps.map(|(pair, shared)| (*pair, shared.mm3)).collect();
         overlaps.sort_by(|a, b| b.1.total_cmp(&a.1));
         overlaps
+    }
+
+    /// Returns the files that are there to cut, and share no pixel with the part.
+    pub(crate) fn idle_cutters(&self, rule: &FillRule) -> Vec<usize> {
+        let cuts = |file: usize| {
+            self.0.keys().any(|&[a, b]| {
+                let is_of_file = |body: u32| rule.rules[body as usize].file == file;
+                is_of_file(a) != is_of_file(b)
+            })
+        };
+        let cutters = rule.rules.iter().filter(|of| of.join != Join::Unite).map(|of| of.file);
+        let mut idle: Vec<_> = cutters.filter(|&file| !cuts(file)).collect();
+        idle.dedup();
+        idle
     }
 }
 

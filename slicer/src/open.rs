@@ -1,6 +1,5 @@
 //! Opens parts from files and streams, in the format that their content says.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +10,7 @@ use std::time::Duration;
 #[cfg(feature = "occt")]
 use lamp_brep::Comparison;
 use lamp_brep::{BodyFault, BrepError, Prepared, ReadFn, prepare};
-use lamp_stack::{FORMAT_BYTES, FileFormat, Length, PartFormat, digest_of, one_line};
+use lamp_stack::{FORMAT_BYTES, FileFormat, Length, PartFormat, digest_of, one_line, open_ending};
 
 use crate::archive::not_three_mf;
 use crate::ascii;
@@ -93,7 +92,7 @@ impl Part {
     ///
     /// [`check_unchanged`]: Self::check_unchanged
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, SliceError> {
-        let file = File::open(path)?;
+        let file = open_ending(path)?;
         let metadata = file.metadata()?;
         if metadata.is_dir() {
             return Err(SliceError::Folder);
@@ -158,7 +157,8 @@ fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, Sli
     if start.is_empty() {
         return Err(SliceError::EmptyFile);
     }
-    if !is_gzip(&start) {
+    let format = FileFormat::of_start(&start, Some(file.size()));
+    if format != Some(FileFormat::Part(PartFormat::Gzip)) {
         return unpacked(file, &start, options);
     }
     let file = Arc::new(unpack(file)?);
@@ -172,11 +172,13 @@ fn unpacked(
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
     let of_one = |piece, notes| Contents { pieces: vec![piece], notes };
-    if looks_packaged(file, start)? {
+    let format = FileFormat::of_start(start, Some(file.size()));
+    let is_counted = format == Some(FileFormat::Part(PartFormat::BinaryStl));
+    if !is_counted && looks_packaged(file, start)? {
         return three_mf::read(file).map_err(|error| not_three_mf(file, error));
     }
     let of_facets = |facets, notes| of_one(Piece::new(facets), notes);
-    match FileFormat::of_start(start, Some(file.size())) {
+    match format {
         Some(FileFormat::Part(PartFormat::Step)) => {
             let mut bytes = Vec::new();
             file.reader().read_to_end(&mut bytes)?;
@@ -197,9 +199,6 @@ fn unpacked(
         }
         Some(FileFormat::Part(PartFormat::Gzip)) => {
             Err(SliceError::OtherFormat(FileFormat::Archive("a doubly packed file")))
-        }
-        Some(FileFormat::Text) if file.size() < stl::HEADER_BYTES => {
-            Err(SliceError::NotStl { size: file.size() })
         }
         Some(format) => Err(SliceError::OtherFormat(format)),
     }

@@ -379,7 +379,13 @@ impl Slices {
             let [(file, a), (_, b)] = bodies.map(|body| self.model.model.body_in_file(body));
             BodyOverlap { file, bodies: [a, b], volume_mm3 }
         };
-        self.shared.overlaps().into_iter().map(of_pair).collect()
+        self.shared.overlaps(&self.rule).into_iter().map(of_pair).collect()
+    }
+
+    /// Returns the files that are subtracted or intersected, and touch nothing of the part in the
+    /// layers made so far.
+    pub fn idle_cutters(&self) -> Vec<usize> {
+        self.shared.idle_cutters(&self.rule)
     }
 
     /// Returns the files whose surfaces left doubts in the layers made so far. Under

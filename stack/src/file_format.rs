@@ -205,15 +205,12 @@ impl FileFormat {
     /// A file whose size is that of the facets which its header counts is a binary STL, whatever
     /// its header says.
     pub fn of_start(start: &[u8], size: Option<u64>) -> Option<Self> {
-        let signature = SIGNATURES.iter().find(|(bytes, _)| start.starts_with(bytes));
-        match signature.map(|(_, format)| *format) {
-            Some(format @ Self::Part(_)) => Some(format),
-            _ if size.is_some_and(|size| is_counted(start, size)) => {
-                Some(Self::Part(PartFormat::BinaryStl))
-            }
-            Some(format) => Some(format),
-            None => of_bytes(start, size).or_else(|| of_text(start, size)),
+        if size.is_some_and(|size| is_counted(start, size)) {
+            return Some(Self::Part(PartFormat::BinaryStl));
         }
+        let signature = SIGNATURES.iter().find(|(bytes, _)| start.starts_with(bytes));
+        let format = signature.map(|(_, format)| *format);
+        format.or_else(|| of_bytes(start, size)).or_else(|| of_text(start, size))
     }
 }
 

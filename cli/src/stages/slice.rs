@@ -234,6 +234,20 @@ impl Slicing<'_> {
         doubts.iter().flat_map(|doubt| fill_doubt(doubt, &files[doubt.file].name())).collect()
     }
 
+    /// Returns a doubt about each file that is there to cut, and cut nothing so far.
+    pub(crate) fn idle_cutters(&self) -> Vec<String> {
+        let SliceSettings { options, parts, .. } = self.settings;
+        let files = options.solid.files(parts).0;
+        let idle = self.bridged.borrow().slices.idle_cutters();
+        let doubt = |file: usize| {
+            let name = files[file].name();
+            format!(
+                "{name} cuts nothing: it shares no pixel with the part, so check where it stands"
+            )
+        };
+        idle.into_iter().map(doubt).collect()
+    }
+
     /// Looks at the slices with `look`.
     pub(crate) fn with_slices<T>(
         &self,
@@ -245,7 +259,8 @@ impl Slicing<'_> {
     /// Returns what else is to be said of the layers so far.
     pub(crate) fn remarks(&self) -> Vec<String> {
         let bridged = self.bridged.borrow().text();
-        bridged.into_iter().chain(self.overlap()).chain(self.fill_doubts()).collect()
+        let doubts = self.fill_doubts().into_iter().chain(self.idle_cutters());
+        bridged.into_iter().chain(self.overlap()).chain(doubts).collect()
     }
 
     /// Returns the number of all layers of the part, also of those that are not wanted.
@@ -267,7 +282,8 @@ impl Slicing<'_> {
             Some(text) => progress.say(&text),
             None => {}
         }
-        self.fill_doubts().iter().for_each(|doubt| progress.warn(doubt));
+        let doubts = self.fill_doubts().into_iter().chain(self.idle_cutters());
+        doubts.for_each(|doubt| progress.warn(&doubt));
         if let [layers, pixels] = self.short.get()
             && pixels > 0
         {

@@ -68,9 +68,7 @@ pub enum ThreeMfError {
         id: u32,
     },
     /// An object whose shape is made in a way that is not read.
-    #[error(
-        "object {id} of its {model} is made by {feature}, which is not read: export it as a plain mesh"
-    )]
+    #[error("object {id} of its {model} is made by {feature}, which is not read")]
     Unread {
         /// The name of the model in the package.
         model: String,
@@ -90,15 +88,13 @@ pub enum ThreeMfError {
         fault: &'static str,
     },
     /// A model that cannot be read without its key.
-    #[error(
-        "its {0} is encrypted, and encrypted models are not read: export it without protection"
-    )]
+    #[error("its {0} is encrypted, and encrypted models are not read")]
     Encrypted(String),
     /// An object that holds itself, or very many objects.
     #[error("its objects hold themselves, or more than {MAX_VISITS} objects in all")]
     Endless,
     /// No item that is built.
-    #[error("of its {items} items none is both a solid and to be printed")]
+    #[error("it holds nothing to build: {}", why_nothing(*.items))]
     NothingToBuild {
         /// The number of items.
         items: usize,
@@ -109,6 +105,16 @@ pub enum ThreeMfError {
     /// A package that holds far more than any mesh its size.
     #[error("its model unpacks to more than {0} bytes, which is far more than a packed mesh does")]
     Inflated(u64),
+}
+
+/// Returns why none of so many items is built.
+fn why_nothing(items: usize) -> String {
+    let items = match items {
+        0 => return "it has no items".to_owned(),
+        1 => "its only item is".to_owned(),
+        items => format!("each of its {items} items is"),
+    };
+    format!("{items} a support, a modifier, a negative volume or marked as not printed")
 }
 
 /// A fault of a model.
