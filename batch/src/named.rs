@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::key::Key;
 use crate::path_bytes;
-use crate::store::{Store, StoreError, sealed};
+use crate::store::{Store, StoreError, is_read_only, sealed};
 use crate::task::Graph;
 
 /// The tasks of a batch, and which of them it wants in the end.
@@ -54,9 +54,16 @@ impl NamedTasks {
         let path = self.path(store);
         if sealed::read::<Self>(&path).as_ref() == Some(self) {
             let touch = || fs::File::open(&path)?.set_modified(SystemTime::now());
-            return touch().map_err(|error| StoreError::Io(path.clone(), error));
+            return match touch() {
+                Err(error) if is_read_only(&error) => Ok(()),
+                touched => touched.map_err(|error| StoreError::Io(path, error)),
+            };
         }
-        sealed::write(&path, self).map_err(|error| StoreError::Io(path, error))
+        match sealed::write(&path, self) {
+            // Nothing is removed from it either.
+            Err(error) if is_read_only(&error) => Ok(()),
+            kept => kept.map_err(|error| StoreError::Io(path, error)),
+        }
     }
 
     /// Returns what batches name that were run within a time, and the files of others.

@@ -1,5 +1,6 @@
 //! Exposure options: a layer's time and gray levels by material or table.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
@@ -9,8 +10,11 @@ use lamp_grayscale::material::{Material, ResinError};
 use lamp_grayscale::resin::{CureModel, Dose, ExposureTime, Intensity, depth_levels};
 use lamp_stack::{DepthLevels, FadingLevels, Length};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use crate::catalogue::{canonical_word, entry, is_file, read_text};
+use crate::catalogue::{
+    check_word, entry_and_word, is_file, read_text, recorded_name, without_digest, word_of_text,
+};
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
 use crate::measured_doses::MeasuredDoses;
@@ -52,6 +56,8 @@ pub(crate) struct ExposureOptions {
 /// Exposure times by layer thickness.
 pub(crate) struct Exposure {
     name: String,
+    /// The word that stacks record for the material or table.
+    word: String,
     source: Source,
 }
 
@@ -80,21 +86,43 @@ impl Default for ExposureOptions {
 }
 
 impl ExposureOptions {
-    /// Puts the name of the material or table in the place of its path, as stacks record it.
+    /// Puts the word of the material or table in the place of its path, as stacks record it.
     pub(crate) fn name(&mut self, exposure: Option<&Exposure>) {
-        let Some(Exposure { name, .. }) = exposure else { return };
-        for path in [&mut self.material, &mut self.exposure_table].into_iter().flatten() {
-            *path = PathBuf::from(name);
+        let Some(Exposure { word, .. }) = exposure else { return };
+        self.paths_mut().for_each(|path| *path = PathBuf::from(word));
+    }
+
+    /// Finds the material or table of a record again, in the first of these folders that has it.
+    ///
+    /// # Errors
+    /// Returns an error if none has it with the digest of the record.
+    pub(crate) fn find(&mut self, folders: &[&Path]) -> Result<(), Exit> {
+        let builtin = self.material.as_deref().is_some_and(|path| !is_file::<Material>(path));
+        if builtin {
+            return self.exposure().map(drop);
         }
+        for path in self.paths_mut() {
+            let is_it = |word: &PathBuf| {
+                let text = fs::read_to_string(without_digest(word).0);
+                text.is_ok_and(|text| check_word(word, &word_of_text(word, &text)).is_ok())
+            };
+            let mut words = folders.iter().map(|folder| folder.join(&*path));
+            *path = words.find(is_it).ok_or_else(|| {
+                let name = path.display();
+                Exit::Failed(anyhow!("{name} is neither here nor beside the stack, as it was"))
+            })?;
+        }
+        Ok(())
+    }
+
+    fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.material.iter_mut().chain(&mut self.exposure_table)
     }
 
     /// Puts words of the same meaning, whatever the folders, in the place of paths.
     pub(crate) fn make_canonical(&mut self) {
-        if let Some(path) = &mut self.material {
-            *path = canonical_word::<Material>(path).into();
-        }
-        if let Some(path) = &mut self.exposure_table {
-            *path = recorded_name(path).into();
+        for path in self.paths_mut() {
+            *path = recorded_name::<Material>(path).into();
         }
     }
 
@@ -117,32 +145,39 @@ impl ExposureOptions {
     /// Returns the exposure, if a material or a table is given.
     pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
         if let Some(path) = &self.exposure_table {
-            let name = recorded_name(path);
-            let times = read_times(path).with_context(|| input_name(path))?;
-            return Ok(Some(Exposure { name, source: Source::Table(times) }));
+            let (file, _) = without_digest(path);
+            let read = || read_times(&file);
+            let (times, text) = read().with_context(|| input_name(&file))?;
+            let (name, word) = (input_name(&file), word_of_text(&file, &text));
+            check_word(path, &word)?;
+            return Ok(Some(Exposure { name, word, source: Source::Table(times) }));
         }
         let Some(path) = &self.material else { return Ok(None) };
-        let (material, lamp_doubt) = self.lamp.material(entry(path)?)?;
+        let (material, word) = entry_and_word(path)?;
+        let (material, lamp_doubt) = self.lamp.material(material)?;
         let model = material.cure_model().map_err(|error| Exit::Failed(error.into()))?;
         let light = material.light().map_err(anyhow::Error::new)?;
         let doses = MeasuredDoses::of_depths(&material);
         let (name, overcure) = (material.name.clone(), self.overcure);
         let curing = Curing { material, light, model, overcure, doses, lamp_doubt };
-        Ok(Some(Exposure { name, source: Source::Resin(Box::new(curing)) }))
+        Ok(Some(Exposure { name, word, source: Source::Resin(Box::new(curing)) }))
     }
 }
 
-/// Returns what a stack calls a table: without blanks, as the stack's commands are words.
-fn recorded_name(table: &Path) -> String {
-    table.file_name().unwrap_or_default().to_string_lossy().replace(' ', "_")
-}
-
-fn read_times(path: &Path) -> anyhow::Result<ExposureTimes> {
-    let table = CsvTable::parse(&read_text(path, MAX_TABLE_BYTES, "a table of exposure times")?)?;
-    Ok(ExposureTimes::new(&table)?)
+/// Reads a table, and its text.
+fn read_times(path: &Path) -> anyhow::Result<(ExposureTimes, String)> {
+    let text = read_text(path, MAX_TABLE_BYTES, "a table of exposure times")?;
+    Ok((ExposureTimes::new(&CsvTable::parse(&text)?)?, text))
 }
 
 impl Exposure {
+    /// Returns the numbers of the material that decide exposures, as stacks record them: the curve,
+    /// doses and light under the lamp as it is now.
+    pub(crate) fn numbers(&self) -> Option<Value> {
+        let Source::Resin(curing) = &self.source else { return None };
+        Some(serde_json::to_value(&curing.material).expect("a material is texts and numbers"))
+    }
+
     /// Checks that a layer has an exposure. Without a light, its dose is enough.
     pub(crate) fn check(&self, thickness: Length) -> Result<(), Exit> {
         match &self.source {

@@ -8,9 +8,11 @@ use anyhow::anyhow;
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
+use crate::catalogue::{check_word, without_digest, word_of};
 use crate::exit::Exit;
 use crate::options::ranges;
 use crate::part_options::part_notes;
+use crate::recorded::option;
 use crate::slicing_options::SlicingOptions;
 use crate::streams::input_name;
 
@@ -28,6 +30,9 @@ const SAME_BOX: f64 = 1e-3;
 /// transitions in an STL than on the surfaces it was made of.
 const TURNING_ROWS: usize = 4;
 
+/// The key of pages that were taken from the fallback.
+const FALLBACK: &str = "fallback";
+
 /// A part's layers, with gaps bridged if there is a fallback.
 pub(crate) struct Bridged {
     pub(crate) slices: Slices,
@@ -36,6 +41,8 @@ pub(crate) struct Bridged {
 
 struct Fallback {
     name: String,
+    /// The word that stacks record for it.
+    word: String,
     slices: Slices,
     /// The layers cut beside their planes, and those taken from here.
     nudged: Vec<u32>,
@@ -52,13 +59,18 @@ impl Bridged {
         say: &dyn Fn(&str),
     ) -> Result<Self, Exit> {
         let open = |path: &Path| {
-            let name = input_name(path);
+            let name = input_name(&without_digest(path).0);
             let say = |note: &str| say(&format!("{name}: {note}"));
             let opened = Fallback::open(path, &slices, options, layers, &say);
             opened.map_err(|error| error.at(name.clone()))
         };
         let fallback = fallback.map(open).transpose()?;
         Ok(Self { slices, fallback })
+    }
+
+    /// Returns the option as stacks record it, if there is a fallback.
+    pub(crate) fn option(&self) -> Option<String> {
+        self.fallback.as_ref().map(|fallback| option("fallback", &fallback.word))
     }
 
     /// Returns a line about the bridged layers, if there are any.
@@ -114,7 +126,10 @@ impl Fallback {
         let other = |what: String| {
             Exit::Failed(anyhow!("it is not the same part as the STEP file: its box {what}"))
         };
-        let part = Part::open(path, &opening)?;
+        let (file, _) = without_digest(path);
+        let part = Part::open(&file, &opening)?;
+        let word = word_of(&file, part.digest());
+        check_word(path, &word)?;
         part_notes(&part).iter().for_each(|note| say(note));
         let fallback = Slices::new(part, &options).map_err(|error| match error {
             SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
@@ -128,7 +143,7 @@ impl Fallback {
             return Err(other(format!("is {apart_mm:.3} mm off")));
         }
         let (nudged, borrowed) = (Vec::new(), Vec::new());
-        Ok(Self { name: input_name(path), slices: fallback, nudged, borrowed })
+        Ok(Self { name: input_name(&file), word, slices: fallback, nudged, borrowed })
     }
 
     /// Returns the layer, or a replacement if it has gaps or lacks contours.
@@ -148,7 +163,9 @@ impl Fallback {
             }
         }
         self.borrowed.push(number);
-        Ok(Layer { info: PageInfo { stack, ..other.info }, ..other })
+        let mut layer = Layer { info: PageInfo { stack, ..other.info }, ..other };
+        layer.info.other.insert(FALLBACK.to_owned(), true.into());
+        Ok(layer)
     }
 }
 

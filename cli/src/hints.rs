@@ -333,6 +333,7 @@ fn recipe(error: &RecipeError) -> Option<String> {
         RecipeError::Json { .. }
         | RecipeError::Schema { .. }
         | RecipeError::Code { .. }
+        | RecipeError::Changed
         | RecipeError::NoPiece { .. } => "write it anew with tile --recipe",
         RecipeError::OtherPart { .. } => {
             "bring that stack back, or write the recipe anew with tile --recipe"

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use lamp_slicer::{Axis, Placement};
-use lamp_stack::Length;
+use lamp_stack::{Length, file_word};
 
 use crate::streams::{input_name, is_stream};
 
@@ -52,11 +52,22 @@ impl PartArg {
 
     /// Returns what a stack records of it: the file's name, and the placement.
     pub(crate) fn recorded(&self) -> String {
-        match self.placement {
-            Some(placement) => format!("{}@{placement}", self.file()),
-            None => self.file(),
-        }
+        recorded(&self.file(), self.placement)
     }
+
+    /// Returns true if a stack records the same place for both.
+    pub(crate) fn stands_like(&self, other: &Self) -> bool {
+        let [a, b] = [self, other].map(|part| part.placement.unwrap_or_default());
+        a == b
+    }
+}
+
+/// Returns what a stack records of a file of a part, so that [`PartArg::parse`] reads it.
+pub(crate) fn recorded(file: &str, placement: Option<PartPlacement>) -> String {
+    // Of a name with an `@` what follows would be taken for the placement.
+    let placement = placement.or_else(|| file.contains('@').then(PartPlacement::default));
+    let file = if file == "-" { file.into() } else { file_word(file) };
+    placement.map_or_else(|| file.clone().into_owned(), |placement| format!("{file}@{placement}"))
 }
 
 /// Returns the paths of parts.
@@ -65,7 +76,7 @@ pub(crate) fn paths(parts: &[PartArg]) -> impl Iterator<Item = &PathBuf> {
 }
 
 /// A turn about z, in degrees counter-clockwise seen from above, and then a move.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PartPlacement {
     by: [Length; 3],
     degrees: f64,

@@ -6,12 +6,14 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_planning::{Light, SampleHeight};
+use lamp_stack::quoted;
 
-use crate::catalogue::entry;
+use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::height_options::parse_share;
 use crate::lamp_option::LampOption;
 use crate::options::one_of_described;
+use crate::recorded::option;
 
 /// What `--help` says of the heights in a layer.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
@@ -47,20 +49,25 @@ pub(crate) struct PlanningOptions {
     pub(crate) at: SampleHeight,
 }
 
-impl PlanningOptions {
-    /// Returns the material under the lamp as it is now, the light that it makes, and what is
-    /// doubtful about the lamp.
-    pub(crate) fn light(&self) -> Result<(Material, Light, Option<String>), Exit> {
-        let (material, doubt) = self.lamp.material(entry(&self.material)?)?;
-        let light = Light::of(&material, self.at)?;
-        Ok((material, light, doubt))
-    }
+/// A resin under the light of a plan.
+pub(crate) struct PlannedResin {
+    pub(crate) material: Material,
+    pub(crate) light: Light,
+    /// What is doubtful about the lamp.
+    pub(crate) doubt: Option<String>,
+    /// The resin and the lamp as pages record them.
+    pub(crate) words: String,
+}
 
-    /// Returns the resin and the lamp as pages record them.
-    pub(crate) fn resin_words(&self, material: &str) -> String {
-        let lamp = self.lamp.canonical();
-        let lamp = lamp.map_or(String::new(), |light| format!(" --lamp-intensity {light}"));
-        format!("--material {material}{lamp}")
+impl PlanningOptions {
+    /// Returns the material under the lamp as it is now, and the light that it makes.
+    pub(crate) fn resin(&self) -> Result<PlannedResin, Exit> {
+        let (material, word) = entry_and_word(&self.material)?;
+        let (material, doubt) = self.lamp.material(material)?;
+        let light = Light::of(&material, self.at)?;
+        let lamp = self.lamp.canonical().map(|light| option("lamp-intensity", &light));
+        let words = format!("--material {}{}", quoted(&word), lamp.unwrap_or_default());
+        Ok(PlannedResin { material, light, doubt, words })
     }
 }
 

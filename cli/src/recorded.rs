@@ -5,6 +5,7 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
+use lamp_stack::quoted;
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
@@ -17,33 +18,49 @@ const RECORDED: &str = "\
     kernel no-polish gray print-through material overcure lamp-intensity exposure-table origin size \
     margin trust-extent";
 
-/// Returns the options as words: ` --dpi 1500 --snap` and so on, those for which `applies`
+/// Returns the options as words of a shell: ` --dpi 1500 --snap` and so on, those for which `applies`
 /// holds.
 pub(crate) fn to_words(options: &impl Serialize, applies: impl Fn(&str) -> bool) -> String {
     let options = serde_json::to_value(options).expect("options are texts and flags");
     let word = |key: &str| match &options[key] {
         Value::Bool(true) => format!(" --{key}"),
-        Value::String(value) => format!(" --{key} {value}"),
+        Value::String(value) => option(key, value),
         Value::Array(values) => {
             let values = values.iter().filter_map(Value::as_str);
-            values.map(|value| format!(" --{key} {value}")).collect()
+            values.map(|value| option(key, value)).collect()
         }
         _ => String::new(),
     };
     RECORDED.split(' ').filter(|key| applies(key)).map(word).collect()
 }
 
+/// Returns the first option that is not the same in both.
+pub(crate) fn differing<T: Serialize>(a: &T, b: &T) -> Option<&'static str> {
+    let [a, b] = [a, b].map(|it| serde_json::to_value(it).expect("options are texts and flags"));
+    RECORDED.split(' ').find(|&key| a[key] != b[key])
+}
+
+/// Returns an option with its value as words of a shell.
+pub(crate) fn option(key: &str, value: &str) -> String {
+    // Else it would be taken for an option.
+    let between = if value.starts_with("--") { '=' } else { ' ' };
+    format!(" --{key}{between}{}", quoted(value))
+}
+
 /// Reads options from their words. Returns none if there are words of other options.
-pub(crate) fn from_words<T: DeserializeOwned>(words: &str) -> Option<T> {
+pub(crate) fn from_words<T: DeserializeOwned>(words: &[String]) -> Option<T> {
     let mut options = Map::new();
-    // Names of files may hold blanks.
-    for option in words.split(" --").map(str::trim).filter(|option| !option.is_empty()) {
-        let (key, value) = option.split_once(' ').unwrap_or((option, ""));
-        let key = key.trim_start_matches('-');
+    let mut words = words.iter().peekable();
+    while let Some(word) = words.next() {
+        let word = word.strip_prefix("--")?;
+        let (key, value) = match word.split_once('=') {
+            Some((key, value)) => (key, Some(value.to_owned())),
+            None => (word, words.next_if(|value| !value.starts_with("--")).cloned()),
+        };
         if !RECORDED.split(' ').any(|it| it == key) {
             return None;
         }
-        let value = if value.is_empty() { Value::Bool(true) } else { value.trim().into() };
+        let value = value.map_or(Value::Bool(true), Value::String);
         match options.get_mut(key) {
             None => drop(options.insert(key.to_owned(), value)),
             Some(Value::Array(values)) => values.push(value),

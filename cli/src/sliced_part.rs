@@ -74,8 +74,8 @@ impl SlicedPart {
         progress: &Progress,
     ) -> Result<LayersOfPart<impl Iterator<Item = Result<Layer, Exit>> + use<>>, Exit> {
         let (parts, _) = slicing.solid.files(std::slice::from_ref(&self.file));
-        let (model, name) = (self.model.clone(), self.file.recorded());
-        let slices = slicing.slices(model, &name, layers, memory, slicing.exposure()?, progress);
+        let (model, names) = (self.model.clone(), [self.file.recorded()]);
+        let slices = slicing.slices(model, &names, layers, memory, slicing.exposure()?, progress);
         let (slices, name_command) = slices.map_err(|error| at_part(error, &parts))?;
         let count = slices.layer_count() as u64;
         let layers = slices.map(move |layer| {

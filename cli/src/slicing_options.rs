@@ -1,7 +1,7 @@
 //! Options that decide the images of a part, and the command that stacks record.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
@@ -12,7 +12,7 @@ use lamp_slicer::{
     Axis, Bodies, GridRule, LayerHeights, LayerLevels, PLANE_TOLERANCE, Part, PlaneRule,
     SliceOptions, Slices,
 };
-use lamp_stack::{Dpi, Layer, Length, Size};
+use lamp_stack::{Dpi, Layer, Length, Size, quoted, words};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
@@ -23,7 +23,7 @@ use crate::options::{one_of, parse_thickness};
 use crate::part_options::PartOptions;
 use crate::placement::Numbers;
 use crate::progress::Progress;
-use crate::recorded::{from_words, optional, text, to_words};
+use crate::recorded::{differing, from_words, optional, text, to_words};
 use crate::step_options::HEADING;
 
 /// Options that decide the images.
@@ -159,11 +159,19 @@ impl SlicingOptions {
         }
     }
 
-    /// Reads the options from a command that a stack records; none if it is no slice command.
-    pub(crate) fn of_command(command: &str) -> Option<Self> {
-        // The name of the part may hold blanks.
-        let rest = command.strip_prefix("slice")?;
-        from_words(rest.find(" --").map_or("", |start| &rest[start..]))
+    /// Reads a part's files, with their placements, the options and the fallback from a command that
+    /// a stack records; none if it is no slice command.
+    pub(crate) fn of_command(command: &str) -> Option<(Vec<String>, Self, Option<String>)> {
+        let mut words = words(command).ok()?;
+        if words.first()? != "slice" {
+            return None;
+        }
+        let first = words.iter().position(|word| word.starts_with("--")).unwrap_or(words.len());
+        let mut options = words.split_off(first);
+        let at = options.iter().position(|word| word == "--fallback");
+        let fallback = at.map(|at| options.drain(at..options.len().min(at + 2)).last());
+        words.remove(0);
+        Some((words, from_words(&options)?, fallback.flatten()))
     }
 
     /// Returns the first option that is not as it is by default, where `machine` may give
@@ -178,18 +186,15 @@ impl SlicingOptions {
             margin: margin.unwrap_or(usual.margin),
             ..usual
         };
-        let words = |options: &Self| to_words(options, |_| true);
-        let (stated, usual) = (words(self), words(&usual));
-        let known: Vec<&str> = usual.split(" --").collect();
-        let stated = stated.split(" --").find(|word| !known.contains(word))?;
-        stated.split(' ').next().map(|name| format!("--{name}"))
+        differing(self, &usual).map(|key| format!("--{key}"))
     }
 
-    /// Returns the names of the files in a command that a stack records, with their
-    /// placements.
-    pub(crate) fn parts_of_command(command: &str) -> &str {
-        let rest = command.strip_prefix("slice ").unwrap_or_default();
-        rest.split_once(" --").map_or(rest, |(parts, _)| parts)
+    /// Finds the material or table of a record again, in the first of these folders that has it.
+    ///
+    /// # Errors
+    /// Returns an error if none has it with the digest of the record.
+    pub(crate) fn find_exposure(&mut self, folders: &[&Path]) -> Result<(), Exit> {
+        self.exposure.find(folders)
     }
 
     /// Returns the options that slice a part for a plan.
@@ -200,14 +205,15 @@ impl SlicingOptions {
         self
     }
 
-    /// The command as the stack records it.
-    pub(crate) fn command(&self, part: &str, exposure: Option<&Exposure>) -> String {
+    /// The command as the stack records it. `parts` are the part's files, with their placements.
+    pub(crate) fn command(&self, parts: &[String], exposure: Option<&Exposure>) -> String {
+        let parts: String = parts.iter().map(|part| format!(" {}", quoted(part))).collect();
         let mut options = self.clone();
         options.exposure.name(exposure);
         let usual_kernel = self.solid.brep.reader.is_usual();
         let words =
             to_words(&options, |key| options.says(key) && (key != "kernel" || !usual_kernel));
-        format!("slice {part}{words}")
+        format!("slice{parts}{words}")
     }
 
     /// Returns whether an option says something beside the others.
@@ -235,12 +241,12 @@ impl SlicingOptions {
         self.exposure.files_mut().chain(self.solid.cutters_mut())
     }
 
-    /// The layers of a part, the first naming this command; `part` is the
-    /// name of its file, or of several.
+    /// The layers of a part, the first naming this command; `parts` are its files, with their
+    /// placements.
     pub(crate) fn slices(
         &self,
         model: Part,
-        part: &str,
+        parts: &[String],
         layers: Option<Range<u32>>,
         memory: Option<u64>,
         exposure: Option<Exposure>,
@@ -273,7 +279,8 @@ impl SlicingOptions {
         }
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
-        let command = self.command(part, exposure.as_ref());
+        let command = self.command(parts, exposure.as_ref());
+        let numbers = exposure.as_ref().and_then(Exposure::numbers);
         let name_command = move |layer: &mut Layer| {
             // All thicknesses were tried above.
             let time = |exposure: &Exposure| {
@@ -282,6 +289,8 @@ impl SlicingOptions {
             layer.info.exposure_ms = exposure.as_ref().and_then(time);
             if let Some(stack) = &mut layer.info.stack {
                 stack.commands.push(command.clone());
+                let numbers = numbers.clone().map(|numbers| ("material".to_owned(), numbers));
+                stack.other.extend(numbers);
             }
         };
         Ok((slices, name_command))
@@ -406,17 +415,28 @@ mod tests {
              --translate -5,0,12.7 --tolerance 1um --no-polish --gray --print-through \
              --material lamp-suspension --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
             "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \
-             --exposure-table my_times.csv --margin 0",
+             --exposure-table 'my times --x.csv@blake3:0123456789abcdef' --margin 0",
             "--dpi 300 --thickness 1mm --plane top --units mm --fill even-odd --bodies xor --margin 1",
         ] {
-            let command = format!("slice my part.stl {words}");
-            let options = SlicingOptions::of_command(&command).unwrap();
-            assert_eq!(options.command("my part.stl", None), command);
+            let command = format!("slice 'my --part@1,2.stl' a.stl@1,0,0,0 {words}");
+            let (parts, options, fallback) = SlicingOptions::of_command(&command).unwrap();
+            assert_eq!(parts, ["my --part@1,2.stl", "a.stl@1,0,0,0"]);
+            assert_eq!(options.command(&parts, None), command);
+            assert_eq!(fallback, None);
+            let (_, same, fallback) =
+                SlicingOptions::of_command(&format!("{command} --fallback 'b c.stl'")).unwrap();
+            assert_eq!(same.command(&parts, None), command);
+            assert_eq!(fallback.as_deref(), Some("b c.stl"));
         }
-        let of_older = SlicingOptions::of_command("slice a.stl --dpi 1500").unwrap();
-        assert_eq!(of_older.command("", None), SlicingOptions::default().command("", None));
-        for wrong in ["fix", "slice a.stl --colour red", "slice a.stl --dpi", "slice a --fill all"]
-        {
+        let (_, of_older, _) = SlicingOptions::of_command("slice a.stl --dpi 1500").unwrap();
+        assert_eq!(of_older.command(&[], None), SlicingOptions::default().command(&[], None));
+        for wrong in [
+            "fix",
+            "slice 'a.stl",
+            "slice a.stl --colour red",
+            "slice a.stl --dpi",
+            "slice a --fill all",
+        ] {
             assert!(SlicingOptions::of_command(wrong).is_none(), "{wrong}");
         }
     }

@@ -12,8 +12,8 @@ use crate::slicing_options::SlicingOptions;
 /// What a stack records of how its part was sliced.
 pub(crate) struct RecordedSlicing<'a> {
     pub(crate) options: SlicingOptions,
-    /// The names of the part's files, with their placements.
-    files: &'a str,
+    /// The part's files, with their placements.
+    files: Vec<String>,
     digest: &'a str,
 }
 
@@ -21,9 +21,7 @@ impl<'a> RecordedSlicing<'a> {
     /// Returns `None` if a stack does not record it.
     pub(crate) fn of(stack: Option<&'a StackInfo>) -> Option<Self> {
         let stack = stack?;
-        let command = stack.commands.first()?;
-        let files = SlicingOptions::parts_of_command(command);
-        let options = SlicingOptions::of_command(command)?;
+        let (files, options, _) = SlicingOptions::of_command(stack.commands.first()?)?;
         Some(Self { options, files, digest: &stack.digest })
     }
 
@@ -46,11 +44,11 @@ impl<'a> RecordedSlicing<'a> {
             )));
         }
         // Names of files may have changed since, but not where the parts stand.
-        let given: Vec<_> = parts.iter().map(PartArg::recorded).collect();
-        if (self.files.contains('@') || parts.iter().any(|part| part.placement.is_some()))
-            && given.join(" ") != self.files
-        {
-            let files = self.files;
+        let recorded = self.files.iter().map(|file| PartArg::parse(file.into()));
+        let recorded = recorded.collect::<Result<Vec<_>, _>>().unwrap_or_default();
+        let same = recorded.iter().zip(parts).all(|(a, b)| a.stands_like(b));
+        if recorded.len() != parts.len() || !same {
+            let files = self.files.join(" ");
             return Err(Exit::Failed(anyhow!(
                 "{name} was sliced from {files}: give --part with the same placements"
             )));

@@ -110,6 +110,26 @@ pub fn white_in_row(transitions: &[u32], width: u32) -> u64 {
     white_runs(transitions, width).map(|(start, end)| u64::from(end - start)).sum()
 }
 
+/// Returns the number of pixels that are white in both of two rows.
+///
+/// ```
+/// assert_eq!(lamp_stack::white_in_both(&[1, 4, 6], &[0, 2, 3, 7], 8), 3);
+/// ```
+pub fn white_in_both(a: &[u32], b: &[u32], width: u32) -> u64 {
+    let (mut left, mut right) = (white_runs(a, width), white_runs(b, width));
+    let (mut in_a, mut in_b) = (left.next(), right.next());
+    let mut shared = 0;
+    while let (Some((from, to)), Some((start, end))) = (in_a, in_b) {
+        shared += u64::from(to.min(end).saturating_sub(from.max(start)));
+        if to < end {
+            in_a = left.next();
+        } else {
+            in_b = right.next();
+        }
+    }
+    shared
+}
+
 /// Builds a [`Mask`] row by row, from the top.
 ///
 /// ```

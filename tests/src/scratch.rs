@@ -116,6 +116,17 @@ impl Scratch {
         names
     }
 
+    /// Returns the names in a folder below, sorted, without hidden files.
+    pub fn names_in(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(folder)).expect("the folder is there");
+        let name = |entry: std::io::Result<fs::DirEntry>| {
+            entry.expect("it can be listed").file_name().to_string_lossy().into_owned()
+        };
+        let mut names: Vec<_> = entries.map(name).filter(|name| !name.starts_with('.')).collect();
+        names.sort();
+        names
+    }
+
     /// Returns a command that runs a binary in the folder with empty standard input.
     pub fn command(&self, words: &str) -> Command {
         let mut words = words.split_whitespace();

@@ -22,7 +22,7 @@ fn every_shape_goes_back_to_the_same_bytes() {
     let scratch = with_build();
     let build = scratch.bytes("build.tif");
     scratch.run("lamp convert build.tif -o pages/").succeeds_quietly();
-    assert_eq!(fs::read_dir(scratch.path("pages")).unwrap().count(), 38);
+    assert_eq!(scratch.names_in("pages").len(), 38);
     scratch.run("lamp convert pages -o back.tif").succeeds_quietly();
     assert!(scratch.bytes("back.tif") == build);
     scratch.run("lamp convert pages/ --classic -o classic.tif").succeeds_quietly();
@@ -89,7 +89,7 @@ fn a_folder_of_pngs_holds_the_pixels_and_the_lines() {
     let scratch = with_build();
     scratch.run("lamp convert build.tif --png -o pngs/").succeeds_quietly();
     let layers = scratch.layers("build.tif");
-    assert_eq!(fs::read_dir(scratch.path("pngs")).unwrap().count(), layers.len());
+    assert_eq!(scratch.names_in("pngs").len(), layers.len());
     for layer in &layers {
         let png = read(scratch.bytes(&format!("pngs/layer_{:05}.png", layer.info.index)));
         assert_shows(&png, layer);
@@ -148,7 +148,7 @@ fn a_range_states_how_many_layers_it_has() {
     let first = read(scratch.bytes("pngs/layer_00015.png"));
     assert_shows(&first, &all[15]);
     assert!(first.line.contains(r#""layers":5,"#), "{}", first.line);
-    assert_eq!(fs::read_dir(scratch.path("pngs")).unwrap().count(), 5);
+    assert_eq!(scratch.names_in("pngs").len(), 5);
 }
 
 #[test]

@@ -74,12 +74,10 @@ fn layers_that_no_edit_is_for_pass_byte_for_byte() {
     scratch.write("one.toml", b"[[edit]]\nz = [\"5mm\", \"5.5mm\"]\nbox = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n");
     scratch.run("lamp edit cube.tif one.toml -o files/").succeeds_quietly();
     scratch.run("lamp convert cube.tif -o same/").succeeds_quietly();
-    let names: Vec<_> =
-        std::fs::read_dir(scratch.path("files")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    let names = scratch.names_in("files");
     assert_eq!(names.len(), 40);
     let differ = names.iter().filter(|name| {
-        let [a, b] = ["files", "same"]
-            .map(|folder| scratch.bytes(&format!("{folder}/{}", name.to_str().unwrap())));
+        let [a, b] = ["files", "same"].map(|folder| scratch.bytes(&format!("{folder}/{name}")));
         a != b
     });
     let mut differ: Vec<_> = differ.collect();

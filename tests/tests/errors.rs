@@ -154,7 +154,7 @@ fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
         ("missing.stl", &["No such file"][..]),
         ("folder", &["not a file"]),
         ("empty.stl", &["empty"]),
-        ("text.stl", &["not an STL file"]),
+        ("text.stl", &["a text file, not an STL"]),
         ("truncated.stl", &["cut off after facet 20", "export it again"]),
         ("lying.stl", &["declares 4294967295 facets", "export it again"]),
         ("modest.stl", &["declares 10 facets", "bytes follow"]),

@@ -52,7 +52,7 @@ fn gray_stacks_go_through_the_pipeline() {
     // 137.4 mJ/cm2 exp(400/215.2) at 1.6 W/cm2.
     assert!(gray.iter().all(|layer| layer.info.exposure_ms == Some(550.942)));
     let stack = gray[0].info.stack.as_ref().unwrap();
-    assert!(stack.commands[0].contains("--gray --material lamp-suspension --overcure 1"));
+    assert!(stack.commands[0].contains("--gray --material lamp-suspension@blake3:"));
 
     let line = format!(
         "slice tower.stl {COARSE} --gray --material lamp-suspension | fix | dither -q > dots.tif"

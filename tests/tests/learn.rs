@@ -18,7 +18,8 @@ fn with_job() -> Scratch {
 /// The times of a profile, bottom first.
 fn times(scratch: &Scratch, name: &str) -> Vec<f64> {
     let text = String::from_utf8(scratch.bytes(name)).unwrap();
-    text.lines().skip(1).map(|row| row.split(',').nth(3).unwrap().parse().unwrap()).collect()
+    let rows = text.lines().skip(1).filter(|line| !line.starts_with('#'));
+    rows.map(|row| row.split(',').nth(3).unwrap().parse().unwrap()).collect()
 }
 
 fn areas(over: impl Fn(u32) -> u32, under: impl Fn(u32) -> u32) -> String {
@@ -51,9 +52,18 @@ fn a_job_keeps_every_print() {
     assert_eq!(report["convergence"].as_array().unwrap().len(), 3);
     let plot = String::from_utf8(scratch.bytes("learn.svg")).unwrap();
     assert!(plot.contains("Pixels to cure in each layer") && plot.contains("print 1"));
-    // The same table is not that of the next print.
+    // The same call gives the same, after a run that did not end.
+    let bytes = scratch.bytes("next.csv");
+    std::fs::remove_file(scratch.path("next.csv")).unwrap();
+    let again = scratch.run(line).succeeds();
+    assert!(again.stderr.contains("print 0 was learnt from already"), "{}", again.stderr);
+    assert_eq!(scratch.bytes("next.csv"), bytes);
     scratch
         .run("lamp learn job/ --measured a.csv -o next.csv")
+        .is_refused_with(&["with other options: print-001.csv is there already"]);
+    // The same table is not that of the next print.
+    scratch
+        .run("lamp learn job/ --measured a.csv --print 1 -o next.csv")
         .is_refused_with(&["given twice: measure print 1"]);
     scratch.write("b.csv", areas(|_| 20, |_| 0).as_bytes());
     scratch.run("lamp learn job/ --measured b.csv --print 1 -o last.csv").succeeds();
@@ -91,7 +101,7 @@ fn heights_that_are_too_low_shorten_times() {
     assert!(next.iter().sum::<f64>() < 0.95 * was.iter().sum::<f64>());
     assert!(scratch.names().contains(&"h.svg".to_owned()));
     let doses = String::from_utf8(scratch.bytes("job/print-001-doses.csv")).unwrap();
-    assert!(doses.starts_with("layer,log_dose\n") && doses.lines().count() == 61);
+    assert!(doses.starts_with("layer,log_dose\n") && doses.lines().count() == 62);
 }
 
 #[test]

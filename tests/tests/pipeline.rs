@@ -211,11 +211,7 @@ fn the_demo_is_what_the_four_binaries_make() {
     assert_eq!(said.stderr, "");
     let said = String::from_utf8(said.stdout).unwrap();
     assert!(said.contains("24016 facets") && said.contains("1270 layers of 6000 x 6750"), "{said}");
-    let mut names: Vec<_> = std::fs::read_dir(scratch.path("shown"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
+    let names = scratch.names_in("shown");
     let pictures = ["layer_00050.png", "layer_00449.png", "layer_00965.png", "layer_01174.png"];
     let stacks = ["alpha.png", "alpha.tif", "blade.stl", "build.tif"];
     assert_eq!(names, [&stacks, &pictures[..], &["layers.png"]].concat());

@@ -1,7 +1,5 @@
 //! Checks that `lamp split` and `lamp join` reproduce the whole stack, byte for byte.
 
-use std::fs;
-
 use lamp_fixtures::Sample;
 use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError};
 use lamp_tests::Scratch;
@@ -54,18 +52,10 @@ fn a_stage_on_ranges_of_one_stack_does_what_it_does_on_all() {
     assert!(scratch.run("lamp join low.tif high.tif").succeeds_quietly().stdout == whole);
 }
 
-fn names(scratch: &Scratch, folder: &str) -> Vec<String> {
-    let entries = fs::read_dir(scratch.path(folder)).unwrap();
-    let mut names: Vec<_> =
-        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
 /// Joins a folder's files in order of name, as a shell's `folder/*.tif` does.
 fn joined(scratch: &Scratch, folder: &str) -> Vec<u8> {
     let files: Vec<_> =
-        names(scratch, folder).iter().map(|name| format!("{folder}/{name}")).collect();
+        scratch.names_in(folder).iter().map(|name| format!("{folder}/{name}")).collect();
     scratch.run(&format!("lamp join {}", files.join(" "))).succeeds_quietly().stdout
 }
 
@@ -78,9 +68,9 @@ fn what_is_split_joins_to_the_same_bytes() {
     scratch.run("lamp split all.tif --at 5,6,75 -o at").succeeds_quietly();
     scratch.run_on("lamp split - --every 1000 --classic -o one/", &all).succeeds_quietly();
     let expected = ["layers_00000-00029.tif", "layers_00030-00059.tif", "layers_00060-00075.tif"];
-    assert_eq!(names(&scratch, "by30"), expected);
-    assert_eq!(names(&scratch, "at").len(), 4);
-    assert_eq!(names(&scratch, "one"), ["layers_00000-00075.tif"]);
+    assert_eq!(scratch.names_in("by30"), expected);
+    assert_eq!(scratch.names_in("at").len(), 4);
+    assert_eq!(scratch.names_in("one"), ["layers_00000-00075.tif"]);
     assert_eq!(scratch.bytes("one/layers_00000-00075.tif")[2], 42);
     for folder in ["by30", "at", "one"] {
         assert!(joined(&scratch, folder) == all, "{folder}");
@@ -89,7 +79,7 @@ fn what_is_split_joins_to_the_same_bytes() {
     scratch.run("lamp split all.tif --layers 10..50 --every 25 -o middle/").succeeds_quietly();
     let middle = scratch.run("lamp convert all.tif --layers 10..50").succeeds_quietly().stdout;
     assert!(joined(&scratch, "middle") == middle);
-    assert_eq!(names(&scratch, "middle"), ["layers_00010-00034.tif", "layers_00035-00049.tif"]);
+    assert_eq!(scratch.names_in("middle"), ["layers_00010-00034.tif", "layers_00035-00049.tif"]);
 }
 
 #[test]
@@ -121,7 +111,7 @@ fn stacks_that_say_nothing_of_themselves_split_and_join_too() {
     let scratch = Scratch::new();
     write_plain_stack(&scratch, "gray.tif", &[3, 4, 5, 6, 7]);
     scratch.run("lamp split gray.tif --every 2 -o parts/").succeeds_quietly();
-    assert_eq!(names(&scratch, "parts").len(), 3);
+    assert_eq!(scratch.names_in("parts").len(), 3);
     assert!(joined(&scratch, "parts") == scratch.bytes("gray.tif"));
     write_plain_stack(&scratch, "gap.tif", &[3, 4, 6, 7]);
     let ran = scratch.run("lamp split gap.tif --every 3 -o x/");

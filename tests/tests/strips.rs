@@ -37,14 +37,6 @@ fn index(scratch: &Scratch, folder: &str) -> Value {
     serde_json::from_slice(&scratch.bytes(&format!("{folder}/strips.json"))).unwrap()
 }
 
-fn names(scratch: &Scratch, folder: &str) -> Vec<String> {
-    let entries = fs::read_dir(scratch.path(folder)).unwrap();
-    let mut names: Vec<_> =
-        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
 /// Checks pixel by pixel that a folder's strips add up to the build, and returns them.
 fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
     let build = scratch.layers(build);
@@ -108,7 +100,7 @@ fn strips_add_up_to_the_build_and_join_to_its_bytes() {
         assert!(strips.iter().flatten().all(|layer| is_gray(layer) == gray), "{options}");
         let mut expected: Vec<_> = (0..files).map(|k| format!("strip_{k:03}.tif")).collect();
         expected.push("strips.json".to_owned());
-        assert_eq!(names(&scratch, &folder), expected);
+        assert_eq!(scratch.names_in(&folder), expected);
         scratch.run(&format!("lamp join {folder} -o joined{k}.tif")).succeeds_quietly();
         let whole = scratch.run(TILE).succeeds_quietly().stdout;
         assert!(scratch.bytes(&format!("{k}.tif")) == whole);
@@ -142,8 +134,8 @@ fn the_machine_knows_its_strips_and_threads_change_no_byte() {
     let line = format!("{TILE} --strips b --mirrors 100 --overlap 20 --threads 3 -o -");
     let build = scratch.run(&line).succeeds_quietly().stdout;
     assert!(build == scratch.run(TILE).succeeds_quietly().stdout);
-    assert_eq!(names(&scratch, "a"), names(&scratch, "b"));
-    for name in names(&scratch, "a") {
+    assert_eq!(scratch.names_in("a"), scratch.names_in("b"));
+    for name in scratch.names_in("a") {
         let [a, b] = ["a", "b"].map(|folder| scratch.bytes(&format!("{folder}/{name}")));
         assert!(a == b, "{name}");
     }
@@ -192,7 +184,7 @@ fn gray_layers_and_ranges_come_back() {
     // A strip is a stack that can be joined and split.
     scratch.run("lamp split s/strip_001.tif --every 4 -o parts/").succeeds_quietly();
     let files: Vec<_> =
-        names(&scratch, "parts").iter().map(|name| format!("parts/{name}")).collect();
+        scratch.names_in("parts").iter().map(|name| format!("parts/{name}")).collect();
     let joined = scratch.run(&format!("lamp join {}", files.join(" "))).succeeds_quietly().stdout;
     assert!(joined == scratch.bytes("s/strip_001.tif"));
 }

@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::rounds::{RoundTask, Scheduler, SchedulerError, answer_of, not_understood};
+use lamp_stack::quoted;
+
 use crate::key::Kind;
 use crate::store::Store;
 
@@ -58,11 +60,6 @@ fn script(array: &Array, round: &[RoundTask]) -> String {
         script += &format!("{number}) exec {};;\n", words.collect::<Vec<_>>().join(" "));
     }
     script + "esac\n"
-}
-
-/// Returns a word as shells take it for one.
-fn quoted(word: &str) -> String {
-    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 /// Returns the words for `sbatch` that say what an array takes.

@@ -4,7 +4,6 @@ mod read;
 #[cfg(test)]
 mod tests;
 mod walk;
-mod words;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

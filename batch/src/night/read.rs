@@ -4,13 +4,13 @@ use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use lamp_stack::one_line;
+use lamp_stack::{one_line, words};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{
     Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, Walk, did_you_mean,
-    twice, words,
+    twice,
 };
 
 type Value<'a> = Spanned<DeValue<'a>>;
@@ -192,7 +192,8 @@ impl Reader<'_> {
 
     /// Reads the words of a command.
     fn command(&self, value: &Value<'_>, before: &[&str]) -> Read<Stage> {
-        let words = words::split(self.text(value)?).map_err(|problem| self.at(value, problem))?;
+        let open = |quote: char| self.at(value, format!("the quote {quote} is not closed"));
+        let words = words(self.text(value)?).map_err(open)?;
         let before = before.iter().map(|&word| word.to_owned());
         Ok(Stage { words: before.chain(words).collect(), place: self.place(value.span().start) })
     }

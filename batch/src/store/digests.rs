@@ -9,7 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use lamp_stack::digest_of;
 use serde::{Deserialize, Serialize};
 
-use super::{Store, StoreError, sealed};
+use super::{Store, StoreError, is_read_only, sealed};
 
 /// Digests by path, each with what its file looked like.
 #[derive(Debug)]
@@ -80,7 +80,10 @@ impl Digests {
     pub fn keep(&mut self) -> Result<(), StoreError> {
         if std::mem::take(&mut self.is_changed) {
             self.known.retain(|path, _| Path::new(path).exists());
-            sealed::write_lightly(&self.path, &self.known).map_err(StoreError::io(&self.path))?;
+            match sealed::write_lightly(&self.path, &self.known) {
+                Err(error) if is_read_only(&error) => {}
+                kept => kept.map_err(StoreError::io(&self.path))?,
+            }
         }
         Ok(())
     }

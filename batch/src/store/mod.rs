@@ -15,13 +15,16 @@ mod manifest;
 pub(crate) mod sealed;
 mod unpublished;
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lamp_stack::{digest_of, remove_leftovers};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use thiserror::Error;
 
 use crate::key::Key;
@@ -35,6 +38,8 @@ pub use unpublished::Unpublished;
 #[derive(Clone, Debug)]
 pub struct Store {
     root: PathBuf,
+    /// Notes that cannot be written, since the store can only be read.
+    unkept: Arc<Mutex<HashMap<Key, Value>>>,
 }
 
 /// Why a store cannot be used.
@@ -130,7 +135,7 @@ impl Store {
         match fs::read_to_string(root.join(MARK.0)) {
             Ok(text) if text == MARK.1 => {
                 let root = fs::canonicalize(root).map_err(StoreError::io(root))?;
-                Ok(Self { root })
+                Ok(Self { root, unkept: Arc::default() })
             }
             Ok(_) => Err(StoreError::Version(root.to_owned())),
             Err(_) => Err(StoreError::None(root.to_owned())),
@@ -253,16 +258,32 @@ impl Store {
 
     /// Returns a note, if there is one.
     pub fn note<T: DeserializeOwned>(&self, key: Key) -> Option<T> {
+        if let Some(note) = self.unkept().get(&key) {
+            return serde_json::from_value(note.clone()).ok();
+        }
         sealed::read(&self.root.join("notes").join(key.place("json")))
     }
 
-    /// Keeps a note: what would take time to find out again.
+    /// Keeps a note: what would take time to find out again. If the store can only be read, this
+    /// process keeps it for itself.
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
     pub fn keep_note(&self, key: Key, note: &impl Serialize) -> Result<(), StoreError> {
         let path = self.root.join("notes").join(key.place("json"));
-        sealed::write_lightly(&path, note).map_err(StoreError::io(&path))
+        match sealed::write_lightly(&path, note) {
+            Err(error) if is_read_only(&error) => {
+                let note = serde_json::to_value(note).expect("notes have text keys");
+                self.unkept().insert(key, note);
+                Ok(())
+            }
+            kept => kept.map_err(StoreError::io(&path)),
+        }
+    }
+
+    fn unkept(&self) -> MutexGuard<'_, HashMap<Key, Value>> {
+        // The map is valid even if a thread panicked while it held the lock.
+        self.unkept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Removes a note, if there is one.
@@ -289,6 +310,11 @@ impl Store {
         keys.dedup();
         Ok(keys)
     }
+}
+
+/// Returns true if a store can only be read there: it still serves what it has.
+pub(crate) fn is_read_only(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied)
 }
 
 /// Removes a file, if it is there.

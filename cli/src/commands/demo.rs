@@ -112,8 +112,8 @@ fn part_layers(
 ) -> Result<impl Iterator<Item = Result<Layer, Exit>>, Exit> {
     let options = SlicingOptions::default();
     let model = Part::open(stl, &OpenOptions::default())?;
-    let file = stl.file_name().unwrap_or_default().to_string_lossy();
-    let (slices, name_command) = options.slices(model, &file, range, None, None, progress)?;
+    let files = [stl.file_name().unwrap_or_default().to_string_lossy().into_owned()];
+    let (slices, name_command) = options.slices(model, &files, range, None, None, progress)?;
     progress.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;

@@ -5,11 +5,12 @@
 
 use std::path::Path;
 
-use lamp_stack::{Destination, Format, PackLevel, StackInfo, copy_packed, write_stack};
+use lamp_stack::{Destination, Format, PackLevel, StackInfo, copy_packed, quoted, write_stack};
 use serde_json::Value;
 
 use super::slice::stem;
 use crate::exit::Exit;
+use crate::part_arg::recorded;
 use crate::streams::{layers_of, open_pages};
 
 /// Returns the name under which stored results record a part, given its digest (`blake3:` and
@@ -64,7 +65,8 @@ impl Names {
                     // Commands have the whole name, all else what is before the last dot.
                     let [short, file_short] = [stored, file].map(|name| stem(Path::new(name)));
                     if text.contains(&short) {
-                        *text = text.replace(stored, file).replace(&short, &file_short);
+                        let file = recorded(file, None);
+                        *text = text.replace(stored, &quoted(&file)).replace(&short, &file_short);
                     }
                 }
             }

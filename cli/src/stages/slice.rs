@@ -20,11 +20,12 @@ use crate::part_arg::{PartArg, paths};
 use crate::part_doubts::short;
 use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::progress::Progress;
+use crate::recorded::option;
 use crate::slicing_options::SlicingOptions;
 use crate::step_options::{HEADING, length};
 
 /// Changes when other bytes come from the same options and part.
-pub(crate) const CODE: u32 = 5;
+pub(crate) const CODE: u32 = 6;
 
 /// What is sliced, and how.
 #[derive(Args, Clone)]
@@ -92,8 +93,9 @@ impl SliceSettings {
     /// record.
     pub(crate) fn canonical(&self) -> String {
         let mut words = format!("slice{}", self.options.canonical());
-        if self.fallback.is_some() {
-            words.push_str(" --fallback file");
+        if let Some(fallback) = &self.fallback {
+            let name = fallback.file_name().unwrap_or_default().to_string_lossy();
+            words.push_str(&option("fallback", &name));
         }
         // It changes no image, but refuses some.
         if let Some(machine) = &self.machine {
@@ -126,8 +128,10 @@ impl SliceSettings {
         if self.fallback.is_some() && part.prepared().next().is_none() {
             return Err(Exit::usage("--fallback needs a STEP part"));
         }
-        let recorded: Vec<_> = self.parts.iter().map(PartArg::recorded).collect();
-        let recorded = name.map_or_else(|| recorded.join(" "), ToOwned::to_owned);
+        let recorded = match name {
+            Some(name) => vec![name.to_owned()],
+            None => self.parts.iter().map(PartArg::recorded).collect(),
+        };
         let (slices, name_command) = self
             .options
             .slices(part.clone(), &recorded, self.layers.clone(), self.memory, exposure, progress)
@@ -140,10 +144,15 @@ impl SliceSettings {
         let fallback = self.fallback.as_deref();
         let bridged = Bridged::new(slices, fallback, &self.options, layers, &note)?;
         let part_name = name.map(|name| stem(Path::new(name)));
+        let fallback = bridged.option();
         let name_command = move |layer: &mut Layer| {
             name_command(layer);
-            if let (Some(stack), Some(name)) = (&mut layer.info.stack, &part_name) {
+            let Some(stack) = &mut layer.info.stack else { return };
+            if let Some(name) = &part_name {
                 stack.part.clone_from(name);
+            }
+            if let (Some(command), Some(fallback)) = (stack.commands.last_mut(), &fallback) {
+                command.push_str(fallback);
             }
         };
         Ok(Slicing {

@@ -60,11 +60,7 @@ fn name(band: &Value) -> String {
 }
 
 fn pictures(scratch: &Scratch) -> Vec<String> {
-    let entries = fs::read_dir(scratch.path("pictures")).unwrap();
-    let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name();
-    let mut names: Vec<_> = entries.map(|entry| name(entry).into_string().unwrap()).collect();
-    names.sort();
-    names
+    scratch.names_in("pictures")
 }
 
 #[test]
@@ -141,7 +137,7 @@ fn pictures_go_to_an_empty_folder() {
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif");
     ran.is_refused_with(&["pictures: a folder is not written over", "--force"]);
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif --force");
-    ran.is_refused_with(&["pictures: only what an earlier run wrote", "mine.txt"]);
+    ran.is_refused_with(&["pictures: only what an earlier run wrote", ".lamp-folder"]);
     assert_eq!((scratch.names(), pictures(&scratch)), (names, vec!["mine.txt".to_owned()]));
 
     fs::remove_file(scratch.path("pictures/mine.txt")).unwrap();

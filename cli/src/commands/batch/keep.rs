@@ -26,9 +26,11 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
             Err(damage) => {
                 damaged += 1;
                 let name = named(&store, key);
-                progress
-                    .warn(&format!("{name}: {damage}: taken away, the next run makes it again"));
-                store.forget(key).map_err(anyhow::Error::new)?;
+                let then = match store.forget(key) {
+                    Ok(()) => "taken away, the next run makes it again".to_owned(),
+                    Err(error) => Exit::from(anyhow::Error::new(error)).to_string(),
+                };
+                progress.warn(&format!("{name}: {damage}: {then}"));
             }
         }
     }

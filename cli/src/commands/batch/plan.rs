@@ -13,6 +13,7 @@ use lamp_batch::{
 
 use super::night_file::NightFile;
 use super::work::{What, Work};
+use crate::catalogue::without_digest;
 use crate::exit::Exit;
 use crate::stages::calls::{Checking, JOIN_CODE, PACK_CODE, Tiling};
 use crate::stages::{Stages, Survey, stored_name};
@@ -192,6 +193,7 @@ impl Planner<'_> {
     }
 
     fn input(&mut self, path: &Path) -> Result<InputFile, Exit> {
+        let (path, _) = &without_digest(path);
         let read = self.digests.digest(path);
         let digest =
             read.map_err(|error| Exit::Failed(error.into()).at(path.display().to_string()))?;

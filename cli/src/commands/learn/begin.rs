@@ -6,12 +6,12 @@ use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::Light;
 use lamp_planning::speed::PartPages;
-use lamp_stack::{Destination, FolderBeside, Format, write_stack};
+use lamp_stack::{Destination, FolderBeside, Format, sealed, write_stack};
 
 use super::KeptOptions;
 use super::job::{JOB, JobFile, MATERIAL, STACK, digest_of_file, profile_name, read_job};
 use crate::catalogue::entry;
-use crate::commands::plan::write_profile;
+use crate::commands::plan::profile_of;
 use crate::exit::Exit;
 use crate::options::Input;
 use crate::progress::Progress;
@@ -76,12 +76,13 @@ pub(super) fn begin(
         max_change: platform.max_change,
     };
     let texts = || -> anyhow::Result<()> {
-        let [job, material] = [toml::to_string(&job)?, material.to_toml()?];
+        let [job, material] = [toml::to_string(&job)?, material.to_toml()?].map(|it| sealed(&it));
         new.add(JOB, |out| out.write_all(job.as_bytes()))?;
         new.add(MATERIAL, |out| out.write_all(material.as_bytes()))?;
         let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
         let times: Vec<ExposureTime> = times.collect();
-        Ok(new.add(&profile_name(0), |out| write_profile(&part_pages, &times, out))?)
+        let profile = sealed(&profile_of(&part_pages, &times));
+        Ok(new.add(&profile_name(0), |out| out.write_all(profile.as_bytes()))?)
     };
     texts().with_context(|| folder.display().to_string())?;
     new.persist().map_err(|error| Exit::Failed(error.into()).at(folder.display().to_string()))?;

@@ -11,7 +11,6 @@
 //! ```
 
 use std::fs::File;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
@@ -20,13 +19,13 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::speed::{PartLayer, PartPages, Platform, TimedPart};
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::digest_of;
+use lamp_stack::{digest_of, is_sealed, sealed};
 use serde::{Deserialize, Serialize};
 
 use super::measured::Measured;
 use super::step::Learned;
 use crate::catalogue::{read_file, read_text};
-use crate::commands::plan::write_profile;
+use crate::commands::plan::profile_of;
 use crate::exit::Exit;
 use crate::progress::Progress;
 use crate::recorded;
@@ -90,13 +89,25 @@ pub(super) fn digest_of_file(file: &Path) -> Result<String, Exit> {
     Ok(digest.with_context(|| file.display().to_string())?)
 }
 
+/// Reads a text that this command sealed.
+fn read_sealed(file: &Path, max: u64, what: &str) -> anyhow::Result<String> {
+    let text = read_text(file, max, what)?;
+    if !is_sealed(&text) {
+        let name = file.file_name().unwrap_or_default().display();
+        return Err(anyhow!(
+            "{name} is not as lamp learn wrote it: bring it back, or begin another job"
+        ));
+    }
+    Ok(text)
+}
+
 pub(super) fn read_job(folder: &Path) -> Result<JobFile, Exit> {
     let file = folder.join(JOB);
     let read = || -> anyhow::Result<JobFile> {
         if !file.exists() {
             return Err(anyhow!("there is no job: begin it with --start STACK --material M"));
         }
-        Ok(toml::from_str(&read_text(&file, 1 << 20, "a job's file")?)?)
+        Ok(toml::from_str(&read_sealed(&file, 1 << 20, "a job's file")?)?)
     };
     Ok(read().with_context(|| folder.display().to_string())?)
 }
@@ -110,7 +121,11 @@ impl Job {
             let text = "this is not the stack that the job was begun with: begin another job";
             return Err(Exit::Failed(anyhow!(text)).at(stack.display().to_string()));
         }
-        let (material, _) = read_file::<Material>(&folder.join(MATERIAL))?;
+        let (material, text) = read_file::<Material>(&folder.join(MATERIAL))?;
+        if !is_sealed(&text) {
+            let text = "this is not the resin that the job was begun with: begin another job";
+            return Err(Exit::Failed(anyhow!(text)).at(folder.join(MATERIAL).display().to_string()));
+        }
         let light = Light::of(&material, file.at)?;
         let mut pages = PartPages::new(file.wanted);
         for layer in read_beside(&stack)? {
@@ -161,7 +176,7 @@ impl Job {
         column: usize,
     ) -> Result<Vec<f64>, Exit> {
         let read = || -> anyhow::Result<Vec<f64>> {
-            let text = read_text(&self.folder.join(name), MAX_TABLE, "a table of times")?;
+            let text = read_sealed(&self.folder.join(name), MAX_TABLE, "a table of times")?;
             let rows = CsvTable::parse(&text)?.numbers(columns, column + 1)?;
             let layers = self.part.layers();
             let is_layer = |(row, layer): (&NumberRow<N>, &PartLayer)| {
@@ -212,26 +227,58 @@ impl Job {
 
     /// Keeps what was measured and learnt.
     pub(super) fn keep(&self, print: usize, text: &str, learned: &Learned) -> Result<(), Exit> {
-        let file = |name: String| self.folder.join(name);
+        let put = |name: String, text: &str| {
+            write_file(&self.folder.join(name), |out| out.write_all(text.as_bytes()))
+        };
         if learned.log_doses.iter().any(|&log| log != 0.0) {
-            write_file(&file(doses_name(print + 1)), |out| self.write_doses(learned, out))?;
+            put(doses_name(print + 1), &sealed(&self.doses(learned)))?;
         }
-        write_file(&file(measured_name(print)), |out| out.write_all(text.as_bytes()))?;
+        put(measured_name(print), text)?;
         // The print is there once its times are.
-        write_file(&file(profile_name(print + 1)), |out| self.write_profile(&learned.times, out))
+        put(profile_name(print + 1), &sealed(&self.profile(&learned.times)))
     }
 
-    fn write_doses(&self, learned: &Learned, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{}", DOSES.join(","))?;
-        for (layer, log_dose) in self.part.layers().iter().zip(&learned.log_doses).rev() {
-            writeln!(out, "{},{log_dose}", layer.index)?;
+    fn doses(&self, learned: &Learned) -> String {
+        let layers = self.part.layers().iter().zip(&learned.log_doses).rev();
+        let lines = layers.map(|(layer, log_dose)| format!("{},{log_dose}\n", layer.index));
+        format!("{}\n{}", DOSES.join(","), lines.collect::<String>())
+    }
+
+    /// Goes back to where the last print was still to be learnt from, if these are its measurements.
+    /// Returns its number.
+    ///
+    /// So the same call again, after one that did not end, gives the same.
+    pub(super) fn take_back(&mut self, text: &str) -> Option<usize> {
+        let print = self.prints.len().checked_sub(2)?;
+        let (_, known) = self.prints[print].measured.as_ref()?;
+        if known != text {
+            return None;
         }
-        Ok(())
+        self.prints.truncate(print + 1);
+        self.prints[print].measured = None;
+        Some(print)
     }
 
-    pub(super) fn write_profile(&self, times: &[f64], out: &mut dyn Write) -> io::Result<()> {
-        let time = |seconds: &f64| ExposureTime::from_ms(seconds * 1000.0);
-        write_profile(&self.part, &times.iter().map(time).collect::<Vec<_>>(), out)
+    /// Checks that what is learnt from a print again is what was learnt before.
+    pub(super) fn check_again(&self, print: usize, learned: &Learned) -> Result<(), Exit> {
+        let name = profile_name(print + 1);
+        let before = read_sealed(&self.folder.join(&name), MAX_TABLE, "a table of times");
+        let before = before.map_err(|error| self.failed(&name, error))?;
+        if before == sealed(&self.profile(&learned.times)) {
+            return Ok(());
+        }
+        let text = anyhow!(
+            "print {print} was learnt from with other options: {name} is there already, and print \
+             {} is the next to be measured",
+            print + 1
+        );
+        Err(Exit::Failed(text).at(self.folder.display().to_string()))
+    }
+
+    /// Returns the table of times.
+    pub(super) fn profile(&self, times: &[f64]) -> String {
+        let times: Vec<_> = times.iter().map(|s| ExposureTime::from_ms(s * 1000.0)).collect();
+        profile_of(&self.part, &times)
     }
 
     pub(super) fn platform(&self) -> Platform {

@@ -175,15 +175,24 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs(measured)?;
     let law = args.law()?;
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
-    let job = Job::open(&args.job, &progress)?;
-    let print_number = job.print_to_learn_from(args.print)?;
+    let mut job = Job::open(&args.job, &progress)?;
     let name = input_name(measured);
     let (measured, text) = Measured::read(measured)?;
+    let last = job.prints.len() - 1;
+    let may_be_again = args.print.is_none_or(|print| print + 1 == last);
+    let again = if may_be_again { job.take_back(&text) } else { None };
+    let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
     job.refuse_known(print_number, &text)?;
     let learned = step::learn(&job, print_number, &measured, &law, args.step, memory)
         .map_err(|error| error.at(name))?;
-    job.keep(print_number, &text, &learned)?;
-    write_file(output, |out| job.write_profile(&learned.times, out))?;
+    match again {
+        Some(print) => {
+            job.check_again(print, &learned)?;
+            progress.say(&format!("print {print} was learnt from already: this is the same again"));
+        }
+        None => job.keep(print_number, &text, &learned)?,
+    }
+    write_file(output, |out| out.write_all(job.profile(&learned.times).as_bytes()))?;
     let job = Job::open(&args.job, &progress)?;
     if let Some(path) = &args.report {
         write_report(&job, print_number, &learned, path)?;

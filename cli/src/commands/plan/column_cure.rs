@@ -13,18 +13,19 @@ use lamp_planning::column::{
 };
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{GrayPicture, HeightMap, Target};
-use lamp_stack::Length;
+use lamp_stack::{Length, quoted};
 
 use super::column_measures::doubt;
 use super::column_report::{Reported, lines_of, report_of};
 use super::simulate::parse_rays;
 use crate::bitmaps::Bitmap;
-use crate::catalogue::entry;
+use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::height_options::parse_share;
 use crate::options::{Common, one_of_described, parse_count, parse_thickness};
 use crate::plan_folder::{PlanFiles, PlanFolder};
 use crate::progress::Progress;
+use crate::recorded::option;
 use crate::target_arg::{GivenTarget, TargetArg};
 
 /// Choose bitmaps and times that cure a part through a glass, without layers
@@ -136,8 +137,8 @@ const MOST_STEPS: usize = 20_000;
 
 pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     let folder = PlanFolder::new(&args.output, args.force)?;
-    let projector: Projector = entry(&args.projector)?;
-    let material: Material = entry(&args.material)?;
+    let (projector, projector_word) = entry_and_word::<Projector>(&args.projector)?;
+    let (material, material_word) = entry_and_word::<Material>(&args.material)?;
     let curve = HeightCurve::of(&material).map_err(anyhow::Error::new)?;
     let progress = Progress::new("plan", common, true);
     let target = args.target.open(&projector, &progress)?;
@@ -162,7 +163,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     let cured = plan.doses.iter().map(|&dose| curve.height_um(dose)).collect();
     folder.write(&PlanFiles {
         part: target.name(),
-        command: args.command(&target, &projector, &material, &options),
+        command: args.command(&target, &projector_word, &material_word, &options),
         pitch: projector.pitch.value,
         bitmaps: &bitmaps,
         report: &report_of(&reported),
@@ -265,16 +266,16 @@ impl ColumnCureArgs {
     fn command(
         &self,
         target: &Target,
-        projector: &Projector,
-        material: &Material,
+        projector: &str,
+        material: &str,
         options: &ColumnOptions,
     ) -> String {
         let mut command = format!(
             "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimise {} \
              --max-time {:.3}s --gap {}",
-            target.name(),
-            projector.name,
-            material.name,
+            quoted(target.name()),
+            quoted(projector),
+            quoted(material),
             options.bitmaps,
             self.optimise,
             options.max_s,
@@ -293,7 +294,7 @@ impl ColumnCureArgs {
             command += &format!(" --voxel {voxel}");
         }
         if let Some(name) = self.flat_field.as_deref().and_then(Path::file_name) {
-            command += &format!(" --flat-field {}", name.display());
+            command += &option("flat-field", &name.to_string_lossy());
         }
         command
     }

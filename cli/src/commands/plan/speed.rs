@@ -1,6 +1,5 @@
 //! `lamp plan speed`: chooses the time of each layer.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -16,7 +15,7 @@ use crate::kept_stack::KeptStack;
 use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, parse_memory};
-use crate::planning_options::PlanningOptions;
+use crate::planning_options::{PlannedResin, PlanningOptions};
 use crate::platform_options::PlatformOptions;
 use crate::plots;
 use crate::progress::Progress;
@@ -71,7 +70,7 @@ pub(super) struct SpeedArgs {
 
 pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let (material, light, lamp_doubt) = args.planning.light()?;
+    let PlannedResin { material, light, doubt, words } = args.planning.resin()?;
     let options = SpeedOptions {
         light,
         platform: args.platform.platform(),
@@ -85,17 +84,17 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     let part = args.part(&mut stack, &progress)?;
     let plan = plan(&part, &options).map_err(|error: PlanError| Exit::from(error).at(name))?;
     let planned = Planned { material: &material.name, part: &part, plan: &plan };
-    args.write(&mut stack, &planned, &progress)?;
+    args.write(&mut stack, &planned, &args.command(&words), &progress)?;
     let doses = MeasuredDoses::of_working_curve(&material);
     if let Some(light) = material.light().map_err(anyhow::Error::new)? {
         plan.times.iter().for_each(|&time| doses.see(light * time));
     }
-    let doubts = lamp_doubt.into_iter().chain(doses.doubt("layers"));
+    let doubts = doubt.into_iter().chain(doses.doubt("layers"));
     for line in lines_of(&planned).into_iter().chain(doubts) {
         progress.say(&line);
     }
     if let Some(path) = &args.profile {
-        write_file(path, |out| write_profile(&part, &plan.times, out))?;
+        write_file(path, |out| out.write_all(profile_of(&part, &plan.times).as_bytes()))?;
     }
     if let Some(path) = &args.report {
         write_report(&planned, args.planning.margin, path)?;
@@ -135,16 +134,16 @@ impl SpeedArgs {
         &self,
         stack: &mut KeptStack,
         planned: &Planned<'_>,
+        command: &str,
         progress: &Progress,
     ) -> Result<(), Exit> {
-        let command = self.command(planned.material);
         let layers = layers_of(stack.pages(false)?, &self.input.stack, self.input.layers.clone());
         // Times count from the light.
         let timed = layers.zip(planned.plan.times.iter().rev()).map(|(layer, time)| {
             let mut layer: Layer = layer?;
             layer.info.exposure_ms = Some(rounded(*time));
             if let Some(stack) = &mut layer.info.stack {
-                stack.commands.push(command.clone());
+                stack.commands.push(command.to_owned());
             }
             Ok(layer)
         });
@@ -152,11 +151,10 @@ impl SpeedArgs {
     }
 
     /// The command, as pages record it.
-    fn command(&self, material: &str) -> String {
+    fn command(&self, resin: &str) -> String {
         let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
         format!(
-            "lamp plan speed {} --wanted {wanted} --margin {}% --gap {}% --at {at}{}",
-            self.planning.resin_words(material),
+            "lamp plan speed {resin} --wanted {wanted} --margin {}% --gap {}% --at {at}{}",
             100.0 * margin,
             100.0 * gap,
             self.platform.words()
@@ -169,17 +167,13 @@ pub(crate) fn rounded(time: ExposureTime) -> f64 {
     (time.ms() * 1000.0).round() / 1000.0
 }
 
-/// Writes the layers' times, bottom first.
-pub(crate) fn write_profile(
-    part: &TimedPart,
-    times: &[ExposureTime],
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    writeln!(out, "layer,z_um,thickness_um,exposure_ms,speed_um_per_s")?;
-    for (layer, time) in part.layers().iter().zip(times).rev() {
+/// Returns the table of the layers' times, bottom first.
+pub(crate) fn profile_of(part: &TimedPart, times: &[ExposureTime]) -> String {
+    let lines = part.layers().iter().zip(times).rev().map(|(layer, time)| {
         let [z_um, um] = [layer.z, layer.thickness].map(|length| length.to_whole_nm().um());
         let ms = rounded(*time);
-        writeln!(out, "{},{z_um},{um},{ms},{:.3}", layer.index, 1000.0 * um / ms)?;
-    }
-    Ok(())
+        format!("{},{z_um},{um},{ms},{:.3}\n", layer.index, 1000.0 * um / ms)
+    });
+    let head = "layer,z_um,thickness_um,exposure_ms,speed_um_per_s\n".to_owned();
+    std::iter::once(head).chain(lines).collect()
 }

@@ -15,7 +15,7 @@ use crate::exit::Exit;
 use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, one_of_described, parse_memory};
-use crate::planning_options::PlanningOptions;
+use crate::planning_options::{PlannedResin, PlanningOptions};
 use crate::plots;
 use crate::progress::Progress;
 use crate::stack_notes::doubts;
@@ -137,8 +137,8 @@ fn parse_exposure(text: &str) -> Result<ExposureTime, String> {
 
 pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let (material, light, lamp_doubt) = args.planning.light()?;
-    let command = args.command(&material.name);
+    let PlannedResin { material, light, doubt, words } = args.planning.resin()?;
+    let command = args.command(&words);
     let progress = progress("plan", common, &args.output);
     let layers = read_layers(&args.input, &progress)?;
     let mut map = LayerMap::new(&args.map, light, args.planning.wanted.get());
@@ -170,7 +170,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
         margin: args.planning.margin,
         outcome: &planned.outcome(),
     };
-    let doubts = lamp_doubt.into_iter().chain(doses.doubt("layers"));
+    let doubts = doubt.into_iter().chain(doses.doubt("layers"));
     for line in lines_of(&planned).into_iter().chain(doubts) {
         progress.say(&line);
     }
@@ -230,11 +230,10 @@ impl VoxelsArgs {
     }
 
     /// The command, as pages record it.
-    fn command(&self, material: &str) -> String {
+    fn command(&self, resin: &str) -> String {
         let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
         let mut command = format!(
-            "lamp plan voxels {} --objective {} --wanted {wanted} --margin {}% --gap {}% --at {at}",
-            self.planning.resin_words(material),
+            "lamp plan voxels {resin} --objective {} --wanted {wanted} --margin {}% --gap {}% --at {at}",
             self.objective,
             100.0 * margin,
             100.0 * gap

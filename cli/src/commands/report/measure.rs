@@ -1,6 +1,6 @@
 //! The numbers of a layer, from its runs.
 
-use lamp_stack::{Image, Layer, Mask, Op, gray_runs, white_in_row};
+use lamp_stack::{Image, Layer, Mask, gray_runs, white_in_both, white_in_row};
 
 /// What is counted in a layer, and what its page says.
 #[derive(Clone, Debug)]
@@ -45,33 +45,31 @@ impl LayerNumbers {
 
 /// Returns how many sides of white pixels are not shared with another one.
 fn perimeter(mask: &Mask) -> u64 {
-    let mut above: &[u32] = &[];
-    let mut between = Vec::new();
+    let width = mask.width();
+    let (mut above, mut white_above): (&[u32], _) = (&[], 0);
     let mut sides = 0;
     for row in mask.rows() {
         // A row that ends white ends at the border.
         sides += row.len().next_multiple_of(2) as u64;
         if row != above {
-            Op::Xor.rows(above, row, &mut between);
-            sides += white_in_row(&between, mask.width());
+            let white = white_in_row(row, width);
+            sides += white + white_above - 2 * white_in_both(above, row, width);
+            (above, white_above) = (row, white);
         }
-        above = row;
     }
-    sides + white_in_row(above, mask.width())
+    sides + white_above
 }
 
 /// Returns the number of white pixels that are black in the layer below. Where the images differ
 /// in size, they begin at one corner.
 pub(super) fn new_pixels(layer: &Mask, below: Option<&Mask>) -> u64 {
     let Some(below) = below else { return layer.white_pixels() };
-    let mut new = Vec::new();
     let of_row = |(number, row): (u32, &[u32])| {
         let under = if number < below.height() { below.row(number) } else { &[] };
         if row == under {
             return 0;
         }
-        Op::Difference.rows(row, under, &mut new);
-        white_in_row(&new, layer.width())
+        white_in_row(row, layer.width()) - white_in_both(row, under, layer.width())
     };
     (0..).zip(layer.rows()).map(of_row).sum()
 }

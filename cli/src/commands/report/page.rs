@@ -76,30 +76,19 @@ fn warnings(report: &StackReport) -> Markup {
 /// The lines of `lamp info`, and what only a report knows.
 fn facts(report: &StackReport) -> Markup {
     let rows_fixed: u64 = report.layers.iter().map(|layer| layer.fixed_rows).sum();
-    let commands = report.totals.first.info.stack.as_ref().map_or(&[][..], |stack| &stack.commands);
+    let stack = report.totals.first.info.stack.as_ref();
+    let material = stack.and_then(|stack| stack.other.get("material")?["name"].as_str());
     html! {
         table.facts {
             @for (key, value) in info::lines(&report.totals, &report.name, None) {
                 tr { th { (key) } td { (with_signs(&value)) } }
             }
             @if rows_fixed > 0 { tr { th { "stray rows fixed" } td { (rows_fixed) } } }
-            @for (key, option) in [("machine", "--machine"), ("material", "--material")] {
-                @if let Some(value) = option_of(commands, option) {
-                    tr { th { (key) } td { (printable(value)) } }
-                }
+            @if let Some(name) = material {
+                tr { th { "material" } td { (printable(name)) } }
             }
         }
     }
-}
-
-/// Returns the value that commands gave an option last.
-fn option_of<'a>(commands: &'a [String], option: &str) -> Option<&'a str> {
-    let value = |command: &'a String| {
-        let mut words = command.split_whitespace();
-        words.find(|word| *word == option)?;
-        words.next()
-    };
-    commands.iter().rev().find_map(value)
 }
 
 fn build_time(report: &StackReport) -> Markup {
@@ -171,17 +160,5 @@ fn figure(picture: &Picture) -> Markup {
             img src=(picture.address) alt=(picture.caption);
             figcaption { (picture.caption) }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_last_value_of_an_option_is_found() {
-        let commands = ["slice a.stl --material x", "fix", "dither --material"].map(str::to_owned);
-        assert_eq!(option_of(&commands, "--material"), Some("x"));
-        assert_eq!(option_of(&commands, "--machine"), None);
     }
 }

@@ -299,7 +299,7 @@ impl TileArgs {
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
         self.tell_places(&placed, progress)?;
         let heights = HeightOptions { settle: self.settle, resample: self.resample };
-        let recipe = self.recipe_of(&placed, heights, mesh.as_ref(), machine.as_ref())?;
+        let recipe = self.recipe_of(&placed, heights, mesh.as_ref())?;
         let recipe = recipe.map(|recipe| Rc::new(RefCell::new(recipe)));
         let layout = placed.clone();
         let layout = match &mesh {

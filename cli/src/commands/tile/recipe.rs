@@ -8,6 +8,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{HeightOptions, Layout, MeshOptions, Recipe, RecipePart};
 use lamp_stack::digest_of;
 
+use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::streams::{check_beside, input_name, is_stream};
 
@@ -59,14 +60,13 @@ impl TileArgs {
         layout: &Layout,
         heights: HeightOptions,
         mesh: Option<&MeshOptions>,
-        machine: Option<&Machine>,
     ) -> Result<Option<Recipe>, Exit> {
         let Some(path) = &self.recipe else { return Ok(None) };
         let parts = self.stacks.iter().map(|stack| part_of(&stack.path, path));
         let parts = parts.collect::<Result<Vec<_>, _>>()?;
         let recipe = Recipe::new(layout, parts, heights, mesh, self.layers.clone());
-        Ok(Some(match machine {
-            Some(machine) => recipe.for_machine(&machine.name),
+        Ok(Some(match &self.machine {
+            Some(machine) => recipe.for_machine(&entry_and_word::<Machine>(machine)?.1),
             None => recipe,
         }))
     }

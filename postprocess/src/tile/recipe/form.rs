@@ -1,6 +1,6 @@
 //! The text of a recipe.
 
-use lamp_stack::{Length, MAX_SIDE, MaskBuilder, Orientation, Size};
+use lamp_stack::{Length, MAX_SIDE, MaskBuilder, Orientation, Size, digest_of};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -44,6 +44,9 @@ pub(super) struct RecipeForm {
     pub(super) copies: Vec<CopyForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) loose: Vec<LoosePieces>,
+    /// The digest of all else, as in [`RecipeForm::digest`].
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) digest: String,
 }
 
 /// A copy: its part from 0, its turn, and the corner of what is placed, in pixels of the build.
@@ -145,9 +148,17 @@ impl RecipeForm {
         Ok(())
     }
 
+    /// Returns the digest of all values but itself: `blake3:` and 64 hexadecimal digits.
+    pub(super) fn digest(&self) -> String {
+        let all = serde_json::to_vec(&Self { digest: String::new(), ..self.clone() });
+        let digest = digest_of(&all.expect("texts and numbers are JSON")[..]);
+        digest.expect("it is in memory")
+    }
+
     /// Returns the text, with a line for each item of lists.
     pub(super) fn to_json(&self) -> String {
-        let all = serde_json::to_value(self).expect("texts and numbers are JSON");
+        let sealed = Self { digest: self.digest(), ..self.clone() };
+        let all = serde_json::to_value(sealed).expect("texts and numbers are JSON");
         let lines = all.as_object().into_iter().flatten().map(|(key, value)| {
             let text = match value {
                 Value::Array(items) if items.iter().any(Value::is_object) => {

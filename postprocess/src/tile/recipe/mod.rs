@@ -145,6 +145,7 @@ impl Recipe {
             schema: SCHEMA.to_owned(),
             code: TILE_CODE,
             machine: None,
+            digest: String::new(),
             area: layout.area,
             command: layout.command.clone(),
             settle: heights.settle,
@@ -186,6 +187,9 @@ impl Recipe {
             return Err(RecipeError::Code { found: version.code, known: TILE_CODE });
         }
         let form: RecipeForm = serde_json::from_str(text).map_err(json)?;
+        if form.digest != form.digest() {
+            return Err(RecipeError::Changed);
+        }
         form.check()?;
         let copies = form.copies.iter().map(CopyForm::placement).collect();
         let mesh = form.mesh.as_ref().map(MeshForm::options).transpose()?;

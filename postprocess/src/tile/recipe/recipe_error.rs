@@ -25,6 +25,9 @@ pub enum RecipeError {
         /// What is read.
         known: &'static str,
     },
+    /// A value is not as it was written.
+    #[error("this recipe is not as tile wrote it: its digest is that of other values")]
+    Changed,
     /// It was written by a version of `tile` that makes other pages.
     #[error(
         "this recipe is for pages by code {found} and here they are made by code {known}: they would not be the same"

@@ -7,7 +7,7 @@ use std::ffi::OsString;
 
 use clap::CommandFactory;
 use lamp_postprocess::{FreeTurns, Pack, PackBy, PartStack, PlannedStack, TurnedPlan};
-use lamp_stack::Length;
+use lamp_stack::{Length, file_word, quoted};
 
 use super::TileArgs;
 use super::stacks::InputStack;
@@ -18,7 +18,7 @@ use crate::exit::Exit;
 use crate::progress::Progress;
 use crate::streams::{input_name, is_stream, print};
 use sliced_from::SlicedFrom;
-use words::{file_word, kept, quoted};
+use words::kept;
 
 impl TileArgs {
     /// Returns the turns of a plan, if one is asked for.
@@ -124,12 +124,16 @@ impl TileArgs {
             }
         }
         let tile = crate::stage(&Lamp::command(), "tile");
-        let stacks = plan.stacks().iter().map(|stack| file_word(&stack.name).into());
-        let layout = self.layout_out.iter().map(|path| file_word(&path.to_string_lossy()).into());
+        let stacks = plan.stacks().iter().map(|stack| file_word(&stack.name).into_owned().into());
+        let layout = self
+            .layout_out
+            .iter()
+            .map(|path| file_word(&path.to_string_lossy()).into_owned().into());
         let settled = ["--fit", "--layout"].map(OsString::from).into_iter().chain(layout);
         let gap = ["--gap".into(), OsString::from(gap.to_string())];
         let words = stacks.chain(settled).chain(gap).chain(kept(words_in_effect(), &tile));
-        let words: Vec<String> = words.map(|word| quoted(&word.to_string_lossy())).collect();
+        let words: Vec<String> =
+            words.map(|word| quoted(&word.to_string_lossy()).into_owned()).collect();
         script + &format!("tile {}\n", words.join(" "))
     }
 }

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use lamp_postprocess::{PartStack, TurnedSlicing};
-use lamp_stack::{digest_of, digest_of_digests};
+use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
 use super::super::stacks::{InputStack, ReadLayers};
-use super::words::{file_word, quoted};
 use crate::exit::Exit;
 use crate::slicing_options::SlicingOptions;
 
@@ -36,11 +35,16 @@ impl SlicedFrom {
         let stack = part.stack();
         let commands = stack.map_or(&[][..], |stack| &stack.commands);
         let options = commands.first().and_then(|command| SlicingOptions::of_command(command));
-        let (Some(stack), Some(options)) = (stack, options) else {
+        let (Some(stack), Some((recorded, mut options, fallback))) = (stack, options) else {
             let why = "it does not say how it was sliced, so it cannot be sliced at other angles: \
                        give --turns quarters";
             return Err(refused(why.to_owned()));
         };
+        if fallback.is_some() {
+            let why = "a fallback stood in for some of its layers, which is not done again at other \
+                       angles: give --turns quarters";
+            return Err(refused(why.to_owned()));
+        }
         if let Some(more) = commands.get(1) {
             let name = more.split(' ').next().unwrap_or_default();
             return Err(refused(format!(
@@ -48,11 +52,11 @@ impl SlicedFrom {
                  the stack before it, or --turns quarters"
             )));
         }
-        let recorded = SlicingOptions::parts_of_command(&commands[0]);
         let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
-        let found = folders.iter().find_map(|folder| files_in(folder, recorded, &stack.digest));
-        let missing = found.is_none().then(|| recorded.to_owned());
-        let files = found.unwrap_or_else(|| recorded.split(' ').map(ToOwned::to_owned).collect());
+        options.find_exposure(&folders).map_err(|error| error.at(part.name().to_owned()))?;
+        let found = folders.iter().find_map(|folder| files_in(folder, &recorded, &stack.digest));
+        let missing = found.is_none().then(|| recorded.join(" "));
+        let files = found.unwrap_or(recorded);
         let ReadLayers { stages, range } = input.read_layers().clone();
         Ok(Self { options, files, missing, stages, layers: range })
     }
@@ -66,8 +70,8 @@ impl SlicedFrom {
 
     /// Returns the command that slices the part for a plan.
     pub(super) fn command(&self, slicing: &TurnedSlicing, all_layers: bool, out: &str) -> String {
-        let files: Vec<String> = self.files.iter().map(|file| quoted(&file_word(file))).collect();
-        let slice = self.options.clone().turned(slicing).command(&files.join(" "), None);
+        let files: Vec<_> = self.files.iter().map(|file| file_word(file).into_owned()).collect();
+        let slice = self.options.clone().turned(slicing).command(&files, None);
         let Range { start, end } = self.layers;
         let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
         format!("{slice}{layers} -o {}", quoted(&file_word(out)))
@@ -75,17 +79,13 @@ impl SlicedFrom {
 }
 
 /// Returns the files of a part that are in a folder, with their placements, if their digest is this.
-fn files_in(folder: &Path, recorded: &str, digest: &str) -> Option<Vec<String>> {
-    let of_names = |names: Vec<&str>| -> Option<Vec<String>> {
-        let found: Vec<(PathBuf, String)> =
-            names.into_iter().map(|name| file_in(folder, name)).collect::<Option<_>>()?;
-        let digests = found.iter().map(|(path, _)| digest_of(File::open(path).ok()?).ok());
-        let digests: Vec<String> = digests.collect::<Option<_>>()?;
-        let is_it = digest_of_digests(digests.iter().map(String::as_str)) == digest;
-        is_it.then(|| found.into_iter().map(|(_, word)| word).collect())
-    };
-    // The name of a file may hold blanks.
-    of_names(vec![recorded]).or_else(|| of_names(recorded.split(' ').collect()))
+fn files_in(folder: &Path, recorded: &[String], digest: &str) -> Option<Vec<String>> {
+    let found: Vec<(PathBuf, String)> =
+        recorded.iter().map(|name| file_in(folder, name)).collect::<Option<_>>()?;
+    let digests = found.iter().map(|(path, _)| digest_of(File::open(path).ok()?).ok());
+    let digests: Vec<String> = digests.collect::<Option<_>>()?;
+    let is_it = digest_of_digests(digests.iter().map(String::as_str)) == digest;
+    is_it.then(|| found.into_iter().map(|(_, word)| word).collect())
 }
 
 /// Returns the path of a file in a folder, and the word for it with its placement.

@@ -61,21 +61,6 @@ fn of_flags<'a>(tile: &'a Command, flags: &str) -> (Option<&'a Arg>, bool) {
     (last, false)
 }
 
-/// Returns a file as a word that no command takes for an option.
-pub(super) fn file_word(path: &str) -> String {
-    if path.starts_with('-') { format!("./{path}") } else { path.to_owned() }
-}
-
-/// Returns a word as a shell reads it.
-pub(super) fn quoted(word: &str) -> String {
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+@%".contains(letter);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
@@ -105,20 +90,6 @@ mod tests {
             ("-q --fit --shares --pack outline a.tif b.tif", "-q"),
         ] {
             assert_eq!(kept(line), rest, "{line}");
-        }
-    }
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(["-a.tif", "a.tif"].map(file_word), ["./-a.tif", "a.tif"]);
-        for (word, expected) in [
-            ("a/b-z15.tif", "a/b-z15.tif"),
-            ("my part.stl", "'my part.stl'"),
-            ("it's", r"'it'\''s'"),
-            ("", "''"),
-            ("$HOME", "'$HOME'"),
-        ] {
-            assert_eq!(quoted(word), expected);
         }
     }
 }

@@ -1,0 +1,184 @@
+//! Fails the first, second, third and further call of one kind in every command that writes, until the
+//! command succeeds, as SQLite's tests do: no failure is passed over, and none leaves half an output.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use lamp_tests::{Scratch, target_dir, tilted_ball, workspace_root};
+
+/// Commands that write, as users type them. `out` is what they write.
+const WRITERS: &[&str] = &[
+    "slice ball.stl --dpi 40 --thickness 2mm -o out.tif",
+    "slice ball.stl --dpi 40 --thickness 2mm -o out/",
+    "slice ball.stl --dpi 40 --thickness 2mm -o out.lamp",
+    "slice ball.stl --dpi 40 --thickness 2mm --report out.json",
+    "fix good.tif -o out.tif",
+    "fix stray.tif --evidence out/",
+    "dither good.tif -o out.tif",
+    "tile good.tif --fit --area 2x2in --mesh none -o out.tif",
+    "tile good.tif --area 2x2in --mesh none --recipe out.json",
+    "tile good.tif --area 2x2in --mesh none --strips out/ --mirrors 40",
+    "lamp compensate good.tif --uniform 100um -o out.tif",
+    "lamp check good.tif --evidence out/",
+    "lamp show good.tif --layer 2 -o out.png",
+    "lamp report good.tif -o out.html",
+    "lamp report good.tif -o out/",
+    "lamp convert good.tif --png -o out/",
+    "lamp convert ball.stl out.step",
+    "lamp pack good.tif -o out.lamp",
+    "lamp join good.tif -o out.tif",
+    "lamp split good.tif --every 2 -o out/",
+    "lamp mesh-out good.tif -o out.stl",
+    "lamp mesh repair ball.stl -o out.stl",
+    "lamp plan speed good.tif --material pegda-sudan -o out.tif",
+    "lamp learn out/ --start good.tif --material pegda-sudan",
+    "lamp target squares --sizes 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
+    "lamp sample cube -o out.stl",
+];
+
+/// What fails, and whether the command must fail with it.
+const CALLS: [(&str, Must); 8] = [
+    ("open", Must::FailOrNot),
+    ("write", Must::Fail),
+    ("short", Must::Succeed),
+    ("fsync", Must::Fail),
+    ("close", Must::Fail),
+    ("rename", Must::Fail),
+    ("mkdir", Must::Fail),
+    ("readdir", Must::FailOrNot),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Must {
+    Fail,
+    Succeed,
+    /// Leftovers of other runs may stay unseen.
+    FailOrNot,
+}
+
+/// Builds the library that fails calls.
+fn library() -> PathBuf {
+    let source = workspace_root().join("tests/tests/late_disks/fail.c");
+    let library = target_dir().join("lamp_fail.so");
+    let mut cc = Command::new("cc");
+    cc.args(["-shared", "-fPIC", "-O1", "-o"]).arg(&library).arg(source).arg("-ldl");
+    assert!(cc.status().expect("cc links Rust programs, too").success());
+    library
+}
+
+fn scratch() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.mesh("ball.stl", &tilted_ball());
+    for line in [
+        "slice ball.stl --dpi 40 --thickness 2mm --material lamp-suspension -q -o good.tif",
+        "lamp sample tower --facets 2k --defect drop --count 20 --seed 7 -q -o broken.stl",
+        "slice broken.stl --dpi 100 --thickness 2mm -q -o stray.tif",
+    ] {
+        scratch.run(line).succeeds();
+    }
+    scratch
+}
+
+/// Returns the bytes of what a command writes, if it is there.
+fn output(scratch: &Scratch, line: &str) -> Option<Vec<u8>> {
+    let path = scratch.path(line.split(' ').find(|word| word.starts_with("out")).unwrap());
+    if !path.is_dir() {
+        return fs::read(path).ok();
+    }
+    let mut files: Vec<_> =
+        fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    Some(files.iter().flat_map(|file| fs::read(file).unwrap()).collect())
+}
+
+fn clear(scratch: &Scratch, names: &[String]) {
+    for name in scratch.names().iter().filter(|name| !names.contains(name)) {
+        let path = scratch.path(name);
+        let _ = fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
+    }
+}
+
+/// Fails the calls of a command, one after another. Returns how many failed.
+fn attack(library: &Path, line: &str) -> usize {
+    let scratch = scratch();
+    let names = scratch.names();
+    scratch.run(line).succeeds();
+    let right = output(&scratch, line).expect("an output");
+    let done = scratch.path("failed");
+    let mut all = 0;
+    for (call, must) in CALLS {
+        // Every one at first, then fewer: a folder of pages has many alike.
+        let mut at = 1;
+        loop {
+            clear(&scratch, &names);
+            let mut command = scratch.command(line);
+            command.env("LD_PRELOAD", library).env("LAMP_FAIL", call);
+            command.env("LAMP_FAIL_AT", at.to_string()).env("LAMP_FAIL_DONE", &done);
+            let ran = command.output().unwrap();
+            if !done.exists() {
+                assert!(ran.status.success(), "{line}, {call} {at}: {ran:?}");
+                break;
+            }
+            fs::remove_file(&done).unwrap();
+            let place = format!("{line}, {call} {at}");
+            let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+            let left: Vec<_> =
+                scratch.names().into_iter().filter(|it| !names.contains(it)).collect();
+            let found = output(&scratch, line);
+            match ran.status.code() {
+                Some(0) => {
+                    assert!(must != Must::Fail, "{place} is passed over");
+                    assert!(found.as_ref() == Some(&right), "{place}: another output");
+                }
+                Some(1) => {
+                    assert!(must != Must::Succeed, "{place}: {said}");
+                    assert!(!said.contains("panicked") && !said.is_empty(), "{place}: {said}");
+                    assert!(found.is_none_or(|it| it == right), "{place}: half an output");
+                }
+                status => panic!("{place}: {status:?}: {said}"),
+            }
+            assert!(left.iter().all(|name| name.starts_with("out")), "{place}: {left:?} are left");
+            all += 1;
+            at += 1 + at / 8;
+        }
+    }
+    all
+}
+
+#[test]
+fn no_failure_of_a_disk_is_passed_over() {
+    let library = library();
+    let (next, all) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(2, usize::from) {
+            scope.spawn(|| {
+                while let Some(line) = WRITERS.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    all.fetch_add(attack(&library, line), Ordering::Relaxed);
+                }
+            });
+        }
+    });
+    let all = all.into_inner();
+    lamp_tests::note(&format!("{all} calls failed in {} commands", WRITERS.len()));
+    assert!(all > 20 * WRITERS.len(), "{all} calls failed");
+}
+
+/// Standard output is synced where it is a file, unless that is left out.
+#[test]
+fn a_redirected_stack_is_synced() {
+    let (library, scratch) = (library(), scratch());
+    let done = scratch.path("failed");
+    for (options, fails) in [("", true), ("--no-sync", false)] {
+        let out = fs::File::create(scratch.path("out.tif")).unwrap();
+        let mut command = scratch.command(&format!("fix good.tif {options}"));
+        command.env("LD_PRELOAD", &library).env("LAMP_FAIL", "fsync").env("LAMP_FAIL_AT", "1");
+        let ran = command.env("LAMP_FAIL_DONE", &done).stdout(out).output().unwrap();
+        assert_eq!(ran.status.success(), !fails, "{ran:?}");
+        assert_eq!(done.exists(), fails);
+        let _ = fs::remove_file(&done);
+    }
+}

@@ -1,0 +1,230 @@
+//! Forms of a stack, and what is wrong with them.
+
+use std::fs;
+
+use lamp_tests::Scratch;
+
+/// A form of a stack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    File,
+    Classic,
+    Folder,
+    Pngs,
+    Packed,
+    Pipe,
+}
+
+/// What is wrong with a set of pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    FirstMissing,
+    MiddleMissing,
+    LastMissing,
+    Twice,
+    Swapped,
+    OfAnother,
+    Cut,
+    Empty,
+    Changed,
+    Unreadable,
+}
+
+use Fault::{
+    Changed, Cut, Empty, FirstMissing, LastMissing, MiddleMissing, OfAnother, Swapped, Twice,
+    Unreadable,
+};
+
+/// The pages of the good stack.
+const PAGES: usize = 6;
+
+impl Form {
+    pub(crate) const ALL: [Self; 6] =
+        [Self::File, Self::Classic, Self::Folder, Self::Pngs, Self::Packed, Self::Pipe];
+
+    pub(crate) fn label(self) -> &'static str {
+        match self {
+            Self::File => "file",
+            Self::Classic => "classic",
+            Self::Folder => "folder",
+            Self::Pngs => "PNGs",
+            Self::Packed => "packed",
+            Self::Pipe => "pipe",
+        }
+    }
+
+    /// Returns the name of the stack.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::File | Self::Classic | Self::Pipe => "stack.tif",
+            Self::Folder | Self::Pngs => "stack",
+            Self::Packed => "stack.lamp",
+        }
+    }
+
+    /// Returns what can be wrong with it.
+    pub(crate) fn faults(self) -> &'static [Fault] {
+        match self {
+            Self::Folder | Self::Pngs => &[
+                FirstMissing,
+                MiddleMissing,
+                LastMissing,
+                Twice,
+                Swapped,
+                OfAnother,
+                Cut,
+                Empty,
+                Changed,
+                Unreadable,
+            ],
+            Self::File | Self::Classic | Self::Pipe => {
+                &[FirstMissing, MiddleMissing, LastMissing, Twice, Swapped, Cut, Empty, Changed]
+            }
+            Self::Packed => &[Cut, Empty, Changed],
+        }
+    }
+
+    /// Writes the stack, whole or with a fault, over what is there.
+    pub(crate) fn write(self, folder: &Scratch, fault: Option<Fault>) {
+        let path = folder.path(self.name());
+        let _ = fs::remove_file(&path);
+        let _ = fs::remove_dir_all(&path);
+        let options = match self {
+            Self::File | Self::Pipe => "convert good.tif -q -o stack.tif",
+            Self::Classic => "convert good.tif -q --classic -o stack.tif",
+            Self::Folder => "convert good.tif -q -o stack/",
+            Self::Pngs => "convert good.tif -q --png -o stack/",
+            Self::Packed => "pack good.tif -q -o stack.lamp",
+        };
+        folder.run(&format!("lamp {options}")).succeeds_quietly();
+        match (self, fault) {
+            (_, None) => {}
+            (Self::Folder | Self::Pngs, Some(fault)) => self.break_folder(folder, fault),
+            (_, Some(fault)) => {
+                let bytes = broken_file(folder.bytes(self.name()), fault);
+                folder.write(self.name(), &bytes);
+            }
+        }
+    }
+
+    fn break_folder(self, folder: &Scratch, fault: Fault) {
+        let end = if self == Self::Pngs { "png" } else { "tif" };
+        let page = |number: usize| folder.path(&format!("stack/layer_{number:05}.{end}"));
+        let remove = |number: usize| fs::remove_file(page(number)).unwrap();
+        let last = PAGES - 1;
+        match fault {
+            FirstMissing => remove(0),
+            MiddleMissing => remove(3),
+            LastMissing => remove(last),
+            Twice => drop(fs::copy(page(2), page(PAGES)).unwrap()),
+            Swapped => {
+                let aside = folder.path("stack/aside");
+                fs::rename(page(2), &aside).unwrap();
+                fs::rename(page(3), page(2)).unwrap();
+                fs::rename(aside, page(3)).unwrap();
+            }
+            OfAnother => {
+                let png = if self == Self::Pngs { "--png " } else { "" };
+                folder.run(&format!("lamp convert other.tif -q {png}-o other/")).succeeds_quietly();
+                let other = folder.path(&format!("other/layer_00003.{end}"));
+                fs::copy(other, page(3)).unwrap();
+                fs::remove_dir_all(folder.path("other")).unwrap();
+            }
+            Unreadable => {
+                remove(3);
+                fs::create_dir(page(3)).unwrap();
+            }
+            Cut | Empty | Changed => {
+                let bytes = broken_bytes(fs::read(page(3)).unwrap(), fault);
+                fs::write(page(3), bytes).unwrap();
+            }
+        }
+    }
+}
+
+fn broken_bytes(mut bytes: Vec<u8>, fault: Fault) -> Vec<u8> {
+    let middle = bytes.len() / 2;
+    match fault {
+        Cut => bytes.truncate(middle),
+        Empty => bytes.clear(),
+        _ => bytes[middle] ^= 0x10,
+    }
+    bytes
+}
+
+fn broken_file(mut bytes: Vec<u8>, fault: Fault) -> Vec<u8> {
+    if matches!(fault, Cut | Empty | Changed) {
+        return broken_bytes(bytes, fault);
+    }
+    // Each page begins where a link says so: the one in the header, or that of the page before.
+    let (links, pages) = chain_of(&bytes);
+    let last = PAGES - 1;
+    let order: Vec<usize> = match fault {
+        FirstMissing => (1..PAGES).collect(),
+        MiddleMissing => (0..PAGES).filter(|&page| page != 3).collect(),
+        LastMissing => (0..last).collect(),
+        Swapped => vec![0, 1, 3, 2, 4, 5],
+        Twice => {
+            let copy = copied_page(&mut bytes, pages[2], links[3]);
+            let link = links[PAGES];
+            put(&mut bytes, link, copy);
+            return bytes;
+        }
+        _ => unreachable!("files have no such fault"),
+    };
+    let mut link = links[0];
+    for page in order {
+        put(&mut bytes, link, pages[page]);
+        link = links[page + 1];
+    }
+    put(&mut bytes, link, 0);
+    bytes
+}
+
+fn is_big(bytes: &[u8]) -> bool {
+    bytes[2] == 43
+}
+
+/// Returns where the links of a TIFF are, in the header and in each page, and where its pages are.
+fn chain_of(bytes: &[u8]) -> (Vec<usize>, Vec<usize>) {
+    let big = is_big(bytes);
+    let (mut links, mut pages) = (vec![if big { 8 } else { 4 }], Vec::new());
+    loop {
+        let page = get(bytes, *links.last().unwrap());
+        if page == 0 {
+            return (links, pages);
+        }
+        let entries = if big {
+            8 + 20 * u64::from_le_bytes(bytes[page..page + 8].try_into().unwrap()) as usize
+        } else {
+            2 + 12 * usize::from(u16::from_le_bytes(bytes[page..page + 2].try_into().unwrap()))
+        };
+        pages.push(page);
+        links.push(page + entries);
+    }
+}
+
+/// Adds a copy of a page's directory, the last one of the chain. Returns where it is.
+fn copied_page(bytes: &mut Vec<u8>, page: usize, link: usize) -> usize {
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    let at = bytes.len();
+    let directory = bytes[page..link].to_vec();
+    bytes.extend(directory);
+    let end = if is_big(bytes) { 8 } else { 4 };
+    bytes.extend(vec![0; end]);
+    at
+}
+
+fn get(bytes: &[u8], at: usize) -> usize {
+    match is_big(bytes) {
+        true => u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize,
+        false => u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize,
+    }
+}
+
+fn put(bytes: &mut [u8], at: usize, value: usize) {
+    match is_big(bytes) {
+        true => bytes[at..at + 8].copy_from_slice(&(value as u64).to_le_bytes()),
+        false => bytes[at..at + 4].copy_from_slice(&(value as u32).to_le_bytes()),
+    }
+}
