@@ -1,7 +1,10 @@
 //! Outlines of labels' letters, as closed lines.
 
 use lamp_stack::Orientation;
-use ttf_parser::{Face, GlyphId, OutlineBuilder};
+use skrifa::instance::{LocationRef, Size};
+use skrifa::outline::pen::PathStyle;
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::{FontRef, GlyphId, MetadataProvider};
 
 use super::edit_error::EditProblem;
 use super::fill::Point;
@@ -30,16 +33,27 @@ pub(super) fn outlines(
     turn: Orientation,
     tolerance: f64,
 ) -> Result<Vec<Vec<Point>>, char> {
-    let face = Face::parse(FONT, 0).expect("the font that comes with the program is one");
-    let capital = glyph(&face, 'H').expect("the font has capitals");
-    let capital = face.glyph_bounding_box(capital).expect("capitals have outlines");
+    let font = FontRef::new(FONT).expect("the font that comes with the program is one");
+    // Places in units of the font, as whole numbers.
+    let (size, location) = (Size::unscaled(), LocationRef::default());
+    let (glyphs, metrics) = (font.outline_glyphs(), font.glyph_metrics(size, location));
+    let capital = glyph(&font, 'H').expect("the font has capitals");
+    let capital = metrics.bounds(capital).expect("capitals have outlines");
     let scale = 1.0 / f64::from(capital.y_max);
-    let mut pen = Pen { lines: Vec::new(), x: 0.0, scale, tolerance };
+    let mut pen = Pen { lines: Vec::new(), x: 0.0, shift: 0.0, scale, tolerance };
     for letter in text.chars() {
-        let id = glyph(&face, letter).ok_or(letter)?;
-        // A blank has no outline.
-        let _ = face.outline_glyph(id, &mut pen);
-        pen.x += f64::from(face.glyph_hor_advance(id).unwrap_or(0)) * scale;
+        let id = glyph(&font, letter).ok_or(letter)?;
+        // Rasterizers of screens, whom skrifa follows, move an outline to where the letter's bearing
+        // says that it begins. In this font some bearings are off by a unit: it stays where it is.
+        let (bounds, bearing) = (metrics.bounds(id), metrics.left_side_bearing(id));
+        pen.shift = bounds.zip(bearing).map_or(0.0, |(bounds, bearing)| bounds.x_min - bearing);
+        if let Some(outline) = glyphs.get(id) {
+            // Of the two styles, this one begins lines where the font does.
+            let settings = DrawSettings::unhinted(size, location);
+            let drawn = outline.draw(settings.with_path_style(PathStyle::HarfBuzz), &mut pen);
+            drawn.expect("the outlines of the font that comes with the program are whole");
+        }
+        pen.x += f64::from(metrics.advance_width(id).unwrap_or(0.0)) * scale;
     }
     let shift = match align {
         Align::Left => 0.0,
@@ -51,8 +65,8 @@ pub(super) fn outlines(
     Ok(pen.lines.into_iter().map(placed).collect())
 }
 
-fn glyph(face: &Face<'_>, letter: char) -> Option<GlyphId> {
-    face.glyph_index(letter).filter(|id| id.0 != 0)
+fn glyph(font: &FontRef<'_>, letter: char) -> Option<GlyphId> {
+    font.charmap().map(letter).filter(|&id| id != GlyphId::NOTDEF)
 }
 
 /// Turns a point about the origin, with y up.
@@ -66,13 +80,15 @@ struct Pen {
     lines: Vec<Vec<Point>>,
     /// The start of the letter.
     x: f64,
+    /// How far to the right to move the letter, in units of the font.
+    shift: f32,
     scale: f64,
     tolerance: f64,
 }
 
 impl Pen {
     fn point(&self, x: f32, y: f32) -> Point {
-        [self.x + f64::from(x) * self.scale, f64::from(y) * self.scale]
+        [self.x + f64::from(x + self.shift) * self.scale, f64::from(y) * self.scale]
     }
 
     fn last(&self) -> Point {
@@ -93,7 +109,7 @@ impl Pen {
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlinePen for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
         let point = self.point(x, y);
         self.lines.push(vec![point]);
@@ -199,6 +215,16 @@ mod tests {
         let letters: String = (' '..='~').collect();
         assert!(outlines(&letters, Align::Left, Orientation::default(), 0.01).is_ok());
         assert_eq!(outlines("a\u{3a9}", Align::Left, Orientation::default(), 0.01), Err('\u{3a9}'));
+    }
+
+    /// The bearings of these three differ from their outlines, which begin at these units.
+    #[test]
+    fn letters_stand_where_the_font_draws_them() {
+        for (letter, first) in [("&", 102.0), ("8", 113.0), ("\u{2013}", 161.602_05)] {
+            let lines = outlines(letter, Align::Left, Orientation::default(), 0.001).unwrap();
+            let found = lines.iter().flatten().map(|[x, _]| x * 1456.0).fold(f64::MAX, f64::min);
+            assert!((found - first).abs() < 0.01, "{letter} begins at {found}, not {first}");
+        }
     }
 
     fn drawn(text: &str, align: Align, turn: &str) -> Vec<String> {
