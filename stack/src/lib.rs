@@ -119,7 +119,7 @@ pub use runs::{Change, Pixel, RunError, RunImage};
 pub use shell::{file_word, quoted, words};
 pub use split::{SplitError, SplitPoints, write_split};
 pub use strut::Strut;
-pub use temporary::{FOLDER_LIST, FileBeside, FolderBeside, remove_temporaries};
+pub use temporary::{FOLDER_LIST, FileBeside, FolderBeside, PrivateFile, remove_temporaries};
 pub use text::{line_of, one_line};
 pub use tiff::{Compression, EncodedPage, Format, Page, PageHeader, PageReader, PageWriter};
 pub use totals::{NumberRange, StackTotals};

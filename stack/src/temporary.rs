@@ -245,6 +245,47 @@ impl FolderBeside {
     }
 }
 
+/// A file for a program that is told its path, which its owner alone may read (mode 600). It is
+/// removed on drop, and by [`remove_temporaries`].
+pub struct PrivateFile {
+    file: NamedTempFile,
+    _registered: Registered,
+}
+
+impl PrivateFile {
+    /// Writes a file with a name between `start` and `end` that nobody can guess.
+    ///
+    /// It is in the user's folder for the session (`XDG_RUNTIME_DIR`), which is not on a disk, or
+    /// in that for temporary files.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be written.
+    pub fn new(start: &str, end: &str, content: &[u8]) -> io::Result<Self> {
+        let session = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+        let session = session.filter(|folder| folder.is_absolute());
+        let written = session.map(|folder| Self::within(&folder, start, end, content));
+        match written {
+            Some(Ok(file)) => Ok(file),
+            _ => Self::within(&std::env::temp_dir(), start, end, content),
+        }
+    }
+
+    fn within(folder: &Path, start: &str, end: &str, content: &[u8]) -> io::Result<Self> {
+        let mut builder = Builder::new();
+        builder.prefix(start).suffix(end).rand_bytes(RANDOM_LETTERS);
+        // The mode is set before anything is written; a file with this name is not taken over.
+        let (mut file, registered) = Registered::made(|| builder.tempfile_in(folder))?;
+        file.write_all(content)?;
+        file.flush()?;
+        Ok(Self { file, _registered: registered })
+    }
+
+    /// Returns the file's path.
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+}
+
 /// Waits until no other process gives a folder its name in `parent`, and has the others wait as
 /// long as the file lives. An exchange in steps must not meet another.
 ///

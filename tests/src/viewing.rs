@@ -1,10 +1,11 @@
 //! Runs `lamp view`, and talks to it byte by byte.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
+use std::path::Path;
 use std::process::{Child, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::Scratch;
 
@@ -43,29 +44,87 @@ impl Viewing {
         Some(peak.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
     }
 
-    /// Starts `lamp view` in a folder, and waits until it has printed its address.
+    /// Starts `lamp view` in a folder, waits until it has printed its address, and opens that for
+    /// the cookie.
     ///
     /// # Panics
     /// Panics if it does not.
     #[track_caller]
     pub fn start(scratch: &Scratch, words: &str) -> Self {
+        let mut viewing = Self::unopened(scratch, words, &[]);
+        let welcome = viewing.ask(&viewing.request(&format!("/?token={}", viewing.token()), ""));
+        let cookie = welcome.header("set-cookie").expect("the token becomes a cookie");
+        viewing.cookie = cookie.split(';').next().expect("there is a first part").to_owned();
+        viewing
+    }
+
+    /// Starts `lamp view` with some variables of its environment, and leaves its address, which is
+    /// good for once, to others. There is no cookie then.
+    ///
+    /// # Panics
+    /// Panics if it does not print its address.
+    #[track_caller]
+    pub fn unopened(scratch: &Scratch, words: &str, variables: &[(&str, &Path)]) -> Self {
         let said = tempfile::tempfile().expect("a temporary file");
         let mut command = scratch.command(&format!("lamp view {words}"));
+        command.envs(variables.iter().copied());
         command.stdout(Stdio::piped()).stderr(said.try_clone().expect("a file has many handles"));
         let mut server = command.spawn().expect("lamp starts");
         let mut address = String::new();
         let stdout = server.stdout.take().expect("it was asked for");
         BufReader::new(stdout).read_line(&mut address).expect("a line");
         let mut viewing = Self { server, said, address, port: 0, cookie: String::new() };
-        let Some((port, token)) = port_and_token(viewing.address.trim()) else {
+        let Some((port, _)) = port_and_token(viewing.address.trim()) else {
             panic!("no address in {:?}: {}", viewing.address, viewing.said());
         };
-        let token = token.to_owned();
         viewing.port = port;
-        let welcome = viewing.ask(&viewing.request(&format!("/?token={token}"), ""));
-        let cookie = welcome.header("set-cookie").expect("the token becomes a cookie");
-        viewing.cookie = cookie.split(';').next().expect("there is a first part").to_owned();
         viewing
+    }
+
+    /// Starts `lamp view --open` with a browser that only notes its arguments, and waits for those,
+    /// each in a line. The address that was printed is left to others.
+    ///
+    /// # Panics
+    /// Panics if no browser is started.
+    #[cfg(unix)]
+    #[track_caller]
+    pub fn opened(scratch: &Scratch, words: &str) -> (Self, String) {
+        use std::os::unix::fs::PermissionsExt;
+        // `told` gets its name once it is whole.
+        const OPENER: &[u8] =
+            b"#!/bin/sh\nprintf '%s\\n' \"$@\" > \"$0.new\"\nmv \"$0.new\" \"$0.told\"\n";
+        let [programs, session] = ["programs", "session"].map(|name| scratch.path(name));
+        for folder in [&programs, &session] {
+            fs::create_dir_all(folder).expect("the folder can be written to");
+        }
+        let opener = programs.join("xdg-open");
+        fs::write(&opener, OPENER).expect("the folder can be written to");
+        fs::set_permissions(&opener, PermissionsExt::from_mode(0o755)).expect("it is ours");
+        let system = std::env::var_os("PATH").unwrap_or_default();
+        let folders = std::iter::once(programs).chain(std::env::split_paths(&system));
+        let path = std::env::join_paths(folders).expect("folders were split before");
+        let variables = [("PATH", Path::new(&path)), ("XDG_RUNTIME_DIR", &*session)];
+        let viewing = Self::unopened(scratch, &format!("{words} --open"), &variables);
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            if let Ok(told) = fs::read_to_string(opener.with_extension("told")) {
+                return (viewing, told);
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        panic!("no browser was started: {}", viewing.said());
+    }
+
+    /// Ends it as Ctrl-C does.
+    ///
+    /// # Panics
+    /// Panics if it does not end.
+    #[cfg(unix)]
+    pub fn interrupt(&mut self) {
+        let process = self.server.id().to_string();
+        let kill = std::process::Command::new("kill").args(["-INT", &process]).status();
+        assert!(kill.expect("systems have kill").success());
+        self.server.wait().expect("it ends");
     }
 
     /// Returns the token of the first address.
@@ -73,7 +132,7 @@ impl Viewing {
         port_and_token(self.address.trim()).expect("it was read before").1
     }
 
-    /// Returns the cookie that stands for the token, as `name=value`.
+    /// Returns the cookie that the token became, as `name=value`.
     pub fn cookie(&self) -> &str {
         &self.cookie
     }

@@ -51,17 +51,101 @@ fn still_answers(viewing: &Viewing) {
 }
 
 #[test]
-fn only_the_token_opens_and_becomes_a_cookie() {
-    let (scratch, viewing) = viewing();
-    let token = viewing.token().to_owned();
+fn a_token_opens_once_and_becomes_a_cookie() {
+    let scratch = Scratch::with_tower_and_torus();
+    let viewing = Viewing::unopened(&scratch, "torus.tif --threads 2", &[]);
+    let token = viewing.token();
     assert_eq!(token.len(), 32);
-    let welcome = viewing.ask(&viewing.request(&format!("/?token={token}"), ""));
-    let welcome = checked(welcome, &scratch);
-    assert_eq!((welcome.status, welcome.header("location")), (303, Some("/")));
+    let first = format!("/?token={token}");
+    // What is loaded ahead, or without looking at it, does not use the token up.
+    for purpose in ["Sec-Purpose: prefetch;prerender", "Purpose: prefetch", "X-Moz: prefetch"] {
+        let answer = viewing.ask(&viewing.request(&first, &format!("{purpose}\r\n")));
+        assert!(answer.header("set-cookie").is_none());
+        refused(answer, &scratch, &[403]);
+    }
+    let head = viewing.request(&first, "").replacen("GET", "HEAD", 1);
+    assert_eq!(checked(viewing.ask(&head), &scratch).status, 403);
+
+    let welcome = checked(viewing.ask(&viewing.request(&first, "")), &scratch);
+    assert_eq!(welcome.status, 200);
+    assert!(welcome.text().contains("0; url=/\"") && !welcome.text().contains(token));
     let cookie = welcome.header("set-cookie").unwrap();
     for attribute in ["; HttpOnly", "; SameSite=Strict", "; Path=/"] {
         assert!(cookie.contains(attribute), "{cookie}");
     }
+    assert!(!cookie.contains(token), "the token is good for nothing any more");
+
+    let again = viewing.ask(&viewing.request(&first, ""));
+    assert!(again.header("set-cookie").is_none());
+    assert!(again.text().contains("end lamp view and start it again"), "{}", again.text());
+    refused(again, &scratch, &[403]);
+
+    let cookie = format!("Cookie: {}\r\n", cookie.split(';').next().unwrap());
+    for _ in 0..2 {
+        let page = viewing.ask(&viewing.request("/", &cookie));
+        assert_eq!(checked(page, &scratch).status, 200);
+        // Who goes to the first address again is led on, and it is in no link or history.
+        let page = checked(viewing.ask(&viewing.request(&first, &cookie)), &scratch);
+        assert_eq!((page.status, page.header("location")), (303, Some("/")));
+    }
+}
+
+/// Arguments are seen by all users of a machine.
+#[cfg(unix)]
+#[test]
+fn a_browser_is_given_a_private_file() {
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
+
+    let scratch = Scratch::with_tower_and_torus();
+    let (viewing, told) = Viewing::opened(&scratch, "torus.tif");
+    let path = Path::new(told.trim_end());
+    assert!(path.starts_with(scratch.path("session")), "{told}");
+    let mode = std::fs::metadata(path).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    let page = std::fs::read_to_string(path).unwrap();
+    let start = format!("0; url=http://127.0.0.1:{}/?token=", viewing.port);
+    let token = page.split_once(&start).unwrap().1.split('"').next().unwrap();
+    assert_eq!(token.len(), 32);
+    assert!(!told.contains(token) && !told.contains(viewing.token()));
+
+    // It is gone once it was used, which the printed address does not notice.
+    let first = viewing.request(&format!("/?token={token}"), "");
+    assert_eq!(viewing.ask(&first).status, 200);
+    assert!(!path.exists());
+    assert_eq!(viewing.ask(&first).status, 403);
+    let printed = viewing.request(&format!("/?token={}", viewing.token()), "");
+    assert_eq!(
+        [viewing.ask(&printed), viewing.ask(&printed)].map(|answer| answer.status),
+        [200, 403]
+    );
+    assert_eq!(viewing.said(), "");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_private_file_that_nobody_used_goes_with_the_viewer() {
+    let scratch = Scratch::with_tower_and_torus();
+    let session = scratch.path("session");
+    let files = || std::fs::read_dir(&session).unwrap().count();
+    let (mut viewing, _) = Viewing::opened(&scratch, "torus.tif");
+    assert_eq!(files(), 1);
+    viewing.interrupt();
+    assert_eq!(files(), 0);
+    // Nor is one left where there is no browser.
+    let nothing = scratch.path("nothing");
+    let variables = [("PATH", &*nothing), ("XDG_RUNTIME_DIR", &*session)];
+    let viewing = Viewing::unopened(&scratch, "torus.tif --open", &variables);
+    let printed = viewing.request(&format!("/?token={}", viewing.token()), "");
+    assert_eq!(viewing.ask(&printed).status, 200);
+    assert!(viewing.said().contains("open the address above"), "{}", viewing.said());
+    assert_eq!(files(), 0);
+}
+
+#[test]
+fn nothing_but_token_and_cookie_opens() {
+    let (scratch, viewing) = viewing();
+    let token = viewing.token().to_owned();
     let last = if token.ends_with('0') { "1" } else { "0" };
     let wrong = [
         "",

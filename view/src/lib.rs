@@ -2,7 +2,8 @@
 //!
 //! Tiles of any scale come straight from the runs of a layer, by the share of each pixel that is
 //! white ([`lamp_stack::mean_levels`]): there is no pyramid, and nothing is written. A [`Viewer`]
-//! answers what the page asks; [`serve`] puts it on the loopback address, behind a token.
+//! answers what the page asks; [`serve`] puts it on the loopback address, behind tokens that open the
+//! page once each.
 
 mod assets;
 mod background;
@@ -27,7 +28,7 @@ pub use background::Progress;
 pub use error::ViewError;
 pub use findings::{Finding, of_report};
 pub use overlay::Overlay;
-pub use server::{Address, Token, serve};
+pub use server::{Address, Ticket, Token, serve};
 pub use stack::ViewedStack;
 pub use surface::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
 pub use viewer::Viewer;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_stack::{Destination, Format, IndexedStack, write_stack};
-use lamp_view::{Address, Token, ViewedStack, Viewer, licences, of_report, serve};
+use lamp_stack::{Destination, Format, IndexedStack, PrivateFile, write_stack};
+use lamp_view::{Address, Ticket, Token, ViewedStack, Viewer, licences, of_report, serve};
 
 use super::check;
 use crate::exit::Exit;
@@ -20,8 +20,8 @@ use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
 
 /// Look at layers in a browser
 ///
-/// Prints an address to open; it has a secret, so that nobody else on this machine can see the
-/// layers. Zoom and place stay while the layer changes. Shown on demand: what is new over the layer
+/// Prints an address to open; it has a secret and works once, so that nobody else on this machine can
+/// see the layers. Zoom and place stay while the layer changes. Shown on demand: what is new over the layer
 /// below, what a second stack adds or lacks, stray rows and what `fix` changed, findings of `lamp
 /// check`, and the part in 3D. A part is sliced first. Ctrl-C ends the viewer.
 #[derive(Args)]
@@ -38,7 +38,7 @@ pub(crate) struct ViewArgs {
     #[arg(value_name = "STACK|PART", default_value = "-")]
     inputs: Vec<PathBuf>,
 
-    /// Open the address in the usual browser
+    /// Open the page in the usual browser, by a private file that leads to it
     #[arg(long)]
     open: bool,
 
@@ -59,7 +59,7 @@ pub(crate) struct ViewArgs {
     memory: u64,
 
     /// Print the licences of the libraries in the page
-    #[arg(long)]
+    #[arg(long, alias = "licenses")]
     licences: bool,
 
     #[command(flatten)]
@@ -99,13 +99,49 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
         });
         viewer.set_findings(findings.collect::<Result<Vec<_>, Exit>>()?.concat());
     }
-    let token = Token::new().context("random numbers for the address")?;
-    let first = address.with(&token);
-    print(&format!("{first}\n"))?;
-    if args.open && open::that_detached(&first).is_err() {
-        Progress::new("view", common, true).say("no browser was found: open the address above");
+    let token = new_token()?;
+    print(&format!("{}\n", address.with(&token)))?;
+    let mut tickets = vec![Ticket::new(token, || {})];
+    if args.open {
+        match open_in_browser(&address)? {
+            Some(ticket) => tickets.push(ticket),
+            None => Progress::new("view", common, true)
+                .say("no browser was found: open the address above"),
+        }
     }
-    Ok(serve(viewer, address, token, threads).context("the viewer")?)
+    Ok(serve(viewer, address, tickets, threads).context("the viewer")?)
+}
+
+fn new_token() -> Result<Token, Exit> {
+    Ok(Token::new().context("random numbers for the address")?)
+}
+
+/// Opens the usual browser; returns none if there is none. Arguments are seen by all users of the
+/// machine, so what it is told to open is a file that it alone can read, and that leads to an
+/// address of its own: the one that was printed stays good. The file is gone once the page is asked
+/// for, or the viewer ends.
+fn open_in_browser(address: &Address) -> Result<Option<Ticket>, Exit> {
+    let token = new_token()?;
+    let page = leading_to(&address.with(&token));
+    let file = PrivateFile::new("lamp-view-", ".html", page.as_bytes());
+    let file = file.context("a private file for the browser")?;
+    let opened = open::that_detached(file.path()).is_ok();
+    Ok(opened.then(|| Ticket::new(token, move || drop(file))))
+}
+
+/// Returns a page that goes on to an address at once.
+fn leading_to(address: &str) -> String {
+    let page = maud::html! {
+        (maud::DOCTYPE)
+        html lang="en" {
+            meta charset="utf-8";
+            meta name="referrer" content="no-referrer";
+            meta http-equiv="refresh" content=(format!("0; url={address}"));
+            title { "lamp view" }
+            p { a href=(address) { "Layers" } }
+        }
+    };
+    page.into_string()
 }
 
 /// Opens a stack; a part is sliced into a temporary file.

@@ -28,8 +28,17 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Opens a page of `lamp view` in a window of a size, or says why it cannot.
-    pub(crate) fn open(viewing: &Viewing, [width, height]: [u32; 2]) -> Option<Self> {
+    /// Opens the page of `lamp view` in a window of a size, or says why it cannot.
+    pub(crate) fn open(viewing: &Viewing, window: [u32; 2]) -> Option<Self> {
+        Self::open_by(viewing, viewing.address.trim(), window)
+    }
+
+    /// Opens the page by another address that leads to it.
+    pub(crate) fn open_by(
+        viewing: &Viewing,
+        address: &str,
+        [width, height]: [u32; 2],
+    ) -> Option<Self> {
         let chromium = ["chromium", "chromium-browser", "google-chrome"]
             .into_iter()
             .find(|name| Command::new(name).arg("--version").output().is_ok());
@@ -54,7 +63,7 @@ impl Browser {
             note("Chromium does not start: the viewer is not tested in a browser");
             return None;
         }
-        browser.runtime.block_on(browser.client().goto(viewing.address.trim())).unwrap();
+        browser.runtime.block_on(browser.client().goto(address)).unwrap();
         browser.settle();
         Some(browser)
     }
@@ -67,6 +76,13 @@ impl Browser {
     #[track_caller]
     pub(crate) fn run(&self, script: &str, arguments: Vec<Value>) -> Value {
         self.runtime.block_on(self.client().execute(script, arguments)).unwrap()
+    }
+
+    /// Loads the page again.
+    #[track_caller]
+    pub(crate) fn reload(&self) {
+        self.runtime.block_on(self.client().refresh()).unwrap();
+        self.settle();
     }
 
     /// Waits until a condition of the page holds.

@@ -55,7 +55,7 @@ fn is_laid_over(browser: &Browser, layer: &Layer, wanted: impl Fn([u32; 2]) -> b
 #[test]
 fn the_demo_build_is_seen_to_the_pixel() {
     let scratch = demo();
-    let viewing = Viewing::start(&scratch, "lamp-demo/alpha.tif --check");
+    let viewing = Viewing::unopened(&scratch, "lamp-demo/alpha.tif --check", &[]);
     let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
     let layers = scratch.layers("lamp-demo/alpha.tif");
     browser.shows(&["0/0/layer"]);
@@ -99,6 +99,23 @@ fn the_demo_build_is_seen_to_the_pixel() {
     follow_a_finding(&browser);
     see_the_part(&browser);
     browser.was_quiet();
+}
+
+/// Browsers keep the cookie from what other pages lead to, as the file of `--open` does.
+#[cfg(unix)]
+#[test]
+fn the_private_file_leads_to_the_page() {
+    let scratch = Scratch::with_tower_and_torus();
+    let (viewing, path) = Viewing::opened(&scratch, "torus.tif");
+    let file = format!("file://{}", path.trim_end());
+    let Some(browser) = Browser::open_by(&viewing, &file, WINDOW) else { return };
+    let place =
+        || browser.run("return location.origin + location.pathname + location.search", vec![]);
+    let page = format!("http://127.0.0.1:{}/", viewing.port);
+    assert_eq!(place(), json!(page));
+    browser.reload();
+    assert_eq!(place(), json!(page));
+    assert_eq!(browser.run("return document.cookie", vec![]), json!(""), "it is for the server");
 }
 
 fn follow_a_finding(browser: &Browser) {
@@ -148,7 +165,7 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
         .succeeds();
     scratch.run("slice tower.stl --dpi 300 --layers 4..17 -o stray.tif").succeeds();
     scratch.run("fix stray.tif --max-width 2 -o fixed.tif").succeeds();
-    let viewing = Viewing::start(&scratch, "fixed.tif stray.tif");
+    let viewing = Viewing::unopened(&scratch, "fixed.tif stray.tif", &[]);
     let Some(browser) = Browser::open(&viewing, LARGE) else { return };
     let (fixed, stray) = (scratch.layers("fixed.tif"), scratch.layers("stray.tif"));
     let mut counts = [0; 6];
@@ -200,7 +217,7 @@ fn an_island_is_coloured_and_all_is_reached_by_keys() {
         image: Image::Mask(block_and_island(index == 1)).into(),
     };
     scratch.stack("island.tif", (0..3).map(layer));
-    let viewing = Viewing::start(&scratch, "island.tif --check");
+    let viewing = Viewing::unopened(&scratch, "island.tif --check", &[]);
     let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
     browser.wait_for("document.querySelector('#findings-list button')");
     browser.press('n');
@@ -263,7 +280,7 @@ fn reach_all_by_keys(browser: &Browser) {
 #[ignore = "writes docs/view.png"]
 fn screenshot() {
     let scratch = demo();
-    let viewing = Viewing::start(&scratch, "lamp-demo/build.tif --check");
+    let viewing = Viewing::unopened(&scratch, "lamp-demo/build.tif --check", &[]);
     let browser = Browser::open(&viewing, WINDOW).expect("Chromium takes the picture");
     browser.go("#stack=0&layer=965&overlays=new");
     browser.run("document.querySelector('#solid').open = true", vec![]);

@@ -1,7 +1,7 @@
 //! Answers: their kinds, and what stands on all of them.
 
 use axum::Json;
-use axum::http::header::{CONTENT_ENCODING, CONTENT_TYPE};
+use axum::http::header::{CONTENT_ENCODING, CONTENT_TYPE, SET_COOKIE};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
@@ -40,6 +40,24 @@ fn bytes(kind: &'static str, bytes: impl IntoResponse) -> Response {
     let mut answer = bytes.into_response();
     answer.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));
     answer
+}
+
+/// A page that goes on to the layers.
+///
+/// It gives a cookie that is `SameSite=Strict`. A redirect would not do: when another page led
+/// here, as the file of `lamp view --open` does, browsers keep such cookies back from all redirects
+/// that follow. What our own page asks for has them.
+pub(super) fn welcome(cookie: &HeaderValue) -> Response {
+    const PAGE: &str = r#"<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta http-equiv="refresh" content="0; url=/">
+<title>lamp view</title>
+<p><a href="/">Layers</a></p>
+"#;
+    let mut answer = bytes("text/html; charset=utf-8", PAGE);
+    answer.headers_mut().insert(SET_COOKIE, cookie.clone());
+    with_policy(answer)
 }
 
 pub(super) fn png(file: Vec<u8>) -> Response {

@@ -1,26 +1,34 @@
-//! Who may ask: requests for the loopback address with the cookie, or with the token for it.
+//! Who may ask: requests for the loopback address with the cookie, or once with a token for it.
 
 use axum::extract::Request;
-use axum::http::header::{COOKIE, HOST, LOCATION, SET_COOKIE};
+use axum::http::header::{COOKIE, HOST, LOCATION};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::response::{IntoResponse, Response};
 
-use super::answer::{refusal, with_policy};
+use super::answer::{refusal, welcome, with_policy};
 use super::connections::Trust;
+use super::ticket::{Shown, Ticket, show};
 use super::token::Token;
+
+const NO_TOKEN: &str = "lamp view printed an address that opens this page, once; for another, end \
+                        lamp view and start it again";
+const USED_TOKEN: &str = "this address was opened before, and is good for once; for another, end \
+                          lamp view and start it again";
+const AHEAD: &str = "this address is good for once, so it is not for loading ahead";
 
 /// Lets requests pass that may.
 pub(super) struct Guard {
-    token: Token,
+    tickets: Vec<Ticket>,
+    secret: Token,
     /// Cookies are shared by all ports of an address, so the name has the port.
     cookie: String,
     hosts: [String; 2],
 }
 
 impl Guard {
-    pub(super) fn new(token: Token, port: u16) -> Self {
+    pub(super) fn new(tickets: Vec<Ticket>, secret: Token, port: u16) -> Self {
         let hosts = ["127.0.0.1", "localhost"].map(|host| format!("{host}:{port}"));
-        Self { token, cookie: format!("lamp_view_{port}"), hosts }
+        Self { tickets, secret, cookie: format!("lamp_view_{port}"), hosts }
     }
 
     /// Returns why a request is not answered, or the cookie for a token, or none if it may pass.
@@ -29,32 +37,43 @@ impl Guard {
             return Some(refusal(StatusCode::FORBIDDEN, "this address is not the viewer's"));
         }
         let is_get = request.method() == Method::GET;
-        if self.has_cookie(request.headers()) {
-            request.extensions().get().map(Trust::gain);
-            let method = "the viewer answers GET alone";
-            return (!is_get).then(|| {
-                let mut refused = refusal(StatusCode::METHOD_NOT_ALLOWED, method);
-                refused.headers_mut().insert("allow", HeaderValue::from_static("GET"));
-                refused
-            });
+        let token = if is_get { token_in(request) } else { None };
+        let has_cookie = self.has_cookie(request.headers());
+        if !has_cookie && token.is_none() {
+            return Some(refusal(StatusCode::FORBIDDEN, NO_TOKEN));
         }
-        let token = request.uri().query().and_then(|query| query.strip_prefix("token="));
-        if is_get && request.uri().path() == "/" && token.is_some_and(|token| self.token.is(token))
-        {
-            return Some(self.welcome());
+        if let Some(token) = token {
+            return Some(self.answer_to_token(token, request.headers(), has_cookie));
         }
-        let why = "open the address that lamp view printed: it has the token for this page";
-        Some(refusal(StatusCode::FORBIDDEN, why))
+        request.extensions().get().map(Trust::gain);
+        let method = "the viewer answers GET alone";
+        (!is_get).then(|| {
+            let mut refused = refusal(StatusCode::METHOD_NOT_ALLOWED, method);
+            refused.headers_mut().insert("allow", HeaderValue::from_static("GET"));
+            refused
+        })
     }
 
-    /// Gives the cookie, and an address without the token, so that it is in no link or history.
-    fn welcome(&self) -> Response {
-        let cookie = format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie, self.token);
-        let mut answer = StatusCode::SEE_OTHER.into_response();
-        let headers = answer.headers_mut();
-        headers.insert(LOCATION, HeaderValue::from_static("/"));
-        headers.insert(SET_COOKIE, HeaderValue::from_str(&cookie).expect("it is ASCII"));
-        with_policy(answer)
+    /// Lets a token become the cookie. Who has that already is only led on; the token is used up
+    /// all the same, and is in no link or history.
+    fn answer_to_token(&self, token: &str, headers: &HeaderMap, has_cookie: bool) -> Response {
+        if is_loaded_ahead(headers) {
+            return refusal(StatusCode::FORBIDDEN, AHEAD);
+        }
+        match show(&self.tickets, token) {
+            _ if has_cookie => {
+                let mut answer = StatusCode::SEE_OTHER.into_response();
+                answer.headers_mut().insert(LOCATION, HeaderValue::from_static("/"));
+                with_policy(answer)
+            }
+            Shown::Valid => {
+                let (name, secret) = (&self.cookie, &self.secret);
+                let cookie = format!("{name}={secret}; Path=/; HttpOnly; SameSite=Strict");
+                welcome(&HeaderValue::from_str(&cookie).expect("it is ASCII"))
+            }
+            Shown::UsedBefore => refusal(StatusCode::FORBIDDEN, USED_TOKEN),
+            Shown::Unknown => refusal(StatusCode::FORBIDDEN, NO_TOKEN),
+        }
     }
 
     /// Returns whether the request names this address: a page of another name that leads here
@@ -72,7 +91,21 @@ impl Guard {
         let mut cookies = texts.flat_map(|text| text.split(';'));
         cookies.any(|cookie| {
             let (name, value) = cookie.trim().split_once('=').unwrap_or_default();
-            name == self.cookie && self.token.is(value)
+            name == self.cookie && self.secret.is(value)
         })
     }
+}
+
+/// Returns the token that a request for the page has in its address.
+fn token_in(request: &Request) -> Option<&str> {
+    let uri = request.uri();
+    uri.query().filter(|_| uri.path() == "/").and_then(|query| query.strip_prefix("token="))
+}
+
+/// Returns whether a browser asks before its user does, and may throw the answer away: that must
+/// not use the token up. Current browsers say so in `Sec-Purpose`, older ones in the others.
+fn is_loaded_ahead(headers: &HeaderMap) -> bool {
+    let purposes = ["sec-purpose", "purpose", "x-purpose", "x-moz"].map(|name| headers.get(name));
+    let mut purposes = purposes.into_iter().flatten().filter_map(|purpose| purpose.to_str().ok());
+    purposes.any(|purpose| purpose.contains("prefetch") || purpose.contains("preview"))
 }

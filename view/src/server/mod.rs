@@ -4,6 +4,7 @@ mod answer;
 mod connections;
 mod guard;
 mod routes;
+mod ticket;
 mod token;
 mod work;
 
@@ -12,6 +13,7 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
 
 use guard::Guard;
+pub use ticket::Ticket;
 pub use token::Token;
 use work::Workers;
 
@@ -35,29 +37,31 @@ impl Address {
         Ok(Self { listener, port })
     }
 
-    /// Returns the first address to open. It has the token, so it is for the person alone who
-    /// started the viewer.
+    /// Returns an address that opens the page once, if [`serve`] gets a ticket of the token. It is
+    /// for the person alone who started the viewer.
     pub fn with(&self, token: &Token) -> String {
         format!("http://127.0.0.1:{}/?token={token}", self.port)
     }
 }
 
-/// Answers at an address until the process ends, with at most so many threads at work.
+/// Answers at an address until the process ends, with at most so many threads at work. The browser
+/// that shows a ticket gets a cookie for all else.
 ///
 /// # Errors
-/// Returns an error if the system does not let it start.
+/// Returns an error if the system does not let it start, or has no random numbers for the cookie.
 pub fn serve(
     viewer: Arc<Viewer>,
     address: Address,
-    token: Token,
+    tickets: Vec<Ticket>,
     threads: usize,
 ) -> io::Result<()> {
+    let cookie = Token::new()?;
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // Threads keep memory: no more of them than work at a time.
     let runtime = runtime.enable_all().max_blocking_threads(threads.max(1)).build()?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(address.listener)?;
-        let guard = Arc::new(Guard::new(token, address.port));
+        let guard = Arc::new(Guard::new(tickets, cookie, address.port));
         let workers = Arc::new(Workers::new(viewer, threads));
         connections::answer(listener, routes::routes(workers, guard)).await
     })

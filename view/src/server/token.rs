@@ -1,4 +1,4 @@
-//! The secret in the first address, and in the cookie that replaces it.
+//! Secrets: those of the first addresses, and that of the cookie which replaces them.
 
 use std::fmt;
 

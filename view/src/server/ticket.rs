@@ -1,0 +1,75 @@
+//! Tokens of addresses that open the page once.
+
+use std::sync::{Mutex, PoisonError};
+
+use super::token::Token;
+
+/// A token that opens the page once: who finds it later, in a log or a history, has no use for it.
+pub struct Ticket {
+    token: Token,
+    /// What to do when it is used; nothing once it was.
+    when_used: Mutex<Option<Box<dyn FnOnce() + Send>>>,
+}
+
+/// What becomes of a text that is said to be the token of a ticket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    Unknown,
+    /// It was shown for the first time.
+    Valid,
+    UsedBefore,
+}
+
+impl Ticket {
+    /// Makes a ticket of a token. When it is used, `when_used` is called, which must not take long.
+    pub fn new(token: Token, when_used: impl FnOnce() + Send + 'static) -> Self {
+        Self { token, when_used: Mutex::new(Some(Box::new(when_used))) }
+    }
+
+    /// Uses the ticket, if a text is its token.
+    fn show(&self, text: &str) -> Shown {
+        if !self.token.is(text) {
+            return Shown::Unknown;
+        }
+        let unused = self.when_used.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match unused {
+            Some(when_used) => {
+                when_used();
+                Shown::Valid
+            }
+            None => Shown::UsedBefore,
+        }
+    }
+}
+
+/// Uses the ticket that has a text as its token, if there is one.
+pub(super) fn show(tickets: &[Ticket], text: &str) -> Shown {
+    let shown = tickets.iter().map(|ticket| ticket.show(text));
+    shown.fold(Shown::Unknown, |all, one| if one == Shown::Unknown { all } else { one })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn each_ticket_is_used_once() {
+        let used = Arc::new(AtomicU32::new(0));
+        let tokens = [Token::new().unwrap(), Token::new().unwrap()];
+        let texts = tokens.each_ref().map(Token::to_string);
+        let tickets = tokens.map(|token| {
+            let used = Arc::clone(&used);
+            Ticket::new(token, move || drop(used.fetch_add(1, Ordering::Relaxed)))
+        });
+        assert_eq!(show(&tickets, "0"), Shown::Unknown);
+        for (before, text) in (0..).zip(&texts) {
+            assert_eq!(used.load(Ordering::Relaxed), before);
+            assert_eq!(show(&tickets, text), Shown::Valid);
+            assert_eq!(show(&tickets, text), Shown::UsedBefore);
+        }
+        assert_eq!(used.load(Ordering::Relaxed), 2);
+    }
+}
