@@ -21,6 +21,7 @@ mod hints;
 mod json_report;
 mod kept_stack;
 mod lamp_option;
+mod licences;
 mod measured_doses;
 mod memory;
 mod mesh_report;
@@ -66,12 +67,12 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use commands::Command;
 use exit::Exit;
 use help::{formed, version};
-use options::Common;
+use options::{Common, GENERAL};
 use out_of_memory::note_command;
 use progress::say;
 use signals::{clean_up_on_signals, wait_if_ending};
 use stack_notes::print_notes_of;
-use streams::{give_up, settle_output};
+use streams::{give_up, print, settle_output};
 use usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
@@ -80,6 +81,11 @@ use usage::refuse;
 struct Lamp {
     #[command(subcommand)]
     command: Command,
+
+    /// Print the licences of all that is in the program
+    #[arg(long, alias = "licenses", help_heading = GENERAL)]
+    licences: bool,
+
     #[command(flatten)]
     common: Common,
 }
@@ -95,15 +101,25 @@ slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and 
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
+    if licences::are_asked_for() {
+        return finish("lamp", print_licences());
+    }
     let lamp = formed(Lamp::command());
     let matches = match arguments::matches(&lamp, lamp.clone()) {
         Ok(matches) => matches,
         Err(error) => return finish("lamp", Err(error)),
     };
     let parsed = Lamp::from_arg_matches(&matches);
-    let Lamp { command, common } = parsed.unwrap_or_else(|error| refuse(&error));
+    let Lamp { command, licences, common } = parsed.unwrap_or_else(|error| refuse(&error));
+    if licences {
+        return finish("lamp", print_licences());
+    }
     let name = matches.subcommand_name().unwrap_or_default();
     finish(name, run(name, &command, &common))
+}
+
+fn print_licences() -> Result<ExitCode, Exit> {
+    print(&licences::licences()).map(|()| ExitCode::SUCCESS)
 }
 
 /// Runs one of the pipeline's stages with the process's arguments.
