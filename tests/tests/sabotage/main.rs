@@ -11,6 +11,7 @@ mod kills;
 mod limits;
 mod memory;
 mod mutants;
+mod sets;
 mod stacks;
 mod writers;
 

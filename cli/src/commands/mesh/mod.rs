@@ -8,12 +8,14 @@ mod text;
 use std::io::{Read, stdin};
 use std::path::PathBuf;
 
+use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use lamp_slicer::{Part, Units};
 use lamp_stack::Length;
 
 use crate::exit::Exit;
-use crate::options::{Common, one_of};
+use crate::memory::{available, in_words};
+use crate::options::{Common, one_of, parse_memory};
 use crate::part_options::part_notes;
 use crate::progress::say;
 use crate::step_options::{HEADING, ReaderOptions, parse_tolerance};
@@ -61,7 +63,14 @@ struct MeshPart {
 
     #[command(flatten)]
     reader: ReaderOptions,
+
+    /// Memory that the mesh may take, some 70 bytes a facet [default: what there is]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
 }
+
+/// The bytes that a mesh takes a facet: half a vertex, its corners, its edges and what finds them.
+const FACET_BYTES: u64 = 70;
 
 impl MeshPart {
     /// Returns the name for messages.
@@ -85,6 +94,17 @@ impl MeshPart {
         if self.units != Units::default() && part.states_unit() {
             let why = "a STEP or 3MF file states its own unit: leave out --units";
             return Err(Exit::usage(why).at(self.name()));
+        }
+        let there_is = available();
+        let most = self.memory.unwrap_or(there_is).min(there_is);
+        let needed = part.facet_count() as u64 * FACET_BYTES;
+        if needed > most {
+            let [needed, most] = [needed, most].map(in_words);
+            return Err(Exit::Failed(anyhow!(
+                "its {} facets take some {needed} of memory, and {most} are allowed",
+                part.facet_count()
+            ))
+            .at(self.name()));
         }
         if !common.quiet {
             part_notes(&part).iter().for_each(|note| say(&format!("{command}: {note}")));
