@@ -279,3 +279,38 @@ fn what_is_wrong_with_a_night_is_told_before_anything_runs() {
     let status = String::from_utf8(status.stdout).unwrap();
     assert_eq!(status, "3 of 3 are done (2 parts and 1 build), 0 tasks are to do\n");
 }
+
+/// Names are bytes, and no link and no file is passed over.
+#[test]
+#[cfg(target_os = "linux")]
+fn no_part_of_a_night_is_passed_over() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let scratch = Scratch::new();
+    let folder = scratch.path("x").with_file_name(OsStr::from_bytes(b"n\xe9e"));
+    fs::create_dir_all(folder.join("parts")).unwrap();
+    scratch.part("good.stl", Sample::Cube, 64);
+    for name in [&b"good.stl"[..], b"caf\xe9.stl"] {
+        let file = folder.join("parts").join(OsStr::from_bytes(name));
+        fs::copy(scratch.path("good.stl"), file).unwrap();
+    }
+    std::os::unix::fs::symlink("nothing", folder.join("parts/link.stl")).unwrap();
+    let night = format!("[defaults]\nstages = [\"{STAGES}\"]\n[[part]]\nfile = \"parts/*.stl\"\n");
+    fs::write(folder.join("night.toml"), night).unwrap();
+    let batch = || {
+        let mut batch = std::process::Command::new(lamp_tests::bin("lamp"));
+        batch.args(["batch", "night.toml"]).current_dir(&folder).output().unwrap()
+    };
+    for _ in 0..2 {
+        let ran = batch();
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert_eq!(ran.status.code(), Some(1), "{said}");
+        // As the night file names it.
+        assert!(said.contains("link: failed: parts/link.stl: No such file"), "{said}");
+        assert!(said.contains("1 of 3 parts failed (link)"), "{said}");
+    }
+    let made = fs::read_dir(folder.join("night/parts")).unwrap().count();
+    assert_eq!(made, 2);
+    fs::remove_file(folder.join("parts/link.stl")).unwrap();
+    assert!(batch().status.success());
+}

@@ -32,7 +32,7 @@ pub struct Night {
 pub struct Part {
     /// The name that builds and results have.
     pub name: String,
-    /// The part's file, or a folder that it may be in.
+    /// The part's file, or a folder that it may be in, from the folder of the night file.
     pub file: PathBuf,
     /// Why no file can be had, if that is known already.
     pub fault: Option<String>,

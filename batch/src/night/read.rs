@@ -66,8 +66,8 @@ struct Drafts {
 }
 
 impl Drafts {
-    fn add(&mut self, draft: Draft) {
-        self.places.insert(real(&draft.file), self.list.len());
+    fn add(&mut self, real: PathBuf, draft: Draft) {
+        self.places.insert(real, self.list.len());
         self.list.push(draft);
     }
 }
@@ -268,9 +268,10 @@ impl Reader<'_> {
             return Err(NightError { place: *place, problem });
         }
         for (file, fault, place) in files {
-            match drafts.places.get(&real(&file)) {
+            let real = real(&self.folder.join(&file));
+            match drafts.places.get(&real) {
                 Some(&place) => drafts.list[place].table.change(read.clone()),
-                None => drafts.add(Draft { file, fault, place, table: read.clone() }),
+                None => drafts.add(real, Draft { file, fault, place, table: read.clone() }),
             }
         }
         Ok(())
@@ -282,7 +283,7 @@ impl Reader<'_> {
         let name = self.text(value)?;
         let path = self.folder.join(name);
         if path.exists() || !name.contains(['*', '?', '[']) {
-            return Ok(vec![(path, None)]);
+            return Ok(vec![(name.into(), None)]);
         }
         let wrong = |error: glob::PatternError| self.at(value, format!("{name}: {}", error.msg));
         let Walk { files, closed } = Walk::new(self.folder, name).map_err(wrong)?;
@@ -291,15 +292,17 @@ impl Reader<'_> {
                 self.at(value, format!("no file matches {name}: check its folder and its end"))
             );
         }
+        let from_here = |path: PathBuf| match path.strip_prefix(self.folder) {
+            Ok(below) => below.to_owned(),
+            Err(_) => path,
+        };
         let fault = |(folder, error): (PathBuf, io::Error)| {
+            let folder = from_here(folder);
             let fault = format!("{}: not all files in it can be found: {error}", folder.display());
             (folder, Some(fault))
         };
-        Ok(files
-            .into_iter()
-            .map(|file| (file, None))
-            .chain(closed.into_iter().map(fault))
-            .collect())
+        let files = files.into_iter().map(|file| (from_here(file), None));
+        Ok(files.chain(closed.into_iter().map(fault)).collect())
     }
 
     fn build(&self, value: &Value<'_>, parts: &[Part]) -> Read<Build> {

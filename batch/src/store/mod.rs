@@ -291,7 +291,10 @@ impl Store {
     /// # Errors
     /// Returns an error if it cannot be removed.
     pub fn forget_note(&self, key: Key) -> Result<(), StoreError> {
-        remove(&self.root.join("notes").join(key.place("json")))
+        match remove(&self.root.join("notes").join(key.place("json"))) {
+            Err(StoreError::Io(_, error)) if is_read_only(&error) => Ok(()),
+            removed => removed,
+        }
     }
 
     /// Returns the keys of all tasks of which the store has a file.

@@ -1,5 +1,6 @@
 /* Fails one call of the file system: LAMP_FAIL is the call, LAMP_FAIL_AT which of them, from 1. Only files
-   that are written count. A file LAMP_FAIL_DONE says that it has failed. */
+   that are written count. A file LAMP_FAIL_DONE says that it has failed. With LAMP_FAIL=store, nothing can
+   be made in a folder lamp-store. */
 
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -27,6 +28,11 @@ static int fails(const char *call) {
     return 1;
 }
 
+static int is_closed(const char *path) {
+    const char *wanted = getenv("LAMP_FAIL");
+    return wanted && strcmp(wanted, "store") == 0 && strstr(path, "lamp-store/");
+}
+
 static int is_file(int fd) {
     struct stat found;
     return fstat(fd, &found) == 0 && S_ISREG(found.st_mode);
@@ -45,6 +51,7 @@ static int opened(int fd, int flags) {
         va_start(rest, flags);                                                \
         mode_t mode = va_arg(rest, mode_t);                                   \
         va_end(rest);                                                         \
+        if ((flags & O_CREAT) && is_closed(path)) return errno = EROFS, -1;   \
         if ((flags & O_CREAT) && fails("open")) return errno = EACCES, -1;    \
         return opened(NEXT(name)(path, flags, mode), flags);                  \
     }
@@ -57,6 +64,7 @@ OPEN(open64)
         va_start(rest, flags);                                                \
         mode_t mode = va_arg(rest, mode_t);                                   \
         va_end(rest);                                                         \
+        if ((flags & O_CREAT) && is_closed(path)) return errno = EROFS, -1;   \
         if ((flags & O_CREAT) && fails("open")) return errno = EACCES, -1;    \
         return opened(NEXT(name)(at, path, flags, mode), flags);              \
     }
@@ -98,6 +106,7 @@ int rename(const char *from, const char *to) {
 }
 
 int mkdir(const char *path, mode_t mode) {
+    if (is_closed(path)) return errno = EROFS, -1;
     if (fails("mkdir")) return errno = ENOSPC, -1;
     return NEXT(mkdir)(path, mode);
 }

@@ -182,3 +182,26 @@ fn a_redirected_stack_is_synced() {
         let _ = fs::remove_file(&done);
     }
 }
+
+/// A store that can only be read serves what it has.
+#[test]
+fn a_store_that_is_only_read_serves() {
+    let (library, scratch) = (library(), scratch());
+    let night = "[defaults]\nstages = [\"slice --dpi 60 --thickness 2mm\"]\n\
+                 [[part]]\nfile = \"ball.stl\"\n[output]\nfolder = \"out\"\n";
+    scratch.write("night.toml", night.as_bytes());
+    scratch.run("lamp batch night.toml -q").succeeds();
+    let right = scratch.bytes("out/parts/ball.lamp");
+    fs::remove_dir_all(scratch.path("out")).unwrap();
+    for line in [
+        "lamp batch status night.toml",
+        "lamp batch plan night.toml",
+        "lamp batch night.toml -q",
+        "lamp batch verify night.toml",
+    ] {
+        let mut command = scratch.command(line);
+        let ran = command.env("LD_PRELOAD", &library).env("LAMP_FAIL", "store").output().unwrap();
+        assert!(ran.status.success(), "{line}: {ran:?}");
+    }
+    assert_eq!(scratch.bytes("out/parts/ball.lamp"), right);
+}

@@ -193,11 +193,12 @@ impl Planner<'_> {
     }
 
     fn input(&mut self, path: &Path) -> Result<InputFile, Exit> {
-        let (path, _) = &without_digest(path);
-        let read = self.digests.digest(path);
+        let (name, _) = without_digest(path);
+        let path = self.folder.join(&name);
+        let read = self.digests.digest(&path);
         let digest =
-            read.map_err(|error| Exit::Failed(error.into()).at(path.display().to_string()))?;
-        Ok(InputFile { path: self.folder.join(path), digest })
+            read.map_err(|error| Exit::Failed(error.into()).at(name.display().to_string()))?;
+        Ok(InputFile { path, digest })
     }
 
     /// Adds the tasks of a part.
@@ -207,7 +208,7 @@ impl Planner<'_> {
         }
         let chained = self.stages(&part.stages)?;
         let input = self.input(&part.file)?;
-        let survey = self.survey(&chained, &input)?;
+        let survey = self.survey(&chained, &part.file, &input)?;
         let stored = stored_name(&input.digest);
         let joined = self.layers(part, &chained, &input, &survey);
         let all = 0..survey.layers;
@@ -221,7 +222,7 @@ impl Planner<'_> {
                 inputs: inputs_of([stack.to_string()], &files),
                 code: coded([after.code()]),
             };
-            let (part_file, stages) = (input.path.clone(), chained.words.clone());
+            let (part_file, stages) = (part.file.clone(), chained.words.clone());
             let what = What::Whole { part: part_file, stages, which };
             let cost = Cost { cpu_s: all_s * 0.3, memory: survey.memory, disk: bytes };
             let label = format!("{} of the whole stack", after.code().0);
@@ -270,7 +271,7 @@ impl Planner<'_> {
             code: chained.code.clone(),
         };
         let what = |layers: Range<u32>| What::Range {
-            part: input.path.clone(),
+            part: part.file.clone(),
             stored_name: stored_name(&input.digest),
             stages: chained.words.clone(),
             layers,
@@ -318,14 +319,14 @@ impl Planner<'_> {
     }
 
     /// Returns what a part takes, from the store if it has been surveyed.
-    fn survey(&self, chained: &Chained, input: &InputFile) -> Result<Survey, Exit> {
+    fn survey(&self, chained: &Chained, file: &Path, input: &InputFile) -> Result<Survey, Exit> {
         let chain = &chained.stages.chain;
         let files = inputs_of([], std::iter::once(input).chain(&chained.files));
         let note = Key::of_note("survey", &(files, &chained.options, &chained.code));
         if let Some(known) = self.store.note(note) {
             return Ok(known);
         }
-        let survey = chain.survey(&input.path)?;
+        let survey = chain.survey(file)?;
         self.store.keep_note(note, &survey).map_err(anyhow::Error::new)?;
         Ok(survey)
     }
