@@ -275,10 +275,18 @@ fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     if text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) {
         return None;
     }
-    let of_format = of_xml(text).or_else(|| of_phrases(text)).or_else(|| of_columns(text));
+    // What follows a signature may name any program: STEP and STL headers do.
+    let signed = || of_part(text, is_whole).filter(|format| is_signed(*format));
+    let of_format = of_xml(text).or_else(signed);
+    let of_format = of_format.or_else(|| of_phrases(text)).or_else(|| of_columns(text));
     let of_format = of_format.or_else(|| of_part(text, is_whole)).or_else(|| of_lines(text));
     // The header of a binary file that was cut off may be text, too.
     of_format.or((!has_zeros).then_some(FileFormat::Text))
+}
+
+/// Returns whether a part begins with a word that no other format begins with.
+fn is_signed(format: FileFormat) -> bool {
+    matches!(format, FileFormat::Part(PartFormat::Step | PartFormat::AsciiStl))
 }
 
 fn of_phrases(text: &[u8]) -> Option<FileFormat> {
@@ -458,6 +466,8 @@ mod tests {
             ("\u{feff}solid a facet", PartFormat::AsciiStl),
             ("solid facet\0\0\x1a", PartFormat::AsciiStl),
             ("ISO-10303-21;", PartFormat::Step),
+            ("ISO-10303-21;\nHEADER;\nFILE_NAME('', '', (''), (''), 'ACIS Interop'", PartFormat::Step),
+            ("solid by ACIS 7\nfacet normal", PartFormat::AsciiStl),
             ("\u{feff} \r\n/* a */\n/* b\n*/ ISO-10303-21;\nHEADER;", PartFormat::Step),
             ("v 0 0 0", PartFormat::Obj),
             ("# a\ng\nv 0 0 0", PartFormat::Obj),

@@ -33,11 +33,29 @@ impl BrepModel {
         (0..uses.len()).filter(is_free).collect()
     }
 
-    fn is_point(&self, edge: &BrepEdge) -> bool {
+    /// Returns the ends and the middles of the edges of loops.
+    pub(crate) fn points_of(&self, loops: &[Loop]) -> Vec<Vec3> {
+        let edges = loops.iter().flat_map(|around| match around {
+            Loop::Edges(edges) => edges.as_slice(),
+            Loop::Vertex(_) => &[],
+        });
+        let of_edge = |(edge, _): &(usize, bool)| {
+            let edge = &self.edges[*edge];
+            let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
+            [start, end, self.middle(edge)]
+        };
+        edges.flat_map(of_edge).collect()
+    }
+
+    fn middle(&self, edge: &BrepEdge) -> Vec3 {
         let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
         let [from, to] = edge_range(&edge.curve, start, end, edge.forward);
-        let middle = edge.curve.place((from + to) / 2.0);
-        distance(start, end) < POINT_MM && distance(start, middle) < POINT_MM
+        edge.curve.place((from + to) / 2.0)
+    }
+
+    fn is_point(&self, edge: &BrepEdge) -> bool {
+        let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
+        distance(start, end) < POINT_MM && distance(start, self.middle(edge)) < POINT_MM
     }
 }
 

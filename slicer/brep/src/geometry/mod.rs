@@ -3,6 +3,7 @@
 pub(crate) mod chain;
 pub(crate) mod curve;
 mod offset;
+mod parts;
 mod polynomials;
 mod project;
 pub(crate) mod spline;

@@ -104,9 +104,10 @@ impl<'a> BodyReader<'a> {
                 let along_normal = item.truth(3)?;
                 let bounds = item.references(1)?;
                 let outer = self.outer(&bounds);
-                let loops =
+                let loops: Vec<Loop> =
                     bounds.into_iter().map(|bound| self.bound(bound)).collect::<Result<_, _>>()?;
                 let surface = self.geometry.surface(item.reference(2)?)?;
+                let surface = surface.part_at(|| self.model.points_of(&loops));
                 // A mirror turns normals over, but not the sense of loops in parameters.
                 let is_mirrored = self.geometry.place.is_mirrored();
                 let outwards = (along_normal == outwards) != is_mirrored;
