@@ -6,7 +6,7 @@
 //! closes with its neighbours. Triangles at a crossing lie upside down; their area tells
 //! whether the loops cross by more than the tolerance.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use spade::Point2;
 
@@ -121,38 +121,140 @@ pub(super) fn doubled(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
+/// Triangles whose sides are halved where they are too long.
+pub(super) struct Refined {
+    pub(super) triangles: Vec<[usize; 3]>,
+    /// Whether sides that are too long are left, because there would be too many triangles.
+    pub(super) is_coarse: bool,
+}
+
+impl Refined {
+    pub(super) fn sides(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.triangles.iter().flat_map(|&triangle| sides(triangle))
+    }
+}
+
 /// Halves the sides that two triangles share and that are too long, and both triangles with
-/// them, until none is. `is_long` says so of two corners; `halve` makes the one between.
+/// them, until none is, or until there are more than `most` triangles. In between, sides are
+/// turned to be Delaunay: ears reach across a strip many times as long as it is wide, and
+/// halving alone would never make them follow it.
+///
+/// `places` are those of the corners; `is_long` tells of two corners and `halve` makes the one
+/// between.
 pub(super) fn refine(
-    triangles: &mut Vec<[usize; 3]>,
+    mut triangles: Vec<[usize; 3]>,
+    places: &mut Vec<Point2<f64>>,
+    most: usize,
     mut is_long: impl FnMut(usize, usize) -> bool,
-    mut halve: impl FnMut(usize, usize) -> usize,
-) {
+    mut halve: impl FnMut(usize, usize) -> Point2<f64>,
+) -> Refined {
+    turn_sides(&mut triangles, places);
+    // Sides found short need no second look.
+    let mut short: HashSet<[usize; 2]> = HashSet::new();
     for _ in 0..MAX_ROUNDS {
         let mut uses: HashMap<[usize; 2], usize> = HashMap::new();
         for [a, b] in triangles.iter().flat_map(|&triangle| sides(triangle)) {
             *uses.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
-        let mut middles: Vec<([usize; 2], usize)> = Vec::new();
-        let mut long: Vec<[usize; 2]> =
-            uses.into_iter().filter(|(_, uses)| *uses == 2).map(|(side, _)| side).collect();
-        long.sort_unstable();
-        for [a, b] in long {
+        let shared = uses.into_iter().filter(|(side, uses)| *uses == 2 && !short.contains(side));
+        let mut shared: Vec<[usize; 2]> = shared.map(|(side, _)| side).collect();
+        shared.sort_unstable();
+        let mut middles: HashMap<[usize; 2], usize> = HashMap::new();
+        for [a, b] in shared {
             if is_long(a, b) {
-                middles.push(([a, b], halve(a, b)));
+                middles.insert([a, b], places.len());
+                places.push(halve(a, b));
+            } else {
+                short.insert([a, b]);
             }
         }
         if middles.is_empty() {
-            return;
+            return Refined { triangles, is_coarse: false };
         }
-        let middles: HashMap<[usize; 2], usize> = middles.into_iter().collect();
-        let parts = triangles.iter().flat_map(|&triangle| halved(triangle, &middles));
-        *triangles = parts.collect();
+        triangles = triangles.iter().flat_map(|&triangle| halved(triangle, &middles)).collect();
+        turn_sides(&mut triangles, places);
+        if triangles.len() > most {
+            break;
+        }
     }
+    Refined { triangles, is_coarse: true }
 }
 
 /// The greatest number of rounds of halving.
-const MAX_ROUNDS: usize = 12;
+const MAX_ROUNDS: usize = 30;
+/// The greatest number of sides turned, per triangle.
+const MOST_TURNS: usize = 30;
+
+/// Turns sides that two triangles share to the other diagonal of both, where that is Delaunay.
+///
+/// Triangles that lie upside down stay, and so do sides beside them. Each turn lowers the
+/// triangles lifted to a paraboloid, so that turning ends.
+fn turn_sides(triangles: &mut [[usize; 3]], places: &[Point2<f64>]) {
+    let key = |a: usize, b: usize| [a.min(b), a.max(b)];
+    let mut beside: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
+    for (number, &triangle) in triangles.iter().enumerate() {
+        for [a, b] in sides(triangle) {
+            beside.entry(key(a, b)).or_default().push(number);
+        }
+    }
+    let mut stack: Vec<[usize; 2]> = beside.keys().copied().collect();
+    stack.sort_unstable();
+    let mut left = MOST_TURNS * triangles.len();
+    while let Some([a, b]) = stack.pop() {
+        let Some(&[one, other]) = beside.get(&[a, b]).map(Vec::as_slice) else { continue };
+        let Some((a, b, c, d)) = quad(triangles[one], triangles[other], [a, b]) else { continue };
+        if left == 0 || beside.get(&key(c, d)).is_some_and(|uses| !uses.is_empty()) {
+            continue;
+        }
+        if !is_turned_better([a, b, c, d].map(|k| places[k])) {
+            continue;
+        }
+        left -= 1;
+        // a, b, c and b, a, d become a, d, c and d, b, c.
+        triangles[one] = [a, d, c];
+        triangles[other] = [d, b, c];
+        beside.remove(&key(a, b));
+        beside.insert(key(c, d), vec![one, other]);
+        for (side, from, to) in [(key(a, d), other, one), (key(b, c), one, other)] {
+            let uses = beside.entry(side).or_default();
+            uses.iter_mut().filter(|number| **number == from).for_each(|number| *number = to);
+        }
+        stack.extend([key(a, d), key(d, b), key(b, c), key(c, a)]);
+    }
+}
+
+/// Returns the ends of a side as the first triangle follows it, and the corner opposite to it of
+/// each triangle; `None` if both follow it the same way.
+fn quad(
+    one: [usize; 3],
+    other: [usize; 3],
+    side: [usize; 2],
+) -> Option<(usize, usize, usize, usize)> {
+    let along = |triangle: [usize; 3]| {
+        let is_side = |[a, b]: &[usize; 2]| side == [*a.min(b), *a.max(b)];
+        let [a, b] = sides(triangle).into_iter().find(is_side)?;
+        let far = triangle.into_iter().find(|k| *k != a && *k != b)?;
+        Some((a, b, far))
+    };
+    let ((a, b, c), (e, f, d)) = (along(one)?, along(other)?);
+    (a == f && b == e && c != d).then_some((a, b, c, d))
+}
+
+/// Returns whether a quadrilateral a, d, b, c, cut from a to b, should be cut from c to d.
+fn is_turned_better([a, b, c, d]: [Point2<f64>; 4]) -> bool {
+    let areas = [doubled(a, b, c), doubled(b, a, d), doubled(a, d, c), doubled(d, b, c)];
+    if areas.iter().any(|area| *area <= 0.0) {
+        return false;
+    }
+    // d lies within the circle through a, b and c if the angles at c and d exceed a half turn.
+    let angle = |p: Point2<f64>| {
+        let (u, v) = ((a.x - p.x, a.y - p.y), (b.x - p.x, b.y - p.y));
+        ((u.0 * v.1 - u.1 * v.0).abs(), u.0 * v.0 + u.1 * v.1)
+    };
+    let ((sin_c, cos_c), (sin_d, cos_d)) = (angle(c), angle(d));
+    let scale = (sin_c.hypot(cos_c)) * (sin_d.hypot(cos_d));
+    sin_c * cos_d + cos_c * sin_d < -1e-12 * scale
+}
 
 fn sides([a, b, c]: [usize; 3]) -> [[usize; 2]; 3] {
     [[a, b], [b, c], [c, a]]
@@ -210,20 +312,35 @@ mod tests {
     fn a_crossed_ring_keeps_all_its_sides() {
         // The last corner lies a little beyond the first side.
         let crossed = ring(&[[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, -0.001], [0.0, 2.0]], 0);
-        let mut triangles = ears(crossed, Vec::new());
+        let mut places: Vec<_> = crossed.iter().map(|corner| corner.at).collect();
+        let triangles = ears(crossed, Vec::new());
         assert_eq!(triangles.len(), 3);
         let sides = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]];
         assert_eq!(border(&triangles), sides);
-        let mut count = 5;
-        refine(
-            &mut triangles,
-            |_, b| b < 5,
-            |_, _| {
-                count += 1;
-                count - 1
-            },
-        );
+        let at = places.clone();
+        let half = |a: usize, b: usize| {
+            Point2::new((at[a].x + at[b].x) / 2.0, (at[a].y + at[b].y) / 2.0)
+        };
+        let refined = refine(triangles, &mut places, 1000, |a, b| a.max(b) < 5, half);
+        assert!(!refined.is_coarse);
+        let triangles = refined.triangles;
         assert!(triangles.len() > 3);
         assert_eq!(border(&triangles), sides);
+    }
+
+    #[test]
+    fn sides_follow_a_strip() {
+        // A strip of 1 by 100, whose ears span all of it.
+        let low = (0..=100).map(|k| [f64::from(k), 0.0]);
+        let high = (0..=100).rev().map(|k| [f64::from(k), 1.0]);
+        let strip = ring(&low.chain(high).collect::<Vec<_>>(), 0);
+        let mut places: Vec<_> = strip.iter().map(|corner| corner.at).collect();
+        let triangles = ears(strip, Vec::new());
+        let none = |_, _| unreachable!("nothing is long");
+        let refined = refine(triangles, &mut places, 1000, |_, _| false, none);
+        for [a, b] in refined.triangles.iter().flat_map(|&triangle| sides(triangle)) {
+            assert!((places[a].x - places[b].x).abs() <= 1.0, "{a} {b}");
+        }
+        assert_eq!(border(&refined.triangles).len(), 202);
     }
 }

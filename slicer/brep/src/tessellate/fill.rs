@@ -4,6 +4,7 @@
 //! about equally along both. Edges along the polygons stay; others are halved until the
 //! triangles are within the chord of the surface.
 
+use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
@@ -26,6 +27,9 @@ const MOST_CROSSED: usize = 5_000;
 const MAX_ROUNDS: usize = 40;
 /// The greatest number of corners that halving may add: per cell, and regardless of cells.
 const MORE: [usize; 2] = [4, 20_000];
+
+/// The length below which sides are not halved, in cells.
+const LEAST_CELLS: f64 = 1e-3;
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
 
@@ -51,7 +55,7 @@ pub(super) fn fill(
         borders: HashMap::new(),
     };
     if let Err(Fault::Crossing) = work.add_borders(polygons) {
-        return crossed(&work, polygons, points).map(|triangles| (triangles, None));
+        return crossed(&work, polygons, points);
     }
     work.add_grid(polygons)?;
     let coarse = work.refine(points)?;
@@ -64,7 +68,7 @@ fn crossed(
     work: &FaceTriangulation,
     polygons: &[Vec<Node>],
     points: &mut FacePoints,
-) -> Result<Vec<[Node; 3]>, Fault> {
+) -> Result<Filled, Fault> {
     let (surface, chord_mm) = (work.surface, work.chord_mm);
     let mut nodes: Vec<Node> = Vec::new();
     let mut rings = Vec::new();
@@ -90,29 +94,41 @@ fn crossed(
     }
     let off = |node: &Node| distance(points.get(node.point), surface.point(node.uv));
     let off_mm = nodes.iter().map(off).fold(chord_mm, f64::max);
-    let mut triangles = ears(outer, rings);
+    let triangles = ears(outer, rings);
     let (turned, around) =
         (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
     if turned > off_mm * around {
         return Err(Fault::Crossing);
     }
-    let nodes = std::cell::RefCell::new(nodes);
+    let most = triangles.len() + MORE[0] * work.cells() + MORE[1];
+    let mut places = nodes.iter().map(|node| work.scale.place(node.uv)).collect();
+    let nodes = RefCell::new(nodes);
     let half = |a: usize, b: usize| {
         let nodes = nodes.borrow();
         [0, 1].map(|k| (nodes[a].uv[k] + nodes[b].uv[k]) / 2.0)
     };
-    let is_long = |a: usize, b: usize| {
-        let ends = [a, b].map(|k| surface.point(nodes.borrow()[k].uv));
-        distance(surface.point(half(a, b)), middle(ends[0], ends[1])) > chord_mm
+    let apart = |a: usize, b: usize| {
+        let ends = [a, b].map(|k| nodes.borrow()[k].uv);
+        let [p, q] = ends.map(|uv| work.scale.place(uv));
+        let is_short = (p.x - q.x).hypot(p.y - q.y) < LEAST_CELLS;
+        let [p, q] = ends.map(|uv| surface.point(uv));
+        if is_short { 0.0 } else { distance(surface.point(half(a, b)), middle(p, q)) }
     };
-    refine(&mut triangles, is_long, |a, b| {
+    let is_long = |a: usize, b: usize| apart(a, b) > chord_mm;
+    let refined = refine(triangles, &mut places, most, is_long, |a, b| {
         let uv = half(a, b);
         let node = Node { uv, point: points.push(surface.point(uv)) };
         nodes.borrow_mut().push(node);
-        nodes.borrow().len() - 1
+        work.scale.place(uv)
     });
+    let worst_mm = match refined.is_coarse {
+        true => refined.sides().map(|[a, b]| apart(a, b)).fold(0.0, f64::max),
+        false => 0.0,
+    };
+    let coarse = (worst_mm > 4.0 * chord_mm).then_some(Fault::Coarse { off_mm: worst_mm });
     let nodes = nodes.into_inner();
-    Ok(triangles.into_iter().map(|triangle| triangle.map(|k| nodes[k])).collect())
+    let corners = refined.triangles.into_iter().map(|triangle| triangle.map(|k| nodes[k]));
+    Ok((corners.collect(), coarse))
 }
 
 fn ring_area(ring: &[Corner]) -> f64 {
@@ -170,6 +186,10 @@ fn ordered(a: FixedVertexHandle, b: FixedVertexHandle) -> [FixedVertexHandle; 2]
 }
 
 impl FaceTriangulation<'_> {
+    fn cells(&self) -> usize {
+        (self.scale.count[0] * self.scale.count[1]) as usize
+    }
+
     fn add_borders(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
         let mut rings = Vec::new();
         for polygon in polygons {
@@ -247,8 +267,7 @@ impl FaceTriangulation<'_> {
             }
         }
         let mut worst = 0.0;
-        let cells = (self.scale.count[0] * self.scale.count[1]) as usize;
-        let most = self.corners.len() + MORE[0] * cells + MORE[1];
+        let most = self.corners.len() + MORE[0] * self.cells() + MORE[1];
         let mut near = HashSet::new();
         for _ in 0..MAX_ROUNDS {
             let (list, off) = self.too_far(&mut near);
@@ -303,7 +322,7 @@ impl FaceTriangulation<'_> {
                 let half = Point2::new((p.x + q.x) / 2.0, (p.y + q.y) / 2.0);
                 let [at, bt] = [a, b].map(|v| self.corners[v.index()].place);
                 let apart = off(half, at, bt);
-                let is_short = (p.x - q.x).hypot(p.y - q.y) < 1e-3;
+                let is_short = (p.x - q.x).hypot(p.y - q.y) < LEAST_CELLS;
                 if apart > self.chord_mm && !is_short {
                     worst = worst.max(apart);
                     is_split = true;
