@@ -4,10 +4,13 @@ use std::f64::consts::TAU;
 
 use super::curve::Curve;
 use super::surface::{SAME_MM, Surface, TorusPart};
+use crate::kernel::Jet;
 use crate::vector::{Vec3, distance, dot, length, sub};
 
 /// The number of starts from which the nearest point is searched.
 const MOST_SEEDS: usize = 6;
+/// How far seeds at a pole move towards the middle of the surface.
+const OFF_POLE: f64 = 1e-3;
 
 impl Surface {
     /// Returns the parameters from which to search for the point nearest to `p`.
@@ -95,13 +98,14 @@ impl Surface {
 
     fn search(&self, p: Vec3, hint: Option<[f64; 2]>, off_mm: f64) -> [f64; 2] {
         let near = hint.map(|hint| self.nearer(p, hint));
+        // From a pole the search leaves along one line alone, which may lead away from the point.
         if let Some((apart, uv)) = near
             && apart < off_mm
+            && (apart < SAME_MM || self.arbitrary(&self.at(uv)).is_none())
         {
             return uv;
         }
-        let mut seeds: Vec<_> =
-            self.seeds(p).into_iter().map(|uv| (distance(self.point(uv), p), uv)).collect();
+        let mut seeds: Vec<_> = self.seeds(p).into_iter().map(|uv| self.seed(p, uv)).collect();
         if seeds.len() > MOST_SEEDS {
             seeds.select_nth_unstable_by(MOST_SEEDS, |a, b| a.0.total_cmp(&b.0));
             seeds.truncate(MOST_SEEDS);
@@ -111,6 +115,25 @@ impl Surface {
         // In near ties the hint wins.
         let better = |a: (f64, [f64; 2]), b: (f64, [f64; 2])| if b.0 < a.0 * 0.99 { b } else { a };
         near.into_iter().chain(found).reduce(better).map_or([0.0; 2], |(_, uv)| uv)
+    }
+
+    /// Returns the parameter that is arbitrary at a pole.
+    fn arbitrary(&self, jet: &Jet) -> Option<usize> {
+        let spans = self.domain().map(|side| side.map_or(1.0, |[low, high]| high - low));
+        let slopes = [length(jet.du) * spans[0], length(jet.dv) * spans[1]];
+        slopes.iter().position(|slope| *slope < SAME_MM)
+    }
+
+    /// Returns the distance of a seed from `p`. Seeds at a pole move off it a little: there they
+    /// are all as near, and only some lead to the point.
+    fn seed(&self, p: Vec3, mut uv: [f64; 2]) -> (f64, [f64; 2]) {
+        let jet = self.at(uv);
+        let Some(axis) = self.arbitrary(&jet) else { return (distance(jet.point, p), uv) };
+        let across = 1 - axis;
+        if let Some([low, high]) = self.domain()[across] {
+            uv[across] += OFF_POLE * ((low + high) / 2.0 - uv[across]);
+        }
+        (distance(self.point(uv), p), uv)
     }
 
     /// Searches for the foot of `p` by Gauss-Newton, and returns its distance and

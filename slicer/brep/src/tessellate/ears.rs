@@ -318,9 +318,8 @@ mod tests {
         let sides = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]];
         assert_eq!(border(&triangles), sides);
         let at = places.clone();
-        let half = |a: usize, b: usize| {
-            Point2::new((at[a].x + at[b].x) / 2.0, (at[a].y + at[b].y) / 2.0)
-        };
+        let half =
+            |a: usize, b: usize| Point2::new((at[a].x + at[b].x) / 2.0, (at[a].y + at[b].y) / 2.0);
         let refined = refine(triangles, &mut places, 1000, |a, b| a.max(b) < 5, half);
         assert!(!refined.is_coarse);
         let triangles = refined.triangles;

@@ -35,6 +35,9 @@ struct Node {
 /// The clearance of an edge's inner points from its vertices, as a multiple of the
 /// distance between a vertex and the curve's end.
 const CLEAR: f64 = 4.0;
+/// The least clearance of an edge's inner points from its vertices, in millimetres: where a
+/// surface ends in a point, loops must not pass that point twice.
+const CLEAR_MM: f64 = 2.0 * unwrap::AT_POLE_MM;
 /// The greatest number of facets, which take about 5 GB of memory.
 pub const MAX_FACETS: usize = 50_000_000;
 /// The greatest number of cells of all faces, with one to three facets each.
@@ -91,14 +94,54 @@ struct FacePatch {
 }
 
 /// Tessellates all faces of a model.
+///
+/// The edges of faces whose loops cross get more points if that lets them cross no more: chords
+/// of edges that run beside each other may cross where the edges do not.
 pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
     }
+    let mesh = with_chords(model, chord_mm, &vec![chord_mm; model.edges.len()])?;
+    let crossing = crossing(&mesh);
+    if crossing.is_empty() {
+        return Ok(mesh);
+    }
+    let mut chords = vec![chord_mm; model.edges.len()];
+    for (edge, _) in crossing.iter().flat_map(|&face| edges_of(&model.faces[face])) {
+        chords[*edge] = FINER * chord_mm;
+    }
+    match with_chords(model, chord_mm, &chords) {
+        Ok(finer) if self::crossing(&finer).len() < crossing.len() => Ok(finer),
+        _ => Ok(mesh),
+    }
+}
+
+/// The chord of edges of faces whose loops cross, as a part of the others'.
+const FINER: f64 = 1.0 / 16.0;
+
+/// Returns the faces whose loops cross.
+fn crossing(mesh: &Tessellation) -> Vec<usize> {
+    let findings = mesh.findings.iter().filter(|it| matches!(it.fault, Fault::Crossing));
+    findings.map(|finding| finding.face as usize).collect()
+}
+
+fn edges_of(face: &Face) -> impl Iterator<Item = &(usize, bool)> {
+    face.loops.iter().flat_map(|around| match around {
+        Loop::Edges(edges) => edges.as_slice(),
+        Loop::Vertex(_) => &[],
+    })
+}
+
+/// Tessellates all faces of a model, with a chord for each edge.
+fn with_chords(
+    model: &BrepModel,
+    chord_mm: f64,
+    chords_mm: &[f64],
+) -> Result<Tessellation, BrepError> {
     let mut points = model.vertices.clone();
     let mut chains = Vec::with_capacity(model.edges.len());
-    for edge in &model.edges {
-        chains.push(chain(edge, model, chord_mm, &mut points));
+    for (edge, chord_mm) in model.edges.iter().zip(chords_mm) {
+        chains.push(chain(edge, model, *chord_mm, &mut points));
         if points.len() > MAX_POINTS {
             return Err(BrepError::TooMany { most: MAX_POINTS });
         }
@@ -151,7 +194,9 @@ fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec
     let first = points.len() as u32;
     // The vertices replace the curve's ends, so that all edges of a vertex meet. If a
     // vertex lies off the curve, a point close to it would make the chain double back.
-    let off = |vertex: usize, end: usize| CLEAR * distance(model.vertices[vertex], line[end]);
+    let off = |vertex: usize, end: usize| {
+        f64::max(CLEAR_MM, CLEAR * distance(model.vertices[vertex], line[end]))
+    };
     let (off_start, off_end) = (off(start, 0), off(end, line.len() - 1));
     let is_clear = |p: &&Vec3| {
         distance(**p, line[0]) >= off_start && distance(**p, line[line.len() - 1]) >= off_end

@@ -17,7 +17,7 @@ pub(super) struct Unwrapped {
 }
 
 /// The distance within which a point counts as at a pole, in millimetres.
-const AT_POLE_MM: f64 = 1e-5;
+pub(super) const AT_POLE_MM: f64 = 1e-5;
 /// The number of corners that stand for a pole, per full turn around it.
 const POLE_PARTS: f64 = 16.0;
 
@@ -40,9 +40,14 @@ pub(super) fn unwrap(
     let order = ring[start..].iter().chain(&ring[..start]).copied();
     let mut nodes: Vec<Node> = Vec::with_capacity(ring.len() + 1);
     let mut waiting: Option<(&Pole, u32)> = None;
+    // Points that share the pole with the one before them.
+    let mut others = Vec::new();
     for point in order.chain([ring[start]]) {
         if let Some(pole) = pole_at(point) {
-            waiting = Some((pole, point));
+            match waiting {
+                Some((_, tip)) if tip != point => others.push(point),
+                _ => waiting = Some((pole, point)),
+            }
             continue;
         }
         let before = nodes.last().map(|node| node.uv);
@@ -53,6 +58,8 @@ pub(super) fn unwrap(
             }
             if let Some((pole, tip)) = waiting.take() {
                 uv = around_pole(face, pole, tip, before, uv, &mut nodes);
+                let at = nodes.last().map_or(uv, |node| node.uv);
+                nodes.extend(others.drain(..).map(|point| Node { uv: at, point }));
             }
         }
         nodes.push(Node { uv, point });
