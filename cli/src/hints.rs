@@ -372,7 +372,9 @@ fn machine_limit(error: &MachineLimit) -> Option<String> {
 
 fn no_solid(error: &NoSolid) -> String {
     let hint = match error {
-        NoSolid::Crossed { .. } => "lamp mesh check --self-intersections lists the facets",
+        NoSolid::Crossed { .. } | NoSolid::Wound { .. } => {
+            "lamp mesh check --self-intersections lists the facets"
+        }
         _ => "lamp mesh check names the facets, and lamp mesh repair mends what it can",
     };
     hint.to_owned()

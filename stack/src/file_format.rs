@@ -466,7 +466,10 @@ mod tests {
             ("\u{feff}solid a facet", PartFormat::AsciiStl),
             ("solid facet\0\0\x1a", PartFormat::AsciiStl),
             ("ISO-10303-21;", PartFormat::Step),
-            ("ISO-10303-21;\nHEADER;\nFILE_NAME('', '', (''), (''), 'ACIS Interop'", PartFormat::Step),
+            (
+                "ISO-10303-21;\nHEADER;\nFILE_NAME('', '', (''), (''), 'ACIS Interop'",
+                PartFormat::Step,
+            ),
             ("solid by ACIS 7\nfacet normal", PartFormat::AsciiStl),
             ("\u{feff} \r\n/* a */\n/* b\n*/ ISO-10303-21;\nHEADER;", PartFormat::Step),
             ("v 0 0 0", PartFormat::Obj),

@@ -4,7 +4,9 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use lamp_brep::{BodyReport, Facet, Kernel, StepModel, Tessellation, check};
-use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, blade_volume_mm3, step};
+use lamp_fixtures::{
+    StepSample, StepUnit, blade_area_mm2, blade_volume_mm3, step, step_behind_tip, step_thin_tube,
+};
 
 fn read(part: StepSample, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
     let model = StepModel::read(step(part, unit).as_bytes()).unwrap();
@@ -107,6 +109,30 @@ fn parts_of_a_torus_that_meets_itself_are_told_apart() {
             // The lemon is small for its bends.
             assert!(off.abs() < 10.0 * patched(chord_mm), "{part:?} {chord_mm}: exact {off}");
         }
+    }
+}
+
+#[test]
+fn a_cone_behind_its_tip_holds_what_the_one_before_it_does() {
+    let frustum = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
+    for (kernel, mesh) in kernels(&step_behind_tip(), 0.01) {
+        let [report] = &check(&*kernel, &mesh)[..] else { panic!("one body") };
+        assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{report:?}");
+        assert!((report.volume_mm3 / frustum - 1.0).abs() < 1e-3, "{report:?}");
+        assert!((report.exact_volume_mm3 / frustum - 1.0).abs() < 1e-4, "{report:?}");
+    }
+}
+
+#[test]
+fn a_wall_thinner_than_the_chord_keeps_its_sides_apart() {
+    // Chords of the outer circle cross the inner one, unless its edges get more points.
+    for (wall_mm, chord_mm) in [(0.02, 0.05), (0.05, 0.2), (0.01, 0.01), (0.01, 0.001)] {
+        let model = StepModel::read(step_thin_tube(wall_mm).as_bytes()).unwrap();
+        let mesh = model.tessellate(chord_mm).unwrap();
+        let [report] = &check(&model, &mesh)[..] else { panic!("one body") };
+        assert!(report.faults.is_empty(), "{wall_mm} {chord_mm}: {:?}", report.faults);
+        let off = report.exact_volume_mm3 / (PI * 64.0 * 5.0) - 1.0;
+        assert!(off.abs() < 1e-3, "{wall_mm} {chord_mm}: {off}");
     }
 }
 

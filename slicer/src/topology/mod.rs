@@ -50,6 +50,7 @@ mod step;
 #[cfg(test)]
 mod testing;
 mod weld;
+mod winding;
 
 pub use check::MeshCheck;
 pub use corner_table::{CornerTable, facet_of, next, previous};

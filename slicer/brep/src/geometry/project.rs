@@ -180,3 +180,45 @@ impl Surface {
         best
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::spline::{Knots, weighted};
+    use crate::geometry::spline_surface::SplineSurface;
+
+    /// Returns an eighth of a sphere of radius 5 mm as a rational surface with three sides: all of
+    /// v = 1 is its pole.
+    fn eighth() -> Surface {
+        let knots = || Knots::new(2, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], 3).unwrap();
+        let w = std::f64::consts::FRAC_1_SQRT_2;
+        let arc = [([1.0, 0.0], 1.0), ([1.0, 1.0], w), ([0.0, 1.0], 1.0)];
+        let control = |k: usize| {
+            let ([x, y], wu) = arc[k / 3];
+            let ([out, up], wv) = arc[k % 3];
+            weighted([5.0 * out * x, 5.0 * out * y, 5.0 * up], wu * wv)
+        };
+        let surface = SplineSurface::new(knots(), knots(), (0..9).map(control).collect());
+        Surface::Spline(Box::new(surface.unwrap()))
+    }
+
+    #[test]
+    fn points_beside_a_pole_find_their_feet() {
+        let surface = eighth();
+        for turn in [0.1_f64, 0.4, 0.8, 1.2, 1.5] {
+            for tilt in [0.0005_f64, 0.02, 0.05] {
+                for radius in [5.0, 4.95, 5.05] {
+                    let out = radius * tilt.sin();
+                    let p = [out * turn.cos(), out * turn.sin(), radius * tilt.cos()];
+                    // From nowhere, and from the pole itself, where the search is stuck.
+                    for hint in [None, Some([0.9, 1.0]), Some([0.0, 1.0])] {
+                        let foot = surface.project_near(p, hint, 0.25);
+                        let apart = distance(surface.point(foot), p);
+                        let most = (radius - 5.0).abs() + 1e-6;
+                        assert!(apart < most, "{turn} {tilt} {radius} {hint:?}: {apart}");
+                    }
+                }
+            }
+        }
+    }
+}

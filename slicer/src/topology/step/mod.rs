@@ -5,6 +5,7 @@ mod entities;
 mod flat_faces;
 mod outline;
 
+use std::cell::RefCell;
 use std::io::{self, Write};
 
 use lamp_brep::vector::{Vec3, add, cross, sub, unit};
@@ -13,6 +14,7 @@ use thiserror::Error;
 
 use crate::topology::crossings::deepest;
 use crate::topology::slivers::without_slivers;
+use crate::topology::winding::wound_twice;
 use crate::topology::{CornerTable, Crossings, Lump, MeshCheck, Shells};
 use decimals::{meant, unit_mm};
 use entities::{EntityWriter, text};
@@ -63,6 +65,19 @@ pub enum NoSolid {
         at_mm: [f64; 3],
         /// How deep, in millimetres.
         depth_mm: f64,
+    },
+    /// Its surface passes through itself along edges.
+    #[error(
+        "the surface passes through itself along edges of facets: beside facet {facet}, at \
+         ({:.3}, {:.3}, {:.3}) mm, it encloses the same place twice; mend the part where it was \
+         made, or slice the mesh itself",
+        at_mm[0], at_mm[1], at_mm[2]
+    )]
+    Wound {
+        /// The facet.
+        facet: u32,
+        /// The place, in millimetres.
+        at_mm: [f64; 3],
     },
 }
 
@@ -245,15 +260,34 @@ fn check_apart(table: &CornerTable, shells: &Shells, lumps: &[Lump]) -> Result<(
     }
     let greatest = table.points().iter().flatten().fold(0.0, |most, c| f64::max(most, c.abs()));
     let lump = |facet: u32| lump_of[shells.of(facet) as usize];
+    // The facets that cross by no more than rounding.
+    let shallow = RefCell::new(Vec::new());
     let found = Crossings::of_pairs(table, PAIRS, |a, b| {
-        lump(a) == lump(b) && deepest(table, a, b).1 > ROUNDED * greatest
+        let is_deep = deepest(table, a, b).1 > ROUNDED * greatest;
+        if lump(a) == lump(b) && !is_deep {
+            shallow.borrow_mut().extend([a, b]);
+        }
+        lump(a) == lump(b) && is_deep
     });
     let depth = |pair: &[u32; 2]| (deepest(table, pair[0], pair[1]), *pair);
     let worst = found.pairs.iter().map(depth).max_by(|a, b| a.0.1.total_cmp(&b.0.1));
-    worst.map_or(Ok(()), |((at_mm, depth_mm), facets)| {
-        Err(NoSolid::Crossed { pairs: found.count, facets, at_mm, depth_mm })
-    })
+    if let Some(((at_mm, depth_mm), facets)) = worst {
+        return Err(NoSolid::Crossed { pairs: found.count, facets, at_mm, depth_mm });
+    }
+    // Where edges meet edges exactly, no pair of facets is deep, but the surface may be.
+    let mut shallow = shallow.into_inner();
+    shallow.sort_unstable();
+    shallow.dedup();
+    let beside_mm = BESIDE * greatest;
+    match wound_twice(table, &shallow, beside_mm, |a, b| lump(a) == lump(b)) {
+        Some((facet, at_mm)) => Err(NoSolid::Wound { facet, at_mm }),
+        None => Ok(()),
+    }
 }
+
+/// How far beside facets the solid is looked for, as a share of the greatest coordinate: further
+/// than rounding lets facets cross.
+const BESIDE: f64 = 10.0 * ROUNDED;
 
 /// Returns the unit normal of facets in one plane.
 fn normal(table: &CornerTable, facets: &[u32]) -> Vec3 {

@@ -300,6 +300,47 @@ fn a_surface_through_itself_is_refused_and_solids_through_each_other_are_not() {
     assert!(StepSolids::new(table_of(&[cube, cavity].concat())).is_err());
 }
 
+/// Returns a block of 4 by 4 by 4 of a grid of unit cells, with a pit in one of them down to a
+/// height. The pit's walls have no vertices between.
+fn pitted(low: f32) -> Vec<Facet> {
+    let quad = |[a, b, c, d]: [[f32; 3]; 4]| [[a, b, c], [a, c, d]];
+    let floor = |x: f32, y: f32, z: f32| {
+        quad([[x, y, z], [x + 1.0, y, z], [x + 1.0, y + 1.0, z], [x, y + 1.0, z]])
+    };
+    let wall = |[a, b]: [[f32; 2]; 2], [low, high]: [f32; 2]| {
+        quad([[a[0], a[1], low], [b[0], b[1], low], [b[0], b[1], high], [a[0], a[1], high]])
+    };
+    let mut facets = Vec::new();
+    for (x, y) in (0..16).map(|k| ((k % 4) as f32, (k / 4) as f32)) {
+        facets.extend(floor(x, y, if (x, y) == (1.0, 1.0) { low } else { 4.0 }));
+        facets.extend(turned(&floor(x, y, 0.0)));
+    }
+    for k in [0.0, 1.0, 2.0, 3.0f32] {
+        let (from, to) = (4.0 - k, 3.0 - k);
+        let sides = [
+            [[k, 0.0], [k + 1.0, 0.0]],
+            [[4.0, k], [4.0, k + 1.0]],
+            [[from, 4.0], [to, 4.0]],
+            [[0.0, from], [0.0, to]],
+        ];
+        facets.extend(sides.into_iter().flat_map(|side| wall(side, [0.0, 4.0])));
+    }
+    let around = [[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]];
+    facets.extend(around.windows(2).flat_map(|side| wall([side[0], side[1]], [low, 4.0])));
+    facets
+}
+
+#[test]
+fn a_surface_through_itself_exactly_along_edges_is_refused() {
+    assert!(StepSolids::new(table_of(&pitted(1.0))).is_ok());
+    for low in [-1.0, -0.01] {
+        let found = StepSolids::new(table_of(&pitted(low))).unwrap_err();
+        let NoSolid::Wound { at_mm: [x, y, z], .. } = found else { panic!("{found}") };
+        // In the cell of the pit, at the floor or below.
+        assert!((1.0..2.0).contains(&x) && (1.0..2.0).contains(&y) && z < 0.1, "{x} {y} {z}");
+    }
+}
+
 #[test]
 fn numbers_and_texts_are_those_of_step() {
     let real = |number: f64| entities::Real(number).to_string();
