@@ -168,8 +168,16 @@ fn faults(
     if facets.is_empty() {
         return vec![BodyFault::Empty];
     }
+    let faces = facets[0].face..=facets[facets.len() - 1].face;
+    let horn = faces.map(|face| kernel.face(face)).find(|face| face.kind == HORN_TORUS);
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
-    faults.extend(off(kernel, mesh, facets, report));
+    // Loops whose side cannot be told give facets that are anywhere.
+    faults.extend(off(kernel, mesh, facets, report).map(|off| match (&horn, &off) {
+        (Some(face), BodyFault::Off { entity, what: FACETS, .. }) if face.entity == *entity => {
+            BodyFault::Horn { entity: *entity }
+        }
+        _ => off,
+    }));
     faults.extend(outside(kernel, mesh, facets));
     if let Some(fault) = apart(report, mesh.chord_mm) {
         faults.push(fault);
@@ -180,8 +188,6 @@ fn faults(
     }
     if faults.is_empty() {
         let crossed = crossed(kernel, mesh, facets);
-        let faces = facets[0].face..=facets[facets.len() - 1].face;
-        let horn = faces.map(|face| kernel.face(face)).find(|face| face.kind == HORN_TORUS);
         faults.extend(crossed.map(|crossed| match horn {
             Some(face) => BodyFault::Horn { entity: face.entity },
             None => crossed,
@@ -258,7 +264,7 @@ fn off(
             (off_mm > most_mm).then_some((finding, "edges", off_mm))
         }
         Fault::Coarse { off_mm } => {
-            (off_mm > f64::max(4.0 * mesh.chord_mm, most_mm)).then_some((finding, "facets", off_mm))
+            (off_mm > f64::max(4.0 * mesh.chord_mm, most_mm)).then_some((finding, FACETS, off_mm))
         }
         _ => None,
     });
@@ -277,6 +283,9 @@ fn off(
     let worst = off.iter().filter(|off| !is_local(off)).max_by(|a, b| a.2.total_cmp(&b.2));
     worst.map(|&(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
 }
+
+/// What lies off where it is not edges.
+const FACETS: &str = "facets";
 
 /// How far edges and facets may lie off their surface, as a part of the body's longest side.
 pub(crate) const MOST_OFF: f64 = 1e-3;

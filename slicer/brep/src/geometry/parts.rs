@@ -1,6 +1,6 @@
 //! Chooses the part of a surface that crosses itself on which a face lies.
 
-use super::surface::{Surface, TorusPart};
+use super::surface::{SAME_MM, Surface, TorusPart};
 use crate::vector::{Vec3, distance};
 
 /// How much nearer the points of a face must be to the other part.
@@ -19,7 +19,8 @@ impl Surface {
             let apart = |p: &Vec3| distance(surface.point(surface.project(*p, None)), *p);
             points.iter().map(apart).fold(0.0, f64::max)
         };
-        if off(&other) < CLEARLY_NEARER * off(&self) { other } else { self }
+        let off_mm = off(&self);
+        if off_mm > SAME_MM && off(&other) < CLEARLY_NEARER * off_mm { other } else { self }
     }
 
     /// Returns the other part of a surface that crosses itself.

@@ -203,10 +203,8 @@ fn turn_sides(triangles: &mut [[usize; 3]], places: &[Point2<f64>]) {
     while let Some([a, b]) = stack.pop() {
         let Some(&[one, other]) = beside.get(&[a, b]).map(Vec::as_slice) else { continue };
         let Some((a, b, c, d)) = quad(triangles[one], triangles[other], [a, b]) else { continue };
-        if left == 0 || beside.get(&key(c, d)).is_some_and(|uses| !uses.is_empty()) {
-            continue;
-        }
-        if !is_turned_better([a, b, c, d].map(|k| places[k])) {
+        let is_new = !beside.contains_key(&key(c, d));
+        if left == 0 || !is_new || !is_turned_better([a, b, c, d].map(|k| places[k])) {
             continue;
         }
         left -= 1;
