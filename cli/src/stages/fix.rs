@@ -12,7 +12,7 @@ use crate::fix_report::FixReport;
 use crate::options::one_of_described;
 
 /// Changes when other bytes come from the same options and layers.
-pub(crate) const CODE: u32 = 3;
+pub(crate) const CODE: u32 = 4;
 
 /// How rows are corrected.
 #[derive(Args, Clone)]

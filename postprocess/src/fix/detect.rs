@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use lamp_stack::{Image, Mask, white_in_row};
+use lamp_stack::{Layer, Mask, white_in_row};
 
 use super::FixOptions;
 use super::band::{BandKind, BandKinds};
+use super::beside::Beside;
 use super::combine::{difference, majority, white_in_both};
 use super::contours::{Contours, DEPTH};
 use super::mend::{DROP, mend};
@@ -13,7 +14,8 @@ use super::mend::{DROP, mend};
 /// Pixels from which on a run counts as a sliver, or as wrong for lack of two crossings:
 /// shorter ones may be the part's own.
 const MIN_RUN: u32 = 16;
-/// Rows of the widest band that is searched for contours missed in all its rows.
+/// Rows of the widest band that is searched for contours missed in all its rows, if it is not known
+/// where contours break off.
 const MAX_PAIRED_ROWS: u32 = 30;
 /// Effort after which the search for paired rows ends, as a multiple of the layer's rows and
 /// crossings: no part's section takes more, but noise would take the square.
@@ -29,8 +31,8 @@ pub(super) struct Scene<'a> {
     pub(super) unbalanced: &'a [u32],
     /// The rows at which contours break off, increasing, if that is known.
     pub(super) open_rows: Option<&'a [u32]>,
-    /// The images of the layers below and above, the nearest first.
-    pub(super) neighbours: &'a [Vec<&'a Image>; 2],
+    /// The layers below and above, the nearest first.
+    pub(super) neighbours: &'a [Vec<&'a Layer>; 2],
 }
 
 /// The stray rows of an image.
@@ -96,13 +98,51 @@ impl Scene<'_> {
             }
         }
         if !is_closed {
-            let widest =
-                options.max_width.map_or(MAX_PAIRED_ROWS, |most| most.min(MAX_PAIRED_ROWS));
+            let most = self.open_rows.map_or(MAX_PAIRED_ROWS, |_| self.mask.height());
+            let widest = options.max_width.map_or(most, |width| width.min(most));
+            self.find_shown(&mut strays);
             self.find_pairs(&mut strays, &crossings, widest);
             self.find_slivers(&mut strays, &crossings);
             strays.doubtful.sort_unstable();
         }
         strays.kinds.iter().any(|kinds| !kinds.is_empty()).then_some(strays)
+    }
+
+    /// Finds rows that end black, but lack contours which the layers below and above show. They
+    /// begin where a contour breaks off; a fin whose tip is missing breaks off on one side only.
+    fn find_shown(&self, strays: &mut Strays) {
+        let Some(open_rows) = self.open_rows else { return };
+        let beside = Beside { mask: self.mask, sides: self.neighbours };
+        for &open in open_rows.iter().filter(|&&open| open <= self.mask.height()) {
+            let lacks = |row: &u32| {
+                let near = *row.min(&open)..open.max(row + 1);
+                let shown = strays.is_good(*row).then(|| beside.show(*row, &near))??;
+                Some((shown.missed_pixels()?, shown))
+            };
+            let above: Vec<_> = (0..open).rev().map_while(|row| lacks(&row)).collect();
+            let below: Vec<_> = (open..self.mask.height()).map_while(|row| lacks(&row)).collect();
+            for (mut rows, is_above) in [(above, true), (below, false)] {
+                let band = |count: u32| match is_above {
+                    true => open - count..open,
+                    false => open..open + count,
+                };
+                let all = band(rows.len() as u32);
+                let far = if is_above { all.start } else { all.end };
+                if open_rows.binary_search(&far).is_err() {
+                    let sure = rows.iter().take_while(|(_, shown)| shown.is_sure()).count();
+                    rows.truncate(sure);
+                }
+                // What breaks off here goes on behind the break.
+                let across = if is_above { Some(open) } else { open.checked_sub(1) };
+                let across = across.filter(|&row| row < self.mask.height());
+                let across = across.map_or(&[][..], |row| self.mask.row(row));
+                let breaks_off = rows.first().is_some_and(|(_, shown)| shown.goes_on_in(across));
+                let pixels = rows.iter().map(|(pixels, _)| pixels).sum::<f64>();
+                if breaks_off && pixels >= MIN_RUN.into() {
+                    strays.mark(band(rows.len() as u32), BandKind::Paired, true);
+                }
+            }
+        }
     }
 
     /// Finds rows that lack contours which cross good rows above and below them.
@@ -120,17 +160,23 @@ impl Scene<'_> {
             let Some(above) = nearest.rev().find(|&row| strays.kinds[row].is_empty()) else {
                 continue;
             };
-            let last = crossings.len().min(above + max_width as usize + 2);
-            let below = (row + 1..last)
-                .find(|&below| strays.kinds[below].is_empty() && crossings[below] > crossings[row]);
-            let Some(below) = below.filter(|_| crossings[row] < crossings[above]) else { continue };
-            let band = above as u32 + 1..below as u32;
-            if self.open_rows.is_some_and(|open| !any_in(open, &band)) {
+            if crossings[row] >= crossings[above] {
                 continue;
             }
+            let falls = above as u32 + 1..row as u32;
+            if self.open_rows.is_some_and(|open| !any_in(open, &falls)) {
+                continue;
+            }
+            let last = crossings.len().min(above.saturating_add(max_width as usize + 2));
+            let below = (row + 1..last)
+                .find(|&below| strays.kinds[below].is_empty() && crossings[below] > crossings[row]);
+            let Some(left) = effort.checked_sub(below.unwrap_or(last) - row) else { return };
+            effort = left;
+            let Some(below) = below else { continue };
+            let band = above as u32 + 1..below as u32;
             let rows = band.len() + 2 * DEPTH as usize;
             let cost = crossings[above].max(crossings[below]) as usize * rows;
-            let Some(left) = effort.checked_sub(cost) else { return };
+            let Some(left) = effort.checked_sub(cost) else { continue };
             effort = left;
             self.check_pairs(strays, &band);
         }
@@ -200,8 +246,8 @@ impl Scene<'_> {
         let width = self.mask.width();
         let differ = difference(had, mended);
         let pixels = white_in_row(&differ, width) as f64;
-        self.neighbours.iter().filter_map(|side| side.first()).any(|image| {
-            let as_mended = difference(&image.exposed_row(row), had);
+        self.neighbours.iter().filter_map(|side| side.first()).any(|layer| {
+            let as_mended = difference(&layer.image.exposed_row(row), had);
             let share = white_in_both(&differ, &as_mended, width) as f64 / pixels;
             share <= 1.0 - MIN_AGREEMENT
         })

@@ -10,6 +10,7 @@
 
 mod align;
 mod band;
+mod beside;
 mod combine;
 mod contours;
 mod detect;
@@ -31,6 +32,7 @@ use serde_json::json;
 
 pub use band::{Band, BandKind, BandKinds, BandOutcome};
 
+use beside::Beside;
 use combine::difference;
 use detect::{Scene, Strays};
 use gray_rows::GrayRow;
@@ -187,7 +189,7 @@ fn fix_decoded<E: Send>(
 /// Returns the corrected layer, if anything was corrected, and the bands found.
 fn fix_layer(
     layer: &Layer,
-    neighbours: &[Vec<&Image>; 2],
+    neighbours: &[Vec<&Layer>; 2],
     options: &FixOptions,
 ) -> (Option<Layer>, Vec<Band>) {
     let mut unbalanced = layer.info.stray_rows.clone();
@@ -203,17 +205,18 @@ fn fix_layer(
     let mut bands = Vec::new();
     let mut corrected = Vec::new();
     for rows in strays.bands() {
-        let (band, new_rows) = fix_band(&scene, &strays, &rows, options);
-        // Rows that only looked stray turn out right on a closer look.
-        let is_known =
-            band.kinds.contains(BandKind::EndsWhite) || band.kinds.contains(BandKind::Unbalanced);
-        if band.pixels == 0 && !new_rows.is_empty() && !is_known {
-            continue;
+        for (band, new_rows) in fix_band(&scene, &strays, &rows, options) {
+            // Rows that only looked stray turn out right on a closer look.
+            let is_known = band.kinds.contains(BandKind::EndsWhite)
+                || band.kinds.contains(BandKind::Unbalanced);
+            if band.pixels == 0 && !new_rows.is_empty() && !is_known {
+                continue;
+            }
+            if band.outcome == BandOutcome::Corrected {
+                corrected.push((band.first_row..band.end(), new_rows));
+            }
+            bands.push(band);
         }
-        if band.outcome == BandOutcome::Corrected {
-            corrected.push((rows, new_rows));
-        }
-        bands.push(band);
     }
     if corrected.is_empty() {
         return (None, bands);
@@ -238,20 +241,53 @@ fn page_entry(bands: &[Band], method: FixMethod) -> serde_json::Value {
     json!({"method": method.name(), "bands": bands})
 }
 
-/// Returns what was found in a band, and the rows that it should have, if they are known.
+/// Returns what was found in a band, and the rows that it should have, if they are known. Of a band
+/// that is too uncertain as a whole, the rows that other layers show well are bands of their own.
 fn fix_band(
     scene: &Scene<'_>,
     strays: &Strays,
     band: &Range<u32>,
     options: &FixOptions,
-) -> (Band, Vec<Vec<u32>>) {
-    let mask = scene.mask;
+) -> Vec<(Band, Vec<Vec<u32>>)> {
+    let kinds = kinds_of(scene, strays, band);
+    let correction = correct(scene, strays, band, kinds, options).unwrap_or_default();
+    let is_certain = |confidence: &f64| *confidence >= options.min_confidence;
+    if is_certain(&correction.confidence) || !correction.by_row.iter().any(is_certain) {
+        return vec![decide(scene, strays, band, correction, options)];
+    }
+    let (mut parts, mut start) = (Vec::new(), 0);
+    for part in correction.by_row.chunk_by(|a, b| is_certain(a) == is_certain(b)) {
+        let end = start + part.len();
+        let confidence = part.iter().copied().fold(1.0, f64::min);
+        let rows = correction.rows[start..end].to_vec();
+        let part = band.start + start as u32..band.start + end as u32;
+        let gap = beside::added_columns(scene.mask, &part, &rows);
+        let part_correction = Correction { rows, gap, confidence, ..Correction::default() };
+        parts.push(decide(scene, strays, &part, part_correction, options));
+        start = end;
+    }
+    parts
+}
+
+/// Returns how the rows of a band were found.
+fn kinds_of(scene: &Scene<'_>, strays: &Strays, band: &Range<u32>) -> BandKinds {
     let mut kinds = BandKinds::NONE;
     band.clone().for_each(|row| kinds.join(strays.kinds(row)));
-    if band.start == 0 || band.end == mask.height() {
+    if band.start == 0 || band.end == scene.mask.height() {
         kinds.insert(BandKind::AtEdge);
     }
-    let correction = correct(scene, strays, band, kinds, options).unwrap_or_default();
+    kinds
+}
+
+/// Decides what is to be done about a band.
+fn decide(
+    scene: &Scene<'_>,
+    strays: &Strays,
+    band: &Range<u32>,
+    correction: Correction,
+    options: &FixOptions,
+) -> (Band, Vec<Vec<u32>>) {
+    let mut kinds = kinds_of(scene, strays, band);
     if correction.touching {
         kinds.insert(BandKind::Touching);
     }
@@ -266,7 +302,7 @@ fn fix_band(
     } else {
         BandOutcome::Corrected
     };
-    let (columns, pixels) = changes(mask, band, &rows);
+    let (columns, pixels) = changes(scene.mask, band, &rows);
     let (first_row, row_count) = (band.start, band.len() as u32);
     let band =
         Band { first_row, rows: row_count, kinds, columns, gap, pixels, confidence, outcome };
@@ -288,34 +324,34 @@ fn correct(
     } else {
         let is_good = |row| !band.contains(&row) && strays.is_good(row);
         let is_ended = |row| strays.is_ended(mask, row);
-        let neighbours = match scene.neighbours.each_ref().map(|side| side.first().copied()) {
-            [Some(below), Some(above)]
-                if options.use_neighbours && band.len() as u32 >= MIN_ADJUSTED_ROWS =>
-            {
-                Some([below, above])
-            }
-            _ => None,
-        };
+        let neighbours =
+            match scene.neighbours.each_ref().map(|side| side.first().map(|layer| &*layer.image)) {
+                [Some(below), Some(above)]
+                    if options.use_neighbours && band.len() as u32 >= MIN_ADJUSTED_ROWS =>
+                {
+                    Some([below, above])
+                }
+                _ => None,
+            };
         let rebuilt = rebuild::rebuild(mask, band, is_good, is_ended, scene.open_rows, neighbours);
         let traced = trace::trace(mask, band, is_good, is_ended, scene.open_rows, scene.neighbours);
-        match (rebuilt, traced) {
+        let guess = match (rebuilt, traced) {
             (Some(rebuilt), Some(traced)) => {
                 // Without open rows, rows of a band may miss different contours.
                 let is_known =
                     scene.open_rows.is_some() || rebuilt.confidence < options.min_confidence;
-                let is_shown = traced.is_shown && traced.confidence >= options.min_confidence;
-                if is_shown || is_known && traced.confidence > rebuilt.confidence {
-                    traced
-                } else {
-                    rebuilt
-                }
+                let is_traced = is_known && traced.confidence > rebuilt.confidence;
+                Some(if is_traced { traced } else { rebuilt })
             }
-            (rebuilt, traced) => rebuilt.or(traced)?,
-        }
+            (rebuilt, traced) => rebuilt.or(traced),
+        };
+        let beside = Beside { mask, sides: scene.neighbours };
+        beside.judge(band, guess)?
     };
     if options.method == FixMethod::Nearest {
         // The gap and what touches are known from the contours, whatever the method.
         (correction.rows, correction.confidence) = nearest::nearest(mask, band);
+        correction.by_row.clear();
     }
     Some(correction)
 }

@@ -22,8 +22,8 @@ pub(super) struct Correction {
     pub(super) confidence: f64,
     /// Whether neighbouring rows lack different contours.
     pub(super) touching: bool,
-    /// Whether the layers below and above show all that was added.
-    pub(super) is_shown: bool,
+    /// The confidence in each row. Empty if other layers show none of them.
+    pub(super) by_row: Vec<f64>,
 }
 
 /// Rebuilds the rows of a band. Returns `None` if no good row lies beside it.
@@ -78,8 +78,8 @@ pub(super) fn rebuild(
     Some(Correction {
         gap: columns_of(mended.iter().flat_map(|mended| &mended.added), mask.width()),
         confidence: least * beside * if at_edge { 0.8 } else { 1.0 },
+        by_row: Vec::new(),
         touching: mended.windows(2).any(|rows| lack_others(&rows[0], &rows[1])),
-        is_shown: false,
         rows: mended.into_iter().map(|mended| mended.row).collect(),
     })
 }

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use lamp_stack::{Image, Mask, white_in_row};
+use lamp_stack::{Image, Layer, Mask, white_in_row};
 
 use super::align::{align, align_broken};
 use super::combine::difference;
@@ -25,11 +25,6 @@ const ONE_SIDED: f64 = 30.0;
 const MAX_ENDS: usize = 8;
 /// The steepest slope, in columns a row, by which contours are continued.
 const MAX_SLOPE: f64 = 20.0;
-/// How far, in pixels, the neighbouring layers may lie from a curve without contradicting it.
-const NEAR: f64 = 1.5;
-/// The share of a missing piece's rows in which a neighbouring layer must show it.
-const MIN_SHOWN: f64 = 0.8;
-
 /// A contour in consecutive rows.
 #[derive(Clone, Debug)]
 struct Line {
@@ -88,8 +83,6 @@ struct Missing {
     rows: Range<u32>,
     /// The columns, and the error they may have. Unknown if no end leads into the rows.
     columns: Option<Vec<(f64, f64)>>,
-    /// The ends that it joins.
-    ends: [LooseEnd; 2],
     confidence: f64,
 }
 
@@ -112,7 +105,7 @@ pub(super) fn trace(
     is_good: impl Fn(u32) -> bool,
     is_ended: impl Fn(u32) -> bool,
     open_rows: Option<&[u32]>,
-    neighbours: &[Vec<&Image>; 2],
+    neighbours: &[Vec<&Layer>; 2],
 ) -> Option<Correction> {
     // `tile` adds a crossing where it ends a row, so lines do not show what is missing.
     if band.start == 0 || band.end == mask.height() || band.clone().any(is_ended) {
@@ -132,18 +125,12 @@ pub(super) fn trace(
                 }))
     };
     let lines = Lines::follow(mask, rows, is_break);
-    let mut missing = lines.join()?;
+    let missing = lines.join()?;
     if missing.is_empty() {
         return None;
     }
     let mut added: Vec<Vec<(f64, f64)>> = vec![Vec::new(); band.len()];
-    let mut is_shown = true;
-    for which in 0..missing.len() {
-        let others: Vec<&Missing> =
-            missing.iter().enumerate().filter(|(i, _)| *i != which).map(|(_, m)| m).collect();
-        let seen = lines.seen_beside(&missing[which], &others, neighbours);
-        let piece = &mut missing[which];
-        is_shown &= settle(piece, &seen)?;
+    for piece in &missing {
         for (row, &guess) in piece.rows.clone().zip(piece.columns.as_ref()?) {
             added.get_mut(row.checked_sub(band.start)? as usize)?.push(guess);
         }
@@ -173,10 +160,10 @@ pub(super) fn trace(
         }
         new_rows.push(new);
     }
-    for image in neighbours.iter().filter_map(|side| side.first()) {
-        confidence *= agreement(mask, band, &new_rows, image, above.min(below));
+    for layer in neighbours.iter().filter_map(|side| side.first()) {
+        confidence *= agreement(mask, band, &new_rows, &layer.image, above.min(below));
     }
-    Some(Correction { rows: new_rows, gap, confidence, touching: false, is_shown })
+    Some(Correction { rows: new_rows, gap, confidence, ..Correction::default() })
 }
 
 /// Returns how well corrected rows agree with those of a neighbouring layer, from 0 to 1: how much
@@ -412,111 +399,8 @@ impl<'a> Lines<'a> {
             }
             (true, false) => (None, 0.5),
         };
-        Some(Missing { rows, columns, ends: [a, b], confidence })
+        Some(Missing { rows, columns, confidence })
     }
-
-    /// Returns where the neighbouring layers show a missing piece, by row, and how far those below
-    /// and above lie apart.
-    fn seen_beside(
-        &self,
-        piece: &Missing,
-        others: &[&Missing],
-        neighbours: &[Vec<&Image>; 2],
-    ) -> Vec<Option<(f64, f64)>> {
-        let sides = neighbours.each_ref().map(|side| {
-            let mut seen: Vec<Option<(f64, f64)>> = vec![None; piece.rows.len()];
-            for (image, away) in side.iter().zip(1..) {
-                if seen.iter().all(Option::is_some) {
-                    break;
-                }
-                let shown = self.shown_in(piece, others, image);
-                for (seen, shown) in seen.iter_mut().zip(shown) {
-                    *seen = seen.or(shown.map(|column| (column, f64::from(away))));
-                }
-            }
-            seen
-        });
-        let [below, above] = sides;
-        let joined = below.into_iter().zip(above).map(|sides| match sides {
-            (Some((below, under)), Some((above, over))) => {
-                Some(((below * over + above * under) / (under + over), (below - above).abs()))
-            }
-            (one, other) => one.or(other),
-        });
-        joined.collect()
-    }
-
-    /// Returns where another layer shows a missing piece, by row.
-    fn shown_in(&self, piece: &Missing, others: &[&Missing], image: &Image) -> Vec<Option<f64>> {
-        let whole = |row: u32| -> Vec<f64> {
-            let mut columns = self.columns(row);
-            for other in others.iter().filter(|other| other.rows.contains(&row)) {
-                if let Some(known) = &other.columns {
-                    columns.push(known[(row - other.rows.start) as usize].0);
-                }
-            }
-            columns.sort_by(f64::total_cmp);
-            columns
-        };
-        let row_of = |row: u32| -> Option<Vec<f64>> {
-            let row = image.exposed_row(row);
-            row.len().is_multiple_of(2).then(|| row.iter().map(|&c| c.into()).collect())
-        };
-        // How far the layers lie apart where the piece begins and ends.
-        let offset = |end: &LooseEnd| -> Option<f64> {
-            let row = end.point.0 as u32;
-            let (mine, theirs) = (whole(row), row_of(row)?);
-            let which = mine.iter().position(|&column| column == end.point.1)?;
-            let partner = align_broken(&mine, &theirs, BREAKING).partners[which]?;
-            Some(mine[which] - theirs[partner])
-        };
-        let [from, to] = [0, 1].map(|end| {
-            let leads_in = piece.ends[end].is_below == (end == 1);
-            leads_in.then(|| offset(&piece.ends[end])).flatten()
-        });
-        let (from, to) = (from.or(to).unwrap_or(0.0), to.or(from).unwrap_or(0.0));
-        let length = f64::from(piece.rows.end - piece.rows.start) + 1.0;
-        let shown = |row: u32| {
-            let (mine, theirs) = (whole(row), row_of(row)?);
-            if theirs.len() != mine.len() + 1 {
-                return None;
-            }
-            let aligned = align_broken(&mine, &theirs, BREAKING);
-            let ([], &[only]) = (&aligned.broken[0][..], &aligned.broken[1][..]) else {
-                return None;
-            };
-            let share = f64::from(row - piece.rows.start + 1) / length;
-            Some(theirs[only] + from + (to - from) * share)
-        };
-        piece.rows.clone().map(shown).collect()
-    }
-}
-
-/// Moves a missing piece to where the neighbouring layers show it, if they contradict its curve.
-/// Returns whether they show it, or `None` if neither says where it is.
-fn settle(piece: &mut Missing, seen: &[Option<(f64, f64)>]) -> Option<bool> {
-    let shown = seen.iter().flatten().count();
-    if (shown as f64) < MIN_SHOWN * seen.len() as f64 {
-        return piece.columns.is_some().then_some(false);
-    }
-    let columns = piece.columns.take();
-    let mut settled: Vec<(f64, f64)> = Vec::with_capacity(seen.len());
-    for (at, shown) in seen.iter().enumerate() {
-        let curve = columns.as_ref().map(|columns| columns[at]);
-        settled.push(match (*shown, curve) {
-            (Some((column, apart)), Some(curve))
-                if apart >= 1.0 && (column - curve.0).abs() <= NEAR =>
-            {
-                curve
-            }
-            (Some((column, apart)), _) => (column, 0.5 + 0.5 * apart),
-            (None, Some(curve)) => curve,
-            (None, None) => settled.last().copied()?,
-        });
-    }
-    piece.columns = Some(settled);
-    piece.confidence = piece.confidence.max(0.9);
-    Some(true)
 }
 
 /// Calls `see` with each way to join an even number of things in pairs.

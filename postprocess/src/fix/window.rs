@@ -3,13 +3,24 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lamp_stack::{Image, Layer, MemorySize, PassingLayer, map_in_order};
+use lamp_stack::{Layer, MemorySize, PassingLayer, map_in_order};
 
-/// How many layers below and above a layer [`fix`](super::fix) looks at.
+/// How many layers below and above a layer [`fix`](super::fix) looks at, at most.
 ///
-/// A gap in a mesh spoils the same rows of many layers, but of fewer and fewer rows
-/// where a facet narrows.
-pub const FIX_REACH: u32 = 4;
+/// A gap in a mesh spoils the same rows of all layers that it spans: of more if it is a patch of
+/// facets, and of fewer and fewer rows where a facet narrows.
+pub const FIX_REACH: u32 = 32;
+/// How many layers on each side are kept whatever they take.
+const MIN_REACH: usize = 4;
+/// The bytes that more layers on each side may take.
+const MAX_BYTES: usize = 64 << 20;
+
+/// Returns whether another layer may be kept beside some.
+fn has_room<'a>(layers: impl ExactSizeIterator<Item = &'a Arc<PassingLayer>>) -> bool {
+    layers.len() < MIN_REACH
+        || layers.len() < FIX_REACH as usize
+            && layers.map(|layer| layer.bytes()).sum::<usize>() < MAX_BYTES
+}
 
 /// A layer with the layers below and above it, the nearest first, if these are present and show the
 /// same place. They are decoded where the layer's rows may be stray.
@@ -19,11 +30,11 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Returns the images of the layers below and above, the nearest first.
-    pub(super) fn neighbours(&self) -> [Vec<&Image>; 2] {
+    /// Returns the layers below and above, the nearest first.
+    pub(super) fn neighbours(&self) -> [Vec<&Layer>; 2] {
         self.beside
             .each_ref()
-            .map(|side| side.iter().map_while(|layer| Some(&*layer.as_decoded()?.image)).collect())
+            .map(|side| side.iter().map_while(|layer| layer.as_decoded()).collect())
     }
 }
 
@@ -39,21 +50,30 @@ pub(super) fn windows<E>(
 ) -> impl Iterator<Item = Result<Window, E>> {
     let mut layers = layers.map(|layer| layer.map(Arc::new)).fuse();
     let mut below: VecDeque<Arc<PassingLayer>> = VecDeque::new();
-    let mut coming: VecDeque<Result<Arc<PassingLayer>, E>> = VecDeque::new();
+    let mut above: VecDeque<Arc<PassingLayer>> = VecDeque::new();
+    let mut error = None;
     std::iter::from_fn(move || {
-        let wanted = FIX_REACH as usize + 1 - coming.len();
-        coming.extend(layers.by_ref().take(wanted));
-        let layer = match coming.pop_front()? {
-            Ok(layer) => layer,
-            Err(error) => {
-                coming.clear();
-                return Some(Err(error));
-            }
+        let layer = match above.pop_front() {
+            Some(layer) => layer,
+            None => match error.take().map_or_else(|| layers.next(), |error| Some(Err(error)))? {
+                Ok(layer) => layer,
+                Err(error) => return Some(Err(error)),
+            },
         };
-        let above = coming.iter().map_while(|layer| layer.as_ref().ok());
-        let beside = [show_same_place(&layer, below.iter()), show_same_place(&layer, above)];
+        while error.is_none() && has_room(above.iter()) {
+            match layers.next() {
+                Some(Ok(layer)) => above.push_back(layer),
+                other => {
+                    error = other.and_then(Result::err);
+                    break;
+                }
+            }
+        }
+        let beside = [show_same_place(&layer, below.iter()), show_same_place(&layer, above.iter())];
+        while !has_room(below.iter()) {
+            below.pop_back();
+        }
         below.push_front(layer.clone());
-        below.truncate(FIX_REACH as usize);
         Some(Ok(Window { layer, beside }))
     })
 }
