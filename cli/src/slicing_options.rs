@@ -168,10 +168,14 @@ impl SlicingOptions {
         }
         let first = words.iter().position(|word| word.starts_with("--")).unwrap_or(words.len());
         let mut options = words.split_off(first);
-        let at = options.iter().position(|word| word == "--fallback");
-        let fallback = at.map(|at| options.drain(at..options.len().min(at + 2)).last());
+        let mut take = |option: &str| {
+            let at = options.iter().position(|word| word == option)?;
+            options.drain(at..options.len().min(at + 2)).last()
+        };
+        // Of the machine, all that decided images stands in other options.
+        let [fallback, _] = ["--fallback", "--machine"].map(&mut take);
         words.remove(0);
-        Some((words, from_words(&options)?, fallback.flatten()))
+        Some((words, from_words(&options)?, fallback))
     }
 
     /// Returns the first option that is not as it is by default, where `machine` may give

@@ -11,7 +11,7 @@ use lamp_slicer::{Bodies, Fill, FillDoubt, Part, Polished, SHORT_PX, SliceError,
 use lamp_stack::{Layer, Length, PageInfo, Size};
 
 use crate::body_overlaps::overlap_text;
-use crate::catalogue::{canonical_word, entry, is_file};
+use crate::catalogue::{entry_and_word, is_file, recorded_name};
 use crate::exit::Exit;
 use crate::fallback::Bridged;
 use crate::mesh_report::Counts;
@@ -99,7 +99,8 @@ impl SliceSettings {
         }
         // It changes no image, but refuses some.
         if let Some(machine) = &self.machine {
-            words.push_str(&format!(" --machine {}", canonical_word::<Machine>(machine)));
+            words
+                .push_str(&option("machine", &recorded_name::<Machine>(machine).to_string_lossy()));
         }
         words
     }
@@ -117,7 +118,8 @@ impl SliceSettings {
             return Err(Exit::usage(why));
         }
         let exposure = self.options.exposure()?;
-        let machine: Option<Machine> = self.machine.as_deref().map(entry).transpose()?;
+        let machine = self.machine.as_deref().map(entry_and_word::<Machine>).transpose()?;
+        let (machine, machine_word) = machine.unzip();
         if let Some(machine) = &machine {
             self.options.check_machine(machine).map_err(Exit::wrong_options)?;
         }
@@ -144,15 +146,16 @@ impl SliceSettings {
         let fallback = self.fallback.as_deref();
         let bridged = Bridged::new(slices, fallback, &self.options, layers, &note)?;
         let part_name = name.map(|name| stem(Path::new(name)));
-        let fallback = bridged.option();
+        let machine = machine_word.map(|word| option("machine", &word));
+        let more: String = bridged.option().into_iter().chain(machine).collect();
         let name_command = move |layer: &mut Layer| {
             name_command(layer);
             let Some(stack) = &mut layer.info.stack else { return };
             if let Some(name) = &part_name {
                 stack.part.clone_from(name);
             }
-            if let (Some(command), Some(fallback)) = (stack.commands.last_mut(), &fallback) {
-                command.push_str(fallback);
+            if let Some(command) = stack.commands.last_mut() {
+                command.push_str(&more);
             }
         };
         Ok(Slicing {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lamp_stack::{Dpi, Length, MAX_SIDE, Mask, Orientation, Size};
+use lamp_stack::{Dpi, Length, MAX_SIDE, Mask, Orientation, Size, quoted};
 
 use super::mesh::BuildMesh;
 use super::overlap::common_pixel;
@@ -259,6 +259,13 @@ impl Layout {
         let pitch = self.dpi.pitch().mm();
         let y_mm = self.area.height.mm() - f64::from(row) * pitch;
         TileError::Overlap { one, other, at_mm: [f64::from(column) * pitch, y_mm] }
+    }
+
+    /// Records the machine that the build is for, by the word for it.
+    #[must_use]
+    pub fn for_machine(mut self, word: &str) -> Self {
+        self.command.push_str(&format!(" --machine {}", quoted(word)));
+        self
     }
 
     fn packing_command(&self, gap: Length, pack: Pack) -> String {

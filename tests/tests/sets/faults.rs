@@ -12,6 +12,7 @@ pub(crate) enum Form {
     Folder,
     Pngs,
     Packed,
+    Strips,
     Pipe,
 }
 
@@ -35,12 +36,20 @@ use Fault::{
     Unreadable,
 };
 
-/// The pages of the good stack.
+/// The pages of the good stack, and the strips of a build of it.
 const PAGES: usize = 6;
+const STRIPS: usize = 4;
 
 impl Form {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::File, Self::Classic, Self::Folder, Self::Pngs, Self::Packed, Self::Pipe];
+    pub(crate) const ALL: [Self; 7] = [
+        Self::File,
+        Self::Classic,
+        Self::Folder,
+        Self::Pngs,
+        Self::Packed,
+        Self::Strips,
+        Self::Pipe,
+    ];
 
     pub(crate) fn label(self) -> &'static str {
         match self {
@@ -49,6 +58,7 @@ impl Form {
             Self::Folder => "folder",
             Self::Pngs => "PNGs",
             Self::Packed => "packed",
+            Self::Strips => "strips",
             Self::Pipe => "pipe",
         }
     }
@@ -57,7 +67,7 @@ impl Form {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::File | Self::Classic | Self::Pipe => "stack.tif",
-            Self::Folder | Self::Pngs => "stack",
+            Self::Folder | Self::Pngs | Self::Strips => "stack",
             Self::Packed => "stack.lamp",
         }
     }
@@ -65,7 +75,7 @@ impl Form {
     /// Returns what can be wrong with it.
     pub(crate) fn faults(self) -> &'static [Fault] {
         match self {
-            Self::Folder | Self::Pngs => &[
+            Self::Folder | Self::Pngs | Self::Strips => &[
                 FirstMissing,
                 MiddleMissing,
                 LastMissing,
@@ -89,17 +99,12 @@ impl Form {
         let path = folder.path(self.name());
         let _ = fs::remove_file(&path);
         let _ = fs::remove_dir_all(&path);
-        let options = match self {
-            Self::File | Self::Pipe => "convert good.tif -q -o stack.tif",
-            Self::Classic => "convert good.tif -q --classic -o stack.tif",
-            Self::Folder => "convert good.tif -q -o stack/",
-            Self::Pngs => "convert good.tif -q --png -o stack/",
-            Self::Packed => "pack good.tif -q -o stack.lamp",
-        };
-        folder.run(&format!("lamp {options}")).succeeds_quietly();
+        folder.run(&format!("lamp {}", self.line("good.tif", self.name()))).succeeds_quietly();
         match (self, fault) {
             (_, None) => {}
-            (Self::Folder | Self::Pngs, Some(fault)) => self.break_folder(folder, fault),
+            (Self::Folder | Self::Pngs | Self::Strips, Some(fault)) => {
+                self.break_folder(folder, fault);
+            }
             (_, Some(fault)) => {
                 let bytes = broken_file(folder.bytes(self.name()), fault);
                 folder.write(self.name(), &bytes);
@@ -107,36 +112,53 @@ impl Form {
         }
     }
 
+    /// Returns the command that writes a stack in this form.
+    fn line(self, from: &str, to: &str) -> String {
+        match self {
+            Self::File | Self::Pipe => format!("convert {from} -q -o {to}"),
+            Self::Classic => format!("convert {from} -q --classic -o {to}"),
+            Self::Folder => format!("convert {from} -q -o {to}/"),
+            Self::Pngs => format!("convert {from} -q --png -o {to}/"),
+            Self::Packed => format!("pack {from} -q -o {to}"),
+            Self::Strips => format!(
+                "tile {from} --area 40x40mm --mesh none --strips {to} --mirrors 20 -q -o x.tif"
+            ),
+        }
+    }
+
     fn break_folder(self, folder: &Scratch, fault: Fault) {
-        let end = if self == Self::Pngs { "png" } else { "tif" };
-        let page = |number: usize| folder.path(&format!("stack/layer_{number:05}.{end}"));
+        let (start, end, digits, count) = match self {
+            Self::Strips => ("strip", "tif", 3, STRIPS),
+            Self::Pngs => ("layer", "png", 5, PAGES),
+            _ => ("layer", "tif", 5, PAGES),
+        };
+        let name = |number: usize| format!("{start}_{number:0digits$}.{end}");
+        let page = |number: usize| folder.path("stack").join(name(number));
         let remove = |number: usize| fs::remove_file(page(number)).unwrap();
-        let last = PAGES - 1;
+        let (middle, last) = (count / 2, count - 1);
         match fault {
             FirstMissing => remove(0),
-            MiddleMissing => remove(3),
+            MiddleMissing => remove(middle),
             LastMissing => remove(last),
-            Twice => drop(fs::copy(page(2), page(PAGES)).unwrap()),
+            Twice => drop(fs::copy(page(middle), page(count)).unwrap()),
             Swapped => {
                 let aside = folder.path("stack/aside");
-                fs::rename(page(2), &aside).unwrap();
-                fs::rename(page(3), page(2)).unwrap();
-                fs::rename(aside, page(3)).unwrap();
+                fs::rename(page(middle - 1), &aside).unwrap();
+                fs::rename(page(middle), page(middle - 1)).unwrap();
+                fs::rename(aside, page(middle)).unwrap();
             }
             OfAnother => {
-                let png = if self == Self::Pngs { "--png " } else { "" };
-                folder.run(&format!("lamp convert other.tif -q {png}-o other/")).succeeds_quietly();
-                let other = folder.path(&format!("other/layer_00003.{end}"));
-                fs::copy(other, page(3)).unwrap();
+                folder.run(&format!("lamp {}", self.line("other.tif", "other"))).succeeds_quietly();
+                fs::copy(folder.path("other").join(name(middle)), page(middle)).unwrap();
                 fs::remove_dir_all(folder.path("other")).unwrap();
             }
             Unreadable => {
-                remove(3);
-                fs::create_dir(page(3)).unwrap();
+                remove(middle);
+                fs::create_dir(page(middle)).unwrap();
             }
             Cut | Empty | Changed => {
-                let bytes = broken_bytes(fs::read(page(3)).unwrap(), fault);
-                fs::write(page(3), bytes).unwrap();
+                let bytes = broken_bytes(fs::read(page(middle)).unwrap(), fault);
+                fs::write(page(middle), bytes).unwrap();
             }
         }
     }

@@ -24,7 +24,7 @@ use lamp_postprocess::{
 };
 use lamp_stack::{Length, Size};
 
-use crate::catalogue::{canonical_word, entry, is_file};
+use crate::catalogue::{entry, entry_and_word, is_file, recorded_name};
 use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
@@ -244,7 +244,7 @@ impl TileArgs {
     pub(crate) fn canonical(&self) -> String {
         let mut options = Self { stacks: Vec::new(), ..self.clone() };
         if let Some(machine) = &mut options.machine {
-            *machine = canonical_word::<Machine>(machine).into();
+            *machine = recorded_name::<Machine>(machine).into();
         }
         for file in options.files_mut() {
             *file = file.file_name().unwrap_or_default().into();
@@ -297,6 +297,10 @@ impl TileArgs {
         let parts = stacks.iter_mut().map(|stack| stack.part(outlines));
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
+        let placed = match &self.machine {
+            Some(machine) => placed.for_machine(&entry_and_word::<Machine>(machine)?.1),
+            None => placed,
+        };
         self.tell_places(&placed, progress)?;
         let heights = HeightOptions { settle: self.settle, resample: self.resample };
         let recipe = self.recipe_of(&placed, heights, mesh.as_ref())?;

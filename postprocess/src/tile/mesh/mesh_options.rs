@@ -1,6 +1,6 @@
 //! Options of a mesh, and the walls that they ask for.
 
-use lamp_stack::{Dpi, Length, MAX_RUNS, Mask};
+use lamp_stack::{Dpi, Length, MAX_RUNS, Mask, quoted};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Cells, Lattice};
@@ -132,7 +132,7 @@ impl MeshOptions {
             MeshPattern::Cells { shape, cell, wall } => {
                 format!("{shape} --cell {cell} --wall {wall}")
             }
-            MeshPattern::Image { name, .. } => name.clone(),
+            MeshPattern::Image { name, .. } => quoted(name).into_owned(),
         };
         format!(
             " --mesh {pattern} --clearance {clearance}{moat} \
