@@ -35,7 +35,7 @@ pub(crate) fn entry_and_word<T: Entry>(path: &Path) -> Result<(T, String), Exit>
     Ok((entry, word_of_text(path, &text)))
 }
 
-/// What stands between a name and the digest of what is meant.
+/// The separator between a name and the digest of the file.
 const DIGEST: &str = "@blake3:";
 
 /// The hexadecimal digits of a digest behind a name.

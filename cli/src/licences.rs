@@ -1,6 +1,6 @@
 //! The licences of what is in the program: `lamp --licences`.
 
-/// Those of the crates, as `licences/update` wrote them.
+/// The notices of the crates, as `licences/update` wrote them.
 const CRATES: &str = include_str!("../licences/notices.txt");
 
 const OWN: &str = include_str!("../../LICENSE-MIT");

@@ -53,7 +53,7 @@ pub(crate) struct PlanningOptions {
 pub(crate) struct PlannedResin {
     pub(crate) material: Material,
     pub(crate) light: Light,
-    /// What is doubtful about the lamp.
+    /// A doubt about the lamp.
     pub(crate) doubt: Option<String>,
     /// The resin and the lamp as pages record them.
     pub(crate) words: String,

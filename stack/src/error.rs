@@ -177,7 +177,7 @@ pub enum StackError {
     /// There is no layer to write.
     #[error("there is no layer to write")]
     NoLayers,
-    /// A page's name is that of a pipe or a device.
+    /// A page is a pipe or a device.
     #[error("{name} is a pipe or a device, not a page")]
     NoFile {
         /// Its name.

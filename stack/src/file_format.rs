@@ -275,7 +275,7 @@ fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     if text.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace()) {
         return None;
     }
-    // What follows a signature may name any program: STEP and STL headers do.
+    // Text behind a signature may name any program, as STEP and STL headers do.
     let signed = || of_part(text, is_whole).filter(|format| is_signed(*format));
     let of_format = of_xml(text).or_else(signed);
     let of_format = of_format.or_else(|| of_phrases(text)).or_else(|| of_columns(text));

@@ -14,7 +14,7 @@ use crate::page_names::PageFiles;
 /// The endings of names of stacks in one file, in small letters.
 pub const STACK_ENDINGS: [&str; 5] = ["tif", "tiff", "btf", "tf8", "lamp"];
 
-/// Returns whether a file's name ends as that of a stack in one file.
+/// Returns whether a file has the extension of a stack in one file.
 pub fn is_stack_name(path: &Path) -> bool {
     let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
     extension.is_some_and(|end| STACK_ENDINGS.contains(&&*end))
@@ -60,7 +60,7 @@ fn add_stacks(
         match path.is_dir() {
             true if is_stack => {}
             true => add_stacks(&path, seen, stacks)?,
-            // Beside pages there may be packed stacks, which are none.
+            // A packed stack next to pages is a stack of its own.
             false if is_stack && is_packed(&path) => stacks.push(path),
             false if !is_stack && is_stack_file(&path) => stacks.push(path),
             false => {}

@@ -171,8 +171,8 @@ impl FolderBeside {
         Self::new(path, false)
     }
 
-    /// Creates a folder that will become `path`, and then replaces a folder there. That may hold no
-    /// files but those which its [`FOLDER_LIST`] names. It stays until the new one is complete.
+    /// Creates a folder that will become `path`, and then replaces a folder there. Its files must all
+    /// be in its [`FOLDER_LIST`]. It stays until the new one is complete.
     ///
     /// # Errors
     /// Returns an error if `path` is anything else, or no folder can be created there.
@@ -245,7 +245,7 @@ impl FolderBeside {
     }
 }
 
-/// A file for a program that is told its path, which its owner alone may read (mode 600). It is
+/// A file for another program, which its owner alone may read (mode 600). It is
 /// removed on drop, and by [`remove_temporaries`].
 pub struct PrivateFile {
     file: NamedTempFile,

@@ -83,7 +83,7 @@ pub enum SchedulerError {
     },
     /// A path that schedulers cannot be given.
     #[error(
-        "schedulers take names in UTF-8 only, and {path} is none: rename it, or leave --engine out"
+        "{path} is not UTF-8, and schedulers take no other names: rename it, or leave --engine out"
     )]
     NoText {
         /// The path.
@@ -94,7 +94,7 @@ pub enum SchedulerError {
     Silent {
         /// The program.
         program: &'static str,
-        /// How long it had.
+        /// The time that it was given.
         seconds: u64,
     },
     /// A program of the scheduler failed.

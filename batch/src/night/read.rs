@@ -277,8 +277,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Returns the files that a text names: one, or those that a pattern matches, and folders in which
-    /// they may be, with why these cannot be read.
+    /// Returns the file that a text names, or the files that a pattern matches and the folders that
+    /// cannot be read, each with the reason.
     fn files(&self, value: &Value<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
         let name = self.text(value)?;
         let path = self.folder.join(name);

@@ -264,7 +264,7 @@ impl Store {
         sealed::read(&self.root.join("notes").join(key.place("json")))
     }
 
-    /// Keeps a note: what would take time to find out again. If the store can only be read, this
+    /// Keeps a note, which would take time to find out again. If the store can only be read, this
     /// process keeps it for itself.
     ///
     /// # Errors

@@ -80,7 +80,7 @@ struct Pen {
     lines: Vec<Vec<Point>>,
     /// The start of the letter.
     x: f64,
-    /// How far to the right to move the letter, in units of the font.
+    /// The distance to move the letter to the right, in units of the font.
     shift: f32,
     scale: f64,
     tolerance: f64,

@@ -1,8 +1,8 @@
-//! What the layers below and above show of the crossings that a row misses.
+//! Finds the crossings that a row misses in the layers below and above.
 //!
 //! A gap in a mesh spoils the same rows of many layers, but each of these rows is whole in some
 //! layer below and in some layer above. Between these two the contours run on nearly straight, so
-//! they show which crossings the row should have, and where, whatever the rows beside it look like.
+//! they show which crossings the row should have, and where, whatever its neighbors look like.
 
 use std::ops::Range;
 
@@ -17,13 +17,13 @@ const MAX_MISSING: usize = 8;
 const NEAR: f64 = 1.5;
 /// How far, in pixels, contours may move from layer to layer.
 const DRIFT: f64 = 8.0;
-/// How much further off a missing crossing may be than those that the row has.
+/// The ratio by which a missing crossing may be further off than the present ones.
 const BEND: f64 = 2.5;
 /// Pixels of room beside a missing crossing that are always granted.
 const MIN_ROOM: f64 = 8.0;
 /// The confidence in a row that lies between two alike ones.
 const BETWEEN: f64 = 0.95;
-/// The confidence in a row of which only one layer tells, or of which two tell different things.
+/// The confidence in a row that only one layer shows, or that two show differently.
 const BY_ONE: f64 = 0.7;
 
 /// A layer between others.
@@ -51,7 +51,7 @@ struct Whole {
 }
 
 impl Beside<'_> {
-    /// Returns which crossings a row of a band misses. `None` if the other layers do not tell.
+    /// Returns which crossings a row of a band misses. `None` if the other layers do not show it.
     pub(super) fn show(&self, row: u32, band: &Range<u32>) -> Option<Shown> {
         let mine: Vec<f64> = self.mask.row(row).iter().map(|&column| column.into()).collect();
         // A layer that has more crossings may have features that this one has not, so they count
@@ -66,7 +66,7 @@ impl Beside<'_> {
     }
 
     /// Holds a band's correction against what the layers show. Rows that they contradict become
-    /// those that they show.
+    /// the rows that they show.
     pub(super) fn judge(&self, band: &Range<u32>, guess: Option<Correction>) -> Option<Correction> {
         let mut shown: Vec<_> = band.clone().map(|row| self.show(row, band)).collect();
         self.fill(band, &mut shown);
@@ -234,7 +234,7 @@ fn between(mine: &[f64], below: &Whole, above: &Whole) -> Option<Shown> {
     let is_near = |pair: (&f64, &usize)| off(pair) <= NEAR + 0.25 * moved(*pair.1);
     let most = partners.iter().map(|&which| moved(which)).fold(0.0, f64::max);
     let missing = missing_from(&partners, expected.len());
-    // What moves far more than all others is not one contour.
+    // A crossing that moves far more than all others is of two contours.
     if !mine.iter().zip(&partners).all(is_near)
         || missing.iter().any(|&which| moved(which) > 2.0 * most + 2.0 * NEAR)
     {

@@ -132,7 +132,7 @@ impl Scene<'_> {
                     let sure = rows.iter().take_while(|(_, shown)| shown.is_sure()).count();
                     rows.truncate(sure);
                 }
-                // What breaks off here goes on behind the break.
+                // A contour that breaks off here goes on behind the break.
                 let across = if is_above { Some(open) } else { open.checked_sub(1) };
                 let across = across.filter(|&row| row < self.mask.height());
                 let across = across.map_or(&[][..], |row| self.mask.row(row));

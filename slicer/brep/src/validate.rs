@@ -171,7 +171,7 @@ fn faults(
     let faces = facets[0].face..=facets[facets.len() - 1].face;
     let horn = faces.map(|face| kernel.face(face)).find(|face| face.kind == HORN_TORUS);
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
-    // Loops whose side cannot be told give facets that are anywhere.
+    // Loops without a known side give facets anywhere.
     faults.extend(off(kernel, mesh, facets, report).map(|off| match (&horn, &off) {
         (Some(face), BodyFault::Off { entity, what: FACETS, .. }) if face.entity == *entity => {
             BodyFault::Horn { entity: *entity }

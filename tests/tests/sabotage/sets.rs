@@ -183,7 +183,7 @@ fn damaged_sets_are_errors_or_the_same() {
     note("| damaged | refused | read as it was | read otherwise, or a panic |");
     let mut all_wrong = Vec::new();
     for target in &TARGETS {
-        let inputs = trials(24);
+        let inputs = trials(9);
         let (refused, read, wrong) = attack(target, inputs);
         note(&format!("| {inputs} of {} | {refused} | {read} | {} |", target.name, wrong.len()));
         all_wrong.extend(wrong);

@@ -46,7 +46,7 @@ fn bytes(kind: &'static str, bytes: impl IntoResponse) -> Response {
 ///
 /// It gives a cookie that is `SameSite=Strict`. A redirect would not do: when another page led
 /// here, as the file of `lamp view --open` does, browsers keep such cookies back from all redirects
-/// that follow. What our own page asks for has them.
+/// that follow. Requests of our own page have them.
 pub(super) fn welcome(cookie: &HeaderValue) -> Response {
     const PAGE: &str = r#"<!doctype html>
 <html lang="en">

@@ -7,11 +7,11 @@ use super::token::Token;
 /// A token that opens the page once: who finds it later, in a log or a history, has no use for it.
 pub struct Ticket {
     token: Token,
-    /// What to do when it is used; nothing once it was.
+    /// The action at its first use; `None` after that.
     when_used: Mutex<Option<Box<dyn FnOnce() + Send>>>,
 }
 
-/// What becomes of a text that is said to be the token of a ticket.
+/// The outcome of a text that claims to be the token of a ticket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Unknown,

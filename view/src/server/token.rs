@@ -1,4 +1,4 @@
-//! Secrets: those of the first addresses, and that of the cookie which replaces them.
+//! Secrets: one for each first address, and one for the cookie that replaces them.
 
 use std::fmt;
 

@@ -64,7 +64,7 @@ struct MeshPart {
     #[command(flatten)]
     reader: ReaderOptions,
 
-    /// Memory that the mesh may take, some 70 bytes a facet [default: what there is]
+    /// Most memory for the mesh, which takes some 70 bytes a facet [default: all that is free]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 }

@@ -26,7 +26,7 @@ pub enum RecipeError {
         known: &'static str,
     },
     /// A value is not as it was written.
-    #[error("this recipe is not as tile wrote it: its digest is that of other values")]
+    #[error("this recipe is not as tile wrote it: its digest does not match its values")]
     Changed,
     /// It was written by a version of `tile` that makes other pages.
     #[error(

@@ -8,7 +8,7 @@ const CLEARLY_NEARER: f64 = 0.5;
 
 impl Surface {
     /// Returns the surface with the part on which points lie, of a cone and of a torus whose tube
-    /// crosses itself. Others stay, and so does the part if the points do not tell.
+    /// crosses itself. Others stay, and so does the part if the points do not decide.
     ///
     /// ISO 10303-42 has both halves of a cone, and a `TOROIDAL_SURFACE` with a tube wider than its
     /// ring has the part around the axis, too; programs use them.
