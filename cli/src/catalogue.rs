@@ -6,7 +6,7 @@ use std::io::{self, IsTerminal, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use lamp_stack::{Builtin, Catalogued, digest_of};
+use lamp_stack::{Builtin, Catalogued, digest_of, file_word};
 
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream, print};
@@ -45,6 +45,7 @@ const DIGEST_DIGITS: usize = 16;
 pub(crate) fn word_of(path: &Path, digest: &str) -> String {
     let (path, _) = without_digest(path);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = if name == "-" { name } else { file_word(&name).into_owned().into() };
     let digits = digest.strip_prefix("blake3:").unwrap_or(digest);
     format!("{name}{DIGEST}{}", &digits[..DIGEST_DIGITS])
 }

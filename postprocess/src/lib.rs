@@ -52,7 +52,7 @@ pub use offset::{
 };
 pub use strips::{
     IndexError, JoinSwathsError, Seam, StripDifference, StripFile, StripForm, StripWriter,
-    StripsError, Swaths, SwathsError, is_strips, join_strips, strip_files,
+    StripsError, Swaths, SwathsError, check_number, is_strips, join_strips, strip_files,
 };
 pub use tile::{
     BuildFinding, BuildWanted, CellShape, Composer, CopyEntry, CopyName, CopyPlacement,

@@ -395,38 +395,3 @@ fn table() {
         );
     }
 }
-
-#[test]
-#[ignore = "debug"]
-fn samples() {
-    use lamp_fixtures::{Defect, Sample, build, inject};
-    for (sample, facets, count) in
-        [(Sample::Tower, 20_000, 20), (Sample::Torus, 20_000, 20), (Sample::Blade, 24_000, 24)]
-    {
-        let mesh = build(sample, facets).unwrap();
-        let options = SliceOptions { dpi: Dpi::new(1500.0).unwrap(), ..SliceOptions::default() };
-        let (whole, grid) = sliced(&mesh, &options);
-        assert!(fixed(&whole) == whole);
-        let options = SliceOptions { grid, ..options };
-        for seed in 1..=2 {
-            let mut bad = mesh.clone();
-            inject(&mut bad, Defect::Drop, count, seed);
-            let (stray, _) = sliced(&bad, &options);
-            if stray.len() != whole.len() {
-                println!("{sample:?} {seed} height");
-                continue;
-            }
-            let start = std::time::Instant::now();
-            let after = fixed(&stray);
-            let time = start.elapsed();
-            let s = score(&whole, &stray, &after);
-            println!(
-                "SAMPLE {sample:?} {seed}: {} -> {} ({:.3} %) harmed {} {time:.1?}",
-                s.all.before,
-                s.all.after,
-                100.0 * s.all.after as f64 / s.all.before as f64,
-                s.harmed
-            );
-        }
-    }
-}

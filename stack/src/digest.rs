@@ -107,15 +107,16 @@ impl StackInfo {
 /// How the last line of a sealed text begins: a comment, in TOML and in tables.
 const SEAL: &str = "# blake3:";
 
-/// Returns a text with its digest in a comment as the last line, so that [`is_sealed`] finds changes.
+/// Returns a text with its digest in a comment as the last line, so that [`unsealed`] finds changes.
 pub fn sealed(text: &str) -> String {
     let digest = blake3::hash(text.as_bytes()).to_hex();
     format!("{text}{SEAL}{digest}\n")
 }
 
-/// Returns true if a text is as [`sealed`] wrote it.
-pub fn is_sealed(text: &str) -> bool {
-    text.rfind(SEAL).is_some_and(|end| sealed(&text[..end]) == text)
+/// Returns the text that [`sealed`] wrote, if it is as it was.
+pub fn unsealed(text: &str) -> Option<&str> {
+    let before = &text[..text.rfind(SEAL)?];
+    (sealed(before) == text).then_some(before)
 }
 
 /// Opens a file or a pipe to be read to its end.

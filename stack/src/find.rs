@@ -45,40 +45,52 @@ fn add_stacks(
         stacks.push(path.to_owned());
         return Ok(());
     }
-    let is_stack = is_stack(path);
-    if is_stack {
-        stacks.push(path.to_owned());
-    }
-    if !seen.insert(path.canonicalize()?) {
+    let named =
+        |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    if !seen.insert(path.canonicalize().map_err(named)?) {
         return Ok(());
     }
-    let mut entries = fs::read_dir(path)?.collect::<Result<Vec<_>, _>>()?;
+    let entries = fs::read_dir(path).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    let mut entries = entries.map_err(named)?;
     entries.retain(|entry| !entry.file_name().as_encoded_bytes().starts_with(b"."));
     entries.sort_by_key(fs::DirEntry::file_name);
+    let pages = pages_of(path);
+    if pages.is_some() {
+        stacks.push(path.to_owned());
+    }
     for entry in entries {
         let path = entry.path();
-        match path.is_dir() {
-            true if is_stack => {}
-            true => add_stacks(&path, seen, stacks)?,
-            // A packed stack next to pages is a stack of its own.
-            false if is_stack && is_packed(&path) => stacks.push(path),
-            false if !is_stack && is_stack_file(&path) => stacks.push(path),
-            false => {}
+        let is_page = pages.as_ref().is_some_and(|pages| pages.contains(&path));
+        match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => add_stacks(&path, seen, stacks)?,
+            Ok(metadata) if !metadata.is_file() && !is_page => {
+                if is_stack_name(&path) || is_picture(&path) {
+                    let why = format!("{} is a pipe or a device, not a stack", path.display());
+                    return Err(io::Error::other(why));
+                }
+            }
+            // Pictures next to pages are thumbnails and the like.
+            Ok(_) if !is_page && is_stack_file(&path, pages.is_none()) => stacks.push(path),
+            // A link to nothing, or a file that cannot be looked at: opening it says why.
+            Err(_) if !is_page => stacks.push(path),
+            _ => {}
         }
     }
     Ok(())
 }
 
-/// Returns whether a file is a stack by its name or its first bytes.
-fn is_stack_file(path: &Path) -> bool {
-    let is_picture = || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-    is_stack_name(path) || is_picture() || matches!(format(path), Some(FileFormat::Layers(_)))
+/// Returns whether a file is a stack by its name or its first bytes; `pictures` count, if they may.
+fn is_stack_file(path: &Path, pictures: bool) -> bool {
+    is_stack_name(path)
+        || match format(path) {
+            Some(FileFormat::Layers("a TIFF file" | "a packed stack")) => true,
+            Some(FileFormat::Layers(_)) => pictures,
+            _ => pictures && is_picture(path),
+        }
 }
 
-/// Returns whether a file is a packed stack by its name or its first bytes.
-fn is_packed(path: &Path) -> bool {
-    let is_named = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("lamp"));
-    is_named || format(path) == Some(FileFormat::Layers("a packed stack"))
+fn is_picture(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"))
 }
 
 fn format(path: &Path) -> Option<FileFormat> {
@@ -89,16 +101,21 @@ fn format(path: &Path) -> Option<FileFormat> {
     FileFormat::of_start(&start, None)
 }
 
-/// Returns whether a folder's files are the pages of one stack. The first file that tells decides.
-fn is_stack(folder: &Path) -> bool {
+/// Returns the files of a folder that are the pages of one stack. The first file that tells decides.
+fn pages_of(folder: &Path) -> Option<Vec<PathBuf>> {
     let PageFiles { files, left_out, .. } = match PageFiles::of(folder) {
         Ok(found) => found,
-        // The folder's stack is refused when it is opened.
-        Err(StackError::SamePage { .. }) => return true,
-        Err(_) => return false,
+        // The folder's stack is refused when it is opened, and its files with it.
+        Err(StackError::SamePage { .. } | StackError::NoFile { .. }) => {
+            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+            return Some(entries.map(|entry| entry.path()).filter(|path| !path.is_dir()).collect());
+        }
+        Err(_) => return None,
     };
     let is_alone = files.len() == 1 && !left_out.iter().any(StackNote::is_doubt);
-    !files.is_empty() && files.iter().find_map(|file| is_page(file, is_alone)).unwrap_or(true)
+    let are_pages =
+        !files.is_empty() && files.iter().find_map(|file| is_page(file, is_alone)).unwrap_or(true);
+    are_pages.then_some(files)
 }
 
 /// Returns whether a file is a page and not a stack of its own, if it says so. A file alone is.

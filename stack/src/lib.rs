@@ -86,7 +86,7 @@ pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use coverage::mean_levels;
 pub use depth_levels::{DepthLevels, LevelSteps};
 pub use difference::{Difference, Overlaid};
-pub use digest::{digest_of, digest_of_digests, digest_of_range, is_sealed, open_ending, sealed};
+pub use digest::{digest_of, digest_of_digests, digest_of_range, open_ending, sealed, unsealed};
 pub use durable::{close, skip_sync, sync};
 pub use error::{PageFault, StackError, UnsupportedFeature};
 pub use fading_levels::FadingLevels;

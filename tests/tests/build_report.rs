@@ -168,8 +168,9 @@ fn the_time_is_told_in_words_with_what_is_missing() {
     }
     assert_eq!(scratch.names(), ["box.tif", "mine.toml"]);
     // Standard output is the build's.
+    let line = format!("{line} --machine mine.toml");
     scratch.run(&format!("{line} -o build.tif")).succeeds_quietly();
-    let ran = scratch.run(&format!("{line} --machine mine.toml --time -o -")).succeeds();
+    let ran = scratch.run(&format!("{line} --time -o -")).succeeds();
     assert!(ran.stdout == scratch.bytes("build.tif"));
     assert!(ran.stderr.contains("build time: 17.5min"), "{}", ran.stderr);
 }

@@ -131,16 +131,17 @@ fn the_machine_knows_its_strips_and_threads_change_no_byte() {
     let line = "tile tower.tif --machine mine.toml";
     scratch.run(&format!("{line} --strips a/ --threads 1")).succeeds_quietly();
     // The build is also written if requested.
-    let line = format!("{TILE} --strips b --mirrors 100 --overlap 20 --threads 3 -o -");
+    let tile = format!("{TILE} --machine mine.toml");
+    let line = format!("{tile} --strips b --mirrors 100 --overlap 20 --threads 3 -o -");
     let build = scratch.run(&line).succeeds_quietly().stdout;
-    assert!(build == scratch.run(TILE).succeeds_quietly().stdout);
+    assert!(build == scratch.run(&tile).succeeds_quietly().stdout);
     assert_eq!(scratch.names_in("a"), scratch.names_in("b"));
     for name in scratch.names_in("a") {
         let [a, b] = ["a", "b"].map(|folder| scratch.bytes(&format!("{folder}/{name}")));
         assert!(a == b, "{name}");
     }
     assert!(scratch.run("lamp join a").succeeds_quietly().stdout == build);
-    scratch.run(&format!("{TILE} --strips c --mirrors 100 --classic")).succeeds_quietly();
+    scratch.run(&format!("{tile} --strips c --mirrors 100 --classic")).succeeds_quietly();
     assert_eq!(scratch.bytes("c/strip_002.tif")[2], 42);
     assert!(scratch.run("lamp join c").succeeds_quietly().stdout == build);
 }

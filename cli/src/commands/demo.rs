@@ -14,8 +14,9 @@ use lamp_postprocess::{
     FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
 };
 use lamp_slicer::{OpenOptions, Part};
-use lamp_stack::{Catalogued, Layer, Pages, StackError};
+use lamp_stack::{Layer, Pages, StackError};
 
+use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, PictureScale, Region};
@@ -148,12 +149,14 @@ fn build_in_mesh(
     range: Option<Range<u32>>,
     progress: &Progress,
 ) -> Result<u32, Exit> {
-    let area = Machine::builtin("alpha").expect("it is built in").area.value;
+    let (machine, word) = entry_and_word::<Machine>(Path::new("alpha"))?;
+    let area = machine.area.value;
     let mut layers = part_layers(stl, range, progress)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;
     let parts = vec![PartStack::of_image("the mould", &first)?];
     let mesh = MeshOptions::default();
     let layout = Layout::packed(parts, &[None], area, mesh.gap(), Pack::default())?;
+    let layout = layout.for_machine(&word);
     let layers = std::iter::once(Ok(first)).chain(layers);
     let build = layout.with_mesh(&mesh)?.build(vec![layers], HeightOptions::default(), |_| {});
     let mut made = 0;

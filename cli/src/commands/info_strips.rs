@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use lamp_postprocess::{StripFile, StripForm, strip_files};
+use lamp_postprocess::{
+    StripDifference, StripFile, StripForm, StripsError, check_number, strip_files,
+};
 use lamp_stack::{Pages, StackTotals};
 use serde::Serialize;
 
@@ -51,7 +53,12 @@ pub(super) fn print_strips(folder: &Path, as_json: bool) -> Result<(), Exit> {
     let failed = |error| Exit::from(error).at(name.clone());
     let form = StripForm::of(folder).map_err(failed)?;
     let files = strip_files(folder).map_err(failed)?;
-    let strips = files.into_iter().map(|file| read(folder, file)).collect::<Result<Vec<_>, _>>()?;
+    let strips = files.into_iter().zip(0..).map(|(file, number)| read(folder, file, number));
+    let strips = strips.collect::<Result<Vec<_>, _>>()?;
+    if let Some(strip) = strips.iter().find(|strip| made_by(strip) != made_by(&strips[0])) {
+        let (file, difference) = (strip.file.name.clone(), StripDifference::Input);
+        return Err(failed(StripsError::Unlike { file, difference }));
+    }
     let totals = Totals::of(&form, &strips);
     if as_json {
         return print_answer("lamp-info-strips-1", &json(&totals, &strips));
@@ -59,12 +66,23 @@ pub(super) fn print_strips(folder: &Path, as_json: bool) -> Result<(), Exit> {
     print(&text(&name, &totals, &strips))
 }
 
-fn read(folder: &Path, file: StripFile) -> Result<Strip, Exit> {
+/// Returns the input of a strip, and the commands that made its build: all but the strip's own.
+fn made_by(strip: &Strip) -> Option<(&str, &[String])> {
+    let stack = strip.totals.first.info.stack.as_ref()?;
+    let (_, commands) = stack.commands.split_last()?;
+    Some((&stack.digest, commands))
+}
+
+fn read(folder: &Path, file: StripFile, number: u32) -> Result<Strip, Exit> {
     let path = folder.join(&file.name);
     let at = |error| failed_at(input_name(&path), error);
     let mut totals: Option<StackTotals> = None;
     for header in Pages::open(&path).map_err(at)?.headers() {
         let header = header.map_err(at)?;
+        check_number(&header.info, number).map_err(|difference| {
+            let file = file.name.clone();
+            Exit::from(StripsError::Unlike { file, difference }).at(input_name(folder))
+        })?;
         match &mut totals {
             Some(totals) => totals.add(&header),
             None => totals = Some(StackTotals::of(&header)),

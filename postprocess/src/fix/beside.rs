@@ -67,8 +67,17 @@ impl Beside<'_> {
 
     /// Holds a band's correction against what the layers show. Rows that they contradict become
     /// the rows that they show.
-    pub(super) fn judge(&self, band: &Range<u32>, guess: Option<Correction>) -> Option<Correction> {
-        let mut shown: Vec<_> = band.clone().map(|row| self.show(row, band)).collect();
+    ///
+    /// A row that a later stage ended has a crossing there, as at the edge of a copy's image in a build:
+    /// layers that lack it show nothing of the row.
+    pub(super) fn judge(
+        &self,
+        band: &Range<u32>,
+        guess: Option<Correction>,
+        is_ended: impl Fn(u32) -> bool,
+    ) -> Option<Correction> {
+        let show = |row: u32| if is_ended(row) { None } else { self.show(row, band) };
+        let mut shown: Vec<_> = band.clone().map(show).collect();
         self.fill(band, &mut shown);
         if shown.iter().all(Option::is_none) {
             return guess;
@@ -206,8 +215,9 @@ fn whole(side: &[&Layer], row: u32, mine: &[f64], band: &Range<u32>, most: usize
         if columns.len() % 2 == 1 || columns.len() > mine.len() + most {
             return None;
         }
-        // A layer whose contours break off near by may miss the same crossings.
-        if columns.len() == mine.len() && is_open_near(layer, band) {
+        // A layer whose contours break off near by may miss the same crossings, and a row that looks
+        // whole in itself is judged by layers that are beyond doubt.
+        if mine.len().is_multiple_of(2) && is_open_near(layer, band) {
             return None;
         }
         let columns: Vec<f64> = columns.iter().map(|&column| column.into()).collect();

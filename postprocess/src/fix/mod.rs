@@ -346,7 +346,7 @@ fn correct(
             (rebuilt, traced) => rebuilt.or(traced),
         };
         let beside = Beside { mask, sides: scene.neighbours };
-        beside.judge(band, guess)?
+        beside.judge(band, guess, is_ended)?
     };
     if options.method == FixMethod::Nearest {
         // The gap and what touches are known from the contours, whatever the method.

@@ -1,11 +1,11 @@
 //! The index of a folder of strips.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_stack::{MAX_SIDE, StackError};
+use lamp_stack::{MAX_SIDE, StackError, one_line};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -103,7 +103,21 @@ impl StripIndex {
             file: INDEX.to_owned(),
             source: StackError::Io(error),
         })?;
-        Self::parse(&text)
+        let index = Self::parse(&text)?;
+        index.check_no_more(folder)?;
+        Ok(index)
+    }
+
+    /// Checks that a folder has no strips that the index does not list.
+    fn check_no_more(&self, folder: &Path) -> Result<(), StripsError> {
+        for entry in fs::read_dir(folder).map_err(StackError::Io)? {
+            let file = entry.map_err(StackError::Io)?.file_name().to_string_lossy().into_owned();
+            let is_strip = file.starts_with("strip_") && file.ends_with(".tif");
+            if is_strip && self.strips.iter().all(|strip| strip.file != file) {
+                return Err(StripsError::More { file: one_line(&file) });
+            }
+        }
+        Ok(())
     }
 
     fn parse(text: &str) -> Result<Self, StripsError> {

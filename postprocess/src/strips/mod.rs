@@ -39,7 +39,7 @@ const COMMAND: &str = "strip";
 pub use form::{StripFile, StripForm, strip_files};
 pub use index::IndexError;
 pub use join_swaths::JoinSwathsError;
-pub use read::{StripDifference, is_strips, join_strips};
+pub use read::{StripDifference, check_number, is_strips, join_strips};
 pub use seam::Seam;
 pub use strips_error::StripsError;
 pub use write::StripWriter;

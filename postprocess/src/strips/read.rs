@@ -139,12 +139,23 @@ impl StripReader {
         if self.left == 0 {
             return Some(StripDifference::Unlisted { layer: info.name() });
         }
-        if info.other.get("strip").map(|strip| &strip["number"]) != Some(&swath.into()) {
-            return Some(StripDifference::Number { layer: info.name(), number: swath });
+        if let Err(difference) = check_number(info, swath) {
+            return Some(difference);
         }
         let digest = info.stack.as_ref().map(|stack| stack.digest.clone())?;
         let first = self.digest.get_or_insert_with(|| digest.clone());
         (*first != digest).then_some(StripDifference::Input)
+    }
+}
+
+/// Checks that a page says that it is of a strip, counted from 0.
+///
+/// # Errors
+/// Returns an error if it says anything else.
+pub fn check_number(page: &PageInfo, strip: u32) -> Result<(), StripDifference> {
+    match page.other.get("strip").map(|of| &of["number"]) == Some(&strip.into()) {
+        true => Ok(()),
+        false => Err(StripDifference::Number { layer: page.name(), number: strip }),
     }
 }
 

@@ -58,6 +58,12 @@ pub enum StripsError {
     /// The index is malformed.
     #[error("{index}: this is no index of strips", index = super::INDEX)]
     Index(#[source] IndexError),
+    /// A file has the name of a strip, and is of another build.
+    #[error("{file} is no strip of this build: {index} does not list it", index = super::INDEX)]
+    More {
+        /// The file's name.
+        file: String,
+    },
     /// A strip cannot be read.
     #[error("{file}")]
     In {

@@ -121,7 +121,7 @@ fn at_edge() -> (String, Mask) {
 /// Gaps on both sides of the sphere, the one where the other ends.
 fn touching() -> (String, Mask) {
     let scratch = broken("sphere --facets 1k --defect drop --count 14 --seed 3", "");
-    let kinds = &["ends white", "unbalanced"];
+    let kinds = &["ends white", "unbalanced", "touching"];
     pair("fix_touching", &corrected(&scratch, 18, kinds, ""))
 }
 

@@ -35,7 +35,8 @@ static int is_closed(const char *path) {
 
 static int is_file(int fd) {
     struct stat found;
-    return fstat(fd, &found) == 0 && S_ISREG(found.st_mode);
+    /* Temporary files without a name are no outputs. */
+    return fstat(fd, &found) == 0 && S_ISREG(found.st_mode) && found.st_nlink > 0;
 }
 
 static int opened(int fd, int flags) {

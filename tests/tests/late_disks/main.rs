@@ -38,6 +38,33 @@ const WRITERS: &[&str] = &[
     "lamp learn out/ --start good.tif --material pegda-sudan",
     "lamp target squares --sizes 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
     "lamp sample cube -o out.stl",
+    "lamp edit good.tif edits.toml -o out.tif",
+    "lamp support good.tif --part ball.stl -o out.tif",
+    "lamp compose build.json -o out.tif",
+    "lamp cure good.tif --material lamp-suspension --section y=0mm -o out.png",
+    "lamp plan voxels good.tif --material pegda-sudan -o out.tif",
+    "lamp heights ball.stl --report out.csv",
+    "lamp orient ball.stl --directions 20 --plot out.svg",
+    "lamp learn job --measured a.csv --law single -o out.csv",
+];
+
+/// Commands that write nothing by themselves, or only by way of those above; nights keep a store and are
+/// attacked by kills (`batch_kills`), calibration writes as `sample` does.
+const OTHERS: &[&str] = &[
+    "demo",
+    "info",
+    "verify",
+    "compare",
+    "view",
+    "machine",
+    "material",
+    "projector",
+    "calibrate",
+    "brep",
+    "batch",
+    "completions",
+    "man",
+    "help",
 ];
 
 /// What fails, and whether the command must fail with it.
@@ -77,9 +104,16 @@ fn scratch() -> Scratch {
         "slice ball.stl --dpi 40 --thickness 2mm --material lamp-suspension -q -o good.tif",
         "lamp sample tower --facets 2k --defect drop --count 20 --seed 7 -q -o broken.stl",
         "slice broken.stl --dpi 100 --thickness 2mm -q -o stray.tif",
+        "tile good.tif --area 2x2in --mesh none -q --recipe build.json",
+        "lamp learn job --start good.tif --material pegda-sudan -q",
     ] {
         scratch.run(line).succeeds();
     }
+    let edit =
+        "[[edit]]\nop = \"subtract\"\nbox = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n";
+    scratch.write("edits.toml", edit.as_bytes());
+    let rows: String = (0..6).map(|layer| format!("{layer},{},0\n", 10 * layer)).collect();
+    scratch.write("a.csv", format!("layer,over_px,under_px\n{rows}").as_bytes());
     scratch
 }
 
@@ -93,6 +127,13 @@ fn output(scratch: &Scratch, line: &str) -> Option<Vec<u8>> {
         fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     Some(files.iter().flat_map(|file| fs::read(file).unwrap()).collect())
+}
+
+/// Puts the learning job back as it was begun.
+fn restart_job(scratch: &Scratch) {
+    for name in ["print-000-measured.csv", "print-001.csv", "print-001-doses.csv"] {
+        let _ = fs::remove_file(scratch.path("job").join(name));
+    }
 }
 
 fn clear(scratch: &Scratch, names: &[String]) {
@@ -115,6 +156,7 @@ fn attack(library: &Path, line: &str) -> usize {
         let mut at = 1;
         loop {
             clear(&scratch, &names);
+            restart_job(&scratch);
             let mut command = scratch.command(line);
             command.env("LD_PRELOAD", library).env("LAMP_FAIL", call);
             command.env("LAMP_FAIL_AT", at.to_string()).env("LAMP_FAIL_DONE", &done);
@@ -147,6 +189,22 @@ fn attack(library: &Path, line: &str) -> usize {
         }
     }
     all
+}
+
+#[test]
+fn every_command_that_writes_is_attacked() {
+    let scratch = Scratch::new();
+    let ran = scratch.run("lamp completions fish").succeeds_quietly();
+    let text = String::from_utf8(ran.stdout).unwrap();
+    let of_lamp =
+        text.lines().filter_map(|line| line.split("__fish_lamp_needs_command\" -f -a \"").nth(1));
+    let commands: Vec<&str> = of_lamp.map(|rest| rest.split('"').next().unwrap()).collect();
+    assert!(commands.len() > 30, "{commands:?}");
+    for command in commands {
+        let mut words = WRITERS.iter().map(|line| line.strip_prefix("lamp ").unwrap_or(line));
+        let is_attacked = words.any(|line| line.split(' ').next() == Some(command));
+        assert!(is_attacked || OTHERS.contains(&command), "{command}: add it to the writers");
+    }
 }
 
 #[test]

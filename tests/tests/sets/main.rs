@@ -21,12 +21,13 @@ use std::thread;
 
 use lamp_tests::{Scratch, tilted_ball, workspace_root};
 
-use faults::{Fault, Form};
+use faults::Form;
 
 /// Commands that read a stack, as users type them: `S` is the stack, `out` what they write, if they
 /// do; else their answer counts.
 const READERS: &[&str] = &[
     "fix S -o out.tif",
+    "fix S -o out/",
     "dither S -o out.tif",
     "lamp compensate S --uniform 100um -o out.tif",
     "lamp edit S edits.toml -o out.tif",

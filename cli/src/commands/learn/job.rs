@@ -19,7 +19,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::speed::{PartLayer, PartPages, Platform, TimedPart};
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::{digest_of, is_sealed, sealed};
+use lamp_stack::{digest_of, sealed, unsealed};
 use serde::{Deserialize, Serialize};
 
 use super::measured::Measured;
@@ -92,13 +92,10 @@ pub(super) fn digest_of_file(file: &Path) -> Result<String, Exit> {
 /// Reads a text that this command sealed.
 fn read_sealed(file: &Path, max: u64, what: &str) -> anyhow::Result<String> {
     let text = read_text(file, max, what)?;
-    if !is_sealed(&text) {
+    unsealed(&text).map(ToOwned::to_owned).ok_or_else(|| {
         let name = file.file_name().unwrap_or_default().display();
-        return Err(anyhow!(
-            "{name} is not as lamp learn wrote it: bring it back, or begin another job"
-        ));
-    }
-    Ok(text)
+        anyhow!("{name} is not as lamp learn wrote it: bring it back, or begin another job")
+    })
 }
 
 pub(super) fn read_job(folder: &Path) -> Result<JobFile, Exit> {
@@ -122,7 +119,7 @@ impl Job {
             return Err(Exit::Failed(anyhow!(text)).at(stack.display().to_string()));
         }
         let (material, text) = read_file::<Material>(&folder.join(MATERIAL))?;
-        if !is_sealed(&text) {
+        if unsealed(&text).is_none() {
             let text = "this is not the resin that the job was begun with: begin another job";
             return Err(Exit::Failed(anyhow!(text)).at(folder.join(MATERIAL).display().to_string()));
         }
@@ -160,7 +157,12 @@ impl Job {
         // Without a next print, what was measured was kept by a run that did not end.
         let next = self.folder.join(profile_name(number + 1));
         let is_learnt_from = measured.exists() && next.exists();
-        let measured = is_learnt_from.then(|| Measured::read(&measured)).transpose()?;
+        let read = || -> anyhow::Result<_> {
+            let text = read_sealed(&measured, MAX_TABLE, "a table of measurements")?;
+            Ok((Measured::parse(&text)?, text))
+        };
+        let measured = is_learnt_from.then(read).transpose();
+        let measured = measured.map_err(|error| self.failed(&measured_name(number), error))?;
         if times.iter().any(|ms| *ms <= 0.0) {
             let text = "exposure_ms must be above zero".to_owned();
             return Err(self.failed(&profile_name(number), anyhow!(text)));
@@ -214,7 +216,8 @@ impl Job {
 
     /// Refuses what was given for an earlier print, word for word.
     pub(super) fn refuse_known(&self, print: usize, text: &str) -> Result<(), Exit> {
-        let same = |print: &Print| print.measured.as_ref().is_some_and(|(_, known)| known == text);
+        let same =
+            |print: &Print| print.measured.as_ref().is_some_and(|(_, known)| is_same(known, text));
         match self.prints.iter().position(same) {
             Some(earlier) => Err(Exit::Failed(anyhow!(
                 "{}: these are the measurements of print {earlier}, given twice: measure print \
@@ -233,7 +236,8 @@ impl Job {
         if learned.log_doses.iter().any(|&log| log != 0.0) {
             put(doses_name(print + 1), &sealed(&self.doses(learned)))?;
         }
-        put(measured_name(print), text)?;
+        let end = if text.ends_with('\n') { "" } else { "\n" };
+        put(measured_name(print), &sealed(&format!("{text}{end}")))?;
         // The print is there once its times are.
         put(profile_name(print + 1), &sealed(&self.profile(&learned.times)))
     }
@@ -251,7 +255,7 @@ impl Job {
     pub(super) fn take_back(&mut self, text: &str) -> Option<usize> {
         let print = self.prints.len().checked_sub(2)?;
         let (_, known) = self.prints[print].measured.as_ref()?;
-        if known != text {
+        if !is_same(known, text) {
             return None;
         }
         self.prints.truncate(print + 1);
@@ -264,7 +268,7 @@ impl Job {
         let name = profile_name(print + 1);
         let before = read_sealed(&self.folder.join(&name), MAX_TABLE, "a table of times");
         let before = before.map_err(|error| self.failed(&name, error))?;
-        if before == sealed(&self.profile(&learned.times)) {
+        if before == self.profile(&learned.times) {
             return Ok(());
         }
         let text = anyhow!(
@@ -293,6 +297,11 @@ impl Job {
     pub(super) fn origin_mm(&self) -> Option<[f64; 2]> {
         self.file.origin_mm
     }
+}
+
+/// Returns true if two tables are the same, but for blank lines at the end.
+fn is_same(a: &str, b: &str) -> bool {
+    a.trim_end() == b.trim_end()
 }
 
 fn measured_name(print: usize) -> String {

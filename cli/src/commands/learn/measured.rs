@@ -54,7 +54,7 @@ impl Measured {
         Ok(read().with_context(|| input_name(path))?)
     }
 
-    fn parse(text: &str) -> anyhow::Result<Self> {
+    pub(super) fn parse(text: &str) -> anyhow::Result<Self> {
         let table = CsvTable::parse(text)?;
         let has = |column: &str| table.columns().iter().any(|name| name == column);
         let measured = if has("layer") { Self::areas(&table)? } else { Self::heights(&table)? };

@@ -97,10 +97,10 @@ impl Work<'_> {
     fn report(&self, path: &Path) -> Result<StackReport, Exit> {
         let progress = Progress::new("report", self.common, true);
         let stack = open_indexed(path)?.into_whole();
-        let stack = stack.map_err(|error| failed_at(shown_name(path), error))?;
+        let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
         let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
         progress.done();
-        report.map_err(|error| error.at(shown_name(path)))
+        report.map_err(|error| error.at(input_name(path)))
     }
 
     /// Writes the page of a stack, or prints the numbers of all stacks.

@@ -186,8 +186,8 @@ impl Recipe {
         if version.code != TILE_CODE {
             return Err(RecipeError::Code { found: version.code, known: TILE_CODE });
         }
-        let form: RecipeForm = serde_json::from_str(text).map_err(json)?;
-        if form.digest != form.digest() {
+        let mut form: RecipeForm = serde_json::from_str(text).map_err(json)?;
+        if std::mem::take(&mut form.digest) != form.digest() {
             return Err(RecipeError::Changed);
         }
         form.check()?;

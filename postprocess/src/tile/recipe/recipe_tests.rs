@@ -14,6 +14,7 @@ use super::super::{
     BuildFinding, BuildWanted, CellShape, HeightOptions, Layout, MeshOptions, MeshPattern, Moat,
     Pack, PackBy, PartStack, TileError, Turns,
 };
+use super::form::RecipeForm;
 use super::{Composer, Recipe, RecipeError, RecipePart, TILE_CODE};
 
 /// Numbers that look random, the same each time.
@@ -279,11 +280,16 @@ fn what_is_no_recipe_is_refused_in_a_sentence() {
     let plan = Plan { fit: true, ..Plan::of(&one, Some(Moat::Rising)) };
     let text = plan.made().1.to_json();
     let refused = |text: &str| {
-        let composed = Recipe::from_json(text)
+        // With a digest of what it says now, if it says something.
+        let form = serde_json::from_str::<RecipeForm>(text);
+        let text = form.map_or_else(|_| text.to_owned(), |form| form.to_json());
+        let composed = Recipe::from_json(&text)
             .and_then(|recipe| Composer::new(&recipe, folder.path()))
             .and_then(|mut composer| composer.range(0..99)?.collect::<Result<Vec<_>, _>>());
         composed.unwrap_err().to_string()
     };
+    let changed = Recipe::from_json(&text.replacen("110x84mm", "110x85mm", 1));
+    assert!(matches!(changed, Err(RecipeError::Changed)));
     for end in (0..text.len() - 2).step_by(7) {
         assert!(refused(&text[..end]).starts_with("this is not a recipe: "), "{end}");
     }
