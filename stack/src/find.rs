@@ -63,11 +63,13 @@ fn add_stacks(
         let is_page = pages.as_ref().is_some_and(|pages| pages.contains(&path));
         match path.metadata() {
             Ok(metadata) if metadata.is_dir() => add_stacks(&path, seen, stacks)?,
-            Ok(metadata) if !metadata.is_file() && !is_page => {
-                if is_stack_name(&path) || is_picture(&path) {
-                    let why = format!("{} is a pipe or a device, not a stack", path.display());
-                    return Err(io::Error::other(why));
-                }
+            Ok(metadata)
+                if !metadata.is_file()
+                    && !is_page
+                    && (is_stack_name(&path) || is_picture(&path)) =>
+            {
+                let why = format!("{} is a pipe or a device, not a stack", path.display());
+                return Err(io::Error::other(why));
             }
             // Pictures next to pages are thumbnails and the like.
             Ok(_) if !is_page && is_stack_file(&path, pages.is_none()) => stacks.push(path),
