@@ -170,7 +170,7 @@ impl SlicingOptions {
         let mut options = words.split_off(first);
         let mut take = |option: &str| {
             let at = options.iter().position(|word| word == option)?;
-            options.drain(at..options.len().min(at + 2)).last()
+            options.drain(at..options.len().min(at + 2)).next_back()
         };
         // Of the machine, all that decided images stands in other options.
         let [fallback, _] = ["--fallback", "--machine"].map(&mut take);

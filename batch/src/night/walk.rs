@@ -95,8 +95,11 @@ impl Walk {
             return Vec::new();
         }
         let mut paths = Vec::new();
-        let read = fs::read_dir(folder).and_then(|entries| {
-            entries.into_iter().try_for_each(|entry| Ok(paths.push(entry?.path())))
+        let read = fs::read_dir(folder).and_then(|mut entries| {
+            entries.try_for_each(|entry| {
+                paths.push(entry?.path());
+                Ok(())
+            })
         });
         if let Err(error) = read {
             self.closed.push((folder.to_owned(), error));

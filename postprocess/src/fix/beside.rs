@@ -133,13 +133,13 @@ impl Beside<'_> {
                 continue;
             }
             let (above, to) = (above.clone(), to.clone());
-            for at in start..end {
+            for (at, shown) in shown.iter_mut().enumerate().take(end).skip(start) {
                 let share = (at - from) as f64 / (end - from) as f64;
                 let pairs = above.missing.iter().zip(&to.missing);
                 let missing = pairs
                     .map(|(a, b)| [a[0].min(b[0]), a[1].max(b[1]), a[2] + share * (b[2] - a[2])]);
                 let confidence = above.confidence.min(to.confidence).min(BY_ONE);
-                shown[at] = Some(Shown { missing: missing.collect(), confidence });
+                *shown = Some(Shown { missing: missing.collect(), confidence });
             }
         }
     }

@@ -207,7 +207,7 @@ fn every_command_is_in_the_matrix() {
         let is_reader =
             |line: &&str| line.strip_prefix("lamp ").unwrap_or(line).starts_with(command);
         assert!(
-            READERS.iter().any(|line| is_reader(&line)) || OTHERS.contains(&command),
+            READERS.iter().any(is_reader) || OTHERS.contains(&command),
             "{command}: add it to the matrix if it reads stacks, else to the others"
         );
     }
