@@ -103,7 +103,7 @@ fn format(path: &Path) -> Option<FileFormat> {
     FileFormat::of_start(&start, None)
 }
 
-/// Returns the files of a folder that are the pages of one stack. The first file that tells decides.
+/// Returns the files of a folder that are the pages of one stack. The first file that says so decides.
 fn pages_of(folder: &Path) -> Option<Vec<PathBuf>> {
     let PageFiles { files, left_out, .. } = match PageFiles::of(folder) {
         Ok(found) => found,

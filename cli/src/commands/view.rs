@@ -117,7 +117,7 @@ fn new_token() -> Result<Token, Exit> {
 }
 
 /// Opens the usual browser; returns none if there is none. Arguments are seen by all users of the
-/// machine, so what it is told to open is a file that it alone can read, and that leads to an
+/// machine, so it gets a file that it alone can read, and that leads to an
 /// address of its own: the one that was printed stays good. The file is gone once the page is asked
 /// for, or the viewer ends.
 fn open_in_browser(address: &Address) -> Result<Option<Ticket>, Exit> {

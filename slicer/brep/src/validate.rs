@@ -284,7 +284,7 @@ fn off(
     worst.map(|&(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
 }
 
-/// What lies off where it is not edges.
+/// The things other than edges that are off.
 const FACETS: &str = "facets";
 
 /// How far edges and facets may lie off their surface, as a part of the body's longest side.
