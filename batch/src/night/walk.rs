@@ -50,7 +50,10 @@ impl Walk {
 
     fn go(&mut self, at: &Path, steps: &[Step<'_>]) {
         let Some((step, rest)) = steps.split_first() else {
-            if !at.is_dir() && at.symlink_metadata().is_ok() {
+            // Also one that cannot be looked at, as in a folder that lets its names be read alone.
+            let is_missing = |error: &io::Error| matches!(error.kind(), NotFound | NotADirectory);
+            let is_there = at.symlink_metadata().map_or_else(|error| !is_missing(&error), |_| true);
+            if is_there && !at.is_dir() {
                 self.files.push(at.to_owned());
             }
             return;

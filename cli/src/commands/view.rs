@@ -116,7 +116,7 @@ fn new_token() -> Result<Token, Exit> {
     Ok(Token::new().context("random numbers for the address")?)
 }
 
-/// Opens the usual browser; returns none if there is none. Arguments are seen by all users of the
+/// Opens the usual browser; returns `None` without one. Arguments are seen by all users of the
 /// machine, so it gets a file that it alone can read, and that leads to an
 /// address of its own: the one that was printed stays good. The file is gone once the page is asked
 /// for, or the viewer ends.

@@ -307,7 +307,7 @@ fn missing_from(partners: &[usize], count: usize) -> Vec<usize> {
     (0..count).filter(|which| partners.binary_search(which).is_err()).collect()
 }
 
-/// Matches all crossings of a row with those of a longer one, in order, so that they lie as near
+/// Matches all crossings of a row with crossings of a longer row, in order, so that they lie as near
 /// to each other as possible. `None` if one lies further off than `most`.
 fn inject(row: &[f64], longer: &[f64], most: f64) -> Option<Vec<usize>> {
     let more = longer.len().checked_sub(row.len()).filter(|&more| more <= MAX_MISSING)?;

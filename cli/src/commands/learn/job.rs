@@ -299,7 +299,7 @@ impl Job {
     }
 }
 
-/// Returns true if two tables are the same, but for blank lines at the end.
+/// Returns true if two tables are the same, except for blank lines at the end.
 fn is_same(a: &str, b: &str) -> bool {
     a.trim_end() == b.trim_end()
 }

@@ -136,10 +136,10 @@ impl Refined {
 
 /// Halves the sides that two triangles share and that are too long, and both triangles with
 /// them, until none is, or until there are more than `most` triangles. In between, sides are
-/// turned to be Delaunay: ears reach across a strip many times as long as it is wide, and
+/// turned to be Delaunay: ears reach across a strip much longer than wide, and
 /// halving alone would never make them follow it.
 ///
-/// `places` are those of the corners; `is_long` tells of two corners and `halve` makes the one
+/// `places` has the corners; `is_long` says of two corners and `halve` makes the one
 /// between.
 pub(super) fn refine(
     mut triangles: Vec<[usize; 3]>,
@@ -187,7 +187,7 @@ const MOST_TURNS: usize = 30;
 
 /// Turns sides that two triangles share to the other diagonal of both, where that is Delaunay.
 ///
-/// Triangles that lie upside down stay, and so do sides beside them. Each turn lowers the
+/// Triangles that lie upside down stay, and so do the sides next to them. Each turn lowers the
 /// triangles lifted to a paraboloid, so that turning ends.
 fn turn_sides(triangles: &mut [[usize; 3]], places: &[Point2<f64>]) {
     let key = |a: usize, b: usize| [a.min(b), a.max(b)];
