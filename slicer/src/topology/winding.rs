@@ -11,8 +11,8 @@ use crate::topology::CornerTable;
 const MOST_FACETS: usize = 200_000_000;
 
 /// Returns the first of some facets beside which its solid is wound around twice, or turned
-/// inside out, and the place. `off_mm` is the distance to the side of a facet that is looked at, and `solid` gives
-/// the facets of the same solid.
+/// inside out, and the place. `off_mm` is the distance to the side of a facet that is looked at,
+/// and `solid` gives the facets of the same solid.
 ///
 /// Facets may lie exactly on each other's edges here: no place is on a facet's border.
 pub(crate) fn wound_twice(
