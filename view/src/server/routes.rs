@@ -27,6 +27,8 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
     Router::new()
         .route("/", get(|| async { page() }))
         .route("/assets/{name}", get(file))
+        // Browsers ask for this name wherever a document has not named an icon yet.
+        .route("/favicon.ico", get(|| async { asset_named("icon.svg") }))
         .route("/api/session", get(session))
         .route("/api/findings", get(findings))
         .route("/api/surface", get(surface_state))
