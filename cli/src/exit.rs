@@ -5,6 +5,7 @@ use std::io;
 
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
+use lamp_grayscale::exposure::{ExposureError, LampError};
 use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
 use lamp_planning::{LightError, NoLight};
@@ -152,7 +153,9 @@ failures!(
     JoinError,
     SplitError,
     DataError,
-    FitError
+    FitError,
+    ExposureError,
+    LampError,
 );
 
 /// Tells failures to write from stacks without layers; errors of the layers pass through as they

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::calibrate::{CsvTable, ExposureTimes};
-use lamp_grayscale::material::{Material, ResinError};
-use lamp_grayscale::resin::{CureModel, Dose, ExposureTime, Intensity, depth_levels};
-use lamp_stack::{DepthLevels, FadingLevels, Length};
+use lamp_grayscale::exposure::Exposure;
+use lamp_grayscale::material::Material;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -17,7 +16,6 @@ use crate::catalogue::{
 };
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
-use crate::measured_doses::MeasuredDoses;
 use crate::recorded::text;
 use crate::streams::input_name;
 
@@ -53,29 +51,10 @@ pub(crate) struct ExposureOptions {
     exposure_table: Option<PathBuf>,
 }
 
-/// Exposure times by layer thickness.
-pub(crate) struct Exposure {
-    name: String,
-    /// The word that stacks record for the material or table.
-    word: String,
-    source: Source,
-}
-
-enum Source {
-    Resin(Box<Curing>),
-    Table(ExposureTimes),
-}
-
-/// How white cures layers.
-struct Curing {
-    material: Material,
-    /// Unknown where only doses are.
-    light: Option<Intensity>,
-    model: Box<dyn CureModel>,
-    overcure: f64,
-    doses: MeasuredDoses,
-    /// What is doubtful about the lamp.
-    lamp_doubt: Option<String>,
+/// An exposure, and the word that stacks record for its material or table.
+pub(crate) struct RecordedExposure {
+    pub(crate) word: String,
+    pub(crate) exposure: Exposure,
 }
 
 impl Default for ExposureOptions {
@@ -87,8 +66,8 @@ impl Default for ExposureOptions {
 
 impl ExposureOptions {
     /// Puts the word of the material or table in the place of its path, as stacks record it.
-    pub(crate) fn name(&mut self, exposure: Option<&Exposure>) {
-        let Some(Exposure { word, .. }) = exposure else { return };
+    pub(crate) fn name(&mut self, word: Option<&str>) {
+        let Some(word) = word else { return };
         self.paths_mut().for_each(|path| *path = PathBuf::from(word));
     }
 
@@ -143,24 +122,20 @@ impl ExposureOptions {
     }
 
     /// Returns the exposure, if a material or a table is given.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
+    pub(crate) fn exposure(&self) -> Result<Option<RecordedExposure>, Exit> {
         if let Some(path) = &self.exposure_table {
             let (file, _) = without_digest(path);
             let read = || read_times(&file);
             let (times, text) = read().with_context(|| input_name(&file))?;
             let (name, word) = (input_name(&file), word_of_text(&file, &text));
             check_word(path, &word)?;
-            return Ok(Some(Exposure { name, word, source: Source::Table(times) }));
+            let exposure = Exposure::by_table(name, times);
+            return Ok(Some(RecordedExposure { word, exposure }));
         }
         let Some(path) = &self.material else { return Ok(None) };
         let (material, word) = entry_and_word(path)?;
-        let (material, lamp_doubt) = self.lamp.material(material)?;
-        let model = material.cure_model().map_err(|error| Exit::Failed(error.into()))?;
-        let light = material.light().map_err(anyhow::Error::new)?;
-        let doses = MeasuredDoses::of_depths(&material);
-        let (name, overcure) = (material.name.clone(), self.overcure);
-        let curing = Curing { material, light, model, overcure, doses, lamp_doubt };
-        Ok(Some(Exposure { name, word, source: Source::Resin(Box::new(curing)) }))
+        let exposure = Exposure::by_material(material, self.lamp.light(), self.overcure)?;
+        Ok(Some(RecordedExposure { word, exposure }))
     }
 }
 
@@ -170,104 +145,11 @@ fn read_times(path: &Path) -> anyhow::Result<(ExposureTimes, String)> {
     Ok((ExposureTimes::new(&CsvTable::parse(&text)?)?, text))
 }
 
-impl Exposure {
-    /// Returns the numbers of the material that decide exposures, as stacks record them: the curve,
-    /// doses and light under the lamp as it is now.
-    pub(crate) fn numbers(&self) -> Option<Value> {
-        let Source::Resin(curing) = &self.source else { return None };
-        Some(serde_json::to_value(&curing.material).expect("a material is texts and numbers"))
-    }
-
-    /// Checks that a layer has an exposure. Without a light, its dose is enough.
-    pub(crate) fn check(&self, thickness: Length) -> Result<(), Exit> {
-        match &self.source {
-            Source::Resin(curing) if curing.light.is_none() => {
-                self.dose(curing, thickness).map(|_| ())
-            }
-            _ => self.time(thickness).map(|_| ()),
-        }
-    }
-
-    /// Checks that exposures have times, and not only doses.
-    pub(crate) fn check_light(&self) -> Result<(), Exit> {
-        match &self.source {
-            Source::Resin(curing) if curing.light.is_none() => Err(self.no_light()),
-            _ => Ok(()),
-        }
-    }
-
-    /// Returns the exposure time of a layer, rounded to the microsecond.
-    ///
-    /// # Errors
-    /// Where the resin or the table does not tell it.
-    pub(crate) fn time(&self, thickness: Length) -> Result<ExposureTime, Exit> {
-        let time = match &self.source {
-            Source::Resin(curing) => {
-                let light = curing.light.ok_or_else(|| self.no_light())?;
-                self.dose(curing, thickness)? / light
-            }
-            Source::Table(times) => times.of(thickness.to_whole_nm()).ok_or_else(|| {
-                let ([least, most], thickness) = (times.limits(), thickness.to_whole_nm());
-                self.failed(anyhow!("the table covers {least} to {most}, not {thickness}"))
-            })?,
-        };
-        Ok(ExposureTime::from_ms((time.ms() * 1000.0).round() / 1000.0))
-    }
-
-    /// Returns the gray level of each depth in layers of one thickness.
-    ///
-    /// # Errors
-    /// Where the resin does not say them; a table of times never does.
-    pub(crate) fn levels(&self, thickness: Length) -> Result<DepthLevels, Exit> {
-        let Source::Resin(curing) = &self.source else {
-            return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
-        };
-        let levels = depth_levels(&*curing.model, self.white(curing, thickness)?);
-        levels.map_err(|error| self.failed(error.into()))
-    }
-
-    /// Returns sentences on a lamp, and on doses that layers of these thicknesses take, that the
-    /// material was not measured at.
-    pub(crate) fn doubts(&self, thicknesses: impl Iterator<Item = Length>) -> Vec<String> {
-        let Source::Resin(curing) = &self.source else { return Vec::new() };
-        thicknesses.flat_map(|um| self.white(curing, um)).for_each(|dose| curing.doses.see(dose));
-        curing.lamp_doubt.clone().into_iter().chain(curing.doses.doubt("layers")).collect()
-    }
-
-    /// Returns the dose that cures a layer.
-    fn dose(&self, curing: &Curing, thickness: Length) -> Result<Dose, Exit> {
-        let depth = Length::from_um(thickness.to_whole_nm().um() * curing.overcure);
-        curing.model.dose(depth).map_err(|error| self.failed(error.into()))
-    }
-
-    /// Returns the dose that a layer gets, by its rounded time where there is a light.
-    fn white(&self, curing: &Curing, thickness: Length) -> Result<Dose, Exit> {
-        match curing.light {
-            Some(light) => Ok(light * self.time(thickness)?),
-            None => self.dose(curing, thickness),
-        }
-    }
-
-    fn no_light(&self) -> Exit {
-        let error = ResinError::NoLight(self.name.clone());
-        Exit::Failed(error.into())
-    }
-
-    /// Returns what each gray level leaves in layers of one thickness, where doses add up.
-    ///
-    /// # Errors
-    /// Where the resin does not say how light fades; a table of times never does.
-    pub(crate) fn fading_levels(&self, thickness: Length) -> Result<FadingLevels, Exit> {
-        let Source::Resin(curing) = &self.source else {
-            return Err(self.failed(anyhow!("gray levels need a material, not exposure times")));
-        };
-        let fading = curing.material.fading().map_err(|error| self.failed(error.into()))?;
-        Ok(fading.levels(self.time(thickness)?))
-    }
-
-    fn failed(&self, error: anyhow::Error) -> Exit {
-        Exit::Failed(error).at(self.name.clone())
-    }
+/// Returns the numbers of the material that decide exposures, as stacks record them: the curve,
+/// doses and light under the lamp as it is now.
+pub(crate) fn numbers(exposure: &Exposure) -> Option<Value> {
+    let material = exposure.material()?;
+    Some(serde_json::to_value(material).expect("a material is texts and numbers"))
 }
 
 /// Parses the depth that white cures, in layers.

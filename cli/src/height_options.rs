@@ -9,12 +9,12 @@ use lamp_adaptive::{
     SweptLayer, Thicknesses, VolumeDeviation, Watch,
 };
 use lamp_grayscale::calibrate::format_significant;
+use lamp_grayscale::exposure::Exposure;
 use lamp_slicer::{FacetIndex, Fill};
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
-use crate::exposure::Exposure;
 use crate::options::{one_of, parse_thickness};
 use crate::progress::Progress;
 use crate::recorded::optional;

@@ -7,6 +7,7 @@ use std::io;
 
 use lamp_adaptive::HeightsError;
 use lamp_grayscale::calibrate::DataError;
+use lamp_grayscale::exposure::{ExposureError, LampError};
 use lamp_grayscale::material::MaterialError;
 use lamp_planning::LightError;
 use lamp_planning::ecpl;
@@ -44,6 +45,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(support))
         .or_else(|| error.downcast_ref().and_then(surface))
         .or_else(|| error.downcast_ref().and_then(compensate))
+        .or_else(|| error.downcast_ref().and_then(lamp))
+        .or_else(|| error.downcast_ref().and_then(exposure))
         .or_else(|| error.downcast_ref().and_then(light))
         .or_else(|| error.downcast_ref().and_then(plan))
         .or_else(|| error.downcast_ref().and_then(ecpl))
@@ -270,6 +273,20 @@ fn compensate(error: &CompensateError) -> Option<String> {
         _ => return None,
     };
     Some(hint.to_owned())
+}
+
+fn lamp(error: &LampError) -> Option<String> {
+    match error {
+        LampError::NoOwnLight(_) => Some("give --lamp-intensity as 1.2W/cm2".to_owned()),
+        _ => None,
+    }
+}
+
+fn exposure(error: &ExposureError) -> Option<String> {
+    match error {
+        ExposureError::Lamp(error) => lamp(error),
+        _ => None,
+    }
 }
 
 fn light(error: &LightError) -> Option<String> {

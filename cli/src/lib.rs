@@ -22,7 +22,6 @@ mod json_report;
 mod kept_stack;
 mod lamp_option;
 mod licences;
-mod measured_doses;
 mod memory;
 mod mesh_report;
 #[cfg(feature = "occt")]

@@ -9,6 +9,7 @@ use std::thread;
 use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use lamp_grayscale::exposure::parse_lamp_light;
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError, Named, skip_sync};
 
@@ -222,14 +223,7 @@ pub(crate) fn parse_area(text: &str) -> Result<f64, String> {
 
 /// Parses the light of full white, which is some.
 pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
-    match text.parse::<Intensity>() {
-        Ok(light) if light.mw_per_cm2() == 0.0 => {
-            Err("the intensity must be above zero".to_owned())
-        }
-        Ok(light) if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
-        Ok(_) => Err("the intensity must be between 1e-6 and 1e9 mW/cm2".to_owned()),
-        Err(error) => Err(error.to_string()),
-    }
+    parse_lamp_light(text).map_err(|error| error.to_string())
 }
 
 /// Parses a count with an optional `k` or `M`: `750k`, `5.5M`.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
+use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_postprocess::TurnedSlicing;
 use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
@@ -16,7 +17,7 @@ use lamp_stack::{Dpi, Layer, Length, Size, quoted, words};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Exit;
-use crate::exposure::{EXPOSURE, Exposure, ExposureOptions};
+use crate::exposure::{EXPOSURE, ExposureOptions, RecordedExposure, numbers};
 use crate::height_options::{self, HeightOptions};
 use crate::memory::{available, in_words};
 use crate::options::{one_of, parse_thickness};
@@ -209,8 +210,9 @@ impl SlicingOptions {
         self
     }
 
-    /// The command as the stack records it. `parts` are the part's files, with their placements.
-    pub(crate) fn command(&self, parts: &[String], exposure: Option<&Exposure>) -> String {
+    /// The command as the stack records it. `parts` are the part's files, with their placements;
+    /// `exposure` is the word for the material or table.
+    pub(crate) fn command(&self, parts: &[String], exposure: Option<&str>) -> String {
         let parts: String = parts.iter().map(|part| format!(" {}", quoted(part))).collect();
         let mut options = self.clone();
         options.exposure.name(exposure);
@@ -253,9 +255,10 @@ impl SlicingOptions {
         parts: &[String],
         layers: Option<Range<u32>>,
         memory: Option<u64>,
-        exposure: Option<Exposure>,
+        exposure: Option<RecordedExposure>,
         progress: &Progress,
     ) -> Result<(Slices, impl Fn(&mut Layer) + use<>), Exit> {
+        let (word, exposure) = exposure.map(|it| (it.word, it.exposure)).unzip();
         let heights =
             self.adaptive.then(|| self.layer_heights(&model, exposure.as_ref(), progress));
         let heights = heights.transpose()?;
@@ -283,8 +286,8 @@ impl SlicingOptions {
         }
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
-        let command = self.command(parts, exposure.as_ref());
-        let numbers = exposure.as_ref().and_then(Exposure::numbers);
+        let command = self.command(parts, word.as_deref());
+        let numbers = exposure.as_ref().and_then(numbers);
         let name_command = move |layer: &mut Layer| {
             // All thicknesses were tried above.
             let time = |exposure: &Exposure| {
@@ -356,7 +359,7 @@ impl SlicingOptions {
     ///
     /// # Errors
     /// Where options contradict each other, or the material cannot be read.
-    pub(crate) fn exposure(&self) -> Result<Option<Exposure>, Exit> {
+    pub(crate) fn exposure(&self) -> Result<Option<RecordedExposure>, Exit> {
         let needs_top = [(self.gray, "--gray"), (self.adaptive, "--adaptive")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
             && self.plane != PlaneRule::Top
@@ -369,13 +372,14 @@ impl SlicingOptions {
         {
             return Err(Exit::usage(format!("{option} needs --adaptive")));
         }
-        let exposure = self.exposure.exposure()?;
+        let recorded = self.exposure.exposure()?;
+        let exposure = recorded.as_ref().map(|it| &it.exposure);
         // Gray levels need only doses.
-        exposure.iter().filter(|_| !self.gray).try_for_each(Exposure::check_light)?;
+        exposure.filter(|_| !self.gray).map_or(Ok(()), Exposure::check_light)?;
         if self.adaptive {
-            self.heights.check(exposure.as_ref())?;
+            self.heights.check(exposure)?;
         }
-        Ok(exposure)
+        Ok(recorded)
     }
 }
 

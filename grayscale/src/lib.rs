@@ -2,6 +2,7 @@
 //!
 //! - [`material`] reads a resin's numbers from TOML files, some of which are built in.
 //! - [`resin`] has the cure models: depth and width for a dose or gray level, and back.
+//! - [`exposure`] says how long layers are exposed, by a material or a table of times.
 //! - [`calibrate`] finds a material's numbers from measurements, of images that [`target`]
 //!   makes.
 //! - [`dither`] turns gray layers into dots, for machines that expose a pixel or not: a
@@ -32,6 +33,7 @@ mod cured;
 mod diffusion;
 mod dither;
 mod dots;
+pub mod exposure;
 mod homogeneity;
 pub mod material;
 mod ordered;

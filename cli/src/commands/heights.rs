@@ -7,6 +7,7 @@ use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, SweptLayer, uniform_heights,
 };
+use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Dpi, Length};
 use serde::Serialize;
@@ -14,7 +15,7 @@ use serde_json::json;
 
 use crate::endings::parse_table;
 use crate::exit::Exit;
-use crate::exposure::{Exposure, ExposureOptions};
+use crate::exposure::ExposureOptions;
 use crate::height_options::{FoundHeights, HeightOptions, Measure, significant, time_text};
 use crate::json_report::print_answer;
 use crate::options::{Common, parse_thickness};
@@ -75,7 +76,7 @@ pub(crate) struct HeightsArgs {
 
 pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
-    let exposure = args.exposure.exposure()?;
+    let exposure = args.exposure.exposure()?.map(|it| it.exposure);
     exposure.iter().try_for_each(Exposure::check_light)?;
     args.heights.check(exposure.as_ref())?;
     let progress = Progress::new("heights", common, true);

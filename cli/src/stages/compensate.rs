@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime, QuantityError};
 use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
@@ -15,7 +16,6 @@ use crate::catalogue::{canonical_word, entry, is_file};
 use crate::compensate_report::WallReport;
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
-use crate::measured_doses::MeasuredDoses;
 use crate::options::parse_distance;
 use crate::progress::Progress;
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::calibrate::{Estimate, WidthFit, WidthPoint, fit_widths, width_points};
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
 use lamp_stack::Dpi;
@@ -12,7 +13,6 @@ use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::catalogue::entry;
 use crate::exit::Exit;
-use crate::measured_doses::MeasuredDoses;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;

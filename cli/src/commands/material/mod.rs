@@ -6,6 +6,7 @@ mod profile;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin};
 use lamp_stack::{Catalogued, Length};
@@ -14,7 +15,6 @@ use serde_json::{Value, json};
 use crate::catalogue;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
-use crate::measured_doses::MeasuredDoses;
 use crate::options::Common;
 use crate::streams::{input_name, print};
 

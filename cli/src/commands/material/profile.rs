@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::calibrate::format_significant;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
 use lamp_stack::Length;
 
 use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
-use crate::measured_doses::MeasuredDoses;
 use crate::options::{Common, parse_distance};
 use crate::progress::Progress;
 use crate::streams::print;

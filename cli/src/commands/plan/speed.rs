@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::speed::{PartError, PartPages, PlanError, SpeedOptions, TimedPart, plan};
 use lamp_stack::Layer;
@@ -12,7 +13,6 @@ use super::speed_report::{Planned, lines_of, write_report};
 use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, parse_memory};
 use crate::planning_options::{PlannedResin, PlanningOptions};

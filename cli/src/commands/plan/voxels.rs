@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::voxels::{Objective, Options, Outcome, PlanError, PlannedStack, Sources, plan};
 use lamp_stack::Layer;
@@ -12,7 +13,6 @@ use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
 use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::measured_doses::MeasuredDoses;
 use crate::memory;
 use crate::options::{Common, Input, Output, one_of_described, parse_memory};
 use crate::planning_options::{PlannedResin, PlanningOptions};

@@ -1,33 +1,37 @@
-//! Tells of doses outside those that a material's numbers were measured at.
+//! Doses outside the range that a material's numbers were measured at.
 
 use std::sync::{Mutex, MutexGuard};
 
-use lamp_grayscale::calibrate::format_significant;
-use lamp_grayscale::material::{GivenRange, Material, MeasuredRange};
-use lamp_grayscale::resin::Dose;
+use crate::calibrate::format_significant;
+use crate::material::{GivenRange, Material, MeasuredRange};
+use crate::resin::Dose;
 
-/// Doses of white, and those that a material was measured at.
-pub(crate) struct MeasuredDoses {
+/// Doses of white, compared with the range that a material was measured at.
+///
+/// Threads that see doses may share it.
+#[derive(Debug)]
+pub struct MeasuredDoses {
     material: String,
     range: Option<GivenRange<Dose>>,
     seen: Mutex<Option<GivenRange<Dose>>>,
 }
 
 impl MeasuredDoses {
-    /// Doses that cure as deep as the material says.
-    pub(crate) fn of_depths(material: &Material) -> Self {
+    /// Creates the range of doses that cure as deep as the material says.
+    pub fn of_depths(material: &Material) -> Self {
         Self::of(material, material.measured().map(|range| range.doses))
     }
 
-    /// Doses that cure by the working curve, as planners add them up.
-    pub(crate) fn of_working_curve(material: &Material) -> Self {
+    /// Creates the range of doses that cure by the working curve, as planners add them up.
+    pub fn of_working_curve(material: &Material) -> Self {
         let curve = material.working_curve.as_ref();
         let range: Option<&MeasuredRange> = curve.and_then(|curve| curve.measured.as_ref());
         Self::of(material, range.map(|range| range.doses))
     }
 
-    /// Doses that cure as wide as the material says: those that all its sizes were measured at.
-    pub(crate) fn of_widths(material: &Material) -> Self {
+    /// Creates the range of doses that cure as wide as the material says: those that all its sizes
+    /// were measured at.
+    pub fn of_widths(material: &Material) -> Self {
         let ranges = material.cure_width.iter().filter_map(|size| size.measured.as_ref());
         let common = ranges.map(|range| range.doses).reduce(|a, b| GivenRange {
             from: if a.from > b.from { a.from } else { b.from },
@@ -41,7 +45,10 @@ impl MeasuredDoses {
     }
 
     /// Takes note of a dose.
-    pub(crate) fn see(&self, dose: Dose) {
+    ///
+    /// # Panics
+    /// Never: no thread panics while it takes note.
+    pub fn see(&self, dose: Dose) {
         if self.range.is_some_and(|range| !range.holds(dose)) {
             let mut seen = self.seen();
             let ends = seen.into_iter().flat_map(|seen| [seen.from, seen.to]);
@@ -54,7 +61,10 @@ impl MeasuredDoses {
     }
 
     /// Returns a sentence on the doses outside, if there were some. `what` gets them, in the plural.
-    pub(crate) fn doubt(&self, what: &str) -> Option<String> {
+    ///
+    /// # Panics
+    /// Never, as [`see`](Self::see).
+    pub fn doubt(&self, what: &str) -> Option<String> {
         let (range, seen) = (self.range?, (*self.seen())?);
         Some(format!(
             "{what} get {} mJ/cm2, but {} was measured at {} mJ/cm2: its numbers are extrapolated",
