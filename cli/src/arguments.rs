@@ -11,13 +11,14 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, FromArgMatches};
 use lamp_postprocess::machine::{Defaults, Machine};
 
-use crate::catalogue::{entry, read_text};
+use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::options_file::{Setting, option_of, settings_of};
 use crate::progress::say;
 use crate::streams::{input_name, is_stream};
 use crate::usage::show;
+use lamp_pipeline::documents::document;
 
 /// An options file has a line for each option.
 const MAX_OPTIONS_BYTES: u64 = 1 << 20;
@@ -159,7 +160,7 @@ pub(crate) fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
     if is_stream(file) {
         return Err(Exit::usage("standard input is for the part: name the machine's file"));
     }
-    let machine: Machine = entry(file)?;
+    let machine: Machine = document(file)?;
     let Defaults { dpi, thickness, margin } = machine.defaults;
     let settings = [
         ("dpi", dpi.map(|dpi| dpi.to_string())),

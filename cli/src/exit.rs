@@ -6,6 +6,7 @@ use std::io;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_grayscale::exposure::{ExposureError, LampError};
+use lamp_pipeline::ErrorKind;
 use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
 use lamp_planning::{LightError, NoLight};
@@ -165,6 +166,21 @@ impl From<StackError> for Exit {
         match error {
             StackError::NoLayers => Self::Failed(error.into()),
             error => Self::Output(error.into()),
+        }
+    }
+}
+
+/// The cause keeps its type, so that hints know it.
+impl From<lamp_pipeline::Error> for Exit {
+    fn from(error: lamp_pipeline::Error) -> Self {
+        let kind = error.kind();
+        let (cause, places) = error.into_parts();
+        let error = places
+            .into_iter()
+            .fold(anyhow::Error::from_boxed(cause), |error, place| error.context(place));
+        match kind {
+            ErrorKind::Settings => Self::Usage(error),
+            ErrorKind::Work => Self::Failed(error),
         }
     }
 }

@@ -112,7 +112,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::Timeout { tolerance, .. } => {
             return Some(format!(
                 "give it more with --timeout, or let facets lie more than {} from the surfaces",
-                crate::step_options::length(tolerance.mm())
+                lamp_pipeline::step::length(tolerance.mm())
             ));
         }
         _ => return None,

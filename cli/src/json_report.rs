@@ -51,8 +51,3 @@ impl JsonReport {
 fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("reports have text keys")
 }
-
-/// Rounds to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
-pub(crate) fn to_nm(mm: f64) -> f64 {
-    (mm * 1e6).round() / 1e6 + 0.0
-}

@@ -5,7 +5,7 @@ use lamp_grayscale::exposure::{LampError, LampLight};
 use lamp_grayscale::material::Material;
 use serde::{Deserialize, Serialize};
 
-use crate::recorded::optional;
+use lamp_pipeline::words::optional;
 
 /// The present light of a lamp.
 #[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]

@@ -3,55 +3,40 @@
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
 //! same code under the names of the pipeline.
 
+mod allocator;
+mod args;
 mod arguments;
 mod band_pictures;
 mod bitmaps;
-mod body_overlaps;
 mod catalogue;
 mod commands;
-mod compensate_report;
 mod endings;
 mod exit;
-mod exposure;
-mod fallback;
-mod fix_report;
-mod height_options;
 mod help;
 mod hints;
 mod json_report;
 mod kept_stack;
 mod lamp_option;
 mod licences;
-mod memory;
 mod mesh_report;
 #[cfg(feature = "occt")]
 mod occt_process;
 mod options;
 mod options_file;
 mod out_of_memory;
-mod part_arg;
-mod part_doubts;
-mod part_options;
 mod picture;
-mod pixel_location;
-mod placement;
 mod plan_folder;
 mod planning_options;
 mod platform_options;
 mod plots;
 mod progress;
-mod recorded;
 mod second_opinion;
 mod section;
 mod shades;
 mod signals;
-mod sliced_part;
-mod slicing_options;
 mod stack_facts;
 mod stack_notes;
-mod stack_part;
 mod stages;
-mod step_options;
 mod streams;
 mod strip_folder;
 mod target_arg;

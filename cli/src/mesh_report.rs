@@ -3,31 +3,14 @@
 
 use std::path::Path;
 
+use lamp_pipeline::slice::Counts;
 use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
-use lamp_stack::{Dpi, PageInfo};
+use lamp_stack::Dpi;
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::json_report::{JsonReport, to_nm};
-
-/// Counts of layers and stray rows.
-#[derive(Clone, Copy, Default, Serialize)]
-pub(crate) struct Counts {
-    pub(crate) layers: usize,
-    /// Layers whose contours do not all close.
-    pub(crate) open_layers: usize,
-    pub(crate) stray_layers: usize,
-    pub(crate) stray_rows: usize,
-}
-
-impl Counts {
-    pub(crate) fn add(&mut self, info: &PageInfo) {
-        self.layers += 1;
-        self.open_layers += usize::from(info.closed == Some(false));
-        self.stray_layers += usize::from(!info.stray_rows.is_empty());
-        self.stray_rows += info.stray_rows.len();
-    }
-}
+use crate::json_report::JsonReport;
+use lamp_pipeline::to_nm;
 
 /// The head of the report: the part's files and the counts.
 #[derive(Serialize)]

@@ -9,12 +9,11 @@ use std::thread;
 use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use lamp_grayscale::exposure::parse_lamp_light;
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::{Length, LengthError, Named, skip_sync};
 
 use crate::exit::Exit;
-use crate::memory::{in_words, within_limits};
+use lamp_pipeline::memory::{in_words, within_limits};
 
 /// The heading of options that every command has.
 pub(crate) const GENERAL: &str = "General options";
@@ -223,7 +222,14 @@ pub(crate) fn parse_area(text: &str) -> Result<f64, String> {
 
 /// Parses the light of full white, which is some.
 pub(crate) fn parse_light(text: &str) -> Result<Intensity, String> {
-    parse_lamp_light(text).map_err(|error| error.to_string())
+    match text.parse::<Intensity>() {
+        Ok(light) if light.mw_per_cm2() == 0.0 => {
+            Err("the intensity must be above zero".to_owned())
+        }
+        Ok(light) if Intensity::PLAUSIBLE.contains(&light) => Ok(light),
+        Ok(_) => Err("the intensity must be between 1e-6 and 1e9 mW/cm2".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// Parses a count with an optional `k` or `M`: `750k`, `5.5M`.
@@ -276,16 +282,6 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Formats numbers in order, those that follow each other as ranges: `3, 7-9`.
-pub(crate) fn ranges(rows: &[u32]) -> String {
-    let text = |run: &[u32]| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        _ => run[0].to_string(),
-    };
-    let runs = rows.chunk_by(|a, b| a.checked_add(1) == Some(*b));
-    runs.map(text).collect::<Vec<_>>().join(", ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -311,12 +307,6 @@ mod tests {
         for wrong in ["", "1..9/0", "1..9/-1", "1..9/", "/4", "9..1/2"] {
             assert!(wrong.parse::<EveryNth>().is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn rows_that_touch_are_one_range() {
-        assert_eq!(ranges(&[3, 7, 8, 9, 11, 12]), "3, 7-9, 11-12");
-        assert_eq!(ranges(&[u32::MAX]), u32::MAX.to_string());
     }
 
     #[test]

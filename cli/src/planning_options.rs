@@ -8,12 +8,12 @@ use lamp_grayscale::material::Material;
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::quoted;
 
-use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
-use crate::height_options::parse_share;
 use crate::lamp_option::LampOption;
 use crate::options::one_of_described;
-use crate::recorded::option;
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::heights::parse_share;
+use lamp_pipeline::words::option;
 
 /// What `--help` says of the heights in a layer.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
@@ -62,7 +62,7 @@ pub(crate) struct PlannedResin {
 impl PlanningOptions {
     /// Returns the material under the lamp as it is now, and the light that it makes.
     pub(crate) fn resin(&self) -> Result<PlannedResin, Exit> {
-        let (material, word) = entry_and_word(&self.material)?;
+        let (material, word) = document_and_word(&self.material)?;
         let (material, doubt) = self.lamp.material(material)?;
         let light = Light::of(&material, self.at)?;
         let lamp = self.lamp.canonical().map(|light| option("lamp-intensity", &light));

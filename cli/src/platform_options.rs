@@ -4,7 +4,7 @@ use clap::Args;
 use lamp_planning::speed::{Platform, Speed};
 use lamp_stack::{Length, LengthError};
 
-use crate::height_options::parse_share;
+use lamp_pipeline::heights::parse_share;
 
 /// The speeds of a platform of which none are told, in micrometres a second.
 pub(crate) const DEFAULT_SPEEDS: (Speed, Speed) = (5.0, 2000.0);

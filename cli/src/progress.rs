@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lamp_adaptive::{LayeredPart, SweptLayer};
+use lamp_pipeline::watcher::{Importance, KeptRemarks, Remark, Watcher};
 
 use crate::options::Common;
 
@@ -17,19 +17,18 @@ pub(crate) struct Progress {
     verbose: bool,
     watched: bool,
     bar: ProgressBar,
+    /// How far a search for layer heights has come, while there is one.
+    heights: Arc<Mutex<Option<ProgressBar>>>,
     /// Where lines go instead of standard error.
-    notes: Option<Notes>,
+    kept: Option<Arc<KeptRemarks>>,
 }
 
-/// Lines that are kept instead of printed.
-pub(crate) type Notes = Arc<Mutex<Vec<String>>>;
-
 impl Progress {
-    /// Returns progress without a bar, whose lines go into `notes`: without those for who asks for
-    /// details.
-    pub(crate) fn noting(command: &'static str, notes: &Notes) -> Self {
-        let (bar, notes) = (ProgressBar::hidden(), Some(Arc::clone(notes)));
-        Self { command, quiet: false, verbose: false, watched: false, bar, notes }
+    /// Returns progress without a bar, whose lines are kept, details left out.
+    pub(crate) fn keeping(command: &'static str, kept: &Arc<KeptRemarks>) -> Self {
+        let kept = Some(Arc::clone(kept));
+        let (bar, heights) = (ProgressBar::hidden(), Arc::default());
+        Self { command, quiet: false, verbose: false, watched: false, bar, heights, kept }
     }
 
     /// Returns progress with a bar if standard error is a terminal. Of the stages of a pipeline
@@ -40,7 +39,7 @@ impl Progress {
         let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
         bar.set_prefix(command);
-        Self { command, quiet, verbose, watched, bar, notes: None }
+        Self { command, quiet, verbose, watched, bar, heights: Arc::default(), kept: None }
     }
 
     /// Sets the number of layers to expect.
@@ -55,19 +54,6 @@ impl Progress {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         self.bar.inc(1);
-    }
-
-    /// Returns a bar of how much of a part's height a search for layer heights has come past.
-    pub(crate) fn height_bar(&self, part: &LayeredPart) -> HeightBar {
-        let [bottom_um, top_um] = part.heights_um();
-        let bar = if self.watched {
-            ProgressBar::new((top_um - bottom_um) as u64)
-        } else {
-            ProgressBar::hidden()
-        };
-        bar.set_style(style("{prefix} layer heights {bar:40} {percent}%, {eta} left"));
-        bar.set_prefix(self.command);
-        HeightBar { bottom_um, bar }
     }
 
     /// Prints a line of what is told only to who asks for it with `--verbose`.
@@ -92,8 +78,8 @@ impl Progress {
     /// Prints a line, also if quiet.
     pub(crate) fn warn(&self, line: &str) {
         let line = format!("{}: {line}", self.command);
-        match &self.notes {
-            Some(notes) => notes.lock().expect("nobody panics while it is held").push(line),
+        match &self.kept {
+            Some(kept) => kept.keep(line),
             None => self.bar.suspend(|| say(&line)),
         }
     }
@@ -104,22 +90,32 @@ impl Progress {
     }
 }
 
-/// A bar over the height of a part. It goes when it is dropped.
-pub(crate) struct HeightBar {
-    bottom_um: f64,
-    bar: ProgressBar,
-}
-
-impl HeightBar {
-    /// Moves to the top of a layer.
-    pub(crate) fn move_to(&self, layer: &SweptLayer) {
-        self.bar.set_position((layer.top_um() - self.bottom_um) as u64);
+impl Watcher for Progress {
+    fn remark(&self, Remark { importance, text }: Remark) {
+        match importance {
+            Importance::Detail => self.detail(&text),
+            Importance::Note => self.say(&text),
+            Importance::Warning => self.warn(&text),
+        }
     }
-}
 
-impl Drop for HeightBar {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
+    fn height_reached(&self, [bottom_um, top_um]: [f64; 2], um: f64) {
+        if !self.watched {
+            return;
+        }
+        let mut heights = self.heights.lock().unwrap_or_else(PoisonError::into_inner);
+        let bar = heights.get_or_insert_with(|| {
+            let bar = ProgressBar::new((top_um - bottom_um) as u64);
+            bar.set_style(style("{prefix} layer heights {bar:40} {percent}%, {eta} left"));
+            bar.set_prefix(self.command);
+            bar
+        });
+        bar.set_position((um - bottom_um) as u64);
+    }
+
+    fn heights_found(&self) {
+        let bar = self.heights.lock().unwrap_or_else(PoisonError::into_inner).take();
+        bar.into_iter().for_each(|bar| bar.finish_and_clear());
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn asked(
 
 #[cfg(not(feature = "occt"))]
 pub(crate) fn asked(_: &Prepared, _: Arc<[u8]>, _: &OpenOptions) -> Result<Comparison, Exit> {
-    Err(crate::step_options::without_occt("--both"))
+    Err(lamp_pipeline::step::without_occt("--both").into())
 }
 
 /// Returns a comparison as JSON.

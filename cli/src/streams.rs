@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, anyhow};
+pub(crate) use lamp_pipeline::documents::is_stream;
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
     PageWriter, Pages, PassingLayer, StackError, StackInfo, close, map_in_order, sync,
@@ -21,10 +22,8 @@ use crate::options::{Common, Input, Output};
 use crate::progress::Progress;
 use crate::stack_notes::{noting, print_note};
 
-/// Returns whether a path means standard input or output.
-pub(crate) fn is_stream(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
+/// Layers on their way to a writer.
+pub(crate) type Layers<'a> = Box<dyn Iterator<Item = Result<Layer, Exit>> + 'a>;
 
 /// The part on standard input, of which a process has one.
 static PIPED_PART: OnceLock<String> = OnceLock::new();
@@ -234,6 +233,13 @@ fn decoded(
     })
 }
 
+/// Opens a stack that is used beside the first, for a stage.
+pub(crate) fn open_beside(path: &Path) -> Result<Pages, lamp_pipeline::Error> {
+    let pages = if is_stream(path) { Pages::from_stream(io::stdin()) } else { Pages::open(path) };
+    let pages = pages.map_err(|error| lamp_pipeline::Error::from(error).at(input_name(path)))?;
+    Ok(noting(pages, path))
+}
+
 /// Reads all layers of a stack that is used beside the first, decoded, in order.
 pub(crate) fn read_beside(
     path: &Path,
@@ -315,22 +321,22 @@ pub(crate) fn write_layers(
     written_to(&output.output, written, progress)
 }
 
-/// Writes layers that pass where `output` says, which must [take their codes](takes_codes), counting
-/// them in `report`.
+/// Writes layers that pass where `output` says, undecoded if it can take them as they are, counting
+/// them.
 pub(crate) fn write_passing(
     layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
+    decode: impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync,
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
+    // Other outputs code images in their own way.
+    if output.packbits || is_packed_name(&output.output) {
+        return write_layers(map_in_order(layers, decode), output, progress);
+    }
     let to = destination(output)?;
     let counted = layers.inspect(|_| progress.layer_done());
     let written = write_stack(counted, to, format(output.classic));
     written_to(&output.output, written, progress)
-}
-
-/// Returns whether pages can pass to `output` as they are coded.
-pub(crate) fn takes_codes(output: &Output) -> bool {
-    !output.packbits && !is_packed_name(&output.output)
 }
 
 /// Writes layers as a packed stack where `output` says, counting them in `report`.

@@ -9,8 +9,7 @@ use crate::exit::Exit;
 use crate::options::{Input, Output};
 use crate::progress::Progress;
 use crate::streams::{
-    decoding, format, input_name, is_stream, new_folder, read_passing, takes_codes, write_layers,
-    write_passing,
+    decoding, format, input_name, is_stream, new_folder, read_passing, write_passing,
 };
 
 /// Layers in order, coded or not.
@@ -54,14 +53,10 @@ pub(crate) fn write_passing_or_strips(
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    let is_of_strips = is_strips(&input.stack);
-    if !is_of_strips && takes_codes(output) {
-        return write_passing(layers, output, progress);
+    if !is_strips(&input.stack) {
+        return write_passing(layers, decoding(input), output, progress);
     }
     let layers = map_in_order(layers, decoding(input));
-    if !is_of_strips {
-        return write_layers(layers, output, progress);
-    }
     let cut_as = StripForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;
     let StripForm { mirrors, overlap, seam } = form(cut_as);
     let to = &output.output;

@@ -14,8 +14,8 @@ use lamp_stack::{Catalogued, Length};
 
 use crate::exit::Exit;
 use crate::options::{one_of, parse_thickness};
-use crate::part_options::part_notes;
 use crate::progress::Progress;
+use lamp_pipeline::solid::part_notes;
 
 /// How a target's file is read.
 #[derive(Args, Clone, Debug)]

@@ -9,11 +9,12 @@ use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::{Dpi, one_line};
 use serde_json::{Map, Value, json};
 
+use crate::args::solid::StepArgs;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::second_opinion;
-use crate::step_options::{BrepOptions, bytes_of, length, notes};
 use crate::streams::{input_name, print};
+use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
 
 /// Describe a STEP part, and check whether it can be sliced
 ///
@@ -36,7 +37,7 @@ pub(crate) struct BrepArgs {
     dpi: Dpi,
 
     #[command(flatten)]
-    brep: BrepOptions,
+    brep: StepArgs,
 
     /// Read the part with OpenCASCADE, too, and compare boxes, volumes and five sections of each
     /// body; exit with status 3 if they differ by more than the tolerance explains
@@ -55,10 +56,11 @@ pub(crate) struct BrepArgs {
 pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     let name = input_name(&args.part);
     let failed = |error: SliceError| Exit::from(error).at(name.clone());
-    let options = args.brep.reader.for_opening(args.brep.tolerance(args.dpi))?;
+    let step = StepSettings::from(&args.brep);
+    let options = step.reader.for_opening(step.tolerance(args.dpi))?;
     let bytes = bytes_of(&args.part).map_err(failed)?;
     let prepared = read_step(bytes.clone(), &options).map_err(failed)?;
-    let second = match args.both || args.brep.reader.asks_both() {
+    let second = match args.both || step.reader.kernel == Kernel::Both {
         true => Some(second_opinion::asked(&prepared, bytes, &options)),
         false => None,
     };

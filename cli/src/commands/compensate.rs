@@ -3,11 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
+use lamp_postprocess::CompensateError;
 
+use crate::args::stages::CompensateStageArgs;
 use crate::endings::parse_report;
 use crate::exit::Exit;
+use crate::json_report::JsonReport;
 use crate::options::{Common, Input, Output};
-use crate::stages::compensate::{CompensateSettings, Compensating, is_of_stage};
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };
@@ -31,7 +34,7 @@ pub(crate) struct CompensateArgs {
     input: Input,
 
     #[command(flatten)]
-    pub(crate) settings: CompensateSettings,
+    settings: CompensateStageArgs,
 
     /// Write the walls that were narrowed less than asked, and lost pieces, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
@@ -43,7 +46,8 @@ pub(crate) struct CompensateArgs {
 
 pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let CompensateArgs { input, settings, report, output } = args;
-    let compensating = Compensating::new(settings)?;
+    let settings = CompensateSettings::from(settings);
+    let compensating = Compensating::new(&settings)?;
     if let Some(beside) = report {
         check_beside(beside, &output.output, settings.inputs().chain([&input.stack]))?;
     }
@@ -51,11 +55,13 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("compensate", common, output);
     let layers = compensating.layers(read_layers(input, &progress)?, 0..u32::MAX);
     let name = input_name(&input.stack);
+    let is_of_stage = |error: &Exit| {
+        error.cause::<CompensateError>().is_some() || error.cause::<NoDose>().is_some()
+    };
     write_layers(layers, output, &progress)
         .map_err(|error| if is_of_stage(&error) { error.at(name.clone()) } else { error })?;
-    compensating.tell(&name, &progress);
-    match report {
-        Some(path) => compensating.write_report(path),
-        None => Ok(()),
-    }
+    compensating.lines(&name).iter().for_each(|line| progress.say(line));
+    let Some(path) = report else { return Ok(()) };
+    let (walls, layers) = compensating.report();
+    JsonReport::new(&walls.head(layers)).list("walls", walls.listed()).write(path)
 }

@@ -11,17 +11,18 @@ use lamp_stack::{
     FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
 };
 
+use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::endings::is_step_name;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output, one_of};
-use crate::part_options::part_notes;
 use crate::progress::say;
 use crate::stack_notes::doubts;
-use crate::step_options::{HEADING, ReaderOptions, bytes_of, parse_tolerance};
 use crate::streams::{
     check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
     new_folder, open_pages, progress, unless_found, write_file, write_layers, written_to,
 };
+use lamp_pipeline::solid::part_notes;
+use lamp_pipeline::step::{ReaderSettings, bytes_of};
 
 /// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
 ///
@@ -51,7 +52,7 @@ pub(crate) struct ConvertArgs {
 
     /// How far the facets of a STEP part may lie from its surfaces
     #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_tolerance)]
-    #[arg(help_heading = HEADING)]
+    #[arg(help_heading = STEP)]
     chord: Length,
 
     /// Unit of the coordinates of a mesh in an STL or OBJ file
@@ -59,7 +60,7 @@ pub(crate) struct ConvertArgs {
     units: Units,
 
     #[command(flatten)]
-    reader: ReaderOptions,
+    reader: ReaderArgs,
 
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png
     #[arg(long, conflicts_with = "classic")]
@@ -183,7 +184,7 @@ impl ConvertArgs {
         self.check_for_part(stl)?;
         let path = &self.input.stack;
         let name = input_name(path);
-        let options = self.reader.for_opening(self.chord)?;
+        let options = ReaderSettings::from(&self.reader).for_opening(self.chord)?;
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
         let model = model.map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {

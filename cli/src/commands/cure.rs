@@ -6,24 +6,25 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::OutlinePiece;
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::StackInfo;
 
-use crate::catalogue::entry;
+use crate::args::solid::part_file;
 use crate::endings::{PNG, check_ending};
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
 use crate::options::{Common, Input, one_of_described};
-use crate::part_arg::{PartArg, paths};
-use crate::part_options::name_of_all;
 use crate::picture::PictureScale;
 use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
 use crate::section::{CureRule, Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
-use crate::stack_part::RecordedSlicing;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::RecordedSlicing;
+use lamp_pipeline::documents::document;
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::name_of_all;
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
@@ -61,8 +62,8 @@ pub(crate) struct CureArgs {
 
     /// Part that the stack was sliced from, for its outline; it is placed as the stack records.
     /// Give several files in the order in which slice got them, each with its own placement
-    #[arg(long, value_name = "FILE", value_parser = PartArg::parser())]
-    part: Vec<PartArg>,
+    #[arg(long, value_name = "FILE", value_parser = part_file())]
+    part: Vec<PartFile>,
 
     /// Draw only this stretch of the section, for example 10mm..14mm
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
@@ -113,7 +114,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     check_ending(&args.output, &PNG)?;
-    let (material, lamp_doubt) = args.lamp.material(entry(&args.material)?)?;
+    let (material, lamp_doubt) = args.lamp.material(document(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
     let name = input_name(&args.input.stack);
@@ -161,7 +162,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
 
 /// The part's outline, placed as the stack says.
 fn outline(
-    parts: &[PartArg],
+    parts: &[PartFile],
     course: &SectionLine,
     stack: Option<&StackInfo>,
     name: &str,
@@ -170,7 +171,9 @@ fn outline(
     let sliced = RecordedSlicing::of(stack).with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;
-    let model = sliced.open(parts, name, &|note| progress.say(note))?;
+    let model = sliced.open(parts, name, progress)?;
     let part = name_of_all(parts);
-    course.outline(model, &sliced.options).map_err(|error| Exit::from(error).at(part))
+    course
+        .outline(model, &sliced.settings.for_slicing())
+        .map_err(|error| Exit::from(error).at(part))
 }

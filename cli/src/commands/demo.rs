@@ -16,13 +16,13 @@ use lamp_postprocess::{
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, StackError};
 
-use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, PictureScale, Region};
 use crate::progress::Progress;
-use crate::slicing_options::SlicingOptions;
 use crate::streams::{failed_at, print, write_file, write_layers};
+use lamp_pipeline::SliceSettings;
+use lamp_pipeline::documents::document_and_word;
 
 /// Run the whole pipeline on a built-in blade mould, and draw the result
 #[derive(Args)]
@@ -111,14 +111,14 @@ fn part_layers(
     range: Option<Range<u32>>,
     progress: &Progress,
 ) -> Result<impl Iterator<Item = Result<Layer, Exit>>, Exit> {
-    let options = SlicingOptions::default();
+    let options = SliceSettings::default();
     let model = Part::open(stl, &OpenOptions::default())?;
-    let files = [stl.file_name().unwrap_or_default().to_string_lossy().into_owned()];
-    let (slices, name_command) = options.slices(model, &files, range, None, None, progress)?;
+    let files = vec![stl.file_name().unwrap_or_default().to_string_lossy().into_owned()];
+    let (slices, words) = options.slices(model, files, range, None, None, progress)?;
     progress.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {
         let mut layer = layer?;
-        name_command(&mut layer);
+        words.write(&mut layer);
         Ok::<Layer, Exit>(layer)
     });
     let progress = progress.clone();
@@ -149,7 +149,7 @@ fn build_in_mesh(
     range: Option<Range<u32>>,
     progress: &Progress,
 ) -> Result<u32, Exit> {
-    let (machine, word) = entry_and_word::<Machine>(Path::new("alpha"))?;
+    let (machine, word) = document_and_word::<Machine>(Path::new("alpha"))?;
     let area = machine.area.value;
     let mut layers = part_layers(stl, range, progress)?;
     let first = layers.next().ok_or(StackError::NoLayers)??;

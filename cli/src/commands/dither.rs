@@ -1,11 +1,12 @@
 //! `lamp dither`: turns gray layers into dots.
 
 use clap::Args;
+use lamp_pipeline::dither::DitherSettings;
 use lamp_postprocess::{Seam, StripForm};
 
+use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
-use crate::stages::dither::DitherSettings;
 use crate::streams::{decoding, progress};
 use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 
@@ -31,7 +32,7 @@ pub(crate) struct DitherArgs {
     input: Input,
 
     #[command(flatten)]
-    pub(crate) settings: DitherSettings,
+    settings: DitherStageArgs,
 
     #[command(flatten)]
     output: Output,
@@ -40,7 +41,8 @@ pub(crate) struct DitherArgs {
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
     let layers = read_passing_or_strips(&args.input, &progress)?;
-    let dots = args.settings.passing(layers, decoding(&args.input), &progress);
+    let settings = DitherSettings::from(&args.settings);
+    let dots = settings.layers(layers, decoding(&args.input), &progress);
     // Dots on ramps would be dots of each side alone.
     let by_comb = |form| StripForm { seam: Seam::Comb, ..form };
     write_passing_or_strips(dots, &args.input, by_comb, &args.output, &progress)

@@ -1,14 +1,15 @@
 //! `lamp edit`: changes a stack at image level.
 
 use clap::Args;
+use lamp_pipeline::edit::{EditSettings, Editing, unused_text};
 use lamp_postprocess::EditError;
 
+use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
 use crate::options::{Common, Input, Output};
-use crate::stages::edit::{EditSettings, Editing, unused_text};
 use crate::streams::{
-    check_not_input, input_name, is_stream, progress, read_layers, read_passing, takes_codes,
-    write_layers, write_passing,
+    check_not_input, decoding, input_name, is_stream, open_beside, progress, read_passing,
+    write_passing,
 };
 
 /// Change a design at image level, without slicing it again
@@ -39,15 +40,15 @@ pub(crate) struct EditArgs {
     input: Input,
 
     #[command(flatten)]
-    pub(crate) settings: EditSettings,
+    settings: EditStageArgs,
 
     #[command(flatten)]
     output: Output,
 }
 
 impl EditArgs {
-    fn check_streams(&self) -> Result<(), Exit> {
-        let all = self.settings.named().chain([&self.input.stack]);
+    fn check_streams(&self, settings: &EditSettings) -> Result<(), Exit> {
+        let all = [settings.named(), &self.input.stack].into_iter();
         match all.filter(|path| is_stream(path)).count() {
             0 | 1 => Ok(()),
             _ => Err(Exit::usage(
@@ -58,19 +59,16 @@ impl EditArgs {
 }
 
 pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
-    args.check_streams()?;
-    let editing = Editing::new(&args.settings)?;
+    let settings = EditSettings::from(&args.settings);
+    args.check_streams(&settings)?;
+    let editing = Editing::new(&settings)?;
     check_not_input(&args.output.output, editing.inputs())?;
     let progress = progress("edit", common, &args.output);
     // Layers that are not wanted are no loss.
     let is_whole = [args.input.layers.is_none(); 2];
-    let written = if takes_codes(&args.output) {
-        let layers = read_passing(&args.input, &progress)?;
-        write_passing(editing.passing(layers, 0..u32::MAX, is_whole)?, &args.output, &progress)
-    } else {
-        let layers = read_layers(&args.input, &progress)?;
-        write_layers(editing.layers(layers, 0..u32::MAX, is_whole)?, &args.output, &progress)
-    };
+    let layers = read_passing(&args.input, &progress)?;
+    let edited = editing.layers(layers, 0..u32::MAX, is_whole, &open_beside)?;
+    let written = write_passing(edited, decoding(&args.input), &args.output, &progress);
     written.map_err(|error| match error {
         Exit::Failed(error) if error.is::<EditError>() => {
             Exit::Failed(error).at(input_name(&args.input.stack))

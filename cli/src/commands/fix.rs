@@ -2,17 +2,19 @@
 
 use std::path::PathBuf;
 
+use crate::json_report::JsonReport;
 use clap::Args;
+use lamp_pipeline::fix::{FixSettings, Fixing};
+use lamp_pipeline::whereabouts;
 use lamp_postprocess::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
+use crate::args::stages::FixStageArgs;
 use crate::band_pictures::BandPictures;
 use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::fix_report::whereabouts;
 use crate::options::{Common, Input, Output};
 use crate::stack_notes::doubts;
-use crate::stages::fix::{FixSettings, Fixing};
 use crate::streams::{check_beside, decoding, progress, unless_found};
 use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 
@@ -40,7 +42,7 @@ pub(crate) struct FixArgs {
     input: Input,
 
     #[command(flatten)]
-    pub(crate) settings: FixSettings,
+    settings: FixStageArgs,
 
     /// Write all bands, and what was done about them, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
@@ -65,14 +67,15 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         check_beside(beside, &args.output.output, [&args.input.stack])?;
     }
     let progress = progress("fix", common, &args.output);
-    let options = args.settings.options();
-    let fixing = Fixing::new(&args.settings);
+    let settings = FixSettings::from(&args.settings);
+    let options = settings.options();
+    let fixing = Fixing::new(&settings);
     let evidence = args.evidence.as_deref();
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
     let layers = read_passing_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
-    let fixed = fixing.passing(layers, decoding(&args.input), |fixed| {
+    let fixed = fixing.layers(layers, decoding(&args.input), 0..u32::MAX, |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
         }
@@ -94,7 +97,8 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         evidence.finish()?;
     }
     if let Some(path) = &args.report {
-        findings.write(layer_count, path)?;
+        let report = JsonReport::new(&findings.head(layer_count));
+        report.list("bands", findings.bands()).write(path)?;
     }
     if let Some(line) = findings.text_of_corrected() {
         progress.say(&line);

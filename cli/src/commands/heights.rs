@@ -7,23 +7,28 @@ use clap::Args;
 use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, SweptLayer, uniform_heights,
 };
-use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Dpi, Length};
 use serde::Serialize;
 use serde_json::json;
 
+use crate::args::exposure::ExposureArgs;
+use crate::args::heights::HeightArgs;
+use crate::args::solid::SolidArgs;
+use crate::args::solid::part_file;
 use crate::endings::parse_table;
 use crate::exit::Exit;
-use crate::exposure::ExposureOptions;
-use crate::height_options::{FoundHeights, HeightOptions, Measure, significant, time_text};
 use crate::json_report::print_answer;
 use crate::options::{Common, parse_thickness};
-use crate::part_arg::{PartArg, paths};
-use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::plots::{self, Plot, PlotAxis, Series, drawn};
 use crate::progress::Progress;
 use crate::streams::{check_beside, print, write_file};
+use lamp_grayscale::exposure::Exposure;
+use lamp_pipeline::exposure::ExposureSettings;
+use lamp_pipeline::heights::{FoundHeights, HeightSettings, Measure, significant, time_text};
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::SolidSettings;
+use lamp_pipeline::solid::{Reading, at_part, name_of_all};
 
 /// Find how thick each layer of a part may be, and what that saves
 ///
@@ -39,8 +44,8 @@ Examples:
   lamp heights blade.stl --time-budget 10h --layer-overhead 20s --material lamp-suspension")]
 pub(crate) struct HeightsArgs {
     /// The part: files, or - for standard input, as for `slice`
-    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
-    parts: Vec<PartArg>,
+    #[arg(value_name = "PART", required = true, value_parser = part_file())]
+    parts: Vec<PartFile>,
 
     /// Write a table of the layers: height, thickness, volume lost and gained, and the error by
     /// every criterion
@@ -65,39 +70,42 @@ pub(crate) struct HeightsArgs {
     dpi: Dpi,
 
     #[command(flatten)]
-    solid: PartOptions,
+    solid: SolidArgs,
 
     #[command(flatten)]
-    heights: HeightOptions,
+    heights: HeightArgs,
 
     #[command(flatten)]
-    exposure: ExposureOptions,
+    exposure: ExposureArgs,
 }
 
 pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
-    args.check()?;
-    let exposure = args.exposure.exposure()?.map(|it| it.exposure);
-    exposure.iter().try_for_each(Exposure::check_light)?;
-    args.heights.check(exposure.as_ref())?;
+    let solid = SolidSettings::from(&args.solid);
+    let settings = HeightSettings::from(&args.heights);
+    let exposure = ExposureSettings::from(&args.exposure);
+    args.check(&solid.cutters().chain(exposure.files()).collect::<Vec<_>>())?;
+    let exposure = exposure.exposure()?.map(|recorded| recorded.exposure);
+    let exposure = exposure.as_ref();
+    exposure.map_or(Ok(()), Exposure::check_light)?;
+    settings.check(exposure)?;
     let progress = Progress::new("heights", common, true);
-    let say = |line: &str| progress.say(line);
-    let model =
-        args.solid.open(&args.parts, &Reading { dpi: args.dpi, may_be_open: false, say: &say })?;
-    let body = args.solid.body(model.clone());
-    let (files, _) = args.solid.files(&args.parts);
+    let reading = Reading { dpi: args.dpi, may_be_open: false, watcher: &progress };
+    let model = solid.open(&args.parts, &reading)?;
+    let body = solid.body(model.clone());
+    let (files, _) = solid.files(&args.parts);
     let body = body.map_err(|error| at_part(error.into(), &files))?;
     let box_mm = [body.min(), body.max()].map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
-    let size = args.solid.size(&model, box_mm);
-    let overlap = args.solid.overlap_doubt(&files, body.overlap());
-    size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| say(doubt));
-    let part = args.heights.part(body, args.dpi, args.solid.fill)?;
-    let found = args.heights.find(&part, exposure.as_ref(), &progress);
+    let size = solid.size(&model, box_mm);
+    let overlap = solid.overlap_doubt(&files, body.overlap());
+    size.doubt(args.dpi, None).iter().chain(&overlap).for_each(|doubt| progress.say(doubt));
+    let part = settings.part(body, args.dpi, solid.fill)?;
+    let found = settings.find(&part, exposure, &progress);
     let found = found.map_err(|error| at_part(error, &files))?;
-    let uniform = args.uniform(&part).map_err(|error| at_part(error, &files))?;
-    found.warn(&say);
-    found.doubts(exposure.as_ref()).iter().for_each(|doubt| say(doubt));
+    let uniform = args.uniform(settings.max(), &part).map_err(|error| at_part(error, &files))?;
+    let doubts = found.doubt().into_iter().chain(found.doubts(exposure));
+    doubts.for_each(|doubt| progress.say(&doubt));
     if let Some(path) = &args.report {
-        write_file(path, |out| write_table(&found.heights, exposure.as_ref(), out))?;
+        write_file(path, |out| write_table(&found.heights, exposure, out))?;
     }
     let all: Vec<_> =
         std::iter::once((found.bound(), found.heights.clone())).chain(uniform).collect();
@@ -107,14 +115,12 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     }
     let choices: Vec<_> = all
         .iter()
-        .map(|(name, heights)| {
-            Choice::new(name, heights, &found, exposure.as_ref(), args.heights.overhead())
-        })
+        .map(|(name, heights)| Choice::new(name, heights, &found, exposure, settings.overhead()))
         .collect();
     if !args.json {
         return print(&summary(&choices, found.measure));
     }
-    let layers = found.heights.layers.iter().map(|layer| LayerRow::new(layer, exposure.as_ref()));
+    let layers = found.heights.layers.iter().map(|layer| LayerRow::new(layer, exposure));
     let answer = json!({
         "part": name_of_all(&args.parts),
         "criterion": found.measure.name(),
@@ -127,11 +133,11 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
 
 impl HeightsArgs {
     /// Checks, before the work, what can be checked.
-    fn check(&self) -> Result<(), Exit> {
+    fn check<'a>(&'a self, files: &[&'a PathBuf]) -> Result<(), Exit> {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
-        let inputs = || paths(&self.parts).chain(self.solid.cutters()).chain(self.exposure.files());
+        let inputs = || paths(&self.parts).chain(files.iter().copied());
         for file in self.report.iter().chain(&self.plot) {
             check_beside(file, Path::new("-"), inputs())?;
         }
@@ -142,13 +148,15 @@ impl HeightsArgs {
     }
 
     /// The uniform layers to compare with, by what they are called.
-    fn uniform(&self, part: &LayeredPart) -> Result<Vec<(String, Heights)>, Exit> {
-        let thickest = [self.heights.max()];
+    fn uniform(
+        &self,
+        thickest: Length,
+        part: &LayeredPart,
+    ) -> Result<Vec<(String, Heights)>, lamp_pipeline::Error> {
+        let thickest = [thickest];
         let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
         let layers = |thickness: &Length| {
-            let heights = uniform_heights(part, *thickness);
-            let heights = heights.map_err(|error| Exit::Failed(error.into()))?;
-            Ok((format!("uniform {thickness}"), heights))
+            Ok((format!("uniform {thickness}"), uniform_heights(part, *thickness)?))
         };
         uniform.iter().map(layers).collect()
     }

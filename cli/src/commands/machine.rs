@@ -7,10 +7,12 @@ use lamp_postprocess::machine::{Machine, Recoating};
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
-use crate::catalogue::{entry, show};
+use crate::catalogue::show;
 use crate::exit::Exit;
-use crate::json_report::{print_answer, to_nm};
+use crate::json_report::print_answer;
 use crate::streams::print;
+use lamp_pipeline::documents::document;
+use lamp_pipeline::to_nm;
 
 /// List or show machines: build area, height, resolution and layer thickness
 #[derive(Args)]
@@ -48,7 +50,7 @@ pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
         Action::List { json: true } => answer(Machine::builtins()),
         Action::List { json: false } => print(&table()),
-        Action::Show { machine, json: true } => answer([entry(machine)?]),
+        Action::Show { machine, json: true } => answer([document(machine)?]),
         Action::Show { machine, json: false } => show::<Machine>(machine),
     }
 }

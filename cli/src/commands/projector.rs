@@ -9,8 +9,10 @@ use serde_json::{Value, json};
 
 use crate::catalogue;
 use crate::exit::Exit;
-use crate::json_report::{print_answer, to_nm};
+use crate::json_report::print_answer;
 use crate::streams::{input_name, print};
+use lamp_pipeline::documents;
+use lamp_pipeline::to_nm;
 
 /// List, show or check projectors: where and how bright mirrors light the glass
 #[derive(Args)]
@@ -57,7 +59,7 @@ pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
     match &args.action {
         Action::List { json: true } => answer(Projector::builtins()),
         Action::List { json: false } => print(&table()),
-        Action::Show { projector, json: true } => answer([catalogue::entry(projector)?]),
+        Action::Show { projector, json: true } => answer([documents::document(projector)?]),
         Action::Show { projector, json: false } => catalogue::show::<Projector>(projector),
         Action::Check { file, json } => check(file, *json),
     }
@@ -134,7 +136,7 @@ fn spread(projector: &Projector) -> String {
 }
 
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
-    let (projector, _) = catalogue::read_file(path)?;
+    let (projector, _) = documents::read_file(path)?;
     if json {
         return answer([projector]);
     }

@@ -3,16 +3,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_pipeline::slice::{SliceStage, Slicing};
+use lamp_pipeline::watcher::Watcher;
 use lamp_slicer::{Bodies, PixelGrid, StrayBand};
 
+use crate::args::slicing::SliceStageArgs;
 use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::mesh_report::{MeshReport, RowPositions};
 use crate::options::{Common, Output};
-use crate::part_arg::PartArg;
-use crate::part_options::name_of_all;
-use crate::stages::slice::{SliceSettings, Slicing};
 use crate::streams::{check_beside, check_not_input, progress, unless_found, write_layers};
+use lamp_pipeline::part_file::PartFile;
+use lamp_pipeline::solid::name_of_all;
 
 /// Slice a part into a stack of layer images
 ///
@@ -32,7 +34,7 @@ Examples:
   slice broken.stl -o broken.tif --report gaps.json")]
 pub(crate) struct SliceArgs {
     #[command(flatten)]
-    pub(crate) settings: SliceSettings,
+    settings: SliceStageArgs,
 
     /// Write the mesh's faults as JSON: for each band of unbalanced rows, the edges that are open
     /// or shared by too many facets, with those facets' numbers and corners in the part's file
@@ -49,16 +51,16 @@ pub(crate) struct SliceArgs {
 }
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
-    let settings = &args.settings;
+    let stage = SliceStage::try_from(&args.settings)?;
     if let Some(report) = &args.report {
-        check_beside(report, &args.output.output, settings.inputs())?;
+        check_beside(report, &args.output.output, stage.inputs())?;
     }
-    check_not_input(&args.output.output, settings.inputs())?;
+    check_not_input(&args.output.output, stage.inputs())?;
     let progress = progress("slice", common, &args.output);
-    let slicing = settings.open(None, &progress)?;
+    let slicing = stage.open(None, &progress)?;
     let doubts = slicing.doubts();
     if args.strict && !doubts.is_empty() {
-        return Err(Exit::Findings(doubts.join("; ")).at(name_of_all(&settings.parts)));
+        return Err(Exit::Findings(doubts.join("; ")).at(name_of_all(&stage.parts)));
     }
     doubts.iter().for_each(|doubt| progress.warn(doubt));
     progress.expect(slicing.layer_count().into());
@@ -68,16 +70,17 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
             bands.extend(StrayBand::of(info));
         }
     });
-    let bodies = settings.options.solid.bodies;
+    let bodies = stage.settings.solid.bodies;
     let finding = || {
         let overlap = slicing.overlap().filter(|_| bodies == Bodies::Xor);
         let found = overlap.into_iter().chain(slicing.is_blank().then(|| BLANK.to_owned()));
         let found: Vec<String> = found.collect();
         (args.strict && !found.is_empty()).then(|| Exit::Findings(found.join("; ")))
     };
+    let layers = layers.map(|layer| Ok(layer?));
     write_layers(unless_found(layers, finding), &args.output, &progress)?;
-    args.write_report(&slicing, &bands)?;
-    slicing.tell(&progress, args.report.as_deref());
+    args.write_report(&stage, &slicing, &bands)?;
+    slicing.summary(args.report.as_deref()).into_iter().for_each(|line| progress.remark(line));
     if slicing.is_blank() {
         progress.warn(BLANK);
     }
@@ -89,13 +92,18 @@ const BLANK: &str = "no layer has a white pixel: check the part, its unit and --
 
 impl SliceArgs {
     /// Writes the mesh's faults, if they are wanted.
-    fn write_report(&self, slicing: &Slicing<'_>, bands: &[StrayBand]) -> Result<(), Exit> {
+    fn write_report(
+        &self,
+        stage: &SliceStage,
+        slicing: &Slicing<'_>,
+        bands: &[StrayBand],
+    ) -> Result<(), Exit> {
         let Some(path) = &self.report else { return Ok(()) };
         let trace = slicing.with_slices(|slices| slices.trace(bands))?;
         let PixelGrid { origin_mm, dpi, .. } = slicing.with_slices(|slices| Ok(*slices.grid()))?;
-        let SliceSettings { parts, options, .. } = &self.settings;
-        let files = parts.iter().map(PartArg::file).collect();
-        let fill = options.solid.fill.name();
+        let SliceStage { parts, settings, .. } = stage;
+        let files = parts.iter().map(PartFile::file).collect();
+        let fill = settings.solid.fill.name();
         let subject = MeshReport { files, fill, counts: slicing.counts() };
         subject.write(&trace, RowPositions { top_mm: origin_mm[1], dpi }, path)
     }

@@ -10,13 +10,13 @@ use lamp_stack::{Destination, Format, IndexedStack, PrivateFile, write_stack};
 use lamp_view::{Address, Ticket, Token, ViewedStack, Viewer, licences, of_report, serve};
 
 use super::check;
+use crate::allocator::give_freed_memory_back;
+use crate::args::slicing::SlicingArgs;
 use crate::exit::Exit;
-use crate::memory::give_freed_memory_back;
 use crate::options::{Common, parse_memory};
 use crate::progress::Progress;
-use crate::sliced_part::{SlicedPart, check_slicing};
-use crate::slicing_options::SlicingOptions;
 use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
+use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
 /// Look at layers in a browser
 ///
@@ -63,7 +63,7 @@ pub(crate) struct ViewArgs {
     licences: bool,
 
     #[command(flatten)]
-    slicing: SlicingOptions,
+    slicing: SlicingArgs,
 }
 
 pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
@@ -73,13 +73,14 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
-    check_slicing(&args.slicing, &args.inputs, None)?;
+    let slicing = SliceSettings::try_from(&args.slicing)?;
+    check_slicing(&slicing, &args.inputs, None)?;
     give_freed_memory_back();
     let address = Address::new(args.port).with_context(|| match args.port {
         0 => "a port of the loopback address".to_owned(),
         port => format!("port {port} of the loopback address"),
     })?;
-    let stacks = args.inputs.iter().map(|input| opened(input, args, common));
+    let stacks = args.inputs.iter().map(|input| opened(input, &slicing, common));
     let stacks = stacks.collect::<Result<Vec<_>, Exit>>()?;
     let threads = rayon::current_num_threads();
     let viewer = Arc::new(Viewer::new(
@@ -145,13 +146,13 @@ fn leading_to(address: &str) -> String {
 }
 
 /// Opens a stack; a part is sliced into a temporary file.
-fn opened(path: &Path, args: &ViewArgs, common: &Common) -> Result<ViewedStack, Exit> {
+fn opened(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<ViewedStack, Exit> {
     let progress = Progress::new("view", common, true);
     let name = input_name(path);
     let failed = |error| failed_at(name.clone(), error);
-    let part = SlicedPart::open(path, &args.slicing, &|line| progress.say(line))?;
+    let part = SlicedPart::open(path, slicing, &progress)?;
     let pages = match part {
-        Some(part) => IndexedStack::from_file(sliced(&part, args, &progress)?).map_err(failed)?,
+        Some(part) => IndexedStack::from_file(sliced(&part, &progress)?).map_err(failed)?,
         None => open_indexed(path)?,
     };
     if let Some(end) = pages.end() {
@@ -161,10 +162,11 @@ fn opened(path: &Path, args: &ViewArgs, common: &Common) -> Result<ViewedStack, 
     Ok(ViewedStack::new(shown, pages))
 }
 
-fn sliced(part: &SlicedPart, args: &ViewArgs, progress: &Progress) -> Result<File, Exit> {
-    let slices = part.layers(&args.slicing, None, None, progress)?;
+fn sliced(part: &SlicedPart, progress: &Progress) -> Result<File, Exit> {
+    let slices = part.layers(None, None, progress)?;
     progress.expect(slices.count);
-    let layers = slices.layers.inspect(|_| progress.layer_done());
+    let layers = slices.layers.map(|layer| Ok::<_, Exit>(layer?));
+    let layers = layers.inspect(|_| progress.layer_done());
     let place = "a temporary file for the layers";
     let file = tempfile::tempfile().context(place)?;
     let to = Destination::Stream(Box::new(file.try_clone().context(place)?));

@@ -6,10 +6,8 @@ use std::str::FromStr;
 
 use anyhow::{Context, anyhow};
 use lamp_grayscale::{OutlinePiece, PixelLine};
-use lamp_slicer::{Axis, Part, SectionOptions, SliceError, Trapezoid, section_area};
+use lamp_slicer::{Axis, Part, SectionOptions, SliceError, SliceOptions, Trapezoid, section_area};
 use lamp_stack::{Dpi, Layer, Length};
-
-use crate::slicing_options::SlicingOptions;
 
 /// The plane of a section, in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,9 +116,8 @@ impl SectionLine {
     pub(crate) fn outline(
         &self,
         model: Part,
-        options: &SlicingOptions,
+        options: &SliceOptions,
     ) -> Result<Vec<Vec<OutlinePiece>>, SliceError> {
-        let options = options.for_slicing();
         let turned = options.placement.rotated(Axis::Y, 90.0);
         let pitch = self.dpi.pitch().mm();
         let (placement, z, top_mm) = match self.plane() {

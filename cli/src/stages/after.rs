@@ -1,20 +1,20 @@
 //! Stages that need the whole stack, and those behind them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use lamp_pipeline::documents::is_file;
+use lamp_pipeline::part_file::PartFile;
+use lamp_pipeline::slice::Counts;
+use lamp_pipeline::watcher::KeptRemarks;
+use lamp_pipeline::{Error, RangeFindings, Stage, named};
 use lamp_postprocess::machine::Machine;
-use lamp_stack::Layer;
+use lamp_stack::{Layer, Page, Pages, PassingLayer, map_in_order};
 
-use super::chain::{Stage, named, taken};
-use super::findings::RangeFindings;
-use crate::catalogue::is_file;
 use crate::commands::support::SupportArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::mesh_report::Counts;
-use crate::part_arg::PartArg;
-use crate::progress::{Notes, Progress};
-use crate::streams::{layers_of, open_pages};
+use crate::progress::Progress;
 
 /// Changes when `support` makes other bytes from the same options, stack and part.
 pub(super) const SUPPORT_CODE: u32 = 3;
@@ -46,7 +46,7 @@ impl After {
                 let machine = Some(args.machine.clone());
                 Ok(machine.into_iter().filter(|path| is_file::<Machine>(path)).collect())
             }
-            Self::Layers(stage) => stage.input_files(),
+            Self::Layers(stage) => Ok(stage.input_files()?),
         }
     }
 
@@ -68,27 +68,36 @@ impl After {
         stack: &Path,
         write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
     ) -> Result<RangeFindings, Exit> {
-        let notes = Notes::default();
+        let kept = Arc::new(KeptRemarks::default());
         let mut findings = RangeFindings::new(Counts::default(), false);
         match self {
             Self::Support(args) => {
                 let mut args = SupportArgs::clone(args);
-                args.part = vec![PartArg { path: part.to_owned(), placement: None }];
+                args.part = vec![PartFile { path: part.to_owned(), placement: None }];
                 args.stack = stack.to_owned();
-                let mut kept = KeptStack::new(stack);
-                let mut layers = args.layers(&mut kept, &Progress::noting("support", &notes))?;
+                let mut stack = KeptStack::new(stack);
+                let progress = Progress::keeping("support", &kept);
+                let mut layers = args.layers(&mut stack, &progress)?;
                 write(&mut layers)?;
             }
             Self::Layers(stage) => {
-                let working = stage.start(&notes)?;
-                let layers = Box::new(layers_of(open_pages(stack)?, stack, None));
-                let mut layers = working.layers(layers, 0..u32::MAX, [true; 2])?;
-                write(&mut layers).map_err(|error| named(error, part))?;
-                drop(layers);
+                let working = stage.start(&kept)?;
+                let failed = |error| Error::from(error).at(stack.display().to_string());
+                let pages = Pages::open(stack).map_err(failed)?;
+                let layers =
+                    map_in_order(pages.map(move |page| page.map_err(failed)), move |page: Page| {
+                        page.decode().map(PassingLayer::from).map_err(failed)
+                    });
+                let layers = working.layers(Box::new(layers), 0..u32::MAX, [true; 2])?;
+                let decoded = layers.map(|layer| {
+                    let layer = layer.and_then(|layer| Ok(layer.decode()?));
+                    layer.map_err(|error| Exit::from(named(error, part)))
+                });
+                write(&mut { decoded })?;
                 working.find(0, &part.display().to_string(), &mut findings);
             }
         }
-        findings.of_part = taken(&notes);
+        findings.of_part = kept.take();
         Ok(findings)
     }
 }

@@ -3,18 +3,19 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use lamp_pipeline::watcher::KeptRemarks;
 use lamp_postprocess::TILE_CODE;
 use lamp_stack::Layer;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::chain::taken;
 use super::parse::{parse_check, parse_tile};
 use crate::commands::check::CheckArgs;
 use crate::commands::tile::{Build, TileArgs};
 use crate::exit::Exit;
-use crate::progress::{Notes, Progress};
+use crate::progress::Progress;
 
 /// Change when other bytes come from the same options and stacks.
 pub(crate) const JOIN_CODE: u32 = 2;
@@ -66,12 +67,12 @@ impl Tiling {
         stacks: &[(PathBuf, Option<u32>)],
         write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
     ) -> Result<Vec<String>, Exit> {
-        let notes = Notes::default();
-        let build = self.0.build_of(stacks, &Progress::noting("tile", &notes))?;
+        let kept = Arc::new(KeptRemarks::default());
+        let build = self.0.build_of(stacks, &Progress::keeping("tile", &kept))?;
         let Build { mut layers, stray_rows, no_mesh, .. } = build;
         write(&mut layers)?;
         let found = [stray_rows.borrow().text(), no_mesh.borrow().text()].into_iter().flatten();
-        Ok(taken(&notes).into_iter().chain(found.map(|text| format!("tile: {text}"))).collect())
+        Ok(kept.take().into_iter().chain(found.map(|text| format!("tile: {text}"))).collect())
     }
 }
 

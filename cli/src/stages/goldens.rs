@@ -7,11 +7,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use lamp_pipeline::{compensate, dither, edit, fix, slice};
 use lamp_stack::digest_of;
 
+use super::after;
 use super::calls::{JOIN_CODE, PACK_CODE, Tiling};
 use super::tests::{Bench, COARSE, GRAY};
-use super::{after, compensate, dither, edit, fix, slice};
 
 const GOLDENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/stages/goldens.txt");
 const BLESS: &str = "LAMP_BLESS=1 cargo test -p lamp-cli --lib stages::goldens";
@@ -99,7 +100,7 @@ fn a_stage_whose_bytes_change_has_another_number() {
         let same_number = golden.get(&**name).filter(|golden| number(golden) == number(line));
         assert!(
             same_number.is_none_or(|golden| golden == line),
-            "{name} makes other bytes than it did: raise its number (CODE in cli/src/stages/), so \
+            "{name} makes other bytes than it did: raise its number (CODE in pipeline/src/), so \
              that stored results are made again, then run {BLESS}"
         );
     }

@@ -1,43 +1,19 @@
-//! The stages of a part, in one process: from the part to layers to layers, without files between.
-//!
-//! Each stage is what its command does between a reader and a writer. [`Chain`] runs them for a
-//! range of layers; ranges that are joined have the bytes of the pipeline typed by hand.
+//! Stages as they stand on a command line, and what follows on the stages of parts, for nights.
 
 pub(crate) mod after;
 pub(crate) mod calls;
-mod chain;
-pub(crate) mod compensate;
-pub(crate) mod dither;
-pub(crate) mod edit;
-mod findings;
-pub(crate) mod fix;
 #[cfg(test)]
 mod goldens;
-mod names;
 mod parse;
-pub(crate) mod slice;
-mod survey;
 #[cfg(test)]
 mod tests;
 
 use std::path::Path;
 
+use lamp_pipeline::Chain;
+
 pub(crate) use after::After;
-pub(crate) use chain::Chain;
 pub(crate) use parse::StageError;
-#[allow(unused_imports, reason = "`lamp batch` uses them")]
-pub(crate) use {
-    findings::RangeFindings,
-    names::{Names, stored_name},
-    survey::Survey,
-};
-
-use lamp_stack::Layer;
-
-use crate::exit::Exit;
-
-/// Layers on their way from stage to stage.
-pub(crate) type Layers<'a> = Box<dyn Iterator<Item = Result<Layer, Exit>> + 'a>;
 
 /// What is done to a part: first layer by layer, in ranges, then to the whole stack.
 pub(crate) struct Stages {

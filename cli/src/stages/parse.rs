@@ -9,21 +9,24 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use lamp_postprocess::machine::Machine;
 
+use lamp_pipeline::compensate::{CompensateSettings, Compensating};
+use lamp_pipeline::documents::is_file;
+use lamp_pipeline::edit::{EditSettings, Editing};
+use lamp_pipeline::part_file::PartFile;
+use lamp_pipeline::slice::SliceStage;
+use lamp_pipeline::{Chain, Stage};
+
+use super::Stages;
 use super::after::After;
-use super::chain::Stage;
-use super::compensate::{CompensateSettings, Compensating};
-use super::edit::{EditSettings, Editing};
-use super::slice::SliceSettings;
-use super::{Chain, Stages};
 use crate::Lamp;
+use crate::args::slicing::SliceStageArgs;
+use crate::args::stages::{CompensateStageArgs, DitherStageArgs, EditStageArgs, FixStageArgs};
 use crate::arguments::{settings_of_machine, words_left_open};
-use crate::catalogue::is_file;
 use crate::commands::check::CheckArgs;
 use crate::commands::support::SupportArgs;
 use crate::commands::tile::TileArgs;
 use crate::exit::Exit;
 use crate::help::formed;
-use crate::part_arg::PartArg;
 use crate::streams::is_stream;
 use crate::usage::sentence;
 
@@ -151,15 +154,17 @@ impl<'a> Reader<'a> {
         T::from_arg_matches(&self.matches).expect("the words are of that command")
     }
 
-    fn slice(&self) -> Result<SliceSettings, String> {
-        let mut settings: SliceSettings = self.read();
-        if settings.parts.len() > 1 {
+    fn slice(&self) -> Result<SliceStage, String> {
+        let said = |error: lamp_pipeline::Error| Exit::from(error).to_string();
+        let args: SliceStageArgs = self.read();
+        let mut stage = SliceStage::try_from(&args).map_err(|error| error.to_string())?;
+        if stage.parts.len() > 1 {
             return Err("leave out the part's file: the stages are for one".to_owned());
         }
-        settings.parts.clear();
-        settings.named_mut().for_each(|path| *path = self.folder.join(&*path));
-        settings.options.exposure().map_err(|error| error.to_string())?;
-        Ok(settings)
+        stage.parts.clear();
+        stage.named_mut().for_each(|path| *path = self.folder.join(&*path));
+        stage.settings.exposure().map_err(said)?;
+        Ok(stage)
     }
 
     fn support(&self) -> Box<SupportArgs> {
@@ -169,20 +174,20 @@ impl<'a> Reader<'a> {
     }
 
     fn per_layer(&self, name: &str) -> Result<Stage, String> {
-        let said = |error: Exit| error.to_string();
+        let said = |error: lamp_pipeline::Error| Exit::from(error).to_string();
         let in_folder = |path: &mut PathBuf| *path = self.folder.join(&*path);
         Ok(match name {
-            "fix" => Stage::Fix(self.read()),
-            "dither" => Stage::Dither(self.read()),
+            "fix" => Stage::Fix((&self.read::<FixStageArgs>()).into()),
+            "dither" => Stage::Dither((&self.read::<DitherStageArgs>()).into()),
             "compensate" => {
-                let mut settings: CompensateSettings = self.read();
+                let mut settings = CompensateSettings::from(&self.read::<CompensateStageArgs>());
                 settings.inputs_mut().for_each(in_folder);
                 Compensating::new(&settings).map_err(said)?;
                 Stage::Compensate(settings)
             }
             _ => {
-                let mut settings: EditSettings = self.read();
-                settings.named_mut().for_each(in_folder);
+                let mut settings = EditSettings::from(&self.read::<EditStageArgs>());
+                in_folder(settings.named_mut());
                 Editing::new(&settings).map_err(said)?;
                 Stage::Edit(settings)
             }
@@ -218,7 +223,7 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
     let is_given =
         |id: &str| ids.contains(&id) && matches.value_source(id) == Some(ValueSource::CommandLine);
     let of_part = |id: &str| {
-        id == "part" && matches.get_many::<PartArg>(id).is_none_or(|parts| parts.len() < 2)
+        id == "part" && matches.get_many::<PartFile>(id).is_none_or(|parts| parts.len() < 2)
     };
     let refused = REFUSED.iter().find(|(id, _)| is_given(id) && !of_part(id));
     if let Some((_, why)) = refused {

@@ -5,13 +5,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use lamp_pipeline::{Names, RangeFindings, stored_name};
 use lamp_stack::{Destination, Format, Layer, join, write_stack};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use tempfile::TempDir;
 
+use super::Stages;
 use super::calls::{CheckFindings, Checking, Tiling};
-use super::{Names, RangeFindings, Stages, stored_name};
 use crate::Lamp;
 use crate::exit::Exit;
 use crate::options::Common;
@@ -194,11 +195,11 @@ fn whatever_reaches_beyond_the_part_is_told_by_the_range_at_that_end() {
     bench.lamp("slice @t.stl --dpi 100 --thickness 1mm --translate 0,0,5 -o @higher.tif");
     let stages = bench.stages(&[COARSE, "edit --union @higher.tif"]);
     bench.range("t.stl", &stages, 0..40, &bench.path("low.tif"));
-    let write = |layers: &mut dyn Iterator<Item = Result<Layer, Exit>>| {
+    let write = |layers: &mut dyn Iterator<Item = Result<Layer, lamp_pipeline::Error>>| {
         for layer in layers {
             layer?;
         }
-        Ok(())
+        Ok::<_, Exit>(())
     };
     let error = stages.chain.run(&bench.path("t.stl"), "t.stl", 40..76, write).unwrap_err();
     assert!(error.to_string().contains("edit 1"), "{error}");
@@ -304,20 +305,25 @@ fn what_follows_on_ranges_does_what_its_command_does() {
     let names = ["t.stl", &stored_name("blake3:0123456789abcdef")];
     let stages = bench.stages(&[COARSE, "support --radius 1mm", "dither"]);
     assert_eq!(stages.after.len(), 2);
-    let to = |name: &str| {
-        let file = bench.path(name);
-        move |layers: &mut dyn Iterator<Item = _>| {
-            write_stack(layers, Destination::File(file), Format::Big)
-        }
-    };
+    fn write(
+        layers: impl Iterator<Item = Result<Layer, impl Into<Exit>>>,
+        file: PathBuf,
+    ) -> Result<(), Exit> {
+        let layers = layers.map(|layer| layer.map_err(Into::into));
+        write_stack(layers, Destination::File(file), Format::Big)
+    }
+    let path = |name: &str| bench.path(name);
     let part = bench.path("t.stl");
     // Under the name of its content, from the part to the build.
-    stages.chain.run(&part, names[1], 0..76, to("sliced.tif")).unwrap();
-    stages.after[0].run(&part, &bench.path("sliced.tif"), to("held.tif")).unwrap();
-    stages.after[1].run(&part, &bench.path("held.tif"), to("dots.tif")).unwrap();
+    let sliced = path("sliced.tif");
+    stages.chain.run(&part, names[1], 0..76, |layers| write(layers, sliced.clone())).unwrap();
+    stages.after[0].run(&part, &sliced, |layers| write(layers, path("held.tif"))).unwrap();
+    let to_dots = |layers: &mut dyn Iterator<Item = _>| write(layers, path("dots.tif"));
+    stages.after[1].run(&part, &path("held.tif"), to_dots).unwrap();
     let words: Vec<String> = ["--mesh", "none", "--area", "8x8in"].map(str::to_owned).to_vec();
     let tiling = Tiling::parse(&words, &[Some(2)], bench.folder.path()).unwrap();
-    tiling.run(&[(bench.path("dots.tif"), Some(2))], to("build.tif")).unwrap();
+    let dots = [(path("dots.tif"), Some(2))];
+    tiling.run(&dots, |layers| write(layers, path("build.tif"))).unwrap();
     // Out of the store with today's name: the bytes of the commands by hand.
     let by_hand = bench.by_hand("t.stl", &[COARSE, "support --radius 1mm", "dither"]);
     let names = Names::new([(names[1].to_owned(), names[0].to_owned())]);

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::{Subject, Wanted};
 use crate::exit::Exit;
-use crate::stages::Names;
+use lamp_pipeline::Names;
 
 /// Delivers results to a folder.
 pub(super) struct Deliverer<'a> {
@@ -87,8 +87,8 @@ impl Deliverer<'_> {
         let names = Names::new(wanted.names.iter().cloned());
         let stored = self.store.result(wanted.stack);
         match self.output.format {
-            NightFormat::Lamp => names.copy(&stored, to),
-            NightFormat::Tif => names.unpack(&stored, to),
+            NightFormat::Lamp => Ok(names.copy(&stored, to)?),
+            NightFormat::Tif => Ok(names.unpack(&stored, to)?),
         }
     }
 

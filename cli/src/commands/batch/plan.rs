@@ -13,10 +13,11 @@ use lamp_batch::{
 
 use super::night_file::NightFile;
 use super::work::{What, Work};
-use crate::catalogue::without_digest;
 use crate::exit::Exit;
+use crate::stages::Stages;
 use crate::stages::calls::{Checking, JOIN_CODE, PACK_CODE, Tiling};
-use crate::stages::{Stages, Survey, stored_name};
+use lamp_pipeline::documents::without_digest;
+use lamp_pipeline::{Survey, stored_name};
 
 /// A range takes about so many seconds of a processor, unless the night file says how many there
 /// are: few enough that a crash costs little, enough that starting it costs nothing.
@@ -152,6 +153,7 @@ impl Planner<'_> {
             .map_err(|error| self.at(stages[error.stage].place, &error))?;
         let files = parsed.chain.input_files();
         let files = files
+            .map_err(Exit::from)
             .and_then(|files| self.inputs(files))
             .map_err(|error| self.at(stages[0].place, error))?;
         let code = parsed.chain.code().into_iter().chain([("join", JOIN_CODE)]);

@@ -10,11 +10,11 @@ use super::night_file::NightFile;
 use super::plan::Plan;
 use super::room::Room;
 use crate::exit::Exit;
-use crate::height_options::time_text;
-use crate::memory::in_words;
 use crate::options::Common;
 use crate::progress::printable;
 use crate::streams::print;
+use lamp_pipeline::heights::time_text;
+use lamp_pipeline::memory::in_words;
 
 pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;

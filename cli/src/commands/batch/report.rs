@@ -18,11 +18,11 @@ use super::task::middle;
 use super::work::Checked;
 use crate::commands::report::{Picture, document};
 use crate::exit::Exit;
-use crate::height_options::time_text;
-use crate::memory::in_words;
 use crate::plots::{Plot, curve, inline_svg, linear};
 use crate::progress::printable;
 use crate::streams::write_file;
+use lamp_pipeline::heights::time_text;
+use lamp_pipeline::memory::in_words;
 
 /// The most findings of a part that are listed.
 const MOST_LINES: usize = 5;

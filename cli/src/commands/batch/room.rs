@@ -6,7 +6,7 @@ use lamp_batch::Ledger;
 
 use super::deliver::Deliverer;
 use super::plan::Plan;
-use crate::memory::in_words;
+use lamp_pipeline::memory::in_words;
 
 /// What a task takes besides its result: what it does, its manifest, and three blocks that are not full.
 const TASK_BYTES: u64 = 3 * 4096;

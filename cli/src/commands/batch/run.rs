@@ -17,9 +17,9 @@ use super::room::Room;
 use super::summary::{LineState, Summary};
 use super::{EngineName, RunArgs};
 use crate::exit::Exit;
-use crate::memory::available;
 use crate::options::Common;
 use crate::progress::Progress;
+use lamp_pipeline::memory::available;
 
 pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let Some(night) = &args.night else {

@@ -24,8 +24,9 @@ use super::work::{Checked, What, Work};
 use crate::commands::report::{Picture, of_layer};
 use crate::exit::Exit;
 use crate::out_of_memory;
+use crate::stages::Stages;
 use crate::stages::calls::{Checking, Tiling};
-use crate::stages::{RangeFindings, Stages};
+use lamp_pipeline::RangeFindings;
 
 type Layers<'a> = dyn Iterator<Item = Result<Layer, Exit>> + 'a;
 type Write<'a> = dyn FnMut(&mut Layers<'_>) -> Result<(), Exit> + 'a;
@@ -236,7 +237,7 @@ impl Doing<'_> {
         let result = self.begin()?;
         let mut count = 0;
         let findings = stages.chain.run(part, stored_name, layers, |layers| {
-            write(&mut layers.inspect(|_| count += 1), &result)
+            write(&mut layers.map(|layer| Ok(layer?)).inspect(|_| count += 1), &result)
         })?;
         facts.insert(STAGES.to_owned(), value(&findings));
         facts.insert(LAYERS.to_owned(), count.into());

@@ -16,12 +16,13 @@ use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
 use lamp_stack::CatalogueError;
 
-use crate::catalogue::{entry, read_text};
+use crate::catalogue::read_text;
 use crate::endings::parse_toml;
 use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use lamp_pipeline::documents::document;
 
 /// Fit a resin's parameters to measured cure depths or widths
 ///
@@ -106,7 +107,7 @@ impl CalibrationFiles {
 
     /// The material to add to, with the light given.
     fn base(&self) -> Result<Option<Material>, Exit> {
-        self.material.as_deref().map(entry).transpose()
+        Ok(self.material.as_deref().map(document).transpose()?)
     }
 
     /// The light that makes doses of times.

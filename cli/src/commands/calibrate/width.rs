@@ -4,18 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::calibrate::{Estimate, WidthFit, WidthPoint, fit_widths, width_points};
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
 use lamp_stack::Dpi;
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
-use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::documents::document;
 
 /// Fit the cure width of features of several sizes to measured squares
 ///
@@ -46,7 +46,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let files = &args.files;
     files.check()?;
     let base = files.base()?;
-    let of_depths = args.depth_material.as_deref().map(entry).transpose()?;
+    let of_depths = args.depth_material.as_deref().map(document).transpose()?;
     let of_depths = of_depths.as_ref().or(base.as_ref());
     let depths = match of_depths {
         Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,

@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 use super::units::Scale;
 use super::{CheckArgs, Kind};
-use crate::height_options::significant;
-use crate::json_report::to_nm;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::to_nm;
 
 /// What is said of a finding.
 pub(crate) struct FindingLine {

@@ -20,17 +20,17 @@ use lamp_supports::{
 };
 use serde_json::{Value, json};
 
-use crate::catalogue::{canonical_word, entry};
+use crate::args::slicing::SlicingArgs;
 use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
-use crate::part_options::at_part;
 use crate::progress::{Progress, printable};
-use crate::sliced_part::{SlicedPart, check_slicing};
-use crate::slicing_options::SlicingOptions;
 use crate::stack_notes::doubts;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
+use lamp_pipeline::documents::{canonical_word, document};
+use lamp_pipeline::solid::at_part;
+use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
 pub(crate) use lines::FindingLine;
 pub(super) use lines::{Shown, drag_mn};
@@ -128,7 +128,7 @@ pub(crate) struct CheckArgs {
     memory: Option<u64>,
 
     #[command(flatten)]
-    slicing: SlicingOptions,
+    slicing: SlicingArgs,
 }
 
 /// A kind of findings, as people name it.
@@ -158,8 +158,9 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
-    let machine: Machine = entry(&args.machine)?;
-    check_slicing(&args.slicing, &args.inputs, Some(&machine))?;
+    let machine: Machine = document(&args.machine)?;
+    let slicing = SliceSettings::try_from(&args.slicing)?;
+    check_slicing(&slicing, &args.inputs, Some(&machine))?;
     let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
     let evidence = evidence.transpose()?;
     let checked = args.inputs.iter().map(|path| {
@@ -194,7 +195,7 @@ fn found_by_default<T: MemorySize + Send>(
     let matches = command.get_matches_from([""; 0]);
     let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
     let findings = lamp_supports::check(layers, decode, &args.options())?;
-    let usual = entry(&args.machine)?;
+    let usual = document(&args.machine)?;
     let recoating = machine.unwrap_or(&usual).recoating.as_ref();
     let lines = lines::of(&findings, &Disagreements::default(), &args, recoating);
     Ok((findings, lines))
@@ -242,7 +243,8 @@ impl CheckArgs {
         machine: &Machine,
         common: &Common,
     ) -> Result<CheckedInput, Exit> {
-        let mut input = Input::open(path, &self.slicing, common)?;
+        let slicing = SliceSettings::try_from(&self.slicing)?;
+        let mut input = Input::open(path, &slicing, common)?;
         // The mesh is out of memory before the layers come.
         let minima = self.minima(&input)?;
         let findings = self.check(&mut input, common)?;
@@ -258,7 +260,7 @@ impl CheckArgs {
 
     /// Returns what there is in a stack, the worst first.
     pub(crate) fn lines(&self, stack: &Path) -> Result<Vec<FindingLine>, Exit> {
-        Ok(self.checked(stack, &entry(&self.machine)?, &Common::quiet())?.lines)
+        Ok(self.checked(stack, &document(&self.machine)?, &Common::quiet())?.lines)
     }
 
     /// Returns the options that matter to findings as one text.
@@ -318,9 +320,9 @@ impl CheckArgs {
         part: &SlicedPart,
         progress: &Progress,
     ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
-        let slices = part.layers(&self.slicing, self.layers.clone(), self.memory, progress)?;
+        let slices = part.layers(self.layers.clone(), self.memory, progress)?;
         progress.expect(slices.count);
-        Ok(slices.layers)
+        Ok(slices.layers.map(|layer| Ok(layer?)))
     }
 
     /// Returns the minima of a part's mesh, if islands are told.
@@ -329,7 +331,7 @@ impl CheckArgs {
         if !self.tells(Kind::Islands) || part.model.is_cut() {
             return Ok(Vec::new());
         }
-        let solid = &self.slicing.solid;
+        let solid = &part.settings.solid;
         let table = CornerTable::of_part(&part.model, &solid.placement(), solid.units);
         let at_file = |error: SliceError| at_part(error.into(), std::slice::from_ref(&part.file));
         Ok(IslandMinimum::of_mesh(&table.map_err(at_file)?))
@@ -344,11 +346,14 @@ impl CheckArgs {
         common: &Common,
     ) -> Result<Disagreements, Exit> {
         // The mesh of a part that is cut by others is not its surface.
-        let has_mesh = matches!(input, Input::Part(part) if !part.model.is_cut());
-        if !has_mesh || !self.tells(Kind::Islands) {
+        let cut = match input {
+            Input::Part(part) if !part.model.is_cut() => part.settings.cut(),
+            _ => return Ok(Disagreements::default()),
+        };
+        if !self.tells(Kind::Islands) {
             return Ok(Disagreements::default());
         }
-        let mut found = findings.compare_minima(minima, self.slicing.cut());
+        let mut found = findings.compare_minima(minima, cut);
         if found.minima.is_empty() {
             return Ok(found);
         }
@@ -383,9 +388,9 @@ enum Input {
 
 impl Input {
     /// Tells a stack from a part by how it begins, and opens a part.
-    fn open(path: &Path, slicing: &SlicingOptions, common: &Common) -> Result<Self, Exit> {
+    fn open(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<Self, Exit> {
         let progress = Progress::new("check", common, true);
-        let part = SlicedPart::open(path, slicing, &|line| progress.say(line))?;
+        let part = SlicedPart::open(path, slicing, &progress)?;
         Ok(part.map_or_else(|| Self::Stack(KeptStack::new(path)), Self::Part))
     }
 }

@@ -2,8 +2,8 @@
 
 use lamp_supports::{Findings, Region};
 
-use crate::height_options::significant;
-use crate::json_report::to_nm;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::to_nm;
 
 /// How pixels and layers lie in the part's coordinates.
 pub(in crate::commands) struct Scale<'a> {

@@ -7,8 +7,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::walk::{DifferenceBox, SectionDifference};
-use crate::json_report::to_nm;
 use crate::progress::printable;
+use lamp_pipeline::to_nm;
 
 /// The most layers, and the most boxes of a layer, that are printed unless all are asked for.
 const MOST_LINES: usize = 20;

@@ -10,12 +10,12 @@ use lamp_stack::{Destination, FolderBeside, Format, sealed, write_stack};
 
 use super::KeptOptions;
 use super::job::{JOB, JobFile, MATERIAL, STACK, digest_of_file, profile_name, read_job};
-use crate::catalogue::entry;
 use crate::commands::plan::profile_of;
 use crate::exit::Exit;
 use crate::options::Input;
 use crate::progress::Progress;
 use crate::streams::{input_name, new_folder, read_layers};
+use lamp_pipeline::documents::document;
 
 /// Begins a job.
 pub(super) fn begin(
@@ -25,7 +25,7 @@ pub(super) fn begin(
     kept: &KeptOptions,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    let (material, lamp_doubt) = kept.lamp.material(entry(material)?)?;
+    let (material, lamp_doubt) = kept.lamp.material(document(material)?)?;
     lamp_doubt.iter().for_each(|doubt| progress.say(doubt));
     let light = Light::of(&material, kept.at.unwrap_or_default())?;
     light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;

@@ -24,12 +24,13 @@ use serde::{Deserialize, Serialize};
 
 use super::measured::Measured;
 use super::step::Learned;
-use crate::catalogue::{read_file, read_text};
+use crate::catalogue::read_text;
 use crate::commands::plan::profile_of;
 use crate::exit::Exit;
 use crate::progress::Progress;
-use crate::recorded;
 use crate::streams::{read_beside, write_file};
+use lamp_pipeline::documents::read_file;
+use lamp_pipeline::words;
 
 pub(super) const JOB: &str = "job.toml";
 pub(super) const STACK: &str = "stack.tif";
@@ -50,7 +51,7 @@ pub(super) struct JobFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) origin_mm: Option<[f64; 2]>,
     pub(super) wanted: u8,
-    #[serde(with = "recorded::text")]
+    #[serde(with = "words::text")]
     pub(super) at: SampleHeight,
     pub(super) margin: f64,
     pub(super) slowest_um_per_s: f64,

@@ -18,13 +18,13 @@ use lamp_planning::speed::{Platform, Speed};
 use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
-use crate::memory;
 use crate::options::{Common, one_of_described, parse_memory};
 use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::plots;
 use crate::progress::Progress;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use lamp_pipeline::memory;
 
 use job::Job;
 use measured::Measured;

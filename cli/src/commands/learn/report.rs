@@ -8,8 +8,8 @@ use super::job::{Job, Print};
 use super::measured::Measured;
 use super::step::Learned;
 use crate::exit::Exit;
-use crate::height_options::{significant, time_text};
 use crate::json_report::JsonReport;
+use lamp_pipeline::heights::{significant, time_text};
 
 /// The lines that are printed.
 pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {

@@ -6,7 +6,6 @@ mod profile;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin};
 use lamp_stack::{Catalogued, Length};
@@ -17,6 +16,8 @@ use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::Common;
 use crate::streams::{input_name, print};
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::documents;
 
 /// List, show, check or make materials: how deep light cures a resin
 #[derive(Args)]
@@ -67,7 +68,7 @@ pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     match &args.action {
         Action::List { json: true } => answer(Material::builtins()),
         Action::List { json: false } => print(&table()),
-        Action::Show { material, json: true } => answer([catalogue::entry(material)?]),
+        Action::Show { material, json: true } => answer([documents::document(material)?]),
         Action::Show { material, json: false } => catalogue::show::<Material>(material),
         Action::Check { file, json } => check(file, *json),
         Action::Make(args) => make::run(args, common),
@@ -171,7 +172,7 @@ fn widths(material: &Material) -> Option<String> {
 }
 
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
-    let (material, _) = catalogue::read_file(path)?;
+    let (material, _) = documents::read_file(path)?;
     if json {
         return answer([material]);
     }

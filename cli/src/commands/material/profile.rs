@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::calibrate::format_significant;
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
 use lamp_stack::Length;
 
-use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
 use crate::options::{Common, parse_distance};
 use crate::progress::Progress;
 use crate::streams::print;
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::documents::document;
 
 /// Print the profile that a line of light cures: how wide at the surface, how deep where
 ///
@@ -48,7 +48,7 @@ pub(super) struct ProfileArgs {
 }
 
 pub(super) fn run(args: &ProfileArgs, common: &Common) -> Result<(), Exit> {
-    let (material, lamp_doubt) = args.lamp.material(entry(&args.material)?)?;
+    let (material, lamp_doubt) = args.lamp.material(document(&args.material)?)?;
     let failed = |error: anyhow::Error| Exit::Failed(error).at(material.name.clone());
     let curve = material.working_curve().map_err(|error| failed(error.into()))?;
     let curve = curve.ok_or_else(|| failed(anyhow!("it has no [working-curve]")))?;

@@ -13,13 +13,14 @@ use clap::{Args, Subcommand};
 use lamp_slicer::{Part, Units};
 use lamp_stack::Length;
 
+use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
-use crate::memory::{available, in_words};
 use crate::options::{Common, one_of, parse_memory};
-use crate::part_options::part_notes;
 use crate::progress::say;
-use crate::step_options::{HEADING, ReaderOptions, parse_tolerance};
 use crate::streams::{input_name, is_stream};
+use lamp_pipeline::memory::{available, in_words};
+use lamp_pipeline::solid::part_notes;
+use lamp_pipeline::step::ReaderSettings;
 
 /// Check or repair the mesh of a part
 #[derive(Args)]
@@ -58,11 +59,11 @@ struct MeshPart {
 
     /// How far the facets of a STEP part may lie from its surfaces
     #[arg(long, value_name = "LENGTH", default_value = "5um", value_parser = parse_tolerance)]
-    #[arg(help_heading = HEADING)]
+    #[arg(help_heading = STEP)]
     chord: Length,
 
     #[command(flatten)]
-    reader: ReaderOptions,
+    reader: ReaderArgs,
 
     /// Most memory for the mesh, which takes some 70 bytes a facet [default: all that is free]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
@@ -80,7 +81,7 @@ impl MeshPart {
 
     /// Opens the part; returns its bytes, too, if they came from a stream.
     fn open(&self, command: &str, common: &Common) -> Result<(Part, Vec<u8>), Exit> {
-        let options = self.reader.for_opening(self.chord)?;
+        let options = ReaderSettings::from(&self.reader).for_opening(self.chord)?;
         let mut bytes = Vec::new();
         let part = match is_stream(&self.part) {
             true => stdin()

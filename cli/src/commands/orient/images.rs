@@ -1,6 +1,8 @@
 //! Counts islands on the images of a pose.
 
-use lamp_slicer::{Part, SliceOptions, Slices};
+use lamp_pipeline::part_file::PartFile;
+use lamp_pipeline::solid::{SolidSettings, at_part};
+use lamp_slicer::{Part, SliceError, SliceOptions, Slices};
 use lamp_supports::{CheckOptions, Pose, check};
 
 use super::OrientArgs;
@@ -8,19 +10,26 @@ use crate::exit::Exit;
 
 impl OrientArgs {
     /// Slices a part in a pose, and counts the islands that hold more than specks.
-    pub(super) fn islands_on_images(&self, part: &Part, pose: &Pose) -> Result<u64, Exit> {
+    pub(super) fn islands_on_images(
+        &self,
+        solid: &SolidSettings,
+        files: &[PartFile],
+        part: &Part,
+        pose: &Pose,
+    ) -> Result<u64, Exit> {
         let options = SliceOptions {
             dpi: self.dpi,
             thickness: self.thickness,
-            units: self.solid.units,
-            placement: self.solid.placement().then(&pose.placement()),
-            fill: self.solid.fill,
+            units: solid.units,
+            placement: solid.placement().then(&pose.placement()),
+            fill: solid.fill,
             // Facets are what the poses were measured on.
             polish: false,
             ..SliceOptions::default()
         };
-        let slices = Slices::new(part.clone(), &options)?;
-        let layers = slices.map(|layer| layer.map_err(Exit::from));
+        let failed = |error: SliceError| Exit::from(at_part(error.into(), files));
+        let slices = Slices::new(part.clone(), &options).map_err(failed)?;
+        let layers = slices.map(|layer| layer.map_err(failed));
         Ok(check(layers, Ok, &CheckOptions::default())?.islands.count())
     }
 }

@@ -10,13 +10,15 @@ use lamp_slicer::topology::CornerTable;
 use lamp_stack::{Dpi, Length};
 use lamp_supports::{PoseFacts, PoseLimits, measure, pareto, poses};
 
+use crate::args::solid::SolidArgs;
+use crate::args::solid::part_file;
 use crate::exit::Exit;
 use crate::options::{Common, parse_angle, parse_thickness};
-use crate::part_arg::{PartArg, paths};
-use crate::part_options::{PartOptions, Reading, at_part, name_of_all};
 use crate::plots::{self, sphere_picture};
-use crate::progress::say;
+use crate::progress::Progress;
 use crate::streams::{check_beside, write_file};
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::{Reading, SolidSettings, at_part, name_of_all};
 
 /// Find how to turn a part so that few islands float, and little overhangs
 ///
@@ -32,8 +34,8 @@ Examples:
   lamp orient blade.step --best 0 --json | jq -r '.best'")]
 pub(crate) struct OrientArgs {
     /// The part: files, or - for standard input, as for `slice`
-    #[arg(value_name = "PART", required = true, value_parser = PartArg::parser())]
-    parts: Vec<PartArg>,
+    #[arg(value_name = "PART", required = true, value_parser = part_file())]
+    parts: Vec<PartFile>,
 
     /// Directions to try, spread evenly; the part as it is and its axes are tried, too
     #[arg(long, value_name = "N", default_value = "500")]
@@ -69,7 +71,7 @@ pub(crate) struct OrientArgs {
     json: bool,
 
     #[command(flatten)]
-    solid: PartOptions,
+    solid: SolidArgs,
 }
 
 fn parse_overhang_angle(text: &str) -> Result<f64, String> {
@@ -99,32 +101,28 @@ impl Compared {
 }
 
 pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
+    let solid = SolidSettings::from(&args.solid);
     if let Some(plot) = &args.plot {
         plots::check_name(plot)?;
-        check_beside(plot, Path::new("-"), paths(&args.parts).chain(args.solid.cutters()))?;
+        check_beside(plot, Path::new("-"), paths(&args.parts).chain(solid.cutters()))?;
     }
-    let say = |line: &str| {
-        if !common.quiet {
-            say(&format!("orient: {line}"));
-        }
-    };
-    let reading = Reading { dpi: args.dpi, may_be_open: false, say: &say };
-    let part = args.solid.open(&args.parts, &reading)?;
+    let progress = Progress::new("orient", common, true);
+    let reading = Reading { dpi: args.dpi, may_be_open: false, watcher: &progress };
+    let part = solid.open(&args.parts, &reading)?;
     let limits =
         PoseLimits { thickness_mm: args.thickness.mm(), max_overhang_deg: args.max_overhang_angle };
-    let table = CornerTable::of_part(&part, &args.solid.placement(), args.solid.units);
-    let (files, _) = args.solid.files(&args.parts);
+    let table = CornerTable::of_part(&part, &solid.placement(), solid.units);
+    let (files, _) = solid.files(&args.parts);
     let table = table.map_err(|error| at_part(error.into(), &files))?;
     let poses = measure(&table, &poses(args.directions, args.cone), &limits);
     drop(table);
     let pareto = pareto(&poses);
-    let images = pareto.iter().take(args.best).map(|&pose| {
-        let islands = args.islands_on_images(&part, &poses[pose].pose);
-        islands.map_err(|error| at_part(error, &files))
-    });
+    let images = pareto.iter().take(args.best);
+    let images =
+        images.map(|&pose| args.islands_on_images(&solid, &files, &part, &poses[pose].pose));
     let image_islands = images.collect::<Result<_, Exit>>()?;
     let rotations =
-        poses.iter().map(|facts| args.solid.rotation_with(facts.pose.turns())).collect();
+        poses.iter().map(|facts| solid.placement.rotation_with(facts.pose.turns())).collect();
     let compared = Compared { poses, pareto, image_islands, rotations };
     if let Some(path) = &args.plot {
         let title = format!("Islands by the direction that is up: {}", name_of_all(&args.parts));

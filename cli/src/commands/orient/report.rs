@@ -6,10 +6,11 @@ use serde_json::json;
 
 use super::{Compared, OrientArgs};
 use crate::exit::Exit;
-use crate::height_options::significant;
-use crate::json_report::{print_answer, to_nm};
-use crate::part_options::name_of_all;
+use crate::json_report::print_answer;
 use crate::streams::print;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::solid::name_of_all;
+use lamp_pipeline::to_nm;
 
 /// The most poses that the table shows.
 const MOST_ROWS: usize = 20;

@@ -19,14 +19,14 @@ use super::column_measures::doubt;
 use super::column_report::{Reported, lines_of, report_of};
 use super::simulate::parse_rays;
 use crate::bitmaps::Bitmap;
-use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
-use crate::height_options::parse_share;
 use crate::options::{Common, one_of_described, parse_count, parse_thickness};
 use crate::plan_folder::{PlanFiles, PlanFolder};
 use crate::progress::Progress;
-use crate::recorded::option;
 use crate::target_arg::{GivenTarget, TargetArg};
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::heights::parse_share;
+use lamp_pipeline::words::option;
 
 /// Choose bitmaps and times that cure a part through a glass, without layers
 ///
@@ -137,8 +137,8 @@ const MOST_STEPS: usize = 20_000;
 
 pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     let folder = PlanFolder::new(&args.output, args.force)?;
-    let (projector, projector_word) = entry_and_word::<Projector>(&args.projector)?;
-    let (material, material_word) = entry_and_word::<Material>(&args.material)?;
+    let (projector, projector_word) = document_and_word::<Projector>(&args.projector)?;
+    let (material, material_word) = document_and_word::<Material>(&args.material)?;
     let curve = HeightCurve::of(&material).map_err(anyhow::Error::new)?;
     let progress = Progress::new("plan", common, true);
     let target = args.target.open(&projector, &progress)?;

@@ -12,12 +12,12 @@ use serde_json::json;
 
 use super::kinetics_report::{Cured, fields, lines_of};
 use crate::bitmaps::Bitmap;
-use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described};
 use crate::plan_folder::{PlanFiles, PlanFolder};
 use crate::progress::Progress;
 use crate::target_arg::TargetArg;
+use lamp_pipeline::documents::document;
 
 /// Choose bitmaps and times that cure a round part, by the kinetics of resin and oxygen
 ///
@@ -66,8 +66,8 @@ pub(super) struct EcplArgs {
 
 pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let folder = PlanFolder::new(&args.output, args.force)?;
-    let projector: Projector = entry(&args.projector)?;
-    let material: Material = entry(&args.material)?;
+    let projector: Projector = document(&args.projector)?;
+    let material: Material = document(&args.material)?;
     let setting = setting_of(&projector, &material)?;
     let progress = Progress::new("plan", common, true);
     let target = args.target.open(&projector, &progress)?;

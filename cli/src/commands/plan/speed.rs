@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::speed::{PartError, PartPages, PlanError, SpeedOptions, TimedPart, plan};
 use lamp_stack::Layer;
@@ -13,7 +12,6 @@ use super::speed_report::{Planned, lines_of, write_report};
 use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::memory;
 use crate::options::{Common, Input, Output, parse_memory};
 use crate::planning_options::{PlannedResin, PlanningOptions};
 use crate::platform_options::PlatformOptions;
@@ -23,6 +21,8 @@ use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
 };
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::memory;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///

@@ -3,8 +3,8 @@
 use lamp_planning::speed::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 
 use super::speed_report::{Planned, seconds};
-use crate::height_options::{significant, time_text};
 use crate::plots::{Plot, PlotAxis, Series, by_layer, curve, linear, stairs};
+use lamp_pipeline::heights::{significant, time_text};
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {

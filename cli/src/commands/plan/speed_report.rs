@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use super::speed::rounded;
 use crate::exit::Exit;
-use crate::height_options::{significant, time_text};
 use crate::json_report::JsonReport;
+use lamp_pipeline::heights::{significant, time_text};
 
 /// A plan, and what it is for.
 pub(super) struct Planned<'a> {

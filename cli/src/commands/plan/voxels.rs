@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::voxels::{Objective, Options, Outcome, PlanError, PlannedStack, Sources, plan};
 use lamp_stack::Layer;
@@ -13,7 +12,6 @@ use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
 use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::memory;
 use crate::options::{Common, Input, Output, one_of_described, parse_memory};
 use crate::planning_options::{PlannedResin, PlanningOptions};
 use crate::plots;
@@ -23,6 +21,8 @@ use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
 };
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::memory;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///

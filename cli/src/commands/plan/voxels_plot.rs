@@ -3,8 +3,8 @@
 use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
 
 use super::voxels_report::Planned;
-use crate::height_options::significant;
 use crate::plots::{Plot, PlotAxis, Series, curve, linear};
+use lamp_pipeline::heights::significant;
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {

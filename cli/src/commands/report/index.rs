@@ -4,8 +4,8 @@ use maud::html;
 
 use super::gather::StackReport;
 use super::page::document;
-use crate::height_options::time_text;
 use crate::progress::printable;
+use lamp_pipeline::heights::time_text;
 
 /// A line of the index.
 pub(super) struct Entry {

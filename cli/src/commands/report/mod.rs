@@ -16,7 +16,6 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::stacks_in;
 use serde_json::json;
 
-use crate::catalogue::entry;
 use crate::endings::{HTML, check_ending};
 use crate::exit::Exit;
 use crate::json_report::print_answer;
@@ -26,6 +25,7 @@ use crate::streams::{
     check_beside, failed_at, input_name, is_folder, is_stream, new_folder, open_indexed, print,
     write_file,
 };
+use lamp_pipeline::documents;
 
 use gather::StackReport;
 pub(super) use page::document;
@@ -69,7 +69,7 @@ pub(crate) struct ReportArgs {
 }
 
 pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
-    let machine = args.machine.as_deref().map(entry::<Machine>).transpose()?;
+    let machine = args.machine.as_deref().map(documents::document::<Machine>).transpose()?;
     let stacks = if is_stream(&args.stack) {
         vec![args.stack.clone()]
     } else {

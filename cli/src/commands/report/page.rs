@@ -6,8 +6,8 @@ use super::charts::{charts, same_thickness_um};
 use super::gather::{Found, StackReport};
 use super::pictures::Picture;
 use crate::commands::info;
-use crate::height_options::time_text;
 use crate::progress::printable;
+use lamp_pipeline::heights::time_text;
 
 /// The most findings of a kind that are listed, as `lamp check` does.
 const MOST_LINES: usize = 20;

@@ -19,21 +19,22 @@ use lamp_supports::{
 };
 use serde_json::Value;
 
-use crate::catalogue::entry;
+use crate::args::solid::part_file;
 use crate::endings::{parse_report, parse_toml};
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::options::{Common, Output, parse_distance, parse_thickness};
-use crate::part_arg::{PartArg, paths};
-use crate::part_options::name_of_all;
 use crate::progress::Progress;
 use crate::stack_notes::doubts;
-use crate::stack_part::RecordedSlicing;
-use crate::stages::Layers;
+use crate::streams::Layers;
 use crate::streams::{
     check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
     write_file, write_layers,
 };
+use lamp_pipeline::RecordedSlicing;
+use lamp_pipeline::documents::document;
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::name_of_all;
 
 use plan_file::plan_text;
 use report::SupportReport;
@@ -65,8 +66,8 @@ pub(crate) struct SupportArgs {
 
     /// The part that the stack was sliced from; repeat it for several parts, as they were given to
     /// slice
-    #[arg(long, value_name = "PART", required = true, value_parser = PartArg::parser())]
-    pub(crate) part: Vec<PartArg>,
+    #[arg(long, value_name = "PART", required = true, value_parser = part_file())]
+    pub(crate) part: Vec<PartFile>,
 
     /// Write the supports as a list of edits, with alternatives, for people to change
     #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
@@ -157,7 +158,7 @@ impl SupportArgs {
         stack: &mut KeptStack,
         progress: &Progress,
     ) -> Result<Layers<'static>, Exit> {
-        let machine: Machine = entry(&self.machine)?;
+        let machine: Machine = document(&self.machine)?;
         let first = first_page(stack)?;
         let name = input_name(&self.stack);
         let surface = self.surface(&first, &name, progress)?;
@@ -234,8 +235,8 @@ impl SupportArgs {
                 "{name} {why}, so it does not lie as its part: support it before"
             )));
         }
-        let part = sliced.open(&self.part, name, &|note| progress.say(note))?;
-        let facets = sliced.options.solid.body(part);
+        let part = sliced.open(&self.part, name, progress)?;
+        let facets = sliced.settings.solid.body(part);
         Ok(Surface::new(facets.map_err(|error| Exit::from(error).at(name_of_all(&self.part)))?))
     }
 

@@ -8,9 +8,10 @@ use serde_json::{Map, Value, json};
 
 use crate::commands::check::{Scale, drag_mn};
 use crate::exit::Exit;
-use crate::height_options::significant;
-use crate::json_report::{JsonReport, to_nm};
+use crate::json_report::JsonReport;
 use crate::progress::Progress;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::to_nm;
 
 /// The most islands that are printed, unless all are asked for.
 const MOST_LINES: usize = 20;

@@ -10,11 +10,11 @@ use lamp_grayscale::target::{TargetExposure, squares};
 use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
 
 use super::{parse_gap, whole_pixels};
-use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::progress::Progress;
 use crate::streams::{new_folder, write_file, written_to};
+use lamp_pipeline::documents::document;
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///
@@ -117,7 +117,7 @@ impl SquaresArgs {
         let Some(path) = &self.material else {
             return Ok(self.intensity.expect("one of the two is required"));
         };
-        let material: Material = entry(path)?;
+        let material: Material = document(path)?;
         let name = path.display();
         material.light().map_err(anyhow::Error::new)?.ok_or_else(|| {
             Exit::usage(format!("{name} states no intensity of full white: give --intensity"))

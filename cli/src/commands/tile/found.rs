@@ -5,7 +5,7 @@ use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
-use crate::options::ranges;
+use lamp_pipeline::ranges;
 
 /// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
 pub(super) fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<String> {

@@ -24,14 +24,14 @@ use lamp_postprocess::{
 };
 use lamp_stack::{Length, Size};
 
-use crate::catalogue::{entry, entry_and_word, is_file, recorded_name};
 use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::progress::Progress;
 use crate::stack_notes::doubts;
-use crate::stages::Layers;
+use crate::streams::Layers;
 use crate::streams::{progress, unless_found, write_file};
+use lamp_pipeline::documents::{document, document_and_word, is_file, recorded_name};
 
 use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::MeshArgs;
@@ -279,7 +279,7 @@ impl TileArgs {
 
     /// Reads the machine, if one is given.
     fn machine(&self) -> Result<Option<Machine>, Exit> {
-        let machine: Option<Machine> = self.machine.as_deref().map(entry).transpose()?;
+        let machine: Option<Machine> = self.machine.as_deref().map(document).transpose()?;
         if let Some((machine, area)) = machine.as_ref().zip(self.area) {
             machine.check_area(area).map_err(Exit::wrong_options)?;
         }
@@ -298,7 +298,7 @@ impl TileArgs {
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
         let placed = match &self.machine {
-            Some(machine) => placed.for_machine(&entry_and_word::<Machine>(machine)?.1),
+            Some(machine) => placed.for_machine(&document_and_word::<Machine>(machine)?.1),
             None => placed,
         };
         self.tell_places(&placed, progress)?;

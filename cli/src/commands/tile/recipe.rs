@@ -8,9 +8,9 @@ use lamp_postprocess::machine::Machine;
 use lamp_postprocess::{HeightOptions, Layout, MeshOptions, Recipe, RecipePart};
 use lamp_stack::digest_of;
 
-use crate::catalogue::entry_and_word;
 use crate::exit::Exit;
 use crate::streams::{check_beside, input_name, is_stream};
+use lamp_pipeline::documents::document_and_word;
 
 use super::TileArgs;
 
@@ -66,7 +66,7 @@ impl TileArgs {
         let parts = parts.collect::<Result<Vec<_>, _>>()?;
         let recipe = Recipe::new(layout, parts, heights, mesh, self.layers.clone());
         Ok(Some(match &self.machine {
-            Some(machine) => recipe.for_machine(&entry_and_word::<Machine>(machine)?.1),
+            Some(machine) => recipe.for_machine(&document_and_word::<Machine>(machine)?.1),
             None => recipe,
         }))
     }

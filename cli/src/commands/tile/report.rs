@@ -6,9 +6,10 @@ use lamp_stack::Dpi;
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
-use crate::json_report::{JsonReport, to_nm};
+use crate::json_report::JsonReport;
 use crate::options::Output;
 use crate::streams::{is_stream, print};
+use lamp_pipeline::to_nm;
 
 use super::TileArgs;
 use super::time;

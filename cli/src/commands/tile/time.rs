@@ -2,7 +2,7 @@
 
 use lamp_postprocess::machine::{BuildTime, Machine};
 
-use crate::height_options::time_text;
+use lamp_pipeline::heights::time_text;
 
 /// Returns a line for the build, each part of its time, and what is not known of it.
 pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {

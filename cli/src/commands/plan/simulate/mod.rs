@@ -15,12 +15,12 @@ use lamp_planning::target::HeightMap;
 use lamp_stack::named;
 use serde_json::{Map, Value, json};
 
-use crate::catalogue::entry;
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described};
 use crate::plan_folder::{PlanFiles, PlanFolder};
 use crate::progress::Progress;
 use crate::target_arg::{GivenTarget, TargetReading};
+use lamp_pipeline::documents::document;
 
 use exposures::Exposures;
 
@@ -120,14 +120,14 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
         None => None,
     };
     let progress = Progress::new("plan", common, true);
-    let projector: Projector = entry(&args.projector)?;
+    let projector: Projector = document(&args.projector)?;
     let target = match &args.target {
         Some(path) => Some(args.reading.open(path, &projector, &progress)?),
         None => None,
     };
     let shown = Shown {
         exposures: Exposures::read(&args.bitmaps, &projector)?,
-        material: entry(&args.material)?,
+        material: document(&args.material)?,
         projector,
         target,
     };

@@ -10,11 +10,11 @@ use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
 use super::super::stacks::{InputStack, ReadLayers};
 use crate::exit::Exit;
-use crate::slicing_options::SlicingOptions;
+use lamp_pipeline::{SliceRecord, SliceSettings};
 
 /// What a stack says of how it was sliced.
 pub(super) struct SlicedFrom {
-    options: SlicingOptions,
+    settings: SliceSettings,
     /// The part's files as words, with their placements.
     files: Vec<String>,
     /// The part's files as the stack records them, if they were not found.
@@ -34,13 +34,13 @@ impl SlicedFrom {
         let refused = |why: String| Exit::Failed(anyhow!("{}: {why}", part.name()));
         let stack = part.stack();
         let commands = stack.map_or(&[][..], |stack| &stack.commands);
-        let options = commands.first().and_then(|command| SlicingOptions::of_command(command));
-        let (Some(stack), Some((recorded, mut options, fallback))) = (stack, options) else {
+        let record = stack.and_then(SliceRecord::of);
+        let (Some(stack), Some(mut record)) = (stack, record) else {
             let why = "it does not say how it was sliced, so it cannot be sliced at other angles: \
                        give --turns quarters";
             return Err(refused(why.to_owned()));
         };
-        if fallback.is_some() {
+        if record.fallback.is_some() {
             let why = "a fallback stood in for some of its layers, which is not done again at other \
                        angles: give --turns quarters";
             return Err(refused(why.to_owned()));
@@ -53,25 +53,26 @@ impl SlicedFrom {
             )));
         }
         let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
-        options.find_exposure(&folders).map_err(|error| error.at(part.name().to_owned()))?;
+        record.find_exposure(&folders).map_err(|error| error.at(part.name()))?;
+        let SliceRecord { parts: recorded, settings, .. } = record;
         let found = folders.iter().find_map(|folder| files_in(folder, &recorded, &stack.digest));
         let missing = found.is_none().then(|| recorded.join(" "));
         let files = found.unwrap_or(recorded);
         let ReadLayers { stages, range } = input.read_layers().clone();
-        Ok(Self { options, files, missing, stages, layers: range })
+        Ok(Self { settings, files, missing, stages, layers: range })
     }
 
     /// Returns the place about which the part turns, in the coordinates of its images.
     pub(super) fn centre_mm(&self) -> [f64; 2] {
         // It is moved after it is turned.
-        let [x, y, _] = self.options.solid.placement().at([0.0; 3]);
+        let [x, y, _] = self.settings.solid.placement().at([0.0; 3]);
         [x, y]
     }
 
     /// Returns the command that slices the part for a plan.
     pub(super) fn command(&self, slicing: &TurnedSlicing, all_layers: bool, out: &str) -> String {
         let files: Vec<_> = self.files.iter().map(|file| file_word(file).into_owned()).collect();
-        let slice = self.options.clone().turned(slicing).command(&files, None);
+        let slice = self.settings.clone().turned(slicing).command(&files);
         let Range { start, end } = self.layers;
         let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
         format!("{slice}{layers} -o {}", quoted(&file_word(out)))

@@ -1,0 +1,82 @@
+//! Options of adaptive layer heights.
+
+use clap::Args;
+use lamp_pipeline::heights::{HeightSettings, Measure, Seconds, parse_share};
+use lamp_stack::Length;
+
+use crate::options::{one_of, parse_thickness};
+
+pub(crate) const HEIGHTS: &str = "Adaptive layer heights";
+
+/// Options of adaptive heights.
+#[derive(Args, Clone)]
+pub(crate) struct HeightArgs {
+    /// Thinnest layer that the machine builds [default: 25um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    min: Option<Length>,
+
+    /// Thickest layer [default: 100um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    max: Option<Length>,
+
+    /// Step of layer thickness: all are multiples of it [default: 1um]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    step: Option<Length>,
+
+    /// Measure of a layer's error: the volume it lacks or has in excess, the height of cusps at its
+    /// edge, or the change of its section's area [default: volume, or cusp with --cusp]
+    #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEIGHTS)]
+    criterion: Option<Measure>,
+
+    /// Largest error of a layer, as a share of its volume (with --criterion area, of its section's
+    /// area): 2% or 0.02 [default: 2%]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEIGHTS)]
+    deviation: Option<f64>,
+
+    /// Largest cusp height: how far a layer's edge may be off the surface, along its normal
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    #[arg(conflicts_with = "deviation")]
+    cusp: Option<Length>,
+
+    /// Use at most N layers, with the smallest error that allows it (found to one percent)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEIGHTS)]
+    layers_budget: Option<u32>,
+
+    /// Build all layers within this time, for example 8h, 90min or 1200s: exposures, from
+    /// --material or --exposure-table, plus --layer-overhead
+    #[arg(long, value_name = "TIME", help_heading = HEIGHTS)]
+    #[arg(conflicts_with_all = ["deviation", "cusp"])]
+    time_budget: Option<Seconds>,
+
+    /// Time per layer besides its exposure, mostly for recoating, for example 30s
+    #[arg(long, value_name = "TIME", help_heading = HEIGHTS)]
+    layer_overhead: Option<Seconds>,
+
+    /// End layers at flat faces where the limits allow
+    #[arg(long, help_heading = HEIGHTS)]
+    snap: bool,
+
+    /// Distance between the rows that measure where parts of a layer lie above each other; features
+    /// thinner than that may be missed there [default: four pixels]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
+    row_pitch: Option<Length>,
+}
+
+impl From<&HeightArgs> for HeightSettings {
+    fn from(args: &HeightArgs) -> Self {
+        Self {
+            min: args.min,
+            max: args.max,
+            step: args.step,
+            criterion: args.criterion,
+            deviation: args.deviation,
+            cusp: args.cusp,
+            layers_budget: args.layers_budget,
+            time_budget: args.time_budget,
+            layer_overhead: args.layer_overhead,
+            row_pitch: args.row_pitch,
+            snap: args.snap,
+        }
+    }
+}

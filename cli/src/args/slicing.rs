@@ -1,0 +1,192 @@
+//! Options of slicing.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::Args;
+use lamp_pipeline::heights::HeightSettings;
+use lamp_pipeline::part_file::PartFile;
+use lamp_pipeline::placement::Numbers;
+use lamp_pipeline::slice::SliceStage;
+use lamp_pipeline::words::differing;
+use lamp_pipeline::{Frame, Shading, SliceSettings, Thickness};
+use lamp_slicer::{PLANE_TOLERANCE, PlaneRule};
+use lamp_stack::{Dpi, Length, Size};
+
+use super::exposure::{EXPOSURE, ExposureArgs};
+use super::heights::{HEIGHTS, HeightArgs};
+use super::solid::{STEP, SolidArgs, part_file};
+use crate::exit::Exit;
+use crate::options::{one_of, parse_layers, parse_memory, parse_thickness};
+
+/// Options that decide the images.
+#[derive(Args, Clone)]
+pub(crate) struct SlicingArgs {
+    /// Resolution in dots per inch
+    #[arg(long, value_name = "DPI", default_value_t = SliceSettings::default().dpi)]
+    dpi: Dpi,
+
+    /// Layer thickness, for example 100um, 0.1mm, 4mil or 0.004in
+    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(default_value = "100um")]
+    #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
+    thickness: Length,
+
+    /// Height in each layer at which the part is cut
+    #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
+    plane: PlaneRule,
+
+    /// How far a vertex may be from a layer's plane and still count as lying on it
+    ///
+    /// Files round heights: 0.7 mm is 0.699999988 in 32 bits. Such noise would move a flat face by
+    /// a layer. 0um compares heights as they are
+    #[arg(long, value_name = "LENGTH", default_value_t = PLANE_TOLERANCE)]
+    plane_tolerance: Length,
+
+    #[command(flatten)]
+    solid: SolidArgs,
+
+    /// Leave crossings on the facets of STEP parts, instead of moving them onto the exact
+    /// surfaces
+    #[arg(long, help_heading = STEP)]
+    no_polish: bool,
+
+    /// Black pixels around the part's bounding box
+    #[arg(long, value_name = "PIXELS", default_value_t = 1)]
+    margin: u32,
+
+    /// Top left corner of the image in part coordinates, in millimetres, instead of around the
+    /// part's bounding box; the image must contain the part and keep its last column black
+    #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
+    #[arg(allow_hyphen_values = true)]
+    origin: Option<Numbers<2>>,
+
+    /// Size of the image, for example 80x80mm or 4x4.5in; needs --origin
+    #[arg(long, value_name = "WxH", requires = "origin")]
+    size: Option<Size>,
+
+    /// Make each layer as thick as the part's slopes allow
+    ///
+    /// The options below set the limits and the largest error
+    #[arg(long, help_heading = HEIGHTS)]
+    adaptive: bool,
+
+    #[command(flatten)]
+    heights: HeightArgs,
+
+    #[command(flatten)]
+    exposure: ExposureArgs,
+
+    /// Write gray layers, which cure just down to where the part ends
+    ///
+    /// Each pixel is just bright enough to cure down to where the part ends below it, or white if
+    /// that is deeper than white cures
+    #[arg(long, requires = "material", conflicts_with = "exposure_table")]
+    #[arg(help_heading = EXPOSURE)]
+    gray: bool,
+
+    /// Choose gray levels for doses that add up, so that light of the layers above does not cure
+    /// through undersides
+    ///
+    /// With --gray. Down each column of pixels, the least light is taken away that leaves the
+    /// underside where it is, from the lowest layers first
+    #[arg(long, requires = "gray", help_heading = EXPOSURE)]
+    print_through: bool,
+}
+
+/// What is sliced, and how.
+#[derive(Args, Clone)]
+pub(crate) struct SliceStageArgs {
+    /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
+    ///
+    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one about z and moves it
+    /// first. Where they overlap they unite; --subtract and --intersect cut them
+    #[arg(value_name = "PART", required = true, value_parser = part_file())]
+    parts: Vec<PartFile>,
+
+    #[command(flatten)]
+    options: SlicingArgs,
+
+    /// Machine to build on: alpha, beta or a file (see lamp machine)
+    ///
+    /// A part, a resolution or a layer thickness beyond its limits is refused before the work. Its
+    /// defaults hold where no other resolution, thickness or margin is given
+    #[arg(long, value_name = "M")]
+    machine: Option<PathBuf>,
+
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    layers: Option<Range<u32>>,
+
+    /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
+    /// [default: a quarter of what there is, as far as it helps]. Facets in no order of height are
+    /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
+    /// memory, 49 bytes per facet
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+
+    /// An STL of the same STEP part, in millimetres. Layers where the STEP part has gaps are cut up
+    /// to 10 um off their plane, or else taken from this STL, as are layers that lack contours of
+    /// it
+    #[arg(long, value_name = "PART.stl", help_heading = STEP)]
+    fallback: Option<PathBuf>,
+}
+
+impl TryFrom<&SlicingArgs> for SliceSettings {
+    type Error = Exit;
+
+    /// # Errors
+    /// Returns an error if an option of adaptive heights is given without these.
+    fn try_from(args: &SlicingArgs) -> Result<Self, Exit> {
+        let heights = (&args.heights).into();
+        if !args.adaptive
+            && let Some(option) = differing(&heights, &HeightSettings::default())
+        {
+            return Err(Exit::usage(format!("--{option} needs --adaptive")));
+        }
+        Ok(Self {
+            dpi: args.dpi,
+            thickness: match args.adaptive {
+                true => Thickness::Adaptive { adaptive: true, heights },
+                false => Thickness::Uniform { thickness: args.thickness },
+            },
+            plane: args.plane,
+            plane_tolerance: args.plane_tolerance,
+            solid: (&args.solid).into(),
+            no_polish: args.no_polish,
+            shading: match (args.gray, args.print_through) {
+                (false, _) => Shading::None,
+                (true, false) => Shading::Gray,
+                (true, true) => Shading::PrintThrough,
+            },
+            exposure: (&args.exposure).into(),
+            frame: match (args.origin, args.size) {
+                (Some(origin), Some(size)) => Frame::At { origin, size },
+                _ => Frame::Around { margin: args.margin },
+            },
+        })
+    }
+}
+
+impl TryFrom<&SliceStageArgs> for SliceStage {
+    type Error = Exit;
+
+    /// # Errors
+    /// Returns an error if options contradict each other.
+    fn try_from(args: &SliceStageArgs) -> Result<Self, Exit> {
+        Ok(Self {
+            parts: args.parts.clone(),
+            settings: (&args.options).try_into()?,
+            machine: args.machine.clone(),
+            layers: args.layers.clone(),
+            memory: args.memory,
+            fallback: args.fallback.clone(),
+        })
+    }
+}
+
+/// Parses `X,Y` in millimetres.
+fn parse_origin(text: &str) -> Result<Numbers<2>, String> {
+    let wrong = || format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2");
+    text.trim_end_matches("mm").parse().map_err(|_| wrong())
+}

@@ -1,0 +1,344 @@
+//! The stage that moves edges by the cure width, and enlarges images for shrinkage.
+
+use std::cell::{Cell, Ref, RefCell};
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use lamp_grayscale::exposure::{LampLight, MeasuredDoses};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime};
+use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
+use lamp_stack::{Dpi, Layer, Length};
+use serde::{Deserialize, Serialize};
+
+use crate::documents::{canonical_word, document, is_file};
+use crate::error::{Error, ErrorKind};
+use crate::solid::is_default;
+use crate::wall_report::WallReport;
+use crate::words::{optional, words_of};
+
+/// Changes when other bytes come from the same settings and layers.
+pub const CODE: u32 = 6;
+
+/// By what edges move and images grow.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct CompensateSettings {
+    /// Moves all edges inwards by this distance, or outwards if it is negative.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub uniform: Option<Length>,
+    /// Moves edges inwards by the cure width of a material: a built-in one's name, or a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<PathBuf>,
+    /// Dose of full white; none is the page's exposure times the material's intensity.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub dose: Option<Dose>,
+    /// The lamp as it is now; none is the material's.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub lamp_intensity: Option<LampLight>,
+    /// Walls stay at least this wide, or as they are if thinner; none is two pixels.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub min_feature: Option<Length>,
+    /// Shrinkage in firing, for which images are enlarged.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub shrinkage: Option<FiringShrinkage>,
+    /// Rounds edges to whole pixels, without gray.
+    #[serde(skip_serializing_if = "is_default")]
+    pub one_bit: bool,
+}
+
+/// Shrinkage as people write it: `2.1%`, or `x:2.1%,y:1.8%`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FiringShrinkage {
+    /// Percent along x and y, from 0 to 50.
+    percent: [f64; 2],
+}
+
+impl FiringShrinkage {
+    /// Returns the shares that parts shrink by.
+    pub fn shares(self) -> Shrinkage {
+        let [x, y] = self.percent.map(|percent| percent / 100.0);
+        Shrinkage { x, y }
+    }
+}
+
+impl CompensateSettings {
+    /// Returns the files that are read.
+    pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.material.iter().filter(|path| is_file::<Material>(path))
+    }
+
+    /// Returns the files that are read, to be changed.
+    pub fn inputs_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.material.iter_mut().filter(|path| is_file::<Material>(path))
+    }
+
+    /// Returns the settings as one text. Files have no names in it.
+    pub fn canonical(&self) -> String {
+        let material = self.material.as_deref().map(canonical_word::<Material>);
+        let settings = Self { material: material.map(PathBuf::from), ..self.clone() };
+        format!("compensate{}", words_of(&settings))
+    }
+}
+
+/// Layers whose edges are being moved.
+pub struct Compensating<'a> {
+    settings: &'a CompensateSettings,
+    by: EdgeMove,
+    walls: RefCell<WallReport>,
+    layer_count: Cell<usize>,
+    done_before: RefCell<DoneBefore>,
+}
+
+impl<'a> Compensating<'a> {
+    /// Reads the material, if there is one.
+    ///
+    /// # Errors
+    /// Returns an error if there is nothing to do, or the material cannot be read.
+    pub fn new(settings: &'a CompensateSettings) -> Result<Self, Error> {
+        Ok(Self {
+            by: EdgeMove::of(settings)?,
+            settings,
+            walls: RefCell::default(),
+            layer_count: Cell::default(),
+            done_before: RefCell::default(),
+        })
+    }
+
+    /// Returns the layers with edges moved. Findings in layers of `counted` are reported.
+    pub fn layers<'b, E: From<CompensateError> + From<Error> + Send + 'b>(
+        &'b self,
+        layers: impl Iterator<Item = Result<Layer, E>> + 'b,
+        counted: Range<u32>,
+    ) -> impl Iterator<Item = Result<Layer, E>> + 'b {
+        let CompensateSettings { min_feature, one_bit, shrinkage, .. } = *self.settings;
+        let shrinkage = shrinkage.map(FiringShrinkage::shares).unwrap_or_default();
+        let layers = layers.inspect(|layer| {
+            self.layer_count.set(self.layer_count.get() + 1);
+            layer.iter().for_each(|layer| self.done_before.borrow_mut().look_at(layer));
+        });
+        let options = CompensateOptions { min_feature, one_bit, shrinkage };
+        let by = &self.by;
+        let widths = |layer: &Layer, dpi| Ok(by.widths(layer, dpi)?);
+        lamp_postprocess::compensate(layers, options, widths, move |done| {
+            if counted.contains(&done.layer.info.index) {
+                self.walls.borrow_mut().add(done);
+            }
+        })
+    }
+
+    /// Returns lines about the layers so far, which came from `name`.
+    pub fn lines(&self, name: &str) -> Vec<String> {
+        let CompensateSettings { uniform, material, shrinkage, .. } = self.settings;
+        let moves = uniform.is_some() || material.is_some();
+        let again = self.done_before.borrow().lines(name, moves, shrinkage.is_some());
+        let doubts = self.by.doubts();
+        again.into_iter().chain(doubts).chain(self.walls.borrow().lines()).collect()
+    }
+
+    /// Returns walls and losses so far, and the number of layers.
+    pub fn report(&self) -> (Ref<'_, WallReport>, usize) {
+        (self.walls.borrow(), self.layer_count.get())
+    }
+}
+
+/// Returns whether layers that this stage cannot change are the cause.
+pub fn is_of_stage(error: &Error) -> bool {
+    error.cause::<CompensateError>().is_some() || error.cause::<NoDose>().is_some()
+}
+
+/// What was already done to the layers, according to their pages.
+#[derive(Default)]
+struct DoneBefore {
+    moved: bool,
+    enlarged: bool,
+}
+
+impl DoneBefore {
+    fn look_at(&mut self, layer: &Layer) {
+        let Some(page) = layer.info.other.get("compensate") else { return };
+        let by = page["inwards_um"].as_array();
+        self.moved |= by.is_some_and(|by| by.iter().any(|by| by.as_f64() != Some(0.0)));
+        self.enlarged |= page.get("shrinkage").is_some();
+    }
+
+    /// Returns messages about what has now been done twice.
+    fn lines(&self, name: &str, moves: bool, enlarges: bool) -> Vec<String> {
+        let again = [
+            (
+                self.moved && moves,
+                "its layers were compensated before, and their edges have moved again",
+            ),
+            (
+                self.enlarged && enlarges,
+                "its layers were enlarged for shrinkage before, and now again",
+            ),
+        ];
+        again.iter().filter(|(is, _)| *is).map(|(_, text)| format!("{name}: {text}")).collect()
+    }
+}
+
+/// By what edges move.
+enum EdgeMove {
+    Uniform(Length),
+    CureWidth(Box<ByCureWidth>),
+}
+
+/// A cure width, and the doses that it is for.
+struct ByCureWidth {
+    width: CureWidth,
+    material: Material,
+    dose: Option<Dose>,
+    doses: MeasuredDoses,
+    /// What is doubtful about the lamp.
+    lamp_doubt: Option<String>,
+}
+
+/// A layer without a dose, and why.
+#[derive(Debug)]
+pub struct NoDose(String);
+
+impl std::fmt::Display for NoDose {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NoDose {}
+
+impl EdgeMove {
+    fn of(args: &CompensateSettings) -> Result<Self, Error> {
+        let Some(path) = &args.material else {
+            return match (args.uniform, args.shrinkage) {
+                (None, None) => {
+                    Err(Error::settings("give --uniform 25um, --material M or --shrinkage 2.1%"))
+                }
+                (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
+            };
+        };
+        let material: Material = document(path)?;
+        let (material, lamp_doubt) = match args.lamp_intensity {
+            Some(light) => {
+                light.material(&material).map_err(|error| Error::new(ErrorKind::Work, error))?
+            }
+            None => (material, None),
+        };
+        let name = &material.name;
+        let width = material.cure_width();
+        let width = width.map_err(|error| Error::new(ErrorKind::Work, error).at(name.clone()))?;
+        let width = width.ok_or_else(|| {
+            Error::work(format!(
+                "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
+            ))
+        })?;
+        let doses = MeasuredDoses::of_widths(&material);
+        let dose = args.dose;
+        Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, lamp_doubt })))
+    }
+
+    /// Returns sentences on a lamp and on doses that the widths were not measured at.
+    fn doubts(&self) -> Vec<String> {
+        match self {
+            Self::Uniform(_) => Vec::new(),
+            Self::CureWidth(by) => {
+                by.lamp_doubt.clone().into_iter().chain(by.doses.doubt("layers")).collect()
+            }
+        }
+    }
+
+    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Error> {
+        let (width, dose) = match self {
+            Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
+            Self::CureWidth(by) => {
+                let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
+                by.doses.see(dose);
+                (&by.width, dose)
+            }
+        };
+        // The image has the sizes that are wanted, not those that are to be exposed.
+        let sizes: Vec<f64> = width.cured_sizes(dose).iter().map(|size| size.pixels(dpi)).collect();
+        let pitch = dpi.pitch().um();
+        let size = |pixels: f64| Length::from_um(pixels * pitch);
+        Ok(Widths::by_size(&sizes, |pixels| width.width_of_cured(dose, size(pixels)).pixels(dpi)))
+    }
+}
+
+/// Returns the dose of a layer from its page's exposure time.
+fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Error> {
+    let no_dose = |text: String| Error::new(ErrorKind::Work, NoDose(text));
+    let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
+        no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
+    })?;
+    let light =
+        material.light().map_err(|error| Error::new(ErrorKind::Work, error))?.ok_or_else(|| {
+            let name = &material.name;
+            no_dose(format!(
+                "{name} states no intensity of full white: give --dose, or add [intensity] to its \
+             file"
+            ))
+        })?;
+    Ok(light * ExposureTime::from_ms(time))
+}
+
+impl FromStr for FiringShrinkage {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "`{text}` is not a shrinkage: write a share from 0% to 50%, as 2.1% or x:2.1%,y:1.8%"
+            )
+        };
+        let share = |text: &str| {
+            let percent: f64 = text.trim().strip_suffix('%')?.trim_end().parse().ok()?;
+            (0.0..=50.0).contains(&percent).then_some(percent)
+        };
+        if !text.contains(':') {
+            let both = share(text).ok_or_else(wrong)?;
+            return Ok(Self { percent: [both; 2] });
+        }
+        let [mut x, mut y] = [None; 2];
+        for part in text.split(',') {
+            let (axis, value) = part.split_once(':').ok_or_else(wrong)?;
+            let side = match axis.trim() {
+                "x" | "X" => &mut x,
+                "y" | "Y" => &mut y,
+                _ => return Err(wrong()),
+            };
+            if side.replace(share(value).ok_or_else(wrong)?).is_some() {
+                return Err(wrong());
+            }
+        }
+        Ok(Self { percent: [x, y].map(Option::unwrap_or_default) })
+    }
+}
+
+impl fmt::Display for FiringShrinkage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.percent;
+        write!(f, "x:{x}%,y:{y}%")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Shrinkage, String> {
+        text.parse().map(FiringShrinkage::shares)
+    }
+
+    #[test]
+    fn shrinkages_people_write() {
+        assert_eq!(parsed("2%"), Ok(Shrinkage { x: 0.02, y: 0.02 }));
+        assert_eq!(parsed("x:2%, y: 50 %"), Ok(Shrinkage { x: 0.02, y: 0.5 }));
+        assert_eq!(parsed("Y:0%"), Ok(Shrinkage { x: 0.0, y: 0.0 }));
+        for wrong in
+            ["", "2", "%", "-1%", "51%", "nan%", "x:2", "x2%", "z:2%", "x:1%,x:2%", "1%,2%"]
+        {
+            assert!(parsed(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Materials, machines and projectors, built in or in files, by the words of settings: `alpha`,
+//! `mine.toml`, or `mine.toml@blake3:0123456789abcdef` as stacks record them.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, IsTerminal, Read};
+use std::path::{Path, PathBuf};
+
+use lamp_stack::{Builtin, Catalogued, digest_of, file_word};
+
+use crate::error::{Error, ErrorKind};
+
+/// A file of a catalogue is text of a few kilobytes.
+const MAX_FILE: u64 = 1 << 20;
+
+/// A document whose errors can be reported.
+pub trait Document: Catalogued<CheckError: std::error::Error + Send + Sync + 'static> {}
+
+impl<T: Catalogued<CheckError: std::error::Error + Send + Sync + 'static>> Document for T {}
+
+/// Returns whether a path means standard input or output.
+pub fn is_stream(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Returns the name of an input for messages.
+pub fn input_name(path: &Path) -> String {
+    if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Returns the built-in document of a name, or that of a file.
+pub fn document<T: Document>(path: &Path) -> Result<T, Error> {
+    document_and_text(path).map(|(document, _)| document)
+}
+
+/// Returns a document, and the word that stacks record for it: its name as it was given, without
+/// folders, and the digest of its text. The word is taken for the document wherever its name is.
+pub fn document_and_word<T: Document>(path: &Path) -> Result<(T, String), Error> {
+    let (document, text) = document_and_text(path)?;
+    Ok((document, word_of_text(path, &text)))
+}
+
+/// The separator between a name and the digest of the file.
+const DIGEST: &str = "@blake3:";
+
+/// The hexadecimal digits of a digest behind a name.
+const DIGEST_DIGITS: usize = 16;
+
+/// Returns the word that stacks record for a file, given its digest.
+pub fn word_of(path: &Path, digest: &str) -> String {
+    let (path, _) = without_digest(path);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = if name == "-" { name } else { file_word(&name).into_owned().into() };
+    let digits = digest.strip_prefix("blake3:").unwrap_or(digest);
+    format!("{name}{DIGEST}{}", &digits[..DIGEST_DIGITS])
+}
+
+/// Returns the word that stacks record for a file of this text.
+pub fn word_of_text(path: &Path, text: &str) -> String {
+    word_of(path, &digest_of(text.as_bytes()).expect("it is in memory"))
+}
+
+/// Takes the digest from a word that stacks record.
+pub fn without_digest(path: &Path) -> (PathBuf, Option<&str>) {
+    match path.to_str().and_then(|text| text.rsplit_once(DIGEST)) {
+        Some((name, digest)) if !path.exists() => (name.into(), Some(digest)),
+        _ => (path.to_owned(), None),
+    }
+}
+
+/// Checks that a file has the digest that a word for it states; `found` is the word for it as it is.
+pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
+    let (name, Some(digest)) = without_digest(path) else { return Ok(()) };
+    let found = found.rsplit_once(DIGEST).map_or("", |(_, found)| found);
+    if digest.is_empty() || !found.starts_with(digest) {
+        let name = name.display();
+        return Err(Error::work(format!(
+            "{name} is not as it was: its digest begins with {found}, not with {digest}"
+        )));
+    }
+    Ok(())
+}
+
+/// Returns the document of a word, and its text as it was written.
+///
+/// # Errors
+/// Returns an error if there is no such document, or it is wrong.
+pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error> {
+    let (path, _) = without_digest(word);
+    let (document, text) = if let Some(builtin) = builtin::<T>(&path) {
+        let document =
+            T::from_toml(builtin.toml).map_err(|error| Error::new(ErrorKind::Work, error))?;
+        (document, builtin.toml.to_owned())
+    } else if !is_stream(&path) && !path.exists() {
+        let names: Vec<_> = T::BUILTINS.iter().map(|builtin| builtin.name).collect();
+        let (path, kind, names) = (path.display(), T::KIND, names.join(", "));
+        let text = format!("{path}: there is no such file, nor a built-in {kind}: {names}");
+        return Err(Error::work(text));
+    } else {
+        read_file(&path)?
+    };
+    check_word(word, &word_of_text(&path, &text))?;
+    Ok((document, text))
+}
+
+fn builtin<T: Document>(path: &Path) -> Option<&'static Builtin> {
+    T::BUILTINS.iter().find(|builtin| path.to_str() == Some(builtin.name))
+}
+
+/// Returns a word for a document in an option: a built-in one's name, with the digest of its text;
+/// `file` for a file, whatever its name.
+pub fn canonical_word<T: Document>(path: &Path) -> String {
+    let word = |builtin: &Builtin| word_of_text(builtin.name.as_ref(), builtin.toml);
+    builtin::<T>(&without_digest(path).0).map_or_else(|| "file".to_owned(), word)
+}
+
+/// Returns what of a document's or another file's record its digest does not give: a built-in one's
+/// word, or the name of a file.
+pub fn recorded_name<T: Document>(path: &Path) -> OsString {
+    match is_file::<T>(path) {
+        true => without_digest(path).0.file_name().unwrap_or_default().into(),
+        false => canonical_word::<T>(path).into(),
+    }
+}
+
+/// Returns whether a word of an option means a file, and not a built-in document.
+pub fn is_file<T: Document>(path: &Path) -> bool {
+    builtin::<T>(&without_digest(path).0).is_none()
+}
+
+/// Reads a document's file, and its text.
+pub fn read_file<T: Document>(path: &Path) -> Result<(T, String), Error> {
+    if is_stream(path) && io::stdin().is_terminal() {
+        let why = format!("no {} to read: name a file, or pipe one in", T::KIND);
+        return Err(Error::settings(why));
+    }
+    let read = || -> Result<(T, String), Error> {
+        let text = read_text(path, MAX_FILE, &format!("a {} file", T::KIND))?;
+        Ok((T::from_toml(&text).map_err(|error| Error::new(ErrorKind::Work, error))?, text))
+    };
+    read().map_err(|error| error.at(input_name(path)))
+}
+
+/// Reads a text of at most `max` bytes. `what` is the word for it in messages.
+///
+/// # Errors
+/// Returns an error if it cannot be read, is longer, or is no text.
+pub fn read_text(path: &Path, max: u64, what: &str) -> Result<String, Error> {
+    let read = || -> io::Result<Vec<u8>> {
+        let from: Box<dyn Read> = if is_stream(path) {
+            Box::new(io::stdin().lock())
+        } else {
+            Box::new(File::open(path)?)
+        };
+        let mut bytes = Vec::new();
+        from.take(max + 1).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let bytes = read()?;
+    if bytes.len() as u64 > max {
+        return Err(Error::work(format!("more than {} MiB is not {what}", max >> 20)));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        Error::work(format!("byte {at} is not UTF-8 text"))
+    })
+}

@@ -1,0 +1,216 @@
+//! The stage that changes layers at image level.
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Read, Seek};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use lamp_postprocess::{EditError, Edits, LabelList, OtherLayers, OtherPicture, edit_passing};
+use lamp_stack::{
+    Layer, Limits, Op, Page, PageInfo, Pages, PassingLayer, StackError, digest_of, map_in_order,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::documents::{input_name, is_stream, read_text};
+use crate::error::{Error, ErrorKind};
+use crate::words::text;
+
+/// Changes when other bytes come from the same settings and layers.
+pub const CODE: u32 = 3;
+
+/// A list of edits is text of a few kilobytes.
+const MAX_LIST_BYTES: u64 = 1 << 20;
+
+/// The changes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum EditSettings {
+    /// A list of edits, a TOML file.
+    List {
+        /// The file.
+        edits: PathBuf,
+    },
+    /// A combination with another stack.
+    Combine {
+        /// The pixels that are white.
+        #[serde(with = "text")]
+        op: Op,
+        /// The other stack.
+        stack: PathBuf,
+    },
+}
+
+/// The edits, and the files that they name.
+struct EditFiles {
+    edits: Edits,
+    stacks: Vec<PathBuf>,
+    pictures: Vec<PathBuf>,
+    lists: Vec<PathBuf>,
+}
+
+impl EditSettings {
+    /// Returns the file that the settings name.
+    pub fn named(&self) -> &PathBuf {
+        let (Self::List { edits: file } | Self::Combine { stack: file, .. }) = self;
+        file
+    }
+
+    /// Returns the file that the settings name, to be changed.
+    pub fn named_mut(&mut self) -> &mut PathBuf {
+        let (Self::List { edits: file } | Self::Combine { stack: file, .. }) = self;
+        file
+    }
+
+    /// Returns the settings as one text. Files have no names in it.
+    pub fn canonical(&self) -> String {
+        match self {
+            Self::Combine { op, .. } => format!("edit --{op}"),
+            Self::List { .. } => "edit list".to_owned(),
+        }
+    }
+
+    fn files(&self) -> Result<EditFiles, Error> {
+        let list = match self {
+            Self::List { edits } => edits,
+            Self::Combine { op, stack } => {
+                let edits = Edits::combine(*op, stack.clone());
+                let stacks = vec![stack.clone()];
+                return Ok(EditFiles { edits, stacks, pictures: vec![], lists: vec![] });
+            }
+        };
+        let text = read_text(list, MAX_LIST_BYTES, "a list of edits");
+        let text = text.map_err(|error| error.at(input_name(list)))?;
+        let failed = |error| Error::new(ErrorKind::Work, error).at(input_name(list));
+        let edits = Edits::from_toml(&text).map_err(failed)?;
+        // Files stand beside the list that names them.
+        let folder = list.parent().unwrap_or(Path::new(""));
+        let stacks = edits.stacks().map(|file| folder.join(file)).collect();
+        let pictures = edits.pictures().map(|file| folder.join(file)).collect();
+        let lists: Vec<_> = edits.lists().map(|file| folder.join(file)).collect();
+        let texts = lists.iter().map(|file| open_list(file)).collect::<Result<_, Error>>()?;
+        let edits = edits.with_lists(texts).map_err(failed)?;
+        Ok(EditFiles { edits, stacks, pictures, lists })
+    }
+}
+
+/// Layers that are being edited.
+pub struct Editing {
+    list: Option<PathBuf>,
+    files: EditFiles,
+    /// How many layers each edit was made in.
+    counts: RefCell<Vec<usize>>,
+}
+
+/// Opens another stack, of which notes are printed or kept.
+pub type OpenStack<'a> = &'a dyn Fn(&Path) -> Result<Pages, Error>;
+
+impl Editing {
+    /// Reads the list of edits, if there is one.
+    ///
+    /// # Errors
+    /// Returns an error if the list, or a list of labels that it names, is wrong.
+    pub fn new(settings: &EditSettings) -> Result<Self, Error> {
+        let files = settings.files()?;
+        let counts = RefCell::new(vec![0; files.edits.count()]);
+        let list = match settings {
+            EditSettings::List { edits } => Some(edits.clone()),
+            EditSettings::Combine { .. } => None,
+        };
+        Ok(Self { list, files, counts })
+    }
+
+    /// Returns all files that are read.
+    pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        let EditFiles { stacks, pictures, lists, .. } = &self.files;
+        self.list.iter().chain(stacks).chain(pictures).chain(lists)
+    }
+
+    /// Returns the edited layers. Layers whose image no edit changes are not decoded. Edits in
+    /// layers of `counted` are counted. `is_end` says whether the first and the last layer are
+    /// the first and the last of the whole stack, so that other stacks that are added must not reach
+    /// beyond.
+    ///
+    /// # Errors
+    /// Returns an error if another stack or a picture cannot be opened.
+    pub fn layers<'a, E: From<EditError> + From<Error> + Send + 'static>(
+        &'a self,
+        layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
+        counted: Range<u32>,
+        is_end: [bool; 2],
+        open: OpenStack<'_>,
+    ) -> Result<impl Iterator<Item = Result<PassingLayer, E>> + 'a, Error> {
+        let EditFiles { edits, stacks, pictures, .. } = &self.files;
+        let may_reach_beyond = is_end.map(|is_end| !is_end);
+        let other = |file: &PathBuf| {
+            let layers = Box::new(layers_beside(open(file)?, file));
+            Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
+        };
+        let others = stacks.iter().map(other).collect::<Result<_, Error>>()?;
+        let pictures = pictures.iter().map(|file| open_picture(file)).collect::<Result<_, Error>>();
+        let count = move |page: &PageInfo, done: &[usize]| {
+            if counted.contains(&page.index) {
+                done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
+            }
+        };
+        Ok(edit_passing(layers, edits.clone(), others, pictures?, count))
+    }
+
+    /// Returns the edits, from 1, that were made in no layer so far.
+    pub fn unused(&self) -> impl Iterator<Item = usize> {
+        let unused = |(number, count): (usize, &usize)| (*count == 0).then_some(number);
+        let unused: Vec<_> = (1..).zip(self.counts.borrow().iter()).filter_map(unused).collect();
+        unused.into_iter()
+    }
+}
+
+/// Returns the sentence on an edit that was made in no layer.
+pub fn unused_text(edit: usize) -> String {
+    format!("edit {edit} applies to no layer: check its z or layers")
+}
+
+/// Returns the layers of another stack or a picture, decoded, in order.
+fn layers_beside<E: From<Error> + Send + 'static>(
+    pages: Pages,
+    path: &Path,
+) -> impl Iterator<Item = Result<Layer, E>> + use<E> {
+    let name = input_name(path);
+    let failed = move |error: StackError| E::from(Error::from(error).at(name.clone()));
+    let pages = pages.map({
+        let failed = failed.clone();
+        move |page| page.map_err(&failed)
+    });
+    map_in_order(pages, move |page: Page| page.decode().map_err(&failed))
+}
+
+/// Reads a label's list.
+fn open_list(path: &Path) -> Result<LabelList, Error> {
+    let name = path.display().to_string();
+    // Standard input, which may be the stack, is no file beside the list of edits.
+    let path = if is_stream(path) { &Path::new(".").join(path) } else { path };
+    let text = read_text(path, MAX_LIST_BYTES, "a list of serial numbers");
+    let text = text.map_err(|error| error.at(name.clone()))?;
+    let digest = digest_of(text.as_bytes()).map_err(|error| Error::from(error).at(name.clone()))?;
+    Ok(LabelList { name, digest, text })
+}
+
+/// Opens a picture. A copy in a temporary file is read, so that the digest is of what is stamped.
+fn open_picture<E: From<Error> + Send + 'static>(path: &Path) -> Result<OtherPicture<E>, Error> {
+    let name = path.display().to_string();
+    let max = Limits::default().png_bytes;
+    let copied = || -> io::Result<(File, u64, String)> {
+        let mut copy = tempfile::tempfile()?;
+        let bytes = io::copy(&mut File::open(path)?.take(max + 1), &mut copy)?;
+        copy.rewind()?;
+        let digest = digest_of(&copy)?;
+        copy.rewind()?;
+        Ok((copy, bytes, digest))
+    };
+    let (copy, bytes, digest) = copied().map_err(|error| Error::from(error).at(name.clone()))?;
+    if bytes > max {
+        let why = format!("more than {} MiB is not a picture", max >> 20);
+        return Err(Error::work(why).at(name));
+    }
+    let pages = Pages::from_file(copy).map_err(|error| Error::from(error).at(name.clone()))?;
+    Ok(OtherPicture { name, digest, pages: Box::new(layers_beside(pages, path)) })
+}

@@ -1,0 +1,202 @@
+//! Bridges layers whose sections have gaps: cuts them again beside their planes, or takes
+//! them from another file of the same part.
+
+use std::ops::Range;
+use std::path::Path;
+
+use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
+use lamp_stack::{Image, Layer, Length, PageInfo};
+
+use crate::documents::{check_word, input_name, without_digest, word_of};
+use crate::error::Error;
+use crate::ranges::ranges;
+use crate::slice_settings::SliceSettings;
+use crate::solid::part_notes;
+use crate::watcher::{Remark, Watcher};
+
+/// Distances that planes are moved by, in micrometres, the nearest first.
+///
+/// Moved by d, a plane shows the part's own section d higher. On a slope that is off by
+/// d times its cotangent, which is d / t of the step that a layer of thickness t makes
+/// there anyway. A flat face between both heights would show as other contours, which
+/// `has_same_contours` refuses. Gaps higher than 20 um are not passed: the fallback
+/// stands in for those.
+const NUDGES_UM: [f64; 8] = [1.0, -1.0, 2.5, -2.5, 5.0, -5.0, 10.0, -10.0];
+/// The greatest distance of two boxes of the same part, as a share of its size.
+const SAME_BOX: f64 = 1e-3;
+/// Where contours turn, fewer consecutive rows than this may have more or fewer
+/// transitions in an STL than on the surfaces it was made of.
+const TURNING_ROWS: usize = 4;
+
+/// The key of pages that were taken from the fallback.
+const FALLBACK: &str = "fallback";
+
+/// A part's layers, with gaps bridged if there is a fallback.
+pub(crate) struct Bridged {
+    pub(crate) slices: Slices,
+    fallback: Option<Fallback>,
+}
+
+struct Fallback {
+    name: String,
+    /// The word that stacks record for it.
+    word: String,
+    slices: Slices,
+    /// The layers cut beside their planes, and those taken from here.
+    nudged: Vec<u32>,
+    borrowed: Vec<u32>,
+}
+
+impl Bridged {
+    /// `fallback` is an STL of the same part, in millimetres.
+    pub(crate) fn new(
+        slices: Slices,
+        fallback: Option<&Path>,
+        options: &SliceSettings,
+        layers: Option<Range<u32>>,
+        watcher: &dyn Watcher,
+    ) -> Result<Self, Error> {
+        let open = |path: &Path| {
+            let name = input_name(&without_digest(path).0);
+            let opened = Fallback::open(path, &slices, options, layers, watcher);
+            opened.map_err(|error| error.at(name.clone()))
+        };
+        let fallback = fallback.map(open).transpose()?;
+        Ok(Self { slices, fallback })
+    }
+
+    /// Returns the word that stacks record for the fallback, if there is one.
+    pub(crate) fn word(&self) -> Option<String> {
+        self.fallback.as_ref().map(|fallback| fallback.word.clone())
+    }
+
+    /// Returns a line about the bridged layers, if there are any.
+    pub(crate) fn text(&self) -> Option<String> {
+        let Fallback { name, nudged, borrowed, .. } = self.fallback.as_ref()?;
+        let counted = |layers: &[u32]| match layers.len() {
+            1 => "1 layer with gaps".to_owned(),
+            count => format!("{count} layers with gaps"),
+        };
+        let part = |what: &str, layers: &[u32]| {
+            (!layers.is_empty()).then(|| format!("{} {what}: {}", counted(layers), ranges(layers)))
+        };
+        let parts = [
+            part("cut up to 10um beside their planes", nudged),
+            part(&format!("taken from {name}"), borrowed),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+}
+
+impl Iterator for Bridged {
+    type Item = Result<Layer, SliceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let layer = self.slices.next()?;
+        match (layer, &mut self.fallback) {
+            (Ok(layer), Some(fallback)) => Some(fallback.better(layer, &self.slices)),
+            (layer, _) => Some(layer),
+        }
+    }
+}
+
+impl Fallback {
+    fn open(
+        path: &Path,
+        slices: &Slices,
+        options: &SliceSettings,
+        layers: Option<Range<u32>>,
+        watcher: &dyn Watcher,
+    ) -> Result<Self, Error> {
+        let grid = slices.grid();
+        let step = &options.solid.step;
+        let opening = step.reader.for_opening(step.tolerance(options.dpi))?;
+        let options = SliceOptions {
+            heights: Some(slices.layer_heights()),
+            gray: slices.levels().cloned(),
+            grid: GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
+            layers,
+            fill: options.solid.fill,
+            ..options.for_slicing()
+        };
+        let other = |what: String| {
+            Error::work(format!("it is not the same part as the STEP file: its box {what}"))
+        };
+        let (file, _) = without_digest(path);
+        let part = Part::open(&file, &opening)?;
+        let word = word_of(&file, part.digest());
+        check_word(path, &word)?;
+        let name = input_name(&file);
+        let note = |note| watcher.remark(Remark::note(format!("{name}: {note}")));
+        part_notes(&part).into_iter().for_each(note);
+        let fallback = Slices::new(part, &options).map_err(|error| match error {
+            SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
+            error => Error::from(error),
+        })?;
+        let ([low, high], others) = (slices.box_mm(), fallback.box_mm());
+        let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let apart = |k: usize| (others[0][k] - low[k]).abs().max((others[1][k] - high[k]).abs());
+        let apart_mm = (0..3).map(apart).fold(0.0, f64::max);
+        if apart_mm > SAME_BOX * size {
+            return Err(other(format!("is {apart_mm:.3} mm off")));
+        }
+        let (nudged, borrowed) = (Vec::new(), Vec::new());
+        Ok(Self { name, word, slices: fallback, nudged, borrowed })
+    }
+
+    /// Returns the layer, or a replacement if it has gaps or lacks contours.
+    fn better(&mut self, layer: Layer, slices: &Slices) -> Result<Layer, SliceError> {
+        let Some(other) = self.slices.next().transpose()? else { return Ok(layer) };
+        let number = layer.info.index;
+        let is_good = |layer: &Layer| is_whole(layer) && has_same_contours(layer, &other);
+        if is_good(&layer) {
+            return Ok(layer);
+        }
+        let stack = layer.info.stack.clone();
+        for by_um in NUDGES_UM.into_iter().filter(|_| !is_whole(&layer)) {
+            let again = slices.cut_again(number, Length::from_um(by_um))?;
+            if is_good(&again) {
+                self.nudged.push(number);
+                return Ok(Layer { info: PageInfo { stack, ..again.info }, ..again });
+            }
+        }
+        self.borrowed.push(number);
+        let mut layer = Layer { info: PageInfo { stack, ..other.info }, ..other };
+        layer.info.other.insert(FALLBACK.to_owned(), true.into());
+        Ok(layer)
+    }
+}
+
+/// Returns whether all contours close, and all rows balance.
+fn is_whole(layer: &Layer) -> bool {
+    layer.info.closed == Some(true) && layer.info.stray_rows.is_empty()
+}
+
+/// Returns whether rows have as many transitions in both, except where contours
+/// turn. A face that is missing whole leaves no gap in a section: its contour is not
+/// there.
+fn has_same_contours(a: &Layer, b: &Layer) -> bool {
+    let [a, b] = [a, b].map(|layer| transitions(&layer.image));
+    let rows: Vec<bool> = a.iter().zip(&b).map(|(a, b)| a != b).collect();
+    a.len() == b.len()
+        && rows.chunk_by(|a, b| a == b).all(|run| !run[0] || run.len() < TURNING_ROWS)
+}
+
+/// Returns how often each row turns from black to some level, or back.
+fn transitions(image: &Image) -> Vec<usize> {
+    match image {
+        Image::Mask(mask) => (0..mask.height()).map(|row| mask.row(row).len()).collect(),
+        Image::Gray(gray) => {
+            let of_row = |changes: &[lamp_stack::LevelChange]| {
+                let mut was_black = true;
+                let turns = changes.iter().filter(|change| {
+                    let is_black = change.level == 0;
+                    std::mem::replace(&mut was_black, is_black) != is_black
+                });
+                turns.count()
+            };
+            gray.rows().map(of_row).collect()
+        }
+    }
+}

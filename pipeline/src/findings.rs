@@ -1,0 +1,87 @@
+//! What the stages of a part find on the way.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use crate::edit::unused_text;
+use crate::fix_report::FixReport;
+use crate::slice::Counts;
+
+/// What stages found in a range of layers, or in several.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RangeFindings {
+    /// Layers that were made.
+    pub layers: usize,
+    /// Rows that did not balance when the part was sliced.
+    pub stray_rows: usize,
+    /// Layers with such rows.
+    pub stray_layers: usize,
+    /// Bands of rows that were corrected.
+    pub bands_corrected: usize,
+    /// Bands that the last `fix` left.
+    pub bands_left: usize,
+    /// Pixels that were changed.
+    pub pixels_corrected: u64,
+    /// Where the first band is that was left.
+    pub first_left: Option<String>,
+    /// Whether the sliced layers had no white pixel.
+    pub is_blank: bool,
+    /// Edits that were made in no layer: the stage's place and the edit's number.
+    pub(crate) unused_edits: BTreeSet<(usize, usize)>,
+    /// Lines about the part.
+    pub of_part: Vec<String>,
+    /// Lines about ranges.
+    pub(crate) of_range: Vec<String>,
+}
+
+impl RangeFindings {
+    /// Begins with the counts of slicing.
+    pub fn new(counts: Counts, is_blank: bool) -> Self {
+        let Counts { layers, stray_layers, stray_rows, .. } = counts;
+        Self { layers, stray_layers, stray_rows, is_blank, ..Self::default() }
+    }
+
+    /// Adds what a `fix` found.
+    pub(crate) fn add_fixed(&mut self, report: &FixReport) {
+        self.bands_corrected += report.corrected();
+        self.pixels_corrected += report.pixels();
+        self.bands_left = report.left();
+        self.first_left = report.first_left().map(ToOwned::to_owned);
+    }
+
+    /// Says of which range remarks are.
+    pub(crate) fn of(mut self, range: &Range<u32>) -> Self {
+        for line in &mut self.of_range {
+            *line = format!("layers {} to {}: {line}", range.start, range.end - 1);
+        }
+        self
+    }
+
+    /// Joins what was found in two ranges of a part, the lower first.
+    pub fn joined(mut self, mut other: Self) -> Self {
+        self.layers += other.layers;
+        self.stray_rows += other.stray_rows;
+        self.stray_layers += other.stray_layers;
+        self.bands_corrected += other.bands_corrected;
+        self.bands_left += other.bands_left;
+        self.pixels_corrected += other.pixels_corrected;
+        self.first_left = self.first_left.or(other.first_left);
+        self.is_blank &= other.is_blank;
+        self.unused_edits.retain(|edit| other.unused_edits.contains(edit));
+        other.of_part.retain(|line| !self.of_part.contains(line));
+        self.of_part.append(&mut other.of_part);
+        self.of_range.append(&mut other.of_range);
+        self
+    }
+
+    /// Returns what is to be said, once all ranges are joined.
+    pub fn notes(&self) -> Vec<String> {
+        let blank = self.is_blank.then(|| "slice: no layer has a white pixel".to_owned());
+        let unused =
+            self.unused_edits.iter().map(|(_, edit)| format!("edit: {}", unused_text(*edit)));
+        let said = self.of_part.iter().chain(&self.of_range).cloned();
+        said.chain(blank).chain(unused).collect()
+    }
+}

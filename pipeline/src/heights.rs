@@ -1,0 +1,377 @@
+//! Adaptive layer heights: their limits, their bound, and the search that they ask for.
+
+use std::fmt;
+use std::str::FromStr;
+
+use lamp_adaptive::{
+    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
+    SweptLayer, Thicknesses, VolumeDeviation, Watch,
+};
+use lamp_grayscale::calibrate::format_significant;
+use lamp_grayscale::exposure::Exposure;
+use lamp_slicer::{FacetIndex, Fill};
+use lamp_stack::{Dpi, Length};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, ErrorKind};
+
+use crate::watcher::Watcher;
+use crate::words::optional;
+
+/// Pixels between measured rows.
+const PIXELS_PER_ROW: f64 = 4.0;
+
+/// The limits and the bound of adaptive heights.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct HeightSettings {
+    /// Thinnest layer that the machine builds; none is 25 um.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub min: Option<Length>,
+    /// Thickest layer; none is 100 um.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub max: Option<Length>,
+    /// Step of layer thickness, of which all are multiples; none is 1 um.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub step: Option<Length>,
+    /// Measure of a layer's error; none is volume, or cusps where `cusp` is given.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub criterion: Option<Measure>,
+    /// Largest error of a layer, as a share; none is 0.02.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<f64>,
+    /// Largest height of cusps.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub cusp: Option<Length>,
+    /// Most layers, in place of a bound.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub layers_budget: Option<u32>,
+    /// Longest time of all layers, in place of a bound.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub time_budget: Option<Seconds>,
+    /// Time of a layer beside its exposure.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub layer_overhead: Option<Seconds>,
+    /// Distance between measured rows; none is four pixels.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub row_pitch: Option<Length>,
+    /// Ends layers at flat faces where the limits allow.
+    #[serde(skip_serializing_if = "crate::solid::is_default")]
+    pub snap: bool,
+}
+
+/// The layers found, and the bound that they keep.
+pub struct FoundHeights {
+    /// The measure of a layer's error.
+    pub measure: Measure,
+    /// Its bound: a share, or micrometres for cusps.
+    pub bound: f64,
+    /// The layers.
+    pub heights: Heights,
+}
+
+/// The measure of a layer's error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// The volume that it lacks or has in excess, as a share.
+    Volume,
+    /// The height of cusps at its edge.
+    Cusp,
+    /// The change of its section's area, as a share.
+    Area,
+}
+
+lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Area = "area" });
+
+impl Measure {
+    /// Returns the library's criterion.
+    pub fn criterion(self) -> &'static dyn Criterion {
+        match self {
+            Self::Volume => &VolumeDeviation,
+            Self::Cusp => &CuspHeight,
+            Self::Area => &AreaDeviation,
+        }
+    }
+
+    /// `2.00%`, `10.0um`.
+    pub fn text(self, measure: f64) -> String {
+        match self {
+            _ if measure.is_infinite() => "none".to_owned(),
+            Self::Cusp => format!("{}um", significant(measure)),
+            Self::Volume | Self::Area => {
+                format!("{}%", significant(measure * 100.0))
+            }
+        }
+    }
+}
+
+impl FoundHeights {
+    /// `volume 2.00%`.
+    pub fn bound(&self) -> String {
+        format!("{} {}", self.measure, self.measure.text(self.bound))
+    }
+
+    /// Returns how many layers exceed the bound.
+    pub fn past(&self, heights: &Heights) -> usize {
+        let is_past = |layer: &&SweptLayer| self.measure.criterion().measure(layer) > self.bound;
+        heights.layers.iter().filter(is_past).count()
+    }
+
+    /// Returns a sentence on rows that could not be measured, if there are some.
+    pub fn doubt(&self) -> Option<String> {
+        let left_out = self.heights.layers.iter().filter(|layer| layer.rows_left_out > 0);
+        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), layer| {
+            (layers + 1, rows + u64::from(layer.rows_left_out))
+        });
+        if rows > 0 {
+            Some(format!(
+                "{rows} rows in {layers} layers do not balance: the mesh has gaps; the other \
+                 rows decide the thickness of these layers"
+            ))
+        } else {
+            let why =
+                "the part has no volume in any row: it is flat, or too thin for this --row-pitch";
+            (self.heights.volumes_mm3()[2] == 0.0).then(|| why.to_owned())
+        }
+    }
+
+    /// Returns sentences on exposures that the material was not measured at.
+    pub fn doubts(&self, exposure: Option<&Exposure>) -> Vec<String> {
+        let thicknesses = self.heights.layers.iter().map(|it| Length::from_um(it.thickness_um));
+        exposure.map_or_else(Vec::new, |exposure| exposure.doubts(thicknesses))
+    }
+}
+
+impl HeightSettings {
+    /// Returns the thickest layer.
+    pub fn max(&self) -> Length {
+        self.max.unwrap_or(Length::from_um(100.0))
+    }
+
+    /// Returns the thinnest layer.
+    pub fn min(&self) -> Length {
+        self.min.unwrap_or(Length::from_um(25.0))
+    }
+
+    /// Returns the part as measured along rows.
+    pub fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Error> {
+        let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
+        let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
+        part.map_err(|error| Error::from(error))
+    }
+
+    /// Returns whether a budget decides the bound.
+    pub fn has_budget(&self) -> bool {
+        self.layers_budget.is_some() || self.time_budget.is_some()
+    }
+
+    /// Returns the thicknesses that the machine builds.
+    fn thicknesses(&self) -> Result<Thicknesses, Error> {
+        let step = self.step.unwrap_or(Length::from_um(1.0));
+        Thicknesses::new(self.min(), self.max(), step)
+            .map_err(|error| Error::new(ErrorKind::Settings, error))
+    }
+
+    /// Checks, before the work, what the parser cannot.
+    pub fn check(&self, exposure: Option<&Exposure>) -> Result<(), Error> {
+        self.thicknesses()?;
+        self.measure()?;
+        if self.time_budget.is_some() {
+            let _ = self.seconds_of_layers(exposure)?;
+        }
+        Ok(())
+    }
+
+    fn measure(&self) -> Result<Measure, Error> {
+        let default = if self.cusp.is_some() { Measure::Cusp } else { Measure::Volume };
+        let criterion = self.criterion.unwrap_or(default);
+        match (criterion == Measure::Cusp, self.cusp.is_some()) {
+            (false, true) => Err(Error::settings("--cusp needs --criterion cusp")),
+            (true, false) if self.deviation.is_some() || !self.has_budget() => {
+                Err(Error::settings("--criterion cusp needs a bound, as --cusp 10um"))
+            }
+            _ => Ok(criterion),
+        }
+    }
+
+    /// Searches for the heights.
+    ///
+    /// # Errors
+    /// Returns an error if settings contradict each other, or no heights keep them.
+    pub fn find(
+        &self,
+        part: &LayeredPart,
+        exposure: Option<&Exposure>,
+        watcher: &dyn Watcher,
+    ) -> Result<FoundHeights, Error> {
+        let found = self.search(part, exposure, watcher);
+        watcher.heights_found();
+        found
+    }
+
+    fn search(
+        &self,
+        part: &LayeredPart,
+        exposure: Option<&Exposure>,
+        watcher: &dyn Watcher,
+    ) -> Result<FoundHeights, Error> {
+        let thicknesses = self.thicknesses()?;
+        let measure = self.measure()?;
+        let criterion = measure.criterion();
+        let part_um = part.heights_um();
+        let watch = |layer: &SweptLayer| watcher.height_reached(part_um, layer.top_um());
+        let search = HeightSearch {
+            part,
+            thicknesses: &thicknesses,
+            criterion,
+            snap: self.snap,
+            watch: Watch(&watch),
+        };
+        let failed = |error: HeightsError| Error::from(error);
+        let (bound, heights) = if let Some(layers) = self.layers_budget {
+            search
+                .within_budget(|_| 1.0, layers.into())
+                .map_err(|error| over(error, |layers| format!("{layers} layers")))?
+        } else if let Some(Seconds(seconds)) = self.time_budget {
+            let cost = self.seconds_of_layers(exposure)?;
+            search.within_budget(cost, seconds).map_err(|error| over(error, time_text))?
+        } else {
+            let bound = self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um);
+            (bound, search.heights(bound).map_err(failed)?)
+        };
+        if let Some(exposure) = exposure {
+            for layer in &heights.layers {
+                exposure.check(Length::from_um(layer.thickness_um))?;
+            }
+        }
+        Ok(FoundHeights { measure, bound, heights })
+    }
+
+    /// Returns the time in seconds that a layer takes by its thickness.
+    fn seconds_of_layers<'a>(
+        &self,
+        exposure: Option<&'a Exposure>,
+    ) -> Result<impl Fn(Length) -> f64 + use<'a>, Error> {
+        let exposure = exposure.ok_or_else(|| {
+            Error::settings("--time-budget needs exposures: give --material or --exposure-table")
+        })?;
+        // What holds for the limits holds between them.
+        exposure.time(self.min())?;
+        exposure.time(self.max())?;
+        let overhead = self.overhead();
+        Ok(move |thickness: Length| {
+            let time = exposure.time(thickness);
+            overhead + time.map_or(f64::INFINITY, |time| time.ms() / 1000.0)
+        })
+    }
+
+    /// Returns the seconds that each layer takes besides its exposure.
+    pub fn overhead(&self) -> f64 {
+        self.layer_overhead.map_or(0.0, |Seconds(seconds)| seconds)
+    }
+}
+
+/// Describes a budget that is too small, in its unit.
+fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Error {
+    match error {
+        HeightsError::Budget { least, budget } => {
+            let [least, budget] = [least, budget].map(say);
+            Error::work(format!(
+                "the cheapest layers take {least}, more than the budget of {budget}: allow more, or \
+                 wider limits"
+            ))
+        }
+        error => error.into(),
+    }
+}
+
+/// Formats a number to three digits.
+pub fn significant(number: f64) -> String {
+    format_significant(number, 3)
+}
+
+/// Formats a time in seconds, minutes or hours.
+pub fn time_text(seconds: f64) -> String {
+    let (number, unit) = match seconds {
+        ..200.0 => (seconds, "s"),
+        ..10_000.0 => (seconds / 60.0, "min"),
+        _ => (seconds / 3600.0, "h"),
+    };
+    format!("{}{unit}", significant(number))
+}
+
+/// Parses a share: `2%` or `0.02`.
+pub fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, factor) = match text.trim().strip_suffix('%') {
+        Some(number) => (number.trim_end(), 0.01),
+        None => (text.trim(), 1.0),
+    };
+    match number.parse::<f64>() {
+        // 2 is far more often meant to be 2% than 200%.
+        Ok(number) if factor == 1.0 && number >= 1.0 => {
+            Err(format!("`{text}` is not below 1: write {number}% or {}", number / 100.0))
+        }
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number * factor),
+        _ => Err(format!("`{text}` is not a share: write 2% or 0.02")),
+    }
+}
+
+/// A time in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seconds(
+    /// Zero or more.
+    pub f64,
+);
+
+impl fmt::Display for Seconds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}s", self.0)
+    }
+}
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    /// Parses `8h`, `90min` or `30s`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is not a time: write 8h, 90min or 30s");
+        let split = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(wrong)?;
+        let factor = match &text[split..] {
+            "h" => 3600.0,
+            "min" => 60.0,
+            "s" => 1.0,
+            "ms" => 0.001,
+            _ => return Err(wrong()),
+        };
+        match text[..split].trim().parse::<f64>() {
+            Ok(number) if (0.0..1e12).contains(&number) => Ok(Self(number * factor)),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_and_times() {
+        assert_eq!(parse_share("2%"), Ok(0.02));
+        assert_eq!(parse_share("0.05"), Ok(0.05));
+        assert_eq!("8h".parse(), Ok(Seconds(28_800.0)));
+        assert_eq!("1.5 min".parse(), Ok(Seconds(90.0)));
+        assert_eq!(parse_share("150%"), Ok(1.5));
+        for wrong in ["", "-1%", "nan", "2 percent", "2", "inf%"] {
+            assert!(parse_share(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "8", "h", "-3s", "nans", "infh"] {
+            assert!(wrong.parse::<Seconds>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn times_have_their_unit() {
+        let times = [12.34, 199.0, 600.0, 9_000.0, 36_000.0].map(time_text);
+        assert_eq!(times, ["12.3s", "199s", "10.0min", "150min", "10.0h"]);
+    }
+}

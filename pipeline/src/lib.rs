@@ -1,0 +1,53 @@
+//! The stages from a part to layers, in one process: their settings, what stacks record of them,
+//! and the keys of their results.
+//!
+//! A stage is its settings, a plain struct that serde knows, and its work between a reader and a
+//! writer. [`Chain`] runs slicing and the stages after it for a range of layers; ranges that are
+//! joined have the bytes of the pipeline typed by hand.
+
+#![forbid(unsafe_code)]
+
+pub mod compensate;
+pub mod dither;
+pub mod documents;
+pub mod edit;
+pub mod exposure;
+pub mod fix;
+pub mod heights;
+pub mod memory;
+pub mod part_file;
+pub mod placement;
+pub mod size;
+pub mod slice;
+pub mod solid;
+pub mod step;
+pub mod watcher;
+pub mod words;
+
+mod chain;
+mod error;
+mod fallback;
+mod findings;
+mod fix_report;
+mod names;
+mod overlaps;
+mod pixel_location;
+mod ranges;
+mod recorded_part;
+mod slice_settings;
+mod sliced_part;
+mod survey;
+mod wall_report;
+
+pub use chain::{Chain, Stage, Working, named};
+pub use error::{Error, ErrorKind};
+pub use findings::RangeFindings;
+pub use fix_report::{FixHead, FixReport, FixedBand, whereabouts};
+pub use names::{Names, stored_name};
+pub use pixel_location::to_nm;
+pub use ranges::ranges;
+pub use recorded_part::RecordedSlicing;
+pub use slice_settings::{Frame, Shading, SliceRecord, SliceSettings, Thickness};
+pub use sliced_part::{LayersOfPart, SlicedPart, check_slicing};
+pub use survey::Survey;
+pub use wall_report::{NarrowedWall, WallHead, WallReport};

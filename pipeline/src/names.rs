@@ -1,0 +1,80 @@
+//! Names of parts in stacks that are stored by content.
+//!
+//! A stack records the name of its part's file. Stored under a name that the part's content gives,
+//! a result is the same whatever the file is called; it gets today's name on its way out.
+
+use std::path::Path;
+
+use lamp_stack::{
+    Destination, Format, PackLevel, Pages, StackError, StackInfo, copy_packed, quoted, write_stack,
+};
+use serde_json::Value;
+
+use crate::error::Error;
+use crate::part_file::recorded;
+use crate::slice::stem;
+
+/// Returns the name under which stored results record a part, given its digest (`blake3:` and
+/// hexadecimal digits).
+pub fn stored_name(digest: &str) -> String {
+    let digits = digest.strip_prefix("blake3:").unwrap_or(digest);
+    format!("part-{}.stored", &digits[..digits.len().min(32)])
+}
+
+/// The files' names of parts, by those under which they are stored.
+pub struct Names(Vec<(String, String)>);
+
+impl Names {
+    /// Takes pairs of a stored name and a file's name.
+    pub fn new(names: impl IntoIterator<Item = (String, String)>) -> Self {
+        Self(names.into_iter().collect())
+    }
+
+    /// Copies a stored stack, packed, under the files' names.
+    ///
+    /// # Errors
+    /// Returns an error if the stack cannot be read, or the copy not be written.
+    pub fn copy(&self, stored: &Path, to: Destination) -> Result<(), Error> {
+        Ok(copy_packed(stored, to, PackLevel::default(), |stack| self.named(stack))?)
+    }
+
+    /// Unpacks a stored stack to a TIFF, under the files' names.
+    ///
+    /// # Errors
+    /// Returns an error if the stack cannot be read, or the TIFF not be written.
+    pub fn unpack(&self, stored: &Path, to: Destination) -> Result<(), Error> {
+        let failed = |error: StackError| Error::from(error).at(stored.display().to_string());
+        let pages = Pages::open(stored).map_err(failed)?;
+        let named = pages.layers().map(|layer| -> Result<_, Error> {
+            let mut layer = layer.map_err(failed)?;
+            layer.info.stack = layer.info.stack.take().map(|stack| self.named(stack));
+            Ok(layer)
+        });
+        write_stack(named, to, Format::Big)
+    }
+
+    /// Puts files' names in the place of stored ones.
+    pub fn named(&self, stack: StackInfo) -> StackInfo {
+        let mut value = serde_json::to_value(stack).expect("a stack's metadata is JSON");
+        self.rename(&mut value);
+        serde_json::from_value(value).expect("only texts changed")
+    }
+
+    fn rename(&self, value: &mut Value) {
+        match value {
+            Value::String(text) => {
+                for (stored, file) in &self.0 {
+                    // Commands have the whole name, all else what is before the last dot.
+                    let [short, file_short] = [stored, file].map(|name| stem(Path::new(name)));
+                    if text.contains(&short) {
+                        let file = recorded(file, None);
+                        *text = text.replace(stored, &quoted(&file)).replace(&short, &file_short);
+                    }
+                }
+            }
+            Value::Array(values) => values.iter_mut().for_each(|value| self.rename(value)),
+            Value::Object(values) => values.values_mut().for_each(|value| self.rename(value)),
+            _ => {}
+        }
+    }
+}

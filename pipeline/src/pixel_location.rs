@@ -1,0 +1,40 @@
+//! Converts pixels to part coordinates.
+
+use std::ops::Range;
+
+use lamp_stack::Layer;
+
+/// Position of a layer's pixels in the part.
+#[derive(Clone, Copy)]
+pub(crate) struct PixelLocation {
+    left_mm: f64,
+    top_mm: f64,
+    pitch_mm: f64,
+}
+
+impl PixelLocation {
+    pub(crate) fn of(layer: &Layer) -> Option<Self> {
+        let [left_mm, top_mm] = layer.info.origin_mm?;
+        Some(Self { left_mm, top_mm, pitch_mm: layer.dpi?.pitch().mm() })
+    }
+
+    /// Returns the y of the lower and upper edge of some rows.
+    pub(crate) fn y_mm(self, rows: &Range<u32>) -> [f64; 2] {
+        [rows.end, rows.start].map(|row| self.top_mm - f64::from(row) * self.pitch_mm)
+    }
+
+    pub(crate) fn x_mm(self, columns: &Range<u32>) -> [f64; 2] {
+        [columns.start, columns.end].map(|c| self.left_mm + f64::from(c) * self.pitch_mm)
+    }
+}
+
+/// Formats a range of millimetres: `12.1-12.8`.
+pub(crate) fn millimetres([low, high]: [f64; 2]) -> String {
+    // Beside a minus a dash would read as another.
+    if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
+}
+
+/// Rounds to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
+pub fn to_nm(mm: f64) -> f64 {
+    (mm * 1e6).round() / 1e6 + 0.0
+}

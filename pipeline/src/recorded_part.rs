@@ -1,0 +1,59 @@
+//! The part that a stack was sliced from, opened again.
+
+use lamp_slicer::Part;
+use lamp_stack::StackInfo;
+
+use crate::error::Error;
+use crate::part_file::PartFile;
+use crate::slice_settings::{SliceRecord, SliceSettings};
+use crate::solid::{Reading, name_of_all};
+use crate::watcher::Watcher;
+
+/// What a stack records of how its part was sliced.
+pub struct RecordedSlicing<'a> {
+    /// The settings.
+    pub settings: SliceSettings,
+    /// The part's files, with their placements.
+    files: Vec<String>,
+    digest: &'a str,
+}
+
+impl<'a> RecordedSlicing<'a> {
+    /// Returns `None` if a stack does not record it.
+    pub fn of(stack: Option<&'a StackInfo>) -> Option<Self> {
+        let stack = stack?;
+        let SliceRecord { parts: files, settings, .. } = SliceRecord::of(stack)?;
+        Some(Self { settings, files, digest: &stack.digest })
+    }
+
+    /// Opens the part. `name` is the name of the stack.
+    ///
+    /// # Errors
+    /// Returns an error if the stack was not sliced from these files as they are and stand.
+    pub fn open(
+        &self,
+        parts: &[PartFile],
+        name: &str,
+        watcher: &dyn Watcher,
+    ) -> Result<Part, Error> {
+        let reading = Reading { dpi: self.settings.dpi, may_be_open: false, watcher };
+        let model = self.settings.solid.open(parts, &reading)?;
+        if model.digest() != self.digest {
+            let part = name_of_all(parts);
+            return Err(Error::work(format!(
+                "{name} was not sliced from {part}, or the part has changed"
+            )));
+        }
+        // Names of files may have changed since, but not where the parts stand.
+        let recorded = self.files.iter().map(|file| PartFile::parse(file.into()));
+        let recorded = recorded.collect::<Result<Vec<_>, _>>().unwrap_or_default();
+        let same = recorded.iter().zip(parts).all(|(a, b)| a.stands_like(b));
+        if recorded.len() != parts.len() || !same {
+            let files = self.files.join(" ");
+            return Err(Error::work(format!(
+                "{name} was sliced from {files}: give --part with the same placements"
+            )));
+        }
+        Ok(model)
+    }
+}

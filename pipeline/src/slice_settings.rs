@@ -1,0 +1,427 @@
+//! The settings of slicing, and what a stack records of them.
+
+use std::path::{Path, PathBuf};
+
+use lamp_postprocess::TurnedSlicing;
+use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
+use lamp_slicer::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
+use lamp_stack::{Dpi, Length, Size, StackInfo, quoted};
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::exposure::{ExposureSettings, RecordedExposure};
+use crate::heights::HeightSettings;
+use crate::placement::{Numbers, Rotation};
+use crate::solid::{SolidSettings, is_default};
+use crate::words::{differing, optional, text, words_of};
+
+/// The settings that decide the images of a part.
+///
+/// Keys of the JSON are the options of `lamp slice`; the words of a command follow the order of the
+/// fields.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct SliceSettings {
+    /// Resolution of the images.
+    #[serde(with = "text")]
+    pub dpi: Dpi,
+    /// Thickness of the layers.
+    #[serde(flatten)]
+    pub thickness: Thickness,
+    /// Height in each layer at which the part is cut.
+    #[serde(with = "text")]
+    pub plane: PlaneRule,
+    /// How far a vertex may be from a layer's plane and still count as lying on it.
+    #[serde(with = "text", skip_serializing_if = "is_usual_tolerance")]
+    pub plane_tolerance: Length,
+    /// The solid.
+    #[serde(flatten)]
+    pub solid: SolidSettings,
+    /// Leaves crossings on the facets of STEP parts.
+    #[serde(skip_serializing_if = "is_default")]
+    pub no_polish: bool,
+    /// Whether layers are gray.
+    #[serde(flatten)]
+    pub shading: Shading,
+    /// The exposure of the layers.
+    #[serde(flatten)]
+    pub exposure: ExposureSettings,
+    /// The pixels of the images.
+    #[serde(flatten)]
+    pub frame: Frame,
+}
+
+/// How thick layers are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Thickness {
+    /// As thick as the part's slopes allow.
+    Adaptive {
+        /// Stands for the option; it is true.
+        adaptive: bool,
+        /// The limits, and the largest error.
+        #[serde(flatten)]
+        heights: HeightSettings,
+    },
+    /// All the same.
+    Uniform {
+        /// The thickness.
+        #[serde(with = "text")]
+        thickness: Length,
+    },
+}
+
+/// Whether layers are gray, and how their doses count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "ShadingFlags", into = "ShadingFlags")]
+pub enum Shading {
+    /// Black and white.
+    #[default]
+    None,
+    /// Each pixel is as bright as cures down to where the part ends below it, by its layer alone.
+    Gray,
+    /// The same, where doses of layers add up: light of the layers above does not cure through
+    /// undersides.
+    PrintThrough,
+}
+
+/// [`Shading`] as options.
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+struct ShadingFlags {
+    #[serde(skip_serializing_if = "is_default")]
+    gray: bool,
+    #[serde(skip_serializing_if = "is_default")]
+    print_through: bool,
+}
+
+/// The part of the plane that images show.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Frame {
+    /// A given place, which holds the part.
+    At {
+        /// The top left corner (x, y) in part coordinates, in millimetres.
+        #[serde(with = "text")]
+        origin: Numbers<2>,
+        /// Its size.
+        #[serde(with = "text")]
+        size: Size,
+    },
+    /// The part's box.
+    Around {
+        /// Black pixels on every side of it.
+        #[serde(with = "text")]
+        margin: u32,
+    },
+}
+
+impl From<ShadingFlags> for Shading {
+    fn from(flags: ShadingFlags) -> Self {
+        match flags {
+            ShadingFlags { print_through: true, .. } => Self::PrintThrough,
+            ShadingFlags { gray: true, .. } => Self::Gray,
+            ShadingFlags { .. } => Self::None,
+        }
+    }
+}
+
+impl From<Shading> for ShadingFlags {
+    fn from(shading: Shading) -> Self {
+        Self { gray: shading != Shading::None, print_through: shading == Shading::PrintThrough }
+    }
+}
+
+fn is_usual_tolerance(tolerance: &Length) -> bool {
+    *tolerance == PLANE_TOLERANCE
+}
+
+impl Default for SliceSettings {
+    fn default() -> Self {
+        Self {
+            dpi: Dpi::new(1500.0).expect("it is a resolution"),
+            thickness: Thickness::Uniform { thickness: Length::from_um(100.0) },
+            plane: PlaneRule::default(),
+            plane_tolerance: PLANE_TOLERANCE,
+            solid: SolidSettings::default(),
+            no_polish: false,
+            shading: Shading::default(),
+            exposure: ExposureSettings::default(),
+            frame: Frame::Around { margin: 1 },
+        }
+    }
+}
+
+impl SliceSettings {
+    /// Returns the options of the library, as far as no material and no search decides them.
+    pub fn for_slicing(&self) -> SliceOptions {
+        let usual = SliceOptions::default();
+        SliceOptions {
+            dpi: self.dpi,
+            thickness: self.uniform_thickness().unwrap_or(usual.thickness),
+            plane: self.plane,
+            plane_tolerance: self.plane_tolerance,
+            units: self.solid.units,
+            placement: self.solid.placement(),
+            fill: self.solid.fill,
+            grid: self.grid(),
+            polish: !self.no_polish,
+            ..usual
+        }
+    }
+
+    fn grid(&self) -> GridRule {
+        match self.frame {
+            Frame::At { origin: Numbers(origin_mm), size } => {
+                let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
+                GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
+            }
+            Frame::Around { margin } => GridRule::Around { margin },
+        }
+    }
+
+    /// Returns the key of the first setting that is not as it is by default, where `machine` may
+    /// give defaults.
+    pub fn stated(&self, machine: Option<&Machine>) -> Option<String> {
+        let Defaults { dpi, thickness, margin } =
+            machine.map(|machine| machine.defaults.clone()).unwrap_or_default();
+        let usual = Self::default();
+        let usual = Self {
+            dpi: dpi.and_then(Dpi::new).unwrap_or(usual.dpi),
+            thickness: thickness
+                .map_or(usual.thickness, |thickness| Thickness::Uniform { thickness }),
+            frame: margin.map_or(usual.frame, |margin| Frame::Around { margin }),
+            ..usual
+        };
+        differing(self, &usual)
+    }
+
+    /// Returns the settings that slice a part for a plan.
+    #[must_use]
+    pub fn turned(mut self, slicing: &TurnedSlicing) -> Self {
+        let TurnedSlicing { degrees, origin_mm, size } = *slicing;
+        self.solid.placement.rotate.push(Rotation { axis: Axis::Z, degrees });
+        self.frame = Frame::At { origin: Numbers(origin_mm), size };
+        self
+    }
+
+    /// Returns the command as people type it, for files that stand where they do.
+    pub fn command(&self, files: &[String]) -> String {
+        let files: String = files.iter().map(|file| format!(" {}", quoted(file))).collect();
+        format!("slice{files}{}", words_of(self))
+    }
+
+    /// Returns the settings as one text, the same for all that mean the same. Of files, which have
+    /// digests, only names stand there that a stack records.
+    pub fn canonical(&self) -> String {
+        let mut settings = self.clone();
+        settings.exposure.make_canonical();
+        words_of(&settings)
+    }
+
+    /// Checks that a machine builds in this resolution, these thicknesses and this size, as far as
+    /// it is given.
+    ///
+    /// # Errors
+    /// Returns the limit that is exceeded.
+    pub fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
+        machine.check_dpi(self.dpi, "the stack")?;
+        if let Frame::At { size, .. } = self.frame {
+            machine.check_footprint(size, "the image")?;
+        }
+        match &self.thickness {
+            Thickness::Adaptive { heights, .. } => {
+                machine.check_thickness(heights.min(), "the thinnest layer")?;
+                machine.check_thickness(heights.max(), "the thickest layer")
+            }
+            Thickness::Uniform { thickness } => machine.check_thickness(*thickness, "a layer"),
+        }
+    }
+
+    /// Returns how far up in each layer the part is cut: 0 at the bottom, 1 at the top.
+    pub fn cut(&self) -> f64 {
+        match self.plane {
+            PlaneRule::Bottom => 0.0,
+            PlaneRule::Middle => 0.5,
+            PlaneRule::Top => 1.0,
+        }
+    }
+
+    /// Returns the thickness of all layers, if they have the same.
+    pub fn uniform_thickness(&self) -> Option<Length> {
+        match self.thickness {
+            Thickness::Uniform { thickness } => Some(thickness),
+            Thickness::Adaptive { .. } => None,
+        }
+    }
+
+    /// Returns the files that the settings name.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.exposure.files().chain(self.solid.cutters())
+    }
+
+    /// Returns the files that the settings name, to be changed.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        self.exposure.files_mut().chain(self.solid.cutters_mut())
+    }
+
+    /// Returns the exposure of the layers, if one is given.
+    ///
+    /// # Errors
+    /// Returns an error if settings contradict each other, or the material cannot be read.
+    pub fn exposure(&self) -> Result<Option<RecordedExposure>, Error> {
+        let is_gray = self.shading != Shading::None;
+        let heights = match &self.thickness {
+            Thickness::Adaptive { heights, .. } => Some(heights),
+            Thickness::Uniform { .. } => None,
+        };
+        let needs_top = [(is_gray, "--gray"), (heights.is_some(), "--adaptive")];
+        if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)
+            && self.plane != PlaneRule::Top
+        {
+            let why = format!("{option} cuts layers at their tops: leave out --plane");
+            return Err(Error::settings(why));
+        }
+        let exposure = self.exposure.exposure()?;
+        // Gray levels need only doses.
+        let known = exposure.as_ref().map(|recorded| &recorded.exposure);
+        known.iter().filter(|_| !is_gray).try_for_each(|known| known.check_light())?;
+        heights.map_or(Ok(()), |heights| heights.check(known))?;
+        Ok(exposure)
+    }
+}
+
+/// What a stack records of how its part was sliced.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub struct SliceRecord {
+    /// The part's files without their folders, each with its placement, as `PartFile::parse` reads
+    /// them.
+    pub parts: Vec<String>,
+    /// The settings; files are words with digests.
+    #[serde(flatten)]
+    pub settings: SliceSettings,
+    /// The word of a file that stood in for layers with gaps.
+    #[serde(with = "optional", default, skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<String>,
+    /// The word of the machine.
+    #[serde(with = "optional", default, skip_serializing_if = "Option::is_none")]
+    pub machine: Option<String>,
+}
+
+impl SliceRecord {
+    /// The key of the record in a stack's metadata.
+    const KEY: &str = "slice";
+
+    /// Reads the record of a stack. There is none if it was not sliced by LAMP, or by a version
+    /// with settings that this one does not know.
+    pub fn of(stack: &StackInfo) -> Option<Self> {
+        let value = stack.other.get(Self::KEY)?;
+        let record: Self = serde_json::from_value(value.clone()).ok()?;
+        (serde_json::to_value(&record).ok().as_ref() == Some(value)).then_some(record)
+    }
+
+    /// Writes the record into a stack's metadata, and the command that it stands for, for people.
+    pub fn write(&self, stack: &mut StackInfo) {
+        let record = serde_json::to_value(self).expect("a record is texts and flags");
+        stack.other.insert(Self::KEY.to_owned(), record);
+        let Self { parts, settings, fallback, machine } = self;
+        #[derive(Serialize)]
+        struct Rest<'a> {
+            fallback: &'a Option<String>,
+            machine: &'a Option<String>,
+        }
+        let rest = words_of(&Rest { fallback, machine });
+        stack.commands.push(settings.command(parts) + &rest);
+    }
+
+    /// Finds the material or table of the record again, in the first of these folders that has it.
+    ///
+    /// # Errors
+    /// Returns an error if none has it with the digest of the record.
+    pub fn find_exposure(&mut self, folders: &[&Path]) -> Result<(), Error> {
+        self.settings.exposure.find(folders)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn records_are_read_as_they_were_written() {
+        for (settings, words) in [
+            (
+                json!({ "dpi": "1500", "thickness": "100um", "plane": "top", "units": "mm",
+                        "fill": "even-odd", "margin": "1" }),
+                "--dpi 1500 --thickness 100um --plane top --units mm --fill even-odd --margin 1",
+            ),
+            (
+                json!({ "dpi": "72.25", "adaptive": true, "min": "0.5um", "step": "1um",
+                        "criterion": "cusp", "cusp": "10um", "time-budget": "28800s",
+                        "row-pitch": "1.5mm", "snap": true, "plane": "top", "units": "inch",
+                        "fill": "solid", "scale": "1,2,0.5", "mirror": "x,y",
+                        "rotate": "x:90,z:-12.5", "translate": "-5,0,12.7", "tolerance": "1um",
+                        "no-polish": true, "gray": true, "print-through": true,
+                        "material": "lamp-suspension", "overcure": "1.5", "origin": "-1,77.2",
+                        "size": "80x80.5mm" }),
+                "--dpi 72.25 --adaptive --min 0.5um --step 1um --criterion cusp --cusp 10um \
+                 --time-budget 28800s --row-pitch 1.5mm --snap --plane top --units inch \
+                 --fill solid --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
+                 --translate -5,0,12.7 --tolerance 1um --no-polish --gray --print-through \
+                 --material lamp-suspension --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
+            ),
+            (
+                json!({ "dpi": "300", "thickness": "1.5mm", "plane": "middle", "units": "mm",
+                        "fill": "even-odd", "margin": "0",
+                        "exposure-table": "my times --x.csv@blake3:0123456789abcdef" }),
+                "--dpi 300 --thickness 1.5mm --plane middle --units mm --fill even-odd \
+                 --exposure-table 'my times --x.csv@blake3:0123456789abcdef' --margin 0",
+            ),
+            (
+                json!({ "dpi": "300", "thickness": "1mm", "plane": "top", "units": "mm",
+                        "fill": "even-odd", "bodies": "xor", "subtract": ["--core.stl", "b.stl"],
+                        "margin": "1" }),
+                "--dpi 300 --thickness 1mm --plane top --units mm --fill even-odd --bodies xor \
+                 --subtract=--core.stl --subtract b.stl --margin 1",
+            ),
+        ] {
+            let settings: SliceSettings = serde_json::from_value(settings).unwrap();
+            let parts = vec!["my --part@1,2.stl".to_owned(), "a.stl@1,0,0,0".to_owned()];
+            let command = format!("slice 'my --part@1,2.stl' a.stl@1,0,0,0 {words}");
+            assert_eq!(settings.command(&parts), command);
+            for fallback in [None, Some("b c.stl".to_owned())] {
+                let settings = settings.clone();
+                let more = fallback.as_ref().map_or("", |_| " --fallback 'b c.stl'");
+                let record =
+                    SliceRecord { parts: parts.clone(), settings, fallback, machine: None };
+                let mut stack = StackInfo::default();
+                record.write(&mut stack);
+                assert_eq!(stack.commands, [format!("{command}{more}")]);
+                assert_eq!(SliceRecord::of(&stack), Some(record));
+            }
+        }
+    }
+
+    #[test]
+    fn a_record_with_a_setting_that_is_not_known_is_none() {
+        let mut stack = StackInfo::default();
+        let (settings, parts) = (SliceSettings::default(), vec!["a.stl".to_owned()]);
+        SliceRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
+        assert!(SliceRecord::of(&stack).is_some());
+        stack.other[SliceRecord::KEY]["color"] = "red".into();
+        assert_eq!(SliceRecord::of(&stack), None);
+    }
+
+    #[test]
+    fn the_first_setting_that_is_stated_is_named() {
+        let usual = SliceSettings::default();
+        assert_eq!(usual.stated(None), None);
+        let at = |dpi| SliceSettings { dpi: Dpi::new(dpi).unwrap(), ..SliceSettings::default() };
+        assert_eq!(at(300.0).stated(None).as_deref(), Some("dpi"));
+        let gray = SliceSettings { shading: Shading::PrintThrough, ..usual };
+        assert_eq!(gray.stated(None).as_deref(), Some("gray"));
+    }
+}

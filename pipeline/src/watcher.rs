@@ -1,0 +1,86 @@
+//! Whoever watches a stage at work: a terminal, or a list of lines.
+
+use std::sync::Mutex;
+
+/// How much a line matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Importance {
+    /// Read by those who ask for details.
+    Detail,
+    /// Worth knowing.
+    Note,
+    /// Something to look at.
+    Warning,
+}
+
+/// A line about the work, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remark {
+    /// How much it matters.
+    pub importance: Importance,
+    /// The sentence.
+    pub text: String,
+}
+
+impl Remark {
+    /// Returns a line worth knowing.
+    pub fn note(text: impl Into<String>) -> Self {
+        Self { importance: Importance::Note, text: text.into() }
+    }
+
+    /// Returns a line about something to look at.
+    pub fn warning(text: impl Into<String>) -> Self {
+        Self { importance: Importance::Warning, text: text.into() }
+    }
+}
+
+/// Watches a stage at work.
+pub trait Watcher {
+    /// Takes a line.
+    fn remark(&self, remark: Remark);
+
+    /// Takes how far a search for layer heights has come, in micrometres, of a part that reaches
+    /// over `part_um`.
+    fn height_reached(&self, part_um: [f64; 2], um: f64) {
+        let _ = (part_um, um);
+    }
+
+    /// Takes the end of such a search.
+    fn heights_found(&self) {}
+}
+
+/// Keeps lines that are worth knowing, each after the name of its stage.
+#[derive(Debug, Default)]
+pub struct KeptRemarks {
+    lines: Mutex<Vec<String>>,
+}
+
+impl KeptRemarks {
+    /// Returns a watcher of one stage.
+    pub fn of<'a>(&'a self, stage: &'static str) -> impl Watcher + 'a {
+        KeptOfStage { stage, kept: self }
+    }
+
+    /// Keeps a line.
+    pub fn keep(&self, line: String) {
+        self.lines.lock().expect("nobody panics while it is held").push(line);
+    }
+
+    /// Takes the lines out.
+    pub fn take(&self) -> Vec<String> {
+        std::mem::take(&mut *self.lines.lock().expect("nobody panics while it is held"))
+    }
+}
+
+struct KeptOfStage<'a> {
+    stage: &'static str,
+    kept: &'a KeptRemarks,
+}
+
+impl Watcher for KeptOfStage<'_> {
+    fn remark(&self, Remark { importance, text }: Remark) {
+        if importance > Importance::Detail {
+            self.kept.keep(format!("{}: {text}", self.stage));
+        }
+    }
+}
