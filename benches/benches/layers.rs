@@ -11,7 +11,7 @@ use fax::{Color, VecWriter, decoder, encoder};
 use lamp_adaptive::LayeredPart;
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::{DitherMethod, dither_image};
-use lamp_postprocess::{Widths, offset, offset_one_bit, shrink};
+use lamp_offset::{Widths, offset, offset_one_bit, shrink};
 use lamp_slicer::{FacetIndex, Fill, LayerLevels, Part, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{
     DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask,

@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
+use lamp_fix::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_fixtures::{Defect, Sample, build};
-use lamp_postprocess::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_slicer::{Fill, SliceOptions};
 
 const PARTS: [(Sample, usize); 5] = [

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, FromArgMatches};
-use lamp_postprocess::machine::{Defaults, Machine};
+use lamp_machine::{Defaults, Machine};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;

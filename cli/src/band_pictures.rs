@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use lamp_postprocess::{Band, BandOutcome, Fixed};
+use lamp_fix::{Band, BandOutcome, Fixed};
 use lamp_stack::{FolderBeside, Image, write_rgb_png};
 
 use crate::exit::Exit;

@@ -3,17 +3,17 @@
 use std::fmt;
 use std::io;
 
+use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
+use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_grayscale::exposure::{ExposureError, LampError};
+use lamp_machine::MachineLimit;
+use lamp_offset::CompensateError;
 use lamp_pipeline::ErrorKind;
 use lamp_planning::speed::{PartError, PlatformError};
 use lamp_planning::voxels::PlanError;
 use lamp_planning::{LightError, NoLight};
-use lamp_postprocess::machine::MachineLimit;
-use lamp_postprocess::{
-    CompensateError, EditError, LayoutError, RecipeError, StripsError, TileError,
-};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
@@ -175,9 +175,8 @@ impl From<lamp_pipeline::Error> for Exit {
     fn from(error: lamp_pipeline::Error) -> Self {
         let kind = error.kind();
         let (cause, places) = error.into_parts();
-        let error = places
-            .into_iter()
-            .fold(anyhow::Error::from_boxed(cause), |error, place| error.context(place));
+        let error =
+            places.into_iter().fold(anyhow::Error::from_boxed(cause), anyhow::Error::context);
         match kind {
             ErrorKind::Settings => Self::Usage(error),
             ErrorKind::Work => Self::Failed(error),

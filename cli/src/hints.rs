@@ -6,20 +6,19 @@ use std::error::Error;
 use std::io;
 
 use lamp_adaptive::HeightsError;
+use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
+use lamp_edit::{EditError, EditProblem, LayerProblem};
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::exposure::{ExposureError, LampError};
 use lamp_grayscale::material::MaterialError;
+use lamp_machine::{MachineError, MachineLimit};
+use lamp_offset::{CompensateError, CompensateProblem};
 use lamp_planning::LightError;
 use lamp_planning::ecpl;
 use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::target::TargetError;
 use lamp_planning::voxels::PlanError;
-use lamp_postprocess::machine::{MachineError, MachineLimit};
-use lamp_postprocess::{
-    CompensateError, CompensateProblem, EditError, EditProblem, LayerProblem, LayoutError,
-    RecipeError, StripsError, TileError,
-};
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
 use lamp_slicer::{SliceError, ThreeMfError};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_postprocess::{StripForm, StripWriter, StripsError, is_strips, join_strips};
+use lamp_build::{StripForm, StripWriter, StripsError, is_strips, join_strips};
 use lamp_stack::{PassingLayer, is_stack_name, map_in_order};
 
 use crate::exit::Exit;

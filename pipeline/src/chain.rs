@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lamp_postprocess::EditError;
+use lamp_edit::EditError;
 use lamp_stack::{Layer, Pages, PassingLayer, StackInfo};
 
 use crate::compensate::{self, CompensateSettings, Compensating, is_of_stage};
@@ -75,7 +75,7 @@ impl Stage {
 
     /// Returns how many layers on each side it looks at.
     fn reach(&self) -> u32 {
-        if matches!(self, Self::Fix(_)) { lamp_postprocess::FIX_REACH } else { 0 }
+        if matches!(self, Self::Fix(_)) { lamp_fix::FIX_REACH } else { 0 }
     }
 
     /// Begins the stage; `remarks` takes what it has to say.

@@ -9,7 +9,7 @@ use std::str::FromStr;
 use lamp_grayscale::exposure::{LampLight, MeasuredDoses};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime};
-use lamp_postprocess::{CompensateError, CompensateOptions, Shrinkage, Widths};
+use lamp_offset::{CompensateError, CompensateOptions, Shrinkage, Widths};
 use lamp_stack::{Dpi, Layer, Length};
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +122,7 @@ impl<'a> Compensating<'a> {
         let options = CompensateOptions { min_feature, one_bit, shrinkage };
         let by = &self.by;
         let widths = |layer: &Layer, dpi| Ok(by.widths(layer, dpi)?);
-        lamp_postprocess::compensate(layers, options, widths, move |done| {
+        lamp_offset::compensate(layers, options, widths, move |done| {
             if counted.contains(&done.layer.info.index) {
                 self.walls.borrow_mut().add(done);
             }

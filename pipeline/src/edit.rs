@@ -6,7 +6,7 @@ use std::io::{self, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use lamp_postprocess::{EditError, Edits, LabelList, OtherLayers, OtherPicture, edit_passing};
+use lamp_edit::{EditError, Edits, LabelList, OtherLayers, OtherPicture, edit_passing};
 use lamp_stack::{
     Layer, Limits, Op, Page, PageInfo, Pages, PassingLayer, StackError, digest_of, map_in_order,
 };

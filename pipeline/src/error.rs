@@ -4,10 +4,11 @@ use std::error::Error as StdError;
 use std::fmt;
 
 use lamp_adaptive::HeightsError;
+use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::exposure::ExposureError;
-use lamp_postprocess::machine::MachineLimit;
-use lamp_postprocess::{CompensateError, EditError};
+use lamp_machine::MachineLimit;
+use lamp_offset::CompensateError;
 use lamp_slicer::SliceError;
 use lamp_stack::StackError;
 

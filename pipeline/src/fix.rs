@@ -3,7 +3,7 @@
 use std::cell::{Ref, RefCell};
 use std::ops::Range;
 
-use lamp_postprocess::{FixMethod, FixOptions, Fixed};
+use lamp_fix::{FixMethod, FixOptions, Fixed};
 use lamp_stack::{Layer, PassingLayer};
 use serde::{Deserialize, Serialize};
 
@@ -76,7 +76,7 @@ impl Fixing {
         counted: Range<u32>,
         mut see: impl FnMut(&Fixed<'_>) + 'a,
     ) -> impl Iterator<Item = Result<PassingLayer, E>> + 'a {
-        lamp_postprocess::fix_passing(layers, self.options, decode, move |fixed| {
+        lamp_fix::fix_passing(layers, self.options, decode, move |fixed| {
             if counted.contains(&fixed.before.info.index) {
                 see(fixed);
                 self.report.borrow_mut().add(fixed);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_postprocess::{Band, BandKind, BandOutcome, FixOptions, Fixed};
+use lamp_fix::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 

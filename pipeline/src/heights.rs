@@ -157,7 +157,7 @@ impl HeightSettings {
     pub fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Error> {
         let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
         let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
-        part.map_err(|error| Error::from(error))
+        Ok(part?)
     }
 
     /// Returns whether a budget decides the bound.

@@ -50,15 +50,28 @@ impl PartFile {
         name.map_or_else(|| "-".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Returns what a stack records of it: the file's name, and the placement.
+    /// Returns the file as a stack records it: its name, and the placement.
+    #[must_use]
+    pub fn named(&self) -> Self {
+        Self { path: self.file().into(), placement: self.placement }
+    }
+
+    /// Returns the words that a stack records of it.
     pub fn recorded(&self) -> String {
-        recorded(&self.file(), self.placement)
+        self.named().to_string()
     }
 
     /// Returns true if a stack records the same place for both.
     pub fn stands_like(&self, other: &Self) -> bool {
         let [a, b] = [self, other].map(|part| part.placement.unwrap_or_default());
         a == b
+    }
+}
+
+impl fmt::Display for PartFile {
+    /// Writes what [`PartFile::parse`] reads.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&recorded(&self.path.to_string_lossy(), self.placement))
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_postprocess::machine::{Machine, MachineLimit};
+use lamp_machine::{Machine, MachineLimit};
 use lamp_slicer::{
     Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, SHORT_PX, SliceError,
     SliceOptions, Slices,
@@ -129,6 +129,7 @@ impl SliceSettings {
     ) -> Result<(Slices, PageWords), Error> {
         let mut settings = self.clone();
         settings.exposure.name(exposure.as_ref());
+        settings.solid.name();
         let record = SliceRecord { parts, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
         let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use lamp_postprocess::TurnedSlicing;
-use lamp_postprocess::machine::{Defaults, Machine, MachineLimit};
+use lamp_build::TurnedSlicing;
+use lamp_machine::{Defaults, Machine, MachineLimit};
 use lamp_slicer::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
 use lamp_stack::{Dpi, Length, Size, StackInfo, quoted};
 use serde::{Deserialize, Serialize};
@@ -216,6 +216,7 @@ impl SliceSettings {
     pub fn canonical(&self) -> String {
         let mut settings = self.clone();
         settings.exposure.make_canonical();
+        settings.solid.name();
         words_of(&settings)
     }
 
@@ -382,10 +383,10 @@ mod tests {
             ),
             (
                 json!({ "dpi": "300", "thickness": "1mm", "plane": "top", "units": "mm",
-                        "fill": "even-odd", "bodies": "xor", "subtract": ["--core.stl", "b.stl"],
+                        "fill": "even-odd", "bodies": "xor", "subtract": ["./--core.stl", "b.stl"],
                         "margin": "1" }),
                 "--dpi 300 --thickness 1mm --plane top --units mm --fill even-odd --bodies xor \
-                 --subtract=--core.stl --subtract b.stl --margin 1",
+                 --subtract ./--core.stl --subtract b.stl --margin 1",
             ),
         ] {
             let settings: SliceSettings = serde_json::from_value(settings).unwrap();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use lamp_postprocess::machine::Machine;
+use lamp_machine::Machine;
 use lamp_slicer::Part;
 use lamp_stack::{Layer, Pages, StackError};
 

@@ -87,6 +87,13 @@ impl SolidSettings {
         self.subtract.iter_mut().chain(&mut self.intersect).map(|part| &mut part.path)
     }
 
+    /// Puts the names that stacks record in the place of the paths of files.
+    pub(crate) fn name(&mut self) {
+        for file in self.subtract.iter_mut().chain(&mut self.intersect) {
+            *file = file.named();
+        }
+    }
+
     /// Returns a doubt about files that overlap: `found` are the numbers of two whose boxes do.
     pub fn overlap_doubt(&self, parts: &[PartFile], found: Option<[usize; 2]>) -> Option<String> {
         let [a, b] = found.filter(|_| self.fill == Fill::EvenOdd)?.map(|file| parts[file].name());

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_postprocess::{Compensated, Loss, ThinWall};
+use lamp_offset::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 

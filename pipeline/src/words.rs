@@ -58,7 +58,7 @@ pub mod parts {
     /// # Errors
     /// Returns the errors of the format.
     pub fn serialize<S: Serializer>(parts: &[PartFile], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(parts.iter().map(PartFile::recorded))
+        to.collect_seq(parts.iter().map(ToString::to_string))
     }
 
     /// Reads them.
@@ -103,7 +103,6 @@ pub mod optional {
     ///
     /// # Errors
     /// Returns the errors of the format.
-    #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
     pub fn serialize<S: Serializer>(
         value: &Option<impl Display>,
         to: S,

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
+use lamp_fix::FixMethod;
 use lamp_grayscale::DitherMethod;
 use lamp_grayscale::resin::{Dose, QuantityError};
 use lamp_pipeline::compensate::{CompensateSettings, FiringShrinkage};
 use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
-use lamp_postprocess::FixMethod;
 use lamp_stack::{Length, LengthError, Op};
 
 use crate::lamp_option::LampOption;

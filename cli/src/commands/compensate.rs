@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_offset::CompensateError;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
-use lamp_postprocess::CompensateError;
 
 use crate::args::stages::CompensateStageArgs;
 use crate::endings::parse_report;

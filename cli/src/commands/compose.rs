@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_postprocess::{Composer, RecipeError};
+use lamp_build::{Composer, RecipeError};
 
 use crate::exit::Exit;
 use crate::options::{Common, Output, parse_layers};

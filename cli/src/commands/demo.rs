@@ -7,12 +7,11 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Args;
+use lamp_build::{HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, tile};
+use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::DitherMethod;
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{
-    FixOptions, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, fix, tile,
-};
+use lamp_machine::Machine;
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, StackError};
 

@@ -1,8 +1,8 @@
 //! `lamp dither`: turns gray layers into dots.
 
 use clap::Args;
+use lamp_build::{Seam, StripForm};
 use lamp_pipeline::dither::DitherSettings;
-use lamp_postprocess::{Seam, StripForm};
 
 use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;

@@ -1,8 +1,8 @@
 //! `lamp edit`: changes a stack at image level.
 
 use clap::Args;
+use lamp_edit::EditError;
 use lamp_pipeline::edit::{EditSettings, Editing, unused_text};
-use lamp_postprocess::EditError;
 
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use crate::json_report::JsonReport;
 use clap::Args;
+use lamp_fix::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_pipeline::fix::{FixSettings, Fixing};
 use lamp_pipeline::whereabouts;
-use lamp_postprocess::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_stack::PageInfo;
 
 use crate::args::stages::FixStageArgs;
@@ -163,7 +163,7 @@ fn range_of(band: &Band) -> String {
 
 #[cfg(test)]
 mod tests {
-    use lamp_postprocess::BandKinds;
+    use lamp_fix::BandKinds;
     use lamp_stack::{Dpi, Layer, Mask};
 
     use super::*;

@@ -1,7 +1,7 @@
 //! `lamp info`: describes a stack.
 
 use clap::Args;
-use lamp_postprocess::is_strips;
+use lamp_build::is_strips;
 use lamp_stack::{
     NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
 };

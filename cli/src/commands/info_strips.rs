@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use lamp_postprocess::{
-    StripDifference, StripFile, StripForm, StripsError, check_number, strip_files,
-};
+use lamp_build::{StripDifference, StripFile, StripForm, StripsError, check_number, strip_files};
 use lamp_stack::{Pages, StackTotals};
 use serde::Serialize;
 

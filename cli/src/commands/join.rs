@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_postprocess::{is_strips, join_strips};
+use lamp_build::{is_strips, join_strips};
 use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
 
 use crate::endings::is_packed_name;

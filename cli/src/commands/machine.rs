@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lamp_postprocess::machine::{Machine, Recoating};
+use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 

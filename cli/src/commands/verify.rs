@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use lamp_postprocess::{is_strips, join_strips};
+use lamp_build::{is_strips, join_strips};
 use lamp_stack::{StackTotals, VerifyError, digest_of, open_ending, stacks_in, verify};
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use lamp_postprocess::{CopyPlacement, Layout, PartStack, PixelSize};
+use lamp_build::{CopyPlacement, Layout, PartStack, PixelSize};
 use lamp_stack::{Mask, Orientation, white_runs};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use lamp_machine::Machine;
 use lamp_pipeline::documents::is_file;
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::Counts;
 use lamp_pipeline::watcher::KeptRemarks;
 use lamp_pipeline::{Error, RangeFindings, Stage, named};
-use lamp_postprocess::machine::Machine;
 use lamp_stack::{Layer, Page, Pages, PassingLayer, map_in_order};
 
 use crate::commands::support::SupportArgs;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use lamp_build::TILE_CODE;
 use lamp_pipeline::watcher::KeptRemarks;
-use lamp_postprocess::TILE_CODE;
 use lamp_stack::Layer;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

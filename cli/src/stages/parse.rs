@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
-use lamp_postprocess::machine::Machine;
+use lamp_machine::Machine;
 
 use lamp_pipeline::compensate::{CompensateSettings, Compensating};
 use lamp_pipeline::documents::is_file;

@@ -1,15 +1,15 @@
 //! Packs flat parts on a square of 584.2 mm, and prints how many fit in what time.
 //!
 //! ```sh
-//! cargo run --release -p lamp-postprocess --example builds [DPI [ANGLE]]
+//! cargo run --release -p lamp-build --example builds [DPI [ANGLE]]
 //! ```
 //!
 //! With an angle such as `15deg`, parts may also lie at its multiples.
 
 use std::time::Instant;
 
+use lamp_build::{FreeTurns, Layout, Pack, PackBy, PartStack, TileError, TurnedPlan, Turns};
 use lamp_fixtures::Plate;
-use lamp_postprocess::{FreeTurns, Layout, Pack, PackBy, PartStack, TileError, TurnedPlan, Turns};
 use lamp_stack::{Dpi, Image, Layer, Length, PageInfo};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,13 +2,13 @@
 //! prints the times.
 //!
 //! ```sh
-//! cargo run --release -p lamp-postprocess --example compose RECIPE [RANDOM] [FROM..TO]
+//! cargo run --release -p lamp-build --example compose RECIPE [RANDOM] [FROM..TO]
 //! ```
 
 use std::path::Path;
 use std::time::Instant;
 
-use lamp_postprocess::{Composer, RecipeError};
+use lamp_build::{Composer, RecipeError};
 use lamp_stack::{Destination, Format, Layer, StackError, write_stack};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,12 +2,12 @@
 //! of each layer.
 //!
 //! ```sh
-//! cargo run --release -p lamp-postprocess --example mesh STACK AREA OUT [MOAT]
+//! cargo run --release -p lamp-build --example mesh STACK AREA OUT [MOAT]
 //! ```
 
 use std::path::Path;
 
-use lamp_postprocess::{HeightOptions, Layout, MeshOptions, Moat, Pack, PartStack, TileError};
+use lamp_build::{HeightOptions, Layout, MeshOptions, Moat, Pack, PartStack, TileError};
 use lamp_stack::{Destination, Format, Pages, StackError, write_stack};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,13 +2,13 @@
 //! what time.
 //!
 //! ```sh
-//! cargo run --release -p lamp-postprocess --example mixes [DPI]
+//! cargo run --release -p lamp-build --example mixes [DPI]
 //! ```
 
 use std::time::Instant;
 
+use lamp_build::{Layout, Pack, PackBy, PartStack, TileError, Turns};
 use lamp_fixtures::Plate;
-use lamp_postprocess::{Layout, Pack, PackBy, PartStack, TileError, Turns};
 use lamp_stack::{Dpi, Image, Layer, Length, PageInfo};
 
 /// A plate, its scale and the number of its copies.
@@ -62,9 +62,8 @@ fn part((plate, scale, _): &Share, dpi: f64) -> Result<PartStack, TileError> {
 
 /// Returns how far the copies reach along the strip.
 fn length_mm(layout: &Layout) -> f64 {
-    let bottom = |at: &lamp_postprocess::CopyPlacement| {
-        at.top + layout.parts()[at.part].size(at.turn).height
-    };
+    let bottom =
+        |at: &lamp_build::CopyPlacement| at.top + layout.parts()[at.part].size(at.turn).height;
     let ends = layout
         .placements()
         .iter()

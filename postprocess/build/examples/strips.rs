@@ -3,7 +3,7 @@
 //! ```sh
 //! lamp sample blade -o blade.stl
 //! slice blade.stl --dpi 1500 --thickness 100um --layers 600..612 -o blade.tif
-//! cargo build --release -p lamp-postprocess --example strips
+//! cargo build --release -p lamp-build --example strips
 //! time target/release/examples/strips blade.tif build
 //! time target/release/examples/strips blade.tif strips/ 1920 64 comb
 //! ```
@@ -12,9 +12,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use lamp_postprocess::{
-    HeightOptions, Layout, MeshOptions, Pack, PartStack, StripWriter, TileError,
-};
+use lamp_build::{HeightOptions, Layout, MeshOptions, Pack, PartStack, StripWriter, TileError};
 use lamp_stack::{EncodedPage, FolderBeside, Format, Layer, PageWriter, Pages};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;

@@ -14,15 +14,16 @@ use super::PixelSize;
 use super::mesh::{MeshRows, inlaid};
 
 /// An image and the places where it stands.
-pub(crate) struct PlacedImage {
-    pub(crate) image: Image,
+pub struct PlacedImage {
+    /// The image.
+    pub image: Image,
     /// Left column and top row. All of the image is on the build.
-    pub(crate) at: Vec<(u32, u32)>,
+    pub at: Vec<(u32, u32)>,
 }
 
 /// Why images make no build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ComposeError {
+pub enum ComposeError {
     /// A pixel is white in two copies.
     Overlap,
     /// There are more runs than an image can hold.
@@ -62,9 +63,12 @@ pub(super) fn compose(
 
 /// Returns the union of masks, which may overlap.
 ///
+/// # Errors
+/// Returns an error if there are more runs than an image can hold.
+///
 /// # Panics
 /// Panics if an image is gray.
-pub(crate) fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
+pub fn united(images: &[PlacedImage], build: PixelSize) -> Result<Mask, ComposeError> {
     compose_masks(images, build, None, true)
 }
 

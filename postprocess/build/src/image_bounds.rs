@@ -4,30 +4,30 @@ use std::fmt;
 
 use lamp_stack::{Dpi, Frame, Layer, Length, Orientation, PageInfo, PassingLayer};
 
-use super::edit_error::EditError;
-
 /// The rectangle that a stack's images cover in the part's coordinates.
 ///
 /// It is written as `x 1.000 to 4.000 and y 3.000 to 5.000 mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageBounds {
     /// The top left corner, in millimetres.
-    pub(super) origin_mm: [f64; 2],
+    pub origin_mm: [f64; 2],
     /// The resolution, if it is known.
-    pub(super) dpi: Option<Dpi>,
-    pub(super) width: u32,
-    pub(super) height: u32,
+    pub dpi: Option<Dpi>,
+    /// The number of columns.
+    pub width: u32,
+    /// The number of rows.
+    pub height: u32,
 }
 
 impl ImageBounds {
     /// Returns the bounds of a layer. If its page does not state them, the lower left
     /// corner is 0, 0.
-    pub(crate) fn of(layer: &Layer) -> Self {
+    pub fn of(layer: &Layer) -> Self {
         Self::of_image(&layer.info, layer.dpi, [layer.image.width(), layer.image.height()])
     }
 
     /// Returns the bounds of a layer that need not be decoded.
-    pub(super) fn of_passing(layer: &PassingLayer) -> Self {
+    pub fn of_passing(layer: &PassingLayer) -> Self {
         Self::of_image(layer.info(), layer.dpi(), layer.size())
     }
 
@@ -37,20 +37,19 @@ impl ImageBounds {
         Self { origin_mm, dpi, width, height }
     }
 
-    /// Returns the map from points of the part to pixels.
-    pub(super) fn grid(&self) -> Result<PixelMap, EditError> {
-        let dpi = self.dpi.ok_or(EditError::NoResolution)?;
-        Ok(PixelMap { origin_mm: self.origin_mm, dpi })
+    /// Makes a page say that its image lies here, if it says where it lies.
+    pub fn locate(&self, info: &mut PageInfo) {
+        info.origin_mm = info.origin_mm.map(|_| self.origin_mm);
     }
 
     /// Returns true if a point in pixels is on the image.
-    pub(super) fn holds(&self, [x, y]: [f64; 2]) -> bool {
+    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let on = |place: f64, size: u32| (-0.5..=f64::from(size) - 0.5).contains(&place);
         on(x, self.width) && on(y, self.height)
     }
 
     /// Returns the bounds of a frame of the image.
-    pub(crate) fn framed(&self, frame: Frame) -> Self {
+    pub fn framed(&self, frame: Frame) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [x0, y1] = self.origin_mm;
         Self {
@@ -62,7 +61,7 @@ impl ImageBounds {
     }
 
     /// Returns the bounds after the part is turned about x = y = 0.
-    pub(super) fn turned(&self, turn: Orientation) -> Self {
+    pub fn turned(&self, turn: Orientation) -> Self {
         let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [mut x0, mut y1] = self.origin_mm;
         let [mut width, mut height] = [self.width, self.height].map(|side| f64::from(side) * pitch);
@@ -85,29 +84,6 @@ impl fmt::Display for ImageBounds {
         let (right, bottom) =
             (x + f64::from(self.width) * pitch, y - f64::from(self.height) * pitch);
         write!(f, "x {x:.3} to {right:.3} and y {bottom:.3} to {y:.3} mm")
-    }
-}
-
-/// Maps points in millimetres to pixels.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelMap {
-    origin_mm: [f64; 2],
-    dpi: Dpi,
-}
-
-impl PixelMap {
-    /// Returns a point in pixels. Pixel centres are whole numbers, as in slicing: columns
-    /// from the first coordinate on have their centres at or right of the point, rows from
-    /// the second on at or below it.
-    pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
-        let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;
-        let [x0, y1] = self.origin_mm;
-        [pixels(x_mm - x0), pixels(y1 - y_mm)]
-    }
-
-    /// Returns a length in pixels.
-    pub(super) fn length(self, length: Length) -> f64 {
-        length.pixels(self.dpi)
     }
 }
 
@@ -138,9 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_on_a_centre_is_a_whole_number() {
-        let grid = PixelMap { origin_mm: [1.0, 5.0], dpi: Dpi::new(25.4).unwrap() };
-        assert_eq!(grid.to_pixels([3.5, 4.5]), [2.0, 0.0]);
+    fn a_frame_begins_at_its_own_corner() {
         assert_eq!(
             place([1.0, 5.0], 9, 9).framed(Frame { left: 2, top: -3, width: 1, height: 1 }),
             place([3.0, 8.0], 1, 1)

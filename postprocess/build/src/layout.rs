@@ -12,7 +12,7 @@ use super::{CopyName, PartStack, PixelSize, TileError};
 /// Where the copies of parts stand on a build area.
 ///
 /// ```
-/// use lamp_postprocess::{Layout, Pack, PartStack};
+/// use lamp_build::{Layout, Pack, PartStack};
 /// use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
 ///
 /// // At 254 dpi, 10 pixels are a millimetre.

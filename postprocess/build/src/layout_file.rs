@@ -27,12 +27,12 @@ use super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 /// A layout as a file has it.
 ///
 /// ```
-/// use lamp_postprocess::LayoutFile;
+/// use lamp_build::LayoutFile;
 ///
 /// let text = r#"{"copies": [{"part": "blade.tif", "x_mm": 2, "y_mm": 3, "turn": 90}]}"#;
 /// let file = LayoutFile::from_json(text)?;
 /// assert_eq!(LayoutFile::from_json(&file.to_json())?, file);
-/// # Ok::<(), lamp_postprocess::LayoutError>(())
+/// # Ok::<(), lamp_build::LayoutError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,63 +1,62 @@
-//! Stages between slicing and the machine: images in, images out, all on runs.
+//! Builds: copies of parts on the area of a machine.
 //!
-//! - [`fix`] corrects stray rows.
-//! - [`compensate`] narrows images by the cure width and makes up for firing shrinkage.
-//! - [`edit`] changes a design without slicing it again.
-//! - [`tile`] lays copies of parts out on a build area; a [`Layout`] says where copies of several
-//!   parts stand, a [`Machine`](machine::Machine) how large a build may be. A [`Composer`] makes any
-//!   layer of a build by its [`Recipe`].
+//! - A [`PartStack`] is what is known of a stack before it is placed, a [`Layout`] says where
+//!   copies stand: [`Layout::packed`] finds places, a [`LayoutFile`] has them. [`TurnedPlan`] turns
+//!   parts by any angle before they are sliced.
+//! - [`Layout::build`] reads the stacks together, by height, and makes the build's layers. It
+//!   orients a layer once for each way in which copies lie, and merges shifted rows into the
+//!   build's. [`tile`] does all of this for one part.
+//! - [`MeshOptions`] says which mesh holds copies together.
+//! - A [`Composer`] makes any layer of a build by its [`Recipe`].
 //! - [`StripWriter`] cuts build layers into [`Swaths`] for a projector that scans, and
 //!   [`join_strips`] joins them again.
+//! - [`BuildTime`] adds up how long a build takes on a machine.
 //!
-//! Stages are adaptors from layers to layers, so they can be chained:
-//!
-//! ```
-//! use lamp_postprocess::{FixOptions, TileError, TileOptions, fix, tile};
-//! use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
-//!
-//! // Row 1 missed its second crossing and runs to the image's edge.
-//! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
-//! let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: mask.into() };
-//!
-//! let layers = std::iter::once(Ok::<_, TileError>(layer));
-//! let fixed = fix(layers, FixOptions::default(), |fixed| {
-//!     let band = &fixed.bands[0];
-//!     assert_eq!((band.first_row, band.pixels, band.gap.clone()), (1, 3, Some(5..6)));
-//! });
-//! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
-//! let mut build = tile(fixed, options);
-//! let Image::Mask(build) = build.next().unwrap()?.image.into_image() else { unreachable!() };
-//! assert_eq!((build.width(), build.height()), (20, 10));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+//! Source: 002 section 2.4.2.
 
-mod edit;
-mod fix;
-pub mod machine;
-mod offset;
+mod areas;
+mod black_parts;
+mod build_page;
+mod compose;
+mod image_bounds;
+mod layout;
+mod layout_file;
+mod lockstep;
+mod mesh;
+mod overlap;
+mod pack;
+mod page_frame;
+mod part_stack;
+mod pixel_size;
+mod recipe;
 mod strips;
+#[cfg(test)]
+mod testing;
 mod tile;
+mod tile_error;
+#[cfg(test)]
+mod tile_tests;
+mod time;
+mod turned;
 
-pub use edit::{
-    EditError, EditProblem, Edits, ImageBounds, LabelList, LayerProblem, ListProblem, OtherLayers,
-    OtherPicture, edit, edit_passing,
-};
-pub use fix::{
-    Band, BandKind, BandKinds, BandOutcome, FIX_REACH, FixMethod, FixOptions, Fixed, fix,
-    fix_passing,
-};
-pub use offset::{
-    CompensateError, CompensateOptions, CompensateProblem, Compensated, Loss, Shrinkage, ThinWall,
-    Widths, beyond_tolerance, compensate, offset, offset_one_bit, shrink,
-};
+pub use areas::{CuredPixels, LayerAreas};
+pub use build_page::StrayRows;
+pub use compose::{ComposeError, PlacedImage, united};
+pub use image_bounds::ImageBounds;
+pub use layout::{CopyPlacement, Layout};
+pub use layout_file::{CopyEntry, LayoutError, LayoutFile};
+pub use lockstep::HeightOptions;
+pub use mesh::{CellShape, MeshOptions, MeshPattern, Moat};
+pub use pack::{Pack, PackBy, Turns};
+pub use page_frame::frame_page;
+pub use part_stack::PartStack;
+pub use pixel_size::PixelSize;
+pub use recipe::{Composer, LoosePieces, Recipe, RecipeError, RecipePart, TILE_CODE};
 pub use strips::{
     IndexError, JoinSwathsError, Seam, StripDifference, StripFile, StripForm, StripWriter,
     StripsError, Swaths, SwathsError, check_number, is_strips, join_strips, strip_files,
 };
-pub use tile::{
-    BuildFinding, BuildWanted, CellShape, Composer, CopyEntry, CopyName, CopyPlacement,
-    CuredPixels, FreeTurns, FreeTurnsError, HeightOptions, LayerAreas, Layout, LayoutError,
-    LayoutFile, LoosePieces, MeshOptions, MeshPattern, Moat, Pack, PackBy, PartStack, PixelSize,
-    PlannedStack, Recipe, RecipeError, RecipePart, StrayRows, TILE_CODE, TileError, TileOptions,
-    TurnedPlan, TurnedSlicing, Turns, tile,
-};
+pub use tile::{BuildFinding, BuildWanted, TileOptions, tile};
+pub use tile_error::{CopyName, TileError};
+pub use time::{BuildTime, SwathTime};
+pub use turned::{FreeTurns, FreeTurnsError, PlannedStack, TurnedPlan, TurnedSlicing};

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use lamp_stack::{Frame, Length, Mask, white_runs};
 
 use super::{CopyName, CopyPlacement, Layout, pack};
-use crate::offset::offset_one_bit;
+use lamp_offset::offset_one_bit;
 
 impl Layout {
     /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.

@@ -1,31 +1,6 @@
-//! Lays copies of parts out on a build area.
-//!
-//! A [`PartStack`] is what is known of a stack before it is placed, a [`Layout`] says
-//! where copies stand: [`Layout::packed`] finds places, a [`LayoutFile`] has them.
-//! [`Layout::build`] reads the stacks together, by height, and makes the build's
-//! layers. It orients a layer once for each way in which copies lie, and merges shifted
-//! rows into the build's.
+//! Makes the layers of a build out of its parts' stacks.
 //!
 //! Source: 002 section 2.4.2.
-
-mod areas;
-mod black_parts;
-mod build_page;
-mod compose;
-mod layout;
-mod layout_file;
-mod lockstep;
-mod mesh;
-mod overlap;
-mod pack;
-mod part_stack;
-mod recipe;
-#[cfg(test)]
-mod testing;
-mod tile_error;
-#[cfg(test)]
-mod tile_tests;
-mod turned;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -34,24 +9,17 @@ use lamp_stack::{
     Image, Layer, Length, Mask, MemorySize, Orientation, PageInfo, Size, map_in_order,
 };
 
-use areas::Areas;
-use black_parts::unless_black;
-use compose::ComposeError;
-use lockstep::{LayerSet, Lockstep};
-use mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
-
-pub use areas::{CuredPixels, LayerAreas};
-pub use build_page::StrayRows;
-pub(crate) use compose::{PlacedImage, united};
-pub use layout::{CopyPlacement, Layout};
-pub use layout_file::{CopyEntry, LayoutError, LayoutFile};
-pub use lockstep::HeightOptions;
-pub use mesh::{CellShape, MeshOptions, MeshPattern, Moat};
-pub use pack::{Pack, PackBy, Turns};
-pub use part_stack::PartStack;
-pub use recipe::{Composer, LoosePieces, Recipe, RecipeError, RecipePart, TILE_CODE};
-pub use tile_error::{CopyName, TileError};
-pub use turned::{FreeTurns, FreeTurnsError, PlannedStack, TurnedPlan, TurnedSlicing};
+use crate::areas::{Areas, LayerAreas};
+use crate::black_parts::unless_black;
+use crate::build_page::StrayRows;
+use crate::compose::{ComposeError, PlacedImage, compose};
+use crate::layout::Layout;
+use crate::lockstep::{HeightOptions, LayerSet, Lockstep};
+use crate::mesh::{BuildMesh, KeptMesh, MeshRows, on_base};
+use crate::pack::Pack;
+use crate::part_stack::PartStack;
+use crate::recipe::LoosePieces;
+use crate::tile_error::TileError;
 
 /// Options to lay out one part.
 #[derive(Clone, Copy, Debug)]
@@ -73,39 +41,12 @@ impl Default for TileOptions {
     }
 }
 
-/// A width and a height in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelSize {
-    /// The number of columns.
-    pub width: u32,
-    /// The number of rows.
-    pub height: u32,
-}
-
-impl PixelSize {
-    /// Returns the size of an image.
-    pub fn of(image: &Image) -> Self {
-        Self { width: image.width(), height: image.height() }
-    }
-
-    /// Returns the size with `by` pixels more on every side.
-    fn grown(self, by: u32) -> Self {
-        Self { width: self.width + 2 * by, height: self.height + 2 * by }
-    }
-}
-
-impl std::fmt::Display for PixelSize {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} x {}", self.width, self.height)
-    }
-}
-
 /// Lays copies of one stack's layers out on a black build area, in rows from the top
 /// left, centred. The first layer decides where the copies stand; its page says so, in
 /// pixels.
 ///
 /// ```
-/// use lamp_postprocess::{TileError, TileOptions, tile};
+/// use lamp_build::{TileError, TileOptions, tile};
 /// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
 ///
 /// let image = Image::Mask(Mask::black(30, 20).inverted());
@@ -141,17 +82,17 @@ pub fn tile<E: From<TileError> + Send>(
 }
 
 /// What a layer of the build is made of.
-struct MeshedStep {
-    set: LayerSet,
+pub(crate) struct MeshedStep {
+    pub(crate) set: LayerSet,
     /// The images of parts that have a layer here.
-    images: Vec<(usize, Image)>,
-    mesh: Option<MeshRows>,
+    pub(crate) images: Vec<(usize, Image)>,
+    pub(crate) mesh: Option<MeshRows>,
     /// The pixels of the mesh, if they are wanted.
-    mesh_px: u64,
+    pub(crate) mesh_px: u64,
     /// The pieces of mesh that hang on nothing, if they are others than in the layer below.
-    loose: Option<LoosePieces>,
+    pub(crate) loose: Option<LoosePieces>,
     /// Whether it is the build's first.
-    is_first: bool,
+    pub(crate) is_first: bool,
 }
 
 /// What is told while the layers of a build are made.
@@ -185,7 +126,7 @@ impl MemorySize for MeshedStep {
 }
 
 impl TileOptions {
-    fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
+    pub(crate) fn layout(&self, first: &Layer) -> Result<Layout, TileError> {
         let part = PartStack::of_image("the stack", first)?;
         Layout::packed(vec![part], &[self.copies], self.area, self.gap, Pack::default())
     }
@@ -220,7 +161,7 @@ impl Layout {
     }
 
     /// Makes the build's layers as [`build`](Self::build) does, or what is `wanted` of them, and
-    /// tells what a [`Recipe`] needs. What is told of a layer is told before it comes.
+    /// tells what a [`Recipe`](crate::Recipe) needs. What is told of a layer is told before it comes.
     ///
     /// # Panics
     /// Panics if there are not as many stacks as parts.
@@ -301,7 +242,7 @@ impl Layout {
     }
 
     /// Takes note of how stacks are joined, for the build's first page.
-    fn join_by(&mut self, heights: HeightOptions) {
+    pub(crate) fn join_by(&mut self, heights: HeightOptions) {
         if self.parts.len() > 1 {
             self.resampled = heights.resample;
             self.command.push_str(heights.options());
@@ -309,7 +250,7 @@ impl Layout {
     }
 
     /// Returns a layer of the build, or only what its page says.
-    fn layer(&self, step: &MeshedStep, image: bool) -> Result<Layer, TileError> {
+    pub(crate) fn layer(&self, step: &MeshedStep, image: bool) -> Result<Layer, TileError> {
         let info = self.page(&step.set, step.is_first)?;
         let image = if image { self.image(step)? } else { Image::Mask(Mask::black(0, 0)) };
         Ok(Layer { info, dpi: Some(self.dpi), image: image.into() })
@@ -334,12 +275,16 @@ impl Layout {
     }
 
     /// Returns what is placed of the parts' layers at a height.
-    fn framed(&self, set: &LayerSet, is_below: bool) -> Result<Vec<(usize, Image)>, TileError> {
+    pub(crate) fn framed(
+        &self,
+        set: &LayerSet,
+        is_below: bool,
+    ) -> Result<Vec<(usize, Image)>, TileError> {
         let framed = if is_below { PartStack::framed_below } else { PartStack::framed };
         self.layers_of(set).map(|(part, known, layer)| Ok((part, framed(known, layer)?))).collect()
     }
 
-    fn too_many_runs(&self, set: &LayerSet) -> TileError {
+    pub(crate) fn too_many_runs(&self, set: &LayerSet) -> TileError {
         let layer = set.some_layer().info.name();
         TileError::TooManyRuns { copies: self.placements.len(), layer }
     }
@@ -348,7 +293,7 @@ impl Layout {
     fn image(&self, step: &MeshedStep) -> Result<Image, TileError> {
         let placed =
             self.placed_images(&step.images).ok_or_else(|| self.too_many_runs(&step.set))?;
-        let composed = compose::compose(&placed, self.pixels, step.mesh.as_ref());
+        let composed = compose(&placed, self.pixels, step.mesh.as_ref());
         composed.map_err(|fault| match fault {
             ComposeError::TooManyRuns => self.too_many_runs(&step.set),
             // The layout was checked by outlines, so a layer is white outside its own.
@@ -361,7 +306,7 @@ impl Layout {
 
     /// Orients parts' images in each way in which copies lie. Returns `None` if one
     /// has too many runs.
-    fn placed_images(&self, images: &[(usize, Image)]) -> Option<Vec<PlacedImage>> {
+    pub(crate) fn placed_images(&self, images: &[(usize, Image)]) -> Option<Vec<PlacedImage>> {
         let mut placed = Vec::new();
         for (part, image) in images {
             let mut corners: HashMap<Orientation, Vec<(u32, u32)>> = HashMap::new();

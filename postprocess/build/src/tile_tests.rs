@@ -1,4 +1,7 @@
-use lamp_stack::{Dpi, Frame, GrayMask, Mask, MaskBuilder, PageInfo, StackInfo};
+use lamp_stack::{
+    Dpi, Frame, GrayMask, Image, Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Size,
+    StackInfo,
+};
 use proptest::prelude::*;
 use serde_json::json;
 

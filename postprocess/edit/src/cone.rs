@@ -1,8 +1,8 @@
 //! Cones and frustums between two points, and their sections in the rows of images.
 
+use lamp_build::ImageBounds;
 use lamp_stack::Length;
 
-use super::image_bounds::ImageBounds;
 use super::schema::ConeEnds;
 
 /// A round cone or frustum with flat ends, in part coordinates.

@@ -1,13 +1,12 @@
 //! Finds the copies of parts on a build, which its first page lists.
 
+use lamp_build::{ImageBounds, PixelSize, PlacedImage, united};
 use lamp_stack::{Frame, Image, Mask, Orientation, PageInfo, StackInfo};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::edit_error::{EditError, LayerProblem};
-use super::image_bounds::ImageBounds;
 use super::schema::CopySelection;
-use crate::tile::{PixelSize, PlacedImage, united};
 
 /// The largest distance of a copy from an image's corner, in pixels.
 const MAX_OFFSET: i64 = 1 << 40;
@@ -168,27 +167,6 @@ pub(super) fn composed<'a>(
     united(&placed, PixelSize { width: place.width, height: place.height }).ok()
 }
 
-/// Adapts the copies on a first page to a frame of the image.
-pub(super) fn move_copies(stack: &mut StackInfo, frame: Frame) {
-    let Some(tile) = stack.other.get_mut("tile") else { return };
-    each_part(tile, |part| {
-        let copies = part.get_mut("copies").and_then(Value::as_array_mut);
-        for copy in copies.into_iter().flatten() {
-            if let Ok([left, top]) = serde_json::from_value::<[i64; 2]>(copy.clone()) {
-                *copy = json!([left.saturating_sub(frame.left), top.saturating_sub(frame.top)]);
-            }
-        }
-    });
-}
-
-/// Calls `with` on the entry for each part.
-fn each_part(tile: &mut Value, mut with: impl FnMut(&mut Value)) {
-    match tile.get_mut("parts").and_then(Value::as_array_mut) {
-        Some(parts) => parts.iter_mut().for_each(with),
-        None => with(tile),
-    }
-}
-
 /// Removes the copies from a first page.
 pub(super) fn forget_copies(stack: &mut StackInfo) {
     stack.other.shift_remove("tile");
@@ -196,8 +174,10 @@ pub(super) fn forget_copies(stack: &mut StackInfo) {
 
 #[cfg(test)]
 mod tests {
+    use lamp_build::frame_page;
     use lamp_stack::{MaskBuilder, Op};
     use proptest::prelude::*;
+    use serde_json::json;
 
     use super::*;
 
@@ -246,7 +226,7 @@ mod tests {
             BuildCopy::all(&CopySelection::Of("blade".to_owned()), &page, &PLACE).unwrap(),
             all
         );
-        move_copies(page.stack.as_mut().unwrap(), Frame { left: 2, top: -3, width: 9, height: 9 });
+        frame_page(&mut page, Frame { left: 2, top: -3, width: 9, height: 9 }, &PLACE);
         let moved = BuildCopy::all(&CopySelection::Any(true), &page, &PLACE).unwrap();
         assert_eq!((moved[1].left, moved[1].top), (3, 9));
     }

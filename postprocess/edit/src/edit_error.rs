@@ -1,9 +1,9 @@
 //! Errors of reading a list of edits and of making them.
 
+use lamp_build::ImageBounds;
 use lamp_stack::{Dpi, OrientationError, StackError};
 use thiserror::Error;
 
-use super::ImageBounds;
 use super::serials::ListProblem;
 
 /// Why a stack cannot be edited.

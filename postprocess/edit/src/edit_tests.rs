@@ -318,9 +318,9 @@ proptest! {
         let composed = |of: &dyn Fn(usize) -> Mask| {
             let placed: Vec<_> = (0..copies.len()).map(|k| {
                 let image = Image::Mask(of(k).oriented(turn(k)).unwrap());
-                crate::tile::PlacedImage { image, at: vec![place(k)] }
+                lamp_build::PlacedImage { image, at: vec![place(k)] }
             }).collect();
-            crate::tile::united(&placed, crate::tile::PixelSize { width: 70, height: 20 }).unwrap()
+            lamp_build::united(&placed, lamp_build::PixelSize { width: 70, height: 20 }).unwrap()
         };
         let mut build = layer(0, Image::Mask(composed(&|_| part.clone())));
         let tile = json!({

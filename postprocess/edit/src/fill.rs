@@ -2,7 +2,7 @@
 
 use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
-/// A point as column and row, as a [`PixelMap`](super::image_bounds::PixelMap) returns it.
+/// A point as column and row, as a [`PixelMap`](super::pixel_map::PixelMap) returns it.
 pub(super) type Point = [f64; 2];
 
 /// White pixels of a row.

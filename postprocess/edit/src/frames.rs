@@ -1,14 +1,15 @@
 //! Frames in pixels: of padding, of cropping, and of an image in another stack's.
 
+use lamp_build::ImageBounds;
 use lamp_stack::{Frame, Layer, PageInfo};
 
 use super::edit_error::{EditError, EditProblem};
-use super::image_bounds::ImageBounds;
+use super::pixel_map::PixelMap;
 use super::schema::{OtherStack, Pad, Rectangle};
 
 /// Returns a frame with black around the image, in whole pixels.
 pub(super) fn padded(pad: Pad, place: &ImageBounds) -> Result<Frame, EditError> {
-    let grid = place.grid()?;
+    let grid = PixelMap::of(place)?;
     let [left, right, top, bottom] =
         [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
     // Lengths are at most 10 m, which 32 bits hold at any resolution.
@@ -41,7 +42,7 @@ pub(super) fn frame_of(
     if other.info.origin_mm.is_some() != info.origin_mm.is_some() {
         return Err(EditProblem::OtherOrigin { stack });
     }
-    let Ok(grid) = place.grid() else {
+    let Ok(grid) = PixelMap::of(place) else {
         // Without a resolution, all images begin at the top left.
         let moved = by[..2].iter().any(|by| by.um() != 0.0);
         return if moved {
@@ -63,7 +64,7 @@ pub(super) fn cropped(
     number: usize,
     place: &ImageBounds,
 ) -> Result<Frame, EditError> {
-    let grid = place.grid()?;
+    let grid = PixelMap::of(place)?;
     let [left, top] = grid.to_pixels([crop.x[0].mm(), crop.y[1].mm()]);
     let [right, bottom] = grid.to_pixels([crop.x[1].mm(), crop.y[0].mm()]);
     let within = |pixels: f64, size: u32| (pixels.ceil() as i64).clamp(0, size.into());

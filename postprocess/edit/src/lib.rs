@@ -13,7 +13,6 @@ mod edit_error;
 mod edit_tests;
 mod fill;
 mod frames;
-mod image_bounds;
 mod letters;
 mod list;
 mod other_stacks;
@@ -22,6 +21,7 @@ mod pattern;
 #[cfg(test)]
 mod pattern_tests;
 mod pictures;
+mod pixel_map;
 mod plan;
 mod schema;
 mod serials;
@@ -33,10 +33,8 @@ use std::sync::Arc;
 use lamp_stack::{Layer, MemorySize, PageInfo, PassingLayer, map_in_order};
 
 pub use edit_error::{EditError, EditProblem, LayerProblem};
-pub use image_bounds::ImageBounds;
 pub use list::Edits;
 pub use other_stacks::OtherLayers;
-pub(crate) use page_changes::frame_page;
 pub use pictures::OtherPicture;
 pub use serials::{LabelList, ListProblem};
 
@@ -51,7 +49,7 @@ use plan::EditPlan;
 /// is, a layer in a range of heights if its middle is.
 ///
 /// ```
-/// use lamp_postprocess::{EditError, Edits, edit};
+/// use lamp_edit::{EditError, Edits, edit};
 /// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
 ///
 /// // At 25.4 dpi a pixel is a millimetre, and the lower left corner is 0, 0.

@@ -17,13 +17,13 @@ use super::serials::{LabelList, SerialList};
 /// A list of edits, made one after the other.
 ///
 /// ```
-/// use lamp_postprocess::Edits;
+/// use lamp_edit::Edits;
 ///
 /// let edits = Edits::from_toml("[[edit]]\nrotate = 90\n[[edit]]\nmirror = \"x\"\n")?;
 /// assert_eq!(edits.count(), 2);
 /// let error = Edits::from_toml("[[edit]]\nrotate = 45\n").unwrap_err();
 /// assert_eq!(error.to_string(), "edit 1: images rotate by 90, 180 or 270 degrees");
-/// # Ok::<(), lamp_postprocess::EditError>(())
+/// # Ok::<(), lamp_edit::EditError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Edits {
@@ -101,7 +101,7 @@ impl Edits {
     /// Reads the serial numbers of the lists that labels name, in order.
     ///
     /// ```
-    /// use lamp_postprocess::{Edits, LabelList};
+    /// use lamp_edit::{Edits, LabelList};
     ///
     /// let edits = r#"
     ///     [[edit]]
@@ -115,7 +115,7 @@ impl Edits {
     /// };
     /// let error = Edits::from_toml(edits)?.with_lists(vec![list]).unwrap_err();
     /// assert_eq!(error.to_string(), "edit 1: sn.csv: line 2: A17 stands on line 1, too");
-    /// # Ok::<(), lamp_postprocess::EditError>(())
+    /// # Ok::<(), lamp_edit::EditError>(())
     /// ```
     ///
     /// # Errors

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use lamp_build::ImageBounds;
 use lamp_stack::{Layer, Length, PageInfo};
 
 use super::edit_error::{EditError, EditProblem, LayerProblem};
-use super::image_bounds::ImageBounds;
 
 /// A stack that an edit names.
 pub struct OtherLayers<E> {

@@ -1,25 +1,10 @@
-//! Adapts pages to images that were cropped, padded or turned.
+//! Adapts pages to images that were turned.
 
-use super::copies::{forget_copies, move_copies};
+use lamp_build::ImageBounds;
+use lamp_stack::{Orientation, PageInfo};
+
+use super::copies::forget_copies;
 use super::edit_error::{EditError, LayerProblem};
-use super::image_bounds::ImageBounds;
-use lamp_stack::{Frame, Orientation, PageInfo};
-
-/// Adapts a page to a frame of its image, which lies at `place`.
-pub(crate) fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds) {
-    move_to(info, place);
-    let moved = |row: u32, end: i64| {
-        let row = i64::from(row).saturating_sub(frame.top);
-        (0..end).contains(&row).then_some(row as u32)
-    };
-    let height = i64::from(frame.height);
-    info.stray_rows = info.stray_rows.iter().filter_map(|&row| moved(row, height)).collect();
-    // An open row may stand below the last row, where contours break off.
-    info.open_rows = info.open_rows.iter().filter_map(|&row| moved(row, height + 1)).collect();
-    if let Some(stack) = &mut info.stack {
-        move_copies(stack, frame);
-    }
-}
 
 /// Adapts the page of an image of `height` rows to the turned image, which lies at
 /// `place`. It no longer says where copies stand.
@@ -35,7 +20,7 @@ pub(super) fn turn_page(
     if turn.is_across() && !info.stray_rows.is_empty() {
         return Err(LayerProblem::StrayColumns.of_layer(info));
     }
-    move_to(info, place);
+    place.locate(info);
     if turn.is_across() {
         info.open_rows.clear();
     }
@@ -52,10 +37,6 @@ pub(super) fn turn_page(
         forget_copies(stack);
     }
     Ok(())
-}
-
-fn move_to(info: &mut PageInfo, place: &ImageBounds) {
-    info.origin_mm = info.origin_mm.map(|_| place.origin_mm);
 }
 
 #[cfg(test)]
@@ -79,15 +60,6 @@ mod tests {
             stack: Some(stack),
             ..PageInfo::default()
         }
-    }
-
-    #[test]
-    fn rows_and_copies_follow_a_frame() {
-        let mut page = info();
-        frame_page(&mut page, Frame { left: 2, top: 3, width: 5, height: 6 }, &PLACE);
-        assert_eq!((page.origin_mm, &page.stray_rows[..]), (Some([7.0, 8.0]), &[2][..]));
-        assert_eq!(page.open_rows, [3]);
-        assert_eq!(page.stack.unwrap().other["tile"]["copies"], json!([[1, 1], [3, 3]]));
     }
 
     #[test]

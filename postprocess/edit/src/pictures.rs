@@ -1,13 +1,13 @@
 //! Stamps pictures: scales their runs to the pixels of a stack.
 
+use lamp_build::{ImageBounds, PixelSize, PlacedImage, united};
 use lamp_stack::{Image, Layer, Length, MAX_RUNS, Mask, MaskBuilder, Orientation};
 
 use super::edit_error::{EditError, EditProblem};
-use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{Align, turned};
 use super::pattern::Motion;
+use super::pixel_map::PixelMap;
 use super::schema::Picture;
-use crate::tile::{PixelSize, PlacedImage, united};
 
 /// Edges this near to a pixel's centre, in pixels, are on it: rounding must not make one
 /// pixel of a picture two columns wide, and its neighbour none.

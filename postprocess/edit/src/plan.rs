@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+use lamp_build::{ImageBounds, frame_page};
 use lamp_stack::{
     Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, PassingLayer, gray_runs,
 };
@@ -12,10 +13,9 @@ use serde_json::json;
 use super::copies::BuildCopy;
 use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::frames::{cropped, frame_of, padded};
-use super::image_bounds::ImageBounds;
 use super::list::Edits;
 use super::other_stacks::{AlignedStack, middle};
-use super::page_changes::{frame_page, turn_page};
+use super::page_changes::turn_page;
 use super::pictures::OtherPicture;
 use super::schema::{Edit, Label, LengthRange, Mirror};
 use super::shape::{EditShape, FromFiles};

@@ -2,16 +2,17 @@
 
 use std::borrow::Cow;
 
+use lamp_build::ImageBounds;
 use lamp_stack::{Length, Mask, PageInfo};
 
 use super::copies::{BuildCopy, composed};
 use super::edit_error::{EditError, EditProblem, LayerProblem};
 use super::fill::{Point, RunSet};
-use super::image_bounds::{ImageBounds, PixelMap};
 use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
 use super::pattern::{Motion, Repeat, motions};
 use super::pictures::stamped;
+use super::pixel_map::PixelMap;
 use super::schema::{Cylinder, Edit, Label, StraightLine};
 use super::serials::SerialList;
 use super::solid::{Solid, rectangle};
@@ -51,7 +52,7 @@ impl EditShape {
         let wrong = |problem: EditProblem| problem.of_edit(number);
         // All copies of a part are alike.
         let part = copies.first().map_or(*place, |copy| copy.part);
-        let grid = part.grid()?;
+        let grid = PixelMap::of(&part)?;
         let motions = motions(&edit.repeat);
         let solids = motions.iter().map(|motion| Solid::of(edit, motion));
         if let Some(solids) = solids.collect::<Result<Option<Vec<_>>, _>>().map_err(wrong)? {
@@ -185,7 +186,7 @@ fn letters<'a>(
     serial: impl Fn(usize) -> &'a str,
     runs: &mut RunSet,
 ) -> Result<(), EditProblem> {
-    let grid = part.grid().expect("shapes are drawn in known resolutions");
+    let grid = PixelMap::of(part).expect("shapes are drawn in known resolutions");
     let size = grid.length(label.height);
     let places: Vec<_> =
         motions.iter().flat_map(|motion| label.at.iter().map(move |at| (motion, *at))).collect();

@@ -1,12 +1,13 @@
 //! Solids of edits: shapes with another section at each height.
 
+use lamp_build::ImageBounds;
 use lamp_stack::{Length, Strut};
 
 use super::cone::Cone;
 use super::edit_error::EditProblem;
 use super::fill::{Point, RunSet};
-use super::image_bounds::{ImageBounds, PixelMap};
 use super::pattern::Motion;
+use super::pixel_map::PixelMap;
 use super::schema::{ConeEnds, Cylinder, CylinderAxis, Edit, Rectangle, Sphere, StrutEnds};
 
 /// A solid in part coordinates.

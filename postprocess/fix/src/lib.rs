@@ -1,8 +1,8 @@
 //! Detection and correction of stray rows.
 //!
 //! A gap in a mesh loses crossings, and each lost crossing inverts all pixels to its right.
-//! [`detect`] finds the rows where that happened. [`contours`] follows the part's contours
-//! from the good rows above and below through a band of stray rows, and [`mend`] decides which
+//! `detect` finds the rows where that happened. `contours` follows the part's contours
+//! from the good rows above and below through a band of stray rows, and `mend` decides which
 //! crossings a row missed. A row begins and ceases to miss crossings only where a contour
 //! breaks off: that tells stray rows from the part's own slits.
 //!
@@ -82,7 +82,7 @@ impl Default for FixOptions {
 /// How the rows of a band are corrected.
 ///
 /// ```
-/// use lamp_postprocess::FixMethod;
+/// use lamp_fix::FixMethod;
 ///
 /// assert_eq!("nearest".parse(), Ok(FixMethod::Nearest));
 /// assert_eq!(FixMethod::default().to_string(), "spline");
@@ -123,7 +123,7 @@ pub struct Fixed<'a> {
 /// depends on no order.
 ///
 /// ```
-/// use lamp_postprocess::{BandOutcome, FixOptions, fix};
+/// use lamp_fix::{BandOutcome, FixOptions, fix};
 /// use lamp_stack::{Image, Layer, Mask, PageInfo};
 ///
 /// // Row 1 missed its second crossing and is white up to the image's edge.

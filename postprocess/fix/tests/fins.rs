@@ -5,15 +5,15 @@
 //! from the rows around, between which the contour runs straight.
 //!
 //! ```sh
-//! cargo test --release -p lamp-postprocess --test fins -- --ignored --nocapture
+//! cargo test --release -p lamp-fix --test fins -- --ignored --nocapture
 //! ```
 
 use std::convert::Infallible;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
+use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Facet, Mesh, SplitMix};
-use lamp_postprocess::{FixOptions, fix};
 use lamp_slicer::{GridRule, LayerLevels, Part, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, white_in_row};
 

@@ -47,7 +47,7 @@ pub enum MachineError {
 
 macro_rules! builtin {
     ($name:literal) => {
-        Builtin { name: $name, toml: include_str!(concat!("../../machines/", $name, ".toml")) }
+        Builtin { name: $name, toml: include_str!(concat!("../machines/", $name, ".toml")) }
     };
 }
 

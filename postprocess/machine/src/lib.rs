@@ -2,7 +2,7 @@
 //! it takes, in TOML files.
 //!
 //! ```
-//! use lamp_postprocess::machine::Machine;
+//! use lamp_machine::Machine;
 //! use lamp_stack::Catalogued;
 //!
 //! let beta = Machine::builtin("beta").unwrap();
@@ -19,7 +19,7 @@ use serde::Deserialize;
 
 pub use file::MachineError;
 pub use limit::MachineLimit;
-pub use times::{BuildTime, SwathTime, Times};
+pub use times::Times;
 
 /// What is known of a machine. What a source does not give is absent, and then
 /// anything goes.

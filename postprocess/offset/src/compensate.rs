@@ -116,7 +116,7 @@ const WIDTH_UNIT: u64 = 32;
 /// lower of its level and what is left of it.
 ///
 /// ```
-/// use lamp_postprocess::{CompensateError, CompensateOptions, Widths, compensate};
+/// use lamp_offset::{CompensateError, CompensateOptions, Widths, compensate};
 /// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
 ///
 /// // A square of 20 pixels at 25.4 um, whose edges move by a pixel.

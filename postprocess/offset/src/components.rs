@@ -126,7 +126,7 @@ pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
 }
 
 /// Makes white all black that is not connected to the top left pixel.
-pub(crate) fn without_holes(mask: &Mask) -> Mask {
+pub fn without_holes(mask: &Mask) -> Mask {
     let black = Components::of(RowRuns::white(&mask.inverted()));
     let outside = black.first.first().copied();
     let outside = black.rows.filtered(|run| Some(black.first[run]) == outside);

@@ -2,19 +2,19 @@
 //!
 //! Source: 002 section 3.4: every cured region is wider than its image.
 //!
-//! An edge lies on the mean line of its stair of pixels, so at no angle is it off. [`contours`]
-//! follows the stairs, [`straight`] splits them into the longest that straight edges leave, and
-//! [`outline`] joins their mean lines. When an edge moves inwards by `r`, a pixel whose middle is
+//! An edge lies on the mean line of its stair of pixels, so at no angle is it off. `contours`
+//! follows the stairs, `straight` splits them into the longest that straight edges leave, and
+//! `outline` joins their mean lines. When an edge moves inwards by `r`, a pixel whose middle is
 //! `d` inside of it keeps the share `d - r + 1/2`, from 0 to 1, as its level: a straight edge moves
 //! by exactly `r`. Growing is the shrinking of what is black, within the image. Outside the image
 //! all is black.
 //!
-//! [`erode`] cuts rows by the disc around each pixel of the other colour, which finds the pixels
-//! near edges ([`aligned_rows`] is faster for plain rows, [`grow`] where only the shape counts);
-//! [`closest`] measures them, and [`edge_map`] keeps the result. [`skeleton`] finds thin walls, unless [`wide`] tells that the
-//! image has none, or [`plain`] that a place has none, and [`walls`] measures them. Where walls
-//! are not kept, [`components`] finds those that vanish or break. [`feature_size`] gives the size
-//! of the feature at each edge, and [`scale`] makes up for firing.
+//! `erode` cuts rows by the disc around each pixel of the other colour, which finds the pixels
+//! near edges (`aligned_rows` is faster for plain rows, `grow` where only the shape counts);
+//! `closest` measures them, and `edge_map` keeps the result. `skeleton` finds thin walls, unless `wide` tells that the
+//! image has none, or `plain` that a place has none, and `walls` measures them. Where walls
+//! are not kept, `components` finds those that vanish or break. `feature_size` gives the size
+//! of the feature at each edge, and `scale` makes up for firing.
 
 mod aligned_rows;
 mod closest;
@@ -48,9 +48,8 @@ use skeleton::Cores;
 pub use compensate::{
     CompensateError, CompensateOptions, CompensateProblem, Compensated, Shrinkage, compensate,
 };
-pub use components::Loss;
-pub(crate) use components::without_holes;
-pub(crate) use row_runs::join_runs;
+pub use components::{Loss, without_holes};
+pub use row_runs::join_runs;
 pub use tolerance::beyond_tolerance;
 pub use walls::ThinWall;
 pub use widths::Widths;
@@ -62,7 +61,7 @@ const MAX_OFFSET: f64 = 30_000.0;
 /// Pixels that are partly left are gray.
 ///
 /// ```
-/// use lamp_postprocess::offset;
+/// use lamp_offset::offset;
 /// use lamp_stack::Mask;
 ///
 /// // A bar three pixels high, columns 2 to 6.

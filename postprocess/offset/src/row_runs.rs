@@ -166,7 +166,7 @@ pub(super) fn first_past<T>(
 }
 
 /// Sorts runs and joins those that touch.
-pub(crate) fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
+pub fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
     runs.sort_unstable();
     runs.dedup_by(|next, last| {
         let touch = next.0 <= last.1;

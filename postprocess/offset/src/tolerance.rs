@@ -15,7 +15,7 @@ use super::row_runs::RowRuns;
 /// the brighter one as dark. Beyond the images all is black.
 ///
 /// ```
-/// use lamp_postprocess::beyond_tolerance;
+/// use lamp_offset::beyond_tolerance;
 /// use lamp_stack::{Image, Mask, Overlaid};
 ///
 /// // A wall that is a pixel wider, and a gap that is closed, in three rows.

@@ -3,7 +3,7 @@
 /// Distances that edges move inwards, in pixels, by the size of the feature.
 ///
 /// ```
-/// use lamp_postprocess::Widths;
+/// use lamp_offset::Widths;
 ///
 /// assert_eq!(Widths::uniform(1.5).range(), [1.5, 1.5]);
 /// let by_size = Widths::by_size(&[20.0, 40.0], |size| size / 20.0);

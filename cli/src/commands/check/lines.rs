@@ -1,6 +1,6 @@
 //! A line and a JSON object for each finding.
 
-use lamp_postprocess::machine::Recoating;
+use lamp_machine::Recoating;
 use lamp_supports::{
     Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
     PocketKind, Region, WeakJoint,

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, FromArgMatches};
-use lamp_postprocess::machine::Machine;
+use lamp_machine::Machine;
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
 use lamp_stack::{Layer, Length, MemorySize, Page, PageHeader};
@@ -383,7 +383,7 @@ impl CheckArgs {
 /// What is checked.
 enum Input {
     Stack(KeptStack),
-    Part(SlicedPart),
+    Part(Box<SlicedPart>),
 }
 
 impl Input {
@@ -391,7 +391,10 @@ impl Input {
     fn open(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<Self, Exit> {
         let progress = Progress::new("check", common, true);
         let part = SlicedPart::open(path, slicing, &progress)?;
-        Ok(part.map_or_else(|| Self::Stack(KeptStack::new(path)), Self::Part))
+        Ok(match part {
+            Some(part) => Self::Part(Box::new(part)),
+            None => Self::Stack(KeptStack::new(path)),
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_postprocess::machine::Recoating;
+use lamp_machine::Recoating;
 use serde_json::{Value, json};
 
 use super::CheckedInput;

@@ -1,7 +1,7 @@
 //! Compares what two stacks have at each height.
 
 use anyhow::anyhow;
-use lamp_postprocess::beyond_tolerance;
+use lamp_offset::beyond_tolerance;
 use lamp_stack::{
     Difference, Image, IndexedStack, Mask, MemorySize, Op, Overlaid, Page, Pairing, Section,
     WhiteBox, largest_boxes, map_in_order, shift_between,

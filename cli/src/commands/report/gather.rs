@@ -2,8 +2,9 @@
 
 use std::cell::RefCell;
 
-use lamp_postprocess::PixelSize;
-use lamp_postprocess::machine::{BuildTime, Machine};
+use lamp_build::BuildTime;
+use lamp_build::PixelSize;
+use lamp_machine::Machine;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
 use lamp_supports::{CheckError, Findings};
 use serde_json::{Value, json};

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_postprocess::machine::Machine;
+use lamp_machine::Machine;
 use lamp_stack::stacks_in;
 use serde_json::json;
 

@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{Edits, edit};
+use lamp_edit::{Edits, edit};
+use lamp_machine::Machine;
 use lamp_stack::{Length, Page, PageInfo, StackInfo};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_postprocess::machine::Recoating;
+use lamp_machine::Recoating;
 use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Support};
 use serde_json::{Map, Value, json};
 

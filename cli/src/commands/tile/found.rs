@@ -1,7 +1,7 @@
 //! What is wrong with a build: stray rows, copies without a place, too great a height.
 
-use lamp_postprocess::StrayRows;
-use lamp_postprocess::machine::Machine;
+use lamp_build::StrayRows;
+use lamp_machine::Machine;
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;

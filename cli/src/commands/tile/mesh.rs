@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use lamp_build::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_grayscale::{DitherMethod, dither_image};
-use lamp_postprocess::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_stack::{Image, Length, StackError};
 
 use crate::exit::Exit;

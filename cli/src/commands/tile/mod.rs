@@ -18,10 +18,8 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use clap::Args;
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{
-    BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe,
-};
+use lamp_build::{BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe};
+use lamp_machine::Machine;
 use lamp_stack::{Length, Size};
 
 use crate::endings::parse_report;

@@ -3,10 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{
-    Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, TileOptions, Turns,
-};
+use lamp_build::{Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, TileOptions, Turns};
+use lamp_machine::Machine;
 use lamp_stack::{Length, Size};
 
 use crate::catalogue::read_text;

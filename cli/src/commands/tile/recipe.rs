@@ -4,8 +4,8 @@ use std::fs::{self, File};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{HeightOptions, Layout, MeshOptions, Recipe, RecipePart};
+use lamp_build::{HeightOptions, Layout, MeshOptions, Recipe, RecipePart};
+use lamp_machine::Machine;
 use lamp_stack::digest_of;
 
 use crate::exit::Exit;

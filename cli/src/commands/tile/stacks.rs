@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use lamp_postprocess::PartStack;
-use lamp_postprocess::machine::Machine;
+use lamp_build::PartStack;
+use lamp_machine::Machine;
 use lamp_stack::{Layer, PageInfo, Pages, StackError};
 
 use crate::exit::Exit;

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_postprocess::machine::Machine;
-use lamp_postprocess::{Seam, StripWriter, StripsError};
+use lamp_build::{Seam, StripWriter, StripsError};
+use lamp_machine::Machine;
 use lamp_stack::Layer;
 
 use crate::exit::Exit;

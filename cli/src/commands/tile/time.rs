@@ -1,6 +1,7 @@
 //! How long a build takes, in words.
 
-use lamp_postprocess::machine::{BuildTime, Machine};
+use lamp_build::BuildTime;
+use lamp_machine::Machine;
 
 use lamp_pipeline::heights::time_text;
 

@@ -5,7 +5,7 @@ use std::fmt;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, Command};
-use lamp_postprocess::{FreeTurns, Turns};
+use lamp_build::{FreeTurns, Turns};
 
 /// The turns that packing may use.
 #[derive(Clone, Copy, PartialEq)]

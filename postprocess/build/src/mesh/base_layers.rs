@@ -11,7 +11,7 @@ use super::BuildMesh;
 /// Base layers are as thick as the first layer and exposed as long. They lie below
 /// it, so that heights stay the parts'. A range of layers that does not begin at
 /// layer 0 gets no base, but counts with it: so ranges can be joined later.
-pub(in crate::tile) fn on_base<E>(
+pub(crate) fn on_base<E>(
     layers: impl Iterator<Item = Result<Made, E>>,
     mesh: Option<BuildMesh>,
 ) -> impl Iterator<Item = Result<Made, E>> {
@@ -48,7 +48,7 @@ pub(in crate::tile) fn on_base<E>(
 
 /// Returns the page of the layer with this index of a base of `count` layers below the parts' first.
 /// The first page describes the stack: now that is the base's first.
-pub(in crate::tile) fn base_page(first: &mut PageInfo, index: u32, count: u32) -> PageInfo {
+pub(crate) fn base_page(first: &mut PageInfo, index: u32, count: u32) -> PageInfo {
     let below = f64::from(count - index);
     let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - below * t);
     let mut stack = first.stack.take();

@@ -3,11 +3,11 @@
 /// The box of a part or of a line, from its first column and row up to but excluding
 /// its last ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::tile) struct Rect {
-    pub(in crate::tile) left: u32,
-    pub(in crate::tile) top: u32,
-    pub(in crate::tile) right: u32,
-    pub(in crate::tile) bottom: u32,
+pub(crate) struct Rect {
+    pub(crate) left: u32,
+    pub(crate) top: u32,
+    pub(crate) right: u32,
+    pub(crate) bottom: u32,
 }
 
 impl Rect {
@@ -22,7 +22,7 @@ const MAX_LINES: u64 = 10_000;
 
 /// The break lines of a build.
 #[derive(Clone, Debug, Default)]
-pub(in crate::tile) struct BreakLines {
+pub(crate) struct BreakLines {
     /// Bands of equal rows: the row behind the last, and their transitions.
     bands: Vec<(u32, Vec<u32>)>,
 }
@@ -32,12 +32,7 @@ impl BreakLines {
     /// middle of each part's box and at every `pitch` from there, to the middle of the
     /// next part's box, whose outline they meet before, or to the build's edge. Lengths
     /// are in pixels. Returns `None` if there are too many.
-    pub(in crate::tile) fn new(
-        parts: &[Rect],
-        area: [u32; 2],
-        width: u32,
-        pitch: u32,
-    ) -> Option<Self> {
+    pub(crate) fn new(parts: &[Rect], area: [u32; 2], width: u32, pitch: u32) -> Option<Self> {
         let of_part = |part: &Rect| {
             let sides = [part.right - part.left, part.bottom - part.top];
             sides.map(|side| u64::from(side / pitch.max(width + 1)) + 1).iter().sum::<u64>()
@@ -53,7 +48,7 @@ impl BreakLines {
     }
 
     /// Returns the transitions of a row.
-    pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
+    pub(crate) fn row(&self, row: u32) -> &[u32] {
         let band = self.bands.partition_point(|band| band.0 <= row);
         self.bands.get(band).map_or(&[], |band| &band.1)
     }

@@ -10,7 +10,7 @@ use super::pieces::{Hanging, Holds, hanging};
 use super::{BuildMesh, Moat, cut};
 
 /// The mesh of the layer that was made last.
-pub(in crate::tile) struct KeptMesh {
+pub(crate) struct KeptMesh {
     /// What the moat of each part follows.
     followed: Vec<Mask>,
     /// The moat of each part in each way in which its copies lie, on an image that is larger than
@@ -28,7 +28,7 @@ pub(in crate::tile) struct KeptMesh {
 
 impl KeptMesh {
     /// Starts with a mesh around parts that are black.
-    pub(in crate::tile) fn new(mesh: &BuildMesh, layout: &Layout) -> Self {
+    pub(crate) fn new(mesh: &BuildMesh, layout: &Layout) -> Self {
         let black = |part: &super::PartStack| {
             let frame = part.frame();
             Mask::black(frame.width, frame.height)
@@ -53,7 +53,7 @@ impl KeptMesh {
 
     /// Returns the mesh around the parts' `images` in the next layer, or `None` if a moat has too
     /// many runs.
-    pub(in crate::tile) fn next(
+    pub(crate) fn next(
         &mut self,
         mesh: &BuildMesh,
         layout: &Layout,
@@ -75,7 +75,7 @@ impl KeptMesh {
 
     /// Returns the mesh of any layer, given what each part's moat follows in it and where pieces
     /// begin that are not small but hang on nothing; `None` if a moat has too many runs.
-    pub(in crate::tile) fn at(
+    pub(crate) fn at(
         &mut self,
         mesh: &BuildMesh,
         layout: &Layout,
@@ -90,12 +90,12 @@ impl KeptMesh {
     }
 
     /// Returns where pieces of the layer's mesh begin that are not small, but hang on nothing.
-    pub(in crate::tile) fn loose(&self) -> &[[u32; 2]] {
+    pub(crate) fn loose(&self) -> &[[u32; 2]] {
         &self.loose
     }
 
     /// Returns how many pixels the mesh of the layer that was made last has.
-    pub(in crate::tile) fn pixels(&mut self) -> u64 {
+    pub(crate) fn pixels(&mut self) -> u64 {
         let Self { hanging, pixels, .. } = self;
         *pixels.get_or_insert_with(|| hanging.as_ref().map_or(0, MeshRows::white_pixels))
     }

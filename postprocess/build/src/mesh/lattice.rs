@@ -7,7 +7,7 @@ use super::CellShape;
 /// The walls of a mesh before moats and break lines. Lengths are in pixels, from the
 /// build's top left corner.
 #[derive(Clone, Debug)]
-pub(in crate::tile) enum Lattice {
+pub(crate) enum Lattice {
     /// Walls around cells.
     Cells(Cells),
     /// An image that is repeated.
@@ -16,7 +16,7 @@ pub(in crate::tile) enum Lattice {
 
 /// Holes between walls, in rows that repeat.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::tile) struct Cells {
+pub(crate) struct Cells {
     shape: CellShape,
     /// The distance between the centres of neighbouring holes.
     pitch: f64,
@@ -28,7 +28,7 @@ const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl Cells {
     /// Creates cells whose centres are `pitch` apart, with walls between them.
-    pub(in crate::tile) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
+    pub(crate) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
         Self { shape, pitch, reach: 0.5 * (pitch - wall) }
     }
 
@@ -84,7 +84,7 @@ impl Cells {
 
 impl Lattice {
     /// Replaces `out` by a row of walls, `width` columns wide.
-    pub(in crate::tile) fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
+    pub(crate) fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
         out.clear();
         match self {
             Self::Cells(cells) => cells.row(row, width, out),

@@ -15,7 +15,7 @@ const MIN_CELL_PIXELS: f64 = 4.0;
 /// 002 gives no measures for meshes: the defaults are ours.
 ///
 /// ```
-/// use lamp_postprocess::{CellShape, MeshOptions, MeshPattern};
+/// use lamp_build::{CellShape, MeshOptions, MeshPattern};
 /// use lamp_stack::Length;
 ///
 /// let options = MeshOptions {

@@ -5,13 +5,13 @@ use std::sync::Arc;
 /// The transitions of each row of a mesh: an even number, as no wall reaches the last column. Copies
 /// share rows that are not changed.
 #[derive(Clone, Debug, Default)]
-pub(in crate::tile) struct MeshRows {
+pub(crate) struct MeshRows {
     rows: Arc<Vec<Arc<[u32]>>>,
 }
 
 impl MeshRows {
     /// Returns a row's transitions.
-    pub(in crate::tile) fn row(&self, row: u32) -> &[u32] {
+    pub(crate) fn row(&self, row: u32) -> &[u32] {
         &self.rows[row as usize]
     }
 
@@ -21,12 +21,12 @@ impl MeshRows {
     }
 
     /// Returns the number of transitions in all rows.
-    pub(in crate::tile) fn change_count(&self) -> usize {
+    pub(crate) fn change_count(&self) -> usize {
         self.rows.iter().map(|row| row.len()).sum()
     }
 
     /// Returns whether nothing is white.
-    pub(in crate::tile) fn is_black(&self) -> bool {
+    pub(crate) fn is_black(&self) -> bool {
         self.rows.iter().all(|row| row.is_empty())
     }
 

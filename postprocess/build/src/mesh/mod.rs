@@ -23,7 +23,7 @@ use lamp_stack::{Frame, Length, Mask, MaskBuilder, Op, white_runs};
 use self::break_lines::{BreakLines, Rect};
 use self::lattice::{Lattice, toggle};
 use super::{Layout, PartStack, PixelSize, TileError};
-use crate::offset::{offset_one_bit, without_holes};
+use lamp_offset::{offset_one_bit, without_holes};
 
 pub(super) use base_layers::{base_page, on_base};
 pub(super) use kept::KeptMesh;

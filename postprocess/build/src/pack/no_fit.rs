@@ -11,7 +11,7 @@ use lamp_stack::{Frame, Mask, Orientation, white_runs};
 
 use super::super::{Layout, PixelSize};
 use super::{PackBy, Way};
-use crate::offset::{join_runs, offset_one_bit};
+use lamp_offset::{join_runs, offset_one_bit};
 
 /// The columns from the first up to but excluding the second.
 pub(super) type CellRun = (i32, i32);

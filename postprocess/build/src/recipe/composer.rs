@@ -11,7 +11,8 @@ use lamp_stack::{Image, Layer, Mask, MemorySize, PageInfo, StackInfo, map_in_ord
 use super::super::lockstep::LayerSet;
 use super::super::mesh::{BuildMesh, KeptMesh, MeshRows, base_page};
 use super::super::part_stack::white_of;
-use super::super::{CopyPlacement, Layout, MeshedStep, Moat, PartStack, TileError};
+use super::super::tile::MeshedStep;
+use super::super::{CopyPlacement, Layout, Moat, PartStack, TileError};
 use super::part_file::PartFile;
 use super::rising::{Rising, RisingError};
 use super::schedule::{Scheduled, schedule};

@@ -34,9 +34,9 @@ const SCHEMA: &str = "lamp-recipe-1";
 /// All that decides the pages of a build but its parts' stacks.
 ///
 /// ```
-/// use lamp_postprocess::{
-///     Composer, HeightOptions, Layout, MeshOptions, Pack, PartStack, Recipe, RecipeError, RecipePart,
-///     TileError,
+/// use lamp_build::{
+///     Composer, HeightOptions, Layout, MeshOptions, Pack, PartStack, Recipe, RecipeError,
+///     RecipePart, TileError,
 /// };
 /// use lamp_stack::{
 ///     Destination, Dpi, Format, IndexedStack, Layer, Mask, PageInfo, StackError, digest_of,

@@ -29,7 +29,8 @@ use lamp_stack::{Frame, Image, Layer, LayerImage, PageInfo};
 use serde_json::json;
 use thiserror::Error;
 
-use crate::edit::{ImageBounds, frame_page};
+use crate::image_bounds::ImageBounds;
+use crate::page_frame::frame_page;
 
 use index::INDEX;
 
@@ -47,7 +48,7 @@ pub use write::StripWriter;
 /// The swaths that build layers are cut into, from the left.
 ///
 /// ```
-/// use lamp_postprocess::Swaths;
+/// use lamp_build::Swaths;
 /// use lamp_stack::{Image, Mask};
 ///
 /// let swaths = Swaths::new(10, 4, 22)?;

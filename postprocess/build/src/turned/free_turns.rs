@@ -10,11 +10,11 @@ use thiserror::Error;
 /// Images turn by right angles, so a part is sliced once for each angle below that.
 ///
 /// ```
-/// use lamp_postprocess::FreeTurns;
+/// use lamp_build::FreeTurns;
 ///
 /// let turns: FreeTurns = "15deg".parse()?;
 /// assert_eq!(turns.degrees(), [15.0, 30.0, 45.0, 60.0, 75.0]);
-/// # Ok::<(), lamp_postprocess::FreeTurnsError>(())
+/// # Ok::<(), lamp_build::FreeTurnsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeTurns {

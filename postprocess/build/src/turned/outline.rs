@@ -2,7 +2,7 @@
 
 use lamp_stack::{Mask, MaskBuilder, white_runs};
 
-use crate::offset::join_runs;
+use lamp_offset::join_runs;
 
 /// How far, in pixels, what is white may reach beyond the pixels of an outline: a section that is
 /// sliced at another angle has its pixels' centres elsewhere.

@@ -4,7 +4,7 @@ use lamp_stack::{Dpi, Frame, Image, Layer, Mask, MaskBuilder, Op, PageInfo};
 use super::super::testing::mask_of;
 use super::super::{PackBy, Turns};
 use super::*;
-use crate::offset::offset_one_bit;
+use lamp_offset::offset_one_bit;
 
 /// Half a millimetre.
 const DPI: f64 = 50.8;

@@ -6,7 +6,7 @@ mod words;
 use std::ffi::OsString;
 
 use clap::CommandFactory;
-use lamp_postprocess::{FreeTurns, Pack, PackBy, PartStack, PlannedStack, TurnedPlan};
+use lamp_build::{FreeTurns, Pack, PackBy, PartStack, PlannedStack, TurnedPlan};
 use lamp_stack::{Length, file_word, quoted};
 
 use super::TileArgs;

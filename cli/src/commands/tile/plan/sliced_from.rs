@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use lamp_postprocess::{PartStack, TurnedSlicing};
+use lamp_build::{PartStack, TurnedSlicing};
 use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
 use super::super::stacks::{InputStack, ReadLayers};
