@@ -2,8 +2,7 @@
 
 use std::cell::RefCell;
 
-use lamp_build::BuildTime;
-use lamp_build::PixelSize;
+use lamp_build::{BuildTime, PixelSize};
 use lamp_machine::Machine;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
 use lamp_supports::{CheckError, Findings};

@@ -1,7 +1,6 @@
 //! What a build is made of, and the report of it.
 
-use lamp_build::BuildTime;
-use lamp_build::{CopyEntry, CuredPixels, LayerAreas, Layout};
+use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_machine::Machine;
 use lamp_stack::Dpi;
 use serde_json::{Value, json};
