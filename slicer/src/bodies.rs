@@ -5,8 +5,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::fill::Fill;
 use crate::placement::Placement;
-use crate::table::Fill;
 
 /// How the bodies of one file join under [`Fill::EvenOdd`]: those of a STEP file, or the items of a
 /// 3MF.

@@ -14,8 +14,9 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use crate::facet::Facet;
+use crate::facet::{PlacedFacet, facet_heights};
 use crate::part_file::for_each_record;
-use crate::placement::{PlacedFacet, PlacedPart, facet_heights};
+use crate::placed_part::PlacedPart;
 use crate::planes::Planes;
 use crate::table::FacetSource;
 

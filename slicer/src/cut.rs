@@ -19,9 +19,9 @@ use std::ops::Range;
 
 use crate::bodies::{FillRule, Turn};
 use crate::closure::EndSum;
+use crate::facet::{PlacedFacet, facet_heights};
 use crate::gray::{DepthSpan, Sheet};
 use crate::grid::PixelGrid;
-use crate::placement::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
 

@@ -50,3 +50,31 @@ impl Units {
         }
     }
 }
+
+/// A facet in its place: x and y in millimetres, z in micrometres.
+pub type PlacedFacet = [[f64; 3]; 3];
+
+/// Returns the lowest and the highest z of a facet.
+#[inline]
+pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
+    let [a, b, c] = facet.map(|corner| corner[2]);
+    (lesser(lesser(a, b), c), greater(greater(a, b), c))
+}
+
+/// Returns the lesser of two numbers. `f64::min` looks for those that are none, and takes several
+/// times as long.
+#[inline]
+pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// Returns the greater of two numbers.
+#[inline]
+pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
+}
+
+/// Rounds corners to 32 bits, as STL has them.
+pub(crate) fn rounded(corners: [[f64; 3]; 3]) -> Facet {
+    corners.map(|corner| corner.map(|c| c as f32))
+}

@@ -7,10 +7,12 @@ use lamp_stack::{Grouped, KeyCounts};
 use crate::bodies::FillRule;
 use crate::error::SliceError;
 use crate::facet::{Facet, Units};
+use crate::facet::{PlacedFacet, facet_heights};
+use crate::fill::Fill;
 use crate::part::Part;
-use crate::placement::{PlacedFacet, PlacedPart, Placement, facet_heights};
+use crate::placed_part::PlacedPart;
+use crate::placement::Placement;
 use crate::survey::Survey;
-use crate::table::Fill;
 
 /// A part in its place, whose facets between two heights are found without looking at
 /// the others. It takes about 49 bytes a facet.

@@ -5,8 +5,8 @@ use std::io;
 use std::sync::Mutex;
 
 use crate::facet::Facet;
+use crate::facet::{greater, lesser};
 use crate::part::BLOCK_FACETS;
-use crate::placement::{greater, lesser};
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
 
 /// What a survey asks of a block of facets, in file units.

@@ -9,13 +9,13 @@ use lamp_stack::{digest_of, digest_of_digests};
 
 use crate::bodies::{Bodies, BodyRule, FillRule, Join, Role};
 use crate::error::SliceError;
-use crate::facet::{Facet, Units};
+use crate::facet::{Facet, Units, rounded};
 use crate::file_blocks::FileBlock;
+use crate::fill::Fill;
 use crate::part_file::PartFile;
 use crate::placement::Placement;
 use crate::read_note::ReadNote;
 use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
-use crate::table::Fill;
 
 /// The facets of a block, in which they are read: 200 kB of a binary file.
 pub(crate) const BLOCK_FACETS: usize = 4096;
@@ -374,9 +374,4 @@ impl Part {
         let (piece, facets) = self.place_of(block);
         self.pieces[piece].for_each(facets, each)
     }
-}
-
-/// Rounds corners to 32 bits, as STL has them.
-pub(crate) fn rounded(corners: [[f64; 3]; 3]) -> Facet {
-    corners.map(|corner| corner.map(|c| c as f32))
 }

@@ -3,14 +3,7 @@
 //! Each corner is placed by itself, in 64 bits. Corners that are equal in the file
 //! stay equal, so a closed mesh stays closed however it is turned.
 
-use std::io;
-
-use lamp_brep::Prepared;
-
-use crate::exact::PlacedSurfaces;
-use crate::facet::{Facet, Units};
-use crate::file_blocks::FileBlock;
-use crate::part::{Part, Piece};
+use crate::facet::Units;
 
 /// An axis of part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,8 +97,13 @@ impl Placement {
         Self { rows }
     }
 
+    /// Returns the coefficients of x, y, z and 1 mm for each coordinate in place.
+    pub(crate) fn rows(&self) -> [[f64; 4]; 3] {
+        self.rows
+    }
+
     /// Returns the coefficients for points in a unit.
-    fn rows_of(&self, units: Units) -> [[f64; 4]; 3] {
+    pub(crate) fn rows_of(&self, units: Units) -> [[f64; 4]; 3] {
         let unit = units.mm();
         self.rows.map(|[x, y, z, shift]| [x * unit, y * unit, z * unit, shift])
     }
@@ -123,179 +121,10 @@ impl Placement {
     }
 }
 
+/// Returns the sum of coefficients times x, y, z and 1.
 #[inline]
-fn affine(row: &[f64; 4], [x, y, z]: [f64; 3]) -> f64 {
+pub(crate) fn affine(row: &[f64; 4], [x, y, z]: [f64; 3]) -> f64 {
     row[0] * x + row[1] * y + row[2] * z + row[3]
-}
-
-#[inline]
-fn scaled(scale: &[f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [x * scale[0], y * scale[1], z * scale[2]]
-}
-
-/// A facet in its place: x and y in millimetres, z in micrometres.
-pub type PlacedFacet = [[f64; 3]; 3];
-
-/// Returns the lowest and the highest z of a facet.
-#[inline]
-pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
-    let [a, b, c] = facet.map(|corner| corner[2]);
-    (lesser(lesser(a, b), c), greater(greater(a, b), c))
-}
-
-/// Returns the lesser of two numbers. `f64::min` looks for those that are none, and takes several
-/// times as long.
-#[inline]
-pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
-    if a < b { a } else { b }
-}
-
-/// Returns the greater of two numbers.
-#[inline]
-pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
-    if a > b { a } else { b }
-}
-
-/// A part in its place.
-#[derive(Debug)]
-pub(crate) struct PlacedPart {
-    pub(crate) model: Part,
-    /// Those of the pieces, each once.
-    transforms: Vec<Transform>,
-    /// The exact surfaces of each file that has some.
-    surfaces: Vec<PlacedSurfaces>,
-    pieces: Vec<PlacedPiece>,
-}
-
-/// A piece of a part in its place.
-#[derive(Debug)]
-struct PlacedPiece {
-    /// Its number among the transforms.
-    transform: usize,
-    /// The number of its file's surfaces, if it has some.
-    surfaces: Option<usize>,
-}
-
-/// The transform from file units to the place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Transform {
-    /// Scales the axes. Most parts stay where they are, and need no more.
-    Scale([f64; 3]),
-    Affine([[f64; 4]; 3]),
-}
-
-impl Transform {
-    pub(crate) fn new(placement: &Placement, units: Units) -> Self {
-        let mut rows = placement.rows;
-        // Straight to micrometres: z in file units times them is exact.
-        for (row, (unit, per_mm)) in
-            rows.iter_mut().zip([(units.mm(), 1.0), (units.mm(), 1.0), (units.um(), 1000.0)])
-        {
-            let [x, y, z, shift] = *row;
-            *row = [x * unit, y * unit, z * unit, shift * per_mm];
-        }
-        let is_scale = (0..12).all(|k| k % 4 == k / 4 || rows[k / 4][k % 4] == 0.0);
-        match is_scale {
-            true => Self::Scale(std::array::from_fn(|axis| rows[axis][axis])),
-            false => Self::Affine(rows),
-        }
-    }
-
-    /// Places a facet.
-    #[inline]
-    pub(crate) fn placed(&self, facet: &Facet) -> PlacedFacet {
-        match self {
-            Self::Scale(scale) => placed(facet, |corner| scaled(scale, corner)),
-            Self::Affine(rows) => placed(facet, |corner| rows.map(|row| affine(&row, corner))),
-        }
-    }
-}
-
-impl PlacedPart {
-    /// Places a part. Files that state no unit are in `units`.
-    pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
-        let (mut transforms, mut surfaces) = (Vec::new(), Vec::new());
-        let mut file_before = None;
-        let mut place = |(body, piece): (u32, &Piece)| {
-            let units = piece.units.unwrap_or(units);
-            let from_corner =
-                Placement::default().translated(piece.offset.map(|offset| offset * units.mm()));
-            let placement = from_corner.then(&piece.placement).then(placement);
-            let transform = Transform::new(&placement, units);
-            // Pieces that stand alike follow each other.
-            if transforms.last() != Some(&transform) {
-                transforms.push(transform);
-            }
-            let is_of_next_file = file_before.replace(piece.file) != Some(piece.file);
-            if let Some(prepared) = piece.surfaces().filter(|_| is_of_next_file) {
-                let Prepared { kernel, mesh, .. } = &**prepared;
-                let rows = placement.rows_of(units);
-                let placed = PlacedSurfaces::new(kernel.clone(), mesh.clone(), rows);
-                surfaces.push(placed.numbered_from(body));
-            }
-            let surfaces = piece.surfaces().map(|_| surfaces.len() - 1);
-            PlacedPiece { transform: transforms.len() - 1, surfaces }
-        };
-        let pieces = (0..).zip(model.pieces()).map(&mut place).collect();
-        Self { model, transforms, surfaces, pieces }
-    }
-
-    /// Drops the surfaces, so that only facets are left.
-    pub(crate) fn on_facets(mut self) -> Self {
-        self.pieces.iter_mut().for_each(|piece| piece.surfaces = None);
-        self.surfaces.clear();
-        self
-    }
-
-    /// Returns the surfaces of all files.
-    pub(crate) fn surfaces(&self) -> &[PlacedSurfaces] {
-        &self.surfaces
-    }
-
-    /// Returns the surfaces of a block's piece, if it has some, and the number there of
-    /// the block's first facet.
-    pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
-        let (piece, facets) = self.model.place_of(block);
-        let surfaces = &self.surfaces[self.pieces[piece].surfaces?];
-        let first = self.model.pieces()[piece].first_facet + facets.start;
-        Some((surfaces, first as u32))
-    }
-
-    /// Returns what was seen of a block when its file was opened, and the scales of its axes from
-    /// file units to the place; none unless that is all that places it.
-    pub(crate) fn seen_block(&self, block: usize) -> Option<(&FileBlock, [f64; 3])> {
-        let (piece, facets) = self.model.place_of(block);
-        let Transform::Scale(scale) = self.transform_of(piece) else { return None };
-        Some((self.model.pieces()[piece].facets.seen_block(facets.start)?, scale))
-    }
-
-    /// Calls `each` with every facet of a block.
-    pub(crate) fn for_each_in_block(
-        &self,
-        block: usize,
-        mut each: impl FnMut(&PlacedFacet),
-    ) -> io::Result<()> {
-        // Two loops, so that neither asks at every facet which one it is.
-        let (piece, _) = self.model.place_of(block);
-        match self.transform_of(piece) {
-            Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {
-                each(&placed(facet, |corner| scaled(&scale, corner)));
-            }),
-            Transform::Affine(rows) => self.model.for_each_in_block(block, |facet| {
-                each(&placed(facet, |corner| rows.map(|row| affine(&row, corner))));
-            }),
-        }
-    }
-
-    /// Returns the transform of a piece.
-    pub(crate) fn transform_of(&self, piece: usize) -> Transform {
-        self.transforms[self.pieces[piece].transform]
-    }
-}
-
-#[inline]
-fn placed(facet: &Facet, place: impl Fn([f64; 3]) -> [f64; 3]) -> PlacedFacet {
-    facet.map(|corner| place(corner.map(f64::from)))
 }
 
 #[cfg(test)]

@@ -7,12 +7,13 @@ use crate::bodies::{FillRule, Position, Turn};
 use crate::cut::Cutter;
 use crate::error::SliceError;
 use crate::facet::Units;
+use crate::fill::Fill;
 use crate::grid::PixelGrid;
 use crate::part::Part;
-use crate::placement::{PlacedPart, Placement};
+use crate::placed_part::PlacedPart;
+use crate::placement::Placement;
 use crate::planes::{PLANE_TOLERANCE, Planes};
 use crate::survey::Survey;
-use crate::table::Fill;
 
 /// Options of a single section.
 #[derive(Clone, Debug)]

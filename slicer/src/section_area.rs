@@ -147,9 +147,9 @@ mod tests {
 
     use super::*;
     use crate::facet::Units;
+    use crate::fill::Fill;
     use crate::placement::Placement;
     use crate::section::section;
-    use crate::table::Fill;
 
     fn options(z_mm: f64, fill: Fill) -> SectionOptions {
         SectionOptions {

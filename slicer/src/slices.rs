@@ -14,14 +14,17 @@ use crate::buckets::Buckets;
 use crate::cut::{Crossing, Cutter};
 use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
+use crate::facet::PlacedFacet;
 use crate::facet::Units;
+use crate::fill::Fill;
 use crate::gray::{Columns, DepthRows, DepthSpan, LayerLevels, PrintThrough};
 use crate::grid::PixelGrid;
 use crate::part::Part;
-use crate::placement::{PlacedFacet, PlacedPart, Placement};
+use crate::placed_part::PlacedPart;
+use crate::placement::Placement;
 use crate::planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{CutImage, CutLayer, FacetSource, Fill, OpenRows, Shading, Table, open_rows};
+use crate::table::{CutImage, CutLayer, FacetSource, OpenRows, Shading, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
 /// Options of slicing.

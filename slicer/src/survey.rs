@@ -9,9 +9,10 @@ use rayon::prelude::*;
 
 use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
+use crate::facet::{PlacedFacet, greater, lesser};
 use crate::file_blocks::FileBlock;
 use crate::part::Piece;
-use crate::placement::{PlacedFacet, PlacedPart, greater, lesser};
+use crate::placed_part::PlacedPart;
 use crate::planes::Planes;
 use crate::wild;
 

@@ -15,43 +15,11 @@ use crate::bodies::{LayerDoubts, Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
 use crate::cut::{BodyCrossing, Crossing, Cutter, LayerShare, RowCrossing, RowSegment};
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
+use crate::facet::PlacedFacet;
+use crate::fill::Fill;
 use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
-use crate::placement::PlacedFacet;
-
-/// The rule that decides what is inside a body.
-///
-/// ```
-/// use lamp_slicer::Fill;
-///
-/// // Where two shells overlap, contours wind around a point twice.
-/// assert!(Fill::Solid.is_inside(2) && !Fill::EvenOdd.is_inside(2));
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Fill {
-    /// Pixels that contours wind around are white. The facets' orientation gives the sign, so
-    /// shells that overlap unite, and those that face inwards are voids. A row whose signs do
-    /// not add up is filled by even-odd.
-    #[default]
-    Solid,
-    /// Every crossing toggles the color, as in 002 section 2.3.4. Shells and files that overlap
-    /// cut each other.
-    EvenOdd,
-}
-
-lamp_stack::named!(Fill { Solid = "solid" | "nonzero" | "non-zero", EvenOdd = "even-odd" });
-
-impl Fill {
-    /// Returns true if a point with this winding number is inside.
-    #[inline]
-    pub fn is_inside(self, winding: i32) -> bool {
-        match self {
-            Self::Solid => winding != 0,
-            Self::EvenOdd => winding % 2 != 0,
-        }
-    }
-}
 
 /// Facets in pieces, which threads take one after another.
 pub(crate) trait FacetSource: Sync {

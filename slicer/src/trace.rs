@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use crate::cut::{Cutter, SegmentEnd};
 use crate::facet::Facet;
 use crate::part::Piece;
-use crate::placement::PlacedPart;
+use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 
 /// Neighbouring rows of a layer that do not balance.

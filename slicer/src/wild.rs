@@ -20,7 +20,8 @@ use rayon::prelude::*;
 
 use crate::error::SliceError;
 use crate::facet::Facet;
-use crate::placement::{PlacedFacet, PlacedPart};
+use crate::facet::PlacedFacet;
+use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 
 /// How far outside the rest a vertex is damaged, and that in a part larger than any

@@ -8,7 +8,7 @@ use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
 use super::tally::Tally;
 use crate::cut::{Crossing, Cutter, LayerShare};
-use crate::placement::PlacedFacet;
+use crate::facet::PlacedFacet;
 
 /// The number of crossings polished at once: enough to amortise each call; 0.5 MB.
 const BATCH: usize = 4096;

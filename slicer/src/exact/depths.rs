@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
 use crate::cut::{Crossing, Cutter, LayerShare};
+use crate::facet::PlacedFacet;
 use crate::gray::{DepthSpan, Sheet};
-use crate::placement::PlacedFacet;
 
 /// The number of pixels evaluated at once: enough to amortise each call; 0.3 MB.
 const BATCH: usize = 4096;

@@ -8,7 +8,7 @@ use lamp_stack::Grouped;
 use rayon::prelude::*;
 
 use super::placed::PlacedSurfaces;
-use crate::placement::PlacedFacet;
+use crate::facet::PlacedFacet;
 
 /// The curved edges of a part.
 #[derive(Debug)]

@@ -36,7 +36,7 @@ pub use tally::Polished;
 pub(crate) use tally::Tally;
 
 use crate::cut::{Cutter, LayerShare};
-use crate::placement::PlacedFacet;
+use crate::facet::PlacedFacet;
 
 /// A worker that turns consecutive facets of a B-rep model into its share of the table.
 pub(crate) struct ExactCut<'a> {

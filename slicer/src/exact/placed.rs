@@ -12,9 +12,11 @@ use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
 use super::rims::Rims;
 use crate::cut::Cutter;
+use crate::facet::PlacedFacet;
 use crate::facet::Units;
-use crate::part::rounded;
-use crate::placement::{PlacedFacet, Placement, Transform};
+use crate::facet::rounded;
+use crate::placement::Placement;
+use crate::transform::Transform;
 
 /// A model's surfaces and facets, scaled, rotated and moved into place.
 pub struct PlacedSurfaces {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::stretch::{Looks, RowStretch};
 use crate::cut::Cutter;
-use crate::placement::{PlacedFacet, facet_heights};
+use crate::facet::{PlacedFacet, facet_heights};
 use crate::planes::Planes;
 use crate::scan::RowFacet;
 

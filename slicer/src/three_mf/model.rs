@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use quick_xml::events::BytesStart;
 
-use super::ModelFault;
+use super::error::ModelFault;
 use super::project::{Project, Volume, VolumeKind};
 use super::slices::{SliceReader, SliceStack};
 use super::xml::{

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
 use zip::ZipArchive;
 
-use super::ThreeMfError;
+use super::error::ThreeMfError;
 use super::xml::{BoundedText, Xml, attribute, for_each_piece};
 use crate::part_file::{FileReader, PartFile};
 use crate::unpack::most_unpacked;

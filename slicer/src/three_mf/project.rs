@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use quick_xml::events::BytesStart;
 
-use super::ModelFault;
+use super::error::ModelFault;
 use super::xml::{BoundedText, Located, Xml, attribute, for_each_piece, number};
 
 /// The ends of the names of files that list the kinds of volumes: `Slic3r_PE_model.config` of

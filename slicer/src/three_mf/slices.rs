@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use quick_xml::events::BytesStart;
 
-use super::ModelFault;
+use super::error::ModelFault;
 use super::xml::{attribute, number, numbers};
 use crate::decimal_mesh::DecimalMesh;
 

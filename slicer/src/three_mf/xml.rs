@@ -7,7 +7,7 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::name::{NamespaceResolver, QName, ResolveResult};
 use quick_xml::{Reader, XmlVersion};
 
-use super::ModelFault;
+use super::error::ModelFault;
 
 /// The longest tag, comment or text in XML.
 const MAX_XML_BYTES: usize = 4 << 20;

@@ -7,7 +7,8 @@ use lamp_stack::{Dpi, Length};
 
 use crate::bodies::Role;
 use crate::error::SliceError;
-use crate::part::{Facets, Part, Piece, rounded};
+use crate::facet::rounded;
+use crate::part::{Facets, Part, Piece};
 use crate::slices::{SliceOptions, Slices};
 use crate::topology::{CornerTable, MeshCheck, Shells};
 

@@ -5,9 +5,11 @@ use std::hash::BuildHasher;
 use hashbrown::{DefaultHashBuilder, HashTable};
 
 use crate::error::SliceError;
+use crate::facet::rounded;
 use crate::facet::{Facet, Units};
-use crate::part::{Part, rounded};
-use crate::placement::{PlacedPart, Placement};
+use crate::part::Part;
+use crate::placed_part::PlacedPart;
+use crate::placement::Placement;
 use crate::topology::CornerTable;
 use crate::topology::corner_table::NONE;
 

@@ -1,0 +1,34 @@
+//! The rule that tells inside from outside of a body.
+
+/// The rule that decides what is inside a body.
+///
+/// ```
+/// use lamp_slicer::Fill;
+///
+/// // Where two shells overlap, contours wind around a point twice.
+/// assert!(Fill::Solid.is_inside(2) && !Fill::EvenOdd.is_inside(2));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fill {
+    /// Pixels that contours wind around are white. The facets' orientation gives the sign, so
+    /// shells that overlap unite, and those that face inwards are voids. A row whose signs do
+    /// not add up is filled by even-odd.
+    #[default]
+    Solid,
+    /// Every crossing toggles the color, as in 002 section 2.3.4. Shells and files that overlap
+    /// cut each other.
+    EvenOdd,
+}
+
+lamp_stack::named!(Fill { Solid = "solid" | "nonzero" | "non-zero", EvenOdd = "even-odd" });
+
+impl Fill {
+    /// Returns true if a point with this winding number is inside.
+    #[inline]
+    pub fn is_inside(self, winding: i32) -> bool {
+        match self {
+            Self::Solid => winding != 0,
+            Self::EvenOdd => winding % 2 != 0,
+        }
+    }
+}
