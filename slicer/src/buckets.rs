@@ -13,8 +13,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use crate::facet::Facet;
-use crate::facet::{PlacedFacet, facet_heights};
+use crate::facet::{Facet, PlacedFacet, facet_heights};
 use crate::part_file::for_each_record;
 use crate::placed_part::PlacedPart;
 use crate::planes::Planes;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::facet::Facet;
-use crate::part::{Facets, Piece};
+use crate::piece::{Facets, Piece};
 
 /// A mesh lies far from the origin along an axis if its coordinates there are this many times as
 /// large as it is. Vertices of nearer ones are off by `size / 2^18` at most, 0.4 um of 100 mm.

@@ -6,8 +6,7 @@ use lamp_stack::{Grouped, KeyCounts};
 
 use crate::bodies::FillRule;
 use crate::error::SliceError;
-use crate::facet::{Facet, Units};
-use crate::facet::{PlacedFacet, facet_heights};
+use crate::facet::{Facet, PlacedFacet, Units, facet_heights};
 use crate::fill::Fill;
 use crate::part::Part;
 use crate::placed_part::PlacedPart;

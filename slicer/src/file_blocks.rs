@@ -4,10 +4,11 @@
 use std::io;
 use std::sync::Mutex;
 
-use crate::facet::Facet;
-use crate::facet::{greater, lesser};
-use crate::part::BLOCK_FACETS;
-use crate::stl::{FACET_BYTES, HEADER_BYTES, parse};
+use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
+use crate::facet::{Facet, greater, lesser};
+
+/// The facets of a block, in which they are read: 200 kB of a binary file.
+pub(crate) const BLOCK_FACETS: usize = 4096;
 
 /// What a survey asks of a block of facets, in file units.
 #[derive(Clone, Copy, Debug)]

@@ -39,6 +39,7 @@
 
 mod archive;
 mod ascii;
+mod binary_stl;
 mod bodies;
 mod buckets;
 mod closure;
@@ -58,6 +59,7 @@ mod obj;
 mod open;
 mod part;
 mod part_file;
+mod piece;
 mod placed_part;
 mod placement;
 mod planes;

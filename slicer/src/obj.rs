@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use crate::decimal_mesh::DecimalMesh;
 use crate::error::{ObjFault, SliceError};
 use crate::number::{NumberFault, Numbers};
-use crate::part::Piece;
+use crate::piece::Piece;
 use crate::read_note::ReadNote;
 use crate::words::Words;
 
@@ -235,7 +235,7 @@ fn vertex_number(corner: &[u8]) -> Option<i64> {
 mod tests {
     use super::*;
     use crate::facet::Facet;
-    use crate::part::Facets;
+    use crate::piece::Facets;
 
     const TETRA: &str = "\
 # a tetrahedron

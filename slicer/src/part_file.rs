@@ -13,9 +13,9 @@ use std::time::{Duration, SystemTime};
 
 use lamp_stack::digest_of_range;
 
+use crate::binary_stl::{HEADER_BYTES, binary_facets};
 use crate::error::FileChange;
 use crate::file_blocks::{FileBlock, FileLooks};
-use crate::stl::{HEADER_BYTES, binary_facets};
 
 /// The bytes that are read at once: few enough to stay in a processor's cache.
 const READ_BYTES: usize = 1 << 15;

@@ -7,7 +7,8 @@ use lamp_brep::Prepared;
 use crate::exact::PlacedSurfaces;
 use crate::facet::{PlacedFacet, Units};
 use crate::file_blocks::FileBlock;
-use crate::part::{Part, Piece};
+use crate::part::Part;
+use crate::piece::Piece;
 use crate::placement::{Placement, affine};
 use crate::transform::{Transform, placed, scaled};
 

@@ -6,16 +6,13 @@ use std::sync::Arc;
 
 use stl_io::{Normal, Triangle, Vertex};
 
+use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, binary_facets, declared_count, parse};
 use crate::error::SliceError;
 use crate::facet::Facet;
-use crate::part::{Facets, Part};
+use crate::part::Part;
 use crate::part_file::PartFile;
+use crate::piece::Facets;
 use crate::read_note::ReadNote;
-
-/// Header and count of a binary STL.
-pub(crate) const HEADER_BYTES: u64 = 84;
-/// A facet of a binary STL: normal, three corners, attributes.
-pub(crate) const FACET_BYTES: usize = 50;
 
 /// The facets at a file's start that say whether it is a binary STL.
 const FIRST_FACETS: u64 = 64;
@@ -140,29 +137,6 @@ fn is_facet(record: &[u8; FACET_BYTES]) -> bool {
         .map(|at| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]));
     let length = normal.iter().map(|n| n * n).sum::<f32>().sqrt();
     is_plausible(record) && (a != b || b != c) && (length < 0.01 || (length - 1.0).abs() < 0.01)
-}
-
-/// Returns the number of facets that a binary file says to have.
-fn declared_count(start: &[u8]) -> Option<u32> {
-    start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()))
-}
-
-/// Returns the number of facets of a binary file that starts with these bytes, if its size is that
-/// of one.
-pub(crate) fn binary_facets(size: u64, start: &[u8]) -> Option<usize> {
-    let count = declared_count(start)?;
-    let is_size = HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size;
-    is_size.then_some(count as usize)
-}
-
-/// Returns the corners of a binary facet.
-#[inline]
-pub(crate) fn parse(record: &[u8; FACET_BYTES]) -> Facet {
-    let number = |at: usize| {
-        f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
-    };
-    let corner = |at| [number(at), number(at + 4), number(at + 8)];
-    [corner(12), corner(24), corner(36)]
 }
 
 impl Part {

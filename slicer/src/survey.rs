@@ -11,7 +11,7 @@ use crate::error::SliceError;
 use crate::exact::PlacedSurfaces;
 use crate::facet::{PlacedFacet, greater, lesser};
 use crate::file_blocks::FileBlock;
-use crate::part::Piece;
+use crate::piece::Piece;
 use crate::placed_part::PlacedPart;
 use crate::planes::Planes;
 use crate::wild;

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::cut::{Cutter, SegmentEnd};
 use crate::facet::Facet;
-use crate::part::Piece;
+use crate::piece::Piece;
 use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 

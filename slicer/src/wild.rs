@@ -19,8 +19,7 @@ use std::io;
 use rayon::prelude::*;
 
 use crate::error::SliceError;
-use crate::facet::Facet;
-use crate::facet::PlacedFacet;
+use crate::facet::{Facet, PlacedFacet};
 use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 

@@ -12,9 +12,7 @@ use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
 use super::rims::Rims;
 use crate::cut::Cutter;
-use crate::facet::PlacedFacet;
-use crate::facet::Units;
-use crate::facet::rounded;
+use crate::facet::{PlacedFacet, Units, rounded};
 use crate::placement::Placement;
 use crate::transform::Transform;
 

@@ -17,8 +17,8 @@ mod xml;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::bodies::Role;
-use crate::part::{Facets, Piece};
 use crate::part_file::PartFile;
+use crate::piece::{Facets, Piece};
 use crate::placement::Placement;
 use crate::read_note::ReadNote;
 use error::MAX_VISITS;

@@ -15,7 +15,7 @@ use super::xml::{
 };
 use crate::decimal_mesh::DecimalMesh;
 use crate::facet::Units;
-use crate::part::{Facets, Piece};
+use crate::piece::{Facets, Piece};
 use crate::placement::Placement;
 
 /// The effect of an extension of 3MF on the objects that use it.

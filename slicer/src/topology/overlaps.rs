@@ -8,7 +8,8 @@ use lamp_stack::{Dpi, Length};
 use crate::bodies::Role;
 use crate::error::SliceError;
 use crate::facet::rounded;
-use crate::part::{Facets, Part, Piece};
+use crate::part::Part;
+use crate::piece::{Facets, Piece};
 use crate::slices::{SliceOptions, Slices};
 use crate::topology::{CornerTable, MeshCheck, Shells};
 

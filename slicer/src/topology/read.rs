@@ -5,8 +5,7 @@ use std::hash::BuildHasher;
 use hashbrown::{DefaultHashBuilder, HashTable};
 
 use crate::error::SliceError;
-use crate::facet::rounded;
-use crate::facet::{Facet, Units};
+use crate::facet::{Facet, Units, rounded};
 use crate::part::Part;
 use crate::placed_part::PlacedPart;
 use crate::placement::Placement;

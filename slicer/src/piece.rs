@@ -1,0 +1,165 @@
+//! Facets of a file that stand alike: those of an item or a body.
+
+use std::io;
+use std::ops::Range;
+use std::sync::Arc;
+
+use lamp_brep::Prepared;
+
+use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
+use crate::bodies::{BodyRule, Join, Role};
+use crate::facet::{Facet, Units, rounded};
+use crate::file_blocks::{BLOCK_FACETS, FileBlock};
+use crate::part_file::PartFile;
+use crate::placement::Placement;
+
+/// Facets of surfaces are fewer and cost more, and all threads should have some.
+const BLOCK_SURFACE_FACETS: usize = 128;
+
+/// The facets of a file that stand alike: all, or those of one of its items or bodies.
+#[derive(Clone, Debug)]
+pub(crate) struct Piece {
+    pub(crate) facets: Facets,
+    /// The file, from 0, among those joined.
+    pub(crate) file: usize,
+    /// The number in the file of its first facet.
+    pub(crate) first_facet: usize,
+    /// The unit that the file states, if it does.
+    pub(crate) units: Option<Units>,
+    /// The point, in units of the file, that its facets are relative to. It is the origin, except
+    /// where a mesh is so far away that 32 bits would move its corners.
+    pub(crate) offset: [f64; 3],
+    /// How it stands among the other pieces.
+    pub(crate) placement: Placement,
+    /// The number in the file of the object whose volume it adds to or takes from.
+    pub(crate) object: usize,
+    pub(crate) role: Role,
+    /// How its file joins the others.
+    pub(crate) join: Join,
+}
+
+impl Piece {
+    pub(crate) fn new(facets: Facets) -> Self {
+        let placement = Placement::default();
+        Self {
+            facets,
+            file: 0,
+            first_facet: 0,
+            units: None,
+            offset: [0.0; 3],
+            placement,
+            object: 0,
+            role: Role::default(),
+            join: Join::default(),
+        }
+    }
+
+    /// Returns how it counts.
+    pub(crate) fn rule(&self) -> BodyRule {
+        let Self { file, object, role, join, .. } = *self;
+        BodyRule { file, object, role, join }
+    }
+
+    /// Returns true if the facets are read again from their file whenever they are needed.
+    pub(crate) fn is_in_file(&self) -> bool {
+        matches!(self.facets, Facets::Binary { .. })
+    }
+
+    /// Creates the pieces of a STEP file: its bodies.
+    pub(crate) fn of_bodies(prepared: Prepared) -> Vec<Self> {
+        let prepared = Arc::new(prepared);
+        let piece = |facets: Range<usize>| Self {
+            first_facet: facets.start,
+            units: Some(Units::Millimetres),
+            ..Self::new(Facets::Surfaces { prepared: prepared.clone(), facets })
+        };
+        let before = |face| prepared.mesh.facets.partition_point(|facet| facet.face < face);
+        let bodies = prepared.kernel.bodies().iter();
+        bodies.map(|body| piece(before(body.faces.start)..before(body.faces.end))).collect()
+    }
+
+    /// Returns the exact surfaces below the facets, if there are some. Bodies of one file
+    /// share them.
+    pub(crate) fn surfaces(&self) -> Option<&Arc<Prepared>> {
+        match &self.facets {
+            Facets::Surfaces { prepared, .. } => Some(prepared),
+            _ => None,
+        }
+    }
+
+    /// Calls `each` with every facet of a range, counter-clockwise seen from outside
+    /// once it is in its place.
+    pub(crate) fn for_each(
+        &self,
+        range: Range<usize>,
+        mut each: impl FnMut(&Facet),
+    ) -> io::Result<()> {
+        if self.placement.is_mirror() {
+            self.facets.for_each(range, |&[a, b, c]| each(&[a, c, b]))
+        } else {
+            self.facets.for_each(range, each)
+        }
+    }
+}
+
+/// Facets in file units.
+#[derive(Clone, Debug)]
+pub(crate) enum Facets {
+    Binary {
+        file: Arc<PartFile>,
+        count: usize,
+    },
+    Memory(Arc<Vec<Facet>>),
+    /// Those of a body.
+    Surfaces {
+        prepared: Arc<Prepared>,
+        facets: Range<usize>,
+    },
+}
+
+impl Facets {
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            Self::Binary { count, .. } => *count,
+            Self::Memory(facets) => facets.len(),
+            Self::Surfaces { facets, .. } => facets.len(),
+        }
+    }
+
+    pub(crate) fn blocks(&self) -> usize {
+        self.count().div_ceil(self.per_block())
+    }
+
+    pub(crate) fn per_block(&self) -> usize {
+        match self {
+            Self::Surfaces { .. } => BLOCK_SURFACE_FACETS,
+            _ => BLOCK_FACETS,
+        }
+    }
+
+    /// Returns what was seen of the block that begins with a facet when the file was opened.
+    pub(crate) fn seen_block(&self, first: usize) -> Option<&FileBlock> {
+        match self {
+            Self::Binary { file, .. } => file.seen_blocks().get(first / BLOCK_FACETS),
+            _ => None,
+        }
+    }
+
+    /// Calls `each` with every facet of a range.
+    fn for_each(&self, range: Range<usize>, mut each: impl FnMut(&Facet)) -> io::Result<()> {
+        match self {
+            Self::Memory(facets) => facets[range].iter().for_each(each),
+            Self::Surfaces { prepared, facets } => {
+                let mesh = &prepared.mesh;
+                let facets = &mesh.facets[facets.clone()][range];
+                facets.iter().for_each(|facet| each(&rounded(mesh.corners(facet))));
+            }
+            Self::Binary { file, .. } => {
+                let at = |facet: usize| HEADER_BYTES + (facet * FACET_BYTES) as u64;
+                let bytes = at(range.start)..at(range.end);
+                file.for_each_record(bytes, |record| each(&parse(record)))?;
+            }
+        }
+        Ok(())
+    }
+}
