@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use lamp_stack::{Grouped, Mask};
 
 use crate::bodies::{Doubts, LayerDoubts, Position, SharedPixels};
-use crate::cut::{BodyCrossing, InRow, RowCrossing};
+use crate::crossing::{BodyCrossing, InRow, RowCrossing};
 use crate::grid::PixelGrid;
 
 /// What the rows of a layer become, from the top.

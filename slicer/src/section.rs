@@ -4,7 +4,7 @@ use lamp_stack::{Dpi, Length};
 use rayon::prelude::*;
 
 use crate::bodies::{FillRule, Position, Turn};
-use crate::cut::Cutter;
+use crate::cutter::Cutter;
 use crate::error::SliceError;
 use crate::facet::Units;
 use crate::fill::Fill;

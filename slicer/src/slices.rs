@@ -11,7 +11,8 @@ use crate::bodies::{
     BodyOverlap, DoubtSum, FillDoubt, FillRule, LayerDoubts, SharedCounts, SharedVolumes,
 };
 use crate::buckets::Buckets;
-use crate::cut::{Crossing, Cutter};
+use crate::crossing::Crossing;
+use crate::cutter::Cutter;
 use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::{PlacedFacet, Units};

@@ -13,13 +13,15 @@ use rayon::prelude::*;
 
 use crate::bodies::{LayerDoubts, Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
-use crate::cut::{BodyCrossing, Crossing, Cutter, LayerShare, RowCrossing, RowSegment};
+use crate::crossing::{BodyCrossing, Crossing, RowCrossing, RowSegment};
+use crate::cutter::Cutter;
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::facet::PlacedFacet;
 use crate::fill::Fill;
 use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
 use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
+use crate::layer_share::LayerShare;
 
 /// Facets in pieces, which threads take one after another.
 pub(crate) trait FacetSource: Sync {

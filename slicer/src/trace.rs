@@ -15,7 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use lamp_stack::{Length, PageInfo};
 use rayon::prelude::*;
 
-use crate::cut::{Cutter, SegmentEnd};
+use crate::cut::SegmentEnd;
+use crate::cutter::Cutter;
 use crate::facet::Facet;
 use crate::piece::Piece;
 use crate::placed_part::PlacedPart;

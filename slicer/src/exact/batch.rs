@@ -7,8 +7,10 @@ use lamp_brep::vector::{Vec3, cross, sub};
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
 use super::tally::Tally;
-use crate::cut::{Crossing, Cutter, LayerShare};
+use crate::crossing::Crossing;
+use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
+use crate::layer_share::LayerShare;
 
 /// The number of crossings polished at once: enough to amortise each call; 0.5 MB.
 const BATCH: usize = 4096;

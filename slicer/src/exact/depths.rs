@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
-use crate::cut::{Crossing, Cutter, LayerShare};
+use crate::crossing::Crossing;
+use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
 use crate::gray::{DepthSpan, Sheet};
+use crate::layer_share::LayerShare;
 
 /// The number of pixels evaluated at once: enough to amortise each call; 0.3 MB.
 const BATCH: usize = 4096;

@@ -35,8 +35,9 @@ pub(crate) use settle::settle;
 pub use tally::Polished;
 pub(crate) use tally::Tally;
 
-use crate::cut::{Cutter, LayerShare};
+use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
+use crate::layer_share::LayerShare;
 
 /// A worker that turns consecutive facets of a B-rep model into its share of the table.
 pub(crate) struct ExactCut<'a> {

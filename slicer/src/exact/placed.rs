@@ -11,7 +11,7 @@ use super::edges::CurvedEdges;
 use super::extrema::CriticalPoints;
 use super::locate::facets_by_point;
 use super::rims::Rims;
-use crate::cut::Cutter;
+use crate::cutter::Cutter;
 use crate::facet::{PlacedFacet, Units, rounded};
 use crate::placement::Placement;
 use crate::transform::Transform;

@@ -15,7 +15,7 @@ use super::lens::{LensPoint, LensSide, Line};
 use super::locate::RowContact;
 use super::placed::PlacedSurfaces;
 use super::polish::{FacetPoint, polish};
-use crate::cut::Cutter;
+use crate::cutter::Cutter;
 use crate::gray::{DepthSpan, Sheet};
 use crate::planes::Planes;
 

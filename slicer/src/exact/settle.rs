@@ -16,7 +16,8 @@ use super::polish::FacetPoint;
 use super::saddle::Saddle;
 use super::switch::{RowLists, Switch};
 use super::tally::Tally;
-use crate::cut::{Crossing, Cutter};
+use crate::crossing::Crossing;
+use crate::cutter::Cutter;
 
 /// A row near an extremum or a saddle, or with crossings that were kept on facets.
 #[derive(Default)]

@@ -3,7 +3,8 @@
 use super::lens::{LensPoint, LensSide};
 use super::placed::PlacedSurfaces;
 use super::polish::FacetPoint;
-use crate::cut::{Crossing, Cutter};
+use crate::crossing::Crossing;
+use crate::cutter::Cutter;
 
 /// A crossing that one face gains and another's reverse, next to a curved edge.
 pub(super) struct Switch {

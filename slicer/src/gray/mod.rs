@@ -21,6 +21,7 @@ mod above;
 mod band;
 mod below;
 mod columns;
+mod depth_span;
 mod levels;
 mod print_through;
 mod row_lists;
@@ -31,8 +32,9 @@ mod solid;
 mod stretch;
 
 pub(crate) use columns::Columns;
+pub(crate) use depth_span::DepthSpan;
 pub use levels::LayerLevels;
 pub(crate) use print_through::PrintThrough;
 pub(crate) use rows::{DepthRows, LevelRows, ShadedRows};
 pub(crate) use shade::Shader;
-pub(crate) use sheet::{DepthSpan, Sheet};
+pub(crate) use sheet::Sheet;

@@ -3,7 +3,7 @@
 use lamp_stack::Grouped;
 
 use crate::bodies::{FillRule, Position};
-use crate::cut::InRow;
+use crate::crossing::InRow;
 use crate::gray::{DepthSpan, ShadedRows};
 use crate::image_rows::RowMaker;
 use crate::planes::Planes;
