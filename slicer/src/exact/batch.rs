@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use lamp_brep::vector::{Vec3, cross, sub};
 
+use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
-use super::polish::{FacetPoint, polish};
+use super::polish::polish;
 use super::tally::Tally;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
-use super::polish::{FacetPoint, polish};
+use super::polish::polish;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;

@@ -7,41 +7,9 @@ use lamp_brep::vector::{Vec3, add, cross, distance, dot, length, scale, sub, uni
 use lamp_stack::Grouped;
 use rayon::prelude::*;
 
+use super::curved_edge::{CurvedEdge, CurvedEdges, EdgePoint};
 use super::placed::PlacedSurfaces;
 use crate::facet::PlacedFacet;
-
-/// The curved edges of a part.
-#[derive(Debug)]
-pub(super) struct CurvedEdges {
-    pub(super) all: Vec<CurvedEdge>,
-    /// The edges at each facet.
-    by_facet: Grouped<u32>,
-}
-
-/// A side that facets of two faces share, where the faces meet along a curve.
-#[derive(Debug)]
-pub(super) struct CurvedEdge {
-    /// The facets on both sides. The first one's corners come in the chord's direction.
-    pub(super) facets: [u32; 2],
-    /// The curve's points at the chord's ends.
-    pub(super) ends: [EdgePoint; 2],
-    /// The chord's ends as the facets have them: x and y in millimetres, z in micrometres.
-    pub(super) chord: [[f64; 3]; 2],
-    /// The curve's extremum along each axis, if there is one between the ends.
-    pub(super) turns: [Option<EdgePoint>; 3],
-}
-
-/// A point of an edge's curve.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct EdgePoint {
-    pub(super) at_mm: Vec3,
-    /// Its parameters on the surface of each side.
-    pub(super) uv: [[f64; 2]; 2],
-    /// Its place along the chord, 0 to 1.
-    pub(super) share: f64,
-    /// The derivative of the point by its share.
-    pub(super) slope: Vec3,
-}
 
 /// Curves nearer to their chords than this are straight, in millimetres.
 const STRAIGHT_MM: f64 = 1e-7;
@@ -61,6 +29,13 @@ const SAME_MM: f64 = 1e-10;
 const SAME_AT_LAST_MM: f64 = 1e-7;
 /// The facets examined at once.
 const BATCH: usize = 1024;
+
+impl PlacedSurfaces {
+    /// Returns the curved edges between facets. The first call examines every facet.
+    pub(super) fn curved_edges(&self) -> &CurvedEdges {
+        self.curved_edges.get_or_init(|| CurvedEdges::find(self))
+    }
+}
 
 impl CurvedEdges {
     pub(super) fn find(surfaces: &PlacedSurfaces) -> Self {

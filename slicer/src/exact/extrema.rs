@@ -11,11 +11,10 @@ use lamp_brep::Jet;
 use lamp_brep::vector::{Vec3, distance, scale, sub};
 use rayon::prelude::*;
 
+use super::critical::{CandidateFacet, CriticalPoints, SAME_MM, Saddle};
 use super::extent::DIFFERENCE;
-use super::locate::RowContact;
+use super::facet_point::{FacetPoint, RowContact};
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
-use super::saddle::Saddle;
 
 /// A point where a contour has a tangent along the rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,25 +33,6 @@ pub struct Extremum {
     along: [f64; 2],
 }
 
-/// A curved facet whose surface may have extrema.
-#[derive(Debug)]
-struct CandidateFacet {
-    facet: u32,
-    /// The x components of the normals at the corners.
-    normal_x: [f64; 3],
-    low_mm: f64,
-    high_mm: f64,
-    /// Whether the surface may be level over the facet.
-    may_be_level: bool,
-}
-
-/// The places where the contours of any section may have extrema or meet.
-#[derive(Debug)]
-pub(super) struct CriticalPoints {
-    candidates: Vec<CandidateFacet>,
-    pub(super) saddles: Vec<Saddle>,
-}
-
 /// Normals that differ by less than this along an axis differ only by rounding.
 const LEVEL: f64 = 1e-9;
 /// If the normal's y component is less than this, the surface is nearly level, and a
@@ -60,8 +40,6 @@ const LEVEL: f64 = 1e-9;
 const STEEP: f64 = 1e-4;
 /// The number of facets evaluated at once.
 const BATCH: usize = 4096;
-/// Extrema closer than this are the same, in millimetres.
-pub(super) const SAME_MM: f64 = 1e-6;
 const MAX_STEPS: usize = 20;
 
 impl CriticalPoints {
@@ -87,6 +65,19 @@ impl CriticalPoints {
 }
 
 impl PlacedSurfaces {
+    /// Examines all facets, which the first layer would do otherwise: its thread would wait for
+    /// others, and might meanwhile take up a layer that waits for the same.
+    pub(crate) fn examine(&self) {
+        self.critical_points();
+        self.curved_edges();
+    }
+
+    /// Returns the places where contours may turn or meet. The first call examines every
+    /// facet.
+    pub(super) fn critical_points(&self) -> &CriticalPoints {
+        self.critical_points.get_or_init(|| CriticalPoints::find(self))
+    }
+
     /// Returns the extrema of a section's contours, by y. The first call examines every
     /// facet.
     pub fn extrema(&self, z_mm: f64) -> Vec<Extremum> {

@@ -10,9 +10,9 @@ use std::ops::Range;
 
 use lamp_brep::vector::{dot, sub};
 
-use super::edges::{CurvedEdge, EdgePoint};
+use super::curved_edge::{CurvedEdge, EdgePoint};
+use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
 use super::solve::{Wanted, solve};
 use crate::grid::PixelGrid;
 use crate::planes::Planes;

@@ -1,12 +1,10 @@
 //! Locates points of surfaces: their facet, by walking from facet to facet, and their
 //! parameters.
 
-use lamp_brep::Tessellation;
 use lamp_brep::vector::{Vec3, add, distance, dot, scale, sub};
-use lamp_stack::Grouped;
 
+use super::facet_point::{FacetPoint, RowContact};
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
 use super::solve::{Wanted, solve};
 
 /// The greatest distance of a point from its facet, in tolerances of the tessellation.
@@ -15,27 +13,6 @@ const NEAR: f64 = 2.0;
 const MAX_FACETS: usize = 256;
 /// The greatest number of faces that a contour is followed through: one and its neighbours.
 const MAX_FACES: usize = 3;
-
-/// A row's crossings near an extremum or a saddle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RowContact {
-    /// Two crossings of the contour, the left one first.
-    Pair([FacetPoint; 2]),
-    /// A crossing on one side at least; on the other the contour may turn again.
-    OneSide(FacetPoint),
-    /// No crossing.
-    Nothing,
-    /// Unknown: no point of the surface was found.
-    Unknown,
-}
-
-/// Groups the facets of a tessellation by their corner points.
-pub(super) fn facets_by_point(mesh: &Tessellation) -> Grouped<u32> {
-    let facets = || (0..).zip(&mesh.facets);
-    Grouped::new(mesh.points.len(), || {
-        facets().flat_map(|(k, facet)| facet.corners.map(|point| (point as usize, k)))
-    })
-}
 
 impl PlacedSurfaces {
     /// Returns the facet below a point of a surface, walking from another facet. Returns

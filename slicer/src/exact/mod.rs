@@ -8,14 +8,18 @@
 //! Source: 002 section 2.2, which slices the CAD model itself for accuracy.
 
 mod batch;
+mod critical;
+mod curved_edge;
 mod depths;
 mod edges;
 mod extent;
 mod extrema;
+mod facet_point;
 mod lens;
 mod locate;
 mod placed;
 mod polish;
+mod rim_search;
 mod rims;
 mod saddle;
 mod settle;
@@ -28,9 +32,9 @@ use std::ops::Range;
 use batch::Batch;
 use depths::Depths;
 pub use extrema::Extremum;
-pub use locate::RowContact;
+pub use facet_point::{FacetPoint, RowContact};
 pub use placed::{Chart, PlacedSurfaces};
-pub use polish::{FacetPoint, polish};
+pub use polish::polish;
 pub(crate) use settle::settle;
 pub use tally::Polished;
 pub(crate) use tally::Tally;

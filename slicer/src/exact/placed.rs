@@ -7,11 +7,9 @@ use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub, unit};
 use lamp_brep::{Facet, Jet, Kernel, Tessellation};
 use lamp_stack::Grouped;
 
-use super::edges::CurvedEdges;
-use super::extrema::CriticalPoints;
-use super::locate::facets_by_point;
+use super::critical::CriticalPoints;
+use super::curved_edge::CurvedEdges;
 use super::rims::Rims;
-use crate::cutter::Cutter;
 use crate::facet::{PlacedFacet, Units, rounded};
 use crate::placement::Placement;
 use crate::transform::Transform;
@@ -29,9 +27,9 @@ pub struct PlacedSurfaces {
     /// Whether each face is flat.
     is_flat: Vec<bool>,
     facets_by_point: OnceLock<Grouped<u32>>,
-    critical_points: OnceLock<CriticalPoints>,
-    curved_edges: OnceLock<CurvedEdges>,
-    rims: OnceLock<Rims>,
+    pub(super) critical_points: OnceLock<CriticalPoints>,
+    pub(super) curved_edges: OnceLock<CurvedEdges>,
+    pub(super) rims: OnceLock<Rims>,
 }
 
 impl fmt::Debug for PlacedSurfaces {
@@ -118,38 +116,9 @@ impl PlacedSurfaces {
         self.rows.map(|[x, y, z, _]| x * direction[0] + y * direction[1] + z * direction[2])
     }
 
-    /// Examines all facets, which the first layer would do otherwise: its thread would wait for
-    /// others, and might meanwhile take up a layer that waits for the same.
-    pub(crate) fn examine(&self) {
-        self.critical_points();
-        self.curved_edges();
-    }
-
-    /// Examines all rows of gray images, for the same reason.
-    pub(crate) fn examine_rims(&self, cutter: Cutter<'_>) {
-        self.rims(cutter);
-    }
-
     /// Returns the facets around each point. The first call examines every facet.
     pub(super) fn facets_by_point(&self) -> &Grouped<u32> {
         self.facets_by_point.get_or_init(|| facets_by_point(&self.mesh))
-    }
-
-    /// Returns the places where contours may turn or meet. The first call examines every
-    /// facet.
-    pub(super) fn critical_points(&self) -> &CriticalPoints {
-        self.critical_points.get_or_init(|| CriticalPoints::find(self))
-    }
-
-    /// Returns the curved edges between facets. The first call examines every facet.
-    pub(super) fn curved_edges(&self) -> &CurvedEdges {
-        self.curved_edges.get_or_init(|| CurvedEdges::find(self))
-    }
-
-    /// Returns how vertical lines through an image's pixels meet surfaces other than facets.
-    /// The first call examines every row; all must be for the same image.
-    pub(crate) fn rims(&self, cutter: Cutter<'_>) -> &Rims {
-        self.rims.get_or_init(|| Rims::find(self, cutter))
     }
 
     /// Returns the surfaces turned so that z lies along the rows, x across, and y points up.
@@ -235,4 +204,12 @@ impl Chart {
         let [p, q, r] = self.uv;
         [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + t * (r[k] - p[k]))
     }
+}
+
+/// Groups the facets of a tessellation by their corner points.
+fn facets_by_point(mesh: &Tessellation) -> Grouped<u32> {
+    let facets = || (0..).zip(&mesh.facets);
+    Grouped::new(mesh.points.len(), || {
+        facets().flat_map(|(k, facet)| facet.corners.map(|point| (point as usize, k)))
+    })
 }

@@ -2,30 +2,9 @@
 
 use lamp_brep::Jet;
 
+use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
 use super::solve::{Wanted, solve};
-
-/// A point of a facet to be moved along an axis, x or z, to the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FacetPoint {
-    /// The index of the facet in the tessellation.
-    pub facet: u32,
-    /// The point's parameters on the facet's surface.
-    pub uv: [f64; 2],
-    /// The point, in millimetres.
-    pub at_mm: [f64; 3],
-    /// Whether the axis enters the part here, according to the facet.
-    pub enters: bool,
-    /// Whether the point was found on the surface.
-    pub is_exact: bool,
-}
-
-impl FacetPoint {
-    /// Returns a point that is still on its facet.
-    pub fn new(facet: u32, uv: [f64; 2], at_mm: [f64; 3], enters: bool) -> Self {
-        Self { facet, uv, at_mm, enters, is_exact: false }
-    }
-}
 
 /// The greatest move across the surface, in tolerances of the tessellation: one for the
 /// facet's distance, one for the difference of the normals.

@@ -6,26 +6,10 @@
 
 use lamp_brep::vector::distance;
 
+use super::critical::{SAME_MM, Saddle};
 use super::extent::AxisDirection;
-use super::extrema::SAME_MM;
-use super::locate::RowContact;
+use super::facet_point::{FacetPoint, RowContact};
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
-
-/// A point where a surface is level and bends both ways.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Saddle {
-    /// The point, in millimetres.
-    pub(super) at_mm: [f64; 3],
-    facet: u32,
-    uv: [f64; 2],
-    /// Whether the part is below.
-    is_above: bool,
-    /// The surface here is z* + (a dx^2 + 2 b dx dy + c dy^2) / 2.
-    form: [f64; 3],
-    /// The derivatives of u and v with respect to x and y.
-    uv_by: [[f64; 2]; 2],
-}
 
 impl Saddle {
     /// Finds the saddle of a facet's surface, if there is one over the facet.

@@ -8,12 +8,11 @@
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
 
+use super::critical::Saddle;
 use super::extrema::Extremum;
+use super::facet_point::{FacetPoint, RowContact};
 use super::lens::Line;
-use super::locate::RowContact;
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
-use super::saddle::Saddle;
 use super::switch::{RowLists, Switch};
 use super::tally::Tally;
 use crate::crossing::Crossing;

@@ -1,8 +1,8 @@
 //! Changes the faces of a row's crossings next to curved edges.
 
+use super::facet_point::FacetPoint;
 use super::lens::{LensPoint, LensSide};
 use super::placed::PlacedSurfaces;
-use super::polish::FacetPoint;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;
 
