@@ -5,9 +5,10 @@
 
 use std::fmt;
 
+use crate::body_report::{BodyFault, BodyReport};
 use crate::kernel::{Facet, Tessellation};
 use crate::prepare::Prepared;
-use crate::validate::{BodyFault, BodyReport, VOLUMES_APART};
+use crate::validate::VOLUMES_APART;
 use crate::vector::{Vec3, distance};
 
 /// The heights of sections, as shares of a body's height: planes on faces are unlikely there.

@@ -34,14 +34,17 @@
 
 #![forbid(unsafe_code)]
 
+mod body_report;
 mod compare;
 mod error;
 mod geometry;
 mod heal;
 mod kernel;
 mod loops;
+mod measure;
 mod model;
 mod nest;
+mod notice;
 mod orient;
 mod prepare;
 mod rays;
@@ -51,12 +54,12 @@ mod validate;
 pub mod vector;
 mod volume;
 
+pub use body_report::{BodyFault, BodyReport};
 pub use compare::{BodyPair, Comparison, Difference, Measure, Measured, NamedBody};
 pub use error::BrepError;
-pub use kernel::{
-    Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Matter, Notice, Tessellation,
-};
+pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
+pub use notice::{Matter, Notice};
 pub use prepare::{Attempt, OpenedModel, Prepared, ReadFn, prepare};
 pub use step::{StepError, StepModel, check_syntax, read_step};
 pub use tessellate::MAX_FACETS;
-pub use validate::{BodyFault, BodyReport, check};
+pub use validate::check;

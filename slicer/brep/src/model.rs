@@ -1,7 +1,8 @@
 //! Holds a model in memory: placed bodies, faces, edges and vertices, in millimetres.
 
 use crate::geometry::{Curve, Surface, edge_range};
-use crate::kernel::{Body, Notice};
+use crate::kernel::Body;
+use crate::notice::Notice;
 use crate::vector::{Vec3, distance};
 
 /// All bodies of a file.

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use crate::body_report::{BodyFault, BodyReport};
 use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
 use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
-use crate::validate::{BodyFault, BodyReport};
 use crate::volume::facet_volume;
 
 /// How far faces may reach into each other, as a multiple of the chord, and of the distance of

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use crate::body_report::BodyReport;
 use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
-use crate::validate::{BodyReport, bounds, doubled, sides};
+use crate::measure::{bounds, doubled, sides};
 use crate::vector::{length, middle};
 use crate::volume::facet_volume;
 

@@ -6,11 +6,12 @@ use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use crate::body_report::{BodyFault, BodyReport};
 use crate::error::BrepError;
 use crate::kernel::{Kernel, Tessellation};
 use crate::nest::turn_shells;
 use crate::orient::turn_over;
-use crate::validate::{BodyFault, BodyReport, check};
+use crate::validate::check;
 use crate::vector::sub;
 
 /// Reads a file's bytes and joins edges within a distance in millimetres; 0 leaves the

@@ -2,10 +2,12 @@
 
 use std::collections::{HashMap, HashSet};
 
+use crate::body_report::{BodyFault, BodyReport};
 use crate::geometry::HORN_TORUS;
 use crate::kernel::{Facet, Fault, Finding, Kernel, Tessellation};
+use crate::measure::{MOST_OFF, bounds, doubled, sides};
 use crate::nest::crossed;
-use crate::vector::{Vec3, cross, length, scale, sub};
+use crate::vector::{length, scale, sub};
 use crate::volume::{facet_volume, surface_volume};
 
 /// The greatest relative difference of a body's two volumes.
@@ -14,118 +16,6 @@ pub(crate) const VOLUMES_APART: f64 = 1e-3;
 /// The least volume of a body of some area, as a part of what such a cube would have: less is
 /// the error of its numbers.
 const LEAST_VOLUME: f64 = 1e-9;
-
-/// The reason why a body cannot be sliced.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BodyFault {
-    /// It has no facets.
-    #[error("none of its faces could be made into facets")]
-    Empty,
-    /// Facets follow some edges more often in one direction than in the other.
-    #[error(
-        "{edges} edges of facets are open, the first at ({:.3}, {:.3}, {:.3}) mm on #{entity}",
-        at_mm[0], at_mm[1], at_mm[2]
-    )]
-    Open {
-        /// The number of these edges.
-        edges: usize,
-        /// The start of the first one, in millimetres.
-        at_mm: [f64; 3],
-        /// The entity of that edge's face.
-        entity: u64,
-    },
-    /// A face reaches beyond the control points of its surface.
-    #[error("#{entity} reaches {off_mm:.3} mm beyond the control points of its surface")]
-    Outside {
-        /// The entity of the face.
-        entity: u64,
-        /// The distance, in millimetres.
-        off_mm: f64,
-    },
-    /// The volume of the facets differs from that of the surfaces.
-    #[error(
-        "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
-         a shorter chord may bring them together"
-    )]
-    Volumes {
-        /// The volume of the facets, in cubic millimetres.
-        facets_mm3: f64,
-        /// The volume of the surfaces, in cubic millimetres.
-        surfaces_mm3: f64,
-    },
-    /// Its faces enclose something twice, or turn inside out: the side of a face is wrong, or the
-    /// body crosses itself.
-    #[error(
-        "the body crosses itself at #{entity} near ({:.3}, {:.3}, {:.3}) mm, \
-         or the side of a face cannot be told",
-        at_mm[0], at_mm[1], at_mm[2]
-    )]
-    Crossed {
-        /// The entity of a face there.
-        entity: u64,
-        /// A place on that face, in millimetres.
-        at_mm: [f64; 3],
-    },
-    /// As [`Crossed`](Self::Crossed), of a body with a face on a torus whose radii are equal.
-    #[error(
-        "#{entity} lies on a torus whose tube touches itself in its center (R = r), and the side of \
-         its loops cannot be told there, or the body crosses itself"
-    )]
-    Horn {
-        /// The entity of the face.
-        entity: u64,
-    },
-    /// A face on a closed surface contradicts its neighbours.
-    #[error(
-        "the side of #{entity} cannot be told: its loop runs against its neighbours, \
-         and its surface is closed"
-    )]
-    Side {
-        /// The entity of the face.
-        entity: u64,
-    },
-    /// An edge or facets lie too far off a surface.
-    #[error(
-        "{what} of #{entity} lie {off_mm:.3} mm off its surface, more than a thousandth of the body"
-    )]
-    Off {
-        /// The entity of the face.
-        entity: u64,
-        /// What lies off: `edges` or `facets`.
-        what: &'static str,
-        /// The distance, in millimetres.
-        off_mm: f64,
-    },
-    /// Its faces lie on each other.
-    #[error("its faces lie on each other and enclose nothing")]
-    Flat,
-    /// Its faces point inwards.
-    #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
-    InsideOut {
-        /// The volume of the facets, in cubic millimetres.
-        volume_mm3: f64,
-    },
-}
-
-/// The measures and faults of a body's facets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BodyReport {
-    /// The body's name in the file.
-    pub name: String,
-    /// The number of facets.
-    pub facets: usize,
-    /// The volume of the facets, in cubic millimetres.
-    pub volume_mm3: f64,
-    /// The volume of the surfaces, in cubic millimetres.
-    pub exact_volume_mm3: f64,
-    /// The area of the facets, in square millimetres.
-    pub area_mm2: f64,
-    /// The least and the greatest corner, in millimetres.
-    pub box_mm: [[f64; 3]; 2],
-    /// The reasons not to slice it; empty for a good body.
-    pub faults: Vec<BodyFault>,
-}
 
 /// Checks every body: facets follow each edge as often in one direction as in the other; no
 /// face leaves the box of its control points; and the volumes of facets and surfaces
@@ -196,23 +86,6 @@ fn faults(
     faults
 }
 
-pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
-    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for corner in facets.iter().flat_map(|facet| mesh.corners(facet)) {
-        for k in 0..3 {
-            bounds[0][k] = bounds[0][k].min(corner[k]);
-            bounds[1][k] = bounds[1][k].max(corner[k]);
-        }
-    }
-    bounds
-}
-
-/// Returns the facet's normal; its length is twice the facet's area.
-pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
-    let [a, b, c] = mesh.corners(facet);
-    cross(sub(b, a), sub(c, a))
-}
-
 /// Returns a fault unless facets follow each edge as often in one direction as in the other.
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
     // The number of uses of each edge, with ascending and with descending point indices.
@@ -233,12 +106,6 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
         at_mm: mesh.points[point as usize],
         entity: kernel.face(face).entity,
     })
-}
-
-/// Returns a facet's edges, as pairs of points.
-pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
-    let [a, b, c] = facet.corners;
-    [[a, b], [b, c], [c, a]]
 }
 
 /// Returns a fault if an edge or facets lie off their surface by more than numbers of another
@@ -287,8 +154,6 @@ fn off(
 /// The things other than edges that are off.
 const FACETS: &str = "facets";
 
-/// How far edges and facets may lie off their surface, as a part of the body's longest side.
-pub(crate) const MOST_OFF: f64 = 1e-3;
 /// The same, for edges of a face whose neighbours hold their edges, or where the surfaces meet
 /// near the edge, and that is small: its area times the distance is below a share of the volume.
 const LOCAL_OFF: f64 = 4e-3;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::kernel::{Body, Facet, Jet, Kernel, Tessellation};
-use crate::validate::sides;
+use crate::measure::sides;
 use crate::vector::{Vec3, add, cross, dot, length, middle, scale, sub, unit};
 
 /// Returns the volume that facets enclose, in cubic millimetres. `about` is a point near them.

@@ -170,6 +170,16 @@ impl SplineCurve {
     }
 }
 
+/// Moves a periodic parameter into the domain.
+pub(super) fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
+    match (domain, period) {
+        (Some([low, high]), Some(period)) if t < low || t > high => {
+            low + (t - low).rem_euclid(period)
+        }
+        _ => t,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

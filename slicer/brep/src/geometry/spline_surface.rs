@@ -1,8 +1,7 @@
 //! Evaluates surfaces of rational B-splines.
 
-use super::spline::{Knots, Weighted, add_times, divided, divided_slope};
+use super::spline::{Knots, Weighted, add_times, divided, divided_slope, inside};
 use super::strips::Strips;
-use super::surface::inside;
 use crate::kernel::Jet;
 use crate::vector::{Vec3, distance};
 

@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
 use super::offset;
+use super::spline::inside;
 use super::spline_surface::SplineSurface;
 use crate::kernel::Jet;
 use crate::vector::{Axes, Vec3, add, scale};
@@ -243,14 +244,4 @@ pub(crate) struct Pole {
     /// The value of that parameter.
     pub(crate) at: f64,
     pub(crate) point: Vec3,
-}
-
-/// Moves a periodic parameter into the domain.
-pub(super) fn inside(t: f64, domain: Option<[f64; 2]>, period: Option<f64>) -> f64 {
-    match (domain, period) {
-        (Some([low, high]), Some(period)) if t < low || t > high => {
-            low + (t - low).rem_euclid(period)
-        }
-        _ => t,
-    }
 }

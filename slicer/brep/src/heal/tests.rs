@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::*;
+use crate::body_report::BodyReport;
 use crate::kernel::Kernel;
 use crate::step::StepModel;
-use crate::validate::{BodyReport, check};
+use crate::validate::check;
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
 /// A way of tearing a model apart.

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::StepError;
 use super::contents::{Contents, Placed, PlacedShape};
 use super::entities::Entities;
+use super::error::StepError;
 use super::place::Place;
 use super::product::Products;
 use super::read_placement::GeometryReader;

@@ -4,14 +4,13 @@ use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::mem::discriminant;
 
-use super::StepError;
 use super::entities::Entities;
-use super::free_face::is_whole_surface;
+use super::error::StepError;
 use super::place::Place;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::shapes::Shape;
 use super::units::Units;
-use crate::kernel::{Matter, Notice};
+use crate::notice::{Matter, Notice};
 
 /// A body with its place.
 #[derive(Clone, Debug)]
@@ -306,4 +305,16 @@ fn bounded_surfaces(entities: &Entities, set: u64) -> impl Iterator<Item = u64> 
     elements.filter(|id| {
         entities.find(*id, "CURVE_BOUNDED_SURFACE").is_some() || is_whole_surface(entities, *id)
     })
+}
+
+/// Returns whether an entity is a surface that ends with its parameters.
+pub(super) fn is_whole_surface(entities: &Entities, id: u64) -> bool {
+    const KINDS: [&str; 5] = [
+        "RECTANGULAR_TRIMMED_SURFACE",
+        "B_SPLINE_SURFACE_WITH_KNOTS",
+        "UNIFORM_SURFACE",
+        "QUASI_UNIFORM_SURFACE",
+        "BEZIER_SURFACE",
+    ];
+    KINDS.iter().any(|kind| entities.find(id, kind).is_some())
 }

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use super::StepError;
+use super::error::StepError;
 use super::token::{Token, Tokens};
 
 /// The greatest nesting of brackets; schemas need less.

@@ -1,23 +1,11 @@
 //! Reads faces of surfaces that carry their bounds themselves.
 
-use super::StepError;
-use super::entities::{Entities, Item};
+use super::entities::Item;
+use super::error::StepError;
 use super::read_curve::is_short;
 use super::topology::BodyReader;
 use crate::geometry::{Curve, Link, Surface, SurfaceCurve, closed};
 use crate::model::{BrepEdge, Face, Loop};
-
-/// Returns whether an entity is a surface that ends with its parameters.
-pub(super) fn is_whole_surface(entities: &Entities, id: u64) -> bool {
-    const KINDS: [&str; 5] = [
-        "RECTANGULAR_TRIMMED_SURFACE",
-        "B_SPLINE_SURFACE_WITH_KNOTS",
-        "UNIFORM_SURFACE",
-        "QUASI_UNIFORM_SURFACE",
-        "BEZIER_SURFACE",
-    ];
-    KINDS.iter().any(|kind| entities.find(id, kind).is_some())
-}
 
 impl BodyReader<'_> {
     /// Reads a `CURVE_BOUNDED_SURFACE`.

@@ -3,8 +3,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::StepError;
 use super::entities::{Entities, Item};
+use super::error::StepError;
 
 /// The products of a file.
 #[derive(Debug, Default)]

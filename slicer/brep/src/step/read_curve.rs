@@ -1,7 +1,7 @@
 //! Reads curves from STEP entities.
 
-use super::StepError;
 use super::entities::{Item, Value};
+use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::{Chain, Curve, Link, edge_range};

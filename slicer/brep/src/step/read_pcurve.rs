@@ -1,7 +1,7 @@
 //! Reads curves that are given by the parameters of a surface (ISO 10303-42, `pcurve`).
 
-use super::StepError;
 use super::entities::Item;
+use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::units::Units;
 use crate::geometry::{Curve, Link, Surface, SurfaceCurve};

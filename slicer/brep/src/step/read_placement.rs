@@ -1,7 +1,7 @@
 //! Reads points, directions and axes from STEP entities.
 
-use super::StepError;
 use super::entities::{Entities, Item};
+use super::error::StepError;
 use super::place::Place;
 use super::units::Units;
 use crate::vector::{Axes, Vec3, dot, scale, unit};

@@ -1,7 +1,7 @@
 //! Reads B-spline curves and surfaces from STEP entities.
 
-use super::StepError;
 use super::entities::{Entities, Item, Value};
+use super::error::StepError;
 use super::read_placement::GeometryReader;
 use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
 use crate::geometry::spline_surface::SplineSurface;

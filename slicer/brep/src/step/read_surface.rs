@@ -1,7 +1,7 @@
 //! Reads surfaces from STEP entities.
 
-use super::StepError;
 use super::entities::Item;
+use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use crate::geometry::{Surface, TorusPart};
 use crate::vector::{Axes, unit};

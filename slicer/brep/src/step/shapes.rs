@@ -2,8 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::StepError;
 use super::entities::{Entities, Item};
+use super::error::StepError;
 use super::product::Products;
 use super::units::Units;
 

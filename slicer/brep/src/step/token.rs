@@ -1,6 +1,6 @@
 //! Splits the text of a STEP file into tokens (ISO 10303-21).
 
-use super::StepError;
+use super::error::StepError;
 
 /// A token of the text.
 #[derive(Clone, Debug, PartialEq)]

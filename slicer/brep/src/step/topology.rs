@@ -2,11 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::StepError;
 use super::assembly::placed;
-use super::contents::PlacedBody;
+use super::contents::{PlacedBody, is_whole_surface};
 use super::entities::{Entities, Item};
-use super::free_face::is_whole_surface;
+use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
 use super::units::Units;
 use crate::geometry::Curve;

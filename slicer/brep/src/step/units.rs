@@ -1,7 +1,7 @@
 //! Reads the units of a representation's context (ISO 10303-41).
 
-use super::StepError;
 use super::entities::{Entities, Item};
+use super::error::StepError;
 
 /// The units of a representation.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@
 //! or to the pole there.
 
 use super::join::Joining;
+use super::points::{FacePoints, Node, PointRing};
 use super::unwrap::{Unwrapped, between, unwrap};
-use super::{FacePoints, Node, PointRing};
 use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;

@@ -2,7 +2,7 @@
 
 use spade::Point2;
 
-use super::Node;
+use super::points::Node;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 

@@ -13,7 +13,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::cells::{Borders, CellScale};
 use super::ears::{Corner, doubled, ears, refine};
-use super::{FacePoints, MAX_CELLS, Node};
+use super::points::{FacePoints, MAX_CELLS, Node};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 use crate::model::Face;

@@ -5,8 +5,8 @@
 //! Walking along loops and cuts, always with the face on the same hand, gives a polygon
 //! that comes back to its start; both sides of a cut have the same points.
 
+use super::points::{FacePoints, Node};
 use super::unwrap::{Unwrapped, between};
-use super::{FacePoints, Node};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 

@@ -9,6 +9,7 @@ mod cells;
 mod ears;
 mod fill;
 mod join;
+mod points;
 mod rebuild;
 mod unwrap;
 
@@ -17,20 +18,13 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use self::cells::CellScale;
+use self::points::{FacePoints, MAX_CELLS, Node, PointRing};
 use crate::error::BrepError;
 use crate::geometry::edge_range;
 use crate::kernel::{Facet, Fault, Finding, Tessellation};
+use crate::measure::MOST_OFF;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
-use crate::validate::MOST_OFF;
 use crate::vector::{Vec3, distance, sub};
-
-/// A corner in a face's parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Node {
-    uv: [f64; 2],
-    /// The point's index. A point has several corners along a seam or at a pole.
-    point: u32,
-}
 
 /// The clearance of an edge's inner points from its vertices, as a multiple of the
 /// distance between a vertex and the curve's end.
@@ -40,28 +34,8 @@ const CLEAR: f64 = 4.0;
 const CLEAR_MM: f64 = 2.0 * unwrap::AT_POLE_MM;
 /// The greatest number of facets, which take about 5 GB of memory.
 pub const MAX_FACETS: usize = 50_000_000;
-/// The greatest number of cells of all faces, with one to three facets each.
-const MAX_CELLS: f64 = 1e6;
 /// The greatest number of points on edges.
 const MAX_POINTS: usize = 5_000_000;
-
-/// The points of a face: those of its edges, which are shared, and its own.
-struct FacePoints<'a> {
-    shared: &'a [Vec3],
-    own: Vec<Vec3>,
-}
-
-impl FacePoints<'_> {
-    fn get(&self, point: u32) -> Vec3 {
-        let point = point as usize;
-        self.shared.get(point).copied().unwrap_or_else(|| self.own[point - self.shared.len()])
-    }
-
-    fn push(&mut self, point: Vec3) -> u32 {
-        self.own.push(point);
-        (self.shared.len() + self.own.len() - 1) as u32
-    }
-}
 
 /// The polygons of one face.
 struct Outline {
@@ -305,13 +279,6 @@ fn patch(number: u32, face: &Face, outline: Outline, shared: &[Vec3], chord_mm: 
 fn has_three_corners(facet: &Facet) -> bool {
     let [a, b, c] = facet.corners;
     a != b && b != c && c != a
-}
-
-/// A loop of a face, as points.
-enum PointRing {
-    Point(u32),
-    /// `None` if its edges do not follow each other.
-    Points(Option<Vec<u32>>),
 }
 
 fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {

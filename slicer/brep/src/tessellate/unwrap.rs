@@ -1,6 +1,6 @@
 //! Maps loops to the parameters of their surface, across seams and poles.
 
-use super::{FacePoints, Node};
+use super::points::{FacePoints, Node};
 use crate::geometry::{Pole, Surface};
 use crate::model::Face;
 use crate::vector::distance;
