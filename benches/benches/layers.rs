@@ -12,7 +12,7 @@ use lamp_adaptive::LayeredPart;
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_offset::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{FacetIndex, Fill, LayerLevels, Part, Placement, SliceOptions, Slices, Units};
+use lamp_slicer::{FacetIndex, Fill, Part, Placement, Shading, SliceOptions, Slices, Units};
 use lamp_stack::{
     DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask,
     PageInfo, PageWriter, g4,
@@ -21,12 +21,12 @@ use lamp_stack::{
 /// Layers with pins and holes, 1500 dpi.
 const LAYERS: std::ops::Range<u32> = 440..460;
 
-fn slices(facets: usize, gray: Option<DepthLevels>) -> impl Fn() -> Slices {
+fn slices(facets: usize, shading: Shading) -> impl Fn() -> Slices {
     let facets = build(Sample::Blade, facets).expect("enough facets").facets;
     move || {
         let model = Part::from_facets("blade", facets.clone());
-        let gray = gray.clone().map(LayerLevels::from);
-        let options = SliceOptions { layers: Some(LAYERS), gray, ..SliceOptions::default() };
+        let shading = shading.clone();
+        let options = SliceOptions { layers: Some(LAYERS), shading, ..SliceOptions::default() };
         Slices::new(model, &options).expect("the blade slices")
     }
 }
@@ -66,7 +66,7 @@ fn fax_encode(mask: &Mask) -> Vec<u8> {
 }
 
 fn layers(criterion: &mut Criterion) {
-    let slice = slices(100_000, None);
+    let slice = slices(100_000, Shading::White);
     let masks = masks(slice());
     let transitions: usize = masks.iter().map(Mask::change_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
@@ -78,7 +78,7 @@ fn layers(criterion: &mut Criterion) {
     group.bench_function("sort", |b| {
         b.iter_batched(|| filled(slice()), self::masks, BatchSize::PerIteration);
     });
-    let gray = slices(100_000, Some(depth_levels()));
+    let gray = slices(100_000, Shading::ByDepth(depth_levels().into()));
     group.bench_function("table, gray", |b| {
         b.iter_batched(&gray, filled, BatchSize::PerIteration);
     });
@@ -200,7 +200,7 @@ fn fill(bytes: &mut [u8], first: usize, end: usize) {
 
 /// Times cure-width compensation of whole layers, beside decoding them to bitmaps.
 fn compensation(criterion: &mut Criterion) {
-    let masks = masks(slices(100_000, None)());
+    let masks = masks(slices(100_000, Shading::White)());
     let transitions: usize = masks.iter().map(Mask::change_count).sum();
     let strips: Vec<Vec<u8>> = masks.iter().map(g4::encode).collect();
     let size = (masks[0].width(), masks[0].height());

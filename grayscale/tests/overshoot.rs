@@ -6,7 +6,8 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, excess};
 use lamp_slicer::{
-    Axis, Fill, Part, PixelGrid, Placement, SectionOptions, SliceOptions, Slices, Units, section,
+    Axis, Fill, Part, PixelGrid, Placement, SectionOptions, Shading, SliceOptions, Slices, Units,
+    section,
 };
 use lamp_stack::{Catalogued, Dpi, Layer, Length};
 
@@ -25,10 +26,12 @@ fn slices(mesh: &Mesh, overcure: f64, gray: bool) -> Slices {
     let thickness = Length::from_um(THICKNESS_UM);
     let resin = resin();
     let time = resin.exposure_time(thickness, overcure).unwrap();
-    let gray = gray.then(|| resin.depth_levels(time).unwrap());
     let dpi = Dpi::new(DPI).unwrap();
-    let gray = gray.map(Into::into);
-    Slices::new(model(mesh), &SliceOptions { dpi, thickness, gray, ..SliceOptions::default() })
+    let shading = match gray {
+        true => Shading::ByDepth(resin.depth_levels(time).unwrap().into()),
+        false => Shading::White,
+    };
+    Slices::new(model(mesh), &SliceOptions { dpi, thickness, shading, ..SliceOptions::default() })
         .unwrap()
 }
 

@@ -7,7 +7,7 @@ use lamp_grayscale::resin::{ExposureTime, FadingLight, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, SummedLine, excess};
 use lamp_slicer::{
     Axis, Fill, LayerHeights, LayerLevels, Part, PixelGrid, Placement, SHORT_PX, SectionOptions,
-    SliceOptions, Slices, Units, section,
+    Shading, SliceOptions, Slices, Units, section,
 };
 use lamp_stack::{Catalogued, Dpi, Image, Layer, Length};
 
@@ -40,17 +40,18 @@ impl Build {
 
     fn slices(&self, gray: bool, more: SliceOptions) -> Slices {
         let levels = |thickness| light().1.levels(self.time(thickness));
-        let print_through = gray.then(|| match &self.heights {
+        let of_layers = || match &self.heights {
             Some(heights) => {
                 LayerLevels::by_thickness(heights, |um| Ok::<_, ()>(levels(um))).unwrap()
             }
             None => LayerLevels::from(levels(self.thickness)),
-        });
+        };
+        let shading = if gray { Shading::PrintThrough(of_layers()) } else { Shading::White };
         let options = SliceOptions {
             dpi: Dpi::new(DPI).unwrap(),
             thickness: self.thickness,
             heights: self.heights.clone(),
-            print_through,
+            shading,
             ..more
         };
         Slices::new(self.part(), &options).unwrap()

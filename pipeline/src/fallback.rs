@@ -114,7 +114,7 @@ impl Fallback {
         let opening = step.reader.for_opening(step.tolerance(options.dpi))?;
         let options = SliceOptions {
             heights: Some(slices.layer_heights()),
-            gray: slices.levels().cloned(),
+            shading: slices.shading(),
             grid: GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
             layers,
             fill: options.solid.fill,

@@ -9,8 +9,8 @@ use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_machine::{Machine, MachineLimit};
 use lamp_slicer::{
-    Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, SHORT_PX, SliceError,
-    SliceOptions, Slices,
+    Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, SHORT_PX, Shading,
+    SliceError, SliceOptions, Slices,
 };
 use lamp_stack::{Layer, Length, PageInfo, Size};
 use serde::Serialize;
@@ -23,7 +23,7 @@ use crate::memory::{available, in_words};
 use crate::overlaps::overlap_text;
 use crate::part_file::{PartFile, paths, recorded};
 use crate::size::short;
-use crate::slice_settings::{Shading, SliceRecord, SliceSettings, Thickness};
+use crate::slice_settings::{GrayRule, SliceRecord, SliceSettings, Thickness};
 use crate::solid::{Reading, SolidSettings, at_part, name_of_all};
 use crate::step::length;
 use crate::watcher::{Importance, Remark, Watcher};
@@ -133,36 +133,10 @@ impl SliceSettings {
         let record = SliceRecord { parts, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
         let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;
-        let known = || {
-            let why = "gray layers need a material";
-            exposure.as_ref().ok_or_else(|| Error::settings(why))
-        };
         let uniform = self.uniform_thickness();
-        let (mut gray, mut print_through) = (None, None);
-        match self.shading {
-            Shading::None => {}
-            Shading::Gray => {
-                let exposure = known()?;
-                gray = Some(match (&heights, uniform) {
-                    (Some(heights), _) => {
-                        LayerLevels::by_thickness(heights, |um| exposure.levels(um))?
-                    }
-                    (None, um) => exposure.levels(um.unwrap_or_default())?.into(),
-                });
-            }
-            Shading::PrintThrough => {
-                let exposure = known()?;
-                print_through = Some(match (&heights, uniform) {
-                    (Some(heights), _) => {
-                        LayerLevels::by_thickness(heights, |um| exposure.fading_levels(um))?
-                    }
-                    (None, um) => exposure.fading_levels(um.unwrap_or_default())?.into(),
-                });
-            }
-        }
+        let shading = self.shading(heights.as_ref(), exposure.as_ref())?;
         let memory = table_memory(memory);
-        let options =
-            SliceOptions { layers, heights, gray, print_through, memory, ..self.for_slicing() };
+        let options = SliceOptions { layers, heights, shading, memory, ..self.for_slicing() };
         if let (Some(exposure), Some(thickness)) = (&exposure, uniform) {
             exposure.check(thickness)?;
             let doubts = exposure.doubts(iter::once(thickness));
@@ -171,6 +145,37 @@ impl SliceSettings {
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
         Ok((slices, PageWords { record, part_name: None, exposure }))
+    }
+
+    /// Returns the gray of layers at these heights, by the resin of an exposure.
+    fn shading(
+        &self,
+        heights: Option<&LayerHeights>,
+        exposure: Option<&Exposure>,
+    ) -> Result<Shading, Error> {
+        let known = || {
+            let why = "gray layers need a material";
+            exposure.ok_or_else(|| Error::settings(why))
+        };
+        // Layers are as thick as their heights say, or all the same.
+        let thickness = self.uniform_thickness().unwrap_or_default();
+        Ok(match self.gray {
+            GrayRule::None => Shading::White,
+            GrayRule::ByDepth => {
+                let levels = |um| known()?.levels(um).map_err(Error::from);
+                Shading::ByDepth(match heights {
+                    Some(heights) => LayerLevels::by_thickness(heights, levels)?,
+                    None => levels(thickness)?.into(),
+                })
+            }
+            GrayRule::PrintThrough => {
+                let levels = |um| known()?.fading_levels(um).map_err(Error::from);
+                Shading::PrintThrough(match heights {
+                    Some(heights) => LayerLevels::by_thickness(heights, levels)?,
+                    None => levels(thickness)?.into(),
+                })
+            }
+        })
     }
 
     /// Finds adaptive layer heights, if they are asked for, with notes on them.
@@ -232,7 +237,7 @@ impl SliceStage {
     /// Returns an error if settings contradict each other, or the part cannot be sliced.
     pub fn open(&self, name: Option<&str>, watcher: &dyn Watcher) -> Result<Slicing<'_>, Error> {
         let Self { parts, settings, .. } = self;
-        if settings.shading == Shading::PrintThrough && self.fallback.is_some() {
+        if settings.gray == GrayRule::PrintThrough && self.fallback.is_some() {
             let why = "--print-through looks at all layers above one, and --fallback mends single \
                        ones: leave out one of them";
             return Err(Error::settings(why));

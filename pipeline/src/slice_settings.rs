@@ -42,7 +42,7 @@ pub struct SliceSettings {
     pub no_polish: bool,
     /// Whether layers are gray.
     #[serde(flatten)]
-    pub shading: Shading,
+    pub gray: GrayRule,
     /// The exposure of the layers.
     #[serde(flatten)]
     pub exposure: ExposureSettings,
@@ -73,22 +73,22 @@ pub enum Thickness {
 
 /// Whether layers are gray, and how their doses count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "ShadingFlags", into = "ShadingFlags")]
-pub enum Shading {
+#[serde(from = "GrayFlags", into = "GrayFlags")]
+pub enum GrayRule {
     /// Black and white.
     #[default]
     None,
     /// Each pixel is as bright as cures down to where the part ends below it, by its layer alone.
-    Gray,
+    ByDepth,
     /// The same, where doses of layers add up: light of the layers above does not cure through
     /// undersides.
     PrintThrough,
 }
 
-/// [`Shading`] as options.
+/// [`GrayRule`] as options.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
-struct ShadingFlags {
+struct GrayFlags {
     #[serde(skip_serializing_if = "is_default")]
     gray: bool,
     #[serde(skip_serializing_if = "is_default")]
@@ -116,19 +116,19 @@ pub enum Frame {
     },
 }
 
-impl From<ShadingFlags> for Shading {
-    fn from(flags: ShadingFlags) -> Self {
+impl From<GrayFlags> for GrayRule {
+    fn from(flags: GrayFlags) -> Self {
         match flags {
-            ShadingFlags { print_through: true, .. } => Self::PrintThrough,
-            ShadingFlags { gray: true, .. } => Self::Gray,
-            ShadingFlags { .. } => Self::None,
+            GrayFlags { print_through: true, .. } => Self::PrintThrough,
+            GrayFlags { gray: true, .. } => Self::ByDepth,
+            GrayFlags { .. } => Self::None,
         }
     }
 }
 
-impl From<Shading> for ShadingFlags {
-    fn from(shading: Shading) -> Self {
-        Self { gray: shading != Shading::None, print_through: shading == Shading::PrintThrough }
+impl From<GrayRule> for GrayFlags {
+    fn from(gray: GrayRule) -> Self {
+        Self { gray: rule != GrayRule::None, print_through: rule == GrayRule::PrintThrough }
     }
 }
 
@@ -145,7 +145,7 @@ impl Default for SliceSettings {
             plane_tolerance: PLANE_TOLERANCE,
             solid: SolidSettings::default(),
             no_polish: false,
-            shading: Shading::default(),
+            gray: GrayRule::default(),
             exposure: ExposureSettings::default(),
             frame: Frame::Around { margin: 1 },
         }
@@ -271,7 +271,7 @@ impl SliceSettings {
     /// # Errors
     /// Returns an error if settings contradict each other, or the material cannot be read.
     pub fn exposure(&self) -> Result<Option<RecordedExposure>, Error> {
-        let is_gray = self.shading != Shading::None;
+        let is_gray = self.gray != GrayRule::None;
         let heights = match &self.thickness {
             Thickness::Adaptive { heights, .. } => Some(heights),
             Thickness::Uniform { .. } => None,
@@ -422,7 +422,7 @@ mod tests {
         assert_eq!(usual.stated(None), None);
         let at = |dpi| SliceSettings { dpi: Dpi::new(dpi).unwrap(), ..SliceSettings::default() };
         assert_eq!(at(300.0).stated(None).as_deref(), Some("dpi"));
-        let gray = SliceSettings { shading: Shading::PrintThrough, ..usual };
+        let gray = SliceSettings { gray: GrayRule::PrintThrough, ..usual };
         assert_eq!(gray.stated(None).as_deref(), Some("gray"));
     }
 }

@@ -6,7 +6,7 @@
 //! a row's crossings gives its runs (002 section 2.3.4, algorithm 9).
 //!
 //! - [`Placement`] scales, turns and moves the part; [`PixelGrid`] lays its pixels.
-//! - [`LayerHeights`] are layers of any thickness, [`LayerLevels`] gray levels.
+//! - [`LayerHeights`] are layers of any thickness, [`Shading`] gray levels.
 //! - [`Slices::trace`] finds the faulty edges behind stray rows.
 //! - [`section`](fn@section) cuts one section without rounding to pixels, and
 //!   [`FacetIndex`] finds facets by height.
@@ -92,7 +92,7 @@ pub use exact::Polished;
 pub use facet::{Facet, PlacedFacet, Units, facet_heights};
 pub use facet_index::FacetIndex;
 pub use fill::Fill;
-pub use gray::LayerLevels;
+pub use gray::{LayerLevels, Shading};
 pub use grid::PixelGrid;
 #[cfg(feature = "occt")]
 pub use open::second_opinion;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, FadingLevels, Image, Layer, Length, LevelChange, Mask, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Image, Layer, Length, LevelChange, Mask, PageInfo, StackInfo};
 use rayon::prelude::*;
 
 use crate::bodies::{
@@ -17,14 +17,14 @@ use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::{PlacedFacet, Units};
 use crate::fill::Fill;
-use crate::gray::{Columns, DepthRows, DepthSpan, LayerLevels, PrintThrough};
+use crate::gray::{Columns, DepthRows, DepthSpan, PlacedShading, PrintThrough, Shading};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placed_part::PlacedPart;
 use crate::placement::Placement;
 use crate::planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule, Planes};
 use crate::survey::Survey;
-use crate::table::{CutImage, CutLayer, FacetSource, OpenRows, Shading, Table, open_rows};
+use crate::table::{CutImage, CutLayer, FacetSource, OpenRows, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
 /// Options of slicing.
@@ -47,13 +47,9 @@ pub struct SliceOptions {
     pub placement: Placement,
     /// The rule that tells inside from outside.
     pub fill: Fill,
-    /// The gray level of each depth below a layer's top, for layers that are gray where
-    /// the part is less deep. The plane must then be [`PlaneRule::Top`].
-    pub gray: Option<LayerLevels>,
-    /// What each gray level leaves in the resin below, for gray layers whose doses add up, instead
-    /// of `gray`: down each column of pixels, the least light is taken away from white layers that
-    /// leaves the undersides where they are. The plane must then be [`PlaneRule::Top`].
-    pub print_through: Option<LayerLevels<FadingLevels>>,
+    /// The gray of layers where the part is less deep. The plane must then be
+    /// [`PlaneRule::Top`].
+    pub shading: Shading,
     /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
     /// The layers to be made; all if `None`.
@@ -111,8 +107,7 @@ impl Default for SliceOptions {
             units: Units::default(),
             placement: Placement::default(),
             fill: Fill::default(),
-            gray: None,
-            print_through: None,
+            shading: Shading::default(),
             polish: true,
             layers: None,
             grid: GridRule::Around { margin: 1 },
@@ -154,8 +149,7 @@ pub struct Slices {
     grid: PixelGrid,
     planes: Planes,
     rule: FillRule,
-    gray: Option<LayerLevels>,
-    print_through: Option<PrintThrough>,
+    shading: PlacedShading,
     wanted: Range<usize>,
     /// The layers that are cut: those wanted, those above them whose light counts, and those below
     /// with their undersides.
@@ -195,7 +189,7 @@ impl Slices {
     }
 
     fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
-        let is_gray = options.gray.is_some() || options.print_through.is_some();
+        let is_gray = options.shading != Shading::White;
         if is_gray && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
@@ -220,9 +214,8 @@ impl Slices {
             _ => planes.with_bodies(&survey.heights_of_bodies(&model)),
         };
         let wanted = wanted_layers(options.layers.as_ref(), planes.len())?;
-        let print_through = options.print_through.clone();
-        let print_through = print_through.map(|levels| PrintThrough::new(levels, &planes));
-        let cut = print_through.as_ref().map_or(wanted.clone(), |light| {
+        let shading = PlacedShading::new(&options.shading, &planes);
+        let cut = shading.print_through().map_or(wanted.clone(), |light| {
             light.first_below(wanted.start)..light.end_above(wanted.end - 1)
         });
         let is_usual =
@@ -232,8 +225,7 @@ impl Slices {
         }
         // A list that grows holds up to twice what it needs.
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
-        let reach_um = shading(options.gray.as_ref(), print_through.as_ref()).reach_um();
-        let reach_um = reach_um.unwrap_or(0.0);
+        let reach_um = shading.reach_um().unwrap_or(0.0);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
         if let Some(layer) = cut.clone().find(|&layer| expected[layer] > MAX_CROSSINGS) {
             let crossings = expected[layer];
@@ -261,8 +253,7 @@ impl Slices {
             survey,
             grid,
             rule,
-            gray: options.gray.clone(),
-            print_through,
+            shading,
             max_crossings,
             largest,
             pending: cut.start..cut.start,
@@ -322,7 +313,7 @@ impl Slices {
         }
         let planes = self.planes.moved(index, up.um(), [self.survey.min[2], self.survey.max[2]]);
         let cutter = Cutter { grid: &self.grid, planes: &planes, rule: &self.rule };
-        let reach_um = self.shading().reach_um();
+        let reach_um = self.shading.reach_um();
         let layers = index..index + 1;
         let below = reach_um.unwrap_or(0.0);
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
@@ -330,16 +321,12 @@ impl Slices {
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
         let Made { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
-        if let (Some(light), Some(depths)) = (&self.print_through, depths) {
+        if let (Some(light), Some(depths)) = (self.shading.print_through(), depths) {
             let mut columns = Columns::new(index);
             columns.extend(light, vec![depths]);
             choose(light, &columns, index, std::slice::from_mut(&mut layer));
         }
         Ok(layer)
-    }
-
-    fn shading(&self) -> Shading<'_> {
-        shading(self.gray.as_ref(), self.print_through.as_ref())
     }
 
     /// Returns the number of crossings of each layer of the part, by an estimate: the work follows
@@ -355,12 +342,12 @@ impl Slices {
 
     /// Returns whether layers are gray.
     pub fn is_gray(&self) -> bool {
-        self.gray.is_some() || self.print_through.is_some()
+        !matches!(self.shading, PlacedShading::White)
     }
 
-    /// Returns the gray levels of depths, if layers are gray by themselves.
-    pub fn levels(&self) -> Option<&LayerLevels> {
-        self.gray.as_ref()
+    /// Returns the gray of the layers.
+    pub fn shading(&self) -> Shading {
+        self.shading.unplaced()
     }
 
     /// Returns the least and the greatest corner of the part in its place, in
@@ -405,7 +392,7 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
-        let gray = self.shading().reach_um();
+        let gray = self.shading.reach_um();
         let reach_um = gray.unwrap_or(0.0);
         self.polished = self.polished.joined(self.table.polished());
         loop {
@@ -488,7 +475,7 @@ impl Slices {
     /// Adds the depths of a batch, and chooses the levels of the waiting layers above which all
     /// layers that count are known.
     fn choose_levels(&mut self, depths: Vec<DepthRows>) {
-        let Some(light) = &self.print_through else { return };
+        let Some(light) = self.shading.print_through() else { return };
         self.columns.extend(light, depths);
         let (Some(first), end) = (self.waiting.front(), self.pending.start) else { return };
         let first = first.info.index as usize;
@@ -513,7 +500,7 @@ impl Slices {
         open_rows: &OpenRows,
     ) -> Made {
         let CutLayer { image, stray_rows, closed, shared, mut doubts } =
-            table.layer(layer, cutter, self.model.surfaces(), self.shading());
+            table.layer(layer, cutter, self.model.surfaces(), &self.shading);
         let (image, depths) = match image {
             CutImage::Image(image) => (image, None),
             CutImage::Depths(depths) => {
@@ -596,15 +583,6 @@ struct Made {
     depths: Option<DepthRows>,
     shared: SharedCounts,
     doubts: LayerDoubts,
-}
-
-/// Returns what becomes of the layers' crossings.
-fn shading<'a>(gray: Option<&'a LayerLevels>, print_through: Option<&PrintThrough>) -> Shading<'a> {
-    match (print_through, gray) {
-        (Some(light), _) => Shading::Depths(light.within_um()),
-        (None, Some(levels)) => Shading::Levels(levels),
-        (None, None) => Shading::White,
-    }
 }
 
 /// Chooses the levels of layers from a first one on.

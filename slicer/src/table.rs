@@ -18,7 +18,7 @@ use crate::cutter::Cutter;
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
 use crate::facet::PlacedFacet;
 use crate::fill::Fill;
-use crate::gray::{DepthRows, DepthSpan, LayerLevels, LevelRows, ShadedRows, Shader};
+use crate::gray::{DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader};
 use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
 use crate::layer_share::LayerShare;
@@ -48,28 +48,6 @@ pub(crate) struct Table {
     shares: Vec<Vec<LayerShare>>,
     /// What polishing did to the crossings of these layers.
     tally: Tally,
-}
-
-/// What becomes of a layer's crossings.
-#[derive(Clone, Copy)]
-pub(crate) enum Shading<'a> {
-    /// A mask.
-    White,
-    /// Gray levels that cure the depth of the part.
-    Levels(&'a LayerLevels),
-    /// The depths of the part, as far as light reaches in micrometres.
-    Depths(f64),
-}
-
-impl Shading<'_> {
-    /// Returns how far below their sections layers look at facets.
-    pub(crate) fn reach_um(self) -> Option<f64> {
-        match self {
-            Self::White => None,
-            Self::Levels(levels) => Some(levels.reach_um()),
-            Self::Depths(reach_um) => Some(reach_um),
-        }
-    }
 }
 
 /// A layer's pixels.
@@ -250,23 +228,23 @@ impl Table {
         layer: usize,
         cutter: Cutter<'_>,
         surfaces: &[PlacedSurfaces],
-        shading: Shading<'_>,
+        shading: &PlacedShading,
     ) -> CutLayer {
         let width = cutter.grid.width;
         let spans = shading.reach_um().map(|um| self.spans(layer, cutter, surfaces, um));
         let spans = spans.unwrap_or_default();
         match shading {
-            Shading::White => {
+            PlacedShading::White => {
                 let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
                 cut.with(CutImage::Image(Image::Mask(mask)))
             }
-            Shading::Levels(levels) => {
+            PlacedShading::ByDepth(levels) => {
                 let rows = LevelRows::new(levels.of_layer(layer), width);
                 let shader = shader(rows, layer, cutter, &spans);
                 let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
                 cut.with(CutImage::Image(rows.finish()))
             }
-            Shading::Depths(_) => {
+            PlacedShading::PrintThrough(_) => {
                 let shader = shader(DepthRows::new(width), layer, cutter, &spans);
                 let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
                 cut.with(CutImage::Depths(rows))

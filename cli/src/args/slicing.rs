@@ -9,7 +9,7 @@ use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::placement::Numbers;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::words::differing;
-use lamp_pipeline::{Frame, Shading, SliceSettings, Thickness};
+use lamp_pipeline::{Frame, GrayRule, SliceSettings, Thickness};
 use lamp_slicer::{PLANE_TOLERANCE, PlaneRule};
 use lamp_stack::{Dpi, Length, Size};
 
@@ -154,10 +154,10 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
             plane_tolerance: args.plane_tolerance,
             solid: (&args.solid).into(),
             no_polish: args.no_polish,
-            shading: match (args.gray, args.print_through) {
-                (false, _) => Shading::None,
-                (true, false) => Shading::Gray,
-                (true, true) => Shading::PrintThrough,
+            gray: match (args.gray, args.print_through) {
+                (false, _) => GrayRule::None,
+                (true, false) => GrayRule::ByDepth,
+                (true, true) => GrayRule::PrintThrough,
             },
             exposure: (&args.exposure).into(),
             frame: match (args.origin, args.size) {

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Facet, Mesh, SplitMix};
-use lamp_slicer::{GridRule, LayerLevels, Part, SliceOptions, Slices};
+use lamp_slicer::{GridRule, Part, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, white_in_row};
 
 /// A pixel at 300 dpi, in mm.
@@ -375,7 +375,7 @@ fn what_can_be_known_of_broken_fins_slots_pins_and_walls_is_put_back() {
 fn exposed_pixels_of_gray_layers_are_put_back_as_well() {
     let um = Length::from_um;
     let levels = DepthLevels::new(um(50.0), |gray| um(50.0 * gray));
-    check(4..6, &SliceOptions { gray: Some(LayerLevels::from(levels)), ..options() });
+    check(4..6, &SliceOptions { shading: Shading::ByDepth(levels.into()), ..options() });
 }
 
 /// Prints what is left of the wrong pixels of many parts.

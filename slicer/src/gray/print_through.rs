@@ -60,6 +60,11 @@ impl PrintThrough {
         light
     }
 
+    /// Returns what each level of each layer leaves below.
+    pub(crate) fn levels(&self) -> &LayerLevels<FadingLevels> {
+        &self.levels
+    }
+
     /// Returns the most layers above a layer that count.
     pub(crate) fn most_above(&self) -> u32 {
         self.most_above

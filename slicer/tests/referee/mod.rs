@@ -2,9 +2,7 @@
 //! gray.
 
 use lamp_fixtures::{StepSample, StepUnit, step};
-use lamp_slicer::{
-    Axis, KernelName, LayerLevels, OpenOptions, Part, Placement, SliceOptions, Slices,
-};
+use lamp_slicer::{Axis, KernelName, OpenOptions, Part, Placement, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
 pub(crate) fn model(part: StepSample, chord_mm: f64) -> Part {
@@ -86,7 +84,7 @@ pub(crate) fn wrong_levels(
 ) -> (u32, u32) {
     let levels =
         DepthLevels::new(Length::from_um(REACH_UM), |part| Length::from_um(REACH_UM * part));
-    let options = SliceOptions { gray: Some(LayerLevels::from(levels)), ..options.clone() };
+    let options = SliceOptions { shading: Shading::ByDepth(levels.into()), ..options.clone() };
     let slices = Slices::new(model(part, chord_mm), &options).unwrap();
     let grid = *slices.grid();
     let [bottom_mm, top_mm] = slices.box_mm().map(|end| end[2]);

@@ -4,7 +4,7 @@
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
 use lamp_slicer::{
-    Axis, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule, SliceError,
+    Axis, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule, Shading, SliceError,
     SliceOptions, Slices,
 };
 use lamp_stack::{DepthLevels, Image, Layer, Length, gray_runs};
@@ -24,7 +24,7 @@ fn gray(overcure: f64, options: &SliceOptions) -> SliceOptions {
         Some(heights) => LayerLevels::by_thickness(heights, |um| Ok::<_, ()>(of(um))).unwrap(),
         None => of(options.thickness).into(),
     };
-    SliceOptions { gray: Some(levels), ..options.clone() }
+    SliceOptions { shading: Shading::ByDepth(levels), ..options.clone() }
 }
 
 fn depth_levels(overcure: f64, thickness: Length) -> DepthLevels {

@@ -4,7 +4,7 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Fill, LayerHeights, LayerLevels, OpenOptions, Part, SliceOptions, Slices};
+use lamp_slicer::{Fill, LayerHeights, OpenOptions, Part, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Layer, Length};
 
 use crate::common::{
@@ -184,8 +184,8 @@ fn even_heights_as_a_list_make_the_same_layers() {
     let mesh = part();
     let heights = Some(even_heights(&mesh));
     let gray = DepthLevels::new(Length::from_um(900.0), |g| Length::from_um(900.0 * g));
-    for gray in [None, Some(LayerLevels::from(gray))] {
-        let uniform = SliceOptions { gray: gray.clone(), ..coarse() };
+    for shading in [Shading::White, Shading::ByDepth(gray.into())] {
+        let uniform = SliceOptions { shading, ..coarse() };
         let given = SliceOptions { heights: heights.clone(), ..uniform.clone() };
         assert!(slice(&mesh, &given) == slice(&mesh, &uniform));
     }
