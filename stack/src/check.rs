@@ -15,8 +15,9 @@ use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::layer::{Image, PageInfo, short_number};
+use crate::image::Image;
 use crate::length::Dpi;
+use crate::page_info::{PageInfo, short_number};
 use crate::runs::{Change, RunImage};
 
 /// What a page's line says of its image and of the stack up to the page.

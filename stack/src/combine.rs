@@ -1,7 +1,7 @@
 //! Combines images pixel by pixel, on their runs.
 
 use crate::gray::GrayMask;
-use crate::layer::Image;
+use crate::image::Image;
 use crate::limits::MAX_RUNS;
 use crate::runs::{Change, Pixel, RunImage};
 

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::ops::Range;
 
-use crate::layer::Image;
+use crate::image::Image;
 use crate::runs::Change;
 
 /// Returns the mean levels of a region's boxes, row by row from the top.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::combine::walk_rows;
 use crate::frame::Frame;
 use crate::gray::GrayMask;
-use crate::layer::Image;
+use crate::image::Image;
 use crate::limits::MAX_RUNS;
 use crate::mask::Mask;
 use crate::runs::{Change, RunImage};

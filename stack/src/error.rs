@@ -6,10 +6,10 @@ use thiserror::Error;
 
 use crate::check::CheckFault;
 use crate::file_format::FileFormat;
+use crate::folder_list::FOLDER_LIST;
 use crate::g4::G4Error;
 use crate::note::ImagesBeside;
-use crate::picture_page::PictureFormat;
-use crate::temporary::FOLDER_LIST;
+use crate::picture_format::PictureFormat;
 
 /// What stands before the reason of a stage that gave up.
 pub(crate) const GAVE_UP: &str = "the stage before gave up: ";
@@ -365,4 +365,9 @@ fn last_whole_text(last_whole: Option<u32>) -> String {
         Some(layer) => format!("the last whole layer is {layer}"),
         None => "not one layer is whole".to_owned(),
     }
+}
+
+/// Returns the error of a page with a fault.
+pub(crate) fn malformed(page: u32, fault: PageFault) -> StackError {
+    StackError::Malformed { page, fault }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::Read;
 
 use crate::packed;
-use crate::picture_page::PictureFormat;
+use crate::picture_format::PictureFormat;
 use crate::plain_text::PlainText;
 
 /// The bytes at a file's start that [`FileFormat::of_start`] looks at.

@@ -1,6 +1,6 @@
 //! Crops and pads images, on their runs.
 
-use crate::layer::Image;
+use crate::image::Image;
 use crate::runs::{Change, RunImage};
 
 /// The rectangle that an image is cropped or padded to. Pixels beyond the image are black.

@@ -7,9 +7,10 @@ use thiserror::Error;
 
 use crate::error::StackError;
 use crate::input::Pages;
-use crate::layer::{Layer, StackInfo};
+use crate::layer::Layer;
 use crate::note::StackNote;
 use crate::ordered::map_in_order;
+use crate::page_info::StackInfo;
 use crate::tiff::Page;
 
 /// An error that prevents joining stacks.

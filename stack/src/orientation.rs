@@ -7,7 +7,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::combine::walk_rows;
-use crate::layer::Image;
+use crate::image::Image;
 use crate::limits::MAX_RUNS;
 use crate::runs::{Change, RunImage};
 

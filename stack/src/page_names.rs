@@ -6,10 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::StackError;
+use crate::folder_list::FOLDER_LIST;
 use crate::input::Pages;
 use crate::note::{PageGap, StackNote};
-use crate::picture_page::PictureFormat;
-use crate::temporary::FOLDER_LIST;
+use crate::picture_format::PictureFormat;
 use crate::text::one_line;
 
 /// The pages of a folder, and what the names in it show.

@@ -227,8 +227,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::layer::PageInfo;
-    use crate::tiff::Compression;
+    use crate::compression::Compression;
+    use crate::page_info::PageInfo;
 
     fn page(info: PageInfo, dpi: Option<f64>) -> PageHeader {
         PageHeader {

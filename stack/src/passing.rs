@@ -2,9 +2,11 @@
 
 use crate::check::rows_that_end_white;
 use crate::error::StackError;
-use crate::layer::{Image, Layer, PageInfo};
+use crate::image::Image;
+use crate::layer::Layer;
 use crate::length::Dpi;
 use crate::ordered::MemorySize;
+use crate::page_info::PageInfo;
 use crate::tiff::{EncodedPage, Page, PassedCode};
 
 /// A layer on its way to another stack: decoded, or as its page has it.

@@ -1,6 +1,5 @@
 //! Reads BMP, PNM, JPEG, WebP and GIF files as pages, and says which pictures are gray.
 
-use std::fmt;
 use std::io::Cursor;
 use std::sync::{Mutex, PoisonError};
 
@@ -11,117 +10,15 @@ use image::codecs::pnm::PnmDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, ColorType, ExtendedColorType, ImageDecoder, ImageError};
 
-use crate::error::{PageFault, StackError, UnsupportedFeature};
+use crate::error::{PageFault, UnsupportedFeature};
 use crate::gray::GrayMask;
-use crate::layer::Image;
+use crate::image::Image;
 use crate::length::has_square_pixels;
 use crate::limits::Limits;
+use crate::picture_fault::{PictureFault, check_runs, gray_level};
+use crate::picture_format::PictureFormat;
 use crate::png_page::Header;
 use crate::text::one_line;
-
-/// A format of pictures, other than PNG and TIFF, that are read as pages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PictureFormat {
-    /// Windows bitmap.
-    Bmp,
-    /// Graphics Interchange Format.
-    Gif,
-    /// JPEG, which is lossy: what was 1-bit has come out gray.
-    Jpeg,
-    /// Netpbm: PBM, PGM, PPM and PAM.
-    Pnm,
-    /// WebP.
-    WebP,
-}
-
-impl PictureFormat {
-    /// Returns the format's name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Bmp => "BMP",
-            Self::Gif => "GIF",
-            Self::Jpeg => "JPEG",
-            Self::Pnm => "PNM",
-            Self::WebP => "WebP",
-        }
-    }
-
-    /// Returns the format of a file that starts with these bytes.
-    pub(crate) fn of_start(start: &[u8]) -> Option<Self> {
-        match start {
-            [b'B', b'M', ..] => Some(Self::Bmp),
-            [b'G', b'I', b'F', b'8', ..] => Some(Self::Gif),
-            [0xFF, 0xD8, 0xFF, ..] => Some(Self::Jpeg),
-            [b'P', b'1'..=b'7', blank, ..] if blank.is_ascii_whitespace() => Some(Self::Pnm),
-            [b'R', b'I', b'F', b'F', ..] => Some(Self::WebP),
-            _ => None,
-        }
-    }
-
-    /// Returns the format of files with this extension, in small letters.
-    pub fn of_extension(extension: &str) -> Option<Self> {
-        match extension {
-            "bmp" => Some(Self::Bmp),
-            "gif" => Some(Self::Gif),
-            "jpg" | "jpeg" => Some(Self::Jpeg),
-            "pbm" | "pgm" | "ppm" | "pnm" | "pam" => Some(Self::Pnm),
-            "webp" => Some(Self::WebP),
-            _ => None,
-        }
-    }
-}
-
-impl fmt::Display for PictureFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// A reason why a picture cannot be read as a page.
-#[derive(Debug)]
-pub(crate) enum PictureFault {
-    Unsupported(UnsupportedFeature),
-    Malformed(PageFault),
-    /// The pixels are not square: the resolution across and down.
-    Rectangular([f64; 2]),
-}
-
-impl PictureFault {
-    pub(crate) fn on(self, page: u32) -> StackError {
-        match self {
-            Self::Unsupported(feature) => StackError::Unsupported { page, feature },
-            Self::Malformed(fault) => StackError::Malformed { page, fault },
-            Self::Rectangular([across, down]) => {
-                StackError::RectangularPixels { page, across, down }
-            }
-        }
-    }
-}
-
-/// Returns the gray level of a pixel: a level, or red, green and blue, with or without opacity.
-///
-/// Colours may differ by one level, as lossy formats round each by itself.
-pub(crate) fn gray_level(pixel: &[u8]) -> Result<u8, PictureFault> {
-    let (colours, opacity) = match pixel.len() {
-        2 | 4 => pixel.split_at(pixel.len() - 1),
-        _ => (pixel, &[0xFF][..]),
-    };
-    if opacity != [0xFF] {
-        return Err(PictureFault::Unsupported(UnsupportedFeature::Transparency));
-    }
-    match *colours {
-        [level] => Ok(level),
-        [r, g, b] if r.max(g).max(b) - r.min(g).min(b) <= 1 => {
-            Ok(((u16::from(r) + u16::from(g) + u16::from(b) + 1) / 3) as u8)
-        }
-        _ => Err(PictureFault::Unsupported(UnsupportedFeature::Colour)),
-    }
-}
-
-/// Returns an error if an image has more runs than a reader takes.
-pub(crate) fn check_runs(runs: usize, max: usize) -> Result<(), PictureFault> {
-    if runs > max { Err(PictureFault::Malformed(PageFault::TooManyRuns)) } else { Ok(()) }
-}
 
 /// Reads the header of a picture.
 pub(crate) fn header(

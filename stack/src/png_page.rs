@@ -4,15 +4,16 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
 
+use crate::bits::{bit_transitions, byte_runs};
 use crate::check::Line;
 use crate::error::{PageFault, UnsupportedFeature};
 use crate::gray::GrayMask;
-use crate::layer::{Image, PageInfo};
+use crate::image::Image;
 use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
 use crate::mask::Mask;
-use crate::picture_page::{PictureFault, check_runs, gray_level};
-use crate::tiff::{bit_transitions, byte_runs};
+use crate::page_info::PageInfo;
+use crate::picture_fault::{PictureFault, check_runs, gray_level};
 
 /// The first bytes of every PNG.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";

@@ -6,12 +6,13 @@ use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, PixelDimensions, Unit,
 };
 
+use crate::bits::bits;
 use crate::check::{Chain, OpenLine};
 use crate::error::StackError;
 use crate::gray::gray_runs;
-use crate::layer::{Image, Layer};
+use crate::image::Image;
+use crate::layer::Layer;
 use crate::length::Dpi;
-use crate::mask::white_runs;
 use crate::ordered::map_in_order;
 use crate::page_folder::{PageFile, PageFolder};
 use crate::png_page::{DESCRIPTION, EXACT_DPI};
@@ -203,25 +204,6 @@ fn write_rows(
     writer.finish()
 }
 
-/// Packs a row's pixels, eight per byte, the first in the highest bit.
-pub(crate) fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
-    let mut bytes = vec![0; width.div_ceil(8) as usize];
-    for (start, end) in white_runs(transitions, width) {
-        let (first, last) = ((start / 8) as usize, (end / 8) as usize);
-        let (from, to) = (0xFF >> (start % 8), !(0xFF >> (end % 8)));
-        if first == last {
-            bytes[first] |= from & to;
-            continue;
-        }
-        bytes[first] |= from;
-        bytes[first + 1..last].fill(0xFF);
-        if to != 0 {
-            bytes[last] |= to;
-        }
-    }
-    bytes
-}
-
 fn pixel_dims(dpi: Dpi) -> PixelDimensions {
     let per_metre = dpi.per_metre();
     PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
@@ -254,27 +236,9 @@ impl<W: Write> Write for Noting<W> {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
     use crate::check::Line;
     use crate::{Limits, Mask, PageInfo, StackInfo, png_page};
-
-    proptest! {
-        #[test]
-        fn bits_are_what_the_runs_say(
-            width in 1u32..100,
-            columns in proptest::collection::btree_set(0u32..100, 0..12),
-        ) {
-            let row: Vec<u32> = columns.into_iter().filter(|&column| column < width).collect();
-            let bytes = bits(&row, width);
-            let mask = Mask::new(width, vec![0, row.len() as u32], row).unwrap();
-            let white = |column: u32| bytes[column as usize / 8] << (column % 8) & 0x80 != 0;
-            prop_assert_eq!(bytes.len(), width.div_ceil(8) as usize);
-            // The last byte is padded with black.
-            prop_assert!((0..8 * bytes.len() as u32).all(|c| white(c) == mask.is_white(c, 0)));
-        }
-    }
 
     fn layer(dpi: f64, part: &str) -> Layer {
         let stack = StackInfo { part: part.to_owned(), ..StackInfo::default() };

@@ -9,8 +9,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::error::StackError;
-use crate::layer::{Layer, StackInfo};
+use crate::layer::Layer;
 use crate::ordered::map_in_order;
+use crate::page_info::StackInfo;
 use crate::temporary::FolderBeside;
 use crate::tiff::{EncodedPage, Format, PageWriter};
 

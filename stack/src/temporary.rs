@@ -13,6 +13,7 @@ use tempfile::{Builder, NamedTempFile, TempDir, TempPath};
 
 use crate::durable::{close, sync, sync_all_in, sync_folder};
 use crate::error::StackError;
+use crate::folder_list::{FOLDER_LIST, list_of};
 use crate::leftovers::{END, RANDOM_LETTERS, claim, remove_leftovers, start_of_name};
 use crate::text::one_line;
 
@@ -383,22 +384,6 @@ fn check_replaceable(path: &Path, replaces: bool) -> Result<Existing, StackError
         Some(name) => Err(StackError::NotReplaceable { name: one_line(&name.to_string_lossy()) }),
         None => Ok(Existing::Replaceable),
     }
-}
-
-/// The file in a folder that lists the others, so that it is known who made them.
-pub const FOLDER_LIST: &str = ".lamp-folder";
-
-/// Returns a line on what the list of a folder is for, and the names of its files.
-fn list_of(folder: &Path) -> io::Result<String> {
-    let names = fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name()));
-    let mut names = names.collect::<io::Result<Vec<_>>>()?;
-    names.sort_unstable();
-    let first = "lamp wrote the files below. With --force it replaces a folder of no others.";
-    let lines = names.iter().map(|name| name.to_string_lossy());
-    Ok([first.into()]
-        .into_iter()
-        .chain(lines)
-        .fold(String::new(), |text, line| text + &line + "\n"))
 }
 
 /// Returns the parent folder of `path`.

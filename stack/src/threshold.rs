@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::num::NonZeroU8;
 
 use crate::gray::{GrayMask, LevelChange};
-use crate::layer::Image;
+use crate::image::Image;
 use crate::mask::{Mask, MaskBuilder};
 
 /// Returns the transitions of the pixels of a gray row that have at least `level`, which is

@@ -1,7 +1,8 @@
 //! Sums up what the pages of a stack say.
 
-use crate::layer::PageInfo;
-use crate::tiff::{Compression, PageHeader};
+use crate::compression::Compression;
+use crate::page_info::PageInfo;
+use crate::tiff::PageHeader;
 
 /// The facts of a stack, summed over its pages.
 #[derive(Clone, Debug)]

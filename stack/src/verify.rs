@@ -3,9 +3,9 @@
 use thiserror::Error;
 
 use crate::error::StackError;
-use crate::layer::PageInfo;
 use crate::length::{Dpi, Length};
 use crate::ordered::map_in_order;
+use crate::page_info::PageInfo;
 use crate::tiff::{Page, PageHeader};
 use crate::totals::StackTotals;
 

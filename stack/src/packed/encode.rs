@@ -10,7 +10,8 @@ use super::write::PackLevel;
 use super::{FRAME_BYTES, FRAME_COST, KEY_LAYERS, MOST_ROWS};
 use crate::check::{Chain, OpenLine};
 use crate::error::{PageFault, StackError};
-use crate::layer::{Image, Layer};
+use crate::image::Image;
+use crate::layer::Layer;
 use crate::ordered::MemorySize;
 
 /// A layer, and the one below if its image may be coded against that.

@@ -7,9 +7,6 @@ use super::streams::Streams;
 use super::{FRAME_COST, KEY_LAYERS, MOST_ROWS};
 use crate::limits::Limits;
 
-/// The first bytes of a packed stack, the last of them its version. As in PNG's, a byte that is no
-/// text and both ends of lines show what a transfer as text does to it.
-pub(crate) const SIGNATURE: [u8; 8] = [0x93, b'L', b'A', b'M', b'P', b'\r', b'\n', 1];
 /// The bytes before the first frame: the signature and the format of the TIFF.
 pub(super) const START_BYTES: u64 = 9;
 /// The last bytes of a packed stack, after the length of the index.

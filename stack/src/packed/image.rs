@@ -4,12 +4,13 @@ use super::blocks::packed_len;
 use super::levels::{self, Split};
 use super::rows::{self, Reference};
 use super::streams::{Cursor, Streams};
+use crate::bits::{bit_transitions, bits as bits_of_row, byte_runs};
 use crate::g4;
-use crate::layer::{Image, LayerImage};
+use crate::image::Image;
+use crate::layer::LayerImage;
 use crate::limits::MAX_RUNS;
 use crate::mask::Mask;
-use crate::png_write::bits as bits_of_row;
-use crate::tiff::{PackedShape, bit_transitions, byte_runs};
+use crate::tiff::PackedShape;
 
 /// How an image is coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,9 +13,9 @@ use crate::check::{Chain, OpenLine};
 use crate::error::{PageFault, StackError};
 use crate::input::Pages;
 use crate::join::{JoinError, Joined, in_stack, survey};
-use crate::layer::{PageInfo, StackInfo};
 use crate::limits::Limits;
 use crate::output::Destination;
+use crate::page_info::{PageInfo, StackInfo};
 use crate::tiff::{Format, Page, Source};
 
 /// Joins packed stacks as [`join`](crate::join) does, and writes them as a packed stack: images

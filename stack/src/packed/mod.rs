@@ -26,7 +26,6 @@ mod write;
 #[cfg(test)]
 mod packed_tests;
 
-pub(crate) use frame::SIGNATURE;
 pub use join::{copy_packed, join_packed};
 pub(crate) use read::Unpacker;
 pub use write::{PackLevel, write_packed};
@@ -40,3 +39,7 @@ const FRAME_COST: u64 = 4 << 20;
 const FRAME_BYTES: usize = 1 << 20;
 /// The most rows of an image: rows like others take memory without any bytes behind them.
 const MOST_ROWS: u32 = 1 << 22;
+
+/// The first bytes of a packed stack, the last of them its version. As in PNG's, a byte that is no
+/// text and both ends of lines show what a transfer as text does to it.
+pub(crate) const SIGNATURE: [u8; 8] = [0x93, b'L', b'A', b'M', b'P', b'\r', b'\n', 1];

@@ -6,9 +6,11 @@ use std::sync::{Arc, Mutex};
 use proptest::prelude::*;
 
 use super::{KEY_LAYERS, PackLevel, join_packed, write_packed};
-use crate::layer::{Image, Layer, LayerImage, PageInfo, Strip};
+use crate::image::Image;
+use crate::layer::{Layer, LayerImage, Strip};
 use crate::mask::Mask;
 use crate::output::Destination;
+use crate::page_info::PageInfo;
 use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 use crate::{
     Compression, Dpi, Format, IndexedStack, JoinError, Pages, StackError, g4, write_stack,

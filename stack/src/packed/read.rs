@@ -13,7 +13,7 @@ use super::frame::{
 use super::image::{Shape, decode};
 use crate::check::Line;
 use crate::error::{PageFault, StackError};
-use crate::layer::Image;
+use crate::image::Image;
 use crate::limits::Limits;
 use crate::text::one_line;
 use crate::tiff::{Format, Page, Source};

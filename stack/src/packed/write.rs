@@ -4,9 +4,10 @@ use std::fmt::Display;
 use std::io::{BufWriter, Write};
 use std::ops::RangeInclusive;
 
+use super::SIGNATURE;
 use super::blocks::Packer;
 use super::encode::{CodedLayer, Frames, OpenFrame, Pair, pairs};
-use super::frame::{IndexEntry, NOTICE, SIGNATURE, index, part};
+use super::frame::{IndexEntry, NOTICE, index, part};
 use super::streams::Streams;
 use crate::error::{GAVE_UP, StackError};
 use crate::layer::Layer;

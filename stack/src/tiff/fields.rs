@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::layout::Layout;
-use super::page::{Compression, Page};
+use super::page::Page;
 use super::tags::{
     BITS_PER_SAMPLE, BLACK_IS_ZERO, BYTE, COMPRESSION, DEFLATE, DOUBLE, FILL_ORDER, FLOAT, IFD,
     IFD8, IMAGE_DESCRIPTION, IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, LZW, MODIFIED_HUFFMAN,
@@ -15,7 +15,8 @@ use super::tags::{
     Y_RESOLUTION, type_size,
 };
 use crate::check::{CheckFault, Line};
-use crate::error::{PageFault, StackError, UnsupportedFeature};
+use crate::compression::Compression;
+use crate::error::{PageFault, StackError, UnsupportedFeature, malformed};
 use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
 use crate::orientation::Orientation;
@@ -271,10 +272,6 @@ impl Fields {
     fn unsupported(&self, feature: UnsupportedFeature) -> StackError {
         StackError::Unsupported { page: self.page, feature }
     }
-}
-
-pub(super) fn malformed(page: u32, fault: PageFault) -> StackError {
-    StackError::Malformed { page, fault }
 }
 
 /// Returns an unsigned number of up to 8 bytes.

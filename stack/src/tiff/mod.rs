@@ -23,11 +23,8 @@ mod tiles;
 mod unpack;
 mod write;
 
-pub(crate) use page::PackedShape;
-pub(crate) use page::PassedCode;
-pub(crate) use page::bit_transitions;
-pub use page::{Compression, Page, PageHeader};
+pub(crate) use page::{PackedShape, PassedCode};
+pub use page::{Page, PageHeader};
 pub use read::PageReader;
 pub(crate) use source::Source;
-pub(crate) use unpack::byte_runs;
 pub use write::{EncodedPage, Format, PageWriter};

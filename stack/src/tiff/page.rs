@@ -3,50 +3,26 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::bits::{bit_transitions, set_bits};
 use crate::check::{ChainReader, CheckFault, CodeCheck, ImageCheck, Line, LineCheck, image_crc};
-use crate::error::{PageFault, StackError};
+use crate::compression::Compression;
+use crate::error::{PageFault, StackError, malformed};
 use crate::g4::{self, G4Error, Group3};
 use crate::gray::GrayMask;
-use crate::layer::{Image, Layer, LayerImage, PageInfo, Strip};
+use crate::image::Image;
+use crate::layer::{Layer, LayerImage, Strip};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::mask::Mask;
 use crate::ordered::MemorySize;
 use crate::orientation::Orientation;
-use crate::picture_page::{self, PictureFormat};
+use crate::page_info::PageInfo;
+use crate::picture_page;
 use crate::png_page::{self, Header};
 use crate::runs::{Change, RunImage};
-use crate::tiff::fields::malformed;
 use crate::tiff::layout::Layout;
 use crate::tiff::tiles::join_tiles;
 use crate::tiff::unpack::{PieceShape, UnpackError, unpack};
-
-/// The compression of a page's image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Compression {
-    /// No compression.
-    Uncompressed,
-    /// CCITT modified Huffman: Group 3 without end-of-line codes.
-    ModifiedHuffman,
-    /// CCITT Group 3, one-dimensional.
-    Group3,
-    /// CCITT Group 3, two-dimensional.
-    Group3TwoDimensional,
-    /// CCITT Group 4.
-    G4,
-    /// TIFF's LZW.
-    Lzw,
-    /// Deflate (zlib).
-    Deflate,
-    /// Apple's PackBits run lengths.
-    PackBits,
-    /// The page is a PNG file.
-    Png,
-    /// The page is another picture file.
-    Picture(PictureFormat),
-    /// The page is one of a packed stack.
-    Packed,
-}
 
 /// A page that is not decoded yet.
 #[derive(Clone, Debug)]
@@ -483,54 +459,5 @@ impl Page {
 
     fn too_many_runs(&self) -> StackError {
         malformed(self.number, PageFault::TooManyRuns)
-    }
-}
-
-/// Returns the columns of the set bits in a row, given as runs of bytes: the transitions of a row
-/// whose bits are stored as differences.
-fn set_bits(row: &[(u32, u8)], width: u32) -> Vec<u32> {
-    let mut columns = Vec::new();
-    let mut column = 0;
-    for &(length, byte) in row {
-        if byte != 0 {
-            let starts = (column..).step_by(8).take(length as usize);
-            let set = (0..8).filter(|bit| byte << bit & 0x80 != 0);
-            columns.extend(starts.flat_map(|start| set.clone().map(move |bit| start + bit)));
-        }
-        column += 8 * length;
-    }
-    columns.truncate(columns.partition_point(|&column| column < width));
-    columns
-}
-
-/// Returns the transitions of a row of bits, given as runs of bytes.
-pub(crate) fn bit_transitions(row: &[(u32, u8)], width: u32) -> Vec<u32> {
-    let mut transitions = Vec::new();
-    let (mut column, mut before) = (0, 0u8);
-    for &(length, byte) in row {
-        // A run of 00 or FF toggles at most at its start.
-        let visited = if matches!(byte, 0 | 0xFF) { 1 } else { length };
-        for start in (column..).step_by(8).take(visited as usize) {
-            let toggles = byte ^ (byte >> 1 | before << 7);
-            let toggled = (0..8).filter(|bit| toggles << bit & 0x80 != 0);
-            transitions.extend(toggled.map(|bit| start + bit));
-            before = byte;
-        }
-        column += 8 * length;
-    }
-    transitions.truncate(transitions.partition_point(|&column| column < width));
-    transitions
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bits_become_transitions() {
-        let row = [(1, 0b0110_0001), (2, 0xFF), (2, 0b1010_1010), (1, 0)];
-        let expected = [1, 3, 7, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39];
-        assert_eq!(bit_transitions(&row, 48), expected);
-        assert_eq!(bit_transitions(&row, 26), [1, 3, 7, 25]);
     }
 }

@@ -4,20 +4,22 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs::File;
 use std::io::{BufReader, Read};
 
-use super::fields::{Fields, KNOWN, malformed, number};
-use super::page::{Compression, Page};
+use super::fields::{Fields, KNOWN, number};
+use super::page::Page;
 use super::source::Source;
 use super::tags::{
     BYTE, FILL_ORDER, LONG, MASK, NEW_SUBFILE_TYPE, OLD_REDUCED, REDUCED, SHORT, SUB_IFDS,
     SUBFILE_TYPE, type_size,
 };
 use super::write::{Format, Notice};
-use crate::error::{PageFault, StackError};
+use crate::compression::Compression;
+use crate::error::{PageFault, StackError, malformed};
 use crate::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
 use crate::note::ImagesBeside;
 use crate::packed::{self, Unpacker};
-use crate::picture_page::{self, PictureFormat};
+use crate::picture_format::PictureFormat;
+use crate::picture_page;
 use crate::png_page;
 use crate::text::one_line;
 

@@ -5,7 +5,8 @@ use std::io::{self, Read};
 use flate2::read::ZlibDecoder;
 use weezl::{BitOrder, LzwStatus, decode::Decoder};
 
-use super::page::Compression;
+use crate::bits::byte_runs;
+use crate::compression::Compression;
 use crate::{deflate, packbits};
 
 /// A reason to stop decompressing.
@@ -118,12 +119,6 @@ fn cut_bytes(
         }
     }
     Ok(())
-}
-
-/// Replaces `runs` by the runs `(length, byte)` of a row of bytes.
-pub(crate) fn byte_runs(row: &[u8], runs: &mut Vec<(u32, u8)>) {
-    runs.clear();
-    runs.extend(row.chunk_by(|a, b| a == b).map(|run| (run.len() as u32, run[0])));
 }
 
 /// Appends a run, or extends the last run if it has the same byte.

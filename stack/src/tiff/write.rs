@@ -5,7 +5,7 @@ use std::io::{BufWriter, IntoInnerError, Write};
 
 use serde::{Deserialize, Serialize};
 
-use super::page::{Compression, Page, PassedCode};
+use super::page::{Page, PassedCode};
 use super::tags::{
     ASCII, BITS_PER_SAMPLE, BLACK_IS_ZERO, COMPRESSION, DEFLATE, FILL_ORDER, IMAGE_DESCRIPTION,
     IMAGE_LENGTH, IMAGE_WIDTH, LONG, LONG8, NEW_SUBFILE_TYPE, ORIENTATION, PACK_BITS, PER_INCH,
@@ -14,9 +14,11 @@ use super::tags::{
     Y_RESOLUTION,
 };
 use crate::check::{Chain, CodeCheck, OpenLine};
+use crate::compression::Compression;
 use crate::durable::close;
 use crate::error::{GAVE_UP, StackError};
-use crate::layer::{Image, Layer};
+use crate::image::Image;
+use crate::layer::Layer;
 use crate::page_folder::PageFile;
 use crate::{deflate, g4};
 
