@@ -12,6 +12,7 @@ mod doses;
 pub mod ecpl;
 pub mod learn;
 mod light;
+mod numeric;
 pub mod projector;
 mod region;
 mod resin_light;

@@ -68,7 +68,7 @@ pub enum LampError {
     Under {
         /// The material's name.
         material: String,
-        /// What is wrong with its numbers.
+        /// The impossible number.
         problem: MaterialError,
     },
 }
@@ -143,7 +143,7 @@ impl FromStr for LampLight {
     /// Parses a light, a percentage up to 1000, or an optical density up to 6.
     ///
     /// # Errors
-    /// Returns an error if it is none of these.
+    /// Returns an error if the text is something else.
     fn from_str(text: &str) -> Result<Self, LampLightError> {
         let wrong = || LampLightError::NotALight(text.to_owned());
         let lower = text.to_lowercase();

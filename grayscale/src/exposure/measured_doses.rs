@@ -29,7 +29,7 @@ impl MeasuredDoses {
         Self::of(material, range.map(|range| range.doses))
     }
 
-    /// Creates the range of doses that cure as wide as the material says: those that all its sizes
+    /// Creates the range of doses that cure as wide as the material says: doses that all its sizes
     /// were measured at.
     pub fn of_widths(material: &Material) -> Self {
         let ranges = material.cure_width.iter().filter_map(|size| size.measured.as_ref());

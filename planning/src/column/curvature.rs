@@ -2,12 +2,7 @@
 
 use super::light::{ColumnLight, product};
 use super::taps::Taps;
-
-/// A matrix that is symmetric and has no negative eigenvalue, as a product.
-pub(super) trait Curvature: Sync {
-    /// Returns the product with a number for each mirror.
-    fn apply(&self, mirrors: &[f64]) -> Vec<f64>;
-}
+use crate::numeric::Curvature;
 
 /// The product of H's transpose with H, or its mean over shifts: a matrix for each axis.
 pub(super) struct Normal<'a> {

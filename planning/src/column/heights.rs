@@ -3,8 +3,8 @@
 use super::curvature::Weighted;
 use super::curve::HeightCurve;
 use super::light::ColumnLight;
-use super::search::{Bounded, Place};
 use super::times::{Stop, Times, frank_wolfe_gap};
+use crate::numeric::{Bounded, Place};
 
 /// How far cured heights are from those wanted, in um, on lights that count alike.
 ///

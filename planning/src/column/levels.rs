@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::curvature::Curvature;
 use super::light::ColumnLight;
-use super::search::Bounded;
+use crate::numeric::{Bounded, Curvature, dot};
 
 /// Rows of column voxels that a thread takes at a time.
 const ROWS: usize = 16;
@@ -23,8 +22,7 @@ struct Dense(Vec<Vec<f64>>);
 
 impl Curvature for Dense {
     fn apply(&self, numbers: &[f64]) -> Vec<f64> {
-        let dot = |row: &Vec<f64>| row.iter().zip(numbers).map(|(a, b)| a * b).sum();
-        self.0.iter().map(dot).collect()
+        self.0.iter().map(|row| dot(row, numbers)).collect()
     }
 }
 

@@ -10,7 +10,6 @@ mod levels;
 mod light;
 mod measures;
 mod plan;
-mod search;
 mod spread;
 mod taps;
 mod times;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::curvature::Normal;
 use super::light::ColumnLight;
-use super::search::{Bounded, Place};
+use crate::numeric::{Bounded, Place};
 
 /// When a search for times ends.
 #[derive(Clone, Copy, Debug, PartialEq)]

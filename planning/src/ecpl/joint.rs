@@ -9,7 +9,7 @@ use super::profile::Wanted;
 use super::reactor::Chamber;
 use super::simulation::{Shown, Simulation};
 use super::{Exposure, PlanError};
-use crate::speed::{Stop, descend};
+use crate::numeric::{DescentEnd, descend, dot};
 
 /// Light that does not reach the wanted height in this time, in seconds, never will in practice.
 const LONGEST_S: f64 = 300.0;
@@ -241,7 +241,7 @@ impl Slopes {
         let held = held * steepest;
         let bounds = [vec![0.0; times.len()], vec![longest_s; times.len()]];
         let mut next = times.to_vec();
-        let stop = Stop { steps: 400, fall: 1e-10 };
+        let stop = DescentEnd { steps: 400, fall: 1e-10 };
         descend(&mut next, [&bounds[0], &bounds[1]], stop, |next| {
             let step: Vec<f64> = next.iter().zip(times).map(|(next, time)| next - time).collect();
             let left = self.after(&step);
@@ -307,8 +307,4 @@ fn moves(rings: usize) -> impl Iterator<Item = Vec<(usize, i32)>> {
 
 fn square(a: &[f64]) -> f64 {
     dot(a, a)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -9,6 +9,7 @@ use lamp_stack::Length;
 use thiserror::Error;
 
 use crate::light::{Light, SampleHeight};
+use crate::numeric::solve_positive;
 use crate::speed::{Simulation, TimedPart};
 
 /// A measured height.
@@ -143,7 +144,7 @@ impl LogDoses {
                 covariance[row * size + column] = self.covariance(a.0, b.0) + noise;
             }
         }
-        let weights = solve(&mut covariance, layers.iter().map(|layer| layer.1).collect());
+        let weights = solve_positive(&mut covariance, layers.iter().map(|layer| layer.1).collect());
         let gained: Vec<f64> = (0..self.values.len())
             .map(|k| layers.iter().zip(&weights).map(|(a, w)| self.covariance(k, a.0) * w).sum())
             .collect();
@@ -158,29 +159,6 @@ impl LogDoses {
         let away = 3.0_f64.sqrt() * (self.z_um[a] - self.z_um[b]).abs() / range;
         UNSURE * UNSURE * (1.0 + away) * (-away).exp()
     }
-}
-
-/// Solves the equations of a symmetric positive matrix, by Cholesky's factors.
-fn solve(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64> {
-    let size = right.len();
-    for column in 0..size {
-        for row in column..size {
-            let earlier: f64 =
-                (0..column).map(|k| matrix[row * size + k] * matrix[column * size + k]).sum();
-            let left = matrix[row * size + column] - earlier;
-            matrix[row * size + column] =
-                if row == column { left.sqrt() } else { left / matrix[column * size + column] };
-        }
-    }
-    for row in 0..size {
-        let known: f64 = (0..row).map(|k| matrix[row * size + k] * right[k]).sum();
-        right[row] = (right[row] - known) / matrix[row * size + row];
-    }
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|k| matrix[k * size + row] * right[k]).sum();
-        right[row] = (right[row] - known) / matrix[row * size + row];
-    }
-    right
 }
 
 #[cfg(test)]

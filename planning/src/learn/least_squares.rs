@@ -2,7 +2,7 @@
 
 use super::law::ModelLaw;
 use super::response::Response;
-use crate::speed::{Stop, descend};
+use crate::numeric::{DescentEnd, descend, dot, solve_by_conjugate_gradients};
 
 /// What a step weighs, layer by layer.
 pub(crate) struct Weights {
@@ -50,24 +50,9 @@ impl Weights {
         let scale: Vec<_> = self.changes.iter().map(|weight| weight.sqrt().recip()).collect();
         let scaled =
             |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a * scale).collect::<Vec<_>>();
-        let mut left = scaled(&self.pull(response, errors));
-        let mut step = vec![0.0; left.len()];
-        let mut along = left.clone();
-        let mut square = dot(&left, &left);
-        let enough = square * 1e-22;
-        for _ in 0..4 * step.len() {
-            if square <= enough {
-                break;
-            }
-            let turned = scaled(&self.apply(response, &scaled(&along)));
-            let length = square / dot(&along, &turned);
-            add(&mut step, length, &along);
-            add(&mut left, -length, &turned);
-            let next = dot(&left, &left);
-            along.iter_mut().zip(&left).for_each(|(a, left)| *a = left + next / square * *a);
-            square = next;
-        }
-        scaled(&step)
+        let apply = |step: &[f64]| scaled(&self.apply(response, &scaled(step)));
+        let pull = scaled(&self.pull(response, errors));
+        scaled(&solve_by_conjugate_gradients(apply, pull))
     }
 }
 
@@ -84,7 +69,7 @@ pub(crate) fn bounded_step(
     let pull = weights.pull(response, errors);
     let [low, high] = bounds.map(shares);
     let mut step = shares(&weights.solve(response, errors));
-    let stop = Stop { steps: 500, fall: 1e-12 };
+    let stop = DescentEnd { steps: 500, fall: 1e-12 };
     descend(&mut step, [&low, &high], stop, |step| {
         let changes = times(step);
         let bent = weights.apply(response, &changes);
@@ -93,12 +78,4 @@ pub(crate) fn bounded_step(
         (value, times(&slopes))
     });
     times(&step)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn add(to: &mut [f64], times: f64, what: &[f64]) {
-    to.iter_mut().zip(what).for_each(|(to, what)| *to += times * what);
 }

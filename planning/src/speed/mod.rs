@@ -4,7 +4,6 @@
 //! their doses. [`plan`] finds the times with the least error and bounds what any others could do.
 
 mod columns;
-mod descent;
 mod feasible;
 mod gather;
 mod hinge;
@@ -15,7 +14,6 @@ mod tally;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub(crate) use descent::{Stop, descend};
 pub use feasible::{Platform, PlatformError, Speed};
 pub use part::{PartError, PartLayer, PartPages, TimedPart};
 pub use plan::{PlanError, SpeedOptions, SpeedPlan, Stage, plan, plan_corrected};

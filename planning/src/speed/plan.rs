@@ -3,13 +3,13 @@
 use lamp_grayscale::resin::ExposureTime;
 use thiserror::Error;
 
-use super::descent::{Stop, descend};
 use super::feasible::{Feasible, Platform, PlatformError};
 use super::hinge::{Hinge, Priced};
 use super::part::{PartError, TimedPart};
 use super::simulation::Simulation;
 use super::tally::Tally;
 use crate::light::Light;
+use crate::numeric::{DescentEnd, descend};
 
 /// What to plan for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -201,7 +201,7 @@ impl Problem<'_> {
             .map(|ends| ends.iter().zip(&scale).map(|(end, scale)| end / scale).collect());
         let [low, high]: [Vec<f64>; 2] = bounds;
         let mut x = vec![1.0; scale.len()];
-        let stop = Stop { steps: STEPS, fall: 1e-9 };
+        let stop = DescentEnd { steps: STEPS, fall: 1e-9 };
         descend(&mut x, [&low, &high], stop, |x| {
             let times: Vec<_> = x.iter().zip(&scale).map(|(x, scale)| x * scale).collect();
             let priced = self.price(&times, smoothing);

@@ -1,4 +1,4 @@
-//! The times whose doses are nearest to those that are wanted: conjugate gradients between bounds.
+//! Finds the least value of a quadratic function between bounds: conjugate gradients.
 //!
 //! Source: Z. Dostál and J. Schöberl, *Minimizing quadratic functions subject to bound
 //! constraints with the rate of convergence and finite termination*, Comput. Optim. Appl. 30
@@ -6,26 +6,30 @@
 
 use rayon::prelude::*;
 
-use super::curvature::Curvature;
-
 /// Numbers that a thread takes at a time. Sums are those of chunks, in order, so that the number
 /// of threads changes no bit.
 const CHUNK: usize = 1 << 13;
 /// Steps along the slopes, as a share of what cannot raise the value.
 const STEP: f64 = 1.9;
 
-/// The least value of `x A x / 2 - b x` for `x` between zero and a bound.
-pub(super) struct Bounded<'a, C> {
-    pub(super) curvature: &'a C,
-    /// b: the slopes at zero, negated.
-    pub(super) pull: &'a [f64],
-    pub(super) high: f64,
+/// A matrix that is symmetric and has no negative eigenvalue, as a product.
+pub(crate) trait Curvature: Sync {
+    /// Returns the product with numbers.
+    fn apply(&self, numbers: &[f64]) -> Vec<f64>;
 }
 
-/// Where a search stands: the times, and the slopes there.
-pub(super) struct Place {
-    pub(super) x: Vec<f64>,
-    pub(super) slopes: Vec<f64>,
+/// The least value of `x A x / 2 - b x` for `x` between zero and a bound.
+pub(crate) struct Bounded<'a, C> {
+    pub(crate) curvature: &'a C,
+    /// b: the slopes at zero, negated.
+    pub(crate) pull: &'a [f64],
+    pub(crate) high: f64,
+}
+
+/// Where a search stands: the numbers, and the slopes there.
+pub(crate) struct Place {
+    pub(crate) x: Vec<f64>,
+    pub(crate) slopes: Vec<f64>,
 }
 
 /// How a number may move.
@@ -59,7 +63,7 @@ struct Sums {
 impl<C: Curvature> Bounded<'_, C> {
     /// Searches from `x` until `is_done`, which is asked at every `look`th step and told how many
     /// steps there were.
-    pub(super) fn search(
+    pub(crate) fn search(
         &self,
         x: Vec<f64>,
         look: usize,
@@ -108,7 +112,7 @@ impl<C: Curvature> Bounded<'_, C> {
     }
 
     /// Returns the slopes at `x`.
-    pub(super) fn place(&self, x: Vec<f64>) -> Place {
+    pub(crate) fn place(&self, x: Vec<f64>) -> Place {
         let mut slopes = self.curvature.apply(&x);
         slopes.iter_mut().zip(self.pull).for_each(|(slope, pull)| *slope -= pull);
         Place { x, slopes }

@@ -6,6 +6,8 @@
 
 use std::collections::VecDeque;
 
+use super::{add_times, dot};
+
 /// Pairs of steps and changes of the slopes that are remembered.
 const MEMORY: usize = 12;
 /// The share of the fall that the slopes promise which a step must bring.
@@ -13,7 +15,7 @@ const ENOUGH: f64 = 1e-4;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stop {
+pub(crate) struct DescentEnd {
     pub(crate) steps: usize,
     /// A fall of the value over a step, as a share of the value.
     pub(crate) fall: f64,
@@ -30,7 +32,7 @@ struct Pair {
 pub(crate) fn descend(
     x: &mut Vec<f64>,
     [low, high]: [&[f64]; 2],
-    stop: Stop,
+    stop: DescentEnd,
     mut function: impl FnMut(&[f64]) -> (f64, Vec<f64>),
 ) {
     let clamp = |x: &mut [f64]| {
@@ -91,10 +93,6 @@ pub(crate) fn descend(
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// Returns the direction of the two loops of L-BFGS, among the free numbers alone.
 fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -> Vec<f64> {
     let only_free = |mut numbers: Vec<f64>| {
@@ -106,7 +104,7 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
     let mut shares = Vec::with_capacity(pairs.len());
     for pair in pairs.iter().rev() {
         let share = pair.scale * along(&pair.step, &direction);
-        direction.iter_mut().zip(&pair.change).for_each(|(d, change)| *d -= share * change);
+        add_times(&mut direction, -share, &pair.change);
         shares.push(share);
     }
     direction = only_free(direction);
@@ -121,7 +119,7 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
     direction.iter_mut().for_each(|d| *d *= first);
     for (pair, share) in pairs.iter().zip(shares.iter().rev()) {
         let back = pair.scale * along(&pair.change, &direction);
-        direction.iter_mut().zip(&pair.step).for_each(|(d, step)| *d += (share - back) * step);
+        add_times(&mut direction, share - back, &pair.step);
     }
     let direction = only_free(direction);
     if dot(&direction, slopes) < 0.0 {
@@ -149,7 +147,7 @@ mod tests {
 
     #[test]
     fn the_bottom_of_a_valley_is_found_within_bounds() {
-        let stop = Stop { steps: 400, fall: 0.0 };
+        let stop = DescentEnd { steps: 400, fall: 0.0 };
         let (low, high) = (vec![0.0; 20], vec![12.5; 20]);
         let mut x = vec![6.0; 20];
         descend(&mut x, [&low, &high], stop, valley);

@@ -1,0 +1,25 @@
+//! Numerical methods that know nothing of light: descent between bounds, conjugate gradients, and
+//! equations of small matrices.
+//!
+//! Each adds numbers in one order, whatever the number of threads, so that plans are the same to the
+//! last bit.
+
+mod bounded;
+mod cholesky;
+mod conjugate_gradients;
+mod lbfgs;
+
+pub(crate) use bounded::{Bounded, Curvature, Place};
+pub(crate) use cholesky::solve_positive;
+pub(crate) use conjugate_gradients::solve_by_conjugate_gradients;
+pub(crate) use lbfgs::{DescentEnd, descend};
+
+/// Returns the sum of products, from the first to the last.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Adds a multiple of numbers to others.
+pub(crate) fn add_times(to: &mut [f64], times: f64, what: &[f64]) {
+    to.iter_mut().zip(what).for_each(|(to, what)| *to += times * what);
+}
