@@ -151,6 +151,18 @@ fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     solid.push([from, to]);
 }
 
+/// Heights of layers that touch differ in the last digits: they are sums of thicknesses.
+const SAME_UM: f64 = 1e-6;
+
+/// Adds an interval below those that a line has, which come from the top down, and joins it with
+/// the last of them where they touch.
+pub fn add_below(solid: &mut SolidHeights, [from, to]: [f64; 2]) {
+    match solid.last_mut() {
+        Some(above) if above[0] <= to + SAME_UM => above[0] = from,
+        _ => solid.push([from, to]),
+    }
+}
+
 /// Returns the length of `a` that is outside `b`.
 pub fn excess(a: &[[f64; 2]], b: &[[f64; 2]]) -> Length {
     let mut length = 0.0;

@@ -9,7 +9,8 @@
 //!   gray level becomes the share of white pixels (002 section 3.3.1). Black and white
 //!   stay as they are, so no dot appears outside the part. [`homogeneity`] tells whether
 //!   the resin averages dots of a size.
-//! - [`CuredLine`] simulates what a stack cures, layer by layer, [`SummedLine`] where doses add up.
+//! - [`CuredLine`] simulates what a stack cures, layer by layer, [`SummedLine`] where doses add up
+//!   down each [`ColumnDose`].
 //!   [`shared_height`] compares that with a part.
 //!
 //! ```
@@ -29,6 +30,7 @@
 
 mod blue_noise;
 pub mod calibrate;
+mod column_dose;
 mod cured;
 mod diffusion;
 mod dither;
@@ -46,7 +48,8 @@ mod threshold;
 #[cfg(test)]
 mod void_and_cluster;
 
-pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, excess};
+pub use column_dose::{ColumnDose, Fades, ResinDepths};
+pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, add_below, excess};
 pub use dither::{DitherError, DitherMethod, dither, dither_image, dither_passing};
 pub use homogeneity::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 pub use outline::{OutlinePiece, shared_height};

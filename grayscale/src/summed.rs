@@ -4,12 +4,9 @@ use std::sync::Arc;
 
 use lamp_stack::Length;
 
-use crate::cured::{LineRun, SolidHeights};
+use crate::column_dose::{ColumnDose, ResinDepths};
+use crate::cured::{LineRun, SolidHeights, add_below};
 use crate::resin::{ExposureTime, FadingLight, GrayLevel};
-
-/// Less than this of the critical dose counts for nothing: it moves a surface by less than a
-/// millionth of a penetration depth.
-const NOTHING: f64 = 1e-9;
 
 /// What exposures cure along a line, each adding to the doses of all that it reaches: resin is
 /// cured where the shares of [`FadingLight`] come to 1. Light goes straight down.
@@ -38,7 +35,7 @@ const NOTHING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct SummedLine {
     fading: FadingLight,
-    depths_um: Arc<[f64; 256]>,
+    resin: Arc<ResinDepths>,
     pixels: usize,
     /// The shares of the last exposure time.
     shares: Option<(ExposureTime, Arc<[f64; 256]>)>,
@@ -55,19 +52,11 @@ struct LineExposure {
     shares: Arc<[f64; 256]>,
 }
 
-/// The light at a height of one pixel: how many critical doses of each level are left.
-#[derive(Clone, Default)]
-struct PixelLight {
-    white: f64,
-    gray: Vec<(u8, f64)>,
-}
-
 impl SummedLine {
     /// Creates a line of so many pixels.
     pub fn new(fading: FadingLight, pixels: u32) -> Self {
-        let depth = |level| fading.penetration_depth(GrayLevel::from_u8(level as u8)).um();
-        let depths_um = Arc::new(std::array::from_fn(depth));
-        Self { fading, depths_um, pixels: pixels as usize, shares: None, layers: Vec::new() }
+        let resin = Arc::new(ResinDepths::new(&fading));
+        Self { fading, resin, pixels: pixels as usize, shares: None, layers: Vec::new() }
     }
 
     /// Exposes a layer, given the runs along the line. Layers must come from the bottom up.
@@ -95,32 +84,24 @@ impl SummedLine {
     /// Returns the heights at which each pixel of the line is cured, above `floor_um`.
     pub fn cured(&self, floor_um: f64) -> Vec<SolidHeights> {
         let mut cured = vec![SolidHeights::new(); self.pixels];
-        let mut lights = vec![PixelLight::default(); self.pixels];
-        let mut fade = [0.0; 256];
+        let mut columns = vec![ColumnDose::dark(&self.resin); self.pixels];
         for (number, layer) in self.layers.iter().enumerate().rev() {
             // What is below the layer gets light through it down to the next top.
             let below = number.checked_sub(1).map(|below| self.layers[below].top_um);
             let end_um = below.unwrap_or_else(|| layer.bottom_um.min(floor_um)).min(layer.top_um);
-            let thick_um = layer.top_um - end_um;
-            for (fade, depth_um) in fade.iter_mut().zip(&*self.depths_um) {
-                *fade = (-thick_um / depth_um).exp();
-            }
+            let fades = self.resin.fades(layer.top_um - end_um);
             for &(start, end, level) in &layer.runs {
                 let share = layer.shares[usize::from(level)];
-                for light in &mut lights[start as usize..end as usize] {
-                    light.add(level, share);
+                for column in &mut columns[start as usize..end as usize] {
+                    column.expose(level, share);
                 }
             }
-            for (light, solid) in lights.iter_mut().zip(&mut cured) {
-                let depth_um = light.depth_um(&self.depths_um, &fade, thick_um);
+            for (column, solid) in columns.iter_mut().zip(&mut cured) {
+                let depth_um = column.cured_depth_um(&fades);
                 if depth_um > 0.0 {
-                    let from = layer.top_um - depth_um;
-                    match solid.last_mut() {
-                        Some(above) if above[0] <= layer.top_um + 1e-6 => above[0] = from,
-                        _ => solid.push([from, layer.top_um]),
-                    }
+                    add_below(solid, [layer.top_um - depth_um, layer.top_um]);
                 }
-                light.fade(&fade);
+                column.go_down(&fades);
             }
         }
         for solid in &mut cured {
@@ -131,73 +112,6 @@ impl SummedLine {
             }
         }
         cured
-    }
-}
-
-impl PixelLight {
-    fn add(&mut self, level: u8, share: f64) {
-        if level == 255 {
-            self.white += share;
-            return;
-        }
-        match self.gray.iter_mut().find(|(known, _)| *known == level) {
-            Some((_, sum)) => *sum += share,
-            None => self.gray.push((level, share)),
-        }
-    }
-
-    fn is_dark(&self) -> bool {
-        self.white == 0.0 && self.gray.is_empty()
-    }
-
-    /// Returns the critical doses that are left at a depth.
-    fn at(&self, depths_um: &[f64; 256], depth_um: f64) -> f64 {
-        let faded =
-            |level: u8, share: f64| share * (-depth_um / depths_um[usize::from(level)]).exp();
-        let gray = self.gray.iter().map(|&(level, share)| faded(level, share)).sum::<f64>();
-        faded(255, self.white) + gray
-    }
-
-    /// Returns how deep it is cured, down to a depth whose fades are given.
-    fn depth_um(&self, depths_um: &[f64; 256], fade: &[f64; 256], most_um: f64) -> f64 {
-        if self.is_dark() {
-            return 0.0;
-        }
-        let sum = |factor: &dyn Fn(u8) -> f64| {
-            let gray = self.gray.iter().map(|&(level, share)| share * factor(level));
-            self.white * factor(255) + gray.sum::<f64>()
-        };
-        if sum(&|_| 1.0) < 1.0 {
-            return 0.0;
-        }
-        if sum(&|level| fade[usize::from(level)]) >= 1.0 {
-            return most_um;
-        }
-        if self.gray.is_empty() {
-            return (depths_um[255] * self.white.ln()).min(most_um);
-        }
-        // The sum falls: halve the bracket to a hundredth of a nanometre.
-        let [mut low, mut high] = [0.0, most_um];
-        while high - low > 1e-5 {
-            let middle = f64::midpoint(low, high);
-            if self.at(depths_um, middle) >= 1.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
-    }
-
-    /// Goes down by the depth whose fades are given.
-    fn fade(&mut self, fade: &[f64; 256]) {
-        let faded = |level: u8, share: f64| {
-            let left = share * fade[usize::from(level)];
-            if left < NOTHING { 0.0 } else { left }
-        };
-        self.white = faded(255, self.white);
-        self.gray.iter_mut().for_each(|(level, share)| *share = faded(*level, *share));
-        self.gray.retain(|(_, share)| *share > 0.0);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The doses of all layers along one line of pixels: a vertical section.
 
-use lamp_grayscale::{PixelLine, SolidHeights};
+use lamp_grayscale::{PixelLine, SolidHeights, add_below};
 use lamp_stack::{Dpi, Image, Length};
 
 use crate::blur::Blur;
@@ -151,11 +151,7 @@ impl DoseSection {
             let [from, to] = [bottom.um(), bottom.um() + exposed.thickness.um()];
             cured.resize(doses.len(), SolidHeights::new());
             for (solid, _) in cured.iter_mut().zip(doses).filter(|(_, dose)| **dose >= 1.0) {
-                match solid.last_mut() {
-                    // Touching layers differ in the last digits of their heights.
-                    Some(above) if above[0] <= to + 1e-6 => above[0] = from,
-                    _ => solid.push([from, to]),
-                }
+                add_below(solid, [from, to]);
             }
         });
         cured.iter_mut().for_each(|solid| solid.reverse());
@@ -178,10 +174,7 @@ impl DoseSection {
             cured.resize(doses.len(), SolidHeights::new());
             for (solid, dose) in cured.iter_mut().zip(doses).filter(|(_, dose)| **dose > 1.0) {
                 let from = top_um - (depth_um * dose.ln()).min(thick_um);
-                match solid.last_mut() {
-                    Some(above) if above[0] <= top_um + 1e-6 => above[0] = from,
-                    _ => solid.push([from, top_um]),
-                }
+                add_below(solid, [from, top_um]);
             }
         });
         cured.iter_mut().for_each(|solid| solid.reverse());
