@@ -5,7 +5,8 @@
 //! layer may have at once. A [`Criterion`] measures a layer's error. A
 //! [`HeightSearch`] takes as few layers whose error is within a bound as it finds from the
 //! bottom up, or the most accurate ones within a budget (002 section 3.2), and places them
-//! where they err least together.
+//! where they err least together. [`WantedHeights`] names the criterion and what decides the
+//! bound.
 //!
 //! ```
 //! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation, Watch};
@@ -54,6 +55,7 @@ mod swept_layer;
 mod table;
 mod thicknesses;
 mod uniform;
+mod wanted;
 
 pub use criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 pub use error::HeightsError;
@@ -62,3 +64,4 @@ pub use search::{HeightSearch, Heights, Watch};
 pub use swept_layer::{SweptLayer, SweptLayers};
 pub use thicknesses::Thicknesses;
 pub use uniform::uniform_heights;
+pub use wanted::{FoundHeights, Goal, HeightsDoubt, Measure, WantedHeights, row_pitch};

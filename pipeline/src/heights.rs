@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, HeightSearch, Heights, HeightsError, LayeredPart,
-    SweptLayer, Thicknesses, VolumeDeviation, Watch,
+    FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, SweptLayer, Thicknesses,
+    WantedHeights, Watch, row_pitch,
 };
 use lamp_grayscale::calibrate::format_significant;
 use lamp_grayscale::exposure::Exposure;
@@ -17,9 +17,6 @@ use crate::error::{Error, ErrorKind};
 
 use crate::watcher::Watcher;
 use crate::words::optional;
-
-/// Pixels between measured rows.
-const PIXELS_PER_ROW: f64 = 4.0;
 
 /// The limits and the bound of adaptive heights.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -60,86 +57,34 @@ pub struct HeightSettings {
     pub snap: bool,
 }
 
-/// The layers found, and the bound that they keep.
-pub struct FoundHeights {
-    /// The measure of a layer's error.
-    pub measure: Measure,
-    /// Its bound: a share, or micrometres for cusps.
-    pub bound: f64,
-    /// The layers.
-    pub heights: Heights,
-}
-
-/// The measure of a layer's error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
-    /// The volume that it lacks or has in excess, as a share.
-    Volume,
-    /// The height of cusps at its edge.
-    Cusp,
-    /// The change of its section's area, as a share.
-    Area,
-}
-
-lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Area = "area" });
-
-impl Measure {
-    /// Returns the library's criterion.
-    pub fn criterion(self) -> &'static dyn Criterion {
-        match self {
-            Self::Volume => &VolumeDeviation,
-            Self::Cusp => &CuspHeight,
-            Self::Area => &AreaDeviation,
-        }
-    }
-
-    /// `2.00%`, `10.0um`.
-    pub fn text(self, measure: f64) -> String {
-        match self {
-            _ if measure.is_infinite() => "none".to_owned(),
-            Self::Cusp => format!("{}um", significant(measure)),
-            Self::Volume | Self::Area => {
-                format!("{}%", significant(measure * 100.0))
-            }
-        }
+/// Returns an error of a layer in words: `2.00%`, `10.0um`.
+pub fn measured(measure: Measure, number: f64) -> String {
+    match measure {
+        _ if number.is_infinite() => "none".to_owned(),
+        Measure::Cusp => format!("{}um", significant(number)),
+        Measure::Volume | Measure::Area => format!("{}%", significant(number * 100.0)),
     }
 }
 
-impl FoundHeights {
-    /// `volume 2.00%`.
-    pub fn bound(&self) -> String {
-        format!("{} {}", self.measure, self.measure.text(self.bound))
-    }
+/// Returns the bound that heights keep in words: `volume 2.00%`.
+pub fn bound(found: &FoundHeights) -> String {
+    format!("{} {}", found.measure, measured(found.measure, found.bound))
+}
 
-    /// Returns how many layers exceed the bound.
-    pub fn past(&self, heights: &Heights) -> usize {
-        let is_past = |layer: &&SweptLayer| self.measure.criterion().measure(layer) > self.bound;
-        heights.layers.iter().filter(is_past).count()
-    }
-
-    /// Returns a sentence on rows that could not be measured, if there are some.
-    pub fn doubt(&self) -> Option<String> {
-        let left_out = self.heights.layers.iter().filter(|layer| layer.rows_left_out > 0);
-        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), layer| {
-            (layers + 1, rows + u64::from(layer.rows_left_out))
-        });
-        if rows > 0 {
-            Some(format!(
-                "{rows} rows in {layers} layers do not balance: the mesh has gaps; the other \
-                 rows decide the thickness of these layers"
-            ))
-        } else {
-            let why =
-                "the part has no volume in any row: it is flat, or too thin for this --row-pitch";
-            (self.heights.volumes_mm3()[2] == 0.0).then(|| why.to_owned())
-        }
-    }
-
-    /// Returns sentences on exposures that the material was not measured at.
-    pub fn doubts(&self, exposure: Option<&Exposure>) -> Vec<String> {
-        let thicknesses = self.heights.layers.iter().map(|it| Length::from_um(it.thickness_um));
-        exposure.map_or_else(Vec::new, |exposure| exposure.doubts(thicknesses))
-    }
+/// Returns sentences on rows that could not be measured, and on exposures that the material was not
+/// measured at.
+pub fn doubts(found: &FoundHeights, exposure: Option<&Exposure>) -> Vec<String> {
+    let of_rows = found.doubt().map(|doubt| match doubt {
+        HeightsDoubt::OpenRows { rows, layers } => format!(
+            "{rows} rows in {layers} layers do not balance: the mesh has gaps; the other rows \
+             decide the thickness of these layers"
+        ),
+        _ => "the part has no volume in any row: it is flat, or too thin for this --row-pitch"
+            .to_owned(),
+    });
+    let of_doses =
+        exposure.map_or_else(Vec::new, |exposure| exposure.doubts(found.thicknesses()));
+    of_rows.into_iter().chain(of_doses).collect()
 }
 
 impl HeightSettings {
@@ -155,8 +100,8 @@ impl HeightSettings {
 
     /// Returns the part as measured along rows.
     pub fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Error> {
-        let pitch = Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW);
-        let part = LayeredPart::new(body, self.row_pitch.unwrap_or(pitch), fill);
+        let pitch = self.row_pitch.unwrap_or_else(|| row_pitch(dpi));
+        let part = LayeredPart::new(body, pitch, fill);
         Ok(part?)
     }
 
@@ -215,36 +160,24 @@ impl HeightSettings {
         exposure: Option<&Exposure>,
         watcher: &dyn Watcher,
     ) -> Result<FoundHeights, Error> {
-        let thicknesses = self.thicknesses()?;
-        let measure = self.measure()?;
-        let criterion = measure.criterion();
+        let cost = match &self.time_budget {
+            Some(_) => Some(self.seconds_of_layers(exposure)?),
+            None => None,
+        };
+        let goal = match (self.layers_budget, self.time_budget, &cost) {
+            (Some(layers), ..) => Goal::Layers(layers),
+            (_, Some(Seconds(most)), Some(cost)) => Goal::Cost { of_layer: cost, most },
+            _ => Goal::Bound(self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um)),
+        };
+        let (thicknesses, measure, snap) = (self.thicknesses()?, self.measure()?, self.snap);
         let part_um = part.heights_um();
         let watch = |layer: &SweptLayer| watcher.height_reached(part_um, layer.top_um());
-        let search = HeightSearch {
-            part,
-            thicknesses: &thicknesses,
-            criterion,
-            snap: self.snap,
-            watch: Watch(&watch),
-        };
-        let failed = |error: HeightsError| Error::from(error);
-        let (bound, heights) = if let Some(layers) = self.layers_budget {
-            search
-                .within_budget(|_| 1.0, layers.into())
-                .map_err(|error| over(error, |layers| format!("{layers} layers")))?
-        } else if let Some(Seconds(seconds)) = self.time_budget {
-            let cost = self.seconds_of_layers(exposure)?;
-            search.within_budget(cost, seconds).map_err(|error| over(error, time_text))?
-        } else {
-            let bound = self.cusp.map_or(self.deviation.unwrap_or(0.02), Length::um);
-            (bound, search.heights(bound).map_err(failed)?)
-        };
+        let found = WantedHeights { thicknesses, measure, goal, snap }.find(part, Watch(&watch));
+        let found = found.map_err(|error| over(error, goal))?;
         if let Some(exposure) = exposure {
-            for layer in &heights.layers {
-                exposure.check(Length::from_um(layer.thickness_um))?;
-            }
+            found.thicknesses().try_for_each(|thickness| exposure.check(thickness))?;
         }
-        Ok(FoundHeights { measure, bound, heights })
+        Ok(found)
     }
 
     /// Returns the time in seconds that a layer takes by its thickness.
@@ -272,7 +205,11 @@ impl HeightSettings {
 }
 
 /// Describes a budget that is too small, in its unit.
-fn over(error: HeightsError, say: impl Fn(f64) -> String) -> Error {
+fn over(error: HeightsError, goal: Goal<'_>) -> Error {
+    let say = |amount| match goal {
+        Goal::Layers(_) => format!("{amount} layers"),
+        _ => time_text(amount),
+    };
     match error {
         HeightsError::Budget { least, budget } => {
             let [least, budget] = [least, budget].map(say);

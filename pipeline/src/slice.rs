@@ -19,6 +19,7 @@ use crate::documents::{document_and_word, is_file, recorded_name};
 use crate::error::{Error, ErrorKind};
 use crate::exposure::RecordedExposure;
 use crate::fallback::Bridged;
+use crate::heights;
 use crate::memory::{available, in_words};
 use crate::overlaps::overlap_text;
 use crate::part_file::{PartFile, paths, recorded};
@@ -185,15 +186,15 @@ impl SliceSettings {
         exposure: Option<&Exposure>,
         watcher: &dyn Watcher,
     ) -> Result<Option<LayerHeights>, Error> {
-        let Thickness::Adaptive { heights, .. } = &self.thickness else { return Ok(None) };
+        let Thickness::Adaptive { heights: settings, .. } = &self.thickness else { return Ok(None) };
         let body = self.solid.body(model.clone())?;
-        let part = heights.part(body, self.dpi, self.solid.fill)?;
-        let found = heights.find(&part, exposure, watcher)?;
-        let notes = found.doubt().into_iter().chain(found.doubts(exposure));
-        notes.for_each(|note| watcher.remark(Remark::note(note)));
-        if heights.has_budget() {
+        let part = settings.part(body, self.dpi, self.solid.fill)?;
+        let found = settings.find(&part, exposure, watcher)?;
+        let notes = heights::doubts(&found, exposure);
+        notes.into_iter().for_each(|note| watcher.remark(Remark::note(note)));
+        if settings.has_budget() {
             let layers = found.heights.layers.len();
-            let bound = found.bound();
+            let bound = heights::bound(&found);
             watcher.remark(Remark::note(format!(
                 "{layers} layers keep the budget, with errors up to {bound}"
             )));

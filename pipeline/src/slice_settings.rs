@@ -127,7 +127,7 @@ impl From<GrayFlags> for GrayRule {
 }
 
 impl From<GrayRule> for GrayFlags {
-    fn from(gray: GrayRule) -> Self {
+    fn from(rule: GrayRule) -> Self {
         Self { gray: rule != GrayRule::None, print_through: rule == GrayRule::PrintThrough }
     }
 }

@@ -1,7 +1,8 @@
 //! Options of adaptive layer heights.
 
 use clap::Args;
-use lamp_pipeline::heights::{HeightSettings, Measure, Seconds, parse_share};
+use lamp_adaptive::Measure;
+use lamp_pipeline::heights::{HeightSettings, Seconds, parse_share};
 use lamp_stack::Length;
 
 use crate::options::{one_of, parse_thickness};

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_adaptive::{
-    AreaDeviation, Criterion, CuspHeight, Heights, LayeredPart, SweptLayer, uniform_heights,
+    AreaDeviation, Criterion, CuspHeight, FoundHeights, Heights, LayeredPart, Measure, SweptLayer,
+    uniform_heights,
 };
 use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Dpi, Length};
@@ -25,7 +26,9 @@ use crate::progress::Progress;
 use crate::streams::{check_beside, print, write_file};
 use lamp_grayscale::exposure::Exposure;
 use lamp_pipeline::exposure::ExposureSettings;
-use lamp_pipeline::heights::{FoundHeights, HeightSettings, Measure, significant, time_text};
+use lamp_pipeline::heights::{
+    HeightSettings, bound, doubts, measured, significant, time_text,
+};
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::solid::{Reading, at_part, name_of_all};
@@ -102,13 +105,12 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let found = settings.find(&part, exposure, &progress);
     let found = found.map_err(|error| at_part(error, &files))?;
     let uniform = args.uniform(settings.max(), &part).map_err(|error| at_part(error, &files))?;
-    let doubts = found.doubt().into_iter().chain(found.doubts(exposure));
-    doubts.for_each(|doubt| progress.say(&doubt));
+    doubts(&found, exposure).iter().for_each(|doubt| progress.say(doubt));
     if let Some(path) = &args.report {
         write_file(path, |out| write_table(&found.heights, exposure, out))?;
     }
     let all: Vec<_> =
-        std::iter::once((found.bound(), found.heights.clone())).chain(uniform).collect();
+        std::iter::once((bound(&found), found.heights.clone())).chain(uniform).collect();
     if let Some(path) = &args.plot {
         let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
@@ -284,7 +286,7 @@ fn summary(choices: &[Choice], measure: Measure) -> String {
             significant(choice.lost_mm3),
             significant(choice.gained_mm3),
             if percent.is_finite() { significant(*percent) + "%" } else { "-".to_owned() },
-            if worst.is_finite() { measure.text(*worst) } else { "-".to_owned() },
+            if worst.is_finite() { measured(measure, *worst) } else { "-".to_owned() },
             choice.past_bound,
             choice.time_s.map_or("-".to_owned(), time_text),
         );

@@ -1,0 +1,190 @@
+//! What layer heights are to be like, and those that were found.
+
+use std::fmt;
+
+use lamp_stack::{Dpi, Length};
+
+use crate::criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
+use crate::error::HeightsError;
+use crate::layered_part::LayeredPart;
+use crate::search::{HeightSearch, Heights, Watch};
+use crate::swept_layer::SweptLayer;
+use crate::thicknesses::Thicknesses;
+
+/// Pixels from a measured row to the next: features that a search must see are wider than that.
+const PIXELS_PER_ROW: f64 = 4.0;
+
+/// Returns how far apart rows are measured for images of a resolution.
+pub fn row_pitch(dpi: Dpi) -> Length {
+    Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW)
+}
+
+/// The measure of a layer's error, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// [`VolumeDeviation`].
+    Volume,
+    /// [`CuspHeight`].
+    Cusp,
+    /// [`AreaDeviation`].
+    Area,
+}
+
+lamp_stack::named!(Measure { Volume = "volume", Cusp = "cusp", Area = "area" });
+
+impl Measure {
+    /// Returns the criterion that measures.
+    pub fn criterion(self) -> &'static dyn Criterion {
+        match self {
+            Self::Volume => &VolumeDeviation,
+            Self::Cusp => &CuspHeight,
+            Self::Area => &AreaDeviation,
+        }
+    }
+}
+
+/// What decides how far layers may err.
+#[derive(Clone, Copy)]
+pub enum Goal<'a> {
+    /// Every layer is within this bound.
+    Bound(f64),
+    /// There are at most so many layers, with the smallest bound that allows it.
+    Layers(u32),
+    /// All layers together cost at most so much, with the smallest bound that allows it.
+    Cost {
+        /// Returns the cost of a layer by its thickness, as the seconds that it takes.
+        of_layer: &'a dyn Fn(Length) -> f64,
+        /// The most that they cost together.
+        most: f64,
+    },
+}
+
+impl fmt::Debug for Goal<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bound(bound) => write!(f, "Bound({bound})"),
+            Self::Layers(layers) => write!(f, "Layers({layers})"),
+            Self::Cost { most, .. } => write!(f, "Cost({most})"),
+        }
+    }
+}
+
+/// What layer heights are to be like.
+#[derive(Clone, Debug)]
+pub struct WantedHeights<'a> {
+    /// The thicknesses that the machine builds.
+    pub thicknesses: Thicknesses,
+    /// The measure of a layer's error.
+    pub measure: Measure,
+    /// What decides its bound.
+    pub goal: Goal<'a>,
+    /// Makes layers end at flat faces.
+    pub snap: bool,
+}
+
+/// The layers found, and the bound that they keep.
+#[derive(Clone, Debug)]
+pub struct FoundHeights {
+    /// The measure of a layer's error.
+    pub measure: Measure,
+    /// The largest error of a layer, unless none within the limits is as small.
+    pub bound: f64,
+    /// The layers.
+    pub heights: Heights,
+}
+
+/// Why found heights may be worse than their numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum HeightsDoubt {
+    /// The mesh has gaps, so that some rows were left out.
+    OpenRows {
+        /// How many rows, in all layers together.
+        rows: u64,
+        /// How many layers have such rows.
+        layers: u64,
+    },
+    /// No row meets the part.
+    NoVolume,
+}
+
+impl WantedHeights<'_> {
+    /// Searches for the heights of a part. `watch` is told of each layer found.
+    ///
+    /// # Errors
+    /// Returns an error if the part is too high, or if no layers within the limits keep a budget.
+    pub fn find(&self, part: &LayeredPart, watch: Watch<'_>) -> Result<FoundHeights, HeightsError> {
+        let (thicknesses, criterion) = (&self.thicknesses, self.measure.criterion());
+        let search = HeightSearch { part, thicknesses, criterion, snap: self.snap, watch };
+        let (bound, heights) = match self.goal {
+            Goal::Bound(bound) => (bound, search.heights(bound)?),
+            Goal::Layers(layers) => search.within_budget(|_| 1.0, layers.into())?,
+            Goal::Cost { of_layer, most } => search.within_budget(of_layer, most)?,
+        };
+        Ok(FoundHeights { measure: self.measure, bound, heights })
+    }
+}
+
+impl FoundHeights {
+    /// Returns how many layers exceed the bound.
+    pub fn past(&self, heights: &Heights) -> usize {
+        let is_past = |layer: &&SweptLayer| self.measure.criterion().measure(layer) > self.bound;
+        heights.layers.iter().filter(is_past).count()
+    }
+
+    /// Returns the thicknesses of the layers, bottom first.
+    pub fn thicknesses(&self) -> impl Iterator<Item = Length> {
+        self.heights.layers.iter().map(|layer| Length::from_um(layer.thickness_um))
+    }
+
+    /// Returns what rows could not be measured, if there were some.
+    pub fn doubt(&self) -> Option<HeightsDoubt> {
+        let left_out = self.heights.layers.iter().filter(|layer| layer.rows_left_out > 0);
+        let (layers, rows) = left_out.fold((0, 0), |(layers, rows), layer| {
+            (layers + 1, rows + u64::from(layer.rows_left_out))
+        });
+        if rows > 0 {
+            Some(HeightsDoubt::OpenRows { rows, layers })
+        } else {
+            (self.heights.volumes_mm3()[2] == 0.0).then_some(HeightsDoubt::NoVolume)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
+
+    use super::*;
+
+    #[test]
+    fn a_goal_is_kept_by_its_own_measure() {
+        // A tetrahedron, 1 mm high.
+        let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
+        let facets = vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
+        let model = Part::from_facets("tetra", facets);
+        let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres).unwrap();
+        let pitch = row_pitch(Dpi::new(10_160.0).unwrap());
+        let part = LayeredPart::new(facets, pitch, Fill::EvenOdd).unwrap();
+        let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
+        let thicknesses = Thicknesses::new(min, max, step).unwrap();
+        let find = |measure, goal| {
+            let wanted =
+                WantedHeights { thicknesses: thicknesses.clone(), measure, goal, snap: false };
+            wanted.find(&part, Watch::default())
+        };
+        let bounded = find(Measure::Volume, Goal::Bound(0.05)).unwrap();
+        // Next to the tip even the thinnest layers exceed the bound.
+        let layers = &bounded.heights.layers;
+        let thinnest = layers.iter().filter(|layer| layer.thickness_um == 10.0).count();
+        let past = bounded.past(&bounded.heights);
+        assert!(0 < past && past <= thinnest && thinnest < layers.len(), "{past} of {thinnest}");
+        assert_eq!(bounded.doubt(), None);
+        let few = find(Measure::Cusp, Goal::Layers(20)).unwrap();
+        assert!(few.heights.layers.len() <= 20 && few.bound > 0.0);
+        let cost = Goal::Cost { of_layer: &|_| 30.0, most: 20.0 * 30.0 };
+        assert_eq!(find(Measure::Cusp, cost).unwrap().heights, few.heights);
+        let nine = find(Measure::Area, Goal::Layers(9));
+        assert!(matches!(nine, Err(HeightsError::Budget { .. })));
+    }
+}
