@@ -4,10 +4,12 @@
 //!   each voxel, from a material's numbers.
 //! - [`Blur`] spreads the light of an image sideways.
 //! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
+//! - [`cure_section`] says what a stack cures along a vertical section.
 //! - [`projector`] and [`target`] are what planners on a fixed glass start from.
 
 mod blur;
 pub mod column;
+pub mod cure_section;
 mod doses;
 pub mod ecpl;
 pub mod learn;

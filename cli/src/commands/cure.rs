@@ -7,8 +7,11 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::OutlinePiece;
 use lamp_grayscale::material::Material;
+use lamp_planning::cure_section::{
+    CureRule, CureSection, CureSectionError, SectionLine, SectionPlane, ShownSection,
+};
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::StackInfo;
+use lamp_stack::{Length, StackInfo};
 
 use crate::args::solid::part_file;
 use crate::endings::{PNG, check_ending};
@@ -18,7 +21,7 @@ use crate::options::{Common, Input, one_of_described};
 use crate::picture::PictureScale;
 use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
-use crate::section::{CureRule, Exposures, SectionLine, SectionPicture, SectionPlane, parse_along};
+use crate::section::SectionPicture;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_pipeline::RecordedSlicing;
@@ -118,17 +121,15 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
     let name = input_name(&args.input.stack);
-    let failed = |error: anyhow::Error| Exit::Failed(error).at(input_name(&args.input.stack));
+    let failed = |error| Exit::Failed(error).at(input_name(&args.input.stack));
+    let no_section = |error: CureSectionError| failed(error.into());
     let progress = Progress::new("cure", common, true);
     lamp_doubt.iter().for_each(|doubt| progress.say(doubt));
-    let doses = match rule {
-        CureRule::Alone | CureRule::Straight(_) => MeasuredDoses::of_depths(&material),
-        CureRule::Spread(_) | CureRule::Voxels(_) => MeasuredDoses::of_working_curve(&material),
-    };
-    let (mut exposures, mut stack) = (None, None);
+    let doses = rule.measured_doses(&material);
+    let (mut section, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
-        if exposures.is_none() {
+        if section.is_none() {
             if layer.info.other.contains_key("dither") {
                 progress
                     .say("these layers are dots: use a stack from before dither to see its gray");
@@ -136,25 +137,26 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
             if layer.info.other.contains_key("compensate") {
                 progress.say("these layers were compensated, so that they differ from the part");
             }
-            let course = SectionLine::new(args.section, &layer).map_err(failed)?;
+            let course = SectionLine::new(args.section, &layer).map_err(no_section)?;
             if let CureRule::Spread(light) | CureRule::Voxels(light) = rule {
                 light.check_spread(course.dpi)?;
             }
-            exposures = Some(Exposures::new(&resin, rule, course));
+            section = Some(CureSection::new(&resin, rule, course));
             stack = layer.info.stack.clone();
         }
-        let exposures = exposures.as_mut().expect("it was made for the first layer");
-        doses.see(exposures.add(&layer).map_err(failed)?);
+        let section = section.as_mut().expect("it was made for the first layer");
+        doses.see(section.add(&layer).map_err(no_section)?);
         progress.layer_done();
     }
     progress.done();
     doses.doubt("layers").iter().for_each(|doubt| progress.say(doubt));
-    let exposures = exposures.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
+    let section = section.ok_or_else(|| failed(anyhow!("there are no such layers")))?;
     let outline = match &args.part[..] {
         [] => None,
-        parts => Some(outline(parts, &exposures.course, stack.as_ref(), &name, &progress)?),
+        parts => Some(outline(parts, section.course(), stack.as_ref(), &name, &progress)?),
     };
-    let panels = SectionPicture::new(&exposures, outline, args.along.as_ref()).map_err(failed)?;
+    let shown = ShownSection::new(&section, outline, args.along.as_ref());
+    let panels = SectionPicture(shown.map_err(no_section)?);
     panels.check_size(args.scale).map_err(failed)?;
     write_file(&args.output, |out| panels.write_png(args.scale, out))?;
     print(&panels.text(&material.name))
@@ -173,7 +175,14 @@ fn outline(
     })?;
     let model = sliced.open(parts, name, progress)?;
     let part = name_of_all(parts);
-    course
-        .outline(model, &sliced.settings.for_slicing())
-        .map_err(|error| Exit::from(error).at(part))
+    course.outline(model, &sliced.settings.for_slicing()).map_err(|error| Exit::from(error).at(part))
+}
+
+/// Parses `3mm..6mm`.
+fn parse_along(text: &str) -> Result<Range<f64>, String> {
+    let wrong = || format!("`{text}` is not a stretch of the section: write A..B, as 3mm..6mm");
+    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
+    let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
+    let range = mm(from)?..mm(to)?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }

@@ -2,17 +2,20 @@
 
 use std::ops::Range;
 
-use anyhow::{Context, anyhow};
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, ExposureTime, FadingLight, GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, LineRun, SolidHeights, SummedLine};
-use lamp_planning::{DoseSection, LayerTime, Light};
 use lamp_stack::{Image, Layer, Length};
 
+use super::error::CureSectionError;
 use super::line::SectionLine;
+use crate::light::{LayerTime, Light};
+use crate::section::DoseSection;
 
 /// How exposures cure.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum CureRule {
+pub enum CureRule {
     /// Each by itself, as deep as its gray level reaches.
     Alone,
     /// Together, where their doses add up to the critical one; light goes straight down.
@@ -24,8 +27,16 @@ pub(crate) enum CureRule {
 }
 
 impl CureRule {
-    /// Returns what is said of it.
-    pub(super) fn text(&self) -> &'static str {
+    /// Returns the doses at which the numbers of a material were measured that the rule cures by.
+    pub fn measured_doses(&self, material: &Material) -> MeasuredDoses {
+        match self {
+            Self::Alone | Self::Straight(_) => MeasuredDoses::of_depths(material),
+            Self::Spread(_) | Self::Voxels(_) => MeasuredDoses::of_working_curve(material),
+        }
+    }
+
+    /// Returns it in words.
+    pub fn text(&self) -> &'static str {
         match self {
             Self::Alone => "each layer alone",
             Self::Straight(_) => "doses added up straight down",
@@ -35,27 +46,29 @@ impl CureRule {
     }
 }
 
-/// The exposures of a stack along a section: every pixel that is not black in full, and by gray
-/// levels.
-pub(crate) struct Exposures<'a> {
+/// What a stack cures along a section, twice: with every pixel that is not black exposed in full,
+/// and by gray levels.
+#[derive(Debug)]
+pub struct CureSection<'a> {
     resin: &'a Resin,
-    pub(super) rule: CureRule,
-    pub(crate) course: SectionLine,
+    rule: CureRule,
+    course: SectionLine,
     cured: Cured,
     has_gray: bool,
-    pub(super) heights_um: Range<f64>,
+    heights_um: Range<f64>,
 }
 
 /// What exposures cure: in full, and by gray levels.
+#[derive(Debug)]
 enum Cured {
     Alone { depths: Option<(ExposureTime, Vec<Length>)>, lines: [CuredLine; 2] },
     Summed([SummedLine; 2]),
     Spread(Box<(Light, [DoseSection; 2])>),
 }
 
-impl<'a> Exposures<'a> {
+impl<'a> CureSection<'a> {
     /// Starts without a layer.
-    pub(crate) fn new(resin: &'a Resin, rule: CureRule, course: SectionLine) -> Self {
+    pub fn new(resin: &'a Resin, rule: CureRule, course: SectionLine) -> Self {
         let cured = match rule {
             CureRule::Alone => Cured::Alone { depths: None, lines: Default::default() },
             CureRule::Straight(fading) => {
@@ -70,8 +83,27 @@ impl<'a> Exposures<'a> {
         Self { resin, rule, course, cured, has_gray: false, heights_um: f64::MAX..f64::MIN }
     }
 
+    /// Returns how exposures cure.
+    pub fn rule(&self) -> CureRule {
+        self.rule
+    }
+
+    /// Returns the line of pixels.
+    pub fn course(&self) -> &SectionLine {
+        &self.course
+    }
+
+    /// Returns the heights from the bottom of the lowest layer to the top of the highest.
+    pub fn heights_um(&self) -> Range<f64> {
+        self.heights_um.clone()
+    }
+
     /// Exposes a layer, and returns the dose of its white. They come from the bottom up.
-    pub(crate) fn add(&mut self, layer: &Layer) -> anyhow::Result<Dose> {
+    ///
+    /// # Errors
+    /// Returns an error if the layer does not state its height and thickness, or no time where the
+    /// resin says none, or if the section misses its image.
+    pub fn add(&mut self, layer: &Layer) -> Result<Dose, CureSectionError> {
         let (bottom, LayerTime { thickness, time }) = self.exposure(layer)?;
         let (line, image) = (self.course.line, &layer.image);
         let top = Length::from_um(bottom.um() + thickness.um());
@@ -109,33 +141,30 @@ impl<'a> Exposures<'a> {
 
     /// The height of a layer's bottom, its thickness and its time. Without a time, white cures
     /// just the layer.
-    fn exposure(&self, layer: &Layer) -> anyhow::Result<(Length, LayerTime)> {
+    fn exposure(&self, layer: &Layer) -> Result<(Length, LayerTime), CureSectionError> {
         let name = || layer.info.name();
         let of_page = layer.info.z().zip(layer.info.thickness_um.map(Length::from_um));
-        let (bottom, thickness) = of_page
-            .with_context(|| format!("{} does not state its height and thickness", name()))?;
+        let (bottom, thickness) = of_page.ok_or_else(|| CureSectionError::NoHeight(name()))?;
         let wrong = |number: f64| !(number > 0.0 && number.is_finite());
         if wrong(thickness.um()) || layer.info.exposure_ms.is_some_and(wrong) {
-            return Err(anyhow!(
-                "{} states a thickness or an exposure that is not above zero",
-                name()
-            ));
+            return Err(CureSectionError::NotPositive(name()));
         }
         if !self.course.line.crosses(&layer.image) {
-            return Err(anyhow!("{} is smaller than the first", name()));
+            return Err(CureSectionError::TooSmall(name()));
         }
         let time = match layer.info.exposure_ms {
             Some(ms) => ExposureTime::from_ms(ms),
             None => self
                 .resin
                 .exposure_time(thickness, 1.0)
-                .with_context(|| format!("{} states no exposure", name()))?,
+                .map_err(|problem| CureSectionError::NoExposure { layer: name(), problem })?,
         };
         Ok((bottom, LayerTime { thickness, time }))
     }
 
-    /// What is cured at each pixel, with a name: in full, and by gray levels if there are any.
-    pub(super) fn cured(&self) -> Vec<(&'static str, Vec<SolidHeights>)> {
+    /// Returns what is cured at each pixel, with a name: in full, and by gray levels if there are
+    /// any.
+    pub fn cured(&self) -> Vec<(&'static str, Vec<SolidHeights>)> {
         let of = |k: usize| match &self.cured {
             Cured::Alone { lines, .. } => lines[k].pixels().to_vec(),
             Cured::Summed(lines) => lines[k].cured(self.heights_um.start),

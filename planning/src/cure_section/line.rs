@@ -4,26 +4,29 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use anyhow::{Context, anyhow};
 use lamp_grayscale::{OutlinePiece, PixelLine};
 use lamp_slicer::{Axis, Part, SectionOptions, SliceError, SliceOptions, Trapezoid, section_area};
 use lamp_stack::{Dpi, Layer, Length};
 
+use super::error::{CureSectionError, UnknownPlane};
+
 /// The plane of a section, in part coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum SectionPlane {
+pub enum SectionPlane {
+    /// Along a column of pixels, at this x.
     X(Length),
+    /// Along a row of pixels, at this y.
     Y(Length),
 }
 
 impl FromStr for SectionPlane {
-    type Err = String;
+    type Err = UnknownPlane;
 
     /// Parses `y=12mm`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is not a section: write y=12mm or x=12mm");
+    fn from_str(text: &str) -> Result<Self, UnknownPlane> {
+        let wrong = || UnknownPlane::NoAxis(text.to_owned());
         let (axis, length) = text.split_once('=').ok_or_else(wrong)?;
-        let length: Length = length.parse().map_err(|error| format!("{error}"))?;
+        let length: Length = length.parse()?;
         match axis.trim() {
             "x" => Ok(Self::X(length)),
             "y" => Ok(Self::Y(length)),
@@ -41,31 +44,27 @@ impl fmt::Display for SectionPlane {
     }
 }
 
-/// Parses `3mm..6mm`.
-pub(crate) fn parse_along(text: &str) -> Result<Range<f64>, String> {
-    let wrong = || format!("`{text}` is not a stretch of the section: write A..B, as 3mm..6mm");
-    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
-    let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
-    let range = mm(from)?..mm(to)?;
-    if range.is_empty() { Err(wrong()) } else { Ok(range) }
-}
-
 /// The row or column of pixels along a section.
-#[derive(Clone, Copy)]
-pub(crate) struct SectionLine {
-    pub(crate) line: PixelLine,
+#[derive(Clone, Copy, Debug)]
+pub struct SectionLine {
+    /// The row or column.
+    pub line: PixelLine,
     corner_mm: [f64; 2],
-    pub(crate) dpi: Dpi,
-    pub(super) pixels: u32,
+    /// The resolution of the images.
+    pub dpi: Dpi,
+    /// How many pixels lie along it.
+    pub pixels: u32,
 }
 
 impl SectionLine {
-    /// The line of pixels that a plane runs through, in the images that are
-    /// like the layer's.
-    pub(crate) fn new(plane: SectionPlane, layer: &Layer) -> anyhow::Result<Self> {
-        let corner_mm =
-            layer.info.origin_mm.context("its pages do not state their position on the part")?;
-        let dpi = layer.dpi.context("its pages do not state their resolution")?;
+    /// Returns the line of pixels that a plane runs through, in images like the layer's.
+    ///
+    /// # Errors
+    /// Returns an error if the layer does not state its position or resolution, or if the plane
+    /// misses its image.
+    pub fn new(plane: SectionPlane, layer: &Layer) -> Result<Self, CureSectionError> {
+        let corner_mm = layer.info.origin_mm.ok_or(CureSectionError::NoPosition)?;
+        let dpi = layer.dpi.ok_or(CureSectionError::NoResolution)?;
         let [x0, y1] = corner_mm;
         let pitch = dpi.pitch().mm();
         let image = &layer.image;
@@ -76,7 +75,7 @@ impl SectionLine {
         };
         if !(0.0..f64::from(count)).contains(&number) {
             let high = low + f64::from(count) * pitch;
-            return Err(anyhow!("{plane} is outside its images: {low:.3} to {high:.3} mm"));
+            return Err(CureSectionError::Outside { plane, low_mm: low, high_mm: high });
         }
         let (line, pixels) = match plane {
             SectionPlane::X(_) => (PixelLine::Column(number as u32), height),
@@ -86,7 +85,7 @@ impl SectionLine {
     }
 
     /// Returns the plane through the centres of its pixels.
-    pub(crate) fn plane(&self) -> SectionPlane {
+    pub fn plane(&self) -> SectionPlane {
         let pitch = self.dpi.pitch().mm();
         let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
         match self.line {
@@ -100,7 +99,7 @@ impl SectionLine {
     }
 
     /// Returns the pixels whose centres lie in a stretch of the section.
-    pub(super) fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
+    pub fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
         let pitch = self.dpi.pitch().mm();
         let [from, to] = match self.line {
             PixelLine::Row(_) => [along_mm.start, along_mm.end].map(|x| x - self.corner_mm[0]),
@@ -113,7 +112,10 @@ impl SectionLine {
 
     /// Returns where the part is within each pixel. Turns the part so that the section is level
     /// and heights run along its rows.
-    pub(crate) fn outline(
+    ///
+    /// # Errors
+    /// Returns an error if the part cannot be cut.
+    pub fn outline(
         &self,
         model: Part,
         options: &SliceOptions,
