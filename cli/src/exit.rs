@@ -11,7 +11,8 @@ use lamp_grayscale::exposure::{ExposureError, LampError};
 use lamp_machine::MachineLimit;
 use lamp_offset::CompensateError;
 use lamp_pipeline::ErrorKind;
-use lamp_planning::speed::{PartError, PlatformError};
+use lamp_planning::learn::{JobError, LearnError};
+use lamp_planning::speed::{PartError, PlatformError, SpeedPlanError};
 use lamp_planning::voxels::PlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_slicer::SliceError;
@@ -136,7 +137,9 @@ failures!(
     NoLight,
     PlanError,
     PartError,
-    lamp_planning::speed::PlanError,
+    SpeedPlanError,
+    JobError,
+    LearnError,
     PlatformError,
     SliceError,
     CheckError,

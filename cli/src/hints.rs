@@ -15,6 +15,7 @@ use lamp_machine::{MachineError, MachineLimit};
 use lamp_offset::{CompensateError, CompensateProblem};
 use lamp_planning::LightError;
 use lamp_planning::ecpl;
+use lamp_planning::learn::{JobError, JobFileError, LearnError};
 use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::target::TargetError;
@@ -51,6 +52,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(ecpl))
         .or_else(|| error.downcast_ref().and_then(target))
         .or_else(|| error.downcast_ref().and_then(timed_part))
+        .or_else(|| error.downcast_ref().and_then(job))
+        .or_else(|| error.downcast_ref().and_then(learning))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().map(no_solid))
@@ -342,6 +345,27 @@ fn timed_part(error: &PartError) -> Option<String> {
         _ => return None,
     };
     Some(hint.to_owned())
+}
+
+fn job(error: &JobError) -> Option<String> {
+    match error {
+        JobError::NoJob(_) => Some("begin it with --start STACK --material M".to_owned()),
+        JobError::Part(error) => timed_part(error),
+        JobError::File { problem, .. } => match problem {
+            JobFileError::Io(error) => input_output(error),
+            JobFileError::Material(error) => catalogue(error),
+            JobFileError::Part(error) => timed_part(error),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn learning(error: &LearnError) -> Option<String> {
+    match error {
+        LearnError::Part(error) => timed_part(error),
+        _ => None,
+    }
 }
 
 fn recipe(error: &RecipeError) -> Option<String> {

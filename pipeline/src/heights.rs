@@ -82,8 +82,7 @@ pub fn doubts(found: &FoundHeights, exposure: Option<&Exposure>) -> Vec<String> 
         _ => "the part has no volume in any row: it is flat, or too thin for this --row-pitch"
             .to_owned(),
     });
-    let of_doses =
-        exposure.map_or_else(Vec::new, |exposure| exposure.doubts(found.thicknesses()));
+    let of_doses = exposure.map_or_else(Vec::new, |exposure| exposure.doubts(found.thicknesses()));
     of_rows.into_iter().chain(of_doses).collect()
 }
 

@@ -186,7 +186,9 @@ impl SliceSettings {
         exposure: Option<&Exposure>,
         watcher: &dyn Watcher,
     ) -> Result<Option<LayerHeights>, Error> {
-        let Thickness::Adaptive { heights: settings, .. } = &self.thickness else { return Ok(None) };
+        let Thickness::Adaptive { heights: settings, .. } = &self.thickness else {
+            return Ok(None);
+        };
         let body = self.solid.body(model.clone())?;
         let part = settings.part(body, self.dpi, self.solid.fill)?;
         let found = settings.find(&part, exposure, watcher)?;

@@ -2,12 +2,14 @@
 
 use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
 use lamp_stack::{Dpi, Length};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::blur::Blur;
 
 /// Where in its layer a voxel's dose is told.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum SampleHeight {
     /// At the top, where light enters.
     #[default]

@@ -23,7 +23,6 @@ use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
 use crate::section::SectionPicture;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_pipeline::RecordedSlicing;
 use lamp_pipeline::documents::document;
 use lamp_pipeline::part_file::{PartFile, paths};
@@ -175,7 +174,9 @@ fn outline(
     })?;
     let model = sliced.open(parts, name, progress)?;
     let part = name_of_all(parts);
-    course.outline(model, &sliced.settings.for_slicing()).map_err(|error| Exit::from(error).at(part))
+    course
+        .outline(model, &sliced.settings.for_slicing())
+        .map_err(|error| Exit::from(error).at(part))
 }
 
 /// Parses `3mm..6mm`.

@@ -26,9 +26,7 @@ use crate::progress::Progress;
 use crate::streams::{check_beside, print, write_file};
 use lamp_grayscale::exposure::Exposure;
 use lamp_pipeline::exposure::ExposureSettings;
-use lamp_pipeline::heights::{
-    HeightSettings, bound, doubts, measured, significant, time_text,
-};
+use lamp_pipeline::heights::{HeightSettings, bound, doubts, measured, significant, time_text};
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::solid::{Reading, at_part, name_of_all};

@@ -46,7 +46,7 @@ impl CureRule {
     }
 }
 
-/// What a stack cures along a section, twice: with every pixel that is not black exposed in full,
+/// The resin that a stack cures along a section, twice: with every pixel that is not black exposed in full,
 /// and by gray levels.
 #[derive(Debug)]
 pub struct CureSection<'a> {

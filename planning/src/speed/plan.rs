@@ -29,7 +29,7 @@ pub struct SpeedOptions {
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum PlanError {
+pub enum SpeedPlanError {
     /// The pages or the model's numbers are impossible.
     #[error(transparent)]
     Part(#[from] PartError),
@@ -91,7 +91,7 @@ const STEPS: usize = 300;
 /// # Errors
 /// Returns an error if the model's or the platform's numbers are impossible, or if no voxel
 /// belongs to the part.
-pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, PlanError> {
+pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, SpeedPlanError> {
     let none = vec![0.0; part.layers().len()];
     plan_corrected(part, options, &none)
 }
@@ -105,7 +105,7 @@ pub fn plan_corrected(
     part: &TimedPart,
     options: &SpeedOptions,
     log_doses: &[f64],
-) -> Result<SpeedPlan, PlanError> {
+) -> Result<SpeedPlan, SpeedPlanError> {
     let feasible = Feasible::new(&options.platform, part.layers())?;
     let simulation = Simulation::corrected(part, &options.light, log_doses, options.memory)?;
     let problem = Problem { simulation: &simulation, feasible, options };
@@ -113,7 +113,7 @@ pub fn plan_corrected(
     let (times, stages) = problem.search(&single, single_error);
     let [before, after] = simulation.tally([&single, &times]);
     if after.wanted.iter().all(|&count| count == 0) {
-        return Err(PlanError::NothingWanted);
+        return Err(SpeedPlanError::NothingWanted);
     }
     let time = |seconds: &f64| ExposureTime::from_ms(seconds * 1000.0);
     Ok(SpeedPlan {

@@ -5,12 +5,11 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::Light;
-use lamp_planning::speed::PartPages;
+use lamp_planning::learn::{JobFile, digest_of_stack, profile_name};
+use lamp_planning::speed::{PartPages, times_table};
 use lamp_stack::{Destination, FolderBeside, Format, sealed, write_stack};
 
 use super::KeptOptions;
-use super::job::{JOB, JobFile, MATERIAL, STACK, digest_of_file, profile_name, read_job};
-use crate::commands::plan::profile_of;
 use crate::exit::Exit;
 use crate::options::Input;
 use crate::progress::Progress;
@@ -35,7 +34,7 @@ pub(super) fn begin(
     let mut pages = PartPages::new(wanted);
     let (mut part, mut origin_mm) = (String::new(), None);
     let new = new_folder_of(folder)?;
-    let file = new.path().join(STACK);
+    let file = new.path().join(JobFile::STACK);
     let layers = read_layers(&input, progress)?.map(|layer| -> Result<_, Exit> {
         let layer = layer?;
         if layer.info.exposure_ms.is_none() {
@@ -57,8 +56,8 @@ pub(super) fn begin(
     let written = write_stack(layers, Destination::File(file.clone()), Format::Big);
     progress.done();
     written?;
-    let digest = digest_of_file(&file)?;
-    if folder.join(JOB).exists() {
+    let digest = digest_of_stack(&file)?;
+    if folder.join(JobFile::NAME).exists() {
         return Err(refuse_second(folder, stack, &digest)?);
     }
     let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
@@ -76,12 +75,12 @@ pub(super) fn begin(
         max_change: platform.max_change,
     };
     let texts = || -> anyhow::Result<()> {
-        let [job, material] = [toml::to_string(&job)?, material.to_toml()?].map(|it| sealed(&it));
-        new.add(JOB, |out| out.write_all(job.as_bytes()))?;
-        new.add(MATERIAL, |out| out.write_all(material.as_bytes()))?;
+        let (job, material) = (job.to_text(), sealed(&material.to_toml()?));
+        new.add(JobFile::NAME, |out| out.write_all(job.as_bytes()))?;
+        new.add(JobFile::MATERIAL, |out| out.write_all(material.as_bytes()))?;
         let times = part_pages.layers().iter().map(|layer| layer.time.unwrap_or_default());
         let times: Vec<ExposureTime> = times.collect();
-        let profile = sealed(&profile_of(&part_pages, &times));
+        let profile = sealed(&times_table(&part_pages, &times));
         Ok(new.add(&profile_name(0), |out| out.write_all(profile.as_bytes()))?)
     };
     texts().with_context(|| folder.display().to_string())?;
@@ -96,7 +95,7 @@ pub(super) fn begin(
 
 /// A folder for a job, under another name at first. If there is a job, one that is never used.
 fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
-    let already = folder.join(JOB).exists();
+    let already = folder.join(JobFile::NAME).exists();
     let unused = folder.join("begun-again");
     new_folder(if already { &unused } else { folder }, false)
 }
@@ -104,7 +103,7 @@ fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
 /// Tells why a job cannot be begun a second time.
 fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
     let (folder, stack) = (folder.to_owned(), input_name(stack));
-    let there = read_job(&folder)?;
+    let there = JobFile::read(&folder)?;
     let error = if there.digest == digest {
         anyhow!("{} is the job of {stack} already: leave out --start", folder.display())
     } else {

@@ -1,20 +1,19 @@
 //! `lamp learn`: corrects the times of layers after every print.
 
 mod begin;
-mod job;
-mod measured;
 mod plot;
 mod report;
-mod step;
 
 use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use lamp_planning::SampleHeight;
-use lamp_planning::learn::Law;
+use lamp_planning::learn::{Job, Law, Measured, learn};
 use lamp_planning::speed::{Platform, Speed};
 
+use crate::catalogue::read_text;
 use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
@@ -23,12 +22,13 @@ use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::plots;
 use crate::progress::Progress;
-use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use crate::streams::{check_beside, input_name, is_stream, print, read_beside, write_file};
 use lamp_pipeline::memory;
 
-use job::Job;
-use measured::Measured;
 use report::{lines_of, write_report};
+
+/// Measurements are read whole.
+const MAX_TABLE: u64 = 64 << 20;
 
 /// Correct the times of layers after every print, from what was measured
 ///
@@ -175,25 +175,29 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs(measured)?;
     let law = args.law()?;
     let memory = args.memory.unwrap_or_else(|| memory::available() / 4);
-    let mut job = Job::open(&args.job, &progress)?;
+    let mut job = open(&args.job, &progress)?;
     let name = input_name(measured);
-    let (measured, text) = Measured::read(measured)?;
+    let (measured, text) = read_measured(measured)?;
     let last = job.prints.len() - 1;
     let may_be_again = args.print.is_none_or(|print| print + 1 == last);
     let again = if may_be_again { job.take_back(&text) } else { None };
     let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
     job.refuse_known(print_number, &text)?;
-    let learned = step::learn(&job, print_number, &measured, &law, args.step, memory)
-        .map_err(|error| error.at(name))?;
+    let learned = learn(&job, print_number, &measured, &law, args.step, memory)
+        .map_err(|error| Exit::from(error).at(name))?;
     match again {
         Some(print) => {
             job.check_again(print, &learned)?;
             progress.say(&format!("print {print} was learnt from already: this is the same again"));
         }
-        None => job.keep(print_number, &text, &learned)?,
+        None => {
+            for (file, text) in job.files_to_keep(print_number, &text, &learned) {
+                write_file(&file, |out| out.write_all(text.as_bytes()))?;
+            }
+        }
     }
     write_file(output, |out| out.write_all(job.profile(&learned.times).as_bytes()))?;
-    let job = Job::open(&args.job, &progress)?;
+    let job = open(&args.job, &progress)?;
     if let Some(path) = &args.report {
         write_report(&job, print_number, &learned, path)?;
     }
@@ -202,6 +206,22 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         write_file(path, |out| out.write_all(&bytes))?;
     }
     print(&lines_of(&job, print_number, &learned))
+}
+
+/// Opens a job.
+fn open(folder: &Path, progress: &Progress) -> Result<Job, Exit> {
+    let job = Job::open(folder, read_beside);
+    progress.done();
+    job
+}
+
+/// Reads what was measured, and its text.
+fn read_measured(path: &Path) -> Result<(Measured, String), Exit> {
+    let read = || -> anyhow::Result<_> {
+        let text = read_text(path, MAX_TABLE, "a table of measurements")?;
+        Ok((Measured::parse(&text)?, text))
+    };
+    Ok(read().with_context(|| input_name(path))?)
 }
 
 impl LearnArgs {

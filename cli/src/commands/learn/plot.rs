@@ -1,7 +1,8 @@
 //! Plots the errors and the times of a job's prints (004 figures 3.7 and 3.8).
 
-use super::job::{Job, Print};
-use super::measured::Measured;
+use lamp_planning::learn::{Job, JobPrint, Measured};
+use lamp_planning::speed::PartLayer;
+
 use super::report::{PrintError, error_of};
 use crate::plots::{Plot, Series, by_layer, curve, linear};
 
@@ -60,17 +61,17 @@ fn course(job: &Job) -> Vec<Plot> {
     areas.into_iter().chain(heights).collect()
 }
 
-fn areas(job: &Job, number: usize, print: &Print) -> Option<Series> {
+fn areas(job: &Job, number: usize, print: &JobPrint) -> Option<Series> {
     let (Measured::Areas(rows), _) = print.measured.as_ref()? else { return None };
     let layers = job.part.layers().iter().rev();
-    let place = |layer: &lamp_planning::speed::PartLayer| {
+    let place = |layer: &PartLayer| {
         let row = rows.iter().find(|row| row.layer == layer.index)?;
         Some((layer.z.mm(), row.under - row.over))
     };
     Some(curve(&format!("print {number}"), layers.filter_map(place).collect()))
 }
 
-fn heights(number: usize, print: &Print) -> Option<Series> {
+fn heights(number: usize, print: &JobPrint) -> Option<Series> {
     let (Measured::Heights(rows), _) = print.measured.as_ref()? else { return None };
     let mut points: Vec<_> =
         rows.iter().map(|row| (row.z_mm, 1000.0 * (row.measured_mm - row.z_mm))).collect();

@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
+use lamp_planning::learn::{Job, JobPrint, Learned, Measured};
 use serde_json::{Value, json};
 
-use super::job::{Job, Print};
-use super::measured::Measured;
-use super::step::Learned;
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 use lamp_pipeline::heights::{significant, time_text};
@@ -111,7 +109,7 @@ impl PrintError {
 }
 
 /// Returns the error of a print that was measured.
-pub(super) fn error_of(print: &Print) -> Option<PrintError> {
+pub(super) fn error_of(print: &JobPrint) -> Option<PrintError> {
     Some(match &print.measured.as_ref()?.0 {
         Measured::Areas(rows) => {
             PrintError::Pixels(rows.iter().map(|row| row.over + row.under).sum())

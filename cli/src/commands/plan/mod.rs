@@ -19,8 +19,6 @@ use clap::{Args, Subcommand};
 use crate::exit::Exit;
 use crate::options::Common;
 
-pub(crate) use speed::profile_of;
-
 /// Plan exposures, so that the doses of all layers together cure the part and nothing else
 #[derive(Args)]
 #[command(after_help = "\

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::speed::{PartError, PartPages, PlanError, SpeedOptions, TimedPart, plan};
+use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_planning::speed::{
+    PartError, PartPages, SpeedOptions, SpeedPlanError, TimedPart, plan, recorded_ms, times_table,
+};
 use lamp_stack::Layer;
 
 use super::speed_plot::plots_of;
@@ -21,7 +23,6 @@ use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
 };
-use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_pipeline::memory;
 
 /// Choose the time of each layer, and so the speed of the platform
@@ -82,7 +83,7 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     let mut stack = KeptStack::new(&args.input.stack);
     let name = input_name(&args.input.stack);
     let part = args.part(&mut stack, &progress)?;
-    let plan = plan(&part, &options).map_err(|error: PlanError| Exit::from(error).at(name))?;
+    let plan = plan(&part, &options).map_err(|error: SpeedPlanError| Exit::from(error).at(name))?;
     let planned = Planned { material: &material.name, part: &part, plan: &plan };
     args.write(&mut stack, &planned, &args.command(&words), &progress)?;
     let doses = MeasuredDoses::of_working_curve(&material);
@@ -94,7 +95,7 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
         progress.say(&line);
     }
     if let Some(path) = &args.profile {
-        write_file(path, |out| out.write_all(profile_of(&part, &plan.times).as_bytes()))?;
+        write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
     }
     if let Some(path) = &args.report {
         write_report(&planned, args.planning.margin, path)?;
@@ -141,7 +142,7 @@ impl SpeedArgs {
         // Times count from the light.
         let timed = layers.zip(planned.plan.times.iter().rev()).map(|(layer, time)| {
             let mut layer: Layer = layer?;
-            layer.info.exposure_ms = Some(rounded(*time));
+            layer.info.exposure_ms = Some(recorded_ms(*time));
             if let Some(stack) = &mut layer.info.stack {
                 stack.commands.push(command.to_owned());
             }
@@ -160,20 +161,4 @@ impl SpeedArgs {
             self.platform.words()
         )
     }
-}
-
-/// Returns a time in milliseconds, rounded to the microsecond.
-pub(crate) fn rounded(time: ExposureTime) -> f64 {
-    (time.ms() * 1000.0).round() / 1000.0
-}
-
-/// Returns the table of the layers' times, bottom first.
-pub(crate) fn profile_of(part: &TimedPart, times: &[ExposureTime]) -> String {
-    let lines = part.layers().iter().zip(times).rev().map(|(layer, time)| {
-        let [z_um, um] = [layer.z, layer.thickness].map(|length| length.to_whole_nm().um());
-        let ms = rounded(*time);
-        format!("{},{z_um},{um},{ms},{:.3}\n", layer.index, 1000.0 * um / ms)
-    });
-    let head = "layer,z_um,thickness_um,exposure_ms,speed_um_per_s\n".to_owned();
-    std::iter::once(head).chain(lines).collect()
 }

@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::speed::{DOSE_BINS, SpeedPlan, Tally, TimedPart, Wrong};
+use lamp_planning::speed::{DOSE_BINS, SpeedPlan, Tally, TimedPart, Wrong, recorded_ms};
 use serde_json::{Value, json};
 
-use super::speed::rounded;
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 use lamp_pipeline::heights::{significant, time_text};
@@ -66,7 +65,7 @@ pub(super) fn write_report(planned: &Planned<'_>, margin: f64, path: &Path) -> R
         "margin": margin,
         "layers": part.layers().len(),
         "wanted": plan.after.wanted.iter().sum::<u64>(),
-        "single_ms": rounded(plan.single),
+        "single_ms": recorded_ms(plan.single),
         "before": tally(&plan.before),
         "after": tally(&plan.after),
         "single_error": plan.single_error,
@@ -81,7 +80,7 @@ pub(super) fn write_report(planned: &Planned<'_>, margin: f64, path: &Path) -> R
             "layer": layer.index,
             "z_um": layer.z.to_whole_nm().um(),
             "thickness_um": layer.thickness.to_whole_nm().um(),
-            "exposure_ms": rounded(plan.times[at]),
+            "exposure_ms": recorded_ms(plan.times[at]),
             "speed_um_per_s": planned.speed(at),
             "wanted": plan.after.wanted[at],
             "before": counts(plan.before.layers[at]),

@@ -1,15 +1,15 @@
 //! Turns what was measured into the times of the next print.
 
-use anyhow::anyhow;
-use lamp_planning::learn::{
-    Convergence, Law, LogDoses, Response, convergence, face_at, heights_of, largest_safe_gain,
-};
-use lamp_planning::speed::{Simulation, SpeedOptions, plan_corrected};
 use lamp_stack::Length;
 
+use super::convergence::{Convergence, convergence, largest_safe_gain};
+use super::error::LearnError;
+use super::heights::{HeightError, LogDoses, face_at, heights_of};
 use super::job::Job;
+use super::law::Law;
 use super::measured::{AreaRow, HeightRow, Measured};
-use crate::exit::Exit;
+use super::response::Response;
+use crate::speed::{Simulation, SpeedOptions, plan_corrected};
 
 /// How near the best plan a corrected one comes, as a share of the unplanned error.
 const GAP: f64 = 0.001;
@@ -17,27 +17,34 @@ const GAP: f64 = 0.001;
 const DEPTHS: [f64; 3] = [1.0, 0.7, 1.3];
 
 /// The next print, and what is known of it.
-pub(super) struct Learned {
+#[derive(Clone, Debug)]
+pub struct Learned {
     /// The times in seconds, from the light on.
-    pub(super) times: Vec<f64>,
+    pub times: Vec<f64>,
     /// What heights have taught, from the light on.
-    pub(super) log_doses: Vec<f64>,
+    pub log_doses: Vec<f64>,
     /// How errors shrink with each print, by what the penetration depth is.
-    pub(super) shrink: Vec<(f64, Convergence)>,
+    pub shrink: Vec<(f64, Convergence)>,
     /// The largest gain with which no print's errors grow, where the law has a gain.
-    pub(super) safe_gain: Option<f64>,
+    pub safe_gain: Option<f64>,
     /// By how far measured heights are below those that the model says, in micrometres.
-    pub(super) deeper_um: Vec<f64>,
+    pub deeper_um: Vec<f64>,
 }
 
-pub(super) fn learn(
+/// Learns from what was measured on a print of a job: `law` turns wrong pixels into times, `step`
+/// is the share of the way that measured heights move the doses.
+///
+/// # Errors
+/// Returns an error if the stack lacks a measured layer or face, or if the model cannot plan
+/// the part.
+pub fn learn(
     job: &Job,
     print: usize,
     measured: &Measured,
     law: &Law,
     step: f64,
     memory: u64,
-) -> Result<Learned, Exit> {
+) -> Result<Learned, LearnError> {
     match measured {
         Measured::Areas(rows) => from_areas(job, print, rows, law, memory),
         Measured::Heights(rows) => from_heights(job, print, rows, step, memory),
@@ -45,17 +52,13 @@ pub(super) fn learn(
 }
 
 /// The errors of each layer from the light on; layers that are not told have none.
-pub(super) fn errors_by_layer(job: &Job, rows: &[AreaRow]) -> Result<Vec<f64>, Exit> {
+fn errors_by_layer(job: &Job, rows: &[AreaRow]) -> Result<Vec<f64>, LearnError> {
     let layers = job.part.layers();
     let mut errors = vec![0.0; layers.len()];
     for row in rows {
         let at = layers.iter().position(|layer| layer.index == row.layer).ok_or_else(|| {
             let [first, last] = [layers.last(), layers.first()].map(|of| of.map_or(0, |l| l.index));
-            Exit::Failed(anyhow!(
-                "line {}: there is no layer {}: the stack has layers {first} to {last}",
-                row.line,
-                row.layer
-            ))
+            LearnError::NoLayer { line: row.line, layer: row.layer, first, last }
         })?;
         errors[at] = row.under - row.over;
     }
@@ -68,7 +71,7 @@ fn from_areas(
     rows: &[AreaRow],
     law: &Law,
     memory: u64,
-) -> Result<Learned, Exit> {
+) -> Result<Learned, LearnError> {
     let errors = errors_by_layer(job, rows)?;
     let now = &job.prints[print];
     let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
@@ -102,14 +105,14 @@ fn from_heights(
     rows: &[HeightRow],
     step: f64,
     memory: u64,
-) -> Result<Learned, Exit> {
+) -> Result<Learned, LearnError> {
     let now = &job.prints[print];
     let faces = rows.iter().map(|row| face_of(job, row)).collect::<Result<Vec<_>, _>>()?;
     let simulation = Simulation::corrected(&job.part, &job.light, &now.log_doses, memory)?;
     let mut deeper = Vec::new();
     for (row, face) in rows.iter().zip(&faces) {
         let expected = heights_of(&job.part, &simulation, &job.light, &now.times, &[*face]);
-        let expected = expected.map_err(|error| at_line(row, error.into()))?;
+        let expected = expected.map_err(|problem| of_face(row, problem))?;
         deeper.push((face.1, expected[0].um() - 1000.0 * row.measured_mm, row.sd_um));
     }
     let mut log_doses = LogDoses::known(&job.part, now.log_doses.clone());
@@ -136,22 +139,22 @@ fn from_heights(
 }
 
 /// The pixel and the layer of a face that was measured.
-fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), Exit> {
-    let silent = "the stack's pages do not state their position on the part";
-    let corner = job.origin_mm().ok_or_else(|| Exit::Failed(anyhow!(silent)))?;
+fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), LearnError> {
+    let corner = job.origin_mm().ok_or(LearnError::NoPosition)?;
     let pitch = job.part.pitch().mm();
     let [x, y] = row.place_mm;
     let place = [(x - corner[0]) / pitch, (corner[1] - y) / pitch].map(f64::floor);
     let outside =
         place.iter().zip(job.part.size()).any(|(at, size)| !(0.0..f64::from(size)).contains(at));
     if outside {
-        return Err(at_line(row, anyhow!("the place {x}, {y} mm is outside the images")));
+        let HeightRow { line, z_mm, place_mm, .. } = *row;
+        return Err(LearnError::Outside { line, z_mm, place_mm });
     }
     let pixel = place.map(|at| at as u32);
     let face = face_at(&job.part, pixel, Length::from_mm(row.z_mm));
-    face.map(|layer| (pixel, layer)).map_err(|error| at_line(row, error.into()))
+    face.map(|layer| (pixel, layer)).map_err(|problem| of_face(row, problem))
 }
 
-fn at_line(row: &HeightRow, error: anyhow::Error) -> Exit {
-    Exit::Failed(error).at(format!("line {}, z {} mm", row.line, row.z_mm))
+fn of_face(row: &HeightRow, problem: HeightError) -> LearnError {
+    LearnError::Face { line: row.line, z_mm: row.z_mm, problem }
 }

@@ -1,0 +1,255 @@
+//! Why nothing can be learnt from a print.
+
+use std::io;
+use std::path::PathBuf;
+
+use lamp_grayscale::calibrate::{DataError, TableError};
+use lamp_grayscale::material::MaterialError;
+use lamp_stack::CatalogueError;
+use thiserror::Error;
+
+use super::heights::HeightError;
+use crate::resin_light::NoLight;
+use crate::speed::{PartError, PlatformError, SpeedPlanError};
+
+/// Why a text is no table of what was measured on a print.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MeasuredError {
+    /// It is not a table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A column or a cell is wrong.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// It has a header alone.
+    #[error("there are no measurements below the header")]
+    Empty,
+    /// A standard deviation is not above zero.
+    #[error("line {line}, column sd_um: {sd_um} is not above zero")]
+    Deviation {
+        /// The line, from 1.
+        line: usize,
+        /// The standard deviation.
+        sd_um: f64,
+    },
+    /// A place stands twice.
+    #[error("line {line}: this place was measured in line {first}, too")]
+    SamePlace {
+        /// The line, from 1.
+        line: usize,
+        /// The line where it stands first.
+        first: usize,
+    },
+    /// A layer's number is not one.
+    #[error("line {line}, column layer: {layer} is not a layer")]
+    NotALayer {
+        /// The line, from 1.
+        line: usize,
+        /// The number.
+        layer: f64,
+    },
+    /// A count is below zero.
+    #[error("line {line}: there are no fewer than 0 wrong pixels")]
+    Negative {
+        /// The line, from 1.
+        line: usize,
+    },
+    /// A layer stands twice.
+    #[error("line {line}: layer {layer} stands in line {first}, too")]
+    SameLayer {
+        /// The line, from 1.
+        line: usize,
+        /// The layer.
+        layer: u32,
+        /// The line where it stands first.
+        first: usize,
+    },
+}
+
+/// Why a file of a job cannot be used.
+// No sources: messages that contain them stand before their text.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum JobFileError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// It is longer than such a file gets.
+    #[error("more than {mib} MiB is not {what}")]
+    TooLong {
+        /// The most that such files have.
+        mib: u64,
+        /// The words for such a file.
+        what: &'static str,
+    },
+    /// It is not text.
+    #[error("byte {0} is not UTF-8 text")]
+    NotText(usize),
+    /// It was changed after it was written.
+    #[error("{0} is not as lamp learn wrote it: bring it back, or begin another job")]
+    Changed(String),
+    /// It is not TOML with the keys of a job.
+    #[error(transparent)]
+    Toml(#[from] toml::de::Error),
+    /// It is not the stack of the job.
+    #[error("this is not the stack that the job was begun with: begin another job")]
+    OtherStack,
+    /// It is not the material of the job.
+    #[error("this is not the resin that the job was begun with: begin another job")]
+    OtherResin,
+    /// It is no material.
+    #[error(transparent)]
+    Material(#[from] CatalogueError<MaterialError>),
+    /// It is not a table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A column or a cell is wrong.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// It is not what was measured.
+    #[error(transparent)]
+    Measured(#[from] MeasuredError),
+    /// Its rows are those of other layers.
+    #[error("its layers are not those of the job's stack")]
+    OtherLayers,
+    /// A time is not above zero.
+    #[error("exposure_ms must be above zero")]
+    NoTime,
+    /// The pages of the stack are impossible.
+    #[error(transparent)]
+    Part(#[from] PartError),
+}
+
+/// Why a job cannot be opened or go on.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum JobError {
+    /// The folder holds no job.
+    #[error("{}: there is no job", .0.display())]
+    NoJob(PathBuf),
+    /// A file cannot be used.
+    // No source: this message contains the problem's text.
+    #[error("{}: {problem}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        problem: JobFileError,
+    },
+    /// The material says no light for plans.
+    #[error(transparent)]
+    Light(#[from] NoLight),
+    /// The stack has no layers to time.
+    #[error(transparent)]
+    Part(#[from] PartError),
+    /// There is no first print.
+    #[error("{}: there is no {name}: begin the job again", folder.display())]
+    NoPrint {
+        /// The job.
+        folder: PathBuf,
+        /// The file of the first print's times.
+        name: String,
+    },
+    /// A later print than the last was measured.
+    #[error(
+        "{}: print {print} was never planned, and so not printed: the last is {last}",
+        folder.display()
+    )]
+    NotPlanned {
+        /// The job.
+        folder: PathBuf,
+        /// The print.
+        print: usize,
+        /// The last print.
+        last: usize,
+    },
+    /// An earlier print than the last was measured.
+    #[error("{}: print {print} was learnt from already: print {last} is the last", folder.display())]
+    LearntFrom {
+        /// The job.
+        folder: PathBuf,
+        /// The print.
+        print: usize,
+        /// The last print.
+        last: usize,
+    },
+    /// The measurements are those of an earlier print, word for word.
+    #[error(
+        "{}: these are the measurements of print {earlier}, given twice: measure print {print}",
+        folder.display()
+    )]
+    GivenTwice {
+        /// The job.
+        folder: PathBuf,
+        /// The print that they were given for.
+        earlier: usize,
+        /// The print that they are given for now.
+        print: usize,
+    },
+    /// The same measurements were learnt from with other options.
+    #[error(
+        "{}: print {print} was learnt from with other options: {name} is there already, and print \
+         {} is the next to be measured",
+        folder.display(),
+        print + 1
+    )]
+    OtherOptions {
+        /// The job.
+        folder: PathBuf,
+        /// The print.
+        print: usize,
+        /// The file of the next print's times.
+        name: String,
+    },
+}
+
+/// Why nothing can be learnt from what was measured.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    /// The stack has no such layer.
+    #[error("line {line}: there is no layer {layer}: the stack has layers {first} to {last}")]
+    NoLayer {
+        /// The line of the table, from 1.
+        line: usize,
+        /// The layer.
+        layer: u32,
+        /// The lowest layer.
+        first: u32,
+        /// The highest layer.
+        last: u32,
+    },
+    /// The stack's pages do not say where on the part they are.
+    #[error("the stack's pages do not state their position on the part")]
+    NoPosition,
+    /// A place is beside the images.
+    #[error("line {line}, z {z_mm} mm: the place {}, {} mm is outside the images", place_mm[0], place_mm[1])]
+    Outside {
+        /// The line of the table, from 1.
+        line: usize,
+        /// The height of the face.
+        z_mm: f64,
+        /// The place, in part coordinates.
+        place_mm: [f64; 2],
+    },
+    /// A measured face is none of the part's, or was not cured.
+    #[error("line {line}, z {z_mm} mm: {problem}")]
+    Face {
+        /// The line of the table, from 1.
+        line: usize,
+        /// The height of the face.
+        z_mm: f64,
+        /// What is wrong with it.
+        problem: HeightError,
+    },
+    /// The model cannot expose the part.
+    #[error(transparent)]
+    Part(#[from] PartError),
+    /// The platform's numbers are impossible.
+    #[error(transparent)]
+    Platform(#[from] PlatformError),
+    /// There is no plan for the corrected doses.
+    #[error(transparent)]
+    Plan(#[from] SpeedPlanError),
+}

@@ -1,0 +1,403 @@
+//! A job: a folder that keeps a stack and what was learnt from its prints.
+//!
+//! ```text
+//! job.toml                what the job is for
+//! stack.tif               the stack
+//! material.toml           its resin
+//! print-000.csv           the times of the first print
+//! print-000-measured.csv  what was measured on it
+//! print-001-doses.csv     by what measured heights correct the doses
+//! print-001.csv           the times of the next
+//! ```
+
+use std::cmp::Ordering;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use lamp_grayscale::calibrate::{CsvTable, NumberRow};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_stack::{Catalogued, Layer, digest_of, sealed, unsealed};
+use serde::{Deserialize, Serialize};
+
+use super::error::{JobError, JobFileError};
+use super::measured::Measured;
+use super::step::Learned;
+use crate::light::{Light, SampleHeight};
+use crate::speed::{PartLayer, PartPages, Platform, TimedPart, times_table};
+
+/// Materials and what a job is for are texts of a few kilobytes.
+const MAX_FILE: u64 = 1 << 20;
+/// Tables of times have a line for each layer.
+const MAX_TABLE: u64 = 64 << 20;
+const PROFILE: [&str; 5] = ["layer", "z_um", "thickness_um", "exposure_ms", "speed_um_per_s"];
+const DOSES: [&str; 2] = ["layer", "log_dose"];
+
+/// The purpose of a job: its stack, and how to plan its prints.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JobFile {
+    /// The name of the part.
+    pub part: String,
+    /// The digest of the stack's file.
+    pub digest: String,
+    /// The images' top left corner in part coordinates, if the pages state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin_mm: Option<[f64; 2]>,
+    /// The lowest gray level of pixels that are wanted.
+    pub wanted: u8,
+    /// Where in its layer a voxel's dose is told.
+    pub at: SampleHeight,
+    /// How far from the critical dose plans keep voxels, as a share of it.
+    pub margin: f64,
+    /// The slowest speed of the platform.
+    pub slowest_um_per_s: f64,
+    /// The fastest speed of the platform.
+    pub fastest_um_per_s: f64,
+    /// By which share the speeds of neighbouring layers may differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_change: Option<f64>,
+}
+
+/// A print of a job.
+#[derive(Clone, Debug)]
+pub struct JobPrint {
+    /// The times in seconds, from the light on.
+    pub times: Vec<f64>,
+    /// The measurements, and their text.
+    pub measured: Option<(Measured, String)>,
+    /// The corrections of doses that heights had taught before, from the light on.
+    pub log_doses: Vec<f64>,
+}
+
+/// A job that is open.
+#[derive(Debug)]
+pub struct Job {
+    folder: PathBuf,
+    file: JobFile,
+    /// The stack as the model sees it.
+    pub part: TimedPart,
+    /// The name of the material.
+    pub material: String,
+    /// The model of light and resin.
+    pub light: Light,
+    /// All prints, the last of which is to be measured.
+    pub prints: Vec<JobPrint>,
+}
+
+/// Returns the name of the file that has the times of a print.
+pub fn profile_name(print: usize) -> String {
+    format!("print-{print:03}.csv")
+}
+
+/// Reads a text that is short enough to be read whole.
+fn read_text(file: &Path, max: u64, what: &'static str) -> Result<String, JobFileError> {
+    let mut bytes = Vec::new();
+    File::open(file)?.take(max + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max {
+        return Err(JobFileError::TooLong { mib: max >> 20, what });
+    }
+    String::from_utf8(bytes)
+        .map_err(|error| JobFileError::NotText(error.utf8_error().valid_up_to()))
+}
+
+/// Reads a text that was sealed when it was written.
+fn read_sealed(file: &Path, max: u64, what: &'static str) -> Result<String, JobFileError> {
+    let text = read_text(file, max, what)?;
+    unsealed(&text).map(ToOwned::to_owned).ok_or_else(|| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        JobFileError::Changed(name.into_owned())
+    })
+}
+
+/// Returns an error that names a file.
+fn at(file: &Path) -> impl Fn(JobFileError) -> JobError {
+    move |problem| JobError::File { file: file.to_owned(), problem }
+}
+
+impl JobFile {
+    /// The name of its file.
+    pub const NAME: &'static str = "job.toml";
+    /// The name of the job's stack.
+    pub const STACK: &'static str = "stack.tif";
+    /// The name of the job's material.
+    pub const MATERIAL: &'static str = "material.toml";
+
+    /// Reads what a job's folder is for.
+    ///
+    /// # Errors
+    /// Returns an error if there is no job, or its file was changed.
+    pub fn read(folder: &Path) -> Result<Self, JobError> {
+        let file = folder.join(Self::NAME);
+        if !file.exists() {
+            return Err(JobError::NoJob(folder.to_owned()));
+        }
+        let text = read_sealed(&file, MAX_FILE, "a job's file");
+        let read = text.and_then(|text| Ok(toml::from_str(&text)?));
+        read.map_err(at(folder))
+    }
+
+    /// Returns the text of its file.
+    ///
+    /// # Panics
+    /// Never: texts and numbers are TOML.
+    pub fn to_text(&self) -> String {
+        sealed(&toml::to_string(self).expect("texts and numbers are TOML"))
+    }
+}
+
+/// Returns the digest of a job's stack.
+///
+/// # Errors
+/// Returns an error if it cannot be read.
+pub fn digest_of_stack(stack: &Path) -> Result<String, JobError> {
+    let digest = File::open(stack).and_then(digest_of);
+    digest.map_err(|error: io::Error| at(stack)(error.into()))
+}
+
+impl Job {
+    /// Opens a job's folder; `layers` reads the layers of a stack.
+    ///
+    /// # Errors
+    /// Returns the errors of `layers`, or an error if a file of the job is missing, was changed or
+    /// does not fit the others.
+    pub fn open<I, E: From<JobError>>(
+        folder: &Path,
+        layers: impl FnOnce(&Path) -> Result<I, E>,
+    ) -> Result<Self, E>
+    where
+        I: IntoIterator<Item = Result<Layer, E>>,
+    {
+        let file = JobFile::read(folder)?;
+        let stack = folder.join(JobFile::STACK);
+        if digest_of_stack(&stack)? != file.digest {
+            return Err(at(&stack)(JobFileError::OtherStack).into());
+        }
+        let material = read_material(&folder.join(JobFile::MATERIAL))?;
+        let light = Light::of(&material, file.at).map_err(JobError::from)?;
+        let mut pages = PartPages::new(file.wanted);
+        for layer in layers(&stack)? {
+            pages.push(layer?).map_err(|error| at(&stack)(error.into()))?;
+        }
+        let part = pages.finish().map_err(JobError::from)?;
+        let material = material.name;
+        let mut job =
+            Self { folder: folder.to_owned(), file, part, material, light, prints: Vec::new() };
+        while job.folder.join(profile_name(job.prints.len())).exists() {
+            let print = job.read_print(job.prints.len())?;
+            job.prints.push(print);
+        }
+        if job.prints.is_empty() {
+            let (folder, name) = (folder.to_owned(), profile_name(0));
+            return Err(JobError::NoPrint { folder, name }.into());
+        }
+        Ok(job)
+    }
+
+    fn read_print(&self, number: usize) -> Result<JobPrint, JobError> {
+        let times = self.read_column(&profile_name(number), &PROFILE, 3)?;
+        let doses = doses_name(number);
+        let log_doses = if self.folder.join(&doses).exists() {
+            self.read_column(&doses, &DOSES, 1)?
+        } else {
+            vec![0.0; times.len()]
+        };
+        let measured = self.folder.join(measured_name(number));
+        // Without a next print, what was measured was kept by a run that did not end.
+        let next = self.folder.join(profile_name(number + 1));
+        let is_learnt_from = measured.exists() && next.exists();
+        let read = || -> Result<_, JobFileError> {
+            let text = read_sealed(&measured, MAX_TABLE, "a table of measurements")?;
+            Ok((Measured::parse(&text)?, text))
+        };
+        let measured_and_text = is_learnt_from.then(read).transpose().map_err(at(&measured))?;
+        if times.iter().any(|ms| *ms <= 0.0) {
+            return Err(at(&self.folder.join(profile_name(number)))(JobFileError::NoTime));
+        }
+        Ok(JobPrint {
+            times: times.iter().map(|ms| ms / 1000.0).collect(),
+            measured: measured_and_text,
+            log_doses,
+        })
+    }
+
+    /// Reads a number of each layer, from the light on.
+    fn read_column<const N: usize>(
+        &self,
+        name: &str,
+        columns: &'static [&'static str; N],
+        column: usize,
+    ) -> Result<Vec<f64>, JobError> {
+        let file = self.folder.join(name);
+        let read = || -> Result<Vec<f64>, JobFileError> {
+            let text = read_sealed(&file, MAX_TABLE, "a table of times")?;
+            let rows = CsvTable::parse(&text)?.numbers(columns, column + 1)?;
+            let layers = self.part.layers();
+            let is_layer = |(row, layer): (&NumberRow<N>, &PartLayer)| {
+                row.numbers[0] == Some(f64::from(layer.index))
+            };
+            if rows.len() != layers.len() || !rows.iter().rev().zip(layers).all(is_layer) {
+                return Err(JobFileError::OtherLayers);
+            }
+            Ok(rows.iter().rev().filter_map(|row| row.numbers[column]).collect())
+        };
+        read().map_err(at(&file))
+    }
+
+    /// Returns the print that was measured: the last, unless another is asked for.
+    ///
+    /// # Errors
+    /// Returns an error if it is not the last.
+    pub fn print_to_learn_from(&self, asked: Option<usize>) -> Result<usize, JobError> {
+        let last = self.prints.len() - 1;
+        let (print, folder) = (asked.unwrap_or(last), self.folder.clone());
+        match print.cmp(&last) {
+            Ordering::Greater => Err(JobError::NotPlanned { folder, print, last }),
+            Ordering::Less => Err(JobError::LearntFrom { folder, print, last }),
+            Ordering::Equal => Ok(print),
+        }
+    }
+
+    /// Refuses what was given for an earlier print, word for word.
+    ///
+    /// # Errors
+    /// Returns an error if it was.
+    pub fn refuse_known(&self, print: usize, text: &str) -> Result<(), JobError> {
+        let same = |print: &JobPrint| {
+            print.measured.as_ref().is_some_and(|(_, known)| is_same(known, text))
+        };
+        match self.prints.iter().position(same) {
+            Some(earlier) => {
+                Err(JobError::GivenTwice { folder: self.folder.clone(), earlier, print })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the files that keep what was measured and learnt, in the order in which they must be
+    /// written.
+    pub fn files_to_keep(
+        &self,
+        print: usize,
+        text: &str,
+        learned: &Learned,
+    ) -> Vec<(PathBuf, String)> {
+        let file = |name: String, text: &str| (self.folder.join(name), sealed(text));
+        let mut files = Vec::new();
+        if learned.log_doses.iter().any(|&log| log != 0.0) {
+            files.push(file(doses_name(print + 1), &self.doses(learned)));
+        }
+        let end = if text.ends_with('\n') { "" } else { "\n" };
+        files.push(file(measured_name(print), &format!("{text}{end}")));
+        // The print is there once its times are.
+        files.push(file(profile_name(print + 1), &self.profile(&learned.times)));
+        files
+    }
+
+    fn doses(&self, learned: &Learned) -> String {
+        let layers = self.part.layers().iter().zip(&learned.log_doses).rev();
+        let lines = layers.map(|(layer, log_dose)| format!("{},{log_dose}\n", layer.index));
+        format!("{}\n{}", DOSES.join(","), lines.collect::<String>())
+    }
+
+    /// Goes back to where the last print was still to be learnt from, if these are its measurements.
+    /// Returns its number.
+    ///
+    /// So the same call again, after one that did not end, gives the same.
+    pub fn take_back(&mut self, text: &str) -> Option<usize> {
+        let print = self.prints.len().checked_sub(2)?;
+        let (_, known) = self.prints[print].measured.as_ref()?;
+        if !is_same(known, text) {
+            return None;
+        }
+        self.prints.truncate(print + 1);
+        self.prints[print].measured = None;
+        Some(print)
+    }
+
+    /// Checks that what is learnt from a print again is what was learnt before.
+    ///
+    /// # Errors
+    /// Returns an error if it is not.
+    pub fn check_again(&self, print: usize, learned: &Learned) -> Result<(), JobError> {
+        let name = profile_name(print + 1);
+        let file = self.folder.join(&name);
+        let before = read_sealed(&file, MAX_TABLE, "a table of times").map_err(at(&file))?;
+        if before == self.profile(&learned.times) {
+            return Ok(());
+        }
+        Err(JobError::OtherOptions { folder: self.folder.clone(), print, name })
+    }
+
+    /// Returns the table of times.
+    pub fn profile(&self, times: &[f64]) -> String {
+        let times: Vec<_> = times.iter().map(|s| ExposureTime::from_ms(s * 1000.0)).collect();
+        times_table(&self.part, &times)
+    }
+
+    pub(super) fn platform(&self) -> Platform {
+        let JobFile { slowest_um_per_s, fastest_um_per_s, max_change, .. } = self.file;
+        Platform { slowest: slowest_um_per_s, fastest: fastest_um_per_s, max_change }
+    }
+
+    pub(super) fn margin(&self) -> f64 {
+        self.file.margin
+    }
+
+    pub(super) fn origin_mm(&self) -> Option<[f64; 2]> {
+        self.file.origin_mm
+    }
+}
+
+fn read_material(file: &Path) -> Result<Material, JobError> {
+    let read = || -> Result<Material, JobFileError> {
+        let text = read_text(file, MAX_FILE, "a material file")?;
+        let material = Material::from_toml(&text)?;
+        unsealed(&text).map(|_| material).ok_or(JobFileError::OtherResin)
+    };
+    read().map_err(at(file))
+}
+
+/// Returns true if two tables are the same, except for blank lines at the end.
+fn is_same(a: &str, b: &str) -> bool {
+    a.trim_end() == b.trim_end()
+}
+
+fn measured_name(print: usize) -> String {
+    format!("print-{print:03}-measured.csv")
+}
+
+fn doses_name(print: usize) -> String {
+    format!("print-{print:03}-doses.csv")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_that_was_changed_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let none = JobFile::read(folder.path());
+        assert!(matches!(none, Err(JobError::NoJob(_))));
+        let job = JobFile {
+            part: "blade".to_owned(),
+            digest: "blake3:00".to_owned(),
+            origin_mm: None,
+            wanted: 128,
+            at: SampleHeight::Middle,
+            margin: 0.05,
+            slowest_um_per_s: 5.0,
+            fastest_um_per_s: 2000.0,
+            max_change: Some(0.2),
+        };
+        let (file, text) = (folder.path().join(JobFile::NAME), job.to_text());
+        assert!(text.contains("at = \"middle\""), "{text}");
+        std::fs::write(&file, &text).unwrap();
+        assert_eq!(JobFile::read(folder.path()).unwrap(), job);
+        std::fs::write(&file, text.replace("128", "100")).unwrap();
+        let changed = JobFile::read(folder.path()).unwrap_err().to_string();
+        assert!(changed.ends_with("bring it back, or begin another job"), "{changed}");
+    }
+}

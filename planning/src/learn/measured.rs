@@ -1,0 +1,152 @@
+//! Reads what was measured on a print.
+
+use lamp_grayscale::calibrate::{CsvTable, NumberRow};
+
+use super::error::MeasuredError;
+
+const HEIGHTS: [&str; 5] = ["x_mm", "y_mm", "z_mm", "measured_mm", "sd_um"];
+const AREAS: [&str; 3] = ["layer", "over_px", "under_px"];
+/// The standard deviation of heights that state none.
+const USUAL_SD_UM: f64 = 20.0;
+
+/// The measurements of a print.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Measured {
+    /// Heights of faces that look down.
+    Heights(Vec<HeightRow>),
+    /// Wrongly cured pixels of layers.
+    Areas(Vec<AreaRow>),
+}
+
+/// A measured height, in part coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightRow {
+    /// Its line in the table, from 1.
+    pub line: usize,
+    /// Where the face is, along x and y.
+    pub place_mm: [f64; 2],
+    /// The height of the face in the part.
+    pub z_mm: f64,
+    /// The height where resin is cured.
+    pub measured_mm: f64,
+    /// The standard deviation of the measurement.
+    pub sd_um: f64,
+}
+
+/// A layer's wrongly cured pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AreaRow {
+    /// Its line in the table, from 1.
+    pub line: usize,
+    /// The number of the layer.
+    pub layer: u32,
+    /// Pixels that are cured and not wanted.
+    pub over: f64,
+    /// Pixels that are wanted and not cured.
+    pub under: f64,
+}
+
+impl Measured {
+    /// Reads a table: of heights, or of areas if it has the column `layer`.
+    ///
+    /// # Errors
+    /// Returns an error if a column is missing or unknown, a number is impossible, or a place or
+    /// layer stands twice.
+    pub fn parse(text: &str) -> Result<Self, MeasuredError> {
+        let table = CsvTable::parse(text)?;
+        let has = |column: &str| table.columns().iter().any(|name| name == column);
+        let measured = if has("layer") { Self::areas(&table)? } else { Self::heights(&table)? };
+        let count = match &measured {
+            Self::Heights(rows) => rows.len(),
+            Self::Areas(rows) => rows.len(),
+        };
+        if count == 0 {
+            return Err(MeasuredError::Empty);
+        }
+        Ok(measured)
+    }
+
+    fn heights(table: &CsvTable) -> Result<Self, MeasuredError> {
+        let mut rows: Vec<HeightRow> = Vec::new();
+        for NumberRow { line, numbers: [x, y, z, measured, sd] } in table.numbers(&HEIGHTS, 4)? {
+            let number = |number: Option<f64>| number.unwrap_or_default();
+            let sd_um = sd.unwrap_or(USUAL_SD_UM);
+            if sd_um <= 0.0 {
+                return Err(MeasuredError::Deviation { line, sd_um });
+            }
+            let row = HeightRow {
+                line,
+                place_mm: [number(x), number(y)],
+                z_mm: number(z),
+                measured_mm: number(measured),
+                sd_um,
+            };
+            let same =
+                |other: &&HeightRow| other.place_mm == row.place_mm && other.z_mm == row.z_mm;
+            if let Some(first) = rows.iter().find(same) {
+                let first = first.line;
+                return Err(MeasuredError::SamePlace { line, first });
+            }
+            rows.push(row);
+        }
+        Ok(Self::Heights(rows))
+    }
+
+    fn areas(table: &CsvTable) -> Result<Self, MeasuredError> {
+        let mut rows: Vec<AreaRow> = Vec::new();
+        for NumberRow { line, numbers: [layer, over, under] } in table.numbers(&AREAS, 3)? {
+            let number = |number: Option<f64>| number.unwrap_or_default();
+            let (layer, over, under) = (number(layer), number(over), number(under));
+            if layer.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&layer) {
+                return Err(MeasuredError::NotALayer { line, layer });
+            }
+            if over < 0.0 || under < 0.0 {
+                return Err(MeasuredError::Negative { line });
+            }
+            let row = AreaRow { line, layer: layer as u32, over, under };
+            if let Some(first) = rows.iter().find(|other| other.layer == row.layer) {
+                let first = first.line;
+                return Err(MeasuredError::SameLayer { line, layer: row.layer, first });
+            }
+            rows.push(row);
+        }
+        Ok(Self::Areas(rows))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_told_apart_by_their_columns() {
+        let heights = Measured::parse("x_mm,y_mm,z_mm,measured_mm\n1,2,3,2.9\n").unwrap();
+        let row = HeightRow {
+            line: 2,
+            place_mm: [1.0, 2.0],
+            z_mm: 3.0,
+            measured_mm: 2.9,
+            sd_um: USUAL_SD_UM,
+        };
+        assert_eq!(heights, Measured::Heights(vec![row]));
+        let areas = Measured::parse("layer,over_px,under_px\n7,5,0\n").unwrap();
+        let row = AreaRow { line: 2, layer: 7, over: 5.0, under: 0.0 };
+        assert_eq!(areas, Measured::Areas(vec![row]));
+    }
+
+    #[test]
+    fn impossible_measurements_are_refused() {
+        let refused = |text: &str| Measured::parse(text).unwrap_err();
+        assert_eq!(refused("layer,over_px,under_px\n"), MeasuredError::Empty);
+        let negative = "layer,over_px,under_px\n7,-1,0\n";
+        assert_eq!(refused(negative), MeasuredError::Negative { line: 2 });
+        let half = "layer,over_px,under_px\n7.5,1,0\n";
+        assert_eq!(refused(half), MeasuredError::NotALayer { line: 2, layer: 7.5 });
+        let twice = "layer,over_px,under_px\n7,1,0\n7,2,0\n";
+        assert_eq!(refused(twice), MeasuredError::SameLayer { line: 3, layer: 7, first: 2 });
+        let exact = "x_mm,y_mm,z_mm,measured_mm,sd_um\n1,2,3,2.9,0\n";
+        assert_eq!(refused(exact), MeasuredError::Deviation { line: 2, sd_um: 0.0 });
+        let place = "x_mm,y_mm,z_mm,measured_mm\n1,2,3,2.9\n1,2,3,2.8\n";
+        assert_eq!(refused(place), MeasuredError::SamePlace { line: 3, first: 2 });
+    }
+}
