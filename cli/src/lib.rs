@@ -7,7 +7,6 @@ mod allocator;
 mod args;
 mod arguments;
 mod band_pictures;
-mod bitmaps;
 mod catalogue;
 mod commands;
 mod endings;

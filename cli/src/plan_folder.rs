@@ -1,31 +1,20 @@
 //! The folder that planners on a fixed glass write: bitmaps in order, a report and pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::Context;
 use lamp_planning::target::HeightMap;
-use lamp_stack::{
-    Destination, Dpi, FolderBeside, Format, Layer, Length, PageInfo, StackError, StackInfo,
-    write_stack,
-};
+use lamp_planning::{MirrorSeconds, PlanFolder, PlanFolderError, PlanPages, ShownBitmap};
+use lamp_stack::Length;
 use serde_json::Value;
 
-use crate::bitmaps::{Bitmap, MirrorSeconds};
 use crate::exit::Exit;
 use crate::plots::{Colours, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 use crate::streams::new_folder;
 
-const BITMAPS: &str = "bitmaps.tif";
 const REPORT: &str = "report.json";
 const SECTION: &str = "section.svg";
 const RESIDUAL: &str = "residual.png";
 const TIMES: &str = "times.png";
-
-/// A folder for a plan, which gets its name when all of it is written.
-pub(crate) struct PlanFolder {
-    folder: FolderBeside,
-    name: PathBuf,
-}
 
 /// A plan, and what it cures.
 pub(crate) struct PlanFiles<'a> {
@@ -36,7 +25,7 @@ pub(crate) struct PlanFiles<'a> {
     /// From the image of a mirror to that of the next.
     pub(crate) pitch: Length,
     /// In the order in which they are displayed.
-    pub(crate) bitmaps: &'a [Bitmap],
+    pub(crate) bitmaps: &'a [ShownBitmap],
     pub(crate) report: &'a Value,
     /// What is wanted, if that is known.
     pub(crate) target: Option<&'a HeightMap>,
@@ -44,72 +33,45 @@ pub(crate) struct PlanFiles<'a> {
     pub(crate) cured: &'a HeightMap,
 }
 
-impl PlanFolder {
-    /// Creates it, before the work. With `force` it will replace one that an earlier run wrote.
-    pub(crate) fn new(path: &Path, force: bool) -> Result<Self, Exit> {
-        Ok(Self { folder: new_folder(path, force)?, name: path.to_owned() })
-    }
-
-    /// Writes all of a plan, and gives the folder its name.
-    pub(crate) fn write(self, files: &PlanFiles<'_>) -> Result<(), Exit> {
-        self.write_bitmaps(files)?;
-        let report = serde_json::to_string_pretty(files.report).expect("reports have text keys");
-        self.put(REPORT, (report + "\n").as_bytes())?;
-        self.put(SECTION, &drawn(&[section(files)], SECTION.as_ref())?)?;
-        if let Some(target) = files.target {
-            self.put(RESIDUAL, &heat_map(&residual(files, target))?)?;
-        }
-        self.put(TIMES, &heat_map(&times(files))?)?;
-        let name = self.name;
-        self.folder
-            .persist()
-            .map_err(|error| Exit::Failed(error.into()).at(name.display().to_string()))
-    }
-
-    fn put(&self, file: &str, bytes: &[u8]) -> Result<(), Exit> {
-        let place = || self.name.join(file).display().to_string();
-        Ok(self.folder.add(file, |out| out.write_all(bytes)).with_context(place)?)
-    }
-
-    fn write_bitmaps(&self, files: &PlanFiles<'_>) -> Result<(), Exit> {
-        let stack = StackInfo {
-            part: files.part.to_owned(),
-            commands: vec![files.command.clone()],
-            layers: u32::try_from(files.bitmaps.len()).ok(),
-            ..StackInfo::default()
-        };
-        let layers = files.bitmaps.iter().zip(0..).map(|(bitmap, index)| {
-            let half_mm = |mirrors: u32| f64::from(mirrors) * files.pitch.mm() / 2.0;
-            let corner = [-half_mm(bitmap.image.width()), half_mm(bitmap.image.height())];
-            let info = PageInfo {
-                index,
-                origin_mm: Some(corner.map(|mm| (mm * 1e6).round() / 1e6)),
-                exposure_ms: Some(bitmap.time.ms()),
-                stack: (index == 0).then(|| stack.clone()),
-                ..PageInfo::default()
-            };
-            Ok::<_, StackError>(Layer {
-                info,
-                dpi: resolution(files.pitch),
-                image: bitmap.image.clone().into(),
-            })
-        });
-        let file = self.folder.path().join(BITMAPS);
-        write_stack(layers, Destination::File(file), Format::Big)
-            .map_err(|error| Exit::from(error).at(self.name.join(BITMAPS).display().to_string()))
-    }
+/// Creates a plan's folder, before the work. With `force` it will replace one that an earlier run
+/// wrote.
+pub(crate) fn plan_folder(path: &Path, force: bool) -> Result<PlanFolder, Exit> {
+    Ok(PlanFolder::new(new_folder(path, force)?, path))
 }
 
-/// Mirrors an inch on the glass, to the four decimals that stacks have.
-fn resolution(pitch: Length) -> Option<Dpi> {
-    Dpi::new((25_400.0 / pitch.um() * 1e4).round() / 1e4)
+/// Writes all of a plan, and gives the folder its name.
+pub(crate) fn write_plan(folder: PlanFolder, files: &PlanFiles<'_>) -> Result<(), Exit> {
+    let PlanFiles { part, command, pitch, bitmaps, .. } = files;
+    folder.add_bitmaps(&PlanPages { part, command, pitch: *pitch, bitmaps })?;
+    let report = serde_json::to_string_pretty(files.report).expect("reports have text keys");
+    folder.add(REPORT, (report + "\n").as_bytes())?;
+    folder.add(SECTION, &drawn(&[section(files)], SECTION.as_ref())?)?;
+    if let Some(target) = files.target {
+        folder.add(RESIDUAL, &heat_map(&residual(files, target))?)?;
+    }
+    folder.add(TIMES, &heat_map(&times(files))?)?;
+    Ok(folder.finish()?)
+}
+
+impl From<PlanFolderError> for Exit {
+    fn from(error: PlanFolderError) -> Self {
+        match error {
+            PlanFolderError::Bitmaps { file, problem } => {
+                Self::from(problem).at(file.display().to_string())
+            }
+            PlanFolderError::File { file, problem } => {
+                Self::Failed(problem.into()).at(file.display().to_string())
+            }
+            error => Self::Failed(error.into()),
+        }
+    }
 }
 
 /// The section along the row nearest to the middle that holds a highest column.
 fn section(files: &PlanFiles<'_>) -> Plot {
     let seen = files.target.unwrap_or(files.cured);
     let grid = seen.grid;
-    let row = highest_row(seen);
+    let row = seen.highest_row();
     let x_mm = |column: usize| grid.x_um(column) / 1000.0;
     let pitch_mm = grid.pitch_um / 1000.0;
     let cured = (0..grid.columns).map(|column| (x_mm(column), files.cured.height_um(column, row)));
@@ -130,23 +92,12 @@ fn section(files: &PlanFiles<'_>) -> Plot {
     }
 }
 
-fn highest_row(map: &HeightMap) -> usize {
-    let (grid, most) = (map.grid, map.highest_um());
-    // Shapes that are alike differ by rounding.
-    let is_highest = |row: &usize| {
-        map.heights_um[row * grid.columns..][..grid.columns].iter().any(|&um| um >= most - 1e-6)
-    };
-    let from_middle = |row: &usize| (2 * row + 1).abs_diff(grid.rows);
-    (0..grid.rows).filter(is_highest).min_by_key(from_middle).unwrap_or(grid.rows / 2)
-}
-
 fn residual(files: &PlanFiles<'_>, target: &HeightMap) -> HeatMap {
-    let both = files.cured.heights_um.iter().zip(&target.heights_um);
     HeatMap {
         title: format!("{}: cured less target", files.part),
         label: "height (um)".to_owned(),
         columns: target.grid.columns,
-        values: both.map(|(cured, target)| cured - target).collect(),
+        values: files.cured.less(target),
         pitch_mm: target.grid.pitch_um / 1000.0,
         colours: Colours::AboutZero,
     }

@@ -5,8 +5,10 @@
 //! - [`Blur`] spreads the light of an image sideways.
 //! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
 //! - [`cure_section`] says what a stack cures along a vertical section.
-//! - [`projector`] and [`target`] are what planners on a fixed glass start from.
+//! - [`projector`] and [`target`] are what planners on a fixed glass start from, a [`PlanFolder`] is
+//!   where they end.
 
+mod bitmaps;
 mod blur;
 pub mod column;
 pub mod cure_section;
@@ -15,6 +17,7 @@ pub mod ecpl;
 pub mod learn;
 mod light;
 mod numeric;
+mod plan_folder;
 pub mod projector;
 mod region;
 mod resin_light;
@@ -27,8 +30,10 @@ mod tiled;
 pub mod voxels;
 mod wide;
 
+pub use bitmaps::{MirrorSeconds, ShownBitmap};
 pub use blur::{Blur, Real};
 pub use light::{IntensityOf, LayerLight, LayerTime, Light, LightError, SampleHeight};
+pub use plan_folder::{PlanFolder, PlanFolderError, PlanPages};
 pub use region::RegionDoses;
 pub use resin_light::NoLight;
 pub use section::DoseSection;

@@ -74,6 +74,24 @@ pub struct HeightMap {
 }
 
 impl HeightMap {
+    /// Returns the row nearest to the middle that holds a highest column.
+    pub fn highest_row(&self) -> usize {
+        let (grid, most) = (self.grid, self.highest_um());
+        // Shapes that are alike differ by rounding.
+        let is_highest = |row: &usize| {
+            self.heights_um[row * grid.columns..][..grid.columns]
+                .iter()
+                .any(|&um| um >= most - 1e-6)
+        };
+        let from_middle = |row: &usize| (2 * row + 1).abs_diff(grid.rows);
+        (0..grid.rows).filter(is_highest).min_by_key(from_middle).unwrap_or(grid.rows / 2)
+    }
+
+    /// Returns by how much each column is higher than in a map of the same grid.
+    pub fn less(&self, other: &Self) -> Vec<f64> {
+        self.heights_um.iter().zip(&other.heights_um).map(|(one, other)| one - other).collect()
+    }
+
     /// Returns the height of a column, in micrometres.
     pub fn height_um(&self, column: usize, row: usize) -> f64 {
         self.heights_um[row * self.grid.columns + column]

@@ -8,6 +8,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::ShownBitmap;
 use lamp_planning::column::{
     ColumnLight, ColumnOptions, ColumnPlan, HeightCurve, Objective, Setup, Stop, Tracing, plan,
 };
@@ -18,10 +19,9 @@ use lamp_stack::{Length, quoted};
 use super::column_measures::doubt;
 use super::column_report::{Reported, lines_of, report_of};
 use super::simulate::parse_rays;
-use crate::bitmaps::Bitmap;
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described, parse_count, parse_thickness};
-use crate::plan_folder::{PlanFiles, PlanFolder};
+use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::{GivenTarget, TargetArg};
 use lamp_pipeline::documents::document_and_word;
@@ -136,7 +136,7 @@ fn parse_gap(text: &str) -> Result<f64, String> {
 const MOST_STEPS: usize = 20_000;
 
 pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
-    let folder = PlanFolder::new(&args.output, args.force)?;
+    let folder = plan_folder(&args.output, args.force)?;
     let (projector, projector_word) = document_and_word::<Projector>(&args.projector)?;
     let (material, material_word) = document_and_word::<Material>(&args.material)?;
     let curve = HeightCurve::of(&material).map_err(anyhow::Error::new)?;
@@ -161,7 +161,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
     };
     let bitmaps = args.bitmaps(&projector, &plan);
     let cured = plan.doses.iter().map(|&dose| curve.height_um(dose)).collect();
-    folder.write(&PlanFiles {
+    let files = PlanFiles {
         part: target.name(),
         command: args.command(&target, &projector_word, &material_word, &options),
         pitch: projector.pitch.value,
@@ -169,7 +169,8 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
         report: &report_of(&reported),
         target: Some(&map),
         cured: &HeightMap { grid: map.grid, heights_um: cured },
-    })?;
+    };
+    write_plan(folder, &files)?;
     lines_of(&reported).iter().for_each(|line| progress.say(line));
     Ok(())
 }
@@ -254,11 +255,11 @@ impl ColumnCureArgs {
         Ok((4.0 * wide_s).min(A_DAY_S))
     }
 
-    fn bitmaps(&self, projector: &Projector, plan: &ColumnPlan) -> Vec<Bitmap> {
+    fn bitmaps(&self, projector: &Projector, plan: &ColumnPlan) -> Vec<ShownBitmap> {
         let time = |steps: u64| ExposureTime::from_ms(projector.step.value.ms() * steps as f64);
         let bitmaps = plan.bitmaps.iter();
         bitmaps
-            .map(|bitmap| Bitmap { image: bitmap.image.clone(), time: time(bitmap.steps) })
+            .map(|bitmap| ShownBitmap { image: bitmap.image.clone(), time: time(bitmap.steps) })
             .collect()
     }
 

@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::material::Material;
+use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::{Exposure, Method, Planned, Profile, Setting, plan};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::Grid;
 use serde_json::json;
 
 use super::kinetics_report::{Cured, fields, lines_of};
-use crate::bitmaps::Bitmap;
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described};
-use crate::plan_folder::{PlanFiles, PlanFolder};
+use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::TargetArg;
 use lamp_pipeline::documents::document;
@@ -65,7 +65,7 @@ pub(super) struct EcplArgs {
 }
 
 pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
-    let folder = PlanFolder::new(&args.output, args.force)?;
+    let folder = plan_folder(&args.output, args.force)?;
     let projector: Projector = document(&args.projector)?;
     let material: Material = document(&args.material)?;
     let setting = setting_of(&projector, &material)?;
@@ -86,7 +86,7 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let report_fields = report.as_object_mut().expect("it is an object");
     report_fields.extend(fields(&reported));
     let grid = grid_of(cured, round.radius_um());
-    folder.write(&PlanFiles {
+    let files = PlanFiles {
         part: target.name(),
         command: format!(
             "lamp plan ecpl {} --projector {} --material {} --method {}",
@@ -100,7 +100,8 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
         report: &report,
         target: Some(&grid.round(|radius_um| round.height_um(radius_um))),
         cured: &cured.on(&grid),
-    })?;
+    };
+    write_plan(folder, &files)?;
     lines_of(&reported).iter().for_each(|line| progress.say(line));
     Ok(())
 }
@@ -131,9 +132,9 @@ pub(super) fn failed(error: impl std::error::Error + Send + Sync + 'static) -> E
     Exit::Failed(error.into())
 }
 
-fn bitmaps(projector: &Projector, exposures: &[Exposure]) -> Vec<Bitmap> {
+fn bitmaps(projector: &Projector, exposures: &[Exposure]) -> Vec<ShownBitmap> {
     let display = &projector.display;
-    let bitmap = |exposure: &Exposure| Bitmap {
+    let bitmap = |exposure: &Exposure| ShownBitmap {
         image: exposure.drawn(display.columns, display.rows).into(),
         time: exposure.time,
     };

@@ -1,12 +1,12 @@
 //! What bitmaps cure where doses add up, column by column (000).
 
+use lamp_planning::MirrorSeconds;
 use lamp_planning::column::{ColumnLight, HeightCurve, Measures, Setup, Tracing};
 use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
 use serde_json::{Map, json};
 
 use super::{Outcome, Shown};
-use crate::bitmaps::MirrorSeconds;
 use crate::commands::plan::column_measures;
 use crate::exit::Exit;
 

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::Exposure;
 use lamp_planning::projector::Projector;
 
-use crate::bitmaps::Bitmap;
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream, layers_of, open_pages};
 
@@ -19,7 +19,7 @@ const A_DAY_MS: f64 = 86_400_000.0;
 pub(super) struct Exposures {
     /// The file's name without its folder, or the text.
     pub(super) name: String,
-    pub(super) bitmaps: Vec<Bitmap>,
+    pub(super) bitmaps: Vec<ShownBitmap>,
 }
 
 impl Exposures {
@@ -50,14 +50,14 @@ impl Exposures {
                     "{text}: the display of {name} reaches {most} mirrors from its middle"
                 )));
             }
-            Ok(Bitmap { image: exposure.drawn(columns, rows).into(), time: exposure.time })
+            Ok(ShownBitmap { image: exposure.drawn(columns, rows).into(), time: exposure.time })
         };
         let bitmaps = text.split(',').map(bitmap).collect::<Result<_, _>>()?;
         Ok(Self { name: text.to_owned(), bitmaps })
     }
 
     fn of_stack(path: &Path, projector: &Projector) -> Result<Self, Exit> {
-        let mut bitmaps: Vec<Bitmap> = Vec::new();
+        let mut bitmaps: Vec<ShownBitmap> = Vec::new();
         let [columns, rows] = [projector.display.columns, projector.display.rows];
         for layer in layers_of(open_pages(path)?, path, None) {
             let layer = layer?;
@@ -81,8 +81,10 @@ impl Exposures {
             let Some(ms) = layer.info.exposure_ms else {
                 return failed("it does not say how long it is shown (exposure_ms)".to_owned());
             };
-            bitmaps
-                .push(Bitmap { image: layer.image.into_image(), time: ExposureTime::from_ms(ms) });
+            bitmaps.push(ShownBitmap {
+                image: layer.image.into_image(),
+                time: ExposureTime::from_ms(ms),
+            });
         }
         let name = match path.file_name() {
             Some(name) if !is_stream(path) => name.to_string_lossy().into_owned(),
@@ -93,7 +95,7 @@ impl Exposures {
 
     /// Checks that the display can show each as long.
     fn check_times(&self, step: ExposureTime) -> Result<(), Exit> {
-        for (Bitmap { time, .. }, of) in self.bitmaps.iter().zip(1..) {
+        for (ShownBitmap { time, .. }, of) in self.bitmaps.iter().zip(1..) {
             // Times that were written as decimals may be short of a step by rounding.
             let is_shown = time.ms() >= step.ms() * (1.0 - 1e-9);
             if time.ms() > A_DAY_MS {

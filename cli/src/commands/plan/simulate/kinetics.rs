@@ -1,12 +1,12 @@
 //! What bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
 
 use anyhow::anyhow;
+use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::{Exposure, Simulation, Wanted};
 use lamp_planning::target::Round;
 use lamp_stack::Image;
 
 use super::{Outcome, Shown};
-use crate::bitmaps::Bitmap;
 use crate::commands::plan::ecpl::{failed, grid_of, setting_of};
 use crate::commands::plan::kinetics_report::{Cured, fields, lines_of};
 use crate::exit::Exit;
@@ -43,7 +43,7 @@ pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
     })
 }
 
-fn exposure((of, bitmap): (usize, &Bitmap)) -> Result<Exposure, Exit> {
+fn exposure((of, bitmap): (usize, &ShownBitmap)) -> Result<Exposure, Exit> {
     let Image::Mask(mask) = &bitmap.image else {
         let text = format!("bitmap {of} has gray levels: kinetics take black and white ones");
         return Err(Exit::Failed(anyhow!(text)));

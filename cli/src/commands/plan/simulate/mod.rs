@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::material::Material;
+use lamp_planning::PlanFolder;
 use lamp_planning::column::Tracing;
 use lamp_planning::projector::Projector;
 use lamp_planning::target::HeightMap;
@@ -17,7 +18,7 @@ use serde_json::{Map, Value, json};
 
 use crate::exit::Exit;
 use crate::options::{Common, one_of_described};
-use crate::plan_folder::{PlanFiles, PlanFolder};
+use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::{GivenTarget, TargetReading};
 use lamp_pipeline::documents::document;
@@ -116,7 +117,7 @@ struct Outcome {
 
 pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     let folder = match &args.output {
-        Some(path) => Some(PlanFolder::new(path, args.force)?),
+        Some(path) => Some(plan_folder(path, args.force)?),
         None => None,
     };
     let progress = Progress::new("plan", common, true);
@@ -160,7 +161,7 @@ fn write(folder: PlanFolder, model: Model, shown: &Shown, outcome: &Outcome) -> 
     let fields = report.as_object_mut().expect("it is an object");
     fields.extend(outcome.report.clone());
     let compared = name.map_or_else(String::new, |name| format!(" --target {name}"));
-    folder.write(&PlanFiles {
+    let files = PlanFiles {
         part: name.unwrap_or(&exposures.name),
         command: format!(
             "lamp plan simulate {} --model {model} --projector {} --material {}{compared}",
@@ -171,5 +172,6 @@ fn write(folder: PlanFolder, model: Model, shown: &Shown, outcome: &Outcome) -> 
         report: &report,
         target: outcome.wanted.as_ref(),
         cured: &outcome.cured,
-    })
+    };
+    write_plan(folder, &files)
 }

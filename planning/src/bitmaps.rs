@@ -5,24 +5,27 @@ use std::ops::Range;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::Image;
 
-/// What to display, and for how long.
+/// A bitmap that is shown, and for how long.
 #[derive(Clone, Debug)]
-pub(crate) struct Bitmap {
-    pub(crate) image: Image,
-    pub(crate) time: ExposureTime,
+pub struct ShownBitmap {
+    /// White, or a gray level, where mirrors are on.
+    pub image: Image,
+    /// How long it is shown.
+    pub time: ExposureTime,
 }
 
 /// For how many seconds of white light each mirror is on.
-pub(crate) struct MirrorSeconds {
+#[derive(Clone, Debug, PartialEq)]
+pub struct MirrorSeconds {
     /// Mirrors along x and y: as far as any is on, and as many on the opposite side of the axis.
-    pub(crate) mirrors: [usize; 2],
+    pub mirrors: [usize; 2],
     /// Row by row.
-    pub(crate) seconds: Vec<f64>,
+    pub seconds: Vec<f64>,
 }
 
 impl MirrorSeconds {
     /// Adds up bitmaps of one size, given the share of white's light that gray levels have.
-    pub(crate) fn of(bitmaps: &[Bitmap], share: impl Fn(u8) -> f64) -> Self {
+    pub fn of(bitmaps: &[ShownBitmap], share: impl Fn(u8) -> f64) -> Self {
         let first = bitmaps.first().map(|bitmap| &bitmap.image);
         let [width, height] = first.map_or([1, 1], |image| [image.width(), image.height()]);
         // Dark mirrors between a place and the nearer side.
@@ -45,8 +48,8 @@ impl MirrorSeconds {
 }
 
 /// Returns the row, columns, level and time of each run that is not black.
-fn runs(bitmaps: &[Bitmap]) -> impl Iterator<Item = (u32, Range<u32>, u8, ExposureTime)> {
-    bitmaps.iter().flat_map(|Bitmap { image, time }| {
+fn runs(bitmaps: &[ShownBitmap]) -> impl Iterator<Item = (u32, Range<u32>, u8, ExposureTime)> {
+    bitmaps.iter().flat_map(|ShownBitmap { image, time }| {
         (0..image.height()).flat_map(move |row| {
             image.runs(row).map(move |(start, end, level)| (row, start..end, level, *time))
         })
@@ -66,7 +69,8 @@ mod tests {
         builder.push_row(&[6, 8]).unwrap();
         builder.push_black(2);
         let image: Image = builder.finish().into();
-        let bitmap = |ms: f64| Bitmap { image: image.clone(), time: ExposureTime::from_ms(ms) };
+        let bitmap =
+            |ms: f64| ShownBitmap { image: image.clone(), time: ExposureTime::from_ms(ms) };
         let sum = MirrorSeconds::of(&[bitmap(500.0), bitmap(1500.0)], |level| {
             f64::from(level) / 255.0 / 2.0
         });
@@ -79,7 +83,7 @@ mod tests {
 
     #[test]
     fn what_is_dark_is_one_mirror_or_two() {
-        let dark = |width: u32| Bitmap {
+        let dark = |width: u32| ShownBitmap {
             image: lamp_stack::Mask::black(width, width).into(),
             time: ExposureTime::from_ms(1.0),
         };
