@@ -16,7 +16,7 @@ const MAX_WAYS: usize = 50_000_000;
 type Cost = (u32, f64);
 
 /// All ways to place layers between whole steps.
-pub(crate) struct Placement<'a> {
+pub(crate) struct LayerPlacement<'a> {
     pub(crate) table: &'a HeightTable,
     pub(crate) thicknesses: &'a Thicknesses,
     pub(crate) criterion: &'a dyn Criterion,
@@ -32,7 +32,7 @@ struct Way {
     cost: Cost,
 }
 
-impl Placement<'_> {
+impl LayerPlacement<'_> {
     /// Returns the thicknesses, in steps, of the layers that cost least, of as many as end in
     /// `tops`. Returns nothing if none cost less than `worthwhile`, or too many are to compare.
     ///

@@ -10,7 +10,7 @@ use crate::error::HeightsError;
 use crate::known::{Known, guessed, know};
 use crate::layered_part::LayeredPart;
 use crate::overlaps::Overlaps;
-use crate::placement::{Placement, cost_of};
+use crate::placement::{LayerPlacement, cost_of};
 use crate::swept_layer::SweptLayer;
 use crate::table::HeightTable;
 use crate::thicknesses::Thicknesses;
@@ -255,7 +255,7 @@ impl HeightSearch<'_> {
         let Climb { heights: found, tops } = climb;
         let Some(table) = &grid.table else { return found };
         let (thicknesses, criterion, ends) = (self.thicknesses, self.criterion, &grid.ends[..]);
-        let placement = Placement { table, thicknesses, criterion, ends, bound, known };
+        let placement = LayerPlacement { table, thicknesses, criterion, ends, bound, known };
         let cost = cost_of(&found, criterion, bound);
         let worthwhile = (cost.0, WORTHWHILE * (cost.1 - found.unbuilt_mm3));
         let Some(best) = placement.least_error(&tops, worthwhile) else { return found };

@@ -10,7 +10,7 @@
 
 use std::path::Path;
 
-use lamp_planning::column::{ColumnLight, Setup, Spread, Stop, Tracing, nearest_times};
+use lamp_planning::column::{GlassLight, MirrorSpread, Setup, Stop, Tracing, nearest_times};
 
 /// From one mirror to the next on the glass, in um (000: 13.65 um at 132/152).
 const PITCH_UM: f64 = 11.85;
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let setup = setup([columns.parse()?, rows.parse()?], cone.parse()?);
     let (folder, wanted) = (Path::new(folder), lenses(setup.voxels));
-    let light = ColumnLight::new(setup);
+    let light = GlassLight::new(setup);
     match what.as_str() {
         "matrix" => {
             write(&folder.join("wanted"), &wanted)?;
@@ -57,7 +57,7 @@ fn setup(mirrors: [usize; 2], cone_um: f64) -> Setup {
         display: mirrors,
         pitch_um: PITCH_UM,
         lit_um: PITCH_UM * 12.65 / 13.65,
-        spread: Spread::Cone(cone_um),
+        spread: MirrorSpread::Cone(cone_um),
         tracing: Tracing::Rays { points, directions },
         irradiance: rays * RAY_MW / (PITCH_UM * 1e-4).powi(2),
         flat_field: Vec::new(),
@@ -84,7 +84,7 @@ fn lenses([columns, rows]: [usize; 2]) -> Vec<f64> {
 }
 
 /// Writes the matrix by columns: `starts` of each mirror's entries, their `voxels` and `weights`.
-fn write_matrix(folder: &Path, light: &ColumnLight) -> std::io::Result<()> {
+fn write_matrix(folder: &Path, light: &GlassLight) -> std::io::Result<()> {
     let setup = light.setup();
     let [columns, rows] = setup.mirrors;
     let mut entries = vec![Vec::new(); columns * rows];

@@ -16,7 +16,8 @@ use std::time::Instant;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::ecpl::{
-    Cells, Chamber, Exposure, Method, Reaction, Setting, Shape, Simulation, plan,
+    Cells, Chamber, ChamberShape, KineticSetting, Method, Reaction, RingExposure, RingSimulation,
+    plan,
 };
 use lamp_planning::projector::Projector;
 use lamp_planning::target::Target;
@@ -38,10 +39,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn setting() -> Result<Setting, Box<dyn Error>> {
+fn setting() -> Result<KineticSetting, Box<dyn Error>> {
     let material = Material::builtin("tmpta").ok_or("tmpta is built in")?;
     let projector = Projector::builtin("jariwala").ok_or("jariwala is built in")?;
-    Ok(Setting::of(&projector, material.kinetics()?.ok_or("tmpta has kinetics")?)?)
+    Ok(KineticSetting::of(&projector, material.kinetics()?.ok_or("tmpta has kinetics")?)?)
 }
 
 fn repeat(
@@ -55,8 +56,9 @@ fn repeat(
     Ok(heights)
 }
 
-fn wide_field(setting: &Setting) -> Result<Vec<f64>, Box<dyn Error>> {
-    let cells = Cells { shape: Shape::Round, across: 1, deep: 200, width_um: 4.0, height_um: 1.0 };
+fn wide_field(setting: &KineticSetting) -> Result<Vec<f64>, Box<dyn Error>> {
+    let cells =
+        Cells { shape: ChamberShape::Round, across: 1, deep: 200, width_um: 4.0, height_um: 1.0 };
     let reaction = Reaction::new(&setting.kinetics, cells, 0.025);
     let mut chamber = Chamber::new(&reaction);
     let light = [10.0 * setting.light.mw_per_cm2()];
@@ -64,15 +66,15 @@ fn wide_field(setting: &Setting) -> Result<Vec<f64>, Box<dyn Error>> {
     Ok(chamber.heights_um(&reaction))
 }
 
-fn figure_11(setting: &Setting) -> Result<Vec<f64>, Box<dyn Error>> {
+fn figure_11(setting: &KineticSetting) -> Result<Vec<f64>, Box<dyn Error>> {
     let disc = |&(pixels, seconds): &(u32, f64)| {
-        Exposure::disc(pixels, ExposureTime::from_ms(1000.0 * seconds))
+        RingExposure::disc(pixels, ExposureTime::from_ms(1000.0 * seconds))
     };
     let plan: Vec<_> = FIGURE_11.iter().map(disc).collect();
-    Ok(Simulation::of_plan(*setting, &plan, 100.0)?.cure(&plan).heights_um)
+    Ok(RingSimulation::of_plan(*setting, &plan, 100.0)?.cure(&plan).heights_um)
 }
 
-fn planned(mut setting: Setting, name: &str) -> Result<Vec<f64>, Box<dyn Error>> {
+fn planned(mut setting: KineticSetting, name: &str) -> Result<Vec<f64>, Box<dyn Error>> {
     let target = Target::builtin(name).ok_or("no such target")?;
     let round = target.round(Length::from_um(1.0))?;
     if name == "lens" {

@@ -13,7 +13,7 @@ use std::path::Path;
 use lamp_fixtures::{Voxels, cavity_staircase, dna_helix};
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::solver::{Operator, Shape};
-use lamp_planning::voxels::{Options, Outcome, PlanError, Window, plan};
+use lamp_planning::voxels::{Options, Outcome, VoxelPlanError, Window, plan};
 use lamp_planning::{Blur, IntensityOf, LayerLight, Light, SampleHeight};
 use lamp_stack::{Dpi, Layer, Length, MaskBuilder, PageInfo};
 
@@ -111,7 +111,7 @@ impl Problem {
         doses[doses.len() - (self.cured * volume as f64).round() as usize]
     }
 
-    fn plan(&self, wanted: &[u8], critical: f64) -> Result<Outcome, PlanError> {
+    fn plan(&self, wanted: &[u8], critical: f64) -> Result<Outcome, VoxelPlanError> {
         let light = Light {
             intensity: Intensity::from_mw_per_cm2(1.0),
             intensity_of: IntensityOf::Pixel(Length::from_um(PITCH_UM)),
@@ -130,7 +130,7 @@ impl Problem {
     }
 
     /// Returns the stack, bottom first.
-    fn layers(&self, wanted: &[u8]) -> impl Iterator<Item = Result<Layer, PlanError>> {
+    fn layers(&self, wanted: &[u8]) -> impl Iterator<Item = Result<Layer, VoxelPlanError>> {
         let [columns, rows, _] = self.size;
         let image = move |image: &[u8]| {
             let mut mask = MaskBuilder::new(columns as u32);

@@ -13,7 +13,7 @@ use lamp_offset::CompensateError;
 use lamp_pipeline::ErrorKind;
 use lamp_planning::learn::{JobError, LearnError};
 use lamp_planning::speed::{PartError, PlatformError, SpeedPlanError};
-use lamp_planning::voxels::PlanError;
+use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
@@ -135,7 +135,7 @@ macro_rules! failures {
 failures!(
     LightError,
     NoLight,
-    PlanError,
+    VoxelPlanError,
     PartError,
     SpeedPlanError,
     JobError,

@@ -19,7 +19,7 @@ use lamp_planning::learn::{JobError, JobFileError, LearnError};
 use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::target::TargetError;
-use lamp_planning::voxels::PlanError;
+use lamp_planning::voxels::VoxelPlanError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
 use lamp_slicer::{SliceError, ThreeMfError};
@@ -300,23 +300,27 @@ fn light(error: &LightError) -> Option<String> {
     }
 }
 
-fn plan(error: &PlanError) -> Option<String> {
+fn plan(error: &VoxelPlanError) -> Option<String> {
     let hint = match error {
         // It is transparent, so that it is no cause of its own.
-        PlanError::Light(error) => return light(error),
-        PlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
-        PlanError::Silent { .. } => "plan the stack that slice wrote",
-        PlanError::Unlike { .. } => "plan the stack before its layers are cropped",
+        VoxelPlanError::Light(error) => return light(error),
+        VoxelPlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
+        VoxelPlanError::Silent { .. } => "plan the stack that slice wrote",
+        VoxelPlanError::Unlike { .. } => "plan the stack before its layers are cropped",
         _ => return None,
     };
     Some(hint.to_owned())
 }
 
-fn ecpl(error: &ecpl::PlanError) -> Option<String> {
+fn ecpl(error: &ecpl::RingPlanError) -> Option<String> {
     let hint = match error {
-        ecpl::PlanError::TooHigh { .. } => "make it lower, or the chamber of the projector higher",
-        ecpl::PlanError::TooWide { .. } => "make it smaller, or take a projector with more mirrors",
-        ecpl::PlanError::TooDim { .. } => "make it lower, or the projector's light brighter",
+        ecpl::RingPlanError::TooHigh { .. } => {
+            "make it lower, or the chamber of the projector higher"
+        }
+        ecpl::RingPlanError::TooWide { .. } => {
+            "make it smaller, or take a projector with more mirrors"
+        }
+        ecpl::RingPlanError::TooDim { .. } => "make it lower, or the projector's light brighter",
         _ => return None,
     };
     Some(hint.to_owned())

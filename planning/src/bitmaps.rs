@@ -10,7 +10,7 @@ use lamp_stack::Image;
 pub struct ShownBitmap {
     /// White, or a gray level, where mirrors are on.
     pub image: Image,
-    /// How long it is shown.
+    /// The time for which it is shown.
     pub time: ExposureTime,
 }
 

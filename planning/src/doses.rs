@@ -76,7 +76,7 @@ pub(crate) struct Room {
 }
 
 /// Light that has spread over a rectangle.
-pub(crate) struct Spread<'a> {
+pub(crate) struct SpreadLight<'a> {
     values: &'a [f32],
     stride: usize,
     border: usize,
@@ -84,7 +84,7 @@ pub(crate) struct Spread<'a> {
     height: usize,
 }
 
-impl Spread<'_> {
+impl SpreadLight<'_> {
     /// Returns the rows of the rectangle.
     pub(crate) fn rows(&self) -> impl Iterator<Item = &[f32]> {
         let lines = self.values.chunks_exact(self.stride).skip(self.border).take(self.height);
@@ -100,7 +100,7 @@ impl Room {
         rect: &Rect,
         blur: &Blur<f32>,
         fill: impl FnOnce(&Rect, usize, &mut [f32], &mut Vec<u8>),
-    ) -> Spread<'_> {
+    ) -> SpreadLight<'_> {
         let border = blur.radius();
         let view = rect.grown(border);
         let stride = view.width().next_multiple_of(LANES);
@@ -110,6 +110,6 @@ impl Room {
         fill(&view, stride, &mut self.light, &mut self.levels);
         blur.apply(&self.light, stride, &mut self.spread, &mut self.blur);
         let (width, height) = (rect.width(), rect.height());
-        Spread { values: &self.spread, stride, border, width, height }
+        SpreadLight { values: &self.spread, stride, border, width, height }
     }
 }

@@ -1,12 +1,12 @@
 //! The example of 001 appendix A, as a stack of five layers.
 
 use lamp_grayscale::resin::{Dose, Intensity};
-use lamp_planning::voxels::{Objective, Options, PlanError, PlannedStack, plan};
+use lamp_planning::voxels::{Options, PlannedStack, VoxelObjective, VoxelPlanError, plan};
 use lamp_planning::{IntensityOf, Light, SampleHeight};
 use lamp_stack::{Dpi, Layer, Length, Mask, PageInfo};
 
 /// The cylinder of 5 pixels and 5 layers, in 7 x 7 pixels.
-fn cylinder() -> Vec<Result<Layer, PlanError>> {
+fn cylinder() -> Vec<Result<Layer, VoxelPlanError>> {
     let rows = [(0, 0), (2, 5), (1, 6), (1, 6), (1, 6), (2, 5), (0, 0)];
     let offsets = [0, 0, 2, 4, 6, 8, 10, 10].to_vec();
     let transitions = rows.iter().filter(|(a, b)| a < b).flat_map(|&(a, b)| [a, b]).collect();
@@ -46,7 +46,7 @@ fn planned(options: &Options) -> (PlannedStack, Vec<Layer>) {
 #[test]
 fn overcured_voxels_go_from_84_to_none_also_in_levels() {
     let options = Options {
-        objective: Objective::Boundary,
+        objective: VoxelObjective::Boundary,
         gap: 1e-6,
         around: Some(0),
         ..Options::default()

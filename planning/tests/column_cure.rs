@@ -3,8 +3,8 @@
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{
-    ColumnLight, ColumnOptions, HeightCurve, Measures, Objective, Setup, Spread, Stop, Tracing,
-    plan,
+    ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread, Setup, Stop,
+    Tracing, plan,
 };
 use lamp_planning::target::{Grid, HeightMap, Target};
 use lamp_stack::{Catalogued, Image, Length, Mask};
@@ -13,14 +13,14 @@ const RAYS: Tracing = Tracing::Rays { points: 9, directions: 15 };
 const CERTAIN: Stop = Stop { gap: 1e-6, steps: 10_000 };
 
 /// 000's 151 x 151 mirrors over a target of so many columns along each side.
-fn zhao(columns: usize, tracing: Tracing) -> ColumnLight {
+fn zhao(columns: usize, tracing: Tracing) -> GlassLight {
     let pitch_um = 4210.0 / 151.0;
-    ColumnLight::new(Setup {
+    GlassLight::new(Setup {
         mirrors: [151; 2],
         display: [151; 2],
         pitch_um,
         lit_um: pitch_um * 12.65 / 13.65,
-        spread: Spread::Cone(12.0),
+        spread: MirrorSpread::Cone(12.0),
         tracing,
         irradiance: 135.0_f64.powi(2) * 8.0275e-11 / (pitch_um * 1e-4).powi(2),
         flat_field: Vec::new(),
@@ -38,7 +38,7 @@ fn map(target: &str, columns: usize) -> HeightMap {
     Target::builtin(target).unwrap().heights(&grid).unwrap()
 }
 
-fn options(objective: Objective) -> ColumnOptions {
+fn options(objective: ColumnObjective) -> ColumnOptions {
     ColumnOptions {
         objective,
         bitmaps: 25,
@@ -59,8 +59,9 @@ fn measures(doses: &[f64], target: &HeightMap) -> Measures {
 fn exact_light_gives_the_smoother_sphere() {
     // Worked out apart from this code, in Python.
     let target = map("sphere", 300);
-    let planned =
-        |tracing| plan(&zhao(300, tracing), &target, pegda(), &options(Objective::Dose)).unwrap();
+    let planned = |tracing| {
+        plan(&zhao(300, tracing), &target, pegda(), &options(ColumnObjective::Dose)).unwrap()
+    };
     let exact = planned(Tracing::Exact);
     assert!(exact.best.relative_gap() <= 1e-6, "{:e}", exact.best.relative_gap());
     assert!((exact.best.error / 23016.5558 - 1.0).abs() < 1e-6, "{}", exact.best.error);
@@ -82,7 +83,7 @@ fn exact_light_gives_the_smoother_sphere() {
 fn light_that_cures_nothing_may_fall_beside_the_part() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);
-    let planned = plan(&light, &target, pegda(), &options(Objective::Height)).unwrap();
+    let planned = plan(&light, &target, pegda(), &options(ColumnObjective::Height)).unwrap();
     assert!(planned.best.relative_gap() <= 1e-6, "{:e}", planned.best.relative_gap());
     let best = measures(&planned.best_doses, &target);
     assert!((best.relative_rms - 0.02127).abs() < 1e-4, "{best:?}");
@@ -94,7 +95,7 @@ fn five_gray_bitmaps_are_as_good_as_any_times() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);
     let shares = std::array::from_fn(|level| level as f64 / 255.0);
-    let five = ColumnOptions { bitmaps: 5, ..options(Objective::Dose) };
+    let five = ColumnOptions { bitmaps: 5, ..options(ColumnObjective::Dose) };
     let gray = ColumnOptions { gray: Some(Box::new(shares)), ..five.clone() };
     let gray = plan(&light, &target, pegda(), &gray).unwrap();
     assert!(gray.excess() < 1e-4, "{}", gray.excess());
@@ -109,7 +110,7 @@ fn five_gray_bitmaps_are_as_good_as_any_times() {
 fn a_plan_that_bears_a_shift_is_better_where_it_is_shifted() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);
-    let robust = ColumnOptions { robust: Length::from_um(3.0), ..options(Objective::Dose) };
+    let robust = ColumnOptions { robust: Length::from_um(3.0), ..options(ColumnObjective::Dose) };
     let planned = plan(&light, &target, pegda(), &robust).unwrap();
     assert!((planned.best.error / 24356.69 - 1.0).abs() < 1e-6, "{}", planned.best.error);
     assert!(planned.best.relative_gap() <= 1e-6);
@@ -119,7 +120,7 @@ fn a_plan_that_bears_a_shift_is_better_where_it_is_shifted() {
 fn bitmaps_are_each_within_the_one_before() {
     let target = map("lens-array", 330);
     let light = zhao(330, Tracing::Exact);
-    let planned = plan(&light, &target, pegda(), &options(Objective::Dose)).unwrap();
+    let planned = plan(&light, &target, pegda(), &options(ColumnObjective::Dose)).unwrap();
     let masks: Vec<_> = planned
         .bitmaps
         .iter()
@@ -151,17 +152,21 @@ fn bitmaps_are_each_within_the_one_before() {
 fn what_cannot_be_planned_is_told() {
     let light = zhao(300, Tracing::Exact);
     let target = map("sphere", 300);
-    let error = |light: &ColumnLight, target: &HeightMap, options: &ColumnOptions| {
+    let error = |light: &GlassLight, target: &HeightMap, options: &ColumnOptions| {
         plan(light, target, pegda(), options).unwrap_err().to_string()
     };
     // 151 mirrors reach over 4.2 mm.
     let wide = Grid { columns: 500, rows: 500, pitch_um: 10.0 };
     let wide = HeightMap { heights_um: vec![300.0; wide.count()], grid: wide };
-    let said = error(&zhao(500, Tracing::Exact), &wide, &options(Objective::Dose));
+    let said = error(&zhao(500, Tracing::Exact), &wide, &options(ColumnObjective::Dose));
     assert!(said.starts_with("no light reaches column 0 of row 0"), "{said}");
-    let said =
-        error(&light, &target, &ColumnOptions { bitmaps: 40_000, ..options(Objective::Dose) });
+    let said = error(
+        &light,
+        &target,
+        &ColumnOptions { bitmaps: 40_000, ..options(ColumnObjective::Dose) },
+    );
     assert!(said.contains("40000 bitmaps are more than the mirrors have distinct times"), "{said}");
-    let said = error(&light, &target, &ColumnOptions { step_s: 1e4, ..options(Objective::Dose) });
+    let said =
+        error(&light, &target, &ColumnOptions { step_s: 1e4, ..options(ColumnObjective::Dose) });
     assert!(said.contains("under the display's step"), "{said}");
 }

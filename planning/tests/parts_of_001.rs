@@ -4,7 +4,7 @@ use lamp_fixtures::{HELIX_CURED, Voxels, dna_helix, overhang_slope};
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::solver::{Operator, Shape};
 use lamp_planning::voxels::{
-    LayerOutcome, Objective, Options, Outcome, PlanError, Sources, Window, plan,
+    LayerOutcome, Options, Outcome, Sources, VoxelObjective, VoxelPlanError, Window, plan,
 };
 use lamp_planning::{Blur, IntensityOf, LayerLight, Light, SampleHeight};
 use lamp_stack::Length;
@@ -96,7 +96,7 @@ impl Case {
         };
         let layers = self.part.layers().map(|mut layer| {
             layer.info.exposure_ms = Some(1000.0);
-            Ok::<_, PlanError>(layer)
+            Ok::<_, VoxelPlanError>(layer)
         });
         let options = Options { around: Some(0), ..*options };
         let mut planned = plan(layers, &light, &options, |_| {}).unwrap();
@@ -124,8 +124,12 @@ fn share_lost(outcome: &Outcome) -> f64 {
 fn the_helix_loses_overcured_voxels_as_in_001() {
     let helix = Case::helix();
     let boundary = |sources| {
-        let options =
-            Options { objective: Objective::Boundary, sources, gap: 3e-3, ..Options::default() };
+        let options = Options {
+            objective: VoxelObjective::Boundary,
+            sources,
+            gap: 3e-3,
+            ..Options::default()
+        };
         let outcome = helix.plan(&options);
         assert!(outcome.bound <= outcome.after.cost);
         assert!(share_lost(&outcome) < 0.025, "{:?}", outcome.after.counts);
@@ -184,7 +188,7 @@ fn the_slope_is_cured_as_it_should_be() {
     let under = cured(slope.under_the_slope(&slope.doses(&slope.white())));
     assert!((under * slope.voxel_mm2() - 19.1e-2).abs() < 3e-4);
 
-    let options = Options { objective: Objective::Boundary, gap: 5e-3, ..Options::default() };
+    let options = Options { objective: VoxelObjective::Boundary, gap: 5e-3, ..Options::default() };
     let outcome = slope.plan(&options);
     let over = outcome.after.counts.overcured as f64 * slope.voxel_mm2();
     assert!(over <= 1e-2, "{over}");

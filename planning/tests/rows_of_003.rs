@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Diffusivity, ExposureTime, Intensity, Kinetics};
 use lamp_planning::ecpl::{
-    Cells, Chamber, Exposure, Method, PlanError, Planned, Reaction, Setting, SettingError, Shape,
-    Simulation, Wanted, plan,
+    Cells, Chamber, ChamberShape, KineticSetting, Method, Reaction, RingExposure, RingPlan,
+    RingPlanError, RingSimulation, SettingError, WantedProfile, plan,
 };
 use lamp_stack::Catalogued;
 
@@ -31,8 +31,8 @@ fn seconds(seconds: f64) -> ExposureTime {
     ExposureTime::from_ms(1000.0 * seconds)
 }
 
-fn setting(light: f64, sigma_um: f64) -> Setting {
-    Setting {
+fn setting(light: f64, sigma_um: f64) -> KineticSetting {
+    KineticSetting {
         kinetics: tmpta(),
         light: watt_per_m2(light),
         sigma_um,
@@ -52,8 +52,8 @@ fn cap(radius: f64, sag: f64) -> impl Fn(f64) -> f64 {
     }
 }
 
-fn figure_11() -> Vec<Exposure> {
-    FIGURE_11.iter().map(|&(pixels, time)| Exposure::disc(pixels, seconds(time))).collect()
+fn figure_11() -> Vec<RingExposure> {
+    FIGURE_11.iter().map(|&(pixels, time)| RingExposure::disc(pixels, seconds(time))).collect()
 }
 
 #[track_caller]
@@ -63,30 +63,35 @@ fn near(number: f64, wanted: f64, tolerance: f64) {
 
 #[test]
 fn figure_11_cures_nearly_the_hemisphere_that_it_was_planned_for() {
-    let simulation = Simulation::new(setting(LIGHT, BLUR_UM), 12, 100.0).unwrap();
+    let simulation = RingSimulation::new(setting(LIGHT, BLUR_UM), 12, 100.0).unwrap();
     let cured = simulation.cure(&figure_11());
     // The text's lens has 100 and 100 um; the prototype of these equations 108 and 105.
     near(cured.sag_um(), 108.0, 0.1 * 108.0);
     near(cured.sag_um(), 100.0, 0.1 * 100.0);
     near(cured.base_um, 105.0, 0.1 * 105.0);
     near(cured.base_um, 100.0, 0.1 * 100.0);
-    let hemisphere = Wanted::new(simulation.reaction().cells(), cap(100.0, 100.0));
+    let hemisphere = WantedProfile::new(simulation.reaction().cells(), cap(100.0, 100.0));
     assert!(hemisphere.rms_um(&cured) <= 5.0, "{}", hemisphere.rms_um(&cured));
 }
 
 #[test]
 fn with_the_light_of_table_1_the_same_plan_fills_the_chamber() {
-    let sharp = Simulation::new(setting(140.0, 0.0), 12, 100.0).unwrap();
+    let sharp = RingSimulation::new(setting(140.0, 0.0), 12, 100.0).unwrap();
     near(sharp.cure(&figure_11()).sag_um(), 200.0, 0.0);
     // The blur was fitted to another light; with both, nine tenths are filled.
-    let blurred = Simulation::new(setting(140.0, BLUR_UM), 12, 100.0).unwrap();
+    let blurred = RingSimulation::new(setting(140.0, BLUR_UM), 12, 100.0).unwrap();
     near(blurred.cure(&figure_11()).sag_um(), 179.3, 2.0);
 }
 
 /// From 90 to 10 % of the height in the middle of a line, 560 um wide, after 10 s.
 fn edge_um(oxygen_diffusion: Diffusivity) -> f64 {
-    let cells =
-        Cells { shape: Shape::Straight, across: 125, deep: 200, width_um: 4.0, height_um: 1.0 };
+    let cells = Cells {
+        shape: ChamberShape::Straight,
+        across: 125,
+        deep: 200,
+        width_um: 4.0,
+        height_um: 1.0,
+    };
     let reaction = Reaction::new(&Kinetics { oxygen_diffusion, ..tmpta() }, cells, 0.025);
     let mut light = vec![0.0; cells.across];
     light[..70].fill(LIGHT);
@@ -110,7 +115,8 @@ fn oxygen_rounds_the_edge_of_a_sharp_line() {
 
 #[test]
 fn heights_under_a_wide_field_are_those_of_bdf() {
-    let cells = Cells { shape: Shape::Round, across: 1, deep: 200, width_um: 4.0, height_um: 1.0 };
+    let cells =
+        Cells { shape: ChamberShape::Round, across: 1, deep: 200, width_um: 4.0, height_um: 1.0 };
     let step_s = 0.025;
     let reaction = Reaction::new(&tmpta(), cells, step_s);
     let mut chamber = Chamber::new(&reaction);
@@ -124,7 +130,7 @@ fn heights_under_a_wide_field_are_those_of_bdf() {
 
 #[test]
 fn figure_11_is_cured_as_by_bdf_in_every_column() {
-    let simulation = Simulation::new(setting(LIGHT, BLUR_UM), 12, 100.0).unwrap();
+    let simulation = RingSimulation::new(setting(LIGHT, BLUR_UM), 12, 100.0).unwrap();
     let cells = simulation.reaction().cells();
     assert_eq!((cells.across, cells.deep, cells.width_um, cells.height_um), (67, 200, 4.0, 1.0));
     let cured = simulation.cure(&figure_11());
@@ -146,27 +152,27 @@ const FIGURE_11_BY_BDF: [f64; 26] = [
 
 #[test]
 fn plans_that_the_display_cannot_show_are_refused() {
-    let refused = |plan: &[Exposure]| {
-        Simulation::of_plan(setting(LIGHT, BLUR_UM), plan, 0.0).unwrap_err().to_string()
+    let refused = |plan: &[RingExposure]| {
+        RingSimulation::of_plan(setting(LIGHT, BLUR_UM), plan, 0.0).unwrap_err().to_string()
     };
-    let ok = Exposure::disc(12, seconds(7.9));
+    let ok = RingExposure::disc(12, seconds(7.9));
     for (plan, said) in [
         (vec![], "no bitmap shows anything"),
-        (vec![Exposure::disc(0, seconds(1.0))], "no bitmap shows anything"),
+        (vec![RingExposure::disc(0, seconds(1.0))], "no bitmap shows anything"),
         (
-            vec![ok.clone(), Exposure::disc(5, seconds(0.05))],
+            vec![ok.clone(), RingExposure::disc(5, seconds(0.05))],
             "bitmap 2 is shown for 50 ms: the display's step is 100 ms",
         ),
-        (vec![Exposure::disc(5, seconds(f64::NAN))], "the display's step is 100 ms"),
-        (vec![Exposure::disc(385, seconds(1.0))], "385 pixels from the middle"),
-        (vec![Exposure::disc(5, seconds(4000.0))], "an hour is the most"),
+        (vec![RingExposure::disc(5, seconds(f64::NAN))], "the display's step is 100 ms"),
+        (vec![RingExposure::disc(385, seconds(1.0))], "385 pixels from the middle"),
+        (vec![RingExposure::disc(5, seconds(4000.0))], "an hour is the most"),
     ] {
         assert!(refused(&plan).contains(said), "{}", refused(&plan));
     }
-    assert!(Simulation::of_plan(setting(LIGHT, BLUR_UM), &[ok], 0.0).is_ok());
+    assert!(RingSimulation::of_plan(setting(LIGHT, BLUR_UM), &[ok], 0.0).is_ok());
 }
 
-static LENS_OF_150: LazyLock<Planned> =
+static LENS_OF_150: LazyLock<RingPlan> =
     LazyLock::new(|| plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Joint).unwrap());
 
 #[test]
@@ -201,7 +207,7 @@ fn plans_are_the_same_for_any_number_of_threads() {
 
 #[test]
 fn parts_of_many_rings_are_planned_at_knots() {
-    let low = Setting { chamber_um: 60.0, ..setting(LIGHT, 8.0) };
+    let low = KineticSetting { chamber_um: 60.0, ..setting(LIGHT, 8.0) };
     let planned = plan(low, 310.0, cap(310.0, 25.0), Method::Joint).unwrap();
     let rms = planned.wanted.rms_um(&planned.cured);
     assert!(rms <= 1.0, "{rms}");
@@ -238,22 +244,25 @@ fn what_cannot_be_planned_is_refused() {
         plan(setting, radius, height, Method::Joint).unwrap_err()
     };
     let usual = setting(LIGHT, 8.0);
-    assert!(matches!(refused(usual, 30.0, &|_| f64::NAN), PlanError::NoHeight { .. }));
-    assert!(matches!(refused(usual, 30.0, &|_| -1.0), PlanError::NoHeight { .. }));
-    assert_eq!(refused(usual, 30.0, &|_| 0.0), PlanError::Empty);
+    assert!(matches!(refused(usual, 30.0, &|_| f64::NAN), RingPlanError::NoHeight { .. }));
+    assert!(matches!(refused(usual, 30.0, &|_| -1.0), RingPlanError::NoHeight { .. }));
+    assert_eq!(refused(usual, 30.0, &|_| 0.0), RingPlanError::Empty);
     assert_eq!(
         refused(usual, 30.0, &|_| 201.0),
-        PlanError::TooHigh { wanted_um: 201.0, chamber_um: 200.0 }
+        RingPlanError::TooHigh { wanted_um: 201.0, chamber_um: 200.0 }
     );
     for radius in [2400.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(refused(usual, radius, &|_| 9.0), PlanError::TooWide { .. }), "{radius}");
+        assert!(
+            matches!(refused(usual, radius, &|_| 9.0), RingPlanError::TooWide { .. }),
+            "{radius}"
+        );
     }
-    let dim = Setting { light: watt_per_m2(0.01), ..usual };
-    assert!(matches!(refused(dim, 30.0, &cap(30.0, 20.0)), PlanError::TooDim { .. }));
-    let dark = Setting { light: watt_per_m2(0.0), ..usual };
+    let dim = KineticSetting { light: watt_per_m2(0.01), ..usual };
+    assert!(matches!(refused(dim, 30.0, &cap(30.0, 20.0)), RingPlanError::TooDim { .. }));
+    let dark = KineticSetting { light: watt_per_m2(0.0), ..usual };
     let why = SettingError::NotPositive("the light");
-    assert_eq!(refused(dark, 30.0, &cap(30.0, 20.0)), PlanError::Setting(why));
-    let huge = Setting { chamber_um: 1e9, ..usual };
+    assert_eq!(refused(dark, 30.0, &cap(30.0, 20.0)), RingPlanError::KineticSetting(why));
+    let huge = KineticSetting { chamber_um: 1e9, ..usual };
     let why = refused(huge, 30.0, &cap(30.0, 20.0));
-    assert!(matches!(why, PlanError::Setting(SettingError::TooLarge { .. })), "{why}");
+    assert!(matches!(why, RingPlanError::KineticSetting(SettingError::TooLarge { .. })), "{why}");
 }

@@ -1,14 +1,14 @@
 //! A part that is much wider than light spreads, planned in tiles.
 
 use lamp_grayscale::resin::{Dose, Intensity};
-use lamp_planning::voxels::{Options, Outcome, PlanError, plan};
+use lamp_planning::voxels::{Options, Outcome, VoxelPlanError, plan};
 use lamp_planning::{IntensityOf, Light, SampleHeight};
 use lamp_stack::{Dpi, Layer, Length, Mask, PageInfo};
 
 const SIDE: u32 = 640;
 
 /// A slab of 600 x 600 pixels and 12 layers, with an overhang of 40 pixels from layer 6 on.
-fn slab() -> impl Iterator<Item = Result<Layer, PlanError>> {
+fn slab() -> impl Iterator<Item = Result<Layer, VoxelPlanError>> {
     (0..12).map(|index| {
         let right = if index < 6 { 580 } else { 620 };
         let rows = 20..620;

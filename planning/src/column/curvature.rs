@@ -1,19 +1,19 @@
 //! The second derivatives of how far doses are from those that are wanted.
 
-use super::light::{ColumnLight, product};
+use super::light::{GlassLight, product};
 use super::taps::Taps;
 use crate::numeric::Curvature;
 
 /// The product of H's transpose with H, or its mean over shifts: a matrix for each axis.
 pub(super) struct Normal<'a> {
-    light: &'a ColumnLight,
+    light: &'a GlassLight,
     taps: [Taps; 2],
 }
 
 impl<'a> Normal<'a> {
     /// Creates the mean of the products for lights that are `light` shifted along x by each of
     /// some lengths, and along y by each of them.
-    pub(super) fn mean(light: &'a ColumnLight, shifts_um: &[f64]) -> Self {
+    pub(super) fn mean(light: &'a GlassLight, shifts_um: &[f64]) -> Self {
         let shifted: Vec<_> = shifts_um.iter().map(|&um| light.shifted([um; 2])).collect();
         let mean = |axis: usize| {
             let normals: Vec<_> = shifted.iter().map(|light| light.taps()[axis].normal()).collect();
@@ -36,7 +36,7 @@ impl Curvature for Normal<'_> {
 
 /// The same with a weight for each column voxel of each of some lights, added up.
 pub(super) struct Weighted<'a> {
-    pub(super) lights: &'a [ColumnLight],
+    pub(super) lights: &'a [GlassLight],
     pub(super) weights: &'a [&'a [f64]],
 }
 

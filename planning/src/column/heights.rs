@@ -2,8 +2,8 @@
 
 use super::curvature::Weighted;
 use super::curve::HeightCurve;
-use super::light::ColumnLight;
-use super::times::{Stop, Times, frank_wolfe_gap};
+use super::light::GlassLight;
+use super::times::{MirrorTimes, Stop, frank_wolfe_gap};
 use crate::numeric::{Bounded, Place};
 
 /// How far cured heights are from those wanted, in um, on lights that count alike.
@@ -11,8 +11,8 @@ use crate::numeric::{Bounded, Place};
 /// A column with a height counts by how far it is, also below the critical dose, where the curve
 /// goes on straight; an empty one by what is cured in it, so that light below the critical dose
 /// costs nothing.
-pub(super) struct HeightError<'a> {
-    pub(super) lights: &'a [ColumnLight],
+pub(super) struct HeightMisfit<'a> {
+    pub(super) lights: &'a [GlassLight],
     pub(super) heights_um: &'a [f64],
     pub(super) curve: HeightCurve,
 }
@@ -25,7 +25,7 @@ pub(super) struct Squares {
     error: f64,
 }
 
-impl HeightError<'_> {
+impl HeightMisfit<'_> {
     fn share(&self) -> f64 {
         1.0 / self.lights.len() as f64
     }
@@ -57,7 +57,7 @@ impl HeightError<'_> {
 
 /// Finds the times, at most `max_s` seconds, whose heights are nearest: Newton's method, whose
 /// squares are found as those of doses are.
-pub(super) fn nearest_heights(error: &HeightError<'_>, max_s: f64, stop: Stop) -> Times {
+pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) -> MirrorTimes {
     let mirrors = error.lights[0].setup().mirrors.iter().product();
     let mut x = vec![0.0; mirrors];
     let mut squares = error.all_squares(&x);
@@ -76,7 +76,7 @@ pub(super) fn nearest_heights(error: &HeightError<'_>, max_s: f64, stop: Stop) -
         let here = problem.place(x);
         let gap = frank_wolfe_gap(&here, max_s);
         if gap <= stop.gap * value || steps >= stop.steps {
-            return Times { seconds: here.x, error: value, gap, steps };
+            return MirrorTimes { seconds: here.x, error: value, gap, steps };
         }
         let enough = (0.1 * gap).max(0.3 * stop.gap * value);
         let before = steps;
@@ -91,7 +91,7 @@ pub(super) fn nearest_heights(error: &HeightError<'_>, max_s: f64, stop: Stop) -
 
 /// Goes to `next`, or so much of the way there that the error falls.
 fn nearer(
-    error: &HeightError<'_>,
+    error: &HeightMisfit<'_>,
     here: &Place,
     next: &[f64],
     value: f64,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::light::ColumnLight;
+use super::light::GlassLight;
 use crate::numeric::{Bounded, Curvature, dot};
 
 /// Rows of column voxels that a thread takes at a time.
@@ -10,7 +10,7 @@ const ROWS: usize = 16;
 
 /// What doses should be, on one light.
 pub(super) struct Wish<'a> {
-    pub(super) light: &'a ColumnLight,
+    pub(super) light: &'a GlassLight,
     /// mJ/cm2 of each column voxel.
     pub(super) wanted: &'a [f64],
     /// What a square of each counts; empty: 1.

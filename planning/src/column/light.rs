@@ -3,7 +3,7 @@
 use lamp_stack::Length;
 use rayon::prelude::*;
 
-use super::spread::{MirrorLine, Spread, Tracing, VoxelLine, taps};
+use super::spread::{MirrorLine, MirrorSpread, Tracing, VoxelLine, taps};
 use super::taps::Taps;
 use crate::projector::{Projector, SpreadOf};
 use crate::target::Grid;
@@ -22,7 +22,7 @@ pub struct Setup {
     /// The side of what a mirror reflects, on the glass, in um.
     pub lit_um: f64,
     /// How light from a point of a mirror spreads.
-    pub spread: Spread,
+    pub spread: MirrorSpread,
     /// How light is found.
     pub tracing: Tracing,
     /// Irradiance of a wide white field, in mW/cm2.
@@ -39,7 +39,7 @@ pub struct Setup {
 /// The light of mirrors on column voxels: 000's matrix H. It separates into a matrix for each
 /// axis, so products take a few numbers a mirror and axis.
 #[derive(Clone, Debug)]
-pub struct ColumnLight {
+pub struct GlassLight {
     setup: Setup,
     /// Column voxels by mirrors, along x and y.
     taps: [Taps; 2],
@@ -47,7 +47,7 @@ pub struct ColumnLight {
     transposed: [Taps; 2],
 }
 
-impl ColumnLight {
+impl GlassLight {
     /// Creates the light of a setup.
     pub fn new(setup: Setup) -> Self {
         let taps = setup.taps([0.0; 2]);
@@ -213,10 +213,10 @@ impl Setup {
     }
 }
 
-fn spread_of(projector: &Projector) -> Spread {
+fn spread_of(projector: &Projector) -> MirrorSpread {
     match projector.spread() {
-        SpreadOf::Cone(half) => Spread::Cone(half.um()),
-        SpreadOf::Gaussian(sigma) => Spread::Gaussian(sigma.um()),
+        SpreadOf::Cone(half) => MirrorSpread::Cone(half.um()),
+        SpreadOf::Gaussian(sigma) => MirrorSpread::Gaussian(sigma.um()),
     }
 }
 

@@ -6,16 +6,16 @@ use thiserror::Error;
 use super::bitmaps::{Bitmap, Mirrors, black_and_white, gray};
 use super::clusters::{Clusters, TooFewTimes};
 use super::curve::HeightCurve;
-use super::heights::{HeightError, nearest_heights};
+use super::heights::{HeightMisfit, nearest_heights};
 use super::levels::{Wish, best_seconds};
-use super::light::ColumnLight;
+use super::light::GlassLight;
 use super::spread::Tracing;
-use super::times::{Stop, Times, nearest_times};
+use super::times::{MirrorTimes, Stop, nearest_times};
 use crate::target::{HeightMap, Place};
 
 /// What should be nearest to that of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Objective {
+pub enum ColumnObjective {
     /// Doses: 000's "optimize E".
     #[default]
     Dose,
@@ -23,13 +23,13 @@ pub enum Objective {
     Height,
 }
 
-lamp_stack::named!(Objective { Dose = "dose", Height = "height" });
+lamp_stack::named!(ColumnObjective { Dose = "dose", Height = "height" });
 
 /// How to plan.
 #[derive(Clone, Debug)]
 pub struct ColumnOptions {
     /// What should be nearest.
-    pub objective: Objective,
+    pub objective: ColumnObjective,
     /// How many bitmaps are shown.
     pub bitmaps: usize,
     /// Whether fewer will do where mirrors have fewer distinct times.
@@ -91,14 +91,14 @@ pub enum ColumnError {
 #[derive(Clone, Debug)]
 pub struct ColumnPlan {
     /// The times without clusters, which no bitmaps can beat by more than their gap.
-    pub best: Times,
+    pub best: MirrorTimes,
     /// Doses of the best times, in mJ/cm2.
     pub best_doses: Vec<f64>,
     /// The bitmaps, in the order of their display.
     pub bitmaps: Vec<Bitmap>,
     /// For how long each mirror is on, in seconds of white light.
     pub seconds: Vec<f64>,
-    /// The error of the bitmaps, as [`Times::error`].
+    /// The error of the bitmaps, as [`MirrorTimes::error`].
     pub error: f64,
     /// Doses of the bitmaps, in mJ/cm2.
     pub doses: Vec<f64>,
@@ -112,10 +112,10 @@ impl ColumnPlan {
 }
 
 /// What a plan is for.
-struct Problem<'a> {
-    light: &'a ColumnLight,
+struct ColumnProblem<'a> {
+    light: &'a GlassLight,
     /// The light, shifted by what the plan has to bear.
-    lights: Vec<ColumnLight>,
+    lights: Vec<GlassLight>,
     heights_um: &'a [f64],
     wanted: Vec<f64>,
     curve: HeightCurve,
@@ -128,12 +128,12 @@ struct Problem<'a> {
 /// Returns an error if light does not reach a column that has a height, if no dose cures it, if
 /// there are fewer distinct times than bitmaps, or if all are too short.
 pub fn plan(
-    light: &ColumnLight,
+    light: &GlassLight,
     target: &HeightMap,
     curve: HeightCurve,
     options: &ColumnOptions,
 ) -> Result<ColumnPlan, ColumnError> {
-    let problem = Problem::new(light, target, curve, options)?;
+    let problem = ColumnProblem::new(light, target, curve, options)?;
     let best = problem.best_times();
     let longest_s = best.seconds.iter().copied().fold(0.0, f64::max);
     if longest_s < options.step_s {
@@ -151,9 +151,9 @@ pub fn plan(
     })
 }
 
-impl<'a> Problem<'a> {
+impl<'a> ColumnProblem<'a> {
     fn new(
-        light: &'a ColumnLight,
+        light: &'a GlassLight,
         target: &'a HeightMap,
         curve: HeightCurve,
         options: &'a ColumnOptions,
@@ -180,22 +180,22 @@ impl<'a> Problem<'a> {
         Ok(Self { light, lights, heights_um, wanted, curve, options })
     }
 
-    fn height_error(&self) -> HeightError<'_> {
-        HeightError { lights: &self.lights, heights_um: self.heights_um, curve: self.curve }
+    fn height_error(&self) -> HeightMisfit<'_> {
+        HeightMisfit { lights: &self.lights, heights_um: self.heights_um, curve: self.curve }
     }
 
-    fn best_times(&self) -> Times {
+    fn best_times(&self) -> MirrorTimes {
         let ColumnOptions { objective, max_s, stop, .. } = *self.options;
         match objective {
-            Objective::Dose => {
+            ColumnObjective::Dose => {
                 nearest_times(self.light, &self.wanted, max_s, &self.options.shifts_um(), stop)
             }
-            Objective::Height => nearest_heights(&self.height_error(), max_s, stop),
+            ColumnObjective::Height => nearest_heights(&self.height_error(), max_s, stop),
         }
     }
 
     /// Returns the bitmaps of times, and for how many steps each mirror is on.
-    fn bitmaps(&self, best: &Times) -> Result<(Vec<Bitmap>, Vec<f64>), ColumnError> {
+    fn bitmaps(&self, best: &MirrorTimes) -> Result<(Vec<Bitmap>, Vec<f64>), ColumnError> {
         let setup = self.light.setup();
         let mirrors = Mirrors { count: setup.mirrors, display: setup.display };
         let times: Vec<_> = best.seconds.iter().map(|s| s / self.options.step_s).collect();
@@ -218,7 +218,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the clusters of times in steps.
-    fn clusters(&self, best: &Times, steps: &[u64]) -> Result<Clusters, ColumnError> {
+    fn clusters(&self, best: &MirrorTimes, steps: &[u64]) -> Result<Clusters, ColumnError> {
         let ColumnOptions { bitmaps, fewer, max_s, .. } = *self.options;
         let too_few = match Clusters::of(steps, bitmaps) {
             Ok(clusters) => return Ok(clusters),
@@ -235,22 +235,22 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the best times of bitmaps.
-    fn best_seconds(&self, best: &Times, clusters: &[u16], count: usize) -> Vec<f64> {
+    fn best_seconds(&self, best: &MirrorTimes, clusters: &[u16], count: usize) -> Vec<f64> {
         let ColumnOptions { objective, max_s, .. } = *self.options;
         let wishes: Vec<_> = match objective {
-            Objective::Dose => Vec::new(),
-            Objective::Height => {
+            ColumnObjective::Dose => Vec::new(),
+            ColumnObjective::Height => {
                 let error = self.height_error();
                 self.lights.iter().map(|light| error.squares(&light.doses(&best.seconds))).collect()
             }
         };
         let wishes: Vec<_> = match objective {
-            Objective::Dose => self
+            ColumnObjective::Dose => self
                 .lights
                 .iter()
                 .map(|light| Wish { light, wanted: &self.wanted, weights: &[] })
                 .collect(),
-            Objective::Height => self
+            ColumnObjective::Height => self
                 .lights
                 .iter()
                 .zip(&wishes)
@@ -263,9 +263,9 @@ impl<'a> Problem<'a> {
     /// Returns the error of times.
     fn error(&self, seconds: &[f64]) -> f64 {
         match self.options.objective {
-            Objective::Height => self.height_error().at(seconds),
-            Objective::Dose => {
-                let of = |light: &ColumnLight| -> f64 {
+            ColumnObjective::Height => self.height_error().at(seconds),
+            ColumnObjective::Dose => {
+                let of = |light: &GlassLight| -> f64 {
                     let doses = light.doses(seconds);
                     doses.iter().zip(&self.wanted).map(|(dose, want)| (dose - want).powi(2)).sum()
                 };

@@ -4,7 +4,7 @@ use super::taps::Taps;
 
 /// How light from a point of a mirror spreads on the glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Spread {
+pub enum MirrorSpread {
     /// Evenly over a square that reaches so far to each side, in um.
     Cone(f64),
     /// As a Gaussian of this standard deviation, in um.
@@ -71,7 +71,7 @@ impl VoxelLine {
 pub(super) fn taps(
     mirrors: MirrorLine,
     voxels: VoxelLine,
-    spread: Spread,
+    spread: MirrorSpread,
     tracing: Tracing,
 ) -> Taps {
     let scale = mirrors.pitch / voxels.pitch;
@@ -81,16 +81,16 @@ pub(super) fn taps(
             Tracing::Exact => shares(middle, mirrors.lit, voxels, spread),
             Tracing::Rays { points, directions } => {
                 let half = match spread {
-                    Spread::Cone(half) => half,
+                    MirrorSpread::Cone(half) => half,
                     // Rays cannot follow a Gaussian to its end.
-                    Spread::Gaussian(sigma) => 3.0 * sigma,
+                    MirrorSpread::Gaussian(sigma) => 3.0 * sigma,
                 };
                 let point = |k: usize| ((k as f64 + 0.5) / points as f64 - 0.5) * mirrors.lit;
                 let steps = (directions - 1).max(1) as f64;
                 let direction = |k: usize| half * (2.0 * k as f64 / steps - 1.0);
                 let weigh = |k: usize| match spread {
-                    Spread::Cone(_) => 1.0,
-                    Spread::Gaussian(sigma) => (-0.5 * (direction(k) / sigma).powi(2)).exp(),
+                    MirrorSpread::Cone(_) => 1.0,
+                    MirrorSpread::Gaussian(sigma) => (-0.5 * (direction(k) / sigma).powi(2)).exp(),
                 };
                 let all: f64 = (0..directions).map(weigh).sum();
                 let ray = 1.0 / (points as f64 * all);
@@ -113,7 +113,7 @@ pub(super) fn taps(
 const LEAST_SHARE: f64 = 1e-9;
 
 /// Returns which shares of a mirror's light fall on voxels.
-fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: Spread) -> Vec<(usize, f64)> {
+fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: MirrorSpread) -> Vec<(usize, f64)> {
     let reach = lit / 2.0 + spread.reach();
     let place = |um| voxels.place(um).clamp(0.0, voxels.count as f64);
     let first = place(middle - reach).floor() as usize;
@@ -124,7 +124,7 @@ fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: Spread) -> Vec<(usiz
     shares.filter(|(_, share)| *share > LEAST_SHARE).collect()
 }
 
-impl Spread {
+impl MirrorSpread {
     /// Returns how far light spreads, in um.
     pub(super) fn reach(self) -> f64 {
         match self {
@@ -163,7 +163,7 @@ mod tests {
     const VOXELS: VoxelLine = VoxelLine { count: 120, pitch: 10.0, shift: 0.0 };
 
     /// The light of each mirror on all voxels, and of all mirrors on each voxel.
-    fn sums(spread: Spread, tracing: Tracing) -> [Vec<f64>; 2] {
+    fn sums(spread: MirrorSpread, tracing: Tracing) -> [Vec<f64>; 2] {
         let taps = taps(MIRRORS, VOXELS, spread, tracing);
         [taps.transposed().row_sums(), taps.row_sums()]
     }
@@ -171,7 +171,9 @@ mod tests {
     #[test]
     fn no_light_is_lost() {
         let rays = Tracing::Rays { points: 9, directions: 15 };
-        for spread in [Spread::Cone(12.0), Spread::Cone(1e-9), Spread::Gaussian(20.0)] {
+        for spread in
+            [MirrorSpread::Cone(12.0), MirrorSpread::Cone(1e-9), MirrorSpread::Gaussian(20.0)]
+        {
             for tracing in [Tracing::Exact, rays] {
                 let [of_mirrors, _] = sums(spread, tracing);
                 // 1200 um of columns see some 40 mirrors; those at the ends lose some.
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_wide_field_is_even_where_light_spreads_far() {
-        let [_, of_voxels] = sums(Spread::Gaussian(60.0), Tracing::Exact);
+        let [_, of_voxels] = sums(MirrorSpread::Gaussian(60.0), Tracing::Exact);
         for light in &of_voxels[45..75] {
             assert!((light - 1.0).abs() < 1e-6, "{light}");
         }
@@ -195,7 +197,7 @@ mod tests {
     fn a_gaussian_is_that_of_the_error_function() {
         // A mirror without width, in the middle of an even number of columns.
         let mirrors = MirrorLine { count: 1, pitch: 10.0, lit: 1e-3 };
-        let taps = taps(mirrors, VOXELS, Spread::Gaussian(15.0), Tracing::Exact);
+        let taps = taps(mirrors, VOXELS, MirrorSpread::Gaussian(15.0), Tracing::Exact);
         for voxel in 55..65 {
             let at = |um: f64| 0.5 * libm::erf(um / 15.0 / std::f64::consts::SQRT_2);
             let from = 10.0 * (voxel as f64 - 60.0);
@@ -206,9 +208,9 @@ mod tests {
 
     #[test]
     fn many_rays_come_near_the_integral() {
-        let exact = taps(MIRRORS, VOXELS, Spread::Cone(12.0), Tracing::Exact);
+        let exact = taps(MIRRORS, VOXELS, MirrorSpread::Cone(12.0), Tracing::Exact);
         let rays = Tracing::Rays { points: 400, directions: 400 };
-        let counted = taps(MIRRORS, VOXELS, Spread::Cone(12.0), rays);
+        let counted = taps(MIRRORS, VOXELS, MirrorSpread::Cone(12.0), rays);
         let line: Vec<_> = (0..MIRRORS.count).map(|mirror| ((mirror * 7) % 5) as f64).collect();
         let [mut a, mut b] = [vec![0.0; 120], vec![0.0; 120]];
         exact.apply(&line, &mut a);

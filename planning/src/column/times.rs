@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::curvature::Normal;
-use super::light::ColumnLight;
+use super::light::GlassLight;
 use crate::numeric::{Bounded, Place};
 
 /// When a search for times ends.
@@ -17,7 +17,7 @@ pub struct Stop {
 
 /// Seconds that mirrors are on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Times {
+pub struct MirrorTimes {
     /// Of each mirror, rows from the first.
     pub seconds: Vec<f64>,
     /// The error that was minimised: half the sum of squares of how far doses are from those
@@ -29,7 +29,7 @@ pub struct Times {
     pub steps: usize,
 }
 
-impl Times {
+impl MirrorTimes {
     /// Returns the gap as a share of the error; none if there is no error.
     pub fn relative_gap(&self) -> f64 {
         if self.gap > 0.0 { self.gap / self.error } else { 0.0 }
@@ -59,12 +59,12 @@ const NOTHING: f64 = 1e-12;
 /// least half sum of squares (000 eq. 4.4), or its mean over lights shifted by `shifts_um` along
 /// each axis.
 pub fn nearest_times(
-    light: &ColumnLight,
+    light: &GlassLight,
     wanted: &[f64],
     max_s: f64,
     shifts_um: &[f64],
     stop: Stop,
-) -> Times {
+) -> MirrorTimes {
     let curvature = Normal::mean(light, shifts_um);
     let pull = mean_pull(light, wanted, shifts_um);
     let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
@@ -78,11 +78,11 @@ pub fn nearest_times(
     // Slopes that steps have added up carry rounding: the proof is made of fresh ones.
     let place = problem.place(place.x);
     let gap = frank_wolfe_gap(&place, max_s);
-    Times { error: error(&place).max(0.0), gap, steps, seconds: place.x }
+    MirrorTimes { error: error(&place).max(0.0), gap, steps, seconds: place.x }
 }
 
 /// Returns the mean of H's transposes times the doses.
-fn mean_pull(light: &ColumnLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> {
+fn mean_pull(light: &GlassLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> {
     let mut pull = vec![0.0; light.setup().mirrors.iter().product()];
     for &x in shifts_um {
         for &y in shifts_um {

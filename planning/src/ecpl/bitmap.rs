@@ -6,7 +6,7 @@ use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Mask, MaskBuilder};
 use thiserror::Error;
 
-use super::exposure::{Exposure, rings_of};
+use super::exposure::{RingExposure, rings_of};
 
 /// An image that is not made of whole rings around its middle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -19,7 +19,7 @@ pub struct NotRound {
     pub row: u32,
 }
 
-impl Exposure {
+impl RingExposure {
     /// Draws its rings around the middle of an image. A pixel belongs to the ring in which its
     /// middle lies; what lies beyond the image is cut off.
     ///
@@ -98,9 +98,9 @@ fn unite(ends: &[u32]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    fn exposure(white: &[u8]) -> Exposure {
+    fn exposure(white: &[u8]) -> RingExposure {
         let rings = rings_of(white.iter().map(|&white| white == b'#'));
-        Exposure { rings, time: ExposureTime::from_ms(100.0) }
+        RingExposure { rings, time: ExposureTime::from_ms(100.0) }
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
             for white in [&b"##"[..], b".#.##", b"#..#", b"", b"..........##"] {
                 let exposure = exposure(white);
                 let image = exposure.drawn(columns, rows);
-                assert_eq!(Exposure::shown(&image, exposure.time), Ok(exposure));
+                assert_eq!(RingExposure::shown(&image, exposure.time), Ok(exposure));
             }
         }
         let mut off = MaskBuilder::new(8);
@@ -139,7 +139,7 @@ mod tests {
         off.push_row(&[2, 6]).unwrap();
         off.push_black(2);
         assert_eq!(
-            Exposure::shown(&off.finish(), ExposureTime::from_ms(1.0)),
+            RingExposure::shown(&off.finish(), ExposureTime::from_ms(1.0)),
             Err(NotRound { row: 1 })
         );
     }

@@ -2,7 +2,7 @@
 
 /// What a section of the chamber stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum ChamberShape {
     /// Turned around its axis: coordinates (r, z).
     Round,
     /// Drawn out into a line that is alike on both sides: coordinates (x, z).
@@ -13,7 +13,7 @@ pub enum Shape {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
     /// What the section stands for.
-    pub shape: Shape,
+    pub shape: ChamberShape,
     /// Cells of a row.
     pub across: usize,
     /// Cells from the glass to the other wall.
@@ -34,8 +34,8 @@ impl Cells {
     /// units of the first cell's.
     pub fn weight(&self, across: usize) -> f64 {
         match self.shape {
-            Shape::Round => (2 * across + 1) as f64,
-            Shape::Straight => 1.0,
+            ChamberShape::Round => (2 * across + 1) as f64,
+            ChamberShape::Straight => 1.0,
         }
     }
 
@@ -48,8 +48,10 @@ impl Cells {
     /// exchange of 1 between flat cells of equal size. Walls let nothing through.
     pub(super) fn exchange(&self, across: usize) -> [f64; 2] {
         let [before, after] = match self.shape {
-            Shape::Round => [across as f64, across as f64 + 1.0].map(|r| r / (across as f64 + 0.5)),
-            Shape::Straight => [1.0; 2],
+            ChamberShape::Round => {
+                [across as f64, across as f64 + 1.0].map(|r| r / (across as f64 + 0.5))
+            }
+            ChamberShape::Straight => [1.0; 2],
         };
         let inner = if across == 0 { 0.0 } else { before };
         [inner, if across + 1 == self.across { 0.0 } else { after }]

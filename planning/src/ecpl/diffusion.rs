@@ -110,10 +110,10 @@ impl Diffusion {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells::Shape;
+    use super::super::cells::ChamberShape;
     use super::*;
 
-    fn cells(shape: Shape) -> Cells {
+    fn cells(shape: ChamberShape) -> Cells {
         Cells { shape, across: 9, deep: 7, width_um: 3.0, height_um: 2.0 }
     }
 
@@ -135,8 +135,10 @@ mod tests {
         let radial = |k: usize| {
             let x = k % cells.across;
             let edges = match cells.shape {
-                Shape::Round => [x as f64, x as f64 + 1.0].map(|r| wide * r / (x as f64 + 0.5)),
-                Shape::Straight => [wide; 2],
+                ChamberShape::Round => {
+                    [x as f64, x as f64 + 1.0].map(|r| wide * r / (x as f64 + 0.5))
+                }
+                ChamberShape::Straight => [wide; 2],
             };
             (x, cells.across, edges)
         };
@@ -146,7 +148,7 @@ mod tests {
 
     #[test]
     fn a_step_solves_its_equations_and_keeps_what_is_there() {
-        for shape in [Shape::Round, Shape::Straight] {
+        for shape in [ChamberShape::Round, ChamberShape::Straight] {
             let cells = cells(shape);
             let before: Vec<_> = (0..cells.count()).map(|k| ((k * k) % 17) as f64).collect();
             let mut after = before.clone();
@@ -159,12 +161,12 @@ mod tests {
             };
             assert!((held(&after) / held(&before) - 1.0).abs() < 1e-13);
         }
-        assert!(Diffusion::new(&cells(Shape::Round), 0.0).is_none());
+        assert!(Diffusion::new(&cells(ChamberShape::Round), 0.0).is_none());
     }
 
     #[test]
     fn chambers_of_one_cell_stay_as_they_are() {
-        let one = Cells { across: 1, deep: 1, ..cells(Shape::Round) };
+        let one = Cells { across: 1, deep: 1, ..cells(ChamberShape::Round) };
         let mut held = [3.0];
         Diffusion::new(&one, 5.0).unwrap().spread(&mut held);
         assert_eq!(held, [3.0]);

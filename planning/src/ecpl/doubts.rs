@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::profile::{Profile, Wanted};
+use super::profile::{Profile, WantedProfile};
 
 /// Directions in which a part is compared: enough for a mean of squares that change like a
 /// cosine and its square.
 const DIRECTIONS: usize = 16;
 
-impl Wanted {
+impl WantedProfile {
     /// Returns the root mean square of cured minus wanted height, in micrometres, when all that
     /// is cured lies `aside_um` off its place.
     ///

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// A bitmap of rings around the axis, and how long it is shown (003 section 5: `B_i`, `L_i`,
 /// `R_i` and `T_i`).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exposure {
+pub struct RingExposure {
     /// From which to which pixel from the axis each ring is white, inner ones first and apart. A
     /// disc begins at zero.
     pub rings: Vec<Range<u32>>,
@@ -17,7 +17,7 @@ pub struct Exposure {
     pub time: ExposureTime,
 }
 
-impl Exposure {
+impl RingExposure {
     /// Returns a disc of so many pixels, shown for a time.
     pub fn disc(pixels: u32, time: ExposureTime) -> Self {
         Self { rings: std::iter::once(0..pixels).collect(), time }
@@ -42,7 +42,7 @@ impl Exposure {
 )]
 pub struct NoExposure(String);
 
-impl FromStr for Exposure {
+impl FromStr for RingExposure {
     type Err = NoExposure;
 
     /// Parses a disc, as `12:7.9s`, or a ring, as `5-12:7.9s`.
@@ -63,7 +63,7 @@ impl FromStr for Exposure {
 
 /// Makes the bitmaps of rings that are white for a number of the display's steps each, the
 /// innermost first: all begin together, so each bitmap lies within the one before.
-pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<Exposure> {
+pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<RingExposure> {
     let mut ends: Vec<u32> = steps.iter().copied().filter(|&steps| steps > 0).collect();
     ends.sort_unstable();
     ends.dedup();
@@ -71,7 +71,7 @@ pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<Exposure> {
     let exposure = |&end: &u32| {
         let time = ExposureTime::from_ms(f64::from(end - shown) * step.ms());
         shown = end;
-        Exposure { rings: rings_of(steps.iter().map(|&steps| steps >= end)), time }
+        RingExposure { rings: rings_of(steps.iter().map(|&steps| steps >= end)), time }
     };
     ends.iter().map(exposure).collect()
 }
@@ -94,13 +94,13 @@ mod tests {
 
     #[test]
     fn discs_and_rings_are_typed_in() {
-        let disc: Exposure = "12:7.9s".parse().unwrap();
-        assert_eq!(disc, Exposure::disc(12, ExposureTime::from_ms(7900.0)));
-        let ring: Exposure = " 5-12 : 800 ms".parse().unwrap();
+        let disc: RingExposure = "12:7.9s".parse().unwrap();
+        assert_eq!(disc, RingExposure::disc(12, ExposureTime::from_ms(7900.0)));
+        let ring: RingExposure = " 5-12 : 800 ms".parse().unwrap();
         assert_eq!((ring.reach(), ring.is_white(5), ring.is_white(4)), (12, true, false));
         for text in ["", "12", "12:7.9", "0:1s", "12-5:1s", "-1:1s", "12:nans", "1:2:3s", "9e9:1s"]
         {
-            let error = text.parse::<Exposure>().unwrap_err().to_string();
+            let error = text.parse::<RingExposure>().unwrap_err().to_string();
             assert!(error.contains("as 12:7.9s"), "{error}");
         }
     }

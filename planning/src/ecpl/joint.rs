@@ -5,10 +5,10 @@
 use rayon::prelude::*;
 
 use super::exposure::nested;
-use super::profile::Wanted;
+use super::profile::WantedProfile;
 use super::reactor::Chamber;
-use super::simulation::{Shown, Simulation};
-use super::{Exposure, PlanError};
+use super::simulation::{RingSimulation, Shown};
+use super::{RingExposure, RingPlanError};
 use crate::numeric::{DescentEnd, descend, dot};
 
 /// Light that does not reach the wanted height in this time, in seconds, never will in practice.
@@ -38,9 +38,9 @@ const MOST_KNOTS: usize = 48;
 const WHOLE_ROUNDS: usize = 4;
 
 /// The search for the times of rings of pixels that begin together, so that bitmaps nest.
-struct Search<'a> {
-    simulation: &'a Simulation,
-    wanted: &'a Wanted,
+struct KnotSearch<'a> {
+    simulation: &'a RingSimulation,
+    wanted: &'a WantedProfile,
     /// The square root of each column's share of the wanted area.
     weights: Vec<f64>,
     step_s: f64,
@@ -56,17 +56,20 @@ struct Slopes {
 }
 
 /// Plans the times of all rings at once.
-pub(super) fn plan(simulation: &Simulation, wanted: &Wanted) -> Result<Vec<Exposure>, PlanError> {
+pub(super) fn plan(
+    simulation: &RingSimulation,
+    wanted: &WantedProfile,
+) -> Result<Vec<RingExposure>, RingPlanError> {
     let wide = simulation.wide_field(wanted.highest_um(), LONGEST_S)?;
-    let search = Search::new(simulation, wanted, LONGER * wide[wide.len() - 1].0);
+    let search = KnotSearch::new(simulation, wanted, LONGER * wide[wide.len() - 1].0);
     let mut times = search.first_times(&wide);
     search.smooth(&mut times);
     let steps = search.whole(&times);
     Ok(nested(&steps, simulation.setting().step))
 }
 
-impl<'a> Search<'a> {
-    fn new(simulation: &'a Simulation, wanted: &'a Wanted, longest_s: f64) -> Self {
+impl<'a> KnotSearch<'a> {
+    fn new(simulation: &'a RingSimulation, wanted: &'a WantedProfile, longest_s: f64) -> Self {
         let cells = simulation.reaction().cells();
         let is_part = |x: &usize| wanted.heights_um[*x] > 0.0;
         let area: f64 = (0..cells.across).filter(is_part).map(|x| cells.weight(x)).sum();

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::cells::{Cells, Shape};
+use super::cells::{Cells, ChamberShape};
 
 /// Points and weights of Gauss's rule between -1 and 1: exact to 1e-9 for a piece as wide as a
 /// standard deviation.
@@ -39,13 +39,13 @@ fn sharp(cells: &Cells, x: usize, shining: &Range<f64>) -> f64 {
     let cell = [x as f64, x as f64 + 1.0].map(|edge| edge * cells.width_um);
     let [from, to] = [shining.start, shining.end].map(|edge| edge.clamp(cell[0], cell[1]));
     let whole = |[from, to]: [f64; 2]| match cells.shape {
-        Shape::Round => to * to - from * from,
-        Shape::Straight => to - from,
+        ChamberShape::Round => to * to - from * from,
+        ChamberShape::Straight => to - from,
     };
     whole([from, to]) / whole(cell)
 }
 
-fn blurred(shape: Shape, at: f64, shining: &Range<f64>, sigma: f64) -> f64 {
+fn blurred(shape: ChamberShape, at: f64, shining: &Range<f64>, sigma: f64) -> f64 {
     let from = shining.start.max(at - FARTHEST * sigma);
     let to = shining.end.min(at + FARTHEST * sigma);
     if to <= from {
@@ -63,14 +63,14 @@ fn blurred(shape: Shape, at: f64, shining: &Range<f64>, sigma: f64) -> f64 {
 }
 
 /// Returns what a line or ring of unit width at `from` gives at `at`.
-fn kernel(shape: Shape, at: f64, from: f64, sigma: f64) -> f64 {
+fn kernel(shape: ChamberShape, at: f64, from: f64, sigma: f64) -> f64 {
     let bell = |far: f64| (-0.5 * (far / sigma).powi(2)).exp();
     match shape {
-        Shape::Round => {
+        ChamberShape::Round => {
             let x = at * from / (sigma * sigma);
             bell(at - from) * scaled_bessel_i0(x) * from / (sigma * sigma)
         }
-        Shape::Straight => {
+        ChamberShape::Straight => {
             (bell(at - from) + bell(at + from)) / (sigma * std::f64::consts::TAU.sqrt())
         }
     }
@@ -106,13 +106,13 @@ fn scaled_bessel_i0(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn cells(shape: Shape) -> Cells {
+    fn cells(shape: ChamberShape) -> Cells {
         Cells { shape, across: 60, deep: 1, width_um: 4.0, height_um: 1.0 }
     }
 
     #[test]
     fn blurred_discs_agree_with_a_sum_over_the_plane() {
-        let cells = cells(Shape::Round);
+        let cells = cells(ChamberShape::Round);
         for (shining, sigma) in [(0.0..74.7, 25.2), (31.0..62.0, 8.0), (0.0..6.2, 8.0)] {
             let light = light_of(&cells, shining.clone(), sigma);
             for x in [0, 3, 10, 17, 25] {
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn wide_fields_are_full_and_rings_add_up() {
-        for shape in [Shape::Round, Shape::Straight] {
+        for shape in [ChamberShape::Round, ChamberShape::Straight] {
             for sigma in [0.0, 8.0] {
                 let whole = light_of(&cells(shape), 0.0..400.0, sigma);
                 assert!(whole.iter().all(|light| (light - 1.0).abs() < 1e-6), "{whole:?}");
@@ -150,8 +150,8 @@ mod tests {
 
     #[test]
     fn without_blur_a_cell_has_the_share_that_shines() {
-        let light = light_of(&cells(Shape::Round), 0.0..6.0, 0.0);
+        let light = light_of(&cells(ChamberShape::Round), 0.0..6.0, 0.0);
         assert_eq!(light[..3], [1.0, 20.0 / 48.0, 0.0]);
-        assert_eq!(light_of(&cells(Shape::Straight), 2.0..6.0, 0.0)[..3], [0.5, 0.5, 0.0]);
+        assert_eq!(light_of(&cells(ChamberShape::Straight), 2.0..6.0, 0.0)[..3], [0.5, 0.5, 0.0]);
     }
 }

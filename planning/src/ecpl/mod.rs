@@ -15,10 +15,10 @@ mod setting;
 mod simulation;
 
 pub use bitmap::NotRound;
-pub use cells::{Cells, Shape};
-pub use exposure::{Exposure, NoExposure};
-pub use plan::{Method, PlanError, Planned, plan};
-pub use profile::{Profile, Wanted};
+pub use cells::{Cells, ChamberShape};
+pub use exposure::{NoExposure, RingExposure};
+pub use plan::{Method, RingPlan, RingPlanError, plan};
+pub use profile::{Profile, WantedProfile};
 pub use reactor::{Chamber, Reaction};
-pub use setting::{Setting, SettingError};
-pub use simulation::Simulation;
+pub use setting::{KineticSetting, SettingError};
+pub use simulation::RingSimulation;

@@ -3,10 +3,10 @@
 use lamp_grayscale::resin::ExposureTime;
 use thiserror::Error;
 
-use super::exposure::Exposure;
-use super::profile::{Profile, Wanted};
-use super::setting::{Setting, SettingError};
-use super::simulation::Simulation;
+use super::exposure::RingExposure;
+use super::profile::{Profile, WantedProfile};
+use super::setting::{KineticSetting, SettingError};
+use super::simulation::RingSimulation;
 use super::{joint, seed};
 
 /// Columns that see the part's edge: pixels that a plan may light beyond it.
@@ -27,10 +27,10 @@ lamp_stack::named!(Method { Joint = "joint", Seed = "seed" });
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum PlanError {
+pub enum RingPlanError {
     /// The setting exposes nothing.
     #[error(transparent)]
-    Setting(#[from] SettingError),
+    KineticSetting(#[from] SettingError),
     /// A height is not a number, infinite or below zero.
     #[error("the height {radius_um:.1} um from the axis is not a number of zero or more")]
     NoHeight {
@@ -120,13 +120,13 @@ pub enum PlanError {
 
 /// Bitmaps and times, and what they cure.
 #[derive(Clone, Debug)]
-pub struct Planned {
+pub struct RingPlan {
     /// The chamber.
-    pub simulation: Simulation,
+    pub simulation: RingSimulation,
     /// The part, at the columns of the chamber.
-    pub wanted: Wanted,
+    pub wanted: WantedProfile,
     /// The bitmaps in order.
-    pub exposures: Vec<Exposure>,
+    pub exposures: Vec<RingExposure>,
     /// What they cure.
     pub cured: Profile,
 }
@@ -138,84 +138,88 @@ pub struct Planned {
 /// Returns an error if a height is impossible, the part does not fit the chamber or the display,
 /// or the light does not cure it.
 pub fn plan(
-    setting: Setting,
+    setting: KineticSetting,
     radius_um: f64,
     height_um: impl Fn(f64) -> f64,
     method: Method,
-) -> Result<Planned, PlanError> {
+) -> Result<RingPlan, RingPlanError> {
     setting.check()?;
     let lit_um = f64::from(setting.pixels) * setting.pixel_um;
     if radius_um.is_nan() || radius_um > lit_um {
-        return Err(PlanError::TooWide { wanted_um: radius_um, lit_um });
+        return Err(RingPlanError::TooWide { wanted_um: radius_um, lit_um });
     }
     let pixels = (radius_um / setting.pixel_um + BEYOND).ceil().min(f64::from(setting.pixels));
-    let simulation = Simulation::new(setting, pixels as u32, radius_um)?;
-    let wanted = Wanted::new(simulation.reaction().cells(), &height_um);
+    let simulation = RingSimulation::new(setting, pixels as u32, radius_um)?;
+    let wanted = WantedProfile::new(simulation.reaction().cells(), &height_um);
     wanted.check(&simulation)?;
     let exposures = match method {
         Method::Joint => joint::plan(&simulation, &wanted)?,
         Method::Seed => seed::plan(&simulation, &wanted),
     };
     if exposures.is_empty() {
-        return Err(PlanError::TooSmall { pixel_um: setting.pixel_um, step: setting.step });
+        return Err(RingPlanError::TooSmall { pixel_um: setting.pixel_um, step: setting.step });
     }
     // As anyone prepares it who has the bitmaps alone: the same heights to the last bit.
-    let simulation = Simulation::of_plan(setting, &exposures, radius_um)?;
-    let wanted = Wanted::new(simulation.reaction().cells(), height_um);
+    let simulation = RingSimulation::of_plan(setting, &exposures, radius_um)?;
+    let wanted = WantedProfile::new(simulation.reaction().cells(), height_um);
     let cured = simulation.cure(&exposures);
     let nothing = Profile { heights_um: vec![0.0; cured.heights_um.len()], ..cured.clone() };
     if wanted.rms_um(&cured) >= wanted.rms_um(&nothing) {
         let (cured_um, wanted_um) = (cured.highest_um(), wanted.highest_um());
-        return Err(PlanError::NoBetter { cured_um, wanted_um, step: setting.step });
+        return Err(RingPlanError::NoBetter { cured_um, wanted_um, step: setting.step });
     }
-    Ok(Planned { simulation, wanted, exposures, cured })
+    Ok(RingPlan { simulation, wanted, exposures, cured })
 }
 
 /// The longest plan, in seconds.
 const LONGEST_S: f64 = 3600.0;
 
-impl Simulation {
+impl RingSimulation {
     /// Prepares a chamber for a plan, and for a part of `radius_um`, zero if there is none.
     ///
     /// # Errors
     /// Returns an error if nothing is shown, a time is below the display's step, a ring lies
     /// beyond the display, all take more than an hour, or the setting is impossible.
-    pub fn of_plan(setting: Setting, plan: &[Exposure], radius_um: f64) -> Result<Self, PlanError> {
+    pub fn of_plan(
+        setting: KineticSetting,
+        plan: &[RingExposure],
+        radius_um: f64,
+    ) -> Result<Self, RingPlanError> {
         setting.check()?;
         for (bitmap, exposure) in (1..).zip(plan) {
             let (time, step, reach) = (exposure.time, setting.step, exposure.reach());
             // Times that were written as decimals may be short of a step by rounding.
             if time.ms().is_nan() || time.ms() < step.ms() * (1.0 - 1e-9) {
-                return Err(PlanError::TooShort { bitmap, time, step });
+                return Err(RingPlanError::TooShort { bitmap, time, step });
             }
             if reach > setting.pixels {
-                return Err(PlanError::BeyondDisplay { bitmap, reach, pixels: setting.pixels });
+                return Err(RingPlanError::BeyondDisplay { bitmap, reach, pixels: setting.pixels });
             }
         }
         let seconds = plan.iter().map(|exposure| exposure.time.ms()).sum::<f64>() / 1000.0;
         if seconds > LONGEST_S {
-            return Err(PlanError::TooLong { seconds });
+            return Err(RingPlanError::TooLong { seconds });
         }
-        match plan.iter().map(Exposure::reach).max() {
-            None | Some(0) => Err(PlanError::Dark),
+        match plan.iter().map(RingExposure::reach).max() {
+            None | Some(0) => Err(RingPlanError::Dark),
             Some(pixels) => Ok(Self::new(setting, pixels, radius_um)?),
         }
     }
 }
 
-impl Wanted {
-    fn check(&self, simulation: &Simulation) -> Result<(), PlanError> {
+impl WantedProfile {
+    fn check(&self, simulation: &RingSimulation) -> Result<(), RingPlanError> {
         let cells = simulation.reaction().cells();
         let possible = |height: f64| height >= 0.0 && height.is_finite();
         if let Some(x) = self.heights_um.iter().position(|&height| !possible(height)) {
-            return Err(PlanError::NoHeight { radius_um: cells.middle_um(x) });
+            return Err(RingPlanError::NoHeight { radius_um: cells.middle_um(x) });
         }
         let (wanted_um, chamber_um) = (self.highest_um(), simulation.setting().chamber_um);
         if wanted_um == 0.0 {
-            return Err(PlanError::Empty);
+            return Err(RingPlanError::Empty);
         }
         if wanted_um > chamber_um {
-            return Err(PlanError::TooHigh { wanted_um, chamber_um });
+            return Err(RingPlanError::TooHigh { wanted_um, chamber_um });
         }
         Ok(())
     }

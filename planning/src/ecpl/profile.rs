@@ -55,14 +55,14 @@ fn height_um(cells: &Cells, heights_um: &[f64], radius_um: f64) -> f64 {
 
 /// A round part to be made: the height of each column of cells.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct WantedProfile {
     /// The chamber's cells.
     pub cells: Cells,
     /// Heights above the glass, in micrometres, from the axis.
     pub heights_um: Vec<f64>,
 }
 
-impl Wanted {
+impl WantedProfile {
     /// Takes the heights at the middles of columns.
     pub fn new(cells: &Cells, height_um: impl Fn(f64) -> f64) -> Self {
         let heights_um = (0..cells.across).map(|x| height_um(cells.middle_um(x))).collect();

@@ -246,13 +246,13 @@ mod tests {
     use lamp_grayscale::material::Material;
     use lamp_stack::Catalogued;
 
-    use super::super::cells::Shape;
+    use super::super::cells::ChamberShape;
     use super::*;
 
     fn reaction(height_um: f64, seconds: f64) -> Reaction {
         let kinetics = Material::builtin("tmpta").unwrap().kinetics().unwrap().unwrap();
         let deep = (200.0 / height_um) as usize;
-        let cells = Cells { shape: Shape::Round, across: 3, deep, width_um: 4.0, height_um };
+        let cells = Cells { shape: ChamberShape::Round, across: 3, deep, width_um: 4.0, height_um };
         Reaction::new(&kinetics, cells, seconds)
     }
 

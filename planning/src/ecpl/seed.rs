@@ -3,10 +3,10 @@
 use lamp_grayscale::resin::ExposureTime;
 use rayon::prelude::*;
 
-use super::Exposure;
-use super::profile::{Profile, Wanted};
+use super::RingExposure;
+use super::profile::{Profile, WantedProfile};
 use super::reactor::Chamber;
-use super::simulation::{Shown, Simulation};
+use super::simulation::{RingSimulation, Shown};
 
 /// Whole seconds of the database of single discs (003 table 2).
 const DATABASE_S: u32 = 30;
@@ -22,33 +22,37 @@ const WORSE_S: f64 = 1.0;
 
 /// Plans a first disc from the database, and then one smaller disc after the other, until what is
 /// cured is as high as wanted, or none betters it.
-pub(super) fn plan(simulation: &Simulation, wanted: &Wanted) -> Vec<Exposure> {
+pub(super) fn plan(simulation: &RingSimulation, wanted: &WantedProfile) -> Vec<RingExposure> {
     let Some((pixels, seconds)) = first_disc(simulation, wanted) else { return Vec::new() };
-    let mut plan = vec![Exposure::disc(pixels, ExposureTime::from_ms(f64::from(seconds) * 1000.0))];
+    let mut plan =
+        vec![RingExposure::disc(pixels, ExposureTime::from_ms(f64::from(seconds) * 1000.0))];
     let mut chamber = Chamber::new(simulation.reaction());
     let shown = [disc(simulation, pixels, f64::from(seconds))];
     simulation.expose(&mut chamber, &shown, 0, |_, _| ());
     let mut reach = pixels;
     while let Some(next) = next_disc(simulation, wanted, &chamber, reach) {
-        plan.push(Exposure::disc(next.pixels, next.time));
+        plan.push(RingExposure::disc(next.pixels, next.time));
         (reach, chamber) = (next.pixels, next.chamber);
     }
     plan
 }
 
-fn disc(simulation: &Simulation, pixels: u32, until_s: f64) -> Shown {
+fn disc(simulation: &RingSimulation, pixels: u32, until_s: f64) -> Shown {
     Shown { until_s, light: simulation.light(|ring| ring < pixels as usize) }
 }
 
 /// Returns how far a profile is from the part up to its own height, as a share of that height
 /// (003 equation 15). Not divided, the thinnest films would be best.
-fn misfit(wanted: &Wanted, profile: &Profile) -> f64 {
+fn misfit(wanted: &WantedProfile, profile: &Profile) -> f64 {
     let highest = profile.highest_um();
     if highest == 0.0 { f64::INFINITY } else { wanted.rms_below(profile, highest) / highest }
 }
 
 /// Returns the disc of the database that fits best, in pixels and seconds (003 section 5.1).
-pub(super) fn first_disc(simulation: &Simulation, wanted: &Wanted) -> Option<(u32, u32)> {
+pub(super) fn first_disc(
+    simulation: &RingSimulation,
+    wanted: &WantedProfile,
+) -> Option<(u32, u32)> {
     let most = DATABASE_PIXELS.min(simulation.rings() as u32);
     let best_time = |pixels: u32| {
         let mut chamber = Chamber::new(simulation.reaction());
@@ -81,8 +85,8 @@ struct Next {
 /// Returns the smaller disc that fits best (003 section 5.2, equations 16 and 17), if one betters
 /// the part.
 fn next_disc(
-    simulation: &Simulation,
-    wanted: &Wanted,
+    simulation: &RingSimulation,
+    wanted: &WantedProfile,
     chamber: &Chamber,
     reach: u32,
 ) -> Option<Next> {
@@ -99,8 +103,8 @@ fn next_disc(
 
 /// Finds the time for which a disc fits best.
 fn try_disc(
-    simulation: &Simulation,
-    wanted: &Wanted,
+    simulation: &RingSimulation,
+    wanted: &WantedProfile,
     chamber: &Chamber,
     pixels: u32,
 ) -> Option<Next> {

@@ -3,7 +3,7 @@
 use lamp_grayscale::resin::{ExposureTime, Intensity, Kinetics};
 use thiserror::Error;
 
-use super::cells::{Cells, Shape};
+use super::cells::{Cells, ChamberShape};
 use crate::projector::{Projector, SpreadOf};
 
 /// The longest step of a display: 003's resin cures its part in some 20 s.
@@ -27,7 +27,7 @@ const OXYGEN_S: f64 = 40.0;
 
 /// What exposes a chamber, and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
+pub struct KineticSetting {
     /// The rates of the resin.
     pub kinetics: Kinetics,
     /// The light of a wide white field on the glass.
@@ -75,7 +75,7 @@ pub enum SettingError {
     },
 }
 
-impl Setting {
+impl KineticSetting {
     /// Takes the numbers of a projector and of its resin.
     ///
     /// # Errors
@@ -144,7 +144,7 @@ impl Setting {
             return Err(SettingError::TooLarge { wide_um, deep_um });
         }
         Ok(Cells {
-            shape: Shape::Round,
+            shape: ChamberShape::Round,
             across: across as usize,
             deep: deep as usize,
             width_um: WIDTH_UM,

@@ -2,18 +2,18 @@
 
 use lamp_grayscale::resin::Intensity;
 
-use super::PlanError;
+use super::RingPlanError;
 use super::cells::Cells;
-use super::exposure::Exposure;
+use super::exposure::RingExposure;
 use super::lamplight::light_of;
 use super::profile::Profile;
 use super::reactor::{Chamber, Reaction};
-use super::setting::{Setting, SettingError};
+use super::setting::{KineticSetting, SettingError};
 
 /// A chamber and its projector, ready to be exposed.
 #[derive(Clone, Debug)]
-pub struct Simulation {
-    setting: Setting,
+pub struct RingSimulation {
+    setting: KineticSetting,
     reaction: Reaction,
     /// The light of each ring of pixels, in W/m² at each column.
     rings: Vec<Vec<f64>>,
@@ -26,13 +26,13 @@ pub(super) struct Shown {
     pub(super) light: Vec<f64>,
 }
 
-impl Simulation {
+impl RingSimulation {
     /// Prepares a chamber for bitmaps that reach `pixels` from the axis, and for a part of
     /// `radius_um`.
     ///
     /// # Errors
     /// Returns an error if a number is impossible, or the chamber too large.
-    pub fn new(setting: Setting, pixels: u32, radius_um: f64) -> Result<Self, SettingError> {
+    pub fn new(setting: KineticSetting, pixels: u32, radius_um: f64) -> Result<Self, SettingError> {
         setting.check()?;
         let lit_um = f64::from(pixels) * setting.pixel_um;
         let cells = setting.cells(radius_um.max(lit_um))?;
@@ -56,7 +56,7 @@ impl Simulation {
     }
 
     /// Returns what it was made for.
-    pub const fn setting(&self) -> &Setting {
+    pub const fn setting(&self) -> &KineticSetting {
         &self.setting
     }
 
@@ -71,14 +71,14 @@ impl Simulation {
     }
 
     /// Returns what a plan cures when its last bitmap goes dark.
-    pub fn cure(&self, plan: &[Exposure]) -> Profile {
+    pub fn cure(&self, plan: &[RingExposure]) -> Profile {
         let mut chamber = Chamber::new(&self.reaction);
         self.expose(&mut chamber, &self.shown(plan), 0, |_, _| ());
         Profile::of(&chamber, &self.reaction)
     }
 
     /// Returns what a plan cures up to the end of each of its bitmaps.
-    pub fn growth(&self, plan: &[Exposure]) -> Vec<Profile> {
+    pub fn growth(&self, plan: &[RingExposure]) -> Vec<Profile> {
         let shown = self.shown(plan);
         let step_of = |shown: &Shown| (shown.until_s / self.reaction.seconds()).round() as usize;
         let ends: Vec<usize> = shown.iter().map(step_of).collect();
@@ -97,7 +97,7 @@ impl Simulation {
         &self,
         wanted_um: f64,
         longest_s: f64,
-    ) -> Result<Vec<(f64, f64)>, PlanError> {
+    ) -> Result<Vec<(f64, f64)>, RingPlanError> {
         let column = Cells { across: 1, ..*self.reaction.cells() };
         let step_s = self.setting.step.ms() / 1000.0;
         let reaction = Reaction::new(&self.setting.kinetics, column, self.reaction.seconds());
@@ -115,15 +115,15 @@ impl Simulation {
                 break;
             }
             if time >= longest_s {
-                return Err(PlanError::TooDim { seconds: time, cured_um, wanted_um });
+                return Err(RingPlanError::TooDim { seconds: time, cured_um, wanted_um });
             }
         }
         Ok(heights)
     }
 
-    fn shown(&self, plan: &[Exposure]) -> Vec<Shown> {
+    fn shown(&self, plan: &[RingExposure]) -> Vec<Shown> {
         let mut until_s = 0.0;
-        let shown = |exposure: &Exposure| {
+        let shown = |exposure: &RingExposure| {
             until_s += exposure.time.ms() / 1000.0;
             Shown { until_s, light: self.light(|ring| exposure.is_white(ring as u32)) }
         };

@@ -8,7 +8,7 @@ use lamp_grayscale::material::MaterialError;
 use lamp_stack::CatalogueError;
 use thiserror::Error;
 
-use super::heights::HeightError;
+use super::heights::FaceError;
 use crate::resin_light::NoLight;
 use crate::speed::{PartError, PlatformError, SpeedPlanError};
 
@@ -109,7 +109,7 @@ pub enum JobFileError {
     Data(#[from] DataError),
     /// It is not what was measured.
     #[error(transparent)]
-    Measured(#[from] MeasuredError),
+    PrintMeasurements(#[from] MeasuredError),
     /// Its rows are those of other layers.
     #[error("its layers are not those of the job's stack")]
     OtherLayers,
@@ -241,7 +241,7 @@ pub enum LearnError {
         /// The height of the face.
         z_mm: f64,
         /// What is wrong with it.
-        problem: HeightError,
+        problem: FaceError,
     },
     /// The model cannot expose the part.
     #[error(transparent)]

@@ -28,7 +28,7 @@ pub struct Height {
 /// Why a height tells nothing.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum HeightError {
+pub enum FaceError {
     /// No face looks down at the place.
     #[error("the part has no face there that looks down")]
     NoFace,
@@ -41,7 +41,7 @@ pub enum HeightError {
 ///
 /// # Errors
 /// Returns an error if there is none within half a layer.
-pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, HeightError> {
+pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, FaceError> {
     let is_face = |layer: &usize| {
         let below = layer + 1;
         let ends = below == part.layers().len() || !part.is_wanted(below, pixel);
@@ -53,7 +53,7 @@ pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, He
     };
     let faces = (0..part.layers().len()).filter(is_face);
     let nearest = faces.min_by(|&a, &b| away(a).total_cmp(&away(b)));
-    nearest.filter(|&layer| away(layer) <= 0.5).ok_or(HeightError::NoFace)
+    nearest.filter(|&layer| away(layer) <= 0.5).ok_or(FaceError::NoFace)
 }
 
 /// Returns the heights down to which the resin is cured at faces that look down, each given by its
@@ -67,7 +67,7 @@ pub fn heights_of(
     light: &Light,
     times: &[f64],
     faces: &[([u32; 2], usize)],
-) -> Result<Vec<Length>, HeightError> {
+) -> Result<Vec<Length>, FaceError> {
     let height = |&(pixel, layer): &([u32; 2], usize)| {
         let doses = simulation.doses_at(pixel, times);
         let down = doses[layer..].iter().take_while(|&&dose| dose >= 1.0).count();
@@ -75,7 +75,7 @@ pub fn heights_of(
             0 => doses[..layer].iter().rposition(|&dose| dose >= 1.0),
             cured => Some(layer + cured - 1),
         };
-        let last = last.ok_or(HeightError::NothingCured)?;
+        let last = last.ok_or(FaceError::NothingCured)?;
         let of_last = &part.layers()[last];
         let above = match light.at {
             SampleHeight::Top => 1.0,
@@ -185,10 +185,10 @@ mod tests {
         assert!((height.um() - expected).abs() < 0.01, "{height} {expected}");
         times[0] = 0.1;
         let nothing = heights_of(&part, &simulation, &light, &times, &[face]);
-        assert_eq!(nothing, Err(HeightError::NothingCured));
+        assert_eq!(nothing, Err(FaceError::NothingCured));
         for (pixel, z_um) in [([40, 7], 4400.0), ([2, 7], 4500.0), ([99, 7], 4500.0)] {
             let face = face_at(&part, pixel, Length::from_um(z_um));
-            assert_eq!(face, Err(HeightError::NoFace), "{pixel:?}");
+            assert_eq!(face, Err(FaceError::NoFace), "{pixel:?}");
         }
     }
 

@@ -22,10 +22,10 @@ use lamp_stack::{Catalogued, Layer, digest_of, sealed, unsealed};
 use serde::{Deserialize, Serialize};
 
 use super::error::{JobError, JobFileError};
-use super::measured::Measured;
+use super::measured::PrintMeasurements;
 use super::step::Learned;
 use crate::light::{Light, SampleHeight};
-use crate::speed::{PartLayer, PartPages, Platform, TimedPart, times_table};
+use crate::speed::{PartPages, Platform, TimedLayer, TimedPart, times_table};
 
 /// Materials and what a job is for are texts of a few kilobytes.
 const MAX_FILE: u64 = 1 << 20;
@@ -66,7 +66,7 @@ pub struct JobPrint {
     /// The times in seconds, from the light on.
     pub times: Vec<f64>,
     /// The measurements, and their text.
-    pub measured: Option<(Measured, String)>,
+    pub measured: Option<(PrintMeasurements, String)>,
     /// The corrections of doses that heights had taught before, from the light on.
     pub log_doses: Vec<f64>,
 }
@@ -209,7 +209,7 @@ impl Job {
         let is_learnt_from = measured.exists() && next.exists();
         let read = || -> Result<_, JobFileError> {
             let text = read_sealed(&measured, MAX_TABLE, "a table of measurements")?;
-            Ok((Measured::parse(&text)?, text))
+            Ok((PrintMeasurements::parse(&text)?, text))
         };
         let measured_and_text = is_learnt_from.then(read).transpose().map_err(at(&measured))?;
         if times.iter().any(|ms| *ms <= 0.0) {
@@ -234,7 +234,7 @@ impl Job {
             let text = read_sealed(&file, MAX_TABLE, "a table of times")?;
             let rows = CsvTable::parse(&text)?.numbers(columns, column + 1)?;
             let layers = self.part.layers();
-            let is_layer = |(row, layer): (&NumberRow<N>, &PartLayer)| {
+            let is_layer = |(row, layer): (&NumberRow<N>, &TimedLayer)| {
                 row.numbers[0] == Some(f64::from(layer.index))
             };
             if rows.len() != layers.len() || !rows.iter().rev().zip(layers).all(is_layer) {

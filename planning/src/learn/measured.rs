@@ -11,7 +11,7 @@ const USUAL_SD_UM: f64 = 20.0;
 
 /// The measurements of a print.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Measured {
+pub enum PrintMeasurements {
     /// Heights of faces that look down.
     Heights(Vec<HeightRow>),
     /// Wrongly cured pixels of layers.
@@ -46,7 +46,7 @@ pub struct AreaRow {
     pub under: f64,
 }
 
-impl Measured {
+impl PrintMeasurements {
     /// Reads a table: of heights, or of areas if it has the column `layer`.
     ///
     /// # Errors
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn tables_are_told_apart_by_their_columns() {
-        let heights = Measured::parse("x_mm,y_mm,z_mm,measured_mm\n1,2,3,2.9\n").unwrap();
+        let heights = PrintMeasurements::parse("x_mm,y_mm,z_mm,measured_mm\n1,2,3,2.9\n").unwrap();
         let row = HeightRow {
             line: 2,
             place_mm: [1.0, 2.0],
@@ -128,15 +128,15 @@ mod tests {
             measured_mm: 2.9,
             sd_um: USUAL_SD_UM,
         };
-        assert_eq!(heights, Measured::Heights(vec![row]));
-        let areas = Measured::parse("layer,over_px,under_px\n7,5,0\n").unwrap();
+        assert_eq!(heights, PrintMeasurements::Heights(vec![row]));
+        let areas = PrintMeasurements::parse("layer,over_px,under_px\n7,5,0\n").unwrap();
         let row = AreaRow { line: 2, layer: 7, over: 5.0, under: 0.0 };
-        assert_eq!(areas, Measured::Areas(vec![row]));
+        assert_eq!(areas, PrintMeasurements::Areas(vec![row]));
     }
 
     #[test]
     fn impossible_measurements_are_refused() {
-        let refused = |text: &str| Measured::parse(text).unwrap_err();
+        let refused = |text: &str| PrintMeasurements::parse(text).unwrap_err();
         assert_eq!(refused("layer,over_px,under_px\n"), MeasuredError::Empty);
         let negative = "layer,over_px,under_px\n7,-1,0\n";
         assert_eq!(refused(negative), MeasuredError::Negative { line: 2 });

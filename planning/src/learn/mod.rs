@@ -5,7 +5,7 @@
 //! - [`convergence`] tells whether a law's changes shrink the errors of the next prints.
 //! - [`LogDoses`] learns from measured heights.
 //! - A [`Job`] keeps a stack and all its prints in a folder; [`learn`] turns what was
-//!   [`Measured`] on the last into the times of the next.
+//!   [`PrintMeasurements`] on the last into the times of the next.
 
 mod convergence;
 mod error;
@@ -19,10 +19,10 @@ mod step;
 
 pub use convergence::{Convergence, convergence, largest_safe_gain};
 pub use error::{JobError, JobFileError, LearnError, MeasuredError};
-pub use heights::{Height, HeightError, LogDoses, face_at, heights_of};
+pub use heights::{FaceError, Height, LogDoses, face_at, heights_of};
 pub use job::{Job, JobFile, JobPrint, digest_of_stack, profile_name};
 pub use law::{Law, ModelLaw, MultiLaw, SHORTEST, errors_of};
-pub use measured::{AreaRow, HeightRow, Measured};
+pub use measured::{AreaRow, HeightRow, PrintMeasurements};
 pub use response::Response;
 pub use step::{Learned, learn};
 

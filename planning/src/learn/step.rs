@@ -4,10 +4,10 @@ use lamp_stack::Length;
 
 use super::convergence::{Convergence, convergence, largest_safe_gain};
 use super::error::LearnError;
-use super::heights::{HeightError, LogDoses, face_at, heights_of};
+use super::heights::{FaceError, LogDoses, face_at, heights_of};
 use super::job::Job;
 use super::law::Law;
-use super::measured::{AreaRow, HeightRow, Measured};
+use super::measured::{AreaRow, HeightRow, PrintMeasurements};
 use super::response::Response;
 use crate::speed::{Simulation, SpeedOptions, plan_corrected};
 
@@ -40,14 +40,14 @@ pub struct Learned {
 pub fn learn(
     job: &Job,
     print: usize,
-    measured: &Measured,
+    measured: &PrintMeasurements,
     law: &Law,
     step: f64,
     memory: u64,
 ) -> Result<Learned, LearnError> {
     match measured {
-        Measured::Areas(rows) => from_areas(job, print, rows, law, memory),
-        Measured::Heights(rows) => from_heights(job, print, rows, step, memory),
+        PrintMeasurements::Areas(rows) => from_areas(job, print, rows, law, memory),
+        PrintMeasurements::Heights(rows) => from_heights(job, print, rows, step, memory),
     }
 }
 
@@ -155,6 +155,6 @@ fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), LearnError> 
     face.map(|layer| (pixel, layer)).map_err(|problem| of_face(row, problem))
 }
 
-fn of_face(row: &HeightRow, problem: HeightError) -> LearnError {
+fn of_face(row: &HeightRow, problem: FaceError) -> LearnError {
     LearnError::Face { line: row.line, z_mm: row.z_mm, problem }
 }

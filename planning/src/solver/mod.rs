@@ -6,4 +6,4 @@ mod search;
 
 pub use operator::Operator;
 pub use problem::{Problem, Role, Shape, Terms};
-pub use search::{Progress, Search, Solution, solve};
+pub use search::{Search, SearchProgress, Solution, solve};

@@ -21,7 +21,7 @@ pub struct Search {
 
 /// The cost and the bound after some iterations: the best so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
+pub struct SearchProgress {
     /// Iterations.
     pub iteration: usize,
     /// The cost of the best light.
@@ -38,7 +38,7 @@ pub struct Solution<T> {
     /// The price of each voxel's dose that gives the bound.
     pub prices: Vec<T>,
     /// How cost and bound came together.
-    pub progress: Vec<Progress>,
+    pub progress: Vec<SearchProgress>,
 }
 
 impl<T> Solution<T> {
@@ -46,7 +46,7 @@ impl<T> Solution<T> {
     ///
     /// # Panics
     /// Never: a search notes where it starts.
-    pub fn end(&self) -> Progress {
+    pub fn end(&self) -> SearchProgress {
         *self.progress.last().expect("a search notes where it starts")
     }
 }
@@ -153,7 +153,7 @@ pub fn solve<T: Real>(
     let mut best = Best {
         light: now.light.clone(),
         prices: now.prices.clone(),
-        progress: vec![Progress { iteration: 0, cost, bound }],
+        progress: vec![SearchProgress { iteration: 0, cost, bound }],
     };
     let (mut weight, mut since) = (FIRST_WEIGHT, 0);
     let (mut gap_at_restart, mut gap_before) = (cost - bound, f64::INFINITY);
@@ -195,11 +195,11 @@ pub fn solve<T: Real>(
 struct Best<T> {
     light: Vec<T>,
     prices: Vec<T>,
-    progress: Vec<Progress>,
+    progress: Vec<SearchProgress>,
 }
 
 impl<T: Real> Best<T> {
-    fn last(&self) -> Progress {
+    fn last(&self) -> SearchProgress {
         *self.progress.last().expect("a search notes where it starts")
     }
 
@@ -208,7 +208,7 @@ impl<T: Real> Best<T> {
     }
 
     fn look_at(&mut self, iteration: usize, next: &Iterate<T>, cost: f64, bound: f64) {
-        let mut progress = Progress { iteration, ..self.last() };
+        let mut progress = SearchProgress { iteration, ..self.last() };
         if cost < progress.cost {
             progress.cost = cost;
             self.light.copy_from_slice(&next.light);

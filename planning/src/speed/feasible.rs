@@ -3,7 +3,7 @@
 use lamp_stack::Length;
 use thiserror::Error;
 
-use super::part::PartLayer;
+use super::part::TimedLayer;
 
 /// A speed of the platform, in micrometres a second.
 pub type Speed = f64;
@@ -37,7 +37,7 @@ impl Platform {
     ///
     /// # Errors
     /// Returns an error if the platform's numbers are impossible.
-    pub fn bounds(&self, layers: &[PartLayer]) -> Result<[Vec<f64>; 2], PlatformError> {
+    pub fn bounds(&self, layers: &[TimedLayer]) -> Result<[Vec<f64>; 2], PlatformError> {
         let feasible = Feasible::new(self, layers)?;
         Ok([feasible.low, feasible.high])
     }
@@ -46,7 +46,7 @@ impl Platform {
     ///
     /// # Errors
     /// Returns an error if the platform's numbers are impossible.
-    pub fn nearest(&self, layers: &[PartLayer], times: &[f64]) -> Result<Vec<f64>, PlatformError> {
+    pub fn nearest(&self, layers: &[TimedLayer], times: &[f64]) -> Result<Vec<f64>, PlatformError> {
         Ok(Feasible::new(self, layers)?.nearest(times))
     }
 }
@@ -62,7 +62,7 @@ pub(crate) struct Feasible {
 }
 
 impl Feasible {
-    pub(crate) fn new(platform: &Platform, layers: &[PartLayer]) -> Result<Self, PlatformError> {
+    pub(crate) fn new(platform: &Platform, layers: &[TimedLayer]) -> Result<Self, PlatformError> {
         let Platform { slowest, fastest, max_change } = *platform;
         if !(slowest > 0.0 && slowest <= fastest && fastest.is_finite()) {
             return Err(PlatformError::Speeds(slowest, fastest));
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
 
     fn feasible(count: u32, max_change: Option<f64>) -> Feasible {
-        let layer = |index: u32| PartLayer {
+        let layer = |index: u32| TimedLayer {
             index,
             z: Length::default(),
             thickness: Length::from_um(50.0 + f64::from(index % 3) * 20.0),

@@ -125,7 +125,8 @@ impl<'a> Gather<'a> {
     /// Returns the light at a pixel in each layer.
     pub(crate) fn light_at(&self, pixel: [u32; 2]) -> Vec<f32> {
         let room = &mut Room::default();
-        let window = Window { corner: pixel.map(i64::from), side: 1, radius: self.blur.radius() };
+        let window =
+            TileWindow { corner: pixel.map(i64::from), side: 1, radius: self.blur.radius() };
         let of_layer = |image| {
             self.spread(image, window, room);
             room.spread[window.place([0, 0])]
@@ -134,7 +135,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Computes the light of a window of a layer.
-    fn spread(&self, image: &Image, window: Window, room: &mut Room) {
+    fn spread(&self, image: &Image, window: TileWindow, room: &mut Room) {
         let pixels = window.width() * window.rows();
         room.levels.resize(pixels, 0);
         let corner = window.corner.map(|place| place - window.radius as i64);
@@ -160,7 +161,7 @@ impl<'a> Gather<'a> {
     fn tile(&self, corner: [i64; 2], step: u32, room: &mut Room) -> ColumnSet {
         let layers = self.part.images.len();
         let places = sampled(corner, self.side, step);
-        let window = Window { corner, side: self.side, radius: self.blur.radius() };
+        let window = TileWindow { corner, side: self.side, radius: self.blur.radius() };
         let mut light = vec![0.0_f32; places.len() * layers];
         room.spread_levels.clear();
         for (layer, image) in self.part.images.iter().enumerate() {
@@ -184,13 +185,13 @@ impl<'a> Gather<'a> {
 
 /// Pixels whose light is computed, and as far around as it comes from.
 #[derive(Clone, Copy)]
-struct Window {
+struct TileWindow {
     corner: [i64; 2],
     side: usize,
     radius: usize,
 }
 
-impl Window {
+impl TileWindow {
     fn rows(self) -> usize {
         self.side + 2 * self.radius
     }

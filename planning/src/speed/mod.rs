@@ -16,8 +16,8 @@ pub(crate) mod testing;
 mod times_table;
 
 pub use feasible::{Platform, PlatformError, Speed};
-pub use part::{PartError, PartLayer, PartPages, TimedPart};
-pub use plan::{SpeedOptions, SpeedPlan, SpeedPlanError, Stage, plan, plan_corrected};
+pub use part::{PartError, PartPages, TimedLayer, TimedPart};
+pub use plan::{SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan, plan_corrected};
 pub use simulation::Simulation;
 pub use tally::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 pub use times_table::{recorded_ms, times_table};

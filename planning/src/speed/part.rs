@@ -10,14 +10,14 @@ use crate::light::{LayerLight, LayerTime, Light, LightError};
 #[derive(Clone, Debug)]
 pub struct TimedPart {
     pub(crate) images: Vec<Image>,
-    layers: Vec<PartLayer>,
+    layers: Vec<TimedLayer>,
     dpi: Dpi,
     wanted: u8,
 }
 
 /// What a page says about its layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PartLayer {
+pub struct TimedLayer {
     /// The layer's index in its stack.
     pub index: u32,
     /// The height of its bottom.
@@ -56,7 +56,7 @@ pub enum PartError {
 #[derive(Clone, Debug)]
 pub struct PartPages {
     images: Vec<Image>,
-    layers: Vec<PartLayer>,
+    layers: Vec<TimedLayer>,
     dpi: Option<Dpi>,
     wanted: u8,
 }
@@ -86,7 +86,7 @@ impl PartPages {
         if self.images.first().is_some_and(unlike) || *self.dpi.get_or_insert(dpi) != dpi {
             return Err(PartError::Unlike(name()));
         }
-        self.layers.push(PartLayer {
+        self.layers.push(TimedLayer {
             index: layer.info.index,
             z: Length::from_um(z_um),
             thickness: Length::from_um(thickness_um),
@@ -111,7 +111,7 @@ impl PartPages {
 
 impl TimedPart {
     /// Returns the layers, the one nearest to the light first.
-    pub fn layers(&self) -> &[PartLayer] {
+    pub fn layers(&self) -> &[TimedLayer] {
         &self.layers
     }
 
@@ -140,7 +140,7 @@ impl TimedPart {
         light.check()?;
         light.check_spread(self.dpi)?;
         let second = ExposureTime::from_ms(1000.0);
-        let layer = |layer: &PartLayer| LayerTime { thickness: layer.thickness, time: second };
+        let layer = |layer: &TimedLayer| LayerTime { thickness: layer.thickness, time: second };
         let layers: Vec<_> = self.layers.iter().map(layer).collect();
         Ok(light.layers(self.dpi, &layers))
     }

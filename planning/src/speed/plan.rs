@@ -43,7 +43,7 @@ pub enum SpeedPlanError {
 
 /// A stage of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stage {
+pub struct SearchStage {
     /// The least error so far.
     pub error: f64,
     /// What no times of the platform can be below.
@@ -64,7 +64,7 @@ pub struct SpeedPlan {
     /// The error of the best single time in the columns that the search sees, `P0`.
     pub single_error: f64,
     /// The search's stages; the last has the plan's error and bound.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<SearchStage>,
     /// How many pixels each column that the search sees stands for. With 1, it sees all, and the
     /// bound holds for the whole part.
     pub sampled: u32,
@@ -78,7 +78,7 @@ impl SpeedPlan {
     }
 }
 
-fn gap(stage: Stage, single_error: f64) -> f64 {
+fn gap(stage: SearchStage, single_error: f64) -> f64 {
     if stage.error == 0.0 { 0.0 } else { (stage.error - stage.bound) / single_error }
 }
 
@@ -108,7 +108,7 @@ pub fn plan_corrected(
 ) -> Result<SpeedPlan, SpeedPlanError> {
     let feasible = Feasible::new(&options.platform, part.layers())?;
     let simulation = Simulation::corrected(part, &options.light, log_doses, options.memory)?;
-    let problem = Problem { simulation: &simulation, feasible, options };
+    let problem = TimesProblem { simulation: &simulation, feasible, options };
     let (single, single_error) = problem.best_single();
     let (times, stages) = problem.search(&single, single_error);
     let [before, after] = simulation.tally([&single, &times]);
@@ -127,13 +127,13 @@ pub fn plan_corrected(
     })
 }
 
-struct Problem<'a> {
+struct TimesProblem<'a> {
     simulation: &'a Simulation<'a>,
     feasible: Feasible,
     options: &'a SpeedOptions,
 }
 
-impl Problem<'_> {
+impl TimesProblem<'_> {
     fn price(&self, times: &[f64], smoothing: f64) -> Priced {
         let margin = self.options.margin;
         let layers = self.simulation.layers();
@@ -161,7 +161,7 @@ impl Problem<'_> {
     }
 
     /// Goes from the best single time to the least error, which is smoothed less and less.
-    fn search(&self, single: &[f64], single_error: f64) -> (Vec<f64>, Vec<Stage>) {
+    fn search(&self, single: &[f64], single_error: f64) -> (Vec<f64>, Vec<SearchStage>) {
         let starts = [single.to_vec(), self.simulation.times_for(2.0)];
         let starts = starts.map(|times| {
             let times = self.feasible.nearest(&times);
@@ -185,7 +185,7 @@ impl Problem<'_> {
             }
             let priced = self.price(&times, smoothing);
             bound = bound.max(priced.bound(&times, self.feasible.least(&priced.slopes)));
-            let stage = Stage { error: best.0, bound: bound.min(best.0) };
+            let stage = SearchStage { error: best.0, bound: bound.min(best.0) };
             stages.push(stage);
             if gap(stage, single_error) <= self.options.gap {
                 break;

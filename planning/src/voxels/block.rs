@@ -2,7 +2,7 @@
 
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
-use crate::solver::{Operator, Problem, Progress, Role, Search, Shape, Terms, solve};
+use crate::solver::{Operator, Problem, Role, Search, SearchProgress, Shape, Terms, solve};
 use crate::tiled::{Grid, Rect, Tiled};
 use crate::voxels::levels::Levels;
 use crate::voxels::roles::{LayerImages, RoleRules};
@@ -52,7 +52,7 @@ fn copy_common<V: Copy>(values: &[V], of: &Rect, rect: &Rect, stride: usize, out
 }
 
 /// What all blocks of a window share.
-pub(crate) struct Window<'a> {
+pub(crate) struct PlannedWindow<'a> {
     pub(crate) grid: Grid,
     pub(crate) blur: &'a Blur<f32>,
     pub(crate) rules: &'a RoleRules,
@@ -89,7 +89,7 @@ pub(crate) struct BlockResult {
     pub(crate) plan: TilePlan,
     /// The cost of white light in the block.
     pub(crate) unplanned: f64,
-    pub(crate) progress: Vec<Progress>,
+    pub(crate) progress: Vec<SearchProgress>,
 }
 
 /// What is planned of a tile in a layer.
@@ -119,7 +119,7 @@ impl Area {
     }
 }
 
-impl Window<'_> {
+impl PlannedWindow<'_> {
     /// Plans a tile.
     pub(crate) fn plan(&self, tile: usize) -> BlockResult {
         let core = self.grid.tile(tile);

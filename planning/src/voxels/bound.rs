@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::doses::Room;
 use crate::solver::Role;
 use crate::tiled::{Tile, Tiled};
-use crate::voxels::setting::Setting;
+use crate::voxels::setting::VoxelSetting;
 
 /// Adds up, from the bottom up, what doses' prices make of the light of each layer.
 #[derive(Debug)]
@@ -19,14 +19,14 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    pub(crate) fn new(setting: &Setting) -> Self {
+    pub(crate) fn new(setting: &VoxelSetting) -> Self {
         Self { prices: Tiled::flat(setting.grid, 0.0), passed: 0.0, bound: 0.0 }
     }
 
     /// Adds the next layer, counted from the light, with its prices and the part's image.
     pub(crate) fn add(
         &mut self,
-        setting: &Setting,
+        setting: &VoxelSetting,
         layer: usize,
         prices: &Tiled<f32>,
         wanted: &Tiled<u8>,
@@ -68,7 +68,7 @@ fn sum_tile(prices: &Tile<f32>, below: &Tile<f32>, passed: f32) -> Tile<f32> {
 }
 
 /// Returns what the prices of a tile's doses add to the bound by themselves.
-fn of_doses(setting: &Setting, tile: usize, prices: &Tiled<f32>) -> f64 {
+fn of_doses(setting: &VoxelSetting, tile: usize, prices: &Tiled<f32>) -> f64 {
     let of = |price: f32| -f64::from(price) * f64::from(setting.aim(price));
     let rect = setting.grid.tile(tile);
     match &prices.tiles[tile] {
@@ -82,7 +82,7 @@ fn of_doses(setting: &Setting, tile: usize, prices: &Tiled<f32>) -> f64 {
 
 /// Returns the least that the light of a tile can cost.
 fn of_light(
-    setting: &Setting,
+    setting: &VoxelSetting,
     layer: usize,
     tile: usize,
     sums: &Tiled<f32>,

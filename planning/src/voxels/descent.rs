@@ -9,19 +9,19 @@ use crate::doses::next_layer;
 use crate::solver::Role;
 use crate::spool::{Runs, Spool};
 use crate::tiled::{Tile, Tiled};
-use crate::voxels::block::{TilePlan, Window};
+use crate::voxels::block::{PlannedWindow, TilePlan};
 use crate::voxels::measure::{TileValues, Voxel};
-use crate::voxels::outcome::{GapAt, Tally};
+use crate::voxels::outcome::{GapAt, VoxelTally};
 use crate::voxels::roles::{LayerImages, REACH};
 use crate::voxels::search_sums::SearchSums;
-use crate::voxels::setting::{Setting, code};
+use crate::voxels::setting::{VoxelSetting, code};
 use crate::voxels::unplanned::price_unplanned;
 
 /// A layer as it was settled.
 #[derive(Debug, Default)]
 pub(crate) struct SettledLayer {
-    pub(crate) before: Tally,
-    pub(crate) after: Tally,
+    pub(crate) before: VoxelTally,
+    pub(crate) after: VoxelTally,
     pub(crate) wanted: u64,
     pub(crate) targets: u64,
 }
@@ -43,7 +43,7 @@ const BYTES_PLANNED: u64 = 5;
 
 /// Where the way down is.
 struct Descent<'a> {
-    setting: &'a Setting,
+    setting: &'a VoxelSetting,
     wanted: &'a mut Spool,
     /// The images of layers that are not settled, and of those just above them.
     images: VecDeque<LayerImages>,
@@ -62,7 +62,7 @@ struct Descent<'a> {
 /// Plans all layers. `wanted` has the part's images, bottom first. `settled` is called with the
 /// number of layers after each window.
 pub(crate) fn descend(
-    setting: &Setting,
+    setting: &VoxelSetting,
     wanted: &mut Spool,
     mut settled: impl FnMut(usize),
 ) -> io::Result<Descended> {
@@ -161,7 +161,7 @@ impl Descent<'_> {
             let across = setting.grid.across();
             let has_turn = |tile: usize| tile / across % 2 * 2 + tile % across % 2 == turn;
             let now: Vec<usize> = tiles.iter().copied().filter(|&tile| has_turn(tile)).collect();
-            let window = Window {
+            let window = PlannedWindow {
                 grid: setting.grid,
                 blur: &setting.blur,
                 rules: &setting.rules,

@@ -2,7 +2,7 @@
 
 use crate::solver::{Role, Terms};
 use crate::tiled::Rect;
-use crate::voxels::outcome::{Counts, DoseHistogram, Tally};
+use crate::voxels::outcome::{Counts, DoseHistogram, VoxelTally};
 
 /// The share by which light may be off.
 const LIGHT_OFF: f32 = 0.05;
@@ -15,7 +15,7 @@ pub(crate) struct Voxel {
     pub(crate) role: Role,
 }
 
-impl Tally {
+impl VoxelTally {
     /// Adds voxels of a dose.
     pub(crate) fn add(&mut self, voxel: Voxel, dose: f32, count: u64, terms: &Terms<f32>) {
         let cases = [
@@ -61,8 +61,8 @@ pub(crate) struct TileValues<'a> {
 
 impl TileValues<'_> {
     /// Returns what doses come to.
-    pub(crate) fn tally(&self, doses: &[f32], terms: &Terms<f32>) -> Tally {
-        let mut tally = Tally::default();
+    pub(crate) fn tally(&self, doses: &[f32], terms: &Terms<f32>) -> VoxelTally {
+        let mut tally = VoxelTally::default();
         for row in 0..self.rect.height() {
             let places = row * self.stride..row * self.stride + self.rect.width();
             for (place, &dose) in places.clone().zip(&doses[places]) {

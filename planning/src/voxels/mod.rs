@@ -18,6 +18,6 @@ mod search_sums;
 mod setting;
 mod unplanned;
 
-pub use options::{Objective, Options, Sources, Window};
-pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
-pub use plan::{PlanError, PlannedStack, plan};
+pub use options::{Options, Sources, VoxelObjective, Window};
+pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
+pub use plan::{PlannedStack, VoxelPlanError, plan};

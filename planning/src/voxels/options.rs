@@ -4,7 +4,7 @@ use std::num::NonZeroU8;
 
 /// What a plan makes least.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Objective {
+pub enum VoxelObjective {
     /// How far doses of wanted voxels lie below the critical dose, and others above it, each with
     /// a margin.
     #[default]
@@ -13,7 +13,7 @@ pub enum Objective {
     Boundary,
 }
 
-lamp_stack::named!(Objective { Wrong = "wrong", Boundary = "boundary" });
+lamp_stack::named!(VoxelObjective { Wrong = "wrong", Boundary = "boundary" });
 
 /// Pixels whose light a plan chooses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub struct Options {
     /// The lowest level of a wanted pixel.
     pub wanted: NonZeroU8,
     /// What the plan makes least.
-    pub objective: Objective,
+    pub objective: VoxelObjective,
     /// How far beyond the critical dose a voxel should be to be surely cured or not: 0.05 is 5 %.
     pub margin: f64,
     /// Pixels whose light is chosen.
@@ -66,7 +66,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             wanted: NonZeroU8::new(128).expect("it is above zero"),
-            objective: Objective::Wrong,
+            objective: VoxelObjective::Wrong,
             margin: 0.05,
             sources: Sources::Lit,
             min_level: 0,

@@ -55,7 +55,7 @@ impl AddAssign<&Self> for DoseHistogram {
 
 /// What the doses of a layer, or of all, come to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct VoxelTally {
     /// Voxels cured wrongly.
     pub counts: Counts,
     /// The same if all light were 5 % less.
@@ -68,7 +68,7 @@ pub struct Tally {
     pub doses: DoseHistogram,
 }
 
-impl AddAssign<&Self> for Tally {
+impl AddAssign<&Self> for VoxelTally {
     fn add_assign(&mut self, other: &Self) {
         self.counts += other.counts;
         self.dimmer += other.dimmer;
@@ -109,9 +109,9 @@ pub struct Outcome {
     /// Every layer, bottom first.
     pub layers: Vec<LayerOutcome>,
     /// What white light comes to: its cost is `P_0`.
-    pub before: Tally,
+    pub before: VoxelTally,
     /// What the plan comes to, in gray levels as they are written: its cost is `P`.
-    pub after: Tally,
+    pub after: VoxelTally,
     /// What no light of the same sources costs less than: `D`.
     pub bound: f64,
     /// How the search went.

@@ -14,15 +14,15 @@ use crate::tiled::{Grid, Tiled};
 use crate::voxels::bound::Ascent;
 use crate::voxels::descent::{Descended, descend};
 use crate::voxels::levels::Levels;
-use crate::voxels::options::{Objective, Options, Window};
+use crate::voxels::options::{Options, VoxelObjective, Window};
 use crate::voxels::outcome::{LayerOutcome, Outcome};
 use crate::voxels::roles::RoleRules;
-use crate::voxels::setting::{Setting, price};
+use crate::voxels::setting::{VoxelSetting, price};
 
 /// Why a stack cannot be planned.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum PlanError {
+pub enum VoxelPlanError {
     /// It has no layers.
     #[error("there are no layers to plan")]
     NoLayers,
@@ -56,7 +56,7 @@ pub enum PlanError {
     Io(#[from] io::Error),
 }
 
-/// What a unit of dose costs that a target lacks, with [`Objective::Boundary`].
+/// What a unit of dose costs that a target lacks, with [`VoxelObjective::Boundary`].
 ///
 /// 001 makes each target a constraint. None has a higher multiplier than 17.2 in its appendix A,
 /// so all of them are kept there; elsewhere about 1 % of targets, those that white light only
@@ -79,27 +79,27 @@ const MOST_TAIL: usize = 60;
 /// `settled` is called with the number of layers that are done.
 ///
 /// # Errors
-/// Returns the part's own error, or a [`PlanError`] if a layer is unlike the first, or lacks its
+/// Returns the part's own error, or a [`VoxelPlanError`] if a layer is unlike the first, or lacks its
 /// thickness or exposure, or if a temporary file fails.
-pub fn plan<E: From<PlanError>>(
+pub fn plan<E: From<VoxelPlanError>>(
     part: impl IntoIterator<Item = Result<Layer, E>>,
     light: &Light,
     options: &Options,
     settled: impl FnMut(usize),
 ) -> Result<PlannedStack, E> {
-    light.check().map_err(PlanError::from)?;
-    let mut wanted = Spool::new().map_err(PlanError::from)?;
+    light.check().map_err(VoxelPlanError::from)?;
+    let mut wanted = Spool::new().map_err(VoxelPlanError::from)?;
     let mut pages = Pages::default();
     for layer in part {
         let layer = layer?;
         pages.add(&layer)?;
         let image = layer.image.into_image().into_mask(options.wanted);
-        wanted.push(runs_of(&image)).map_err(PlanError::from)?;
+        wanted.push(runs_of(&image)).map_err(VoxelPlanError::from)?;
     }
-    let dpi = pages.dpi.ok_or(PlanError::NoLayers)?;
-    light.check_spread(dpi).map_err(PlanError::from)?;
-    let setting = setting(&pages, light, options).ok_or(PlanError::NoLayers)?;
-    let done = descend(&setting, &mut wanted, settled).map_err(PlanError::from)?;
+    let dpi = pages.dpi.ok_or(VoxelPlanError::NoLayers)?;
+    light.check_spread(dpi).map_err(VoxelPlanError::from)?;
+    let setting = setting(&pages, light, options).ok_or(VoxelPlanError::NoLayers)?;
+    let done = descend(&setting, &mut wanted, settled).map_err(VoxelPlanError::from)?;
     let ascent = Ascent::new(&setting);
     let next = pages.infos.len();
     let outcome = outcome(&done, &pages);
@@ -116,17 +116,17 @@ struct Pages {
 }
 
 impl Pages {
-    fn add(&mut self, layer: &Layer) -> Result<(), PlanError> {
+    fn add(&mut self, layer: &Layer) -> Result<(), VoxelPlanError> {
         let name = || layer.info.name();
         let size = [layer.image.width(), layer.image.height()];
-        let silent = |what| PlanError::Silent { layer: name(), what };
+        let silent = |what| VoxelPlanError::Silent { layer: name(), what };
         let dpi = layer.dpi.ok_or_else(|| silent("resolution"))?;
         if *self.size.get_or_insert(size) != size || *self.dpi.get_or_insert(dpi) != dpi {
-            return Err(PlanError::Unlike { layer: name() });
+            return Err(VoxelPlanError::Unlike { layer: name() });
         }
         let above_zero = |number: f64, what| {
             let fits = number > 0.0 && number.is_finite();
-            if fits { Ok(number) } else { Err(PlanError::NotPositive { layer: name(), what }) }
+            if fits { Ok(number) } else { Err(VoxelPlanError::NotPositive { layer: name(), what }) }
         };
         let um = layer.info.thickness_um.ok_or_else(|| silent("thickness"))?;
         let ms = layer.info.exposure_ms.ok_or_else(|| silent("exposure"))?;
@@ -153,7 +153,7 @@ fn runs_of(wanted: &Mask) -> Runs {
     runs
 }
 
-fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
+fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetting> {
     let (size, dpi) = (pages.size?, pages.dpi?);
     let image = size.map(|side| side as usize);
     let sigma = light.spread_pixels(dpi);
@@ -177,21 +177,21 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<Setting> {
     let is_small = longest * longest * layers <= ONE_PIECE;
     let side = if is_small { longest } else { LEAST_SIDE.max((16.0 * sigma) as usize) };
     let (least, short_price) = match options.objective {
-        Objective::Wrong => (1.0 + options.margin, 1.0),
-        Objective::Boundary => (1.0, PRICE_OF_TARGETS),
+        VoxelObjective::Wrong => (1.0 + options.margin, 1.0),
+        VoxelObjective::Boundary => (1.0, PRICE_OF_TARGETS),
     };
     let most = (1.0 - options.margin) as f32;
     let [image_width, image_height] = image;
     let rules = RoleRules::new(options, image_width, image_height, around);
-    Some(Setting {
+    Some(VoxelSetting {
         grid: Grid { width, height, side },
         rules,
         terms: Terms { least: least as f32, short_price, most, least_light: 0.0 },
-        most_of_dark: if options.objective == Objective::Wrong { most } else { 0.0 },
+        most_of_dark: if options.objective == VoxelObjective::Wrong { most } else { 0.0 },
         levels: Levels::new(light, options.min_level),
         lights,
         gap: options.gap,
-        round_up: options.objective == Objective::Boundary,
+        round_up: options.objective == VoxelObjective::Boundary,
         has_min_level: options.min_level > 0,
         window,
         tail,
@@ -226,7 +226,7 @@ fn outcome(done: &Descended, pages: &Pages) -> Outcome {
 /// The bound of its [`Outcome`] is complete once all layers were taken.
 #[derive(Debug)]
 pub struct PlannedStack {
-    setting: Setting,
+    setting: VoxelSetting,
     wanted: Spool,
     done: Descended,
     pages: Pages,
@@ -277,12 +277,12 @@ impl PlannedStack {
 }
 
 impl Iterator for PlannedStack {
-    type Item = Result<Layer, PlanError>;
+    type Item = Result<Layer, VoxelPlanError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         // The last layer from the light is the stack's first.
         let layer = self.left.checked_sub(1)?;
         self.left = layer;
-        Some(self.layer(layer).map_err(PlanError::from))
+        Some(self.layer(layer).map_err(VoxelPlanError::from))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::solver::Role;
 use crate::tiled::{Rect, Tiled};
-use crate::voxels::options::{Objective, Options, Sources};
+use crate::voxels::options::{Options, Sources, VoxelObjective};
 
 /// How far from a target a boundary voxel lies, in voxels along each axis.
 ///
@@ -22,7 +22,7 @@ pub(crate) struct LayerImages {
 /// Which pixels along an outline, and around it, [`Options`] ask for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoleRules {
-    objective: Objective,
+    objective: VoxelObjective,
     sources: Sources,
     keep_wall: usize,
     /// Where pixels can be lit: the image without what lies around it.
@@ -41,7 +41,7 @@ impl RoleRules {
 
     /// Returns how far around a voxel its role depends on images.
     pub(crate) fn reach(&self) -> usize {
-        let boundary = if self.objective == Objective::Boundary { REACH } else { 0 };
+        let boundary = if self.objective == VoxelObjective::Boundary { REACH } else { 0 };
         self.outline().max(boundary)
     }
 
@@ -68,10 +68,10 @@ impl RoleRules {
         layers[layer].wanted.copy(rect, 0, stride, &mut wanted);
         let light = self.light_roles(&layers[layer].wanted, rect, stride, &wanted);
         let doses = match self.objective {
-            Objective::Wrong => {
+            VoxelObjective::Wrong => {
                 wanted.iter().map(|&w| either(w, Role::CURED, Role::UNCURED)).collect()
             }
-            Objective::Boundary => boundary_roles(layers, layer, rect, stride, &wanted),
+            VoxelObjective::Boundary => boundary_roles(layers, layer, rect, stride, &wanted),
         };
         let inside = rect.within(&grid.image());
         let all = roles.iter_mut().zip(light.iter().zip(&doses)).enumerate();
@@ -92,7 +92,7 @@ impl RoleRules {
         rect: &Rect,
     ) -> Option<Role> {
         self.light_of_all(&layers[layer].wanted, rect)?;
-        if self.objective == Objective::Boundary {
+        if self.objective == VoxelObjective::Boundary {
             let near = layer.saturating_sub(REACH)..layers.len().min(layer + REACH + 1);
             for layer in &layers[near] {
                 layer.targets.value_in(&rect.grown(REACH), 0)?;

@@ -1,6 +1,6 @@
 //! Adds up how cost and bound of all blocks come together.
 
-use crate::solver::Progress;
+use crate::solver::SearchProgress;
 use crate::voxels::outcome::GapAt;
 
 /// How cost and bound of blocks come together, added up.
@@ -15,7 +15,7 @@ pub(crate) struct SearchSums {
 }
 
 impl SearchSums {
-    pub(crate) fn add(&mut self, progress: &[Progress], unplanned: f64) {
+    pub(crate) fn add(&mut self, progress: &[SearchProgress], unplanned: f64) {
         self.unplanned += unplanned;
         for (look, now) in progress.iter().enumerate() {
             if look == self.gaps.len() {

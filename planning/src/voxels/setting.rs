@@ -13,7 +13,7 @@ use crate::voxels::roles::RoleRules;
 
 /// What stays the same for all layers.
 #[derive(Debug)]
-pub(crate) struct Setting {
+pub(crate) struct VoxelSetting {
     pub(crate) grid: Grid,
     pub(crate) blur: Blur<f32>,
     pub(crate) rules: RoleRules,
@@ -41,7 +41,7 @@ pub(crate) struct Setting {
     pub(crate) image: [usize; 2],
 }
 
-impl Setting {
+impl VoxelSetting {
     /// Reads the part's image of a layer, counted from the light.
     pub(crate) fn read_wanted(&self, wanted: &mut Spool, layer: usize) -> io::Result<Tiled<u8>> {
         let [width, height] = self.image;

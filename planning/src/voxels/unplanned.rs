@@ -6,12 +6,12 @@ use crate::blur::LANES;
 use crate::solver::{Role, Terms};
 use crate::tiled::{Tile, Tiled};
 use crate::voxels::roles::LayerImages;
-use crate::voxels::setting::Setting;
+use crate::voxels::setting::VoxelSetting;
 
 /// Gives voxels that were not planned, far from surfaces, the slope of their cost as their price:
 /// without it the bound would lack what they cost. `images` are those within reach of `at`.
 pub(crate) fn price_unplanned(
-    setting: &Setting,
+    setting: &VoxelSetting,
     images: &[&LayerImages],
     at: usize,
     doses: &Tiled<f32>,

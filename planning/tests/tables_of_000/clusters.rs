@@ -1,6 +1,8 @@
 //! Clusters against all that there are, and times of bitmaps against an interior-point method.
 
-use lamp_planning::column::{Clusters, ColumnLight, ColumnPlan, Objective, Setup, Tracing, plan};
+use lamp_planning::column::{
+    Clusters, ColumnObjective, ColumnPlan, GlassLight, Setup, Tracing, plan,
+};
 use lamp_stack::Image;
 use proptest::prelude::*;
 
@@ -52,7 +54,7 @@ proptest! {
 }
 
 /// The light of each bitmap, as that of a mirror.
-fn of_bitmaps(light: &ColumnLight, planned: &ColumnPlan) -> Vec<Vec<f64>> {
+fn of_bitmaps(light: &GlassLight, planned: &ColumnPlan) -> Vec<Vec<f64>> {
     let width = light.setup().mirrors[0] as u32;
     let doses = |image: &Image| match image {
         Image::Mask(mask) => {
@@ -67,12 +69,12 @@ fn of_bitmaps(light: &ColumnLight, planned: &ColumnPlan) -> Vec<Vec<f64>> {
 #[test]
 fn no_other_times_of_the_bitmaps_are_better() {
     let part = Part::cap(60, 250.0, 200.0);
-    let light = ColumnLight::new(zhao(23, 60, Tracing::Exact));
+    let light = GlassLight::new(zhao(23, 60, Tracing::Exact));
     for bitmaps in [2, 5, 12] {
         // Steps so fine that they do not count.
         let fine = lamp_planning::column::ColumnOptions {
             step_s: 1e-7,
-            ..options(Objective::Dose, bitmaps)
+            ..options(ColumnObjective::Dose, bitmaps)
         };
         let planned = plan(&light, &part.map, pegda(), &fine).unwrap();
         let columns = of_bitmaps(&light, &planned);
@@ -87,17 +89,17 @@ fn no_other_times_of_the_bitmaps_are_better() {
 #[test]
 fn any_number_of_threads_writes_the_same_bitmaps() {
     let part = Part::builtin("sphere", 300);
-    let with = |threads: usize, objective: Objective| {
+    let with = |threads: usize, objective: ColumnObjective| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let setup: Setup = zhao(151, 300, Tracing::Exact);
         let planned = pool.install(|| {
-            plan(&ColumnLight::new(setup), &part.map, pegda(), &options(objective, 25)).unwrap()
+            plan(&GlassLight::new(setup), &part.map, pegda(), &options(objective, 25)).unwrap()
         });
         let images: Vec<_> =
             planned.bitmaps.into_iter().map(|bitmap| (bitmap.steps, bitmap.image)).collect();
         (images, planned.best.seconds)
     };
-    for objective in [Objective::Dose, Objective::Height] {
+    for objective in [ColumnObjective::Dose, ColumnObjective::Height] {
         let one = with(1, objective);
         assert!(one == with(2, objective) && one == with(3, objective), "{objective:?}");
     }

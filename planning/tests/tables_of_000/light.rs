@@ -1,11 +1,11 @@
 //! The light of mirrors: 000's rays counted one by one, and exact light from its integral.
 
-use lamp_planning::column::{ColumnLight, Setup, Tracing};
+use lamp_planning::column::{GlassLight, Setup, Tracing};
 
 use crate::zhao::{LIT, PITCH_UM, RAYS, setup, zhao};
 
 /// Light of a mirror on all column voxels.
-fn light_of(light: &ColumnLight, mirror: usize) -> Vec<f64> {
+fn light_of(light: &GlassLight, mirror: usize) -> Vec<f64> {
     let count = light.setup().mirrors.iter().product();
     let on: Vec<_> = (0..count).map(|other| f64::from(u8::from(other == mirror))).collect();
     light.doses(&on)
@@ -46,7 +46,7 @@ fn assert_near(found: &[f64], wanted: &[f64], tolerance: f64) {
 fn rays_are_those_that_are_counted_one_by_one() {
     for (mirrors, voxels, pitch, cone) in [(5, 13, PITCH_UM, 12.0), (7, 8, 11.85, 5.0)] {
         let setup = setup(mirrors, voxels, pitch, cone, RAYS);
-        let light = ColumnLight::new(setup.clone());
+        let light = GlassLight::new(setup.clone());
         for mirror in [0, mirrors / 2, mirrors * mirrors / 2, mirrors * mirrors - 2] {
             let counted = counted(&setup, mirror, cone, [9, 15]);
             assert_near(&light_of(&light, mirror), &counted, 1e-12);
@@ -57,7 +57,7 @@ fn rays_are_those_that_are_counted_one_by_one() {
 #[test]
 fn a_mirror_near_the_middle_has_these_rays() {
     // Worked out apart from this code: rays an axis on the voxels from 147.
-    let light = ColumnLight::new(zhao(151, 300, RAYS));
+    let light = GlassLight::new(zhao(151, 300, RAYS));
     let rays = [4.0, 21.0, 42.0, 43.0, 21.0, 4.0];
     let found = light_of(&light, 75 * 151 + 75);
     for (row, of_row) in rays.iter().enumerate() {
@@ -74,7 +74,7 @@ fn a_mirror_near_the_middle_has_these_rays() {
 fn exact_light_is_the_limit_of_many_rays() {
     let (exact, cone) = (zhao(3, 13, Tracing::Exact), 12.0);
     let many = Tracing::Rays { points: 3000, directions: 3001 };
-    let [exact, many] = [exact, zhao(3, 13, many)].map(ColumnLight::new);
+    let [exact, many] = [exact, zhao(3, 13, many)].map(GlassLight::new);
     for mirror in 0..9 {
         assert_near(&light_of(&exact, mirror), &light_of(&many, mirror), 2e-4);
     }
@@ -99,7 +99,7 @@ fn exact_light_is_the_limit_of_many_rays() {
 #[test]
 fn all_light_of_a_mirror_arrives() {
     for tracing in [RAYS, Tracing::Exact] {
-        let light = ColumnLight::new(setup(9, 40, 11.85, 12.0, tracing));
+        let light = GlassLight::new(setup(9, 40, 11.85, 12.0, tracing));
         let white = light.setup().irradiance * (11.85_f64 / 10.0).powi(2);
         for mirror in 0..81 {
             let all: f64 = light_of(&light, mirror).iter().sum();
@@ -111,7 +111,7 @@ fn all_light_of_a_mirror_arrives() {
 #[test]
 fn a_white_field_is_as_uneven_as_000_says() {
     // 5.2.2: 0.305e-3 of 7.721e-3 mW/cm2, on the part of 350 x 350 voxels.
-    let light = ColumnLight::new(zhao(151, 350, RAYS));
+    let light = GlassLight::new(zhao(151, 350, RAYS));
     let field = light.doses(&vec![1.0; 151 * 151]);
     let mean = field.iter().sum::<f64>() / field.len() as f64;
     let spread = crate::zhao::rms(field.iter().map(|light| light - mean));
@@ -124,7 +124,7 @@ fn a_white_field_is_as_uneven_as_000_says() {
 fn edge_voxels_are_dark_until_there_are_six_more_mirrors() {
     // 4.3.1.2: 161 mirrors on 200 pixels, then 167.
     let dark = |mirrors: usize| {
-        let light = ColumnLight::new(setup(mirrors, 200, 11.85, 5.0, RAYS));
+        let light = GlassLight::new(setup(mirrors, 200, 11.85, 5.0, RAYS));
         let field = light.doses(&vec![1.0; mirrors * mirrors]);
         let middle = &field[100 * 200..][..200];
         let [from_left, from_right] = [

@@ -2,7 +2,7 @@
 //!
 //! Numbers that are held closer than the printed ones were worked out apart from this code.
 
-use lamp_planning::column::{ColumnLight, Measures, Objective, Setup, Tracing, plan};
+use lamp_planning::column::{ColumnObjective, GlassLight, Measures, Setup, Tracing, plan};
 use lamp_planning::projector::Projector;
 use lamp_stack::Catalogued;
 
@@ -50,7 +50,7 @@ fn appendix_a_gives_the_dose_for_450_um() {
 }
 
 /// Doses of the times in so many clusters, and RMS(T - Bt) over all mirrors.
-fn in_clusters(light: &ColumnLight, seconds: &[f64], clusters: usize) -> (Vec<f64>, f64) {
+fn in_clusters(light: &GlassLight, seconds: &[f64], clusters: usize) -> (Vec<f64>, f64) {
     let bitmaps = seeds_k_means(seconds, clusters);
     let apart = rms(seconds.iter().zip(&bitmaps).map(|(time, shown)| time - shown));
     (light.doses(&bitmaps), apart)
@@ -75,7 +75,7 @@ const TABLE_4_3: [[f64; 6]; 12] = [
 #[test]
 fn table_4_3_comes_out() {
     let part = Part::builtin("sphere", 300);
-    let light = ColumnLight::new(zhao(151, 300, RAYS));
+    let light = GlassLight::new(zhao(151, 300, RAYS));
     let times = part.times(&light);
     assert_within("error", times.error, 31232.8738, 1e-4);
     for [clusters, apart, dose, relative, roughness, height] in TABLE_4_3 {
@@ -92,7 +92,7 @@ fn table_4_3_comes_out() {
 #[test]
 fn table_4_3_at_25_bitmaps_has_these_digits() {
     let part = Part::builtin("sphere", 300);
-    let light = ColumnLight::new(zhao(151, 300, RAYS));
+    let light = GlassLight::new(zhao(151, 300, RAYS));
     let (doses, apart) = in_clusters(&light, &part.times(&light).seconds, 25);
     let found = part.measures(&doses);
     assert_within("RMS(T - Bt)", apart, 0.898, 0.2);
@@ -106,7 +106,7 @@ fn table_4_3_at_25_bitmaps_has_these_digits() {
 fn equation_4_11_drops_what_appendix_c_keeps() {
     // It lights a mirror only from the mean of its cluster on: the shorter half stays behind.
     let part = Part::builtin("sphere", 300);
-    let light = ColumnLight::new(zhao(151, 300, RAYS));
+    let light = GlassLight::new(zhao(151, 300, RAYS));
     let seconds = part.times(&light).seconds;
     let bitmaps = seeds_k_means(&seconds, 5);
     let mut means = bitmaps.clone();
@@ -123,20 +123,20 @@ fn equation_4_11_drops_what_appendix_c_keeps() {
 #[test]
 fn table_4_4_comes_out() {
     let part = Part::builtin("small-sphere", 200);
-    let light = ColumnLight::new(zhao(101, 200, RAYS));
-    let of = |objective: Objective| {
+    let light = GlassLight::new(zhao(101, 200, RAYS));
+    let of = |objective: ColumnObjective| {
         let planned = plan(&light, &part.map, pegda(), &options(objective, 25)).unwrap();
         assert!(planned.best.relative_gap() <= 1e-6, "{:e}", planned.best.relative_gap());
         let (doses, _) = in_clusters(&light, &planned.best.seconds, 25);
         (part.measures(&doses), planned.best.error)
     };
-    let (by_height, error) = of(Objective::Height);
+    let (by_height, error) = of(ColumnObjective::Height);
     // Heights grow with doses: D_pL / E_c um for each mJ/cm2.
     assert_within("error", error, 6846.395 * (302.8253_f64 / 11.593).powi(2), 1e-3);
     assert_within("E by z", by_height.dose_rms, 1.863, 12.0);
     assert_within("Ra by z", by_height.ra_um, 12.115, 12.0);
     assert_within("RMS by z", by_height.rms_um, 15.228, 12.0);
-    let (by_dose, error) = of(Objective::Dose);
+    let (by_dose, error) = of(ColumnObjective::Dose);
     assert_within("error", error, 17579.5266, 1e-4);
     assert_within("E by E", by_dose.dose_rms, 0.749, 30.0);
     assert_within("Ra by E", by_dose.ra_um, 12.215, 12.0);
@@ -147,7 +147,7 @@ fn table_4_4_comes_out() {
 fn cases_1_to_3_come_out() {
     let of = |name: &str, voxels: usize, error: f64| -> Measures {
         let part = Part::builtin(name, voxels);
-        let light = ColumnLight::new(zhao(151, voxels, RAYS));
+        let light = GlassLight::new(zhao(151, voxels, RAYS));
         let times = part.times(&light);
         assert_within(name, times.error, error, 1e-3);
         part.measures(&in_clusters(&light, &times.seconds, 25).0)
@@ -165,7 +165,7 @@ fn cases_1_to_3_come_out() {
 #[test]
 fn misalignment_and_light_cost_what_was_worked_out() {
     let part = Part::builtin("sphere", 300);
-    let light = ColumnLight::new(zhao(151, 300, Tracing::Exact));
+    let light = GlassLight::new(zhao(151, 300, Tracing::Exact));
     let seconds = part.times(&light).seconds;
     for (shift, relative, roughness) in
         [([1.0, 0.0], 4.644, 7.388), ([0.0, -3.0], 4.747, 7.412), ([5.0, 5.0], 5.225, 7.478)]
@@ -182,7 +182,7 @@ fn misalignment_and_light_cost_what_was_worked_out() {
 fn four_bitmaps_beside_none_are_five_of_000() {
     // Dynamic programming over all times; the shortest of five clusters has a mean of 0.14 s.
     let part = Part::builtin("sphere", 300);
-    let light = ColumnLight::new(zhao(151, 300, Tracing::Exact));
-    let planned = plan(&light, &part.map, pegda(), &options(Objective::Dose, 4)).unwrap();
+    let light = GlassLight::new(zhao(151, 300, Tracing::Exact));
+    let planned = plan(&light, &part.map, pegda(), &options(ColumnObjective::Dose, 4)).unwrap();
     assert_within("Ra", part.measures(&planned.doses).ra_um, 18.6, 0.5);
 }

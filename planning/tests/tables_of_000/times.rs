@@ -2,13 +2,13 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, ZeroConeT};
-use lamp_planning::column::{ColumnLight, Setup, Stop, Tracing, nearest_times};
+use lamp_planning::column::{GlassLight, Setup, Stop, Tracing, nearest_times};
 use proptest::prelude::*;
 
 use crate::zhao::{Part, RAYS, setup, zhao};
 
 /// The light of each mirror.
-fn of_mirrors(light: &ColumnLight) -> Vec<Vec<f64>> {
+fn of_mirrors(light: &GlassLight) -> Vec<Vec<f64>> {
     let mirrors = light.setup().mirrors.iter().product();
     let on = |mirror: usize| (0..mirrors).map(move |m| f64::from(u8::from(m == mirror)));
     (0..mirrors).map(|mirror| light.doses(&on(mirror).collect::<Vec<_>>())).collect()
@@ -48,8 +48,8 @@ pub(crate) fn least_error(light: &[Vec<f64>], wanted: &[f64], high: f64) -> f64 
     solver.solution.obj_val
 }
 
-fn planned(setup: Setup, wanted: &[f64], high: f64) -> (ColumnLight, Vec<f64>, f64) {
-    let light = ColumnLight::new(setup);
+fn planned(setup: Setup, wanted: &[f64], high: f64) -> (GlassLight, Vec<f64>, f64) {
+    let light = GlassLight::new(setup);
     let stop = Stop { gap: 1e-8, steps: 100_000 };
     let times = nearest_times(&light, wanted, high, &[0.0], stop);
     let missing = light.doses(&times.seconds).into_iter().zip(wanted).map(|(e, e0)| e - e0);

@@ -2,8 +2,8 @@
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{
-    ColumnLight, ColumnOptions, HeightCurve, Measures, Objective, Setup, Spread, Stop, Times,
-    Tracing, nearest_times,
+    ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread, MirrorTimes,
+    Setup, Stop, Tracing, nearest_times,
 };
 use lamp_planning::target::{Grid, HeightMap, Target};
 use lamp_stack::{Catalogued, Length};
@@ -38,7 +38,7 @@ pub(crate) fn setup(
         display: [mirrors; 2],
         pitch_um,
         lit_um: LIT * pitch_um,
-        spread: Spread::Cone(cone_um),
+        spread: MirrorSpread::Cone(cone_um),
         tracing,
         irradiance: rays * RAY_MW / (pitch_um * 1e-4).powi(2),
         flat_field: Vec::new(),
@@ -51,7 +51,7 @@ pub(crate) fn pegda() -> HeightCurve {
     HeightCurve::of(&Material::builtin("pegda-mw700").unwrap()).unwrap()
 }
 
-pub(crate) fn options(objective: Objective, bitmaps: usize) -> ColumnOptions {
+pub(crate) fn options(objective: ColumnObjective, bitmaps: usize) -> ColumnOptions {
     ColumnOptions {
         objective,
         bitmaps,
@@ -93,7 +93,7 @@ impl Part {
     }
 
     /// Finds the times that 000 optimises E for.
-    pub(crate) fn times(&self, light: &ColumnLight) -> Times {
+    pub(crate) fn times(&self, light: &GlassLight) -> MirrorTimes {
         let times = nearest_times(light, &self.doses, LONGEST_S, &[0.0], CERTAIN);
         assert!(times.relative_gap() <= CERTAIN.gap, "{:e}", times.relative_gap());
         assert!(times.seconds.iter().all(|&time| time < LONGEST_S));

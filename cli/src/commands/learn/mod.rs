@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use lamp_planning::SampleHeight;
-use lamp_planning::learn::{Job, Law, Measured, learn};
+use lamp_planning::learn::{Job, Law, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
 
 use crate::catalogue::read_text;
@@ -216,10 +216,10 @@ fn open(folder: &Path, progress: &Progress) -> Result<Job, Exit> {
 }
 
 /// Reads what was measured, and its text.
-fn read_measured(path: &Path) -> Result<(Measured, String), Exit> {
+fn read_measured(path: &Path) -> Result<(PrintMeasurements, String), Exit> {
     let read = || -> anyhow::Result<_> {
         let text = read_text(path, MAX_TABLE, "a table of measurements")?;
-        Ok((Measured::parse(&text)?, text))
+        Ok((PrintMeasurements::parse(&text)?, text))
     };
     Ok(read().with_context(|| input_name(path))?)
 }

@@ -1,7 +1,7 @@
 //! Plots the errors and the times of a job's prints (004 figures 3.7 and 3.8).
 
-use lamp_planning::learn::{Job, JobPrint, Measured};
-use lamp_planning::speed::PartLayer;
+use lamp_planning::learn::{Job, JobPrint, PrintMeasurements};
+use lamp_planning::speed::TimedLayer;
 
 use super::report::{PrintError, error_of};
 use crate::plots::{Plot, Series, by_layer, curve, linear};
@@ -62,9 +62,9 @@ fn course(job: &Job) -> Vec<Plot> {
 }
 
 fn areas(job: &Job, number: usize, print: &JobPrint) -> Option<Series> {
-    let (Measured::Areas(rows), _) = print.measured.as_ref()? else { return None };
+    let (PrintMeasurements::Areas(rows), _) = print.measured.as_ref()? else { return None };
     let layers = job.part.layers().iter().rev();
-    let place = |layer: &PartLayer| {
+    let place = |layer: &TimedLayer| {
         let row = rows.iter().find(|row| row.layer == layer.index)?;
         Some((layer.z.mm(), row.under - row.over))
     };
@@ -72,7 +72,7 @@ fn areas(job: &Job, number: usize, print: &JobPrint) -> Option<Series> {
 }
 
 fn heights(number: usize, print: &JobPrint) -> Option<Series> {
-    let (Measured::Heights(rows), _) = print.measured.as_ref()? else { return None };
+    let (PrintMeasurements::Heights(rows), _) = print.measured.as_ref()? else { return None };
     let mut points: Vec<_> =
         rows.iter().map(|row| (row.z_mm, 1000.0 * (row.measured_mm - row.z_mm))).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));

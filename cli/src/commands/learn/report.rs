@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_planning::learn::{Job, JobPrint, Learned, Measured};
+use lamp_planning::learn::{Job, JobPrint, Learned, PrintMeasurements};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
@@ -111,10 +111,10 @@ impl PrintError {
 /// Returns the error of a print that was measured.
 pub(super) fn error_of(print: &JobPrint) -> Option<PrintError> {
     Some(match &print.measured.as_ref()?.0 {
-        Measured::Areas(rows) => {
+        PrintMeasurements::Areas(rows) => {
             PrintError::Pixels(rows.iter().map(|row| row.over + row.under).sum())
         }
-        Measured::Heights(rows) => {
+        PrintMeasurements::Heights(rows) => {
             let away: Vec<_> =
                 rows.iter().map(|row| 1000.0 * (row.measured_mm - row.z_mm)).collect();
             PrintError::Micrometres(rms(&away)?)

@@ -10,7 +10,7 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::ShownBitmap;
 use lamp_planning::column::{
-    ColumnLight, ColumnOptions, ColumnPlan, HeightCurve, Objective, Setup, Stop, Tracing, plan,
+    ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
 };
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{GrayPicture, HeightMap, Target};
@@ -64,11 +64,11 @@ pub(super) struct ColumnCureArgs {
     gray: bool,
 
     /// What is to be nearest to the target's
-    #[arg(long, default_value = "dose", value_parser = one_of_described::<Objective>(&[
+    #[arg(long, default_value = "dose", value_parser = one_of_described::<ColumnObjective>(&[
         "Doses",
         "Cured heights: light that cures nothing costs nothing",
     ]))]
-    optimise: Objective,
+    optimise: ColumnObjective,
 
     /// Longest time of a mirror [default: four times what a wide white field takes for the highest
     /// column]
@@ -181,7 +181,7 @@ impl ColumnCureArgs {
         &self,
         projector: &Projector,
         target: &GivenTarget,
-    ) -> Result<(HeightMap, ColumnLight), Exit> {
+    ) -> Result<(HeightMap, GlassLight), Exit> {
         let voxel = self.voxel.or(projector.voxel.as_ref().map(|voxel| voxel.value));
         let Some(voxel) = voxel else {
             let name = self.projector.display();
@@ -198,7 +198,7 @@ impl ColumnCureArgs {
         if let Some(path) = &self.flat_field {
             setup.flat_field = flat_field(path, &setup)?;
         }
-        Ok((map, ColumnLight::new(setup)))
+        Ok((map, GlassLight::new(setup)))
     }
 
     fn options(

@@ -1,7 +1,7 @@
 //! What a plan of column cure reaches, in lines and as JSON.
 
 use lamp_planning::column::{
-    ColumnLight, ColumnOptions, ColumnPlan, HeightCurve, Measures, Objective, Tracing,
+    ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Measures, Tracing,
 };
 use lamp_planning::projector::Projector;
 use lamp_planning::target::HeightMap;
@@ -15,7 +15,7 @@ pub(super) struct Reported<'a> {
     pub(super) projector: &'a Projector,
     pub(super) material: &'a str,
     pub(super) options: &'a ColumnOptions,
-    pub(super) light: &'a ColumnLight,
+    pub(super) light: &'a GlassLight,
     pub(super) map: &'a HeightMap,
     pub(super) curve: HeightCurve,
     pub(super) plan: &'a ColumnPlan,
@@ -105,8 +105,8 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
     let times_ms: Vec<_> =
         plan.bitmaps.iter().map(|bitmap| bitmap.steps as f64 * step_ms).collect();
     let unit = match options.objective {
-        Objective::Dose => "(mJ/cm2)2",
-        Objective::Height => "um2",
+        ColumnObjective::Dose => "(mJ/cm2)2",
+        ColumnObjective::Height => "um2",
     };
     let lights = [1.0 - LIGHT, 1.0 + LIGHT];
     json!({

@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_planning::ShownBitmap;
-use lamp_planning::ecpl::{Exposure, Method, Planned, Profile, Setting, plan};
+use lamp_planning::ecpl::{KineticSetting, Method, Profile, RingExposure, RingPlan, plan};
 use lamp_planning::projector::Projector;
 use lamp_planning::target::Grid;
 use serde_json::json;
@@ -74,7 +74,7 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let round = target.profile()?;
     let planned = plan(setting, round.radius_um(), |r| round.height_um(r), args.method)
         .map_err(|error| failed(error).at(args.target.target.display().to_string()))?;
-    let Planned { simulation, wanted, exposures, cured } = &planned;
+    let RingPlan { simulation, wanted, exposures, cured } = &planned;
     let reported = Cured { simulation, exposures, cured, wanted: Some(wanted) };
     let mut report = json!({
         "schema": "lamp-plan-ecpl-1",
@@ -107,13 +107,17 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
 }
 
 /// Returns what a projector exposes a resin to.
-pub(super) fn setting_of(projector: &Projector, material: &Material) -> Result<Setting, Exit> {
+pub(super) fn setting_of(
+    projector: &Projector,
+    material: &Material,
+) -> Result<KineticSetting, Exit> {
     let Some(kinetics) = material.kinetics().map_err(anyhow::Error::new)? else {
         let name = &material.name;
         let text = format!("{name} does not tell the rates of its reaction: add [kinetics]");
         return Err(Exit::Failed(anyhow!(text)));
     };
-    Setting::of(projector, kinetics).map_err(|error| failed(error).at(projector.name.clone()))
+    KineticSetting::of(projector, kinetics)
+        .map_err(|error| failed(error).at(projector.name.clone()))
 }
 
 /// Columns of maps are so wide, in micrometres, or wider for large parts.
@@ -132,9 +136,9 @@ pub(super) fn failed(error: impl std::error::Error + Send + Sync + 'static) -> E
     Exit::Failed(error.into())
 }
 
-fn bitmaps(projector: &Projector, exposures: &[Exposure]) -> Vec<ShownBitmap> {
+fn bitmaps(projector: &Projector, exposures: &[RingExposure]) -> Vec<ShownBitmap> {
     let display = &projector.display;
-    let bitmap = |exposure: &Exposure| ShownBitmap {
+    let bitmap = |exposure: &RingExposure| ShownBitmap {
         image: exposure.drawn(display.columns, display.rows).into(),
         time: exposure.time,
     };

@@ -1,14 +1,14 @@
 //! What is told of what bitmaps cure by kinetics.
 
-use lamp_planning::ecpl::{Exposure, Profile, Simulation, Wanted};
+use lamp_planning::ecpl::{Profile, RingExposure, RingSimulation, WantedProfile};
 use serde_json::{Map, Value, json};
 
 /// What bitmaps cure, and what is wanted if that is known.
 pub(super) struct Cured<'a> {
-    pub(super) simulation: &'a Simulation,
-    pub(super) exposures: &'a [Exposure],
+    pub(super) simulation: &'a RingSimulation,
+    pub(super) exposures: &'a [RingExposure],
     pub(super) cured: &'a Profile,
-    pub(super) wanted: Option<&'a Wanted>,
+    pub(super) wanted: Option<&'a WantedProfile>,
 }
 
 /// How far a part may lie aside, in micrometres.
@@ -78,7 +78,7 @@ pub(super) fn lines_of(of: &Cured<'_>) -> Vec<String> {
 
 fn bitmaps(of: &Cured<'_>) -> Vec<Value> {
     let grown = of.simulation.growth(of.exposures);
-    let bitmap = |(exposure, after): (&Exposure, &Profile)| {
+    let bitmap = |(exposure, after): (&RingExposure, &Profile)| {
         let rings: Vec<_> = exposure.rings.iter().map(|ring| [ring.start, ring.end]).collect();
         json!({
             "rings": rings,
@@ -98,7 +98,7 @@ fn shape(cured: &Profile) -> Value {
     })
 }
 
-fn measures(wanted: &Wanted, cured: &Profile) -> Value {
+fn measures(wanted: &WantedProfile, cured: &Profile) -> Value {
     let [low, high] = wanted.extremes_um(cured);
     json!({
         "rms_um": rounded(wanted.rms_um(cured)),
@@ -116,12 +116,12 @@ fn other_light(of: &Cured<'_>, times: f64) -> Value {
 }
 
 /// All bitmaps come from one display: what is aside lies so as a whole.
-fn aside(wanted: &Wanted, cured: &Profile) -> Value {
+fn aside(wanted: &WantedProfile, cured: &Profile) -> Value {
     let one = |um| json!({ "aside_um": um, "rms_um": rounded(wanted.rms_aside_um(cured, um)) });
     Value::Array(ASIDE_UM.map(one).to_vec())
 }
 
-fn seconds(exposures: &[Exposure]) -> f64 {
+fn seconds(exposures: &[RingExposure]) -> f64 {
     exposures.iter().map(|exposure| exposure.time.ms()).sum::<f64>() / 1000.0
 }
 

@@ -13,7 +13,7 @@ pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {
 
 /// The layers' heights in millimetres, and numbers of theirs.
 fn over_z(planned: &Planned<'_>, number: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
-    let layer = |(at, layer): (usize, &lamp_planning::speed::PartLayer)| {
+    let layer = |(at, layer): (usize, &lamp_planning::speed::TimedLayer)| {
         [layer.z.mm(), layer.z.mm() + layer.thickness.mm()].map(|z| (z, number(at)))
     };
     planned.part.layers().iter().enumerate().rev().flat_map(layer).collect()
@@ -102,7 +102,7 @@ fn light(planned: &Planned<'_>) -> Plot {
 fn search(planned: &Planned<'_>) -> Plot {
     const LEAST: f64 = 1e-3;
     let plan = planned.plan;
-    let of = |name: &str, error: fn(&lamp_planning::speed::Stage) -> f64| {
+    let of = |name: &str, error: fn(&lamp_planning::speed::SearchStage) -> f64| {
         let stage = |(number, stage): (usize, &_)| {
             ((number + 1) as f64, (100.0 * error(stage) / plan.single_error.max(1e-9)).max(LEAST))
         };

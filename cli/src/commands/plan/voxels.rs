@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_planning::voxels::{Objective, Options, Outcome, PlanError, PlannedStack, Sources, plan};
+use lamp_planning::voxels::{
+    Options, Outcome, PlannedStack, Sources, VoxelObjective, VoxelPlanError, plan,
+};
 use lamp_stack::Layer;
 
 use super::layer_map::{LayerMap, MapOptions};
@@ -45,11 +47,11 @@ pub(super) struct VoxelsArgs {
     planning: PlanningOptions,
 
     /// What the plan makes least
-    #[arg(long, default_value = "wrong", value_parser = one_of_described::<Objective>(&[
+    #[arg(long, default_value = "wrong", value_parser = one_of_described::<VoxelObjective>(&[
         "How far doses lie on the wrong side of the critical one",
         "The dose next to the part, while all that white light cures stays cured",
     ]))]
-    objective: Objective,
+    objective: VoxelObjective,
 
     /// Pixels whose light is chosen: those of the part (lit), and 3 around it (grow:3px), or 1
     /// along its outlines only, while others stay white (shell:1px)
@@ -267,7 +269,7 @@ impl VoxelsArgs {
 
     /// Names the input in errors about its layers.
     fn at_input(&self, error: Exit) -> Exit {
-        let is_of_layers = error.cause::<PlanError>().is_some();
+        let is_of_layers = error.cause::<VoxelPlanError>().is_some();
         if is_of_layers { error.at(input_name(&self.input.stack)) } else { error }
     }
 

@@ -1,6 +1,6 @@
 //! Plots what a plan of gray levels reaches.
 
-use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, Tally};
+use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
 
 use super::voxels_report::Planned;
 use crate::plots::{Plot, PlotAxis, Series, curve, linear};
@@ -76,7 +76,7 @@ fn by_dose(outcome: &Outcome) -> Plot {
 
 /// Voxels that are cured wrongly at a little less and more light.
 fn by_light(outcome: &Outcome) -> Plot {
-    let of = |name: &str, tally: &Tally, count: fn(Counts) -> u64| {
+    let of = |name: &str, tally: &VoxelTally, count: fn(Counts) -> u64| {
         let all = [(95.0, tally.dimmer), (100.0, tally.counts), (105.0, tally.brighter)];
         let points: Vec<_> = all.map(|(light, counts)| (light, drawn(count(counts)))).into();
         Series { points: points.clone(), ..curve(name, points) }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use lamp_planning::voxels::{Counts, DoseHistogram, LayerOutcome, Objective, Outcome, Tally};
+use lamp_planning::voxels::{
+    Counts, DoseHistogram, LayerOutcome, Outcome, VoxelObjective, VoxelTally,
+};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
@@ -11,7 +13,7 @@ use crate::json_report::JsonReport;
 /// A plan, and what it was for.
 pub(super) struct Planned<'a> {
     pub(super) material: &'a str,
-    pub(super) objective: Objective,
+    pub(super) objective: VoxelObjective,
     pub(super) margin: f64,
     pub(super) outcome: &'a Outcome,
 }
@@ -119,7 +121,7 @@ pub(super) fn write_report(planned: &Planned<'_>, path: &Path) -> Result<(), Exi
         .write(path)
 }
 
-fn tally(tally: &Tally) -> Value {
+fn tally(tally: &VoxelTally) -> Value {
     let mut value = counts(tally.counts);
     value["cost"] = tally.cost.into();
     value["at_less_light"] = counts(tally.dimmer);

@@ -1,7 +1,7 @@
 //! What bitmaps cure where doses add up, column by column (000).
 
 use lamp_planning::MirrorSeconds;
-use lamp_planning::column::{ColumnLight, HeightCurve, Measures, Setup, Tracing};
+use lamp_planning::column::{GlassLight, HeightCurve, Measures, Setup, Tracing};
 use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
 use serde_json::{Map, json};
@@ -24,7 +24,7 @@ pub(super) fn cured(shown: &Shown, tracing: Tracing) -> Result<Outcome, Exit> {
         None => None,
     };
     let setup = Setup { mirrors, display: mirrors, ..Setup::of(projector, &grid, tracing) };
-    let doses = ColumnLight::new(setup).doses(&seconds);
+    let doses = GlassLight::new(setup).doses(&seconds);
     let heights_um = doses.iter().map(|&dose| curve.height_um(dose)).collect();
     let cured = HeightMap { grid, heights_um };
     let volume_mm3 = volume_mm3(&cured);

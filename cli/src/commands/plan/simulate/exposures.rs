@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::ShownBitmap;
-use lamp_planning::ecpl::Exposure;
+use lamp_planning::ecpl::RingExposure;
 use lamp_planning::projector::Projector;
 
 use crate::exit::Exit;
@@ -41,7 +41,7 @@ impl Exposures {
     fn of_text(text: &str, projector: &Projector) -> Result<Self, Exit> {
         let [columns, rows] = [projector.display.columns, projector.display.rows];
         let bitmap = |text: &str| {
-            let exposure: Exposure =
+            let exposure: RingExposure =
                 text.parse().map_err(|error| Exit::Usage(anyhow::Error::new(error)))?;
             let (reach, most) = (exposure.reach(), columns.min(rows) / 2);
             if reach > most {

@@ -2,7 +2,7 @@
 
 use anyhow::anyhow;
 use lamp_planning::ShownBitmap;
-use lamp_planning::ecpl::{Exposure, Simulation, Wanted};
+use lamp_planning::ecpl::{RingExposure, RingSimulation, WantedProfile};
 use lamp_planning::target::Round;
 use lamp_stack::Image;
 
@@ -23,12 +23,12 @@ pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
         None => None,
     };
     let radius_um = round.as_ref().map_or(0.0, Round::radius_um);
-    let simulation = Simulation::of_plan(setting, &bitmaps, radius_um)
+    let simulation = RingSimulation::of_plan(setting, &bitmaps, radius_um)
         .map_err(|error| failed(error).at(place()))?;
     let cured = simulation.cure(&bitmaps);
     let cells = simulation.reaction().cells();
     let grid = grid_of(&cured, radius_um);
-    let wanted = round.as_ref().map(|round| Wanted::new(cells, |um| round.height_um(um)));
+    let wanted = round.as_ref().map(|round| WantedProfile::new(cells, |um| round.height_um(um)));
     let reported = Cured {
         simulation: &simulation,
         exposures: &bitmaps,
@@ -43,10 +43,10 @@ pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
     })
 }
 
-fn exposure((of, bitmap): (usize, &ShownBitmap)) -> Result<Exposure, Exit> {
+fn exposure((of, bitmap): (usize, &ShownBitmap)) -> Result<RingExposure, Exit> {
     let Image::Mask(mask) = &bitmap.image else {
         let text = format!("bitmap {of} has gray levels: kinetics take black and white ones");
         return Err(Exit::Failed(anyhow!(text)));
     };
-    Exposure::shown(mask, bitmap.time).map_err(|error| failed(error).at(format!("bitmap {of}")))
+    RingExposure::shown(mask, bitmap.time).map_err(|error| failed(error).at(format!("bitmap {of}")))
 }
