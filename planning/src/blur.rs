@@ -84,6 +84,7 @@ impl<T: Real> Blur<T> {
     pub fn new(sigma: f64) -> Self {
         let tap = |distance: usize| {
             let distance = distance as f64;
+            // Of σ = 0, 0/0 would be no number.
             if distance == 0.0 { 1.0 } else { (-distance * distance / (2.0 * sigma * sigma)).exp() }
         };
         // Light that spreads wider is refused: this only bounds the memory until then.
@@ -104,6 +105,7 @@ impl<T: Real> Blur<T> {
     /// Returns what a wide white image has at each pixel: the sum of all weights.
     pub fn sum(&self) -> f64 {
         let side: f64 = self.taps[1..].iter().map(|tap| tap.f64()).sum();
+        // 001 eq. 5 in two dimensions is a product of one along rows and one along columns.
         (2.0 * side + 1.0).powi(2)
     }
 
@@ -170,6 +172,7 @@ fn around<T: Real>(taps: &[T], from: &[T], centre: usize, step: usize) -> [T; LA
         *sum = taps[0] * at;
     }
     for (distance, &tap) in taps.iter().enumerate().skip(1) {
+        // Both sides have one weight: adding them first halves the products.
         let low = &from[centre - distance * step..][..LANES];
         let high = &from[centre + distance * step..][..LANES];
         for lane in 0..LANES {
@@ -205,6 +208,8 @@ impl<T: Real> Chunks<T> {
         let mut is_needed = vec![false; rows * across];
         for chunk in at.iter().map(|at| at / LANES) {
             let (row, column) = (chunk / across, chunk % across);
+            // Light spreads along rows first; the rows that spread into a chunk later are those
+            // within the radius.
             let near = row.saturating_sub(blur.radius())..(row + blur.radius() + 1).min(rows);
             near.for_each(|row| is_needed[row * across + column] = true);
         }

@@ -23,10 +23,12 @@ pub(crate) fn next_layer(
     let wide = own * blur.sum() as f32;
     let tiles = (0..grid.tile_count()).into_par_iter().map_init(Room::default, |room, tile| {
         let rect = grid.tile(tile);
+        // Deep inside and outside of a part all doses of a tile are one, which needs no memory.
         let from = &above.tiles[tile];
         if let (Tile::Flat(above), Some(level)) =
             (from, levels.value_in(&rect.grown(blur.radius()), 0))
         {
+            // Far from any edge, pixels have the light of a wide field.
             return Tile::Flat(above * passed + wide * light[usize::from(level)]);
         }
         let spread = room.spread(&rect, blur, |view, stride, light_of, room| {

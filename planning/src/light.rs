@@ -132,6 +132,8 @@ impl Light {
 
     /// Returns what reaches each layer. Layers count from the light: the last page comes first.
     pub fn layers(&self, dpi: Dpi, layers: &[LayerTime]) -> Vec<LayerLight> {
+        // 001 gives the light at the centre of one pixel's Gaussian; radiometers read a wide field,
+        // where the Gaussians of all pixels add up.
         let weight = match self.intensity_of {
             IntensityOf::Field => 1.0 / Blur::<f64>::new(self.spread_pixels(dpi)).sum(),
             IntensityOf::Pixel(size) => (dpi.pitch().um() / size.um()).powi(2),
@@ -142,9 +144,11 @@ impl Light {
             let above_um = above.map_or(0.0, |above| above.thickness.um());
             let (between_um, inside_um) = match self.at {
                 SampleHeight::Top => (above_um, 0.0),
+                // Half of the layer above and half of this one lie between the two middles.
                 SampleHeight::Middle => ((above_um + own_um) / 2.0, own_um / 2.0),
                 SampleHeight::Bottom => (own_um, own_um),
             };
+            // 001 eq. 6, in units of the critical dose of eq. 13.
             let dose = (self.intensity * own.time).mj_per_cm2() / self.critical_dose.mj_per_cm2();
             LayerLight { passed: fade(between_um), own: dose * weight * fade(inside_um) }
         };
@@ -154,6 +158,7 @@ impl Light {
 
     /// Returns the light of a gray level: 0 to 1 (001 eq. 10, whose factor 3 is in the intensity).
     pub fn of_level(&self, level: u8) -> f64 {
+        // A power of zero light is zero, and of white one, whatever γ: black and white stay.
         (f64::from(level) / 255.0).powf(self.gamma)
     }
 

@@ -53,6 +53,7 @@ impl RegionDoses {
 
     /// Returns the light that has spread in the rectangle and around it, and how wide that is.
     fn spread(&self, image: &Image, light_of: impl Fn(u8) -> f64) -> (Vec<f64>, usize) {
+        // Pixels outside the rectangle shine into it from as far as light spreads.
         let reach = self.blur.radius() as i64;
         let [left, top] = [self.columns.start, self.rows.start].map(|at| i64::from(at) - reach);
         let width = (self.columns.len() + 2 * reach as usize).next_multiple_of(LANES);

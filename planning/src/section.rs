@@ -96,6 +96,7 @@ impl DoseSection {
                 for (row, light) in (0..image.height()).zip(&mut light) {
                     for (start, end, level) in image.runs(row) {
                         let columns = start.max(first)..end.min(end_of_band);
+                        // A run is one level: its weights are added before they are multiplied.
                         let taps = columns.map(|column| taps[column.abs_diff(at) as usize]);
                         *light += taps.sum::<f64>() * light_of(level);
                     }
@@ -131,6 +132,7 @@ impl DoseSection {
         let mut doses = vec![0.0; pixels as usize];
         let lights = self.light.layers(self.dpi, &from_top);
         for ((number, layer), light) in self.layers.iter().enumerate().rev().zip(lights) {
+            // 001 eq. 5 from the light down: the light that all layers above have left fades together.
             doses.iter_mut().for_each(|dose| *dose *= light.passed);
             let mut start = 0;
             for &(end, spread) in &layer.spread {
@@ -173,6 +175,8 @@ impl DoseSection {
             let top_um = bottom.um() + thick_um;
             cured.resize(doses.len(), SolidHeights::new());
             for (solid, dose) in cured.iter_mut().zip(doses).filter(|(_, dose)| **dose > 1.0) {
+                // 002 eq. 30 for the sum of doses, which all fade over one depth; below the layer,
+                // the next one goes on.
                 let from = top_um - (depth_um * dose.ln()).min(thick_um);
                 add_below(solid, [from, top_um]);
             }

@@ -261,8 +261,8 @@ fn what_cannot_be_planned_is_refused() {
     assert!(matches!(refused(dim, 30.0, &cap(30.0, 20.0)), RingPlanError::TooDim { .. }));
     let dark = KineticSetting { light: watt_per_m2(0.0), ..usual };
     let why = SettingError::NotPositive("the light");
-    assert_eq!(refused(dark, 30.0, &cap(30.0, 20.0)), RingPlanError::KineticSetting(why));
+    assert_eq!(refused(dark, 30.0, &cap(30.0, 20.0)), RingPlanError::Setting(why));
     let huge = KineticSetting { chamber_um: 1e9, ..usual };
     let why = refused(huge, 30.0, &cap(30.0, 20.0));
-    assert!(matches!(why, RingPlanError::KineticSetting(SettingError::TooLarge { .. })), "{why}");
+    assert!(matches!(why, RingPlanError::Setting(SettingError::TooLarge { .. })), "{why}");
 }

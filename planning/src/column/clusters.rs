@@ -43,6 +43,7 @@ impl Sums {
         let mean = all / count as f64;
         let mut sums = [0.0; 3];
         let prefix = std::iter::once(sums).chain(times.iter().map(|&(time, count)| {
+            // Counted from the mean, squares lose no digits when large sums are subtracted.
             let (time, count) = (time as f64 - mean, count as f64);
             sums = [sums[0] + count, sums[1] + count * time, sums[2] + count * time * time];
             sums
@@ -59,6 +60,7 @@ impl Sums {
     /// Returns the sum of squares of how far times are from their mean.
     fn cost(&self, from: usize, to: usize) -> f64 {
         let [count, sum, squares] = self.between(from, to);
+        // Σ (t - mean)² = Σ t² - (Σ t)² / n.
         (squares - sum * sum / count).max(0.0)
     }
 
@@ -107,6 +109,7 @@ fn best_starts(times: &[(u64, u64)], sums: &Sums, count: usize) -> (Vec<usize>, 
     let mut off = 0.0;
     let mut best: Vec<f64> = std::iter::once(0.0)
         .chain(times.iter().map(|&(time, mirrors)| {
+            // A mirror below the first cluster is off: its error is its own time.
             off += mirrors as f64 * (time as f64).powi(2);
             off
         }))
@@ -166,6 +169,8 @@ impl Row<'_> {
         let mut low = || self.fill(end, [starts[0], at.1], best_low, start_low);
         let (best_high, start_high) = (&mut best_high[1..], &mut start_high[1..]);
         let mut high = || self.fill(middle + 1, [at.1, starts[1]], best_high, start_high);
+        // Halves of the ends need halves of the starts: the row takes n log n costs in place of n².
+        // That later ends start no earlier follows from the costs' quadrangle inequality.
         if half > SHARED {
             join(low, high);
         } else {

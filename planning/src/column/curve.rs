@@ -70,9 +70,12 @@ impl HeightCurve {
         let (critical, liquid) = (self.critical_dose(), self.model.liquid_depth().um());
         let above = dose / critical - 1.0;
         if above <= 0.0 {
+            // The slope of eq. 3.9 at the critical dose, carried on: without it no light would pull
+            // a dark column up.
             return (liquid * above, liquid / critical);
         }
         let solid = self.model.solid_depth().um();
+        // dz/dE of 000 eq. 3.9: (D_pL / E_c) / (1 + D_pL/D_pS (E/E_c - 1)).
         (self.height_um(dose), liquid / critical / (1.0 + liquid / solid * above))
     }
 }

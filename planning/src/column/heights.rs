@@ -36,10 +36,16 @@ impl HeightMisfit<'_> {
         let mut squares = Squares { wanted: Vec::new(), weights: Vec::new(), error: 0.0 };
         for (&dose, &wanted) in doses.iter().zip(self.heights_um) {
             let (height, slope) = self.curve.straight_below(dose);
+            // 000 eq. 3.9: below the critical dose nothing is cured, so that an empty column may
+            // have any such dose.
             let counts = wanted > 0.0 || height > 0.0;
             let left = if counts { height - wanted } else { 0.0 };
             squares.error += share * 0.5 * left * left;
+            // The second derivative of the curve is left out, so that no weight is negative and
+            // each step's problem stays convex.
             squares.weights.push(if counts { share * slope * slope } else { 0.0 });
+            // Gauss and Newton's square: with the slope at this dose, the height would be right
+            // there.
             squares.wanted.push(dose - left / slope);
         }
         squares
@@ -78,6 +84,8 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
         if gap <= stop.gap * value || steps >= stop.steps {
             return MirrorTimes { seconds: here.x, error: value, gap, steps };
         }
+        // A step that leaves a tenth of the gap gains no more by being exact: the squares change
+        // with it.
         let enough = (0.1 * gap).max(0.3 * stop.gap * value);
         let before = steps;
         let next = problem.search(here.x.clone(), 8, |place, step| {

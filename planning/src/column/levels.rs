@@ -61,6 +61,7 @@ pub(super) fn best_seconds(
     // From clusters, which no two bitmaps share, to bitmaps, which light all clusters above.
     let above = |numbers: &mut [f64]| {
         for k in (1..numbers.len()).rev() {
+            // 000 eq. 4.3 with nested bitmaps: a mirror of cluster k is on in the bitmaps 1 to k.
             numbers[k - 1] += numbers[k];
         }
     };
@@ -100,6 +101,7 @@ fn nonnegative(square: &Dense, pull: &[f64], max_s: f64) -> Vec<f64> {
 fn within(mut seconds: Vec<f64>, max_s: f64) -> Vec<f64> {
     let mut left = max_s;
     for seconds in &mut seconds {
+        // The first bitmaps light the most mirrors, so that the last ones are cut.
         *seconds = seconds.min(left);
         left -= *seconds;
     }
@@ -132,6 +134,8 @@ fn add_row(sums: &mut Sums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
     for column in 0..columns {
         let (left, widths) = along.row(column);
         light.clear();
+        // Light separates into a factor for each axis (`spread.rs`): of a mirror it is the product
+        // of both.
         for (mirror_row, &by) in (top..).zip(heights) {
             let start = mirror_row * width + left;
             for (mirror, &share) in (start..start + widths.len()).zip(widths) {
@@ -151,6 +155,8 @@ fn add_row(sums: &mut Sums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
         for &(cluster, share) in &light {
             sums.pull[cluster] += weight * share * wish.wanted[voxel];
             for &(other, too) in &light {
+                // A column sees few clusters, so that the sums of products cost less than a matrix
+                // of columns by clusters would.
                 sums.square[cluster][other] += weight * share * too;
             }
         }

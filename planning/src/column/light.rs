@@ -160,6 +160,7 @@ impl Setup {
         if pitch_um > mirror_um {
             return Err(GridError::Wide { pitch_um, mirror_um });
         }
+        // Light that misses the part cures resin next to it, which must be seen to be avoided.
         let margin = (Self::reach(projector).um() / pitch_um).ceil() as usize;
         let Grid { columns, rows, .. } = Grid::over(size, voxel);
         let [columns, rows] = [columns, rows].map(|count| count.saturating_add(2 * margin));
@@ -184,6 +185,7 @@ impl Setup {
         let voxels = [grid.columns, grid.rows];
         let used = |axis: usize| {
             let side = voxels[axis] as f64 * grid.pitch_um + lit_um + 2.0 * spread.reach();
+            // Mirrors that cannot reach the grid would be columns of zeros in H.
             let spare = display[axis] as f64 - (side / pitch_um).ceil() - 1.0;
             // As many to both sides, so that the middle stays.
             display[axis] - 2 * (spare / 2.0).max(0.0) as usize
@@ -228,6 +230,8 @@ pub(super) fn product([along, down]: &[Taps; 2], image: &[f64]) -> Vec<f64> {
         || vec![0.0; along.columns()],
         |line, (row, out)| {
             wide(|| {
+                // H is the product of a matrix for each axis: two passes of a few numbers in place
+                // of mirrors times columns.
                 down.apply_across(row, image, line);
                 along.apply(line, out);
             });

@@ -163,6 +163,7 @@ impl<'a> ColumnProblem<'a> {
         let is_dark = |(height, light): (&f64, &f64)| *height > 0.0 && *light <= 0.0;
         if let Some(column) = heights_um.iter().zip(&lit).position(is_dark) {
             let place = Place::of(&target.grid, column);
+            // A ray may miss a column that light reaches.
             let exact = light.by(Tracing::Exact);
             let seconds = vec![1.0; light.setup().mirrors.iter().product()];
             let is_missed = exact.doses(&seconds)[column] > 0.0;
@@ -210,6 +211,8 @@ impl<'a> ColumnProblem<'a> {
         let ends: Vec<_> = seconds
             .iter()
             .map(|seconds| {
+                // Ends are rounded, not durations: rounding errors do not add up from bitmap to
+                // bitmap.
                 end += seconds;
                 (end / self.options.step_s).round() as u64
             })
@@ -225,6 +228,8 @@ impl<'a> ColumnProblem<'a> {
             Err(too_few) => too_few,
         };
         let mirrors = best.at_most(max_s);
+        // Where most mirrors are at the longest time, that limit and not the part makes times
+        // alike.
         if 2 * mirrors > steps.iter().filter(|steps| **steps > 0).count() {
             return Err(ColumnError::MaxTime { mirrors, max_s });
         }

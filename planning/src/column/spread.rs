@@ -87,6 +87,8 @@ pub(super) fn taps(
                 };
                 let point = |k: usize| ((k as f64 + 0.5) / points as f64 - 0.5) * mirrors.lit;
                 let steps = (directions - 1).max(1) as f64;
+                // 000 eq. 3.11 counts rays over the points of a mirror and the directions of its
+                // cone.
                 let direction = |k: usize| half * (2.0 * k as f64 / steps - 1.0);
                 let weigh = |k: usize| match spread {
                     MirrorSpread::Cone(_) => 1.0,
@@ -102,6 +104,8 @@ pub(super) fn taps(
                     .collect()
             }
         };
+        // A wide white field brings a mirror's light to as much glass as its pitch: shares of a
+        // voxel are relative to that.
         row.iter_mut().for_each(|(_, share)| *share *= scale);
         row
     };
@@ -118,6 +122,8 @@ fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: MirrorSpread) -> Vec
     let place = |um| voxels.place(um).clamp(0.0, voxels.count as f64);
     let first = place(middle - reach).floor() as usize;
     let last = place(middle + reach).ceil() as usize;
+    // The share between two edges is a difference of what falls below each: shares of all voxels
+    // add up to one.
     let below = |edge| spread.light_below(voxels.edge(edge) - middle, lit);
     // What is only rounding would let a mirror shine forever at nothing.
     let shares = (first..last).map(|voxel| (voxel, below(voxel + 1) - below(voxel)));
@@ -143,9 +149,12 @@ impl MirrorSpread {
     /// Returns the integral, up to a position, of the share of a point's light that falls below.
     fn integral(self, um: f64) -> f64 {
         match self {
+            // The integral of a share that rises evenly from -half to half.
             Self::Cone(half) if um.abs() < half => (um + half).powi(2) / (4.0 * half),
             Self::Cone(_) => um.max(0.0),
             Self::Gaussian(sigma) if sigma > 0.0 => {
+                // ∫ Φ = z Φ(z) + φ(z), with Φ by the complementary error function: exact also far
+                // below zero.
                 let z = um / sigma;
                 let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
                 sigma * (z * (0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)) + density)

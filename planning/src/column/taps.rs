@@ -30,6 +30,7 @@ impl Taps {
         let mut weights = vec![0.0; width * rows.len()];
         for ((row, &first), weights) in rows.iter().zip(&first).zip(weights.chunks_mut(width)) {
             for &(column, weight) in row.iter().filter(|(_, weight)| *weight != 0.0) {
+                // Entries of one column add up, as of several rays on one voxel.
                 weights[column - first] += weight;
             }
         }
@@ -123,6 +124,7 @@ impl Taps {
         out.fill(0.0);
         let (first, weights) = self.row(row);
         for (line, &weight) in image[first * length..].chunks_exact(length).zip(weights) {
+            // A weight of zero would cost a pass over a line for nothing.
             if weight != 0.0 {
                 out.iter_mut().zip(line).for_each(|(out, at)| *out += weight * at);
             }

@@ -47,6 +47,8 @@ impl MirrorTimes {
 pub(super) fn frank_wolfe_gap(place: &Place, high: f64) -> f64 {
     let numbers = place.x.par_chunks(1 << 13).zip(place.slopes.par_chunks(1 << 13));
     let of_chunk = |(x, slopes): (&[f64], &[f64])| -> f64 {
+        // The largest of slopes (x - t) over all t between zero and the bound: each t is at the end
+        // that its slope wants.
         x.iter().zip(slopes).map(|(x, slope)| slope * x + high * (-slope).max(0.0)).sum()
     };
     numbers.map(of_chunk).collect::<Vec<_>>().into_iter().sum()
@@ -68,6 +70,8 @@ pub fn nearest_times(
     let curvature = Normal::mean(light, shifts_um);
     let pull = mean_pull(light, wanted, shifts_um);
     let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
+    // |H t - E|² / 2 = t HᵀH t / 2 - t HᵀE + E E / 2 (000 eq. 4.4, squared): the search needs the
+    // first two terms alone.
     let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
     let error = |place: &Place| dark + fall(place, &pull);
     let (mut steps, mut gap) = (0, f64::INFINITY);
@@ -98,5 +102,6 @@ fn mean_pull(light: &GlassLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> 
 /// Returns x A x / 2 - b x.
 fn fall(place: &Place, pull: &[f64]) -> f64 {
     let numbers = place.x.iter().zip(&place.slopes).zip(pull);
+    // With slopes A x - b: x A x / 2 - b x = x (slopes - b) / 2, without another product with A.
     numbers.map(|((x, slope), pull)| 0.5 * x * (slope - pull)).sum()
 }

@@ -73,6 +73,7 @@ impl<'a> KnotSearch<'a> {
         let cells = simulation.reaction().cells();
         let is_part = |x: &usize| wanted.heights_um[*x] > 0.0;
         let area: f64 = (0..cells.across).filter(is_part).map(|x| cells.weight(x)).sum();
+        // A cell of a round chamber stands for a ring: squares count by its area.
         let weights = (0..cells.across).map(|x| (cells.weight(x) / area).sqrt()).collect();
         let step_s = simulation.setting().step.ms() / 1000.0;
         let knots = simulation.rings().min(MOST_KNOTS);
@@ -111,6 +112,8 @@ impl<'a> KnotSearch<'a> {
     /// Returns what is shown when rings shine so long.
     fn shown(&self, times: &[f64]) -> Vec<Shown> {
         let mut rings: Vec<usize> = (0..times.len()).filter(|&ring| times[ring] > 0.0).collect();
+        // Longest first: light is added up from the last bitmap to the first, as rings only go
+        // dark.
         rings.sort_by(|&a, &b| times[b].total_cmp(&times[a]));
         let mut light = vec![0.0; self.simulation.reaction().cells().across];
         let mut shown: Vec<Shown> = Vec::new();
@@ -144,6 +147,7 @@ impl<'a> KnotSearch<'a> {
         let seconds = self.simulation.reaction().seconds();
         let times = self.by_ring(knots);
         let longer: Vec<Vec<f64>> = (0..knots.len()).map(|knot| self.longer(knots, knot)).collect();
+        // Chambers are kept where times part: all before is the same for every knot.
         let first_dark = |longer: &Vec<f64>| {
             let changed = longer.iter().zip(&times).filter(|(longer, time)| longer != time);
             let first = changed.map(|(_, time)| *time).fold(f64::INFINITY, f64::min);
@@ -186,6 +190,8 @@ impl<'a> KnotSearch<'a> {
             let next = slopes.step(times, held, self.longest_s);
             let then = square(&self.cured(&self.by_ring(&next)));
             if then >= now {
+                // Levenberg and Marquardt: a step that fails is held back more, and one that helps
+                // less.
                 held *= 8.0;
                 continue;
             }
@@ -229,6 +235,7 @@ impl<'a> KnotSearch<'a> {
         let step = |time: &f64| {
             let wanted = time / self.step_s + lost;
             let steps = if *time > 0.0 { wanted.round().max(0.0) } else { 0.0 };
+            // Errors of rounding go on to the neighbour, whose light overlaps this ring's.
             lost = if *time > 0.0 { wanted - steps } else { 0.0 };
             steps as u32
         };
@@ -241,6 +248,7 @@ impl Slopes {
     /// steps are held back.
     fn step(&self, times: &[f64], held: f64, longest_s: f64) -> Vec<f64> {
         let steepest = self.by_knot.iter().map(|slope| square(slope)).fold(0.0, f64::max);
+        // In shares of the steepest slope the factor has no unit.
         let held = held * steepest;
         let bounds = [vec![0.0; times.len()], vec![longest_s; times.len()]];
         let mut next = times.to_vec();

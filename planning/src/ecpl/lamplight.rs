@@ -39,6 +39,7 @@ fn sharp(cells: &Cells, x: usize, shining: &Range<f64>) -> f64 {
     let cell = [x as f64, x as f64 + 1.0].map(|edge| edge * cells.width_um);
     let [from, to] = [shining.start, shining.end].map(|edge| edge.clamp(cell[0], cell[1]));
     let whole = |[from, to]: [f64; 2]| match cells.shape {
+        // Areas of rings, less the π that both have.
         ChamberShape::Round => to * to - from * from,
         ChamberShape::Straight => to - from,
     };
@@ -51,6 +52,7 @@ fn blurred(shape: ChamberShape, at: f64, shining: &Range<f64>, sigma: f64) -> f6
     if to <= from {
         return 0.0;
     }
+    // Pieces no wider than a standard deviation, for which the rule holds.
     let pieces = ((to - from) / sigma).ceil();
     let wide = (to - from) / pieces;
     let piece = |k: usize| {
@@ -68,9 +70,13 @@ fn kernel(shape: ChamberShape, at: f64, from: f64, sigma: f64) -> f64 {
     match shape {
         ChamberShape::Round => {
             let x = at * from / (sigma * sigma);
+            // The Gaussian integrated around a ring: exp(-(r² + s²) / 2σ²) I₀(r s / σ²) s / σ². The
+            // exponents of both factors are taken together: alone, I₀ overflows where the other
+            // vanishes.
             bell(at - from) * scaled_bessel_i0(x) * from / (sigma * sigma)
         }
         ChamberShape::Straight => {
+            // A straight chamber is mirrored at its axis: the other half shines, too.
             (bell(at - from) + bell(at + from)) / (sigma * std::f64::consts::TAU.sqrt())
         }
     }

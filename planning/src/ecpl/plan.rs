@@ -30,7 +30,7 @@ lamp_stack::named!(Method { Joint = "joint", Seed = "seed" });
 pub enum RingPlanError {
     /// The setting exposes nothing.
     #[error(transparent)]
-    KineticSetting(#[from] SettingError),
+    Setting(#[from] SettingError),
     /// A height is not a number, infinite or below zero.
     #[error("the height {radius_um:.1} um from the axis is not a number of zero or more")]
     NoHeight {

@@ -42,6 +42,8 @@ pub struct Reaction {
 impl Reaction {
     /// Prepares steps of `seconds`.
     pub fn new(kinetics: &Kinetics, cells: Cells, seconds: f64) -> Self {
+        // Constants of 003 table 1 are in W/m², mol/m³ and seconds; lengths of cells are in
+        // micrometres.
         let watt_per_m2 = Intensity::from_mw_per_cm2(0.1);
         let um2_per_s = 1e12 * kinetics.oxygen_diffusion.number();
         Self {
@@ -71,6 +73,8 @@ impl Reaction {
 
     /// Returns how far the conversion is beyond the critical one.
     fn beyond_critical(&self, growth: f64) -> f64 {
+        // 003 eq. 11 integrated: [DB] falls by exp(-k_p ∫ [R] dt), and conversion is one less that
+        // (eq. 14, whose sign is lost).
         -(-self.propagation * growth).exp_m1() - self.critical
     }
 }
@@ -105,11 +109,13 @@ impl Chamber {
     /// implicitly.
     pub fn pass(&mut self, reaction: &Reaction, light: &[f64]) {
         let lit = light.iter().rposition(|&light| light > 0.0).map_or(0, |last| last + 1);
+        // Columns that never had light have no radicals: only oxygen moves there.
         self.reach = self.reach.max(lit);
         wide(
             #[inline(always)]
             || {
                 if let Some(diffusion) = &reaction.diffusion {
+                    // Splitting of operators: oxygen alone spreads in 003 eq. 12 and 13.
                     diffusion.spread(&mut self.oxygen);
                 }
                 self.react(reaction, light);
@@ -149,6 +155,7 @@ impl Chamber {
         let Some(liquid) = (0..deep).find(|&z| beyond(z) < 0.0) else {
             return deep as f64 * height_um;
         };
+        // Resin that is solid above a liquid cell does not hold on the glass.
         let Some(solid) = liquid.checked_sub(1) else { return 0.0 };
         let share = beyond(solid) / (beyond(solid) - beyond(liquid));
         (solid as f64 + 0.5 + share) * height_um
@@ -176,10 +183,14 @@ fn split(reaction: &Reaction, left: &mut [f64], initiator: &mut [f64], made: &mu
     let is_small = reaction.fade * reaction.initiator <= SMALL;
     for ((left, initiator), made) in left.iter_mut().zip(initiator).zip(made) {
         let power = reaction.fade * *initiator;
+        // Initiator reacts by the light at its cell's middle: half of the cell fades it before,
+        // half after (003 eq. 4).
         let half = if is_small { faded(power) } else { (-power).exp() };
         let share = *left * half;
         *left = share * half;
+        // 003 eq. 5, implicit: however long the step, initiator stays above zero.
         *initiator /= 1.0 + share;
+        // 003 eq. 10: two radicals for each molecule that splits.
         *made = 2.0 * share * *initiator;
     }
 }
@@ -214,6 +225,7 @@ fn settle(
         lanes
     };
     let (s, o, mut r) = (lanes(source), lanes(oxygen), lanes(radicals));
+    // The cubic a b R³ + (a + b) R² + (1 + b (O - s)) R - s.
     let linear: [f64; LANES] = std::array::from_fn(|k| 1.0 + b * (o[k] - s[k]));
     let slope = |k: usize, r: f64| (3.0 * a * b * r + 2.0 * (a + b)) * r + linear[k];
     for k in 0..LANES {
@@ -235,7 +247,9 @@ fn settle(
     for (k, (radicals, (oxygen, growth))) in
         radicals.iter_mut().zip(oxygen.iter_mut().zip(growth)).enumerate()
     {
+        // The trapezoid of the radicals over the step.
         *growth += 0.5 * reaction.seconds * (*radicals + r[k]);
+        // 003 eq. 12 without diffusion, implicit with the radicals that were just found.
         *oxygen /= 1.0 + b * r[k];
         *radicals = r[k];
     }

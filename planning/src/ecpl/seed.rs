@@ -94,6 +94,8 @@ fn next_disc(
     let rms_now = wanted.rms_um(&now);
     let tries = (1..reach).into_par_iter().filter_map(|pixels| {
         try_disc(simulation, wanted, chamber, pixels).filter(|next| {
+            // The fit is a share of the height, which a higher film can lower and yet be farther
+            // off.
             wanted.rms_um(&Profile::of(&next.chamber, simulation.reaction())) < rms_now
         })
     });
@@ -114,6 +116,7 @@ fn try_disc(
     let mut shown_s = 0.0;
     while shown_s < LONGEST_S {
         simulation.expose(&mut chamber, &[disc(simulation, pixels, step_s)], 0, |_, _| ());
+        // The chamber goes on from step to step, so that all times of a disc take one simulation.
         shown_s += step_s;
         let misfit = misfit(wanted, &Profile::of(&chamber, simulation.reaction()));
         let time = ExposureTime::from_ms((shown_s * 1e6).round() / 1e3);

@@ -37,6 +37,7 @@ impl RingSimulation {
         let lit_um = f64::from(pixels) * setting.pixel_um;
         let cells = setting.cells(radius_um.max(lit_um))?;
         let reaction = Reaction::new(&setting.kinetics, cells, setting.seconds());
+        // 1 mW/cm² is 10 W/m².
         let watt_per_m2 = 10.0 * setting.light.mw_per_cm2();
         let ring = |ring: u32| {
             let shining =
@@ -98,6 +99,8 @@ impl RingSimulation {
         wanted_um: f64,
         longest_s: f64,
     ) -> Result<Vec<(f64, f64)>, RingPlanError> {
+        // A wide field is the same at every column, so that one stands for all, and oxygen has
+        // nowhere to go sideways.
         let column = Cells { across: 1, ..*self.reaction.cells() };
         let step_s = self.setting.step.ms() / 1000.0;
         let reaction = Reaction::new(&self.setting.kinetics, column, self.reaction.seconds());
@@ -164,6 +167,7 @@ impl RingSimulation {
             light.resize(self.reaction.cells().across, 0.0);
             let mut begun = 0.0;
             for shown in shown {
+                // Bitmaps need not end with steps of time: a step gets the mean of its light.
                 let overlap = end.min(shown.until_s) - start.max(begun);
                 begun = shown.until_s;
                 if overlap > 1e-9 * seconds {

@@ -41,6 +41,7 @@ pub fn convergence(
     let radius = match law {
         // The matrix is triangular: its eigenvalues are on its diagonal.
         Law::Single { gain } => {
+            // A layer's time changes its own layer and those below, never one above.
             let own = real.per_second().into_iter().map(|voxels| (1.0 - gain * voxels).abs());
             own.fold(0.0, f64::max)
         }
@@ -60,6 +61,7 @@ pub fn largest_safe_gain(law: &Law, times: &[f64], errors: &[f64], response: &Re
         return high;
     }
     for _ in 0..60 {
+        // Quarters first: safe gains may lie orders of magnitude below.
         let middle = if low == 0.0 { high / 4.0 } else { 0.5 * (low + high) };
         *(if safe(middle) { &mut low } else { &mut high }) = middle;
         if high < 1e-9 {
@@ -118,6 +120,7 @@ impl Shrink {
         let mut x = start(self.size);
         let mut square = 0.0;
         for _ in 0..NORM_ROUNDS {
+            // Power iteration on MᵀM, whose greatest eigenvalue is the squared norm.
             x = self.transposed(gain, &self.apply(gain, &x));
             let next = length(&x);
             if next == 0.0 {
@@ -145,6 +148,8 @@ impl Shrink {
             }
             x.iter_mut().for_each(|x| *x /= next);
             if round >= before {
+                // A pair of complex eigenvalues makes the length swing: the mean of its logarithm
+                // does not.
                 growth += next.ln();
             }
         }

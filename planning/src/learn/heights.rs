@@ -132,6 +132,7 @@ impl LogDoses {
         let mut sorted = deeper.to_vec();
         sorted.sort_by_key(|measured| measured.0);
         for same in sorted.chunk_by(|a, b| a.0 == b.0) {
+            // Measurements of one layer count by their precision, 1 / sd².
             let precision: f64 = same.iter().map(|(_, _, sd)| sd.powi(-2)).sum();
             let mean = same.iter().map(|(_, um, sd)| um * sd.powi(-2)).sum::<f64>() / precision;
             layers.push((same[0].0, mean / depth_um, precision.recip() / (depth_um * depth_um)));
@@ -140,10 +141,13 @@ impl LogDoses {
         let mut covariance = vec![0.0; size * size];
         for (row, a) in layers.iter().enumerate() {
             for (column, b) in layers.iter().enumerate() {
+                // The noise of different layers is independent.
                 let noise = if row == column { a.2 } else { 0.0 };
                 covariance[row * size + column] = self.covariance(a.0, b.0) + noise;
             }
         }
+        // Regression by a Gaussian process (Rasmussen and Williams 2006, eq. 2.25): the mean is
+        // k(·, x) (K + noise)⁻¹ y.
         let weights = solve_positive(&mut covariance, layers.iter().map(|layer| layer.1).collect());
         let gained: Vec<f64> = (0..self.values.len())
             .map(|k| layers.iter().zip(&weights).map(|(a, w)| self.covariance(k, a.0) * w).sum())
@@ -156,6 +160,7 @@ impl LogDoses {
     fn covariance(&self, a: usize, b: usize) -> f64 {
         let ends = self.z_um[0] - self.z_um[self.z_um.len() - 1];
         let range = (ALIKE_OVER * ends).max(f64::MIN_POSITIVE);
+        // Matérn with ν = 3/2 (Rasmussen and Williams 2006, eq. 4.17): (1 + √3 r/l) exp(-√3 r/l).
         let away = 3.0_f64.sqrt() * (self.z_um[a] - self.z_um[b]).abs() / range;
         UNSURE * UNSURE * (1.0 + away) * (-away).exp()
     }

@@ -82,6 +82,7 @@ impl Law {
     ) -> Vec<f64> {
         let changes = match self {
             Self::Model(law) => {
+                // The response is a slope at the present times, and holds only near them.
                 let within = |k: usize, share: f64| times[k] * share;
                 let low: Vec<_> = (0..times.len())
                     .map(|k| low[k].max(within(k, 1.0 - law.most_change)) - times[k])
@@ -130,8 +131,11 @@ impl MultiLaw {
             };
             let count = around.len() as f64;
             let mean = errors[around].iter().sum::<f64>() / count;
+            // 004 eq. 3.5, with the mean error of eq. 3.6 in place of the layer's own.
             changes[layer] += self.gain * mean;
             for distance in 1..=self.reach.min(layer) {
+                // 004 eq. 3.8: layers nearer to the light change as well, since part of their dose
+                // passes down to this one.
                 changes[layer - distance] += self.reach_gain * mean / (distance * distance) as f64;
             }
         }

@@ -29,6 +29,8 @@ impl ModelLaw {
 impl Weights {
     /// Returns the matrix of the step's equations times a step: `Gᵀ W G dt + ρ dt / t²`.
     fn apply(&self, response: &Response, changes: &[f64]) -> Vec<f64> {
+        // `G` is never written down: it and its transpose are two passes over the layers, a matrix
+        // would have the square of their number.
         let mut cured = response.apply(changes);
         cured.iter_mut().zip(&self.errors).for_each(|(cured, weight)| *cured *= weight);
         let mut sums = response.transposed(&cured);
@@ -68,11 +70,13 @@ pub(crate) fn bounded_step(
     let shares = |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a / scale).collect::<Vec<_>>();
     let pull = weights.pull(response, errors);
     let [low, high] = bounds.map(shares);
+    // The step without bounds is a good start: most layers keep away from theirs.
     let mut step = shares(&weights.solve(response, errors));
     let stop = DescentEnd { steps: 500, fall: 1e-12 };
     descend(&mut step, [&low, &high], stop, |step| {
         let changes = times(step);
         let bent = weights.apply(response, &changes);
+        // The quadratic whose slopes are the step's equations; constants are left out.
         let value = 0.5 * dot(&bent, &changes) - dot(&pull, &changes);
         let slopes: Vec<_> = bent.iter().zip(&pull).map(|(bent, pull)| bent - pull).collect();
         (value, times(&slopes))

@@ -29,13 +29,17 @@ impl Response {
         let (more, less) = (scaled(RANGE), scaled(1.0 / RANGE));
         let [more, less] = simulation.tally([&more, &less]);
         let doses = simulation.field_doses(times);
+        // Voxels that turn cured, wanted or not, count the same: they are what a change of dose
+        // moves.
         let crossed = more
             .layers
             .iter()
             .zip(&less.layers)
             .map(|(more, less)| (more.over - less.over) + (less.under - more.under));
         let per_log_dose: Vec<_> =
+            // A central difference over the logarithm of the dose.
             crossed.map(|voxels| voxels as f64 / (2.0 * RANGE.ln())).collect();
+        // d ln e = de / e.
         let per_dose = per_log_dose.iter().zip(doses).map(|(voxels, dose)| voxels / dose).collect();
         let layers = simulation.layers().iter().map(|reach| reach.light).collect();
         Self { per_log_dose, per_dose, layers }
@@ -78,6 +82,7 @@ impl Response {
         let mut dose = 0.0;
         let layers = self.layers.iter().zip(&self.per_dose).zip(changes);
         let cured = layers.map(|((layer, voxels), change)| {
+            // 004 eq. 2.5: a change of time reaches the layers below as the light itself does.
             dose = dose * layer.passed + layer.own * change;
             dose * voxels
         });

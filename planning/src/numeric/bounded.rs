@@ -70,6 +70,7 @@ impl<C: Curvature> Bounded<'_, C> {
         mut is_done: impl FnMut(&Place, usize) -> bool,
     ) -> Place {
         let mut place = self.place(x);
+        // Steps below 2 / |A| lower the value along projected slopes.
         let length = STEP / self.greatest();
         let mut direction = self.free(&place);
         let mut sums = self.sums(&place, None, length);
@@ -78,6 +79,8 @@ impl<C: Curvature> Bounded<'_, C> {
             if (step % look == 0 && is_done(&place, step)) || is_still {
                 break;
             }
+            // The proportioning test with Γ = 1: as long as numbers at their bounds gain less than
+            // free ones, stay in the face.
             if sums.chopped <= sums.reduced {
                 let product = self.curvature.apply(&direction);
                 let (along, curvature, room) = self.along(&place, &direction, &product);
@@ -91,15 +94,20 @@ impl<C: Curvature> Bounded<'_, C> {
                 } else if best <= room {
                     self.walk(&mut place, &direction, &product, best);
                     sums = self.sums(&place, Some(&product), length);
+                    // The new direction is conjugate to the last: its product with A times the last
+                    // one is zero.
                     let turn = sums.conjugate / curvature;
                     self.turn(&place, &mut direction, turn);
                 } else {
+                    // Expansion: go to the first bound, then along the projected slopes, which may
+                    // reach many bounds at once. Conjugacy is lost there.
                     self.walk(&mut place, &direction, &product, room);
                     self.project(&mut place, length);
                     sums = self.sums(&place, None, length);
                     direction = self.free(&place);
                 }
             } else {
+                // Proportioning: release numbers from their bounds by a step of steepest descent.
                 let chopped = self.chopped(&place);
                 let product = self.curvature.apply(&chopped);
                 let (along, curvature, room) = self.along(&place, &chopped, &product);
@@ -120,6 +128,7 @@ impl<C: Curvature> Bounded<'_, C> {
 
     /// Returns a bound of the greatest eigenvalue: no number of the matrix is negative.
     fn greatest(&self) -> f64 {
+        // The greatest sum of a row bounds the greatest eigenvalue (Gershgorin).
         let sums = self.curvature.apply(&vec![1.0; self.pull.len()]);
         sums.into_iter().fold(f64::MIN_POSITIVE, f64::max)
     }
@@ -157,6 +166,7 @@ impl<C: Curvature> Bounded<'_, C> {
         };
         let chunks = place.x.par_chunks(CHUNK).zip(place.slopes.par_chunks(CHUNK)).enumerate();
         let sums: Vec<_> = chunks.map(|(chunk, numbers)| of_chunk(chunk, numbers)).collect();
+        // Chunk after chunk: the sum is the same on any number of threads.
         sums.into_iter().fold(Sums::default(), |all, some| Sums {
             chopped: all.chopped + some.chopped,
             reduced: all.reduced + some.reduced,
@@ -206,6 +216,8 @@ impl<C: Curvature> Bounded<'_, C> {
             let free = slope_at(*x, slope, self.high).free;
             *x = (*x - length * free).clamp(0.0, self.high);
         });
+        // After a projection the slopes do not follow from a product that is known, so that they
+        // are computed anew. That also clears what rounding has gathered.
         *place = self.place(std::mem::take(&mut place.x));
     }
 

@@ -9,6 +9,7 @@ pub(crate) fn solve_positive(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64
     let size = right.len();
     for column in 0..size {
         for row in column..size {
+            // L Lᵀ = A, column by column.
             let earlier: f64 =
                 (0..column).map(|k| matrix[row * size + k] * matrix[column * size + k]).sum();
             let left = matrix[row * size + column] - earlier;
@@ -17,6 +18,7 @@ pub(crate) fn solve_positive(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64
         }
     }
     for row in 0..size {
+        // L y = right, then Lᵀ x = y.
         let known: f64 = (0..row).map(|k| matrix[row * size + k] * right[k]).sum();
         right[row] = (right[row] - known) / matrix[row * size + row];
     }

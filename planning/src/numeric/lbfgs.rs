@@ -59,6 +59,8 @@ pub(crate) fn descend(
                 .zip(&slopes)
                 .map(|((next, x), slope)| (next - x) * slope)
                 .sum();
+            // Armijo's rule along the projected path: the fall is promised for the way left between
+            // the bounds.
             if next_value <= value + ENOUGH * promised.min(0.0) {
                 break (next, next_value, next_slopes);
             }
@@ -67,6 +69,7 @@ pub(crate) fn descend(
                 if pairs.is_empty() {
                     return;
                 }
+                // No step: forget the pairs and try along the slopes.
                 break (x.clone(), value, slopes.clone());
             }
         };
@@ -80,6 +83,8 @@ pub(crate) fn descend(
             pairs.clear();
             continue;
         }
+        // Only pairs of positive curvature keep the matrix positive definite; rounding leaves
+        // others where the function is straight.
         if curve > 1e-12 * dot(&change, &change).sqrt() * dot(&step, &step).sqrt() {
             if pairs.len() == MEMORY {
                 pairs.pop_front();
@@ -103,11 +108,15 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
     let along = |a: &[f64], b: &[f64]| dot(&only_free(a.to_vec()), b);
     let mut shares = Vec::with_capacity(pairs.len());
     for pair in pairs.iter().rev() {
+        // The two loops of Nocedal (1980), with products among the free numbers alone: Bertsekas's
+        // condition that bounds in force take no part in the curvature.
         let share = pair.scale * along(&pair.step, &direction);
         add_times(&mut direction, -share, &pair.change);
         shares.push(share);
     }
     direction = only_free(direction);
+    // The scale of the last pair, sᵀy / yᵀy (Nocedal and Wright, *Numerical Optimization*, eq.
+    // 7.20).
     let first = match pairs.back() {
         Some(pair) => 1.0 / (pair.scale * dot(&pair.change, &pair.change)),
         // A tenth of the largest number is a step that no start makes too far.
@@ -122,6 +131,7 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
         add_times(&mut direction, share - back, &pair.step);
     }
     let direction = only_free(direction);
+    // Pairs from other sets of free numbers may point uphill. The slopes themselves never do.
     if dot(&direction, slopes) < 0.0 {
         direction
     } else {

@@ -103,6 +103,8 @@ impl<T: Real> Operator<T> {
         room: &mut ChunkRoom<T>,
     ) {
         let LayerLight { own, passed } = self.layers[layer];
+        // Layers beyond a window are dark: only what passes reaches them, and blurring black would
+        // cost as much as blurring light.
         let is_dark = own == 0.0;
         let (own, passed) = (T::of(own), T::of(passed));
         wide(
@@ -115,6 +117,9 @@ impl<T: Real> Operator<T> {
                     doses.iter_mut().for_each(|dose| *dose = *dose * own);
                 }
                 for (dose, &above) in doses.iter_mut().zip(above) {
+                    // 001 eq. 5: light of the layers above fades by the same factor wherever it
+                    // comes from, so that one product with the dose above stands for the sum over
+                    // all of them.
                     *dose += above * passed;
                 }
             },
@@ -151,12 +156,15 @@ impl<T: Real> Operator<T> {
             #[inline(always)]
             || {
                 for (sum, &price) in sums.iter_mut().zip(prices) {
+                    // The transpose of the recursion down: a pixel pays for its own layer and for
+                    // all below, each time less by what passes.
                     *sum = *sum * passed + price;
                 }
                 if is_dark {
                     of_light.fill(T::default());
                     return;
                 }
+                // The Gaussian is symmetric, and so its own transpose.
                 self.chunks.spread(sums, of_light, room);
                 of_light.iter_mut().for_each(|price| *price = *price * own);
             },

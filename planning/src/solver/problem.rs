@@ -122,12 +122,15 @@ impl<T: Real> Terms<T> {
     #[inline(always)]
     pub(crate) fn light_bounds(&self, role: Role) -> Bounds<T> {
         let white: T = role.flag(4);
+        // White and never dim do not stand together, so that the sum is one of them.
         Bounds { low: white + self.least_light * role.flag(5), high: role.flag(3) }
     }
 
     /// Returns what a unit of a voxel's dose may cost: the slopes of its cost.
     #[inline(always)]
     pub(crate) fn price_bounds(&self, role: Role) -> Bounds<T> {
+        // Flags become factors of 0 and 1, so that loops over voxels have no branch and use the
+        // widest instructions.
         let dark: T = role.flag(2);
         Bounds { low: dark - self.short_price * role.flag(0), high: dark + role.flag(1) }
     }
@@ -135,6 +138,7 @@ impl<T: Real> Terms<T> {
     /// Returns the dose from which on a voxel's cost changes.
     #[inline(always)]
     pub(crate) fn aim(&self, role: Role) -> T {
+        // A dose that only counts as darkness has its kink at zero, where doses begin.
         self.least * role.flag(0) + self.most * role.flag(1)
     }
 
@@ -142,6 +146,8 @@ impl<T: Real> Terms<T> {
     #[inline(always)]
     pub(crate) fn cost(&self, role: Role, dose: T) -> f64 {
         let (bounds, beyond) = (self.price_bounds(role), (dose - self.aim(role)).f64());
+        // A convex cost with one kink is the larger of its two lines through the kink, and the
+        // slopes of these are the bounds of the price.
         (beyond * bounds.low.f64()).max(beyond * bounds.high.f64())
     }
 }
@@ -156,6 +162,9 @@ impl<T: Real> Problem<T> {
     /// Returns a bound that no light's cost is below, from any prices within their bounds and
     /// what they make of light.
     pub fn bound(&self, prices: &[T], of_light: &[T]) -> f64 {
+        // Weak duality: for any price within the slopes, price (dose - aim) is at most the cost.
+        // Summed over all voxels, doses become light times what it costs, and each pixel alone
+        // takes the end that makes that least.
         let term = |((&price, &of_light), (&role, &incoming)): ((&T, &T), (&Role, &T))| {
             let light = self.terms.light_bounds(role);
             let of_light = of_light.f64();

@@ -55,6 +55,7 @@ impl<T> Solution<T> {
 const LOOK_AFTER: usize = 5;
 /// Steps are no longer than those of a pixel or voxel that sees this share of the most light.
 const LEAST_SHARE: f64 = 1e-3;
+// cuPDLP.jl restarts by the same three shares (Lu and Yang 2023).
 /// A restart follows when the gap has shrunk to this share,
 const SHRUNK: f64 = 0.2;
 /// or to this share without shrinking since the last look,
@@ -108,6 +109,10 @@ impl<T: Real> Steps<T> {
         };
         let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();
         let seen = Iterate::new(problem, light, prices);
+        // Pock and Chambolle's steps with α = 1, over the sums of the matrix's rows and columns. No
+        // number of the matrix is negative, so that its product with ones is those sums. Pixels
+        // that cannot move, and voxels whose dose costs nothing, are left out: they would shorten
+        // the steps of the rest.
         let over = |sums: &[T]| {
             let most = sums.iter().fold(0.0_f64, |most, sum| most.max(sum.f64()));
             // Where nothing sees anything, any step will do that is a number.
@@ -120,6 +125,8 @@ impl<T: Real> Steps<T> {
     /// Returns how far apart two iterates are in light and in prices, in steps.
     fn distances(&self, a: &Iterate<T>, b: &Iterate<T>) -> [f64; 2] {
         let distance = |a: &[T], b: &[T], steps: &[T]| {
+            // The norm in which a step has length one: |apart|² / step, as the theory of PDHG
+            // measures.
             let squares = a.iter().zip(b).zip(steps).map(|((&a, &b), step)| {
                 let apart = (a - b).f64();
                 apart * apart / step.f64()
@@ -162,6 +169,8 @@ pub fn solve<T: Real>(
             break;
         }
         since += 1;
+        // Halpern's weights (k + 1) / (k + 2), with k = 0 at each restart: the anchor counts less
+        // and less.
         let share = f64::from(since) / f64::from(since + 1);
         Step::new(problem, &steps, weight, share).take(&mut now, &mut next, &anchor);
         if iteration % LOOK_AFTER != 0 {
@@ -174,6 +183,9 @@ pub fn solve<T: Real>(
         let long = f64::from(since) > LONG * iteration as f64;
         if gap < SHRUNK * gap_at_restart || stuck || long {
             let [light, prices] = steps.distances(&next, &anchor);
+            // The mean, as logarithms, of the old weight and of the ratio of the ways that prices
+            // and light have gone since the restart: the primal weight of PDLP (Applegate et al.
+            // 2021), smoothed by a half.
             weight = match (light > 1e-9, prices > 1e-9) {
                 (true, true) => (weight * prices / light).sqrt(),
                 // Only prices move, and too slowly: light stays at its bounds.
@@ -211,6 +223,8 @@ impl<T: Real> Best<T> {
         let mut progress = SearchProgress { iteration, ..self.last() };
         if cost < progress.cost {
             progress.cost = cost;
+            // Cost and bound are each of the best so far, whichever iterate had them: together they
+            // still hold the optimum between them.
             self.light.copy_from_slice(&next.light);
         }
         if bound > progress.bound {
@@ -241,6 +255,7 @@ impl<'a, T: Real> Step<'a, T> {
             steps,
             in_light: T::of(1.0 / weight),
             in_prices: T::of(weight),
+            // share (2 next - now) + (1 - share) anchor: the reflected step of Lu and Yang (2024).
             onwards: T::of(2.0 * share),
             back: T::of(share),
             rest: T::of(1.0 - share),
@@ -251,6 +266,7 @@ impl<'a, T: Real> Step<'a, T> {
     /// becomes what `next` reflects it to, drawn towards the anchor.
     fn take(&self, now: &mut Iterate<T>, next: &mut Iterate<T>, anchor: &Iterate<T>) {
         let operator = &self.problem.operator;
+        // One pass down and one up take all that an iteration needs while a layer is in the cache.
         let (plane, mut room) = (operator.plane(), operator.room());
         for layer in 0..operator.layer_count() {
             let here = layer * plane..(layer + 1) * plane;
@@ -290,6 +306,8 @@ impl<'a, T: Real> Step<'a, T> {
                 let pixels = next.iter_mut().zip(light).zip(prices.iter().zip(steps)).zip(roles);
                 for (((next, &light), (&price, &step)), &role) in pixels {
                     let bounds = terms.light_bounds(role);
+                    // Light goes against what it costs, and back between its bounds: the primal
+                    // half of Chambolle and Pock's iteration (2011).
                     let by = step * self.in_light * price;
                     *next = (light - by).within(bounds.low, bounds.high);
                 }
@@ -313,6 +331,8 @@ impl<'a, T: Real> Step<'a, T> {
                 let voxels = next.iter_mut().zip(prices).zip(steps.iter().zip(roles)).zip(doses);
                 for (((next, &price), (&step, &role)), ((&from, &to), &incoming)) in voxels {
                     let bounds = terms.price_bounds(role);
+                    // Prices go by doses extrapolated to 2 next - now: without that, light and
+                    // prices circle each other.
                     let beyond = two * to - from + incoming - terms.aim(role);
                     let by = step * self.in_prices * beyond;
                     *next = (price + by).within(bounds.low, bounds.high);

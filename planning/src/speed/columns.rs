@@ -68,6 +68,7 @@ impl ColumnSet {
 
     /// Adds a column that stands for `weight` pixels.
     pub(crate) fn add(&mut self, column: &[f32], weight: f64) {
+        // Bits, not values: a negative zero is a wanted voxel, a positive one is not.
         let same = |a: &[f32]| a.iter().zip(column).all(|(a, b)| a.to_bits() == b.to_bits());
         let bits: Vec<u32> = column.iter().map(|light| light.to_bits()).collect();
         let hash = self.by_hash.hasher().hash_one(&bits);
@@ -100,6 +101,7 @@ impl ColumnSet {
             let mut block =
                 Block { weights: vec![0.0; LANES], light: vec![0.0; LANES * self.layers] };
             for (lane, number) in numbers.enumerate() {
+                // Lanes beyond the last column weigh nothing.
                 block.weights[lane] = self.weights[number] as f32;
                 for (layer, &light) in self.column(number).iter().enumerate() {
                     block.light[layer * LANES + lane] = light;

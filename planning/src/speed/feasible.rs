@@ -104,10 +104,14 @@ impl Feasible {
                 };
             };
             let count = self.um.len();
+            // Two passes are enough: a layer that limits another lies above or below it, and limits
+            // all between on the way.
             (1..count).for_each(|k| limit(k - 1, k));
             (1..count).rev().for_each(|k| limit(k, k - 1));
             pace
         };
+        // Their geometric mean breaks no ratio, since both keep it, and is the times themselves
+        // where these are possible: then nothing is lowered and nothing raised.
         let (low, high) = (spread(false), spread(true));
         for (k, time) in times.iter_mut().enumerate() {
             *time = ((low[k] * high[k]).sqrt() * self.um[k]).clamp(self.low[k], self.high[k]);
@@ -121,6 +125,8 @@ impl Feasible {
         let Some(ratio) = self.ratio else { return Vec::new() };
         let pace = |k: usize| times[k] / self.um[k];
         (1..times.len())
+            // Both are linear in the times, as an augmented Lagrangian wants; a difference of
+            // logarithms would not be.
             .map(|k| [pace(k - 1) - ratio * pace(k), pace(k) - ratio * pace(k - 1)])
             .collect()
     }
@@ -150,6 +156,8 @@ impl Feasible {
                 corners = widened(&corners, ratio, [low, high]);
             }
             for (pace, least) in &mut corners {
+                // A straight line more keeps a convex function convex and its corners where they
+                // are.
                 *least += slope * um * *pace;
             }
         }
@@ -161,6 +169,9 @@ impl Feasible {
 fn widened(corners: &[(f64, f64)], ratio: f64, [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
     let best = (0..corners.len()).min_by(|&a, &b| corners[a].1.total_cmp(&corners[b].1));
     let best = best.expect("there are two corners or more");
+    // The least within a ratio: to the left of the bottom it comes from the farthest place to the
+    // right, to the right from the farthest to the left. So the two flanks move apart by the ratio,
+    // and between them the bottom is level.
     let falling = corners[..=best].iter().map(|&(pace, least)| (pace / ratio, least));
     let rising = corners[best..].iter().map(|&(pace, least)| (pace * ratio, least));
     cut(&falling.chain(rising).collect::<Vec<_>>(), [low, high])

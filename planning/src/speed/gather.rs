@@ -41,6 +41,8 @@ impl<'a> Gather<'a> {
         let sum = blur.sum();
         let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
         let bytes = |side: usize| side * side * part.images.len() * size_of::<f32>();
+        // A tile is computed with a rim as wide as light spreads. At four radii the rim makes the
+        // work (6/4)² = 2.25 times as much, and wider tiles save little of that.
         let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
         let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
         let mut gather = Self { part, blur, light_of, side, tiles: Vec::new() };
@@ -86,6 +88,8 @@ impl<'a> Gather<'a> {
         each: impl Fn(ColumnSet) -> T + Sync,
     ) -> impl Iterator<Item = T> {
         // A batch's results are merged before the next begins.
+        // Twice as many tiles as threads: a thread that is done early takes another, and few
+        // results wait.
         let batch = 2 * rayon::current_num_threads();
         self.tiles.chunks(batch).flat_map(move |corners| {
             let tile = |room: &mut Room, &corner: &[i64; 2]| each(self.tile(corner, step, room));
@@ -99,6 +103,7 @@ impl<'a> Gather<'a> {
         let layers = self.part.images.len();
         let most = (bytes / (layers * size_of::<f32>())).max(1);
         let mut step = 1;
+        // Merging would have to make one column of more than 64 pixels: such samples are not tried.
         while self.pixels() / (step as usize * step as usize) > 64 * most {
             step *= 2;
         }
@@ -115,6 +120,7 @@ impl<'a> Gather<'a> {
         let mut all = ColumnSet::new(self.part.images.len());
         for tile in self.tiles(step, |tile| tile) {
             all.add_all(&tile, 1.0);
+            // With a pixel of each tile, no coarser sample is left.
             if all.len() > most && step < self.side as u32 {
                 return None;
             }
@@ -140,11 +146,13 @@ impl<'a> Gather<'a> {
         room.levels.resize(pixels, 0);
         let corner = window.corner.map(|place| place - window.radius as i64);
         fill_window(image, corner, window.width(), &mut room.levels);
+        // Walls that stand straight give the same window layer after layer.
         if room.levels == room.spread_levels {
             return;
         }
         room.spread_levels.clone_from(&room.levels);
         let first = room.levels[0];
+        // Inside and outside of the part, blur is a sum that is known.
         if room.levels.iter().all(|&level| level == first) {
             let field = self.light_of[usize::from(first)] * self.blur.sum() as f32;
             room.spread.clear();
@@ -169,6 +177,7 @@ impl<'a> Gather<'a> {
             for (number, &place) in places.iter().enumerate() {
                 let place = window.place(place);
                 let wanted = room.levels[place] >= self.part.wanted();
+                // A zero has a sign as well, so that voxels without light keep their role.
                 let sign = if wanted { -1.0 } else { 1.0 };
                 light[number * layers + layer] = room.spread[place] * sign;
             }

@@ -34,6 +34,9 @@ impl Priced {
     /// Returns an error that no times are below, given the least value of a sum of times, each
     /// multiplied with its slope.
     pub(crate) fn bound(&self, times: &[f64], least: f64) -> f64 {
+        // Errors are linear in times where multipliers are fixed: Σ y x at other times is what it
+        // is here plus slopes times the difference. The least of that over all possible times is a
+        // bound, and no error is negative.
         let here: f64 = self.slopes.iter().zip(times).map(|(slope, time)| slope * time).sum();
         (self.priced - here + least).max(0.0)
     }
@@ -66,6 +69,7 @@ impl Hinge<'_> {
     pub(crate) fn of(&self, columns: &Columns, times: &[f64]) -> Priced {
         let price = |room: &mut Vec<f32>, block: &Block| self.of_block(block, times, room);
         let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, price).collect();
+        // Blocks are added in order, so that the sum is the same on any number of threads.
         let mut all = Priced::none(columns.layers());
         for block in &blocks {
             all.add(block);
@@ -95,13 +99,19 @@ impl Hinge<'_> {
             let scale = reach.scale as f32;
             let [mut error, mut linear, mut slope] = [[0.0_f32; 16]; 3];
             for lane in 0..LANES {
+                // Sixteen sums side by side are two wide registers. One sum would wait for itself,
+                // and differ with the width of the registers.
                 let sum = lane % 16;
                 let weight = block.weights[lane];
                 let sign = 1.0_f32.copysign(light[lane]);
+                // Wanted voxels err by 1 + m - e, others by e - 1 + m: one formula with the sign of
+                // their role (004 eq. 3.1 to 3.3 count the same voxels without a margin).
                 let x = self.margin as f32 + sign * (doses[lane] * scale - 1.0);
                 let y = self.slope(x) * weight;
                 error[sum] += self.smoothed(x) * weight;
                 linear[sum] += x * y;
+                // The transpose of the recursion in `expose`: a second of this layer's light also
+                // reaches all layers below it, less what is absorbed between (004 eq. 2.5).
                 cost[lane] = cost[lane] * below + sign * y * scale;
                 slope[sum] += cost[lane] * light[lane].abs();
             }
@@ -118,12 +128,15 @@ impl Hinge<'_> {
         if self.smoothing == 0.0 {
             return f32::from(u8::from(x > 0.0));
         }
+        // The slope rises from 0 to 1 over twice the smoothing.
         let smoothing = self.smoothing as f32;
         ((x + smoothing) / (2.0 * smoothing)).clamp(0.0, 1.0)
     }
 
     #[inline(always)]
     fn smoothed(&self, x: f32) -> f32 {
+        // Nesterov's smoothing (2005): the largest of y x + s y (1 - y) over 0 ≤ y ≤ 1, which the
+        // clamped slope reaches. It exceeds (x)₊ by s/4 at most, at the kink, and stays convex.
         let slope = self.slope(x);
         slope * x + self.smoothing as f32 * slope * (1.0 - slope)
     }
@@ -139,6 +152,8 @@ pub(crate) fn expose(block: &Block, layers: &[Reach], times: &[f64], doses: &mut
         let light = &block.light[layer * LANES..(layer + 1) * LANES];
         let doses = &mut doses[layer * LANES..(layer + 1) * LANES];
         for lane in 0..LANES {
+            // 004 eq. 2.5 from layer to layer: the light that the layers above leave, and the
+            // layer's own.
             above[lane] = above[lane] * passed + own * light[lane].abs();
             doses[lane] = above[lane];
         }

@@ -103,6 +103,7 @@ impl PartPages {
     pub fn finish(self) -> Result<TimedPart, PartError> {
         let Self { mut images, mut layers, dpi, wanted } = self;
         let dpi = dpi.ok_or(PartError::NoLayers)?;
+        // Light comes from above: doses add up from the last layer down.
         images.reverse();
         layers.reverse();
         Ok(TimedPart { images, layers, dpi, wanted })
@@ -179,6 +180,7 @@ fn fill_row<C: Change>(
     level: impl Fn(C::Pixel) -> u8,
 ) {
     let changes = image.row(row);
+    // The level at the window's left edge is the one after the last change before it.
     let past = changes.partition_point(|change| i64::from(change.column()) <= column);
     let end = (column + line.len() as i64).min(i64::from(image.width()));
     let (mut from, mut pixel) = (column.max(0), C::last_pixel(&changes[..past]));

@@ -84,6 +84,7 @@ fn gap(stage: SearchStage, single_error: f64) -> f64 {
 
 /// The doses around the kink over which the error is smoothed, stage by stage.
 const SMOOTHINGS: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
+// Six stages of this many steps, each a pass over all columns, bound the time of a plan.
 /// The steps of a stage.
 const STEPS: usize = 300;
 /// Finds the times of a part's layers.
@@ -149,6 +150,7 @@ impl TimesProblem<'_> {
         let mut high = high.iter().copied().fold(0.0, f64::max);
         let mut best = (low, f64::INFINITY);
         while high / low > 1.0 + 1e-5 {
+            // Times span orders of magnitude: halve their logarithm.
             let time = (low * high).sqrt();
             let priced = self.price(&vec![time; layers], 0.0);
             if priced.error < best.1 {
@@ -162,6 +164,8 @@ impl TimesProblem<'_> {
 
     /// Goes from the best single time to the least error, which is smoothed less and less.
     fn search(&self, single: &[f64], single_error: f64) -> (Vec<f64>, Vec<SearchStage>) {
+        // Twice the critical dose at every layer is what a wide prism wants: its walls then get
+        // half of it, the critical dose.
         let starts = [single.to_vec(), self.simulation.times_for(2.0)];
         let starts = starts.map(|times| {
             let times = self.feasible.nearest(&times);
@@ -172,7 +176,11 @@ impl TimesProblem<'_> {
         let mut times = best.1.clone();
         let (mut bound, mut stages) = (0.0_f64, Vec::new());
         let mut prices = Prices::new(&self.feasible, &times, single_error);
+        // From smooth to sharp: a sharp error has slopes that do not see kinks far away, and
+        // the times of the smoother stage start near the optimum of the next.
         for smoothing in SMOOTHINGS {
+            // Each round raises the prices of broken ratios; after four the rest is removed by
+            // going to the nearest possible times.
             let rounds = if self.feasible.is_box() { 1 } else { 4 };
             for _ in 0..rounds {
                 self.descend(&mut times, smoothing, &prices);
@@ -184,6 +192,7 @@ impl TimesProblem<'_> {
                 best = (error, near);
             }
             let priced = self.price(&times, smoothing);
+            // A stage may bound worse than an earlier one.
             bound = bound.max(priced.bound(&times, self.feasible.least(&priced.slopes)));
             let stage = SearchStage { error: best.0, bound: bound.min(best.0) };
             stages.push(stage);
@@ -240,6 +249,8 @@ impl Prices {
         let squares = |pairs: &[[f64; 2]]| -> f64 {
             pairs.as_flattened().iter().map(|price| price * price).sum()
         };
+        // The augmented Lagrangian of inequalities g ≤ 0 (Rockafellar 1973) is ((p + w g)₊² - p²) /
+        // 2w. Its slopes are (p + w g)₊ times the slopes of g.
         (squares(&now) - squares(&self.of_pairs)) / (2.0 * self.weight)
     }
 
@@ -253,6 +264,7 @@ impl Prices {
 
     fn update(&mut self, feasible: &Feasible, times: &[f64]) {
         self.of_pairs = self.raised(feasible, times);
+        // A heavier weight keeps ratios sooner, and makes the descent stiffer.
         self.weight *= HEAVIER;
     }
 }

@@ -60,6 +60,7 @@ impl<'a> Simulation<'a> {
     pub fn tally<const N: usize>(&self, times: [&[f64]; N]) -> [Tally; N] {
         assert!(times.iter().all(|times| times.len() == self.layers.len()));
         let of = |columns: &Columns| times.map(|times| Tally::of(columns, &self.layers, times));
+        // The search may see a sample; counts are always of every voxel.
         if self.sampled == 1 {
             return of(&self.columns);
         }
@@ -74,6 +75,8 @@ impl<'a> Simulation<'a> {
     pub fn field_doses(&self, times: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
         let of_layer = |(reach, time): (&Reach, &f64)| {
+            // 004 eq. 2.5 from layer to layer. A correction by measurements is a factor of the
+            // dose, and passes on to no other layer.
             dose = dose * reach.light.passed + reach.light.own * time;
             dose * reach.scale
         };
@@ -88,6 +91,7 @@ impl<'a> Simulation<'a> {
     pub fn times_for(&self, dose: f64) -> Vec<f64> {
         let mut above = 0.0;
         let of_layer = |reach: &Reach| {
+            // A layer can get more light, but none that reaches it from above can be taken away.
             let passed = above * reach.light.passed;
             above = passed.max(dose / reach.scale);
             (above - passed) / reach.light.own

@@ -85,6 +85,7 @@ impl Tally {
         };
         let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, count).collect();
         let mut all = Self::none(columns.layers());
+        // Counts are whole numbers: any order gives the same.
         blocks.iter().for_each(|block| all.add(block));
         all
     }
@@ -97,13 +98,17 @@ impl Tally {
             let mut wrong = [Wrong::default(); 3];
             for lane in 0..LANES {
                 let (place, count) = (layer * LANES + lane, block.weights[lane] as u64);
+                // The sign of a column's light is the voxel's role, also of zero light.
                 let (dose, wanted) = (doses[place] * scale, block.light[place].is_sign_negative());
                 for (wrong, share) in wrong.iter_mut().zip(LIGHT_SHARES) {
+                    // 004 eq. 2.15: at the critical dose resin begins to cure.
                     let cured = dose * share as f32 >= 1.0;
                     wrong.over += count * u64::from(cured && !wanted);
                     wrong.under += count * u64::from(wanted && !cured);
                 }
                 tally.wanted[layer] += count * u64::from(wanted);
+                // Voxels that no light reaches are without end around the part: they are not
+                // counted.
                 if dose > 0.0 {
                     let bin = (dose.min(LAST_DOSE) * 10.0) as usize;
                     tally.doses[usize::from(!wanted)][bin] += count;

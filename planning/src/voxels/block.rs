@@ -123,6 +123,7 @@ impl PlannedWindow<'_> {
     /// Plans a tile.
     pub(crate) fn plan(&self, tile: usize) -> BlockResult {
         let core = self.grid.tile(tile);
+        // Light far from every edge stays white or black: only chunks near edges are unknowns.
         let area = self.area(&core);
         let operator = Operator::of_chunks(
             area.shape,
@@ -136,6 +137,7 @@ impl PlannedWindow<'_> {
         problem.operator.doses(&problem.brightest(), &mut doses);
         // Layers without light are planned in a later window.
         let lit = self.lit * area.starts.len() * LANES;
+        // The gap is a share of what white light costs, so that it means the same for all parts.
         let unplanned = problem.cost(&doses[..lit]);
         let (light, prices) = self.start(&area, &problem, &doses);
         let least = LEAST_ERROR * lit as f64;
@@ -144,6 +146,7 @@ impl PlannedWindow<'_> {
         let progress = std::mem::take(&mut solution.progress);
         let mut light = solution.light;
         if self.has_min_level && self.without_dim_light(&mut problem, &mut light) {
+            // The prices of the first search are near: few iterations are left to go.
             let again = Search { iterations: AGAIN, ..until };
             light = solve(&problem, light, solution.prices.clone(), again).light;
         }
@@ -210,6 +213,8 @@ impl PlannedWindow<'_> {
                 let differs = |other: usize| wanted[place] != wanted[other];
                 let at_right = place % width + 1 < width && differs(place + 1);
                 let at_bottom = place + width < wanted.len() && differs(place + width);
+                // Where a layer differs from the window's first, light goes past an edge above or
+                // below.
                 edges[place] |= at_right || at_bottom || wanted[place] != first[place];
             }
         }
@@ -259,6 +264,7 @@ impl PlannedWindow<'_> {
                 let (row, column) = (start / area.shape.width, start % area.shape.width);
                 let inside = LANES.min(area.rect.width() - column);
                 let place = (row + border) * wide.width + column + border;
+                // Pixels that are planned here must not count twice.
                 of_layer[place..place + inside].fill(0.0);
             }
         }
@@ -269,6 +275,7 @@ impl PlannedWindow<'_> {
         let mut incoming = Vec::with_capacity(area.voxels());
         let mut passed = 1.0;
         for (doses, of) in doses.chunks_exact(wide.plane()).zip(self.lights) {
+            // 001 eq. 5: the layers above the window fade by the product of what each layer passes.
             passed *= of.passed as f32;
             for (start, above) in area.starts.iter().zip(area.chunks(&above)) {
                 let (row, column) = (start / area.shape.width, start % area.shape.width);
@@ -319,11 +326,14 @@ impl PlannedWindow<'_> {
         for (voxel, (light, price)) in light.iter_mut().zip(&mut prices).enumerate() {
             let role = problem.roles[voxel];
             let of_light = self.terms.light_bounds(role);
+            // Plans of neighbouring tiles may have been made with other bounds.
             *light = light.clamp(of_light.low, of_light.high);
             let of_price = self.terms.price_bounds(role);
             if price.is_nan() {
                 let is_above = white[voxel] + problem.incoming[voxel] >= self.terms.aim(role);
                 let slope = if is_above { of_price.high } else { of_price.low };
+                // The true price lies between no price and the slope at white light. Half-way is as
+                // near to either.
                 *price = 0.5 * slope.clamp(-1.0, 1.0);
             }
             *price = price.clamp(of_price.low, of_price.high);
@@ -349,6 +359,8 @@ impl PlannedWindow<'_> {
                 continue;
             }
             any |= *light > 0.0 && *light < least;
+            // Rounding to the nearer of black and the least level, and then searching with what is
+            // left to choose: the choice itself would be a problem of whole numbers.
             if *light < least / 2.0 {
                 (*light, *role) = (0.0, role.without_light());
             } else {

@@ -49,6 +49,7 @@ impl Ascent {
 }
 
 fn sum_tile(prices: &Tile<f32>, below: &Tile<f32>, passed: f32) -> Tile<f32> {
+    // The transpose of 001 eq. 5 from the bottom up, as in `Operator::prices_of_layer`, in tiles.
     let sum = |price: f32, below: f32| price + passed * below;
     match (prices, below) {
         (Tile::Flat(price), Tile::Flat(below)) => Tile::Flat(sum(*price, *below)),
@@ -102,6 +103,7 @@ fn of_light(
     if let (Some(role), Some(price)) =
         (of_all, sums.value_in(&rect.grown(setting.blur.radius()), 0.0))
     {
+        // Of a wide field of one price, blur is a sum.
         let price = own * setting.blur.sum() * f64::from(price);
         return least(role, price) * (rect.width() * rect.height()) as f64;
     }

@@ -106,6 +106,7 @@ impl RoleRules {
     /// Returns what light all pixels of a rectangle in the image may have, if it is plain that
     /// they may have the same.
     pub(crate) fn light_of_all(&self, wanted: &Tiled<u8>, rect: &Rect) -> Option<Role> {
+        // Roles depend on pixels as far as outlines reach: where these are alike, so are the roles.
         wanted.value_in(&rect.grown(self.outline()), 0)?;
         self.light_roles_of(wanted, &first_pixel(rect), 1).first().copied()
     }
@@ -196,6 +197,8 @@ fn boundary_roles(
     let mut targets = vec![0; wanted.len()];
     layers[layer].targets.copy(rect, 0, stride, &mut targets);
     let role = |((&wanted, &target), next)| match (wanted != 0, target != 0, next) {
+        // 001 eq. 13: targets get the critical energy; eq. 11: boundary voxels get as little as
+        // possible.
         (_, true, _) => Role::CURED,
         (false, _, true) => Role::DARK,
         _ => Role::NONE,
@@ -224,6 +227,7 @@ fn around(
     }
     let mut near = vec![false; stride * rect.height()];
     for (row, out) in near.chunks_exact_mut(stride).enumerate() {
+        // Along rows first, then across: a square is separable.
         for line in along.chunks_exact(width).skip(row).take(2 * by + 1) {
             out.iter_mut().zip(&line[by..width - by]).for_each(|(out, &is)| *out |= is);
         }
