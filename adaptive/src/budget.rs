@@ -36,6 +36,7 @@ impl HeightSearch<'_> {
         let budget = Budget { cost: &cost, max };
         let grid = self.grid()?;
         let least = self.least_cost(&grid, budget);
+        // Without any bound, layers cost as little as they can.
         if least > max {
             return Err(HeightsError::Budget { least, budget: max });
         }
@@ -84,6 +85,8 @@ impl HeightSearch<'_> {
             None => {
                 let cheapest = within(f64::INFINITY).expect("its cost was looked at");
                 let high = self.worst(&cheapest.heights.layers);
+                // The worst error of the cheapest layers is a bound that they keep, unless an error
+                // is infinite.
                 let Some(climb) = within(high) else { return (f64::INFINITY, cheapest) };
                 (high, climb)
             }
@@ -91,6 +94,7 @@ impl HeightSearch<'_> {
         // Steps down that grow, since bounds span decades.
         let mut ratio = if was_guessed { 1.0 + PRECISION } else { 8.0 };
         while high > low * (1.0 + PRECISION) && high > NOTHING {
+            // Bounds are positive and span decades: halve their logarithm.
             let middle = if low > 0.0 { f64::sqrt(low * high) } else { high / ratio };
             match within(middle) {
                 Some(climb) => (high, best) = (middle, climb),

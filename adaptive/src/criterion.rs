@@ -62,6 +62,7 @@ pub struct CuspHeight;
 
 impl Criterion for CuspHeight {
     fn measure(&self, layer: &SweptLayer) -> f64 {
+        // 002 eq. 10, solved for the cusp: a layer of thickness t whose edge has the normal N.
         layer.thickness_um * layer.steepest
     }
 
@@ -81,6 +82,7 @@ pub struct AreaDeviation;
 
 impl Criterion for AreaDeviation {
     fn measure(&self, layer: &SweptLayer) -> f64 {
+        // 002 eq. 23: |A_(i+1) - A_i| / A_i.
         share((layer.top_area_mm2 - layer.bottom_area_mm2).abs(), layer.bottom_area_mm2)
     }
 }

@@ -41,6 +41,7 @@ impl LayerPlacement<'_> {
     /// found reach as high as so many can, and from lower down it takes more to the end.
     pub(crate) fn least_error(&self, tops: &[usize], worthwhile: Cost) -> Option<Vec<usize>> {
         let end = *tops.last()?;
+        // Dynamic programming looks at every end with every thickness.
         if end.saturating_mul(self.thicknesses.steps().count()) > MAX_WAYS {
             return None;
         }
@@ -53,6 +54,8 @@ impl LayerPlacement<'_> {
         // Where a layer must end at least, so that those left reach the end.
         let max = *self.thicknesses.steps().end();
         let least = |layers: usize| end.saturating_sub((tops.len() - layers) * max);
+        // Ways with the same number of layers alone are compared: `layers_below` says how many end
+        // at or below a step.
         let may_end = |top: usize, layers: usize| {
             layers_below.get(top) == Some(&layers) && top >= least(layers)
         };
@@ -64,12 +67,14 @@ impl LayerPlacement<'_> {
             let layers = layers_below[step] + 1;
             for Way { steps, cost } in self.ways(step, |top| may_end(top, layers)) {
                 let top = step + steps;
+                // Pairs compare by layers past the bound first: no gain of volume makes up for one.
                 let cost = (so_far.0 + cost.0, so_far.1 + cost.1);
                 if best[top].is_none_or(|(least, _)| cost < least) {
                     best[top] = Some((cost, steps));
                 }
             }
         }
+        // The search's own layers are kept where others are no better.
         best[end].filter(|(cost, _)| *cost < worthwhile)?;
         let mut thicknesses = Vec::new();
         let mut top = end;

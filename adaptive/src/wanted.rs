@@ -118,6 +118,7 @@ impl WantedHeights<'_> {
         let search = HeightSearch { part, thicknesses, criterion, snap: self.snap, watch };
         let (bound, heights) = match self.goal {
             Goal::Bound(bound) => (bound, search.heights(bound)?),
+            // A layer costs one, so that the cost counts layers.
             Goal::Layers(layers) => search.within_budget(|_| 1.0, layers.into())?,
             Goal::Cost { of_layer, most } => search.within_budget(of_layer, most)?,
         };

@@ -55,6 +55,8 @@ impl Diffusion {
         for (row, changes) in gray.rows().enumerate() {
             runs.clear();
             runs.extend(gray_runs(changes, width));
+            // Equal thresholds would settle a flat gray the same way in every layer, and holes of
+            // layers would lie on each other.
             let mask = SCREEN.row(row + shift[1] as usize);
             let least = |column: usize| mask[column.wrapping_add(shift[0] as usize) % SIDE];
             let settle = |&(start, end, level): &(u32, u32, u8)| {
@@ -103,6 +105,8 @@ impl Diffusion {
         let mut ahead = carried.from(edge);
         for k in 0..count {
             let at = if TO_RIGHT { k } else { count - 1 - k };
+            // Floyd and Steinberg (1976): the nearest of black and white, by the level and all
+            // errors that have come in.
             let wanted = level + here[at] + ahead;
             let strength = if k == 0 && is_start { ALL } else { strength };
             let varied = (i32::from(least(columns.start + at)) - 128) * strength;
@@ -180,6 +184,7 @@ impl Errors {
     }
 
     fn next_row(&mut self) {
+        // Only what was touched is cleared: a row may be wide and hold little gray.
         for run in self.touched_here.drain(..) {
             self.here[run.start..run.end + 2].fill(0);
         }

@@ -39,6 +39,8 @@ impl Dots {
     ) {
         let mut white = self.reopen(start);
         let mut len = self.row.len();
+        // Room for a change at every pixel: each is written, and kept only where the colour
+        // changes.
         self.row.resize(len + (end - start) as usize + 1, 0);
         // Dots change colour at random half of the time, which branches cannot predict.
         for column in start..end {
@@ -92,6 +94,7 @@ impl Dots {
 
     /// Ends a row.
     pub(crate) fn finish_row(&mut self) -> Result<(), TooManyRuns> {
+        // A run to the edge of the image has no transition at its end: masks end as they are.
         self.row.pop_if(|end| *end == self.width);
         self.above += self.row.len();
         if self.above > MAX_RUNS {

@@ -36,6 +36,7 @@ pub enum Homogeneity {
 /// assert_eq!(homogeneity(pitch), Homogeneity::Even);
 /// ```
 pub fn homogeneity(pitch: Length) -> Homogeneity {
+    // 002 section 3.3.6 compares screens of 17 and 85 um, and none between.
     if pitch.um() <= EVEN_DOTS.um() * (1.0 + ROUNDING) {
         Homogeneity::Even
     } else if pitch.um() < UNEVEN_DOTS.um() * (1.0 - ROUNDING) {

@@ -29,6 +29,8 @@ impl OutlinePiece {
 pub fn shared_height(cured: &[[f64; 2]], outline: &[OutlinePiece]) -> Length {
     let piece = |piece: &OutlinePiece| {
         let within = |&heights: &[f64; 2]| {
+            // Of two edges, the mean of what lies between is the difference of what lies below
+            // each.
             mean_within(piece.to_um, heights) - mean_within(piece.from_um, heights)
         };
         (piece.along[1] - piece.along[0]) * cured.iter().map(within).sum::<f64>()

@@ -69,6 +69,7 @@ impl SummedLine {
     ) {
         let fading = self.fading;
         let shares = match &self.shares {
+            // The shares of a time are made once for all layers in a row that have it.
             Some((of, shares)) if *of == time => shares.clone(),
             _ => {
                 let share = |level| fading.share(GrayLevel::from_u8(level as u8), time);
@@ -85,6 +86,7 @@ impl SummedLine {
     pub fn cured(&self, floor_um: f64) -> Vec<SolidHeights> {
         let mut cured = vec![SolidHeights::new(); self.pixels];
         let mut columns = vec![ColumnDose::dark(&self.resin); self.pixels];
+        // 002 eq. 28: light comes from above, so that a height gets all layers at or above it.
         for (number, layer) in self.layers.iter().enumerate().rev() {
             // What is below the layer gets light through it down to the next top.
             let below = number.checked_sub(1).map(|below| self.layers[below].top_um);

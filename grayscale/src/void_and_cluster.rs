@@ -47,7 +47,9 @@ impl Field {
     /// Sets a point, or takes it away.
     fn flip(&mut self, place: usize) {
         self.points[place] ^= true;
+        // Energies are whole numbers: taking a point away leaves exactly what was there before.
         let sign = if self.points[place] { 1 } else { -1 };
+        // The mask repeats, so that energy goes around its edges.
         let (column, row) = (place % SIDE, place / SIDE);
         for &(right, down, energy) in &self.kernel {
             let there = (row + down) % SIDE * SIDE + (column + right) % SIDE;
@@ -109,6 +111,8 @@ fn first_points() -> Field {
         field.flip(cluster);
         let void = field.largest_void();
         field.flip(void);
+        // Ulichney's first phase (1993) has converged: the point that is densest would go back to
+        // where it was.
         if void == cluster {
             return field;
         }

@@ -44,11 +44,13 @@ impl CurveLinesFit {
         let curve: Vec<_> = points.iter().map(|p| (p.log_dose, p.depth)).collect();
         // Depths may fall with the dose where they rise much more with x, but then they say little.
         let line = LineFit::new(&curve)?.rising("um for each e-fold of dose")?;
+        // Both lines level: the working curve of all points together.
         let start = [line.zero()[0].exp(), 0.0, line.slope, 0.0];
         let numbers = fitted(start, points, free).ok_or(FitError::NoLines)?;
         let mean = curve.iter().map(|point| point.1).sum::<f64>() / curve.len() as f64;
         let scatter: f64 = curve.iter().map(|point| (point.1 - mean).powi(2)).sum();
         let squares = squares(&numbers, points);
+        // `needed` is one more than there are free numbers.
         let freedom = points.len() + 1 - needed;
         let times = t_95(freedom).powi(2) * squares / freedom as f64;
         let matrix = normal(&numbers, points, free).0;
@@ -76,6 +78,7 @@ impl CurveLinesFit {
 fn at(&[c, c_rise, d, d_rise]: &Numbers, x: f64, log_dose: f64) -> (f64, Numbers) {
     let (critical, penetration) = (c + c_rise * x, d + d_rise * x);
     let folds = log_dose - critical.ln();
+    // d/dc of (d + d' x)(ln E - ln(c + c' x)).
     let by_critical = -penetration / critical;
     (penetration * folds, [by_critical, by_critical * x, folds, folds * x])
 }

@@ -56,6 +56,7 @@ impl ExposureTimes {
     /// Returns the time for a thickness, interpolated linearly; `None` outside the table.
     pub fn of(&self, thickness: Length) -> Option<ExposureTime> {
         let um = thickness.um();
+        // Outside the table nothing is known: times are not extrapolated.
         let above = self.times.partition_point(|time| time.0 < um);
         let &(high_um, high_ms) = self.times.get(above)?;
         if high_um == um {

@@ -37,6 +37,7 @@ pub fn fit_curve(points: &[DepthPoint]) -> Result<CurveFit, FitError> {
     let log = |p: &DepthPoint| (p.arriving().mj_per_cm2().ln(), p.depth.um());
     let logs: Vec<_> = points.iter().map(log).collect();
     let line = LineFit::new(&logs)?.rising("um for each e-fold of dose")?;
+    // 002 eq. 30 over ln E is a line of slope D_p that meets zero at ln E_c.
     let [value, low, high] = line.zero().map(f64::exp);
     if !Dose::PLAUSIBLE.contains(&Dose::from_mj_per_cm2(value)) {
         return Err(FitError::NoCriticalDose(value));

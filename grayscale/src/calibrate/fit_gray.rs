@@ -64,6 +64,7 @@ pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     let level = |group: &[DepthPoint]| LevelFit {
         gray: group[0].gray,
         points: group.len(),
+        // A level alone may have too few points: the lines are fitted to all levels together.
         curve: fit_curve(group).ok(),
     };
     let levels: Vec<LevelFit> = sorted.chunk_by(|a, b| a.gray == b.gray).map(level).collect();
@@ -110,6 +111,7 @@ pub(super) fn line<T: Quantity>(
     let unit = T::UNIT;
     let (fell, rise) = (sloped.numbers[number + 1], lines.numbers[number + 1]);
     let [half_at_zero, half] = [number, number + 1].map(|number| sloped.half(number));
+    // A fall beyond its interval is no scatter: the model does not hold.
     if fell < -half {
         return Err(FitError::GrayFalls { what, fall: -fell, half, unit });
     }

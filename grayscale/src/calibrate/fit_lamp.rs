@@ -45,6 +45,7 @@ pub fn fit_lamp(points: &[LampPoint]) -> Result<LampFit, FitError> {
         return Err(FitError::TooFewLights(lights.len()));
     }
     let point = |p: &LampPoint| LinePoint {
+        // 002 eq. 36 is over W/cm².
         x: p.lamp.mw_per_cm2() / 1000.0,
         log_dose: p.film.arriving().mj_per_cm2().ln(),
         depth: p.film.depth.um(),
@@ -53,6 +54,8 @@ pub fn fit_lamp(points: &[LampPoint]) -> Result<LampFit, FitError> {
     let sloped = CurveLinesFit::new(&points, [true, true, true, false])?;
     let falls = sloped.numbers[CRITICAL_DOSE + 1] < 0.0;
     let lines =
+        // The model takes no falling line (`StraightLine`): it is kept level, if its fall is within
+        // the interval.
         if falls { CurveLinesFit::new(&points, [true, false, true, false])? } else { sloped };
     let half = lines.half(PENETRATION_DEPTH);
     let films: Vec<_> = sorted.iter().map(|point| point.film).collect();
@@ -96,6 +99,7 @@ impl LampFit {
         let critical = self.critical_dose_at(lamp).mj_per_cm2();
         // The band of the depth meets zero by the slope of the curve there.
         let [_, half] = self.lines.depth(lamp.mw_per_cm2() / 1000.0, critical.ln());
+        // A depth off by `half` is a dose off by half / D_p e-folds (002 eq. 30).
         let folds = (half / self.penetration_depth.value.um()).exp();
         let source = format!("{source}; at {} mW/cm2", lamp.mw_per_cm2());
         CurveNumbers {

@@ -53,6 +53,8 @@ pub fn fit_two_depth(points: &[DepthPoint]) -> Result<TwoDepthFit, FitError> {
     let data: Vec<_> = points.iter().map(|p| (p.arriving().mj_per_cm2(), p.depth.um())).collect();
     check(&data)?;
     let deepest = data.iter().map(|point| point.1).fold(0.0, f64::max);
+    // The squares may have several least values over the bend: searches start from a straight line
+    // and from curves that bend up to ten times over the deepest point.
     let bends = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0].map(|times| times / deepest);
     let fits =
         bends.iter().filter_map(|&bend| TwoDepthCurve::from_line(&data, bend)?.fitted(&data));
@@ -83,14 +85,17 @@ impl TwoDepthFit {
         let scatter: f64 = data.iter().map(|point| (point.1 - mean).powi(2)).sum();
         let squares = curve.squares(data);
         let free = data.len() - 3;
+        // Covariance is (JᵀJ)⁻¹ s², and an interval t times its root.
         let times = t_95(free).powi(2) * squares / free as f64;
         let (matrix, _) = curve.normal(data);
         let spread = inverse(matrix)?.map(|row| row.map(|part| part * times));
         let half = |slopes: [f64; 3]| dot(&slopes, &product(&spread, &slopes)).max(0.0).sqrt();
         let liquid = curve.log_rate.exp() * curve.onset;
+        // ln D_pL = ln E_c + ln a: its derivatives over onset and log rate are 1 / E_c and 1.
         let ratio = half([1.0 / curve.onset, 1.0, 0.0]).exp();
         let bend_half = half([0.0, 0.0, 1.0]);
         let solid = if straight { CLEAR * deepest } else { 1.0 / curve.bend };
+        // If a bend of zero is within the interval, D_pS has no upper end.
         let high = if straight || bend_half >= curve.bend {
             f64::INFINITY
         } else {

@@ -34,6 +34,8 @@ impl HingeFit {
         }
         let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(0.0, f64::max);
         let (x_size, y_size) = (size(|p| p.0), size(|p| p.1.abs()));
+        // Sums of squares of doses and of micrometres differ by orders of magnitude: in shares of
+        // the largest, none is lost to rounding.
         let scaled = points.iter().map(|&(x, y)| (x / x_size, y / y_size)).collect();
         let fit = Self::of_scaled(scaled).map_err(|wrong| match wrong {
             Wrong::Early(onset) => match line.rising(unit) {
@@ -61,6 +63,8 @@ impl HingeFit {
         let best = pieces.iter().filter_map(Piece::best);
         let best = best.min_by(|a, b| a.squares.total_cmp(&b.squares));
         let Some(best) = best else { return Err(Wrong::Flat { slope: 0.0, half: 0.0 }) };
+        // Student's t for one number: squares exceed the least ones by t² times the variance,
+        // squares / free.
         let excess = t_95(free as usize).powi(2) / free;
         let limit = best.squares * (1.0 + excess);
         if best.onset <= 0.0 {
@@ -74,6 +78,7 @@ impl HingeFit {
             limit,
         };
         fit.slope = fit.range(best.slope, |piece| piece.slopes(limit));
+        // A slope of zero fits as well: the sum of squares without any growth is within the limit.
         if all <= limit || !fit.slope[0].is_finite() {
             let half = fit.slope[2] - best.slope;
             let half = if half.is_finite() { half.max(best.slope) } else { best.slope };

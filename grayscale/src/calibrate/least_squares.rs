@@ -19,16 +19,19 @@ pub(super) fn fitted<T: Copy, const N: usize>(
     for _ in 0..500 {
         let (mut matrix, vector) = normal(&numbers);
         for (i, row) in matrix.iter_mut().enumerate() {
+            // Marquardt (1963): in shares of the diagonal, damping has no unit.
             row[i] *= 1.0 + damping;
         }
         let next = moved(&numbers, product(&inverse(matrix)?, &vector));
         let then = squares(&next);
         if then < left {
+            // Nothing but rounding is left to gain.
             let ended = left - then <= 1e-15 * left;
             (numbers, left) = (next, then);
             if ended {
                 break;
             }
+            // Nearer to Gauss and Newton, which converge fast where the curve is nearly linear.
             damping = (damping / 10.0).max(1e-12);
         } else if damping > 1e9 {
             break;

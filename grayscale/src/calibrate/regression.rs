@@ -37,11 +37,14 @@ impl LineFit {
             points.iter().map(|&(x, y)| of(x - mean_x, y - mean_y)).sum()
         };
         let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
+        // Compared exactly: by rounding, the sum of squares need not be zero.
         if points.iter().all(|point| point.0 == points[0].0) {
             return Err(FitError::TooFewDoses { doses: 1, needed: 2 });
         }
         let slope = xy / xx;
+        // Of sums about the means, the line goes through both means.
         let left = sum(&|x, y| (y - slope * x).powi(2));
+        // Slope and mean take two degrees of freedom.
         let half2 = t_95(points.len() - 2).powi(2) * left / (n - 2.0);
         let r2 = if yy > 0.0 { 1.0 - left / yy } else { 0.0 };
         Ok(Self {

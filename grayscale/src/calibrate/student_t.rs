@@ -29,6 +29,7 @@ pub(super) fn t_95(freedom: usize) -> f64 {
 /// 26.7.4.
 fn share_within(t: f64, freedom: usize) -> f64 {
     let angle = (t / (freedom as f64).sqrt()).atan();
+    // Their θ is atan(t / √ν).
     let (sin, cos) = angle.sin_cos();
     let odd = freedom % 2 == 1;
     // Powers of the cosine from 1 (odd) or 0 (even) up to `freedom - 2`.

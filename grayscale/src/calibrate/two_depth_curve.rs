@@ -27,6 +27,7 @@ impl TwoDepthCurve {
         let onset = mean_x - mean_y / rate;
         // The curve has to reach the lowest dose.
         let lowest = data.iter().map(|point| point.0).fold(f64::INFINITY, f64::min);
+        // 1 + k a (E - E_c) must be above zero at the lowest dose.
         let onset = if bend > 0.0 { onset.min(lowest + 0.5 / (bend * rate)) } else { onset };
         (rate > 0.0).then_some(Self { onset, log_rate: rate.ln(), bend })
     }
@@ -38,6 +39,7 @@ impl TwoDepthCurve {
         let u = rate * (dose - self.onset);
         let ku = k * u;
         let grows = 1.0 / (1.0 + ku);
+        // Near a straight line the quotients lose their digits: their series has them.
         let (depth, over_bend) = if ku.abs() < 1e-4 {
             (u * (1.0 - ku / 2.0 + ku * ku / 3.0), u * u * (-0.5 + 2.0 / 3.0 * ku))
         } else {
@@ -77,6 +79,7 @@ impl TwoDepthCurve {
             |curve, step: [f64; 3]| Self {
                 onset: curve.onset + step[0],
                 log_rate: curve.log_rate + step[1],
+                // A negative bend would be a solid that adds light.
                 bend: (curve.bend + step[2]).max(0.0),
             },
         )

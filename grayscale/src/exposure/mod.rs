@@ -198,6 +198,7 @@ impl Exposure {
     /// material was not measured at.
     pub fn doubts(&self, thicknesses: impl Iterator<Item = Length>) -> Vec<String> {
         let Rule::Resin(curing) = &self.rule else { return Vec::new() };
+        // Thicknesses without a dose are errors elsewhere.
         thicknesses.flat_map(|um| curing.white(um)).for_each(|dose| curing.doses.see(dose));
         curing.lamp_doubt.clone().into_iter().chain(curing.doses.doubt("layers")).collect()
     }

@@ -255,7 +255,9 @@ impl Composition {
         let absorptivity =
             of.absorptivity.as_ref().map_or_else(|| mean(&self.peaks, |_| 1.0, at_peak), number);
         Absorber {
+            // 1 mol/m³ is a thousandth of a mol a litre.
             concentration: of.concentration.value.mol_per_m3() / 1000.0,
+            // 1 m²/mol is 10 l/(mol cm), and tables are to base 10.
             extinction: absorptivity * 10.0 * std::f64::consts::LN_10,
         }
     }
@@ -264,6 +266,8 @@ impl Composition {
     /// absorbs at the surface, in the mean.
     fn wavelength(&self) -> Length {
         let of_peaks = || {
+            // At the surface each peak has all of its light, of which the photoinitiator takes a
+            // part as its absorptivity.
             let absorbed = |peak: &Peak| peak.photoinitiator.value.m2_per_mol();
             Length::from_um(mean(&self.peaks, absorbed, |peak| peak.wavelength.value.um()))
         };

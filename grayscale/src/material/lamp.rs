@@ -45,6 +45,8 @@ impl Material {
         let before = measured.light()?.ok_or(MaterialError::NoLampOfGray)?.mw_per_cm2();
         let rise = measured.dimmed_lamp.as_ref().map(|lines| lines.critical_dose.rise.number());
         if let Some(gray) = &mut self.gray {
+            // 002 eq. 36 is a line over W/cm². Of a level, which passes G of the light, E_c moves
+            // by G times as much: that is a change of the rise over G.
             let watts = (lamp.mw_per_cm2() - before) / 1000.0;
             let line = &mut gray.critical_dose;
             line.rise = Quantity::of(line.rise.number() + rise.unwrap_or(0.0) * watts);

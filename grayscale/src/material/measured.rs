@@ -50,6 +50,8 @@ impl<T: Quantity> GivenRange<T> {
     /// Returns whether a quantity is within, to rounding.
     pub fn holds(&self, one: T) -> bool {
         let (low, high) = (self.from.number(), self.to.number());
+        // A dose that a material states as its end must not count as outside for coming back from a
+        // rounded time.
         (low * (1.0 - ROUNDING)..=high * (1.0 + ROUNDING)).contains(&one.number())
     }
 

@@ -177,6 +177,7 @@ impl Material {
     /// # Errors
     /// Returns an error if a number of the spread is impossible.
     pub fn light(&self) -> Result<Option<Intensity>, MaterialError> {
+        // 001 eq. 5 has the light of one pixel alone: in a wide field, those around add theirs.
         let gain = self.spread()?.map_or(1.0, |spread| spread.field_gain());
         let wide = |light: f64| Intensity::from_mw_per_cm2(light * gain);
         Ok(self.intensity.as_ref().map(|light| wide(light.value.mw_per_cm2())))
@@ -200,6 +201,7 @@ impl Material {
     /// Returns an error if it is not above zero.
     pub fn gamma(&self) -> Result<f64, MaterialError> {
         let gamma = self.gamma.as_ref().map_or(1.0, |gamma| gamma.value);
+        // With an exponent of zero or less, black would be as bright as white, or brighter.
         if gamma > 0.0 && gamma.is_finite() { Ok(gamma) } else { Err(MaterialError::Gamma) }
     }
 
@@ -225,6 +227,7 @@ impl Material {
             Some(depth) => depth.value,
             None => self.working_curve()?.ok_or(MaterialError::NoWorkingCurve)?.penetration_depth(),
         };
+        // 002 figure 62: D_p does not follow the lamp.
         let stays = StraightLine { at_zero: depth, rise: Length::default() };
         let lines = IntensityLines::new(lines.critical_dose.line(), stays);
         lines.map(Some).map_err(of("dimmed-lamp"))

@@ -30,6 +30,7 @@ pub(super) fn mean(
 ) -> f64 {
     let weights = peaks.iter().map(|peak| peak.share.value * weight(peak));
     let sum: f64 = weights.clone().zip(peaks).map(|(weight, peak)| weight * of(peak)).sum();
+    // Shares need not sum to one.
     sum / weights.sum::<f64>()
 }
 

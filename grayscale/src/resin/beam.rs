@@ -30,6 +30,7 @@ impl GaussianBeam {
     /// Returns the share of the light, and so of the dose, that arrives at a
     /// distance from the centre (002 eq. 41 and 42).
     pub fn share(&self, y: Length) -> GrayLevel {
+        // The exponent has 2 where a standard deviation would have 1/2: W_o is two of them.
         let share = (-2.0 * (y.um() / self.width.um()).powi(2)).exp();
         GrayLevel::clamped(share)
     }
@@ -58,6 +59,7 @@ impl GaussianBeam {
         let ratio = peak.mj_per_cm2() / critical.mj_per_cm2();
         // NaN also ends here.
         let log = if ratio > 1.0 { ratio.ln() } else { 0.0 };
+        // Where the dose of eq. 42 falls to E_c, y² = W_o² ln(E/E_c) / 2, and the line is 2 y wide.
         Length::from_um(self.width.um() * (2.0 * log).sqrt())
     }
 }

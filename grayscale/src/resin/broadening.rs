@@ -17,6 +17,7 @@ pub fn cure_width_of_square(cured: Length, nominal: Length) -> Length {
 ///
 /// It is zero if edges grow before anything cures in depth, where eq. 61 is below zero.
 pub fn broadening_depth(depth: &dyn CureModel, width_critical: Dose) -> Length {
+    // 002 eq. 61 is the cure depth (eq. 30) of the dose at which edges begin to grow.
     depth.depth(width_critical)
 }
 

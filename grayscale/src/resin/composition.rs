@@ -74,6 +74,7 @@ impl Suspension {
     /// Returns the attenuation `1/D_p = 1/l_sc + (1 - Φ)(c_P ε_P + c_D ε_D)`, for
     /// each centimetre (002 eq. 56 and 57).
     fn attenuation(&self) -> f64 {
+        // Ceramic scatters and does not absorb: of 002 eq. 56, the term of the ceramic is zero.
         let scattered = self.scattering_length.map_or(0.0, |length| UM_PER_CM / length.um());
         let absorbed = self.photoinitiator.attenuation() + self.dye.attenuation();
         scattered + (1.0 - self.ceramic) * absorbed
@@ -89,6 +90,7 @@ impl Suspension {
     /// `I_sc`).
     pub fn critical_dose(&self, inhibition: &Inhibition) -> Dose {
         let initiator = self.photoinitiator.attenuation();
+        // The bracket of 002 eq. 58, whose numerator is the attenuation of eq. 57.
         let path = self.attenuation() / (initiator * initiator);
         self.dose_over(inhibition, path)
     }
@@ -105,6 +107,7 @@ impl Suspension {
     fn dose_over(&self, inhibition: &Inhibition, path: f64) -> Dose {
         let taken = inhibition.radicals_per_inhibitor * inhibition.inhibitor
             + inhibition.radicals_per_dye * self.dye.concentration;
+        // hν of 002 eq. 58, for a mole of photons.
         let joules_per_mole = MOLAR_PHOTON / (inhibition.wavelength.um() * 1e-6);
         // mol/l times J/mol times cm are mJ/cm².
         Dose::from_mj_per_cm2(taken * joules_per_mole / inhibition.radicals_per_photon * path)

@@ -74,6 +74,7 @@ impl CureWidth {
     /// Returns the line of features of any size.
     pub fn at(&self, feature_size: Length) -> WidthLine {
         let next = self.lines.partition_point(|line| line.feature_size < feature_size);
+        // Beyond the measured sizes nothing is known: the line of the nearest size holds.
         let (low, high) = match (next.checked_sub(1), self.lines.get(next)) {
             (Some(low), Some(&high)) => (self.lines[low], high),
             (None, Some(&only)) => return WidthLine { feature_size, ..only },
@@ -104,6 +105,7 @@ impl CureWidth {
     pub fn exposed_size(&self, dose: Dose, cured_size: Length) -> Length {
         let wanted = cured_size.um();
         let [mut low, mut high] = [0.0, wanted.max(0.0)];
+        // Edges grow outwards, so that no exposed size is larger than the cured one.
         let is_too_large =
             |size: f64| size + 2.0 * self.width(dose, Length::from_um(size)).um() > wanted;
         // As many halves as a number has digits.
@@ -124,6 +126,7 @@ impl CureWidth {
     pub fn cured_sizes(&self, dose: Dose) -> Vec<Length> {
         let cured = |line: &WidthLine| line.feature_size.um() + 2.0 * line.width(dose).um();
         let mut sizes: Vec<f64> = self.lines.iter().map(cured).collect();
+        // A small feature that grows much may cure larger than the next one.
         sizes.sort_by(f64::total_cmp);
         sizes.into_iter().map(Length::from_um).collect()
     }

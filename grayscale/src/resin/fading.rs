@@ -42,7 +42,10 @@ impl FadingLight {
 
     /// Returns the critical doses that an exposure brings to the surface.
     pub fn share(&self, gray: GrayLevel, time: ExposureTime) -> f64 {
+        // 002 eq. 34 and 27: a gray level passes its share of the light.
         let dose = self.light * time * gray;
+        // Doses of different levels have different critical ones (002 eq. 40): as shares of their
+        // own they can be added.
         dose.mj_per_cm2() / self.curve.at(gray).critical_dose().mj_per_cm2()
     }
 

@@ -13,6 +13,7 @@ pub struct OpticalDensity(f64);
 impl OpticalDensity {
     /// Returns the density `od` if it is zero or more.
     pub fn new(od: f64) -> Option<Self> {
+        // A filter passes no more light than it gets.
         (od >= 0.0 && od.is_finite()).then_some(Self(od))
     }
 

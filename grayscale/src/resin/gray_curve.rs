@@ -95,6 +95,7 @@ impl IntensityLines {
     pub fn under(&self, lamp: Intensity) -> GrayCurve {
         let watts = watts_per_cm2(lamp);
         GrayCurve(ParameterLines {
+            // A line a + b I over I = G I_0 is a + (b I_0) G over the gray level.
             critical_dose: self.0.critical_dose.over(watts),
             penetration_depth: self.0.penetration_depth.over(watts),
         })
@@ -156,6 +157,7 @@ impl CureModel for GrayCurve {
         let [mut low, mut high] = [0.0, 1.0];
         loop {
             let middle = f64::midpoint(low, high);
+            // No number lies between two neighbours: their midpoint is one of them.
             if middle <= low || middle >= high {
                 return Ok(GrayLevel::clamped(high));
             }

@@ -51,6 +51,7 @@ pub trait CureModel: fmt::Debug + Send + Sync {
         if depth.um() == 0.0 {
             return Ok(GrayLevel::BLACK);
         }
+        // 002 eq. 34: the gray level is the share of white's dose.
         Ok(GrayLevel::clamped(dose.mj_per_cm2() / white.mj_per_cm2()))
     }
 }
@@ -78,6 +79,7 @@ impl DepthRange {
         if !(depth.um() >= 0.0 && depth.um().is_finite()) {
             return Err(CureError::NotADepth(depth));
         }
+        // Zero needs no light in any model.
         let within = depth >= self.from && self.to.is_none_or(|to| depth <= to);
         if within || depth.um() == 0.0 {
             Ok(())

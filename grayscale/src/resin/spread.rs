@@ -59,6 +59,8 @@ impl Spread {
         let sigma_px = self.sigma.um() / pixel.um();
         // From two pixels on the sum is the integral to the last bit.
         let line = if sigma_px < 2.0 {
+            // Below two pixels of spread, the twentieth neighbour has less than exp(-45) of the
+            // light.
             let pairs = (1..20).map(|x| (-0.5 * (f64::from(x) / sigma_px).powi(2)).exp());
             1.0 + 2.0 * pairs.sum::<f64>()
         } else {

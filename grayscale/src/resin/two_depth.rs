@@ -96,6 +96,8 @@ impl CureModel for TwoDepth {
             return Ok(Dose::default());
         }
         let [liquid, solid] = [self.liquid_depth.um(), self.solid_depth.um()];
+        // exp(x) - 1 in one step, as the logarithm above: for an almost clear solid x is far below
+        // rounding of 1.
         let above = solid / liquid * (depth.um() / solid).exp_m1();
         let dose = self.critical_dose.mj_per_cm2() * (above + 1.0);
         if dose.is_finite() {

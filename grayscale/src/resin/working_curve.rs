@@ -63,9 +63,12 @@ impl CureModel for WorkingCurve {
 
     fn dose(&self, depth: Length) -> Result<Dose, CureError> {
         self.depths().check(depth)?;
+        // The equation would give E_c, where resin just gels. Nothing is wanted, so that no light
+        // is needed.
         if depth.um() == 0.0 {
             return Ok(Dose::default());
         }
+        // 002 eq. 29, solved for the dose at the surface: E = E_c exp(C_d / D_p).
         let times = (depth.um() / self.penetration_depth.um()).exp();
         let dose = self.critical_dose.mj_per_cm2() * times;
         if dose.is_finite() {
