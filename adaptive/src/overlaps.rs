@@ -183,6 +183,7 @@ impl<'a> Overlaps<'a> {
         let slab = self.rows.slab_of(self.part, bottom_um);
         let rows = &self.rows.slabs[slab];
         let z = [bottom_um, bottom_um + planes[planes.len() - 1]];
+        // Parts of a slab's height are compared in one operation, and most rows are left out by it.
         let parts = Parts::of(z, self.rows.heights(self.part, slab));
         let is_met = |row: &OverlapRow| row.parts.meets(parts);
         if !rows.iter().any(is_met) {
@@ -203,6 +204,7 @@ impl<'a> Overlaps<'a> {
             }
             self.part.rise(&cuts, first as u32, rows.len(), planes, RowsAdd::Differences)
         };
+        // Both ways add the same chunks in the same order.
         if lines.items().len() < MANY_LINES {
             return rows.chunks(ROWS_PER_CHUNK).enumerate().map(of_chunk).reduce(Rise::and);
         }

@@ -80,6 +80,7 @@ impl Surface {
     /// Returns the change of a value that goes from `a` to `b`, over the share passed.
     fn integral(&self, [a, b]: [f64; 2]) -> Cubic {
         let ([d, e], dx) = (self.density, self.extent);
+        // ∫ (a + rise s)(d + thickening s) dx ds, power by power of the share s.
         let (rise, thickening) = (b - a, e - d);
         [dx * a * d, dx * (a * thickening + rise * d) / 2.0, dx * rise * thickening / 3.0]
     }

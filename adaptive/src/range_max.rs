@@ -25,6 +25,8 @@ impl RangeMax {
         while self.levels.len() <= level {
             self.levels.push(vec![0.0; self.levels[0].len()]);
         }
+        // Two ranges of the same power of two cover any range; that they overlap does not matter to
+        // a greatest number.
         for place in [range.start, range.end - (1 << level)] {
             let known = &mut self.levels[level][place];
             *known = known.max(number);
@@ -38,6 +40,7 @@ impl RangeMax {
             let Some(lower) = self.levels.last_mut() else { return upper };
             for (place, number) in upper.into_iter().enumerate().filter(|(_, number)| *number > 0.0)
             {
+                // A number of 2^k places is one of both halves.
                 for place in [place, place + half] {
                     lower[place] = lower[place].max(number);
                 }

@@ -46,10 +46,12 @@ impl Section {
         let Self { plane_um, bottom_area, change } = *self;
         let top_area = (bottom_area + change.area).max(0.0);
         let (lost, gained) = (change.lost.max(0.0), change.gained.max(0.0));
+        // The last layer may end above the part, whose section is swept up as well.
         let above = top_area * (thickness_um - plane_um);
         SweptLayer {
             bottom_um,
             thickness_um,
+            // The part is the swept section, plus what that lacks, less what it has too much.
             volume_mm3: (top_area * plane_um + lost - gained).max(0.0) / 1000.0,
             lost_mm3: lost / 1000.0,
             gained_mm3: (gained + above) / 1000.0,

@@ -60,6 +60,7 @@ impl Thicknesses {
 
     /// Returns true if layers can fill a height, in steps, exactly.
     pub(crate) fn can_fill(&self, steps: usize) -> bool {
+        // As few layers as the thickest allow fill it, unless even their thinnest are too thick.
         steps.div_ceil(*self.steps.end()) * self.steps.start() <= steps
     }
 
@@ -76,6 +77,7 @@ impl Thicknesses {
         if self.all_fill_from().is_some_and(|from| room >= self.steps.end() + from) {
             return self.steps().collect();
         }
+        // A choice must not make the end worse than it has to be.
         let beyond = self.least_beyond(room);
         let leads_on = |step: &usize| match room.checked_sub(*step) {
             Some(rest) => self.least_beyond(rest) == beyond,

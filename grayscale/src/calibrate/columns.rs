@@ -144,6 +144,7 @@ impl DoseColumn {
         let (dose, wanted) = match self.light {
             None => (Dose::from_mj_per_cm2(number), "a dose from 1e-6 to 1e9 mJ/cm2"),
             Some(light) => (
+                // 002 eq. 27: E = I t.
                 light * ExposureTime::from_ms(number),
                 "a time that makes a dose from 1e-6 to 1e9 mJ/cm2 under that light",
             ),

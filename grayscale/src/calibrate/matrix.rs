@@ -14,6 +14,7 @@ pub(super) fn inverse<const N: usize>(matrix: [[f64; N]; N]) -> Option<[[f64; N]
     // Gauss-Jordan elimination: a positive matrix needs no exchange of rows.
     for i in 0..N {
         let pivot = left[i][i];
+        // Scaled, the diagonal is one: a pivot that small is what rounding leaves of zero.
         if pivot.is_nan() || pivot < 1e-13 {
             return None;
         }

@@ -135,10 +135,12 @@ pub fn depth_points(
             GrayLevel::new(level).ok_or_else(|| gray.impossible(row, wanted))
         })?;
         let Some(of_row) = depth.length_or_blank(row)? else { return Ok(Read::Blank) };
+        // A film that did not cure has no depth on the curve, which begins at E_c.
         if of_row.um() <= 0.0 {
             return Ok(Read::Nothing);
         }
         let point = DepthPoint { gray, dose, depth: of_row };
+        // Fits take the logarithm of the dose that arrives, and black has none.
         if !Dose::PLAUSIBLE.contains(&point.arriving()) {
             return Err(depth.impossible(row, "what so dark a gray level cures"));
         }
@@ -202,6 +204,7 @@ pub fn width_points(
         if is_side && of_row.um() <= 0.0 {
             return Ok(Read::Nothing);
         }
+        // 002 eq. 60: both edges moved.
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
         Ok(Read::Point(WidthPoint { feature_size: side.to_whole_nm(), dose, width }))
     })

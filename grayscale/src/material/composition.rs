@@ -210,6 +210,8 @@ impl ShrinkageNumbers {
         number(monomers, "shrinkage.monomers", "there, with numbers above zero")?;
         let areas = self.spectra.iter().flat_map(|it| [it.before, it.after]);
         number(areas.flatten().all(positive), "areas of shrinkage.spectra", POSITIVE)?;
+        // 002 eq. 54 gives the conversion from spectra: given twice, which one counts would be
+        // open.
         let conversion = self.conversion().ok_or(CompositionError::NoConversion)?;
         number((0.0..=1.0).contains(&conversion), "shrinkage.conversion", "from 0 to 1")
     }
@@ -306,6 +308,7 @@ impl Composition {
         };
         let monomers: Vec<_> = of.monomers.iter().map(monomer).collect();
         let filler = self.ceramic.as_ref().map_or(0.0, |it| it.share.value);
+        // 002 eq. 52, with the filler's share of the volume as FL.
         let groups = shrinkage::groups_of_mixture(&monomers, of.density_g_per_cm3.value, filler);
         Some(shrinkage::volume_shrinkage(of.conversion()?, groups))
     }
@@ -362,6 +365,7 @@ fn given<T: Quantity>(value: T, source: String) -> Given<T> {
 
 /// A number to six digits: models are less exact than that.
 fn rounded(number: f64) -> f64 {
+    // Written and read back, the file has the digits that are shown.
     format!("{number:.5e}").parse().expect("a written number reads back")
 }
 

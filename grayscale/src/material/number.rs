@@ -98,6 +98,7 @@ pub struct Constant {
 
 /// Writes a number to the last bit, with an exponent if it would be long otherwise.
 fn exact(number: f64) -> String {
+    // Both ways read back as the same number; long rows of zeros are hard to read.
     let plain = number == 0.0 || (1e-6..1e15).contains(&number.abs());
     if plain { number.to_string() } else { format!("{number:e}") }
 }

@@ -42,6 +42,8 @@ impl Lens {
         let object = self.object.value.um() - half;
         // The curved side first; vergences in glass, then in air behind the plane side.
         let in_glass = (index - 1.0) / radius - 1.0 / object;
+        // By the plane side, distances in glass shorten to their part in air, less the thickness
+        // that lies before.
         let behind_plane = (index / in_glass - thickness) / index;
         let image = behind_plane + half;
         if !(image > half && image.is_finite()) {

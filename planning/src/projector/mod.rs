@@ -134,6 +134,8 @@ impl Projector {
             return light.value;
         }
         let rays = self.rays.as_ref().expect("a checked projector has light");
+        // In a wide field each mirror lights as much glass as a pitch squared, wherever its light
+        // spreads.
         let pitch_cm = self.pitch.value.mm() / 10.0;
         Intensity::from_mw_per_cm2(rays.of_mirror().mw() / (pitch_cm * pitch_cm))
     }
@@ -181,6 +183,7 @@ impl Rays {
     /// Returns the power of all rays of a mirror.
     pub fn of_mirror(&self) -> Power {
         let count = f64::from(self.points) * f64::from(self.directions);
+        // Points and directions are counted along each axis.
         Power::from_mw(count * count * self.power.value.mw())
     }
 }
@@ -194,6 +197,7 @@ impl GrayLight {
             return share;
         }
         let (low, low_share) = self.shares[after - 1];
+        // A checked table begins at black and ends at white: a level has one on either side.
         let along = f64::from(level - low) / f64::from(high - low);
         low_share + along * (share - low_share)
     }

@@ -27,6 +27,7 @@ impl Grid {
 
     /// Returns the least odd grid that holds a rectangle: the middle of one column is on the axis.
     pub(super) fn around([width, height]: [Length; 2], pitch: Length) -> Self {
+        // An odd number, so that the middle of a column lies on the axis.
         let count = |side: Length| 2 * (side.um() / pitch.um() / 2.0).ceil() as usize + 1;
         Self { columns: count(width), rows: count(height), pitch_um: pitch.um() }
     }
@@ -83,6 +84,7 @@ impl HeightMap {
                 .iter()
                 .any(|&um| um >= most - 1e-6)
         };
+        // Twice the distance, which is whole for odd and even numbers of rows.
         let from_middle = |row: &usize| (2 * row + 1).abs_diff(grid.rows);
         (0..grid.rows).filter(is_highest).min_by_key(from_middle).unwrap_or(grid.rows / 2)
     }

@@ -64,11 +64,13 @@ impl PartColumns {
     fn crossings(&self, grid: &Grid) -> Result<Vec<Vec<Crossing>>, TargetError> {
         let (min, max) = (self.facets.min(), self.facets.max());
         let [middle_x, middle_y] = [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
+        // Parts stand with the middle of their box on the optical axis.
         let column_of = |x_mm: f64| (x_mm - middle_x) * 1000.0 / grid.pitch_um;
         let row_of = |y_mm: f64| (middle_y - y_mm) * 1000.0 / grid.pitch_um;
         let [half_columns, half_rows] =
             [grid.columns, grid.rows].map(|count| (count as f64 - 1.0) / 2.0);
         let mut rows = vec![Vec::new(); grid.rows];
+        // A file of millions of facets over each other must not take memory without end.
         let mut room = MOST_CROSSINGS * grid.count();
         self.facets.for_each(|facet, _| {
             let corners = facet
@@ -88,11 +90,14 @@ impl PartColumns {
     fn height_of(&self, line: &[Crossing], place: impl Fn() -> Place) -> Result<f64, TargetError> {
         let bottom_um = self.facets.min()[2];
         let above = |z_um: f64| Length::from_um(z_um - bottom_um).to_whole_nm();
+        // Light comes through the glass: resin cures from there up, and never begins above it.
         if line[0].z_um > bottom_um + TOUCHING_UM {
             return Err(TargetError::NotOnGlass { place: place(), from: above(line[0].z_um) });
         }
         let (mut depth, mut top) = (0, line[0].z_um);
         for crossing in line {
+            // The part was left and is entered again. No light cures the upper stretch without the
+            // gap below it.
             if depth == 0 && crossing.z_um > top + TOUCHING_UM {
                 let (from, to) = (above(top), above(crossing.z_um));
                 return Err(TargetError::Overhang { place: place(), from, to });
@@ -121,6 +126,7 @@ fn cross_row(
     let Range { start, end } = first(from[0])..first(to[0]);
     let enters = if is_reversed == is_flipped { 1 } else { -1 };
     for column in (start..end).take(room) {
+        // The same order of ends for both facets at an edge gives both the same height.
         let along = (f64::from(column) - from[0]) / (to[0] - from[0]);
         let z_um = from[1] + along * (to[1] - from[1]);
         crossings.push(Crossing { column, z_um, enters });

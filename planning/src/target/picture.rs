@@ -49,11 +49,13 @@ impl HeightPicture {
     pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
         let pixel = self.scale.pixel.um();
         let [width, height] = [self.picture.columns, self.picture.rows].map(|count| count as f64);
+        // The middle of the picture is on the axis, and its first row has the greatest y.
         let (column, row) = ((x / pixel + width / 2.0).floor(), (height / 2.0 - y / pixel).floor());
         if !((0.0..width).contains(&column) && (0.0..height).contains(&row)) {
             return 0.0;
         }
         let level = self.picture.levels[row as usize * self.picture.columns + column as usize];
+        // Pictures of 8 bits were widened to 16: white is the same.
         f64::from(level) / f64::from(u16::MAX) * self.scale.full.um()
     }
 }

@@ -60,6 +60,7 @@ impl Round {
             |at: usize| grid.x_um(at % grid.columns).hypot(grid.y_um(at / grid.columns)) / step_um;
         let mut rings: Vec<Ring> = Vec::new();
         for (at, &height) in map.heights_um.iter().enumerate() {
+            // Rings are as wide as columns, so that each holds some.
             let ring = distance(at).round() as usize;
             if rings.len() <= ring {
                 rings.resize(ring + 1, Ring::default());
@@ -70,6 +71,8 @@ impl Round {
         let slack = OUT_OF_ROUND * map.highest_um();
         for (at, &height) in map.heights_um.iter().enumerate() {
             let ring = distance(at).round() as usize;
+            // A column lies up to half a ring off, and walls fall within one: heights of two rings
+            // to either side may be its own.
             let near = &heights_um[ring.saturating_sub(2)..(ring + 3).min(heights_um.len())];
             let [least, most] = [(f64::min as fn(f64, f64) -> f64), f64::max]
                 .map(|of| near.iter().copied().reduce(of).unwrap_or(0.0));

@@ -166,6 +166,7 @@ impl Shapes {
     /// lenses, walls to what is beside channels.
     pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
         let lens = self.lens.iter().map(|lens| self.lens_height_um(lens, x, y));
+        // Shapes unite: the highest counts, and channels cut last.
         let whole = lens.fold(self.base_um(x, y), f64::max);
         let in_it = self.channels.iter().filter(|channels| channels.hold(x, y));
         in_it.map(|channels| channels.floor.um()).fold(whole, f64::min)

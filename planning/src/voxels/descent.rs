@@ -117,6 +117,7 @@ impl Descent<'_> {
         let images = &self.images[first - self.first_image];
         let near_surface = NEAR_SURFACE * images.wanted.dense_count();
         let a_layer = tile * (2 * images.wanted.dense_count() + BYTES_PLANNED * near_surface);
+        // Layers ahead and below are in memory as well as the settled ones.
         let layers = memory.saturating_sub(doses) / a_layer.max(1);
         let others = setting.window.ahead + setting.tail;
         let settled = usize::try_from(layers).unwrap_or(usize::MAX).saturating_sub(others);
@@ -143,6 +144,7 @@ impl Descent<'_> {
         let setting = self.setting;
         let images: Vec<&LayerImages> = self.images.iter().collect();
         let mut lights = setting.lights[first..reached].to_vec();
+        // The layers that follow are planned later: only what falls through to them counts now.
         lights[end - first..].iter_mut().for_each(|dark| dark.own = 0.0);
         let at = first - self.first_image;
         let reach = setting.blur.radius().max(setting.rules.reach());
@@ -159,6 +161,8 @@ impl Descent<'_> {
         let mut plans = std::mem::take(&mut self.plans);
         for turn in 0..4 {
             let across = setting.grid.across();
+            // A chessboard of four colours: tiles of one colour lie a whole tile apart, farther
+            // than light spreads.
             let has_turn = |tile: usize| tile / across % 2 * 2 + tile % across % 2 == turn;
             let now: Vec<usize> = tiles.iter().copied().filter(|&tile| has_turn(tile)).collect();
             let window = PlannedWindow {
@@ -181,6 +185,7 @@ impl Descent<'_> {
                 has_min_level: setting.has_min_level,
             };
             let done: Vec<_> = now.par_iter().map(|&tile| (tile, window.plan(tile))).collect();
+            // In the order of tiles: sums and plans are the same on any number of threads.
             for (tile, result) in done {
                 self.search.add(&result.progress, result.unplanned);
                 plans[tile] = Some(result.plan);
@@ -332,6 +337,7 @@ fn dense<V: Copy + PartialEq>(values: &[V], width: usize, side: usize, outside: 
 fn targets(wanted: &Tiled<u8>, white: &Tiled<f32>) -> Tiled<u8> {
     let tile = |(wanted, white): (&Tile<u8>, &Tile<f32>)| match (wanted, white) {
         (Tile::Flat(0), _) => Tile::Flat(0),
+        // 001 eq. 13, for the light of the part as it is.
         (Tile::Flat(_), Tile::Flat(dose)) => Tile::Flat(u8::from(*dose >= 1.0)),
         (Tile::Flat(_), Tile::Dense(doses)) => {
             let targets: Box<[u8]> = doses.iter().map(|&dose| u8::from(dose >= 1.0)).collect();

@@ -42,17 +42,15 @@ impl Levels {
         let nearest = self.model.level_of(light);
         // A light that is a level's but for its last bits stays that level.
         let enough = self.model.of_level(nearest) >= light - 1e-6;
+        // Rounding down could leave a target just short of its dose.
         self.without_dim(if enough { nearest } else { nearest.saturating_add(1) })
     }
 
     fn without_dim(&self, level: u8) -> u8 {
         match level {
             dim if dim < self.least => {
-                if 2.0 * self.light(dim) < self.least_light() {
-                    0
-                } else {
-                    self.least
-                }
+                // The nearer of black and the least level, by light and not by level.
+                if 2.0 * self.light(dim) < self.least_light() { 0 } else { self.least }
             }
             level => level,
         }

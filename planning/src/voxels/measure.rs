@@ -23,6 +23,8 @@ impl VoxelTally {
             (&mut self.dimmer, 1.0 - LIGHT_OFF),
             (&mut self.brighter, 1.0 + LIGHT_OFF),
         ];
+        // Every dose is linear in the light: a lamp that is off by a share needs no doses of its
+        // own.
         for (counts, light) in cases {
             counts.add(voxel, dose * light >= 1.0, count);
         }
@@ -31,6 +33,7 @@ impl VoxelTally {
         let step = step.min(DoseHistogram::STEPS - 1);
         if voxel.wanted {
             self.doses.wanted[step] += count;
+        // Resin that no light reaches is without end.
         } else if dose > 0.0 {
             self.doses.other[step] += count;
         }

@@ -160,21 +160,26 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetti
     let blur = Blur::new(sigma);
     let around = options.around.map_or(blur.radius(), |around| around as usize);
     let [width, height] = image.map(|side| side + 2 * around);
+    // The last page was exposed last and lies nearest to the light.
     let from_light: Vec<LayerTime> = pages.times.iter().rev().copied().collect();
     let lights = light.layers(dpi, &from_light);
     let passed = lights.iter().skip(1).map(|layer| layer.passed).fold(0.0, f64::max);
     let window = options.window.unwrap_or_else(|| {
+        // Light that has passed n layers is down to passed^n (001 eq. 2).
         let ahead = (LEFT.ln() / passed.ln()).ceil().clamp(4.0, MOST_AHEAD as f64) as usize;
         Window { settled: WINDOW - ahead, ahead }
     });
     // As far as the highest dose that white light can make stays above the critical dose.
     let own = lights.iter().map(|layer| layer.own).fold(0.0, f64::max) * blur.sum();
+    // All layers white without end: the geometric series of own passed^n.
     let highest = own / (1.0 - passed);
     let tail = (highest.max(1.0).ln() / -passed.ln()).ceil().clamp(0.0, MOST_TAIL as f64) as usize;
+    // At four standard deviations a pixel's light is down to exp(-8), a three-thousandth.
     let near = (4.0 * sigma).ceil() as usize;
     let layers = (window.settled + window.ahead + tail).min(lights.len());
     let longest = width.max(height);
     let is_small = longest * longest * layers <= ONE_PIECE;
+    // Sixteen standard deviations make the overlap on both sides half of a tile.
     let side = if is_small { longest } else { LEAST_SIDE.max((16.0 * sigma) as usize) };
     let (least, short_price) = match options.objective {
         VoxelObjective::Wrong => (1.0 + options.margin, 1.0),

@@ -34,6 +34,8 @@ impl SearchSums {
         let mut left = 0.0;
         let looks = self.gaps.iter().zip(&self.left).zip(&self.iterations);
         let share = |((gap, done), &iteration): ((&f64, &f64), &usize)| {
+            // Blocks end after different numbers of looks. An ended block still counts with the gap
+            // that it left.
             let all = gap + left;
             left += done;
             GapAt { iteration, gap: if self.unplanned > 0.0 { all / self.unplanned } else { 0.0 } }

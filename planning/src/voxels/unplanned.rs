@@ -22,6 +22,7 @@ pub(crate) fn price_unplanned(
         let rect = grid.tile(tile);
         let of_all = setting.rules.role_of_all(images, at, &rect);
         if let (Tile::Flat(0.0), Tile::Flat(dose), Some(role)) =
+            // Voxels that are alike in dose and role have one slope.
             (&*prices, &doses.tiles[tile], of_all)
         {
             *prices = Tile::Flat(slope(&setting.terms, role, *dose));
@@ -73,6 +74,8 @@ fn price_row(terms: &Terms<f32>, roles: &[Role], doses: &[f32], prices: &mut [f3
 /// Returns by how much a voxel's cost grows with its dose.
 fn slope(terms: &Terms<f32>, role: Role, dose: f32) -> f32 {
     let bounds = terms.price_bounds(role);
+    // Any price between the slopes at a voxel's dose gives a bound; the slope itself gives the best
+    // one there (`Problem::bound`).
     if dose < terms.aim(role) { bounds.low } else { bounds.high }
 }
 
