@@ -1,6 +1,8 @@
 //! The dithering stage: gray layers to dots.
 
-use lamp_stack::{GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, map_in_order};
+use lamp_stack::{
+    DitherRecord, GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, map_in_order,
+};
 use thiserror::Error;
 
 use crate::diffusion::{FLOYD_STEINBERG, SIERRA_LITE};
@@ -78,7 +80,7 @@ pub fn dither_passing<E: From<DitherError> + Send>(
 fn dither_layer(mut layer: Layer, method: DitherMethod) -> Result<Layer, DitherError> {
     if let Image::Gray(gray) = &*layer.image {
         layer.image = dither_image(gray, method, layer.info.index)?.into();
-        layer.info.other.insert("dither".to_owned(), method.name().into());
+        layer.info.set_record(&DitherRecord(method.name().to_owned()));
     }
     Ok(layer)
 }

@@ -6,8 +6,8 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, FadingLight, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, SummedLine, excess};
 use lamp_slicer::{
-    Axis, Fill, LayerHeights, LayerLevels, Part, PixelGrid, Placement, SHORT_PX, SectionOptions,
-    Shading, SliceOptions, Slices, Units, section,
+    Axis, Fill, LayerHeights, LayerLevels, Part, PixelGrid, Placement, SectionOptions, Shading,
+    SliceOptions, Slices, Units, section,
 };
 use lamp_stack::{Catalogued, Dpi, Image, Layer, Length};
 
@@ -233,8 +233,7 @@ fn memory_ranges_and_threads_change_no_pixel() {
 fn what_white_does_not_reach_is_told() {
     let short = |overcure: f64| -> u64 {
         let build = Build { overcure, ..Build::new(plates(), 200.0) };
-        let pixels =
-            |layer: &Layer| layer.info.other.get(SHORT_PX).map_or(0, |n| n.as_u64().unwrap());
+        let pixels = |layer: &Layer| layer.info.slice_record().short_px.unwrap_or(0);
         build.layers(true).0.iter().map(pixels).sum()
     };
     assert_eq!(short(1.0), 0);

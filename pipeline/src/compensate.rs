@@ -10,7 +10,7 @@ use lamp_grayscale::exposure::{LampLight, MeasuredDoses};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime};
 use lamp_offset::{CompensateError, CompensateOptions, Shrinkage, Widths};
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{CompensateRecord, Dpi, Layer, Length};
 use serde::{Deserialize, Serialize};
 
 use crate::documents::{canonical_word, document, is_file};
@@ -158,10 +158,9 @@ struct DoneBefore {
 
 impl DoneBefore {
     fn look_at(&mut self, layer: &Layer) {
-        let Some(page) = layer.info.other.get("compensate") else { return };
-        let by = page["inwards_um"].as_array();
-        self.moved |= by.is_some_and(|by| by.iter().any(|by| by.as_f64() != Some(0.0)));
-        self.enlarged |= page.get("shrinkage").is_some();
+        let Some(page) = layer.info.record::<CompensateRecord>() else { return };
+        self.moved |= page.moves();
+        self.enlarged |= page.shrinkage.is_some();
     }
 
     /// Returns messages about what has now been done twice.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
-use lamp_stack::{Image, Layer, Length, PageInfo};
+use lamp_stack::{Image, Layer, Length, PageInfo, SliceRecord};
 
 use crate::documents::{check_word, input_name, without_digest, word_of};
 use crate::error::Error;
@@ -27,9 +27,6 @@ const SAME_BOX: f64 = 1e-3;
 /// Where contours turn, fewer consecutive rows than this may have more or fewer
 /// transitions in an STL than on the surfaces it was made of.
 const TURNING_ROWS: usize = 4;
-
-/// The key of pages that were taken from the fallback.
-const FALLBACK: &str = "fallback";
 
 /// A part's layers, with gaps bridged if there is a fallback.
 pub(crate) struct Bridged {
@@ -163,7 +160,7 @@ impl Fallback {
         }
         self.borrowed.push(number);
         let mut layer = Layer { info: PageInfo { stack, ..other.info }, ..other };
-        layer.info.other.insert(FALLBACK.to_owned(), true.into());
+        layer.info.set_slice_record(SliceRecord { is_fallback: true, ..SliceRecord::default() });
         Ok(layer)
     }
 }

@@ -47,7 +47,7 @@ pub use names::{Names, stored_name};
 pub use pixel_location::to_nm;
 pub use ranges::ranges;
 pub use recorded_part::RecordedSlicing;
-pub use slice_settings::{Frame, GrayRule, SliceRecord, SliceSettings, Thickness};
+pub use slice_settings::{Frame, GrayRule, SliceSettings, SlicingRecord, Thickness};
 pub use sliced_part::{LayersOfPart, SlicedPart, check_slicing};
 pub use survey::Survey;
 pub use wall_report::{NarrowedWall, WallHead, WallReport};

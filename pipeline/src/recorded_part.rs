@@ -5,7 +5,7 @@ use lamp_stack::StackInfo;
 
 use crate::error::Error;
 use crate::part_file::PartFile;
-use crate::slice_settings::{SliceRecord, SliceSettings};
+use crate::slice_settings::{SliceSettings, SlicingRecord};
 use crate::solid::{Reading, name_of_all};
 use crate::watcher::Watcher;
 
@@ -22,7 +22,7 @@ impl<'a> RecordedSlicing<'a> {
     /// Returns `None` if a stack does not record it.
     pub fn of(stack: Option<&'a StackInfo>) -> Option<Self> {
         let stack = stack?;
-        let SliceRecord { parts: files, settings, .. } = SliceRecord::of(stack)?;
+        let SlicingRecord { parts: files, settings, .. } = SlicingRecord::of(stack)?;
         Some(Self { settings, files, digest: &stack.digest })
     }
 

@@ -9,8 +9,8 @@ use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_machine::{Machine, MachineLimit};
 use lamp_slicer::{
-    Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, SHORT_PX, Shading,
-    SliceError, SliceOptions, Slices,
+    Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, Shading, SliceError,
+    SliceOptions, Slices,
 };
 use lamp_stack::{Layer, Length, PageInfo, Size};
 use serde::Serialize;
@@ -24,7 +24,7 @@ use crate::memory::{available, in_words};
 use crate::overlaps::overlap_text;
 use crate::part_file::{PartFile, paths, recorded};
 use crate::size::short;
-use crate::slice_settings::{GrayRule, SliceRecord, SliceSettings, Thickness};
+use crate::slice_settings::{GrayRule, SliceSettings, SlicingRecord, Thickness};
 use crate::solid::{Reading, SolidSettings, at_part, name_of_all};
 use crate::step::length;
 use crate::watcher::{Importance, Remark, Watcher};
@@ -87,7 +87,7 @@ pub struct Slicing<'a> {
 
 /// What slicing writes on pages beside their images.
 pub struct PageWords {
-    record: SliceRecord,
+    record: SlicingRecord,
     /// The part's name, where it is not its file's.
     part_name: Option<String>,
     exposure: Option<Exposure>,
@@ -131,7 +131,7 @@ impl SliceSettings {
         let mut settings = self.clone();
         settings.exposure.name(exposure.as_ref());
         settings.solid.name();
-        let record = SliceRecord { parts, settings, fallback: None, machine: None };
+        let record = SlicingRecord { parts, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
         let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;
         let uniform = self.uniform_thickness();
@@ -319,8 +319,7 @@ impl Slicing<'_> {
                 let mut counts = self.counts.get();
                 counts.add(&layer.info);
                 self.counts.set(counts);
-                let short = layer.info.other.get(SHORT_PX).and_then(serde_json::Value::as_u64);
-                if let Some(pixels) = short {
+                if let Some(pixels) = layer.info.slice_record().short_px {
                     let [layers, all] = self.short.get();
                     self.short.set([layers + 1, all + pixels]);
                 }

@@ -295,7 +295,7 @@ impl SliceSettings {
 /// What a stack records of how its part was sliced.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub struct SliceRecord {
+pub struct SlicingRecord {
     /// The part's files without their folders, each with its placement, as `PartFile::parse` reads
     /// them.
     pub parts: Vec<String>,
@@ -310,7 +310,7 @@ pub struct SliceRecord {
     pub machine: Option<String>,
 }
 
-impl SliceRecord {
+impl SlicingRecord {
     /// The key of the record in a stack's metadata.
     const KEY: &str = "slice";
 
@@ -397,11 +397,11 @@ mod tests {
                 let settings = settings.clone();
                 let more = fallback.as_ref().map_or("", |_| " --fallback 'b c.stl'");
                 let record =
-                    SliceRecord { parts: parts.clone(), settings, fallback, machine: None };
+                    SlicingRecord { parts: parts.clone(), settings, fallback, machine: None };
                 let mut stack = StackInfo::default();
                 record.write(&mut stack);
                 assert_eq!(stack.commands, [format!("{command}{more}")]);
-                assert_eq!(SliceRecord::of(&stack), Some(record));
+                assert_eq!(SlicingRecord::of(&stack), Some(record));
             }
         }
     }
@@ -410,10 +410,10 @@ mod tests {
     fn a_record_with_a_setting_that_is_not_known_is_none() {
         let mut stack = StackInfo::default();
         let (settings, parts) = (SliceSettings::default(), vec!["a.stl".to_owned()]);
-        SliceRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
-        assert!(SliceRecord::of(&stack).is_some());
-        stack.other[SliceRecord::KEY]["color"] = "red".into();
-        assert_eq!(SliceRecord::of(&stack), None);
+        SlicingRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
+        assert!(SlicingRecord::of(&stack).is_some());
+        stack.other[SlicingRecord::KEY]["color"] = "red".into();
+        assert_eq!(SlicingRecord::of(&stack), None);
     }
 
     #[test]

@@ -103,7 +103,7 @@ pub use planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule};
 pub use read_note::ReadNote;
 pub use section::{Inside, SectionOptions, section};
 pub use section_area::{Trapezoid, section_area};
-pub use slices::{GridRule, SHORT_PX, SliceOptions, Slices};
+pub use slices::{GridRule, SliceOptions, Slices};
 pub use stl::write_stl;
 pub use three_mf::{ModelFault, ThreeMfError};
 pub use trace::{EdgeFacet, FaultyEdge, OpenEnd, StrayBand, Trace, TracedBand};

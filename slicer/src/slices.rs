@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Image, Layer, Length, LevelChange, Mask, PageInfo, StackInfo};
+use lamp_stack::{Dpi, Image, Layer, Length, LevelChange, Mask, PageInfo, SliceRecord, StackInfo};
 use rayon::prelude::*;
 
 use crate::bodies::{
@@ -130,10 +130,6 @@ const MAX_CROSSINGS: f64 = (1 << 25) as f64;
 /// Layers whose levels are chosen together: several times those whose light reaches one, which must be
 /// looked at again.
 const CHOSEN_AT_ONCE: usize = 64;
-
-/// The key of a page's pixels that even white does not cure down to the underside within their
-/// layer, where doses add up.
-pub const SHORT_PX: &str = "short_px";
 
 /// The layers of a part, bottom first.
 ///
@@ -591,7 +587,8 @@ fn choose(light: &PrintThrough, columns: &Columns, first: usize, layers: &mut [L
     for (layer, chosen) in layers.iter_mut().zip(chosen) {
         layer.image = chosen.image.into();
         if chosen.short_px > 0 {
-            layer.info.other.insert(SHORT_PX.to_owned(), chosen.short_px.into());
+            let short_px = Some(chosen.short_px);
+            layer.info.set_slice_record(SliceRecord { short_px, ..SliceRecord::default() });
         }
     }
 }

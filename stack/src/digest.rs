@@ -97,10 +97,10 @@ impl StackInfo {
     /// order, or as a build of several parts, each of one of them.
     pub fn is_made_of(&self, digests: &[String]) -> bool {
         let whole = digest_of_digests(digests.iter().map(String::as_str));
-        let parts = self.other.get("tile").and_then(|tile| tile["parts"].as_array());
-        let is_given = |part: &serde_json::Value| digests.iter().any(|d| part["digest"] == **d);
+        let mut parts = self.built_digests().peekable();
+        let is_given = |part: &str| digests.iter().any(|digest| part == digest);
         (!whole.is_empty() && self.digest == whole)
-            || parts.is_some_and(|parts| !parts.is_empty() && parts.iter().all(is_given))
+            || (parts.peek().is_some() && parts.all(is_given))
     }
 }
 

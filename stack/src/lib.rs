@@ -71,6 +71,7 @@ mod picture_page;
 mod plain_text;
 mod png_page;
 mod png_write;
+mod record;
 mod runs;
 pub mod sets;
 mod shell;
@@ -125,6 +126,10 @@ pub use picture_format::PictureFormat;
 pub use plain_text::PlainText;
 pub use png_write::{
     png_of_layer, write_gray_animation, write_gray_png, write_png_folder, write_rgb_png,
+};
+pub use record::{
+    BuildRecord, BuiltPart, BuiltParts, CompensateRecord, DitherRecord, FixRecord, FixedBand,
+    PageRecord, SliceRecord, StripRecord,
 };
 pub use runs::{Change, Pixel, RunError, RunImage};
 pub use shell::{file_word, quoted, words};

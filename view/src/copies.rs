@@ -1,8 +1,6 @@
 //! Which copy of a build, and of which part, a pixel belongs to.
 
-use lamp_stack::{Orientation, PageInfo};
-use serde::Deserialize;
-use serde_json::Value;
+use lamp_stack::{BuiltPart, Orientation, PageInfo};
 
 /// A copy of a part on a build, as `tile` records it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,46 +36,34 @@ pub(crate) struct InCopy {
     pub(crate) y: u32,
 }
 
-/// The keys of `stack.tile`, or of one of its parts, that place copies.
-#[derive(Deserialize)]
-struct Places {
-    part: Option<String>,
-    part_pixels: [u32; 2],
-    copies: Vec<[i64; 2]>,
-    turns: Option<Vec<String>>,
-}
-
-impl Places {
-    fn placed(self, part: &str) -> Vec<Placed> {
-        let of = self.copies.len();
-        let part = self.part.unwrap_or_else(|| part.to_owned());
-        let turn = |index: usize| {
-            let text = self.turns.as_ref().and_then(|turns| turns.get(index));
-            text.and_then(|text| text.parse().ok()).unwrap_or_default()
-        };
-        let places = self.copies.iter().enumerate();
-        places
-            .map(|(index, &[left, top])| Placed {
-                part: part.clone(),
-                number: index + 1,
-                of,
-                left,
-                top,
-                size: self.part_pixels,
-                turn: turn(index),
-            })
-            .collect()
-    }
+/// Returns the places of a part's copies; `name` is that of an only part.
+fn placed(built: &BuiltPart, name: &str) -> Vec<Placed> {
+    let of = built.copies.len();
+    let part = built.part.as_deref().unwrap_or(name);
+    let turn = |index: usize| {
+        let text = built.turns.get(index);
+        text.and_then(|text| text.parse().ok()).unwrap_or_default()
+    };
+    let places = built.copies.iter().enumerate();
+    places
+        .map(|(index, &[left, top])| Placed {
+            part: part.to_owned(),
+            number: index + 1,
+            of,
+            left,
+            top,
+            size: built.part_pixels,
+            turn: turn(index),
+        })
+        .collect()
 }
 
 impl Copies {
     /// Reads what `tile` records on the first page of a build. Of other stacks there are none.
     pub(crate) fn of(info: &PageInfo) -> Self {
         let Some(stack) = &info.stack else { return Self::default() };
-        let Some(tile) = stack.other.get("tile") else { return Self::default() };
-        let of_parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
-        let places = |value: &Value| serde_json::from_value::<Places>(value.clone()).ok();
-        Self(of_parts.iter().filter_map(places).flat_map(|at| at.placed(&stack.part)).collect())
+        let parts = stack.built_parts().into_iter().flatten().flatten();
+        Self(parts.flat_map(|part| placed(&part, &stack.part)).collect())
     }
 
     /// Returns the copy whose rectangle holds a pixel.
@@ -104,7 +90,7 @@ impl Placed {
 #[cfg(test)]
 mod tests {
     use lamp_stack::{MaskBuilder, StackInfo};
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     use super::*;
 

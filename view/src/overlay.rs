@@ -2,10 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_stack::{Mask, MaskBuilder, Op};
-use serde_json::Value;
-
-use lamp_stack::PageInfo;
+use lamp_stack::{FixRecord, FixedBand, Mask, MaskBuilder, Op, PageInfo};
 
 /// What is laid over a layer's picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -97,13 +94,9 @@ pub(crate) fn bands(rows: &[u32]) -> Vec<Range<u32>> {
 
 /// Returns the bands that `fix` changed, as it records them on a page.
 pub(crate) fn fixed_bands(info: &PageInfo) -> Vec<Range<u32>> {
-    let bands = info.other.get("fix").and_then(|fix| fix["bands"].as_array());
-    let band = |band: &Value| {
-        let number = |key: &str| u32::try_from(band[key].as_u64()?).ok();
-        let first = number("row")?;
-        Some(first..first.saturating_add(number("rows")?))
-    };
-    let mut bands: Vec<_> = bands.into_iter().flatten().filter_map(band).collect();
+    let bands = info.record().map(|fix: FixRecord| fix.bands);
+    let band = |band: FixedBand| band.row..band.row.saturating_add(band.rows);
+    let mut bands: Vec<_> = bands.into_iter().flatten().map(band).collect();
     bands.sort_by_key(|band| band.start);
     bands
 }

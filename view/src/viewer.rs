@@ -4,7 +4,7 @@ use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use lamp_stack::{Frame, Image, Mask};
+use lamp_stack::{FixRecord, Frame, Image, Mask};
 use serde_json::{Value, json};
 
 use crate::background::{Background, Progress};
@@ -149,7 +149,7 @@ impl Viewer {
         match overlay {
             Overlay::Below | Overlay::New => true,
             Overlay::Added | Overlay::Missing => self.partners.are_comparable(),
-            Overlay::Fixed => any(&|header| header.info.other.contains_key("fix")),
+            Overlay::Fixed => any(&|header| header.info.has_record::<FixRecord>()),
             Overlay::Stray => any(&|header| !header.info.stray_rows.is_empty()),
             Overlay::Findings => self.findings.is_wanted(),
         }

@@ -11,7 +11,7 @@ use lamp_planning::cure_section::{
     CureRule, CureSection, CureSectionError, SectionLine, SectionPlane, ShownSection,
 };
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::{Length, StackInfo};
+use lamp_stack::{CompensateRecord, DitherRecord, Length, StackInfo};
 
 use crate::args::solid::part_file;
 use crate::endings::{PNG, check_ending};
@@ -129,11 +129,11 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
         if section.is_none() {
-            if layer.info.other.contains_key("dither") {
+            if layer.info.has_record::<DitherRecord>() {
                 progress
                     .say("these layers are dots: use a stack from before dither to see its gray");
             }
-            if layer.info.other.contains_key("compensate") {
+            if layer.info.has_record::<CompensateRecord>() {
                 progress.say("these layers were compensated, so that they differ from the part");
             }
             let course = SectionLine::new(args.section, &layer).map_err(no_section)?;

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use lamp_stack::{Layer, Orientation, PageInfo, StackInfo, digest_of_digests};
+use lamp_stack::{
+    BuildRecord, BuiltPart, BuiltParts, Layer, Orientation, PageInfo, StackInfo, digest_of_digests,
+};
 use serde_json::{Map, Value, json};
 
 use super::lockstep::LayerSet;
@@ -110,41 +112,35 @@ impl Layout {
             let of_layer = layer.info.stack.clone().or_else(|| part.stack.clone());
             let mut stack = of_layer.unwrap_or_else(|| unknown(part));
             stack.commands.push(self.whole_command());
-            let mut tile = self.described(0);
-            tile.append(&mut self.base());
-            stack.other.insert("tile".to_owned(), Value::Object(tile));
+            stack.set_build_record(&self.record(BuiltParts::One(self.described(0))));
             return stack;
         }
         let known = |part: &PartStack| part.stack.clone().unwrap_or_else(|| unknown(part));
         let stacks: Vec<StackInfo> = self.parts.iter().map(known).collect();
         let texts = |text: fn(&StackInfo) -> &str| stacks.iter().map(text);
         let names = unique_names(texts(|stack| &stack.part));
-        let described = stacks.iter().zip(names).enumerate().map(|(part, (stack, name))| {
-            let mut all = Map::new();
-            all.insert("part".to_owned(), json!(name));
-            all.insert("digest".to_owned(), json!(stack.digest));
-            all.insert("commands".to_owned(), json!(stack.commands));
-            all.append(&mut self.described(part));
-            all
-        });
-        let mut tile = Map::new();
-        tile.insert("parts".to_owned(), json!(described.collect::<Vec<_>>()));
-        tile.append(&mut self.base());
-        let other = [("tile".to_owned(), Value::Object(tile))];
-        StackInfo {
+        let described =
+            stacks.iter().zip(names).enumerate().map(|(part, (stack, name))| BuiltPart {
+                part: Some(name),
+                digest: Some(stack.digest.clone()),
+                commands: Some(stack.commands.clone()),
+                ..self.described(part)
+            });
+        let parts = BuiltParts::Several { parts: described.collect() };
+        let mut build = StackInfo {
             part: texts(|stack| &stack.part).collect::<Vec<_>>().join("+"),
             commands: vec![self.whole_command()],
             digest: digest_of_digests(texts(|stack| &stack.digest)),
             layers: self.layer_count(),
-            other: other.into_iter().collect(),
-        }
+            ..StackInfo::default()
+        };
+        build.set_build_record(&self.record(parts));
+        build
     }
 
-    /// Returns the entry for the number of base layers, if there are any.
-    fn base(&self) -> Map<String, Value> {
-        let layers = self.mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
-        let base = (layers > 0).then(|| ("base_layers".to_owned(), json!(layers)));
-        base.into_iter().collect()
+    /// Returns what the first page says of the parts, and of the base layers below them.
+    fn record(&self, parts: BuiltParts) -> BuildRecord {
+        BuildRecord { parts, base_layers: self.mesh.as_ref().map_or(0, |mesh| mesh.base_layers) }
     }
 
     /// Returns the number of layers if all stacks say theirs: they start together, so it
@@ -157,8 +153,8 @@ impl Layout {
         counts.collect::<Option<Vec<u32>>>()?.into_iter().max()
     }
 
-    /// Returns the entries for a part: its frame, and where its copies stand.
-    fn described(&self, part: usize) -> Map<String, Value> {
+    /// Returns what is known of a part: its frame, and where its copies stand.
+    fn described(&self, part: usize) -> BuiltPart {
         let copies = || self.placements.iter().filter(|at| at.part == part);
         let PartStack { origin_mm, .. } = self.parts[part];
         let frame = self.parts[part].frame();
@@ -167,19 +163,16 @@ impl Layout {
             (0, 0) => [x, y],
             (left, top) => [x + left as f64 * pitch, y - top as f64 * pitch],
         });
-        let mut all = Map::new();
-        all.insert("part_pixels".to_owned(), json!([frame.width, frame.height]));
-        all.insert("part_origin_mm".to_owned(), json!(corner));
-        if self.parts[part].is_fit() {
-            all.insert("part_corner".to_owned(), json!([frame.left, frame.top]));
+        let is_turned = copies().any(|at| at.turn != Orientation::default());
+        let turns = copies().filter(|_| is_turned).map(|at| at.turn.to_string());
+        BuiltPart {
+            part_pixels: [frame.width, frame.height],
+            part_origin_mm: corner,
+            part_corner: self.parts[part].is_fit().then_some([frame.left, frame.top]),
+            copies: copies().map(|at| [at.left, at.top].map(i64::from)).collect(),
+            turns: turns.collect(),
+            ..BuiltPart::default()
         }
-        let places: Vec<_> = copies().map(|at| [at.left, at.top]).collect();
-        all.insert("copies".to_owned(), json!(places));
-        if copies().any(|at| at.turn != Orientation::default()) {
-            let turns: Vec<_> = copies().map(|at| at.turn.to_string()).collect();
-            all.insert("turns".to_owned(), json!(turns));
-        }
-        all
     }
 }
 

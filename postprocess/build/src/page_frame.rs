@@ -1,7 +1,6 @@
 //! Adapts pages to images that were cropped or padded.
 
-use lamp_stack::{Frame, PageInfo, StackInfo};
-use serde_json::{Value, json};
+use lamp_stack::{Frame, PageInfo};
 
 use crate::image_bounds::ImageBounds;
 
@@ -17,33 +16,15 @@ pub fn frame_page(info: &mut PageInfo, frame: Frame, place: &ImageBounds) {
     // An open row may stand below the last row, where contours break off.
     info.open_rows = info.open_rows.iter().filter_map(|&row| moved(row, height + 1)).collect();
     if let Some(stack) = &mut info.stack {
-        move_copies(stack, frame);
-    }
-}
-
-/// Adapts the copies on a first page to a frame of the image.
-fn move_copies(stack: &mut StackInfo, frame: Frame) {
-    let Some(tile) = stack.other.get_mut("tile") else { return };
-    each_part(tile, |part| {
-        let copies = part.get_mut("copies").and_then(Value::as_array_mut);
-        for copy in copies.into_iter().flatten() {
-            if let Ok([left, top]) = serde_json::from_value::<[i64; 2]>(copy.clone()) {
-                *copy = json!([left.saturating_sub(frame.left), top.saturating_sub(frame.top)]);
-            }
-        }
-    });
-}
-
-/// Calls `with` on the entry for each part.
-fn each_part(tile: &mut Value, mut with: impl FnMut(&mut Value)) {
-    match tile.get_mut("parts").and_then(Value::as_array_mut) {
-        Some(parts) => parts.iter_mut().for_each(with),
-        None => with(tile),
+        stack.move_copies([frame.left, frame.top]);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::StackInfo;
+    use serde_json::json;
+
     use super::*;
 
     const PLACE: ImageBounds =

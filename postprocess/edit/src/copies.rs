@@ -1,9 +1,7 @@
 //! Finds the copies of parts on a build, which its first page lists.
 
 use lamp_build::{ImageBounds, PixelSize, PlacedImage, united};
-use lamp_stack::{Frame, Image, Mask, Orientation, PageInfo, StackInfo};
-use serde::Deserialize;
-use serde_json::Value;
+use lamp_stack::{BuiltPart, Frame, Image, Mask, Orientation, PageInfo, StackInfo};
 
 use super::edit_error::{EditError, LayerProblem};
 use super::schema::CopySelection;
@@ -27,23 +25,10 @@ pub(super) struct BuildCopy {
     pub(super) count: u32,
 }
 
-/// The first page's entry for a part.
-#[derive(Deserialize)]
-struct TiledPart {
-    part: Option<String>,
-    part_pixels: [u32; 2],
-    part_origin_mm: Option<[f64; 2]>,
-    copies: Vec<[i64; 2]>,
-    #[serde(default)]
-    turns: Vec<String>,
-}
-
-impl TiledPart {
-    /// Returns the part's name, which the stack has if it is the only one.
-    fn name(&self, info: &PageInfo) -> String {
-        let one = || info.stack.as_ref().map(|stack| stack.part.clone());
-        self.part.clone().or_else(one).unwrap_or_default()
-    }
+/// Returns the name of a build's part, which the stack has if it is the only one.
+fn name_of(part: &BuiltPart, info: &PageInfo) -> String {
+    let one = || info.stack.as_ref().map(|stack| stack.part.clone());
+    part.part.clone().or_else(one).unwrap_or_default()
 }
 
 impl BuildCopy {
@@ -62,20 +47,16 @@ impl BuildCopy {
             return Ok(vec![whole]);
         }
         let wrong = |problem: LayerProblem| problem.of_layer(info);
-        let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
-        let tile = tile.ok_or_else(|| wrong(LayerProblem::NoCopies))?;
-        let parts = tile["parts"].as_array().map_or(std::slice::from_ref(tile), Vec::as_slice);
-        let read = |part: &Value| serde_json::from_value(part.clone());
-        let parts: Vec<TiledPart> = parts
-            .iter()
-            .map(read)
+        let parts = info.stack.as_ref().and_then(StackInfo::built_parts);
+        let parts = parts.ok_or_else(|| wrong(LayerProblem::NoCopies))?;
+        let parts: Vec<BuiltPart> = parts
             .collect::<Result<_, _>>()
             .map_err(|error| wrong(LayerProblem::CopiesFormat(error)))?;
         let part = chosen(parts, wanted, info).map_err(wrong)?;
         let count = part.copies.len();
         let mut numbers = wanted.numbers().into_iter().flatten();
         if let Some(&number) = numbers.find(|number| !(1..=count).contains(&(**number as usize))) {
-            let part = part.name(info);
+            let part = name_of(&part, info);
             return Err(wrong(LayerProblem::NoSuchCopy { number, part, count }));
         }
         let origin_mm = part.part_origin_mm.ok_or_else(|| wrong(LayerProblem::NoPartOrigin))?;
@@ -118,15 +99,15 @@ impl BuildCopy {
 
 /// Returns the part whose copies are wanted.
 fn chosen(
-    mut parts: Vec<TiledPart>,
+    mut parts: Vec<BuiltPart>,
     wanted: &CopySelection,
     info: &PageInfo,
-) -> Result<TiledPart, LayerProblem> {
+) -> Result<BuiltPart, LayerProblem> {
     let index = match wanted.part() {
-        Some(wanted) => parts.iter().position(|part| part.name(info) == wanted),
+        Some(wanted) => parts.iter().position(|part| name_of(part, info) == wanted),
         None => (parts.len() == 1).then_some(0),
     };
-    let names = || parts.iter().map(|part| part.name(info)).collect();
+    let names = || parts.iter().map(|part| name_of(part, info)).collect();
     let index = index.ok_or_else(|| LayerProblem::WhichPart { parts: names() })?;
     Ok(parts.swap_remove(index))
 }
@@ -169,7 +150,7 @@ pub(super) fn composed<'a>(
 
 /// Removes the copies from a first page.
 pub(super) fn forget_copies(stack: &mut StackInfo) {
-    stack.other.shift_remove("tile");
+    stack.forget_build();
 }
 
 #[cfg(test)]
@@ -177,7 +158,7 @@ mod tests {
     use lamp_build::frame_page;
     use lamp_stack::{MaskBuilder, Op};
     use proptest::prelude::*;
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     use super::*;
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use lamp_build::{ImageBounds, frame_page};
 use lamp_stack::{
-    Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, PassingLayer, gray_runs,
+    Frame, Image, Layer, MAX_SIDE, Mask, Op, Orientation, PageInfo, PassingLayer, StackInfo,
+    gray_runs,
 };
 use serde_json::json;
 
@@ -310,9 +311,7 @@ fn lit(image: &Image) -> u64 {
 
 /// Returns the number of base layers of a build.
 fn base_layers(info: &PageInfo) -> u32 {
-    let tile = info.stack.as_ref().and_then(|stack| stack.other.get("tile"));
-    let layers = tile.and_then(|tile| tile["base_layers"].as_u64()).unwrap_or(0);
-    layers.try_into().unwrap_or(u32::MAX)
+    info.stack.as_ref().map_or(0, StackInfo::base_layers)
 }
 
 /// Returns the origin of a stack for another's first page: its part, digest and

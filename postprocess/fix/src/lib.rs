@@ -26,9 +26,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lamp_stack::{
-    GrayMask, Image, Layer, Mask, MaskBuilder, PassingLayer, map_in_order, white_in_row,
+    FixRecord, FixedBand, GrayMask, Image, Layer, Mask, MaskBuilder, PassingLayer, map_in_order,
+    white_in_row,
 };
-use serde_json::json;
 
 pub use band::{Band, BandKind, BandKinds, BandOutcome};
 
@@ -227,18 +227,15 @@ fn fix_layer(
     };
     let mut info = layer.info.clone();
     info.stray_rows.retain(|&row| corrected_row(&corrected, row).is_none());
-    info.other.insert("fix".to_owned(), page_entry(&bands, options.method));
+    info.set_record(&record_of(&bands, options.method));
     (Some(Layer { info, dpi: layer.dpi, image: image.into() }), bands)
 }
 
 /// Returns what a corrected layer's page says under `fix`.
-fn page_entry(bands: &[Band], method: FixMethod) -> serde_json::Value {
-    let bands: Vec<_> = bands
-        .iter()
-        .filter(|band| band.outcome == BandOutcome::Corrected)
-        .map(|b| json!({"row": b.first_row, "rows": b.rows, "pixels": b.pixels}))
-        .collect();
-    json!({"method": method.name(), "bands": bands})
+fn record_of(bands: &[Band], method: FixMethod) -> FixRecord {
+    let corrected = bands.iter().filter(|band| band.outcome == BandOutcome::Corrected);
+    let band = |b: &Band| FixedBand { row: b.first_row, rows: b.rows, pixels: b.pixels };
+    FixRecord { method: method.name().to_owned(), bands: corrected.map(band).collect() }
 }
 
 /// Returns what was found in a band, and the rows that it should have, if they are known. Of a band

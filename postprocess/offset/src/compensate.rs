@@ -1,7 +1,8 @@
 //! Compensation as a stage: layers enlarged for firing, then their edges moved.
 
-use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, map_in_order};
-use serde_json::{Value, json};
+use lamp_stack::{
+    CompensateRecord, Dpi, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, StackInfo, map_in_order,
+};
 use thiserror::Error;
 
 use super::components::{self, Loss};
@@ -154,9 +155,7 @@ pub fn compensate<E: From<CompensateError> + Send>(
             return Ok((layer, None));
         }
         let moved = moved.unwrap_or_default();
-        let before = layer.info.other.remove("compensate");
-        let page = page_entry(before, &widths, &options, dpi, &moved);
-        layer.info.other.insert("compensate".to_owned(), page);
+        layer.info.renew_record(|before| record_of(before, &widths, &options, dpi, &moved));
         Ok((layer, Some(moved)))
     });
     done.map(move |done| {
@@ -169,26 +168,28 @@ pub fn compensate<E: From<CompensateError> + Send>(
 }
 
 /// Returns what a page says: the last of each kind, if something was done `before`.
-fn page_entry(
-    before: Option<Value>,
+fn record_of(
+    before: Option<CompensateRecord>,
     widths: &Widths,
     options: &CompensateOptions,
     dpi: Dpi,
     moved: &MovedEdges,
-) -> Value {
+) -> CompensateRecord {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
-    let mut page = before.filter(Value::is_object).unwrap_or_else(|| json!({}));
-    if !widths.are_zero() || page.get("inwards_um").is_none() {
-        page["inwards_um"] = json!(widths.range().map(|by| nm(by * dpi.pitch().um())));
+    let mut page = before.unwrap_or_default();
+    if !widths.are_zero() || page.inwards_um.is_none() {
+        page.inwards_um = Some(widths.range().map(|by| nm(by * dpi.pitch().um())));
     }
-    for (key, count) in [("thin_walls", moved.walls.len()), ("losses", moved.losses.len())] {
+    for (of_page, count) in
+        [(&mut page.thin_walls, moved.walls.len()), (&mut page.losses, moved.losses.len())]
+    {
         if count > 0 {
-            page[key] = count.into();
+            *of_page = Some(count);
         }
     }
     let Shrinkage { x, y } = options.shrinkage;
     if options.shrinkage != Shrinkage::default() {
-        page["shrinkage"] = json!([x, y]);
+        page.shrinkage = Some([x, y]);
     }
     page
 }
@@ -198,7 +199,7 @@ fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensatePr
     if shrinkage == Shrinkage::default() {
         return Ok(false);
     }
-    if layer.info.stack.as_ref().is_some_and(|stack| stack.other.contains_key("tile")) {
+    if layer.info.stack.as_ref().is_some_and(StackInfo::is_build) {
         return Err(CompensateProblem::Tiled);
     }
     let columns = AxisScale::new(layer.image.width(), shrinkage.x);

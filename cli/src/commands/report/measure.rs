@@ -1,6 +1,6 @@
 //! The numbers of a layer, from its runs.
 
-use lamp_stack::{Image, Layer, Mask, gray_runs, white_in_both, white_in_row};
+use lamp_stack::{FixRecord, Image, Layer, Mask, gray_runs, white_in_both, white_in_row};
 
 /// What is counted in a layer, and what its page says.
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ impl LayerNumbers {
             new_px: 0,
             gray_px: gray_pixels(&layer.image),
             stray_rows: info.stray_rows.len() as u64,
-            fixed_rows: fixed_rows(info.other.get("fix")),
+            fixed_rows: info.record().map_or(0, |fix: FixRecord| fix.rows()),
         }
     }
 }
@@ -80,16 +80,6 @@ fn gray_pixels(image: &Image) -> u64 {
     runs.filter(|run| run.2 != 255).map(|(start, end, _)| u64::from(end - start)).sum()
 }
 
-/// Returns the rows of the bands that `fix` corrected, which it wrote on the page.
-fn fixed_rows(fix: Option<&serde_json::Value>) -> u64 {
-    let bands = fix.and_then(|fix| fix["bands"].as_array());
-    bands
-        .into_iter()
-        .flatten()
-        .map(|band| band["rows"].as_u64().unwrap_or(0).min(u32::MAX.into()))
-        .sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -118,14 +108,5 @@ mod tests {
         let layer = mask(6, &[&[0, 2], &[1, 4], &[2, 3]]);
         assert_eq!(new_pixels(&layer, Some(&below)), 2);
         assert_eq!(new_pixels(&layer, None), 6);
-    }
-
-    #[test]
-    fn rows_that_were_corrected_are_counted() {
-        let fix = serde_json::json!({"bands": [
-            {"row": 3, "rows": 2}, {"row": 9, "rows": 7}, {"row": 30}, 5
-        ]});
-        assert_eq!((fixed_rows(Some(&fix)), fixed_rows(None)), (9, 0));
-        assert_eq!(fixed_rows(Some(&serde_json::json!([1]))), 0);
     }
 }

@@ -12,7 +12,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_edit::{Edits, edit};
 use lamp_machine::Machine;
-use lamp_stack::{Length, Page, PageInfo, StackInfo};
+use lamp_stack::{CompensateRecord, Length, Page, PageInfo};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,
     plan_supports,
@@ -285,11 +285,12 @@ fn first_page(stack: &mut KeptStack) -> Result<PageInfo, Exit> {
 
 /// Returns what was done to a stack so that it no longer lies as its part did when it was sliced.
 fn moved(first: &PageInfo) -> Option<&'static str> {
-    if first.other.get("compensate").is_some_and(|page| page.get("shrinkage").is_some()) {
+    if first.record().is_some_and(|page: CompensateRecord| page.shrinkage.is_some()) {
         return Some("was enlarged for shrinkage");
     }
-    let StackInfo { commands, other, .. } = first.stack.as_ref()?;
-    if other.contains_key("tile") || commands.iter().any(|command| command.starts_with("tile ")) {
+    let stack = first.stack.as_ref()?;
+    let commands = &stack.commands;
+    if stack.is_build() || commands.iter().any(|command| command.starts_with("tile ")) {
         return Some("is a build");
     }
     let edits = commands.iter().filter_map(|command| command.strip_prefix("edit "));
@@ -301,6 +302,8 @@ fn moved(first: &PageInfo) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::StackInfo;
+
     use super::*;
 
     #[test]

@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use lamp_build::PartStack;
 use lamp_machine::Machine;
-use lamp_stack::{Layer, PageInfo, Pages, StackError};
+use lamp_stack::{
+    CompensateRecord, DitherRecord, FixRecord, Layer, PageInfo, PageRecord, Pages, StackError,
+};
 
 use crate::exit::Exit;
 use crate::stack_notes::noting;
@@ -57,7 +59,7 @@ pub(super) struct ReadLayers {
 }
 
 /// The stages that leave a key on pages that they change.
-const STAGES: [&str; 3] = ["fix", "compensate", "dither"];
+const STAGES: [&str; 3] = [FixRecord::KEY, CompensateRecord::KEY, DitherRecord::KEY];
 
 impl ReadLayers {
     fn add(&mut self, info: &PageInfo) {

@@ -25,8 +25,7 @@ mod write;
 
 use std::ops::Range;
 
-use lamp_stack::{Frame, Image, Layer, LayerImage, PageInfo};
-use serde_json::json;
+use lamp_stack::{Frame, Image, Layer, LayerImage, PageInfo, StripRecord};
 use thiserror::Error;
 
 use crate::image_bounds::ImageBounds;
@@ -159,9 +158,8 @@ impl Swaths {
             frame_page(&mut info, frame, &ImageBounds::of(layer).framed(frame));
         }
         let bits = if matches!(*layer.image, Image::Mask(_)) { 1 } else { 8 };
-        let strip =
-            json!({ "number": swath, "of": self.count(), "columns": [start, end], "bits": bits });
-        info.other.insert("strip".to_owned(), strip);
+        let columns = [start, end];
+        info.set_record(&StripRecord { number: swath, of: self.count(), columns, bits });
         if let Some(stack) = &mut info.stack {
             stack.commands.push(self.command(swath));
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_stack::{Image, Layer, MemorySize, Page, PageInfo, Pages, map_in_order};
+use lamp_stack::{Image, Layer, MemorySize, Page, PageInfo, Pages, StripRecord, map_in_order};
 use thiserror::Error;
 
 use super::index::{INDEX, StripIndex, file_name};
@@ -153,7 +153,7 @@ impl StripReader {
 /// # Errors
 /// Returns an error if it says anything else.
 pub fn check_number(page: &PageInfo, strip: u32) -> Result<(), StripDifference> {
-    match page.other.get("strip").map(|of| &of["number"]) == Some(&strip.into()) {
+    match page.record().is_some_and(|of: StripRecord| of.number == strip) {
         true => Ok(()),
         false => Err(StripDifference::Number { layer: page.name(), number: strip }),
     }
@@ -189,7 +189,7 @@ impl LayerPages {
         if gray.height() != self.height {
             return Err(unlike(JoinSwathsError::Unlike));
         }
-        let was_one_bit = info.other.shift_remove("strip").is_some_and(|strip| strip["bits"] == 1);
+        let was_one_bit = info.take_record().is_some_and(|strip: StripRecord| strip.bits == 1);
         let image = if was_one_bit {
             let mask = gray.to_mask();
             Image::Mask(mask.ok_or_else(|| StripsError::Gray { layer: info.name() })?)

@@ -2,6 +2,7 @@
 
 use lamp_stack::{Dpi, GrayMask, Mask, PageInfo};
 use proptest::prelude::*;
+use serde_json::json;
 
 use super::*;
 

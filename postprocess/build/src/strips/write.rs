@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use lamp_stack::{
     EncodedPage, FolderBeside, Format, Layer, MAX_SIDE, MemorySize, PageWriter, StackError,
-    map_in_order,
+    StripRecord, map_in_order,
 };
 
 use super::index::{INDEX, MAX_STRIPS, StripIndex, file_name};
@@ -62,7 +62,7 @@ impl StripWriter {
     /// Returns an error if the layer has another size than the first, there would be too many
     /// strips, or writing fails.
     pub fn push(&mut self, layer: &Layer) -> Result<(), StripsError> {
-        if layer.info.other.contains_key("strip") {
+        if layer.info.has_record::<StripRecord>() {
             return Err(StripsError::Already { layer: layer.info.name() });
         }
         if self.open.is_none() {

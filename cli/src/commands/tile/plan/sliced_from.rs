@@ -10,7 +10,7 @@ use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
 use super::super::stacks::{InputStack, ReadLayers};
 use crate::exit::Exit;
-use lamp_pipeline::{SliceRecord, SliceSettings};
+use lamp_pipeline::{SliceSettings, SlicingRecord};
 
 /// What a stack says of how it was sliced.
 pub(super) struct SlicedFrom {
@@ -34,7 +34,7 @@ impl SlicedFrom {
         let refused = |why: String| Exit::Failed(anyhow!("{}: {why}", part.name()));
         let stack = part.stack();
         let commands = stack.map_or(&[][..], |stack| &stack.commands);
-        let record = stack.and_then(SliceRecord::of);
+        let record = stack.and_then(SlicingRecord::of);
         let (Some(stack), Some(mut record)) = (stack, record) else {
             let why = "it does not say how it was sliced, so it cannot be sliced at other angles: \
                        give --turns quarters";
@@ -54,7 +54,7 @@ impl SlicedFrom {
         }
         let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
         record.find_exposure(&folders).map_err(|error| error.at(part.name()))?;
-        let SliceRecord { parts: recorded, settings, .. } = record;
+        let SlicingRecord { parts: recorded, settings, .. } = record;
         let found = folders.iter().find_map(|folder| files_in(folder, &recorded, &stack.digest));
         let missing = found.is_none().then(|| recorded.join(" "));
         let files = found.unwrap_or(recorded);
