@@ -1,5 +1,4 @@
 //! Column cure (000): the times, clusters and bitmaps that are found are the best ones.
-#![allow(missing_docs)]
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{

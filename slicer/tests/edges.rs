@@ -1,11 +1,9 @@
 //! Compares layers of parts with edges with closed forms, pixel by pixel: rims of
 //! cylinders, cones, balls and tori, upright, lying and askew.
 
-mod referee;
-
+use crate::referee::{askew, back, model, model_by, options, wrong_levels, wrong_pixels};
 use lamp_fixtures::StepSample;
 use lamp_slicer::{Axis, KernelName, Placement};
-use referee::{askew, back, model, model_by, options, wrong_levels, wrong_pixels};
 
 type Outside = fn([f64; 3]) -> f64;
 

@@ -1,10 +1,8 @@
 //! Compares layers of B-rep parts with closed forms, pixel by pixel.
 
-mod referee;
-
+use crate::referee::{askew, back, model, options, wrong_levels, wrong_pixels};
 use lamp_fixtures::StepSample;
 use lamp_slicer::{Axis, LayerHeights, Placement, SliceOptions};
-use referee::{askew, back, model, options, wrong_levels, wrong_pixels};
 
 fn off_sphere([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z - 15.0) - 15.0

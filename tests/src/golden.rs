@@ -10,7 +10,7 @@ use png::{BitDepth, ColorType, Compression, Decoder, Encoder};
 use crate::binaries::{target_dir, workspace_root};
 
 /// The command that rewrites the golden images after an intended change.
-const BLESS_COMMAND: &str = "LAMP_BLESS=1 cargo test -p lamp-tests --test golden";
+const BLESS_COMMAND: &str = "LAMP_BLESS=1 cargo test -p lamp-tests golden::";
 
 /// A folder of golden images: 1-bit `name.png` files.
 #[derive(Clone, Debug)]

@@ -22,10 +22,12 @@ use running::Running;
 
 /// The folder of the scheduler that is to run, in the process of a test that has its environment.
 const FOLDER: &str = "LAMP_TEST_SCHEDULER";
+/// The file that such a process leaves in the folder.
+const RAN: &str = "ran";
 
 #[test]
 fn slurm_makes_the_files_of_a_local_night() {
-    let test = "slurm_makes_the_files_of_a_local_night";
+    let test = "batch_engines::slurm_makes_the_files_of_a_local_night";
     in_environment(test, |folder| match slurm::Slurm::start(folder) {
         Ok(slurm) => check("slurm", &slurm),
         Err(why) => note(&format!("{test}: skipped, since {why}")),
@@ -34,7 +36,7 @@ fn slurm_makes_the_files_of_a_local_night() {
 
 #[test]
 fn hyperqueue_makes_the_files_of_a_local_night() {
-    let test = "hyperqueue_makes_the_files_of_a_local_night";
+    let test = "batch_engines::hyperqueue_makes_the_files_of_a_local_night";
     in_environment(test, |folder| match hyperqueue::HyperQueue::start(folder) {
         Ok(hyperqueue) => check("hyperqueue", &hyperqueue),
         Err(why) => note(&format!("{test}: skipped, since {why}")),
@@ -45,6 +47,7 @@ fn hyperqueue_makes_the_files_of_a_local_night() {
 /// folder it gets.
 fn in_environment(test: &str, run: impl FnOnce(&Path)) {
     if let Some(folder) = env::var_os(FOLDER) {
+        fs::write(Path::new(&folder).join(RAN), test).unwrap();
         return run(Path::new(&folder));
     }
     let folder = tempfile::tempdir().unwrap();
@@ -58,6 +61,8 @@ fn in_environment(test: &str, run: impl FnOnce(&Path)) {
         .env("HQ_SERVER_DIR", folder.path().join("hq"))
         .status();
     assert!(again.unwrap().success(), "{test}");
+    // A name that no test has would run none, which is no failure either.
+    assert!(folder.path().join(RAN).exists(), "{test} is the name of this test");
 }
 
 /// Does a night of four parts and a build by a scheduler, and by processes alone.

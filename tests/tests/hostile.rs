@@ -1,7 +1,7 @@
 //! Runs the fuzz targets on seeds, damaged seeds and other programs' files, and checks the seeds.
 //!
 //! After an intended change,
-//! `LAMP_BLESS=1 cargo test -p lamp-tests --test hostile`
+//! `LAMP_BLESS=1 cargo test -p lamp-tests hostile::`
 //! rewrites the seeds in `fuzz/seeds`.
 
 use std::fs;
@@ -130,7 +130,7 @@ fn the_seeds_are_what_the_fixtures_make() {
         let same = fs::read(&path).is_ok_and(|bytes| bytes == seed.bytes);
         assert!(
             same,
-            "{} is not what the fixtures make: LAMP_BLESS=1 cargo test -p lamp-tests --test hostile rewrites it",
+            "{} is not what the fixtures make: LAMP_BLESS=1 cargo test -p lamp-tests hostile:: rewrites it",
             path.display()
         );
         names.push(path);

@@ -1,5 +1,4 @@
 //! `lamp plan column-cure` as its users run it.
-#![allow(missing_docs)]
 
 use lamp_stack::{Image, write_gray_png};
 use lamp_tests::Scratch;

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::Running;
+use super::Running;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 

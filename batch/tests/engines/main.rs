@@ -1,7 +1,8 @@
 //! Engines at work on small tasks, with whatever kills them: the same bytes, nothing done twice.
 //!
 //! This program has three parts to play: `batch task` is a task as `lamp` does it, but small;
-//! `coordinate` is a night; without these words it is the test. Slurm and HyperQueue are the real
+//! `coordinate` is a night; without these words it is the test, of one engine or all. `--list` prints
+//! their names, as libtest does for `cargo nextest`. Slurm and HyperQueue are the real
 //! ones. Where they are not installed, it says so.
 
 mod hyperqueue;
@@ -20,6 +21,8 @@ use std::time::{Duration, Instant};
 use night::Night;
 use running::Running;
 
+const ENGINES: [&str; 3] = ["local", "slurm", "hyperqueue"];
+
 fn main() {
     let words: Vec<String> = env::args().collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -31,6 +34,8 @@ fn main() {
             night::coordinate(Path::new(store), engine, seconds.parse().unwrap());
         }
         [_, "in", engine, folder] => in_engine(engine, Path::new(folder)),
+        [_, .., "--ignored"] if words.contains(&"--list") => {}
+        _ if words.contains(&"--list") => ENGINES.iter().for_each(|name| println!("{name}: test")),
         _ => tests(words.get(1).copied().unwrap_or_default()),
     }
 }
@@ -39,7 +44,7 @@ fn main() {
 fn tests(word: &str) {
     let filter = if word.starts_with("--") { "" } else { word };
     let program = env::current_exe().unwrap();
-    for engine in ["local", "slurm", "hyperqueue"].iter().filter(|name| name.contains(filter)) {
+    for engine in ENGINES.iter().filter(|name| name.contains(filter)) {
         let folder = tempfile::tempdir().unwrap();
         let bin = folder.path().join("bin");
         let before = env::var_os("PATH").unwrap();

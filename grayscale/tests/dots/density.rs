@@ -3,7 +3,7 @@
 use lamp_grayscale::DitherMethod;
 use lamp_stack::Mask;
 
-use crate::{DOTS, PERIOD, dots, pixels};
+use super::{DOTS, PERIOD, dots, pixels};
 
 /// The side of the windows whose density is to be that of the level.
 const WINDOW: usize = 16;

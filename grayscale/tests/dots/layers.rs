@@ -2,7 +2,7 @@
 
 use lamp_grayscale::DitherMethod;
 
-use crate::{PERIOD, dots, pixels};
+use super::{PERIOD, dots, pixels};
 
 /// What a pixel of a flat image is over the layers.
 struct Stacked {
@@ -73,7 +73,7 @@ fn diffused_errors_fill_holes_less_regularly() {
 
 #[test]
 fn the_next_layer_is_another_and_the_same_layer_is_the_same() {
-    for method in crate::DOTS {
+    for method in super::DOTS {
         let layer = |index| dots(method, 100, 64, index);
         assert!(layer(7) == layer(7) && layer(7) != layer(8), "{}", method.name());
         // The last index there is.

@@ -3,7 +3,7 @@
 use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_stack::GrayMask;
 
-use crate::pixels;
+use super::pixels;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 256;

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use lamp_grayscale::DitherMethod;
 
-use crate::{PERIOD, dots, pixels};
+use super::{PERIOD, dots, pixels};
 
 const SIDE: usize = PERIOD as usize;
 

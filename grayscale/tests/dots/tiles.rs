@@ -4,7 +4,7 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_stack::GrayMask;
 use proptest::prelude::*;
 
-use crate::PERIOD;
+use super::PERIOD;
 
 /// An image's rows as runs.
 type Rows = Vec<Vec<(u32, u8)>>;

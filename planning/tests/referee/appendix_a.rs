@@ -3,7 +3,7 @@
 use lamp_planning::LayerLight;
 use lamp_planning::solver::Role;
 
-use crate::case::Case;
+use super::case::Case;
 
 /// `E_c` of the example; its light is 3 at white, for one unit of time.
 const CRITICAL: f64 = 170.0;

@@ -5,7 +5,7 @@ use lamp_planning::{LayerLight, Real};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use crate::case::Case;
+use super::case::Case;
 
 /// What voxels may want, and what light their pixels may have, with either objective.
 fn roles(boundary: bool) -> impl Strategy<Value = Role> {

@@ -6,8 +6,8 @@ use lamp_planning::column::{
 use lamp_stack::Image;
 use proptest::prelude::*;
 
-use crate::times::least_error;
-use crate::zhao::{Part, options, pegda, zhao};
+use super::times::least_error;
+use super::zhao::{Part, options, pegda, zhao};
 
 /// The least sum of squares of so many clusters and one at zero, by trying all.
 fn least_squares(times: &[u64], clusters: usize) -> f64 {

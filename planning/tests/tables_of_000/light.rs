@@ -2,7 +2,7 @@
 
 use lamp_planning::column::{GlassLight, Setup, Tracing};
 
-use crate::zhao::{LIT, PITCH_UM, RAYS, setup, zhao};
+use super::zhao::{LIT, PITCH_UM, RAYS, setup, zhao};
 
 /// Light of a mirror on all column voxels.
 fn light_of(light: &GlassLight, mirror: usize) -> Vec<f64> {
@@ -114,7 +114,7 @@ fn a_white_field_is_as_uneven_as_000_says() {
     let light = GlassLight::new(zhao(151, 350, RAYS));
     let field = light.doses(&vec![1.0; 151 * 151]);
     let mean = field.iter().sum::<f64>() / field.len() as f64;
-    let spread = crate::zhao::rms(field.iter().map(|light| light - mean));
+    let spread = super::zhao::rms(field.iter().map(|light| light - mean));
     let percent = 100.0 * spread / mean;
     assert!((percent / 3.95 - 1.0).abs() < 0.25, "{percent} %");
     assert!((mean - 0.1882).abs() < 1e-4, "{mean}");

@@ -6,7 +6,7 @@ use lamp_planning::column::{ColumnObjective, GlassLight, Measures, Setup, Tracin
 use lamp_planning::projector::Projector;
 use lamp_stack::Catalogued;
 
-use crate::zhao::{LIT, PITCH_UM, Part, RAYS, cap_um, options, pegda, rms, seeds_k_means, zhao};
+use super::zhao::{LIT, PITCH_UM, Part, RAYS, cap_um, options, pegda, rms, seeds_k_means, zhao};
 
 fn assert_within(name: &str, found: f64, printed: f64, percent: f64) {
     let off = 100.0 * (found / printed - 1.0);

@@ -5,7 +5,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeCone
 use lamp_planning::column::{GlassLight, Setup, Stop, Tracing, nearest_times};
 use proptest::prelude::*;
 
-use crate::zhao::{Part, RAYS, setup, zhao};
+use super::zhao::{Part, RAYS, setup, zhao};
 
 /// The light of each mirror.
 fn of_mirrors(light: &GlassLight) -> Vec<Vec<f64>> {

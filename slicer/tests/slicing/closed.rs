@@ -6,7 +6,7 @@ use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceOptions};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 
-use crate::common::{cases, cube, joined, options, slice};
+use super::common::{cases, cube, joined, options, slice};
 
 const FILLS: [Fill; 2] = [Fill::EvenOdd, Fill::Solid];
 

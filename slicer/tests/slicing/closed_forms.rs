@@ -23,7 +23,7 @@ use lamp_fixtures::{Mesh, cone, sphere, torus};
 use lamp_slicer::{PlaneRule, Slices};
 use lamp_stack::Layer;
 
-use crate::common::{mask, model, options};
+use super::common::{mask, model, options};
 
 /// The limit to errors, in standard deviations.
 const SIGMAS: f64 = 6.0;

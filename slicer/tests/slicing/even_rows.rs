@@ -10,7 +10,7 @@ use lamp_slicer::{
 use lamp_stack::Layer;
 use proptest::prelude::*;
 
-use crate::common::{
+use super::common::{
     block, cases, joined, mask, masks, model, options, slice, turned, white_pixels,
 };
 

@@ -5,7 +5,7 @@ use lamp_fixtures::{Mesh, blade, sphere};
 use lamp_slicer::{Fill, Join, Part, Placement, PlaneRule, SliceOptions, Slices};
 use lamp_stack::Layer;
 
-use crate::common::{
+use super::common::{
     block, cube, inside_out, joined, mask, masks, model, options, slice, white_pixels,
 };
 

@@ -15,7 +15,7 @@ use lamp_slicer::{
 use lamp_stack::{Dpi, Layer, Length};
 use proptest::prelude::*;
 
-use crate::common::{cases, mask};
+use super::common::{cases, mask};
 
 /// A part of unit boxes: so many columns and rows, each with heights from one layer up to another.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@ use lamp_slicer::{
 };
 use lamp_stack::Layer;
 
-use crate::common::{
+use super::common::{
     block, cube, joined, model, options, slice, try_layers, white_pixels, without_stack,
 };
 

@@ -11,7 +11,7 @@ use lamp_stack::{DepthLevels, Image, Layer, Length, gray_runs};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
-use crate::common::{
+use super::common::{
     block, cases, cube, inside_out, joined, mask, model, options, slice, turned, without_stack,
 };
 

@@ -4,7 +4,7 @@ use lamp_slicer::{GridRule, PlaneRule, SliceError, SliceOptions, Slices};
 use lamp_stack::Length;
 use proptest::prelude::*;
 
-use crate::common::{
+use super::common::{
     block, cases, cube, mask, masks, model, options, slice, try_layers, white_pixels,
 };
 

@@ -8,7 +8,7 @@ use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceError, SliceO
 use lamp_stack::Layer;
 use proptest::prelude::*;
 
-use crate::common::{
+use super::common::{
     block, cases, cube, joined, mask, masks, model, options, slice, try_layers, turned,
     white_pixels,
 };

@@ -13,7 +13,7 @@ use lamp_stack::{Layer, Length};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
-use crate::common::{
+use super::common::{
     block, cases, cube, inside_out, joined, mask, model, options, slice, turned, white_pixels,
 };
 

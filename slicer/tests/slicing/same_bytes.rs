@@ -7,7 +7,7 @@ use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_slicer::{Fill, LayerHeights, OpenOptions, Part, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Layer, Length};
 
-use crate::common::{
+use super::common::{
     block, joined, mask, model, options, slice, try_layers, white_pixels, without_stack,
 };
 

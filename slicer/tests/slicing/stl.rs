@@ -4,7 +4,7 @@ use lamp_fixtures::{Mesh, sphere};
 use lamp_slicer::{Facet, Fill, OpenOptions, Part, SliceError, SliceOptions};
 use proptest::prelude::*;
 
-use crate::common::{cases, cube, options, slice, try_layers, without_stack};
+use super::common::{cases, cube, options, slice, try_layers, without_stack};
 
 fn read(bytes: &[u8]) -> Result<Part, SliceError> {
     Part::from_stream("part", bytes, &OpenOptions::default())
@@ -95,7 +95,7 @@ fn facets_that_are_not_counted_are_read() {
 #[test]
 fn facets_behind_a_closed_surface_are_left_out_or_refused() {
     let [mesh, other] = [cube(0.0, 3.0), cube(5.0, 6.0)];
-    let both = crate::common::joined(&[mesh.clone(), other]);
+    let both = super::common::joined(&[mesh.clone(), other]);
     // Half of what stood in the file before.
     let stale = &with_count(binary(&both), 12)[..84 + 50 * 18];
     assert!(reads_as(stale, &mesh));
@@ -314,7 +314,7 @@ fn a_normal_may_be_no_number() {
 #[test]
 fn several_solids_are_one_part() {
     let [a, b] = [cube(0.0, 2.0), cube(3.0, 4.0)];
-    let both = crate::common::joined(&[a.clone(), b.clone()]);
+    let both = super::common::joined(&[a.clone(), b.clone()]);
     assert!(reads_as((text(&a) + &text(&b)).as_bytes(), &both));
 }
 

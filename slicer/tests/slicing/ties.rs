@@ -9,7 +9,7 @@ use lamp_slicer::{GridRule, PlaneRule, SliceOptions};
 use lamp_stack::Mask;
 use proptest::prelude::*;
 
-use crate::common::{block, cases, joined, mask, options, slice};
+use super::common::{block, cases, joined, mask, options, slice};
 
 /// Columns and rows of the frame, whose top left corner is (0, 32).
 const FRAME: [u32; 2] = [21, 16];

@@ -8,7 +8,7 @@ use lamp_slicer::{
 };
 use proptest::prelude::*;
 
-use crate::common::{cases, joined, model, options};
+use super::common::{cases, joined, model, options};
 
 /// The bands of a part, and their trace.
 fn traced(model: Part, options: &SliceOptions) -> (Vec<StrayBand>, Trace) {

@@ -7,7 +7,7 @@ use lamp_supports::{
     CheckError, CheckOptions, End, Findings, Island, PocketKind, Region, check as check_layers,
 };
 
-use crate::referee::{self, Block, Frame, Kind, Limits};
+use super::referee::{self, Block, Frame, Kind, Limits};
 
 /// The level from which gray pixels are white.
 pub(crate) const THRESHOLD: NonZeroU8 = NonZeroU8::new(100).unwrap();

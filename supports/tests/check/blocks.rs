@@ -4,8 +4,8 @@ use proptest::prelude::*;
 
 use lamp_stack::GrayMask;
 
-use crate::agree::{THRESHOLD, agree, agree_as, layers};
-use crate::referee::{Block, Limits};
+use super::agree::{THRESHOLD, agree, agree_as, layers};
+use super::referee::{Block, Limits};
 
 /// Returns blocks of a size: boxes painted over each other, the first one white and from the
 /// platform up, then single voxels turned over.

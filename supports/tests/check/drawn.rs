@@ -1,7 +1,7 @@
 //! Drawn blocks, counted by hand, and checked.
 
-use crate::agree::agree;
-use crate::referee::*;
+use super::agree::agree;
+use super::referee::*;
 
 /// Reads layers from the bottom, each a picture of rows: `#` is white.
 pub(crate) fn block(layers: &[&str]) -> Block {

@@ -8,8 +8,8 @@ use lamp_slicer::{Axis, Part, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
 use lamp_supports::{End, Findings, PocketKind};
 
-use crate::agree::{agree_as, check};
-use crate::referee::{Block, Limits};
+use super::agree::{agree_as, check};
+use super::referee::{Block, Limits};
 
 const LIMITS: Limits =
     Limits { speck: 3, least_support: 0.25, max_overhang_um: None, drain_um: None };

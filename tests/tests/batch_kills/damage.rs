@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lamp_batch::{Key, Kind, Store};
 
-use crate::night::Night;
+use super::night::Night;
 
 /// Writes a file anew, also a read-only one.
 fn change(path: &Path, edit: impl Fn(&mut Vec<u8>)) {

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use lamp_tests::{bin, note};
 
-use crate::night::{Ended, Night, Outcome, Running};
+use super::night::{Ended, Night, Outcome, Running};
 
 /// Does a night on a disk that is too small for it, makes room, and does it again. The disk is in a mount
 /// namespace of its own, and goes with it.

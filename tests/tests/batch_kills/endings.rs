@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use lamp_batch::Event;
 
-use crate::night::{Night, Running};
-use crate::processes::{PATIENCE, send, tasks, wait_for_no_task};
+use super::night::{Night, Running};
+use super::processes::{PATIENCE, send, tasks, wait_for_no_task};
 
 #[test]
 fn a_signal_ends_the_night_and_its_tasks_and_the_next_one_goes_on() {

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use lamp_fixtures::SplitMix;
 use lamp_tests::note;
 
-use crate::night::{Ended, Night, Outcome};
-use crate::number;
-use crate::processes::{send, tasks, wait_for_no_task};
+use super::night::{Ended, Night, Outcome};
+use super::number;
+use super::processes::{send, tasks, wait_for_no_task};
 
 /// How often each kind of process was hit.
 #[derive(Debug, Default)]

@@ -14,7 +14,7 @@ use lamp_fixtures::{Defect, Sample, inject};
 use lamp_tests::{Scratch, tilted_ball};
 use serde_json::Value;
 
-use crate::processes::PATIENCE;
+use super::processes::PATIENCE;
 
 /// Three parts, one with stray rows, in five ranges, their joins and checks, and a build.
 const NIGHT: &str = r#"

@@ -8,7 +8,7 @@ use lamp_stack::Image;
 use lamp_tests::{Scratch, differing, mask};
 use serde_json::Value;
 
-use crate::{COARSE, bands, broken_ball, is_corrected, layer_of, number, report};
+use super::{COARSE, bands, broken_ball, is_corrected, layer_of, number, report};
 
 /// Each pixel is shown as 4 x 4.
 const SCALE: usize = 4;

@@ -6,7 +6,7 @@ use lamp_stack::Layer;
 use lamp_tests::{differing, ends_white, mask};
 use serde_json::{Value, json};
 
-use crate::{COARSE, bands, broken_ball, is_corrected, layer_of, number, report};
+use super::{COARSE, bands, broken_ball, is_corrected, layer_of, number, report};
 
 const PITCH: f64 = 25.4 / 300.0;
 

@@ -3,7 +3,7 @@
 use lamp_stack::{Image, Layer};
 use lamp_tests::{Scratch, at_least, mask, stripped, with_soft_edges};
 
-use crate::{COARSE, bands, broken_ball, is_corrected, number, pixels_off, report};
+use super::{COARSE, bands, broken_ball, is_corrected, number, pixels_off, report};
 
 #[test]
 fn a_stack_without_metadata_is_corrected_to_the_same_pixels() {

@@ -3,7 +3,7 @@
 use lamp_stack::{Image, Layer, MaskBuilder, PageInfo};
 use lamp_tests::Scratch;
 
-use crate::{COARSE, bands, broken_ball, is_corrected, number, pixels_off, report};
+use super::{COARSE, bands, broken_ball, is_corrected, number, pixels_off, report};
 
 #[test]
 fn threads_do_not_change_a_byte() {

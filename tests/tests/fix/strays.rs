@@ -2,7 +2,7 @@
 
 use lamp_tests::{Scratch, ends_white, mask, masks};
 
-use crate::{COARSE, broken_ball, pixels_off};
+use super::{COARSE, broken_ball, pixels_off};
 
 /// A tower that lost facets, sliced to `stray.tif`.
 fn broken_tower() -> Scratch {

@@ -2,7 +2,7 @@
 
 use lamp_fixtures::Facet;
 
-use crate::{COARSE, bands, broken_ball, is_corrected, number, report};
+use super::{COARSE, bands, broken_ball, is_corrected, number, report};
 
 #[test]
 fn bands_that_are_left_end_with_status_3_and_no_stack() {

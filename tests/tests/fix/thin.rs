@@ -3,7 +3,7 @@
 use lamp_fixtures::{Facet, Mesh};
 use lamp_tests::{Scratch, stripped};
 
-use crate::pixels_off;
+use super::pixels_off;
 
 /// A box from one corner to the other, leaning along y by `lean` per millimetre
 /// of height.

@@ -5,7 +5,7 @@ use lamp_stack::{Image, Layer, Mask, MaskBuilder};
 use lamp_tests::{Scratch, at_least, edited, mask, stripped, with_soft_edges};
 use serde_json::Value;
 
-use crate::{Images, check};
+use super::{Images, check};
 
 /// Black rows between two images.
 const GUTTER: u32 = 6;

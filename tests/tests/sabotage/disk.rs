@@ -5,8 +5,8 @@ use std::process::Command;
 
 use lamp_tests::note;
 
-use crate::jobs::{JOBS, Workplace};
-use crate::limits::{limited, patiently};
+use super::jobs::{JOBS, Workplace};
+use super::limits::{limited, patiently};
 
 #[test]
 fn a_file_above_the_limit_is_one_sentence_and_no_file() {

@@ -7,8 +7,8 @@ use std::thread;
 
 use lamp_fixtures::SplitMix;
 
-use crate::jobs::{JOBS, Job, Wanted, Workplace};
-use crate::trials;
+use super::jobs::{JOBS, Job, Wanted, Workplace};
+use super::trials;
 
 /// The first is for nobody to handle.
 const SIGNALS: [&str; 8] = ["KILL", "KILL", "KILL", "TERM", "HUP", "INT", "USR1", "XCPU"];

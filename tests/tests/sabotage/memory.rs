@@ -1,8 +1,8 @@
 //! Limits of memory, from too little to start with to enough.
 
-use crate::jobs::{JOBS, Workplace};
-use crate::limits::{PATIENCE, limited};
-use crate::trials;
+use super::jobs::{JOBS, Workplace};
+use super::limits::{PATIENCE, limited};
+use super::trials;
 
 #[test]
 fn too_little_memory_is_one_sentence_and_no_file() {

@@ -9,8 +9,8 @@ use lamp_fixtures::{Sample, SplitMix};
 use lamp_tests::hostile::{damage, seeds};
 use lamp_tests::{Scratch, note, target_dir};
 
-use crate::limits::{Ended, limited};
-use crate::trials;
+use super::limits::{Ended, limited};
+use super::trials;
 
 /// A kind of input.
 struct Kind {

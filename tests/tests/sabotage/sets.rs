@@ -7,8 +7,8 @@ use lamp_fixtures::{Sample, SplitMix, cavity_staircase};
 use lamp_tests::hostile::damage;
 use lamp_tests::{Scratch, note, tilted_ball};
 
-use crate::limits::limited;
-use crate::trials;
+use super::limits::limited;
+use super::trials;
 
 /// Something of several files, and a command that reads them.
 struct Target {

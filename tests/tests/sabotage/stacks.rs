@@ -8,7 +8,7 @@ use lamp_stack::{Layer, Pages, StackError};
 use lamp_tests::hostile::damage;
 use lamp_tests::{Scratch, note, read_stack};
 
-use crate::trials;
+use super::trials;
 
 /// A part as a stack of each kind that we write.
 const STACKS: [(&str, &str); 4] = [

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use lamp_tests::Scratch;
 
-use crate::jobs::{JOBS, Workplace};
-use crate::limits::PATIENCE;
+use super::jobs::{JOBS, Workplace};
+use super::limits::PATIENCE;
 
 fn temporaries(scratch: &Scratch) -> Vec<String> {
     scratch.names().into_iter().filter(|name| name.ends_with(".part")).collect()

@@ -47,6 +47,10 @@ fn main() -> ExitCode {
         one_file::answer(judged.read, Path::new(path), size_mm, heights_mm);
         return ExitCode::SUCCESS;
     }
+    if words.iter().any(|word| word == "--list") {
+        list_tests(&words);
+        return ExitCode::SUCCESS;
+    }
     let is_kernel = |word: &String| KERNELS.iter().any(|judged| judged.name == word);
     // Those with a dash are libtest's, such as `--nocapture`.
     let words = words.into_iter().filter(|word| !word.starts_with('-'));
@@ -58,6 +62,13 @@ fn main() -> ExitCode {
     match KERNELS.iter().filter(is_asked).filter(|judged| !is_good(judged)).count() {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
+    }
+}
+
+/// Prints the names of tests as libtest does for `cargo nextest`: none is ignored.
+fn list_tests(words: &[String]) {
+    if !words.iter().any(|word| word == "--ignored") {
+        KERNELS.iter().for_each(|judged| println!("{}: test", judged.name));
     }
 }
 

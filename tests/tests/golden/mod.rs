@@ -1,7 +1,7 @@
 //! Layers compared with golden images, pixel for pixel.
 //!
 //! After a change that is meant,
-//! `LAMP_BLESS=1 cargo test -p lamp-tests --test golden`
+//! `LAMP_BLESS=1 cargo test -p lamp-tests golden::`
 //! rewrites the images in `fixtures/golden` and says which ones changed; look
 //! at them before they are committed.
 

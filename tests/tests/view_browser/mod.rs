@@ -275,7 +275,7 @@ fn reach_all_by_keys(browser: &Browser) {
     assert_eq!(missed, json!([]));
 }
 
-/// Takes the picture of the README: `cargo test -p lamp-tests --test view_browser -- --ignored`.
+/// Takes the picture of the README: `cargo test -p lamp-tests view_browser:: -- --ignored`.
 #[test]
 #[ignore = "writes docs/view.png"]
 fn screenshot() {

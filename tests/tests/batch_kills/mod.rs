@@ -1,7 +1,7 @@
 //! Nights that are ended in every way, with the real `lamp`: whatever happens, the same command again
 //! gives the same files, does no finished task twice, and leaves nothing lying about.
 //!
-//! `LAMP_KILLS=1000 LAMP_SEED=7 cargo test -p lamp-tests --test batch_kills` kills that often, at other
+//! `LAMP_KILLS=1000 LAMP_SEED=7 cargo test -p lamp-tests batch_kills::` kills that often, at other
 //! moments.
 #![cfg(target_os = "linux")]
 

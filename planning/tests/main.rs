@@ -1,0 +1,9 @@
+//! Tests of planners as other crates use them: one program, linked once.
+
+mod appendix_a;
+mod column_cure;
+mod parts_of_001;
+mod referee;
+mod rows_of_003;
+mod tables_of_000;
+mod wide_parts;

@@ -1,0 +1,7 @@
+//! Tests of slicing as other crates use it: one program, linked once.
+
+mod edges;
+mod exact;
+mod referee;
+mod slicing;
+mod surfaces;
