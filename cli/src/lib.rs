@@ -1,7 +1,7 @@
 //! The command line. Each command parses its options, calls one library function and reports.
 //!
-//! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` are the
-//! same code under the names of the pipeline.
+//! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` start it under the names of the
+//! pipeline.
 
 mod allocator;
 mod args;
@@ -125,6 +125,8 @@ pub(crate) fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
     let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
     let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
     stage
+        // Not the name of the program that runs, which is `lamp` where no process chooses its own.
+        .bin_name(name)
         .args(general)
         .version(env!("CARGO_PKG_VERSION"))
         .disable_version_flag(true)

@@ -31,6 +31,7 @@ mod info_show;
 mod input;
 mod json;
 mod late_disks;
+mod launchers;
 mod learn;
 mod licences;
 mod machine;

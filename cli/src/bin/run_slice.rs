@@ -1,7 +1,9 @@
 //! `lamp slice` under its name in the pipeline.
 
+mod launch;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    lamp_cli::run_stage("slice")
+    launch::launch("slice")
 }
