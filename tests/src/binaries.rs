@@ -1,18 +1,25 @@
-//! Builds and finds the binaries.
+//! Builds and finds the programs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Returns the path of a binary of `lamp-cli`, built from the current sources.
+/// Names the folder of programs that are built already, from the workspace's folder.
+const PROGRAMS: &str = "LAMP_PROGRAMS";
+
+/// Returns the path of a binary of `lamp-cli`: in the folder `LAMP_PROGRAMS` if that is set, or else
+/// built from the current sources, once a process.
 ///
 /// # Panics
 /// Panics with the compiler's message if the build fails.
 pub fn bin(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        build();
-        profile_dir()
+    let folder = FOLDER.get_or_init(|| match std::env::var_os(PROGRAMS) {
+        Some(folder) => workspace_root().join(folder),
+        None => {
+            build();
+            profile_dir()
+        }
     });
     folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }
@@ -42,8 +49,8 @@ fn folder_above(path: &Path) -> PathBuf {
 /// Builds the binaries with the profile of this test. Cargo does so itself only for
 /// tests of the package that contains them.
 ///
-/// Builds the whole workspace, so that shared crates keep the features of `cargo test
-/// --workspace` and are not built again.
+/// Chooses this package too, so that shared crates keep the features of its tests and are not built
+/// again: its `Cargo.toml` has those that other packages ask for.
 fn build() {
     let folder = profile_dir();
     let profile = match folder.file_name().and_then(|name| name.to_str()) {
@@ -52,7 +59,8 @@ fn build() {
     };
     let features = if cfg!(feature = "occt") { "lamp-cli/occt" } else { "" };
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--workspace", "--bins", "--profile", profile])
+        .args(["build", "--package", "lamp-cli", "--package", "lamp-tests", "--bins"])
+        .args(["--profile", profile])
         .args(["--features", features, "--target-dir"])
         .arg(target_dir())
         .current_dir(workspace_root())
