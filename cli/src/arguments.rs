@@ -10,6 +10,7 @@ use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, FromArgMatches};
 use lamp_machine::{Defaults, Machine};
+use lamp_pipeline::documents::document;
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
@@ -18,7 +19,6 @@ use crate::options_file::{Setting, option_of, settings_of};
 use crate::progress::say;
 use crate::streams::{input_name, is_stream};
 use crate::usage::show;
-use lamp_pipeline::documents::document;
 
 /// An options file has a line for each option.
 const MAX_OPTIONS_BYTES: u64 = 1 << 20;

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use lamp_pipeline::slice::Counts;
+use lamp_pipeline::to_nm;
 use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::Dpi;
 use serde::Serialize;
 
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
-use lamp_pipeline::to_nm;
 
 /// The head of the report: the part's files and the counts.
 #[derive(Serialize)]

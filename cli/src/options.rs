@@ -10,10 +10,10 @@ use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_grayscale::resin::Intensity;
+use lamp_pipeline::memory::{in_words, within_limits};
 use lamp_stack::{Length, LengthError, Named, skip_sync};
 
 use crate::exit::Exit;
-use lamp_pipeline::memory::{in_words, within_limits};
 
 /// The heading of options that every command has.
 pub(crate) const GENERAL: &str = "General options";

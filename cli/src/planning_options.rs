@@ -5,15 +5,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::material::Material;
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::heights::parse_share;
+use lamp_pipeline::words::option;
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::quoted;
 
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;
 use crate::options::one_of_described;
-use lamp_pipeline::documents::document_and_word;
-use lamp_pipeline::heights::parse_share;
-use lamp_pipeline::words::option;
 
 /// What `--help` says of the heights in a layer.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_pipeline::solid::part_notes;
 use lamp_planning::projector::Projector;
 use lamp_planning::target::{
     Grid, HeightMap, MapScale, Round, Shapes, Target, TargetError, TargetOptions,
@@ -15,7 +16,6 @@ use lamp_stack::{Catalogued, Length};
 use crate::exit::Exit;
 use crate::options::{one_of, parse_thickness};
 use crate::progress::Progress;
-use lamp_pipeline::solid::part_notes;
 
 /// How a target's file is read.
 #[derive(Args, Clone, Debug)]

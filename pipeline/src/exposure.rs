@@ -13,7 +13,7 @@ use crate::documents::{
     word_of_text,
 };
 use crate::error::{Error, ErrorKind};
-use crate::words::{optional, text};
+use crate::words::{optional, path, text};
 
 /// A table has a row for each thickness.
 const MAX_TABLE_BYTES: u64 = 1 << 20;
@@ -25,6 +25,7 @@ pub enum ExposureSettings {
     /// A material.
     Material {
         /// A built-in one's name, or a file.
+        #[serde(with = "path")]
         material: PathBuf,
         /// Depth that full white cures, in layers.
         #[serde(with = "text")]
@@ -36,6 +37,7 @@ pub enum ExposureSettings {
     /// A table of exposure times by layer thickness.
     Table {
         /// The file.
+        #[serde(with = "path")]
         exposure_table: PathBuf,
     },
     /// Pages state no exposure.

@@ -416,6 +416,17 @@ mod tests {
         assert_eq!(SlicingRecord::of(&stack), None);
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn files_may_have_names_that_are_no_text() {
+        use std::os::unix::ffi::OsStringExt;
+        let exposure_table = std::ffi::OsString::from_vec(b"times\xff.csv".to_vec()).into();
+        let exposure = ExposureSettings::Table { exposure_table };
+        let settings = SliceSettings { exposure, ..SliceSettings::default() };
+        assert_eq!(settings.stated(None).as_deref(), Some("exposure-table"));
+        assert!(settings.canonical().contains("--exposure-table"));
+    }
+
     #[test]
     fn the_first_setting_that_is_stated_is_named() {
         let usual = SliceSettings::default();

@@ -150,3 +150,44 @@ pub mod list {
         String::deserialize(from)?.split(',').map(parsed::<T, D>).collect()
     }
 }
+
+/// A path as text, for serde. Names that are no Unicode text are written as far as they are.
+pub mod path {
+    use std::path::{Path, PathBuf};
+
+    use super::{Deserialize, Deserializer, Serializer};
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Returns the errors of the format.
+    pub fn serialize<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(&path.display())
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Returns an error if there is no text.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<PathBuf, D::Error> {
+        String::deserialize(from).map(PathBuf::from)
+    }
+}
+
+/// A path that may be missing as text, for serde.
+pub mod optional_path {
+    use std::path::PathBuf;
+
+    use super::{Serializer, path};
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Returns the errors of the format.
+    pub fn serialize<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+        match path {
+            Some(path) => path::serialize(path, to),
+            None => to.serialize_none(),
+        }
+    }
+}

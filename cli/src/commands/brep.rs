@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
 use lamp_slicer::brep::{Attempt, Body, BodyReport, Comparison, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::{Dpi, one_line};
@@ -14,7 +15,6 @@ use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::second_opinion;
 use crate::streams::{input_name, print};
-use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
 
 /// Describe a STEP part, and check whether it can be sliced
 ///

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
+use lamp_pipeline::solid::part_notes;
+use lamp_pipeline::step::{ReaderSettings, bytes_of};
 use lamp_slicer::topology::{CornerTable, StepSolids};
 use lamp_slicer::{OpenOptions, Part, Placement, Units};
 use lamp_stack::{
@@ -21,8 +23,6 @@ use crate::streams::{
     check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
     new_folder, open_pages, progress, unless_found, write_file, write_layers, written_to,
 };
-use lamp_pipeline::solid::part_notes;
-use lamp_pipeline::step::{ReaderSettings, bytes_of};
 
 /// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
 ///

@@ -7,6 +7,10 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::OutlinePiece;
 use lamp_grayscale::material::Material;
+use lamp_pipeline::RecordedSlicing;
+use lamp_pipeline::documents::document;
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::name_of_all;
 use lamp_planning::cure_section::{
     CureRule, CureSection, CureSectionError, SectionLine, SectionPlane, ShownSection,
 };
@@ -23,10 +27,6 @@ use crate::planning_options::SAMPLE_HEIGHTS;
 use crate::progress::Progress;
 use crate::section::SectionPicture;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
-use lamp_pipeline::RecordedSlicing;
-use lamp_pipeline::documents::document;
-use lamp_pipeline::part_file::{PartFile, paths};
-use lamp_pipeline::solid::name_of_all;
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///

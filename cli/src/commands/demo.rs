@@ -12,6 +12,8 @@ use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::DitherMethod;
 use lamp_machine::Machine;
+use lamp_pipeline::SliceSettings;
+use lamp_pipeline::documents::document_and_word;
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, StackError};
 
@@ -20,8 +22,6 @@ use crate::options::{Common, Output, parse_count};
 use crate::picture::{Picture, PictureScale, Region};
 use crate::progress::Progress;
 use crate::streams::{failed_at, print, write_file, write_layers};
-use lamp_pipeline::SliceSettings;
-use lamp_pipeline::documents::document_and_word;
 
 /// Run the whole pipeline on a built-in blade mould, and draw the result
 #[derive(Args)]

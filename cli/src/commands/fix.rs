@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::json_report::JsonReport;
 use clap::Args;
 use lamp_fix::{Band, BandOutcome, FixOptions, Fixed};
 use lamp_pipeline::fix::{FixSettings, Fixing};
@@ -13,6 +12,7 @@ use crate::args::stages::FixStageArgs;
 use crate::band_pictures::BandPictures;
 use crate::endings::parse_report;
 use crate::exit::Exit;
+use crate::json_report::JsonReport;
 use crate::options::{Common, Input, Output};
 use crate::stack_notes::doubts;
 use crate::streams::{check_beside, decoding, progress, unless_found};

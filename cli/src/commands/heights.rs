@@ -8,7 +8,13 @@ use lamp_adaptive::{
     AreaDeviation, Criterion, CuspHeight, FoundHeights, Heights, LayeredPart, Measure, SweptLayer,
     uniform_heights,
 };
+use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_pipeline::exposure::ExposureSettings;
+use lamp_pipeline::heights::{HeightSettings, bound, doubts, measured, significant, time_text};
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::SolidSettings;
+use lamp_pipeline::solid::{Reading, at_part, name_of_all};
 use lamp_stack::{Dpi, Length};
 use serde::Serialize;
 use serde_json::json;
@@ -24,12 +30,6 @@ use crate::options::{Common, parse_thickness};
 use crate::plots::{self, Plot, PlotAxis, Series, drawn};
 use crate::progress::Progress;
 use crate::streams::{check_beside, print, write_file};
-use lamp_grayscale::exposure::Exposure;
-use lamp_pipeline::exposure::ExposureSettings;
-use lamp_pipeline::heights::{HeightSettings, bound, doubts, measured, significant, time_text};
-use lamp_pipeline::part_file::{PartFile, paths};
-use lamp_pipeline::solid::SolidSettings;
-use lamp_pipeline::solid::{Reading, at_part, name_of_all};
 
 /// Find how thick each layer of a part may be, and what that saves
 ///

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use lamp_machine::{Machine, Recoating};
+use lamp_pipeline::documents::document;
+use lamp_pipeline::to_nm;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
@@ -11,8 +13,6 @@ use crate::catalogue::show;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::streams::print;
-use lamp_pipeline::documents::document;
-use lamp_pipeline::to_nm;
 
 /// List or show machines: build area, height, resolution and layer thickness
 #[derive(Args)]

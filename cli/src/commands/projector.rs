@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use lamp_pipeline::documents;
+use lamp_pipeline::to_nm;
 use lamp_planning::projector::{Focus, Lens, Projector, SpreadOf};
 use lamp_stack::{Catalogued, Length, Size};
 use serde_json::{Value, json};
@@ -11,8 +13,6 @@ use crate::catalogue;
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::streams::{input_name, print};
-use lamp_pipeline::documents;
-use lamp_pipeline::to_nm;
 
 /// List, show or check projectors: where and how bright mirrors light the glass
 #[derive(Args)]

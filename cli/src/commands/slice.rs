@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::{SliceStage, Slicing};
+use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::watcher::Watcher;
 use lamp_slicer::{Bodies, PixelGrid, StrayBand};
 
@@ -13,8 +15,6 @@ use crate::exit::Exit;
 use crate::mesh_report::{MeshReport, RowPositions};
 use crate::options::{Common, Output};
 use crate::streams::{check_beside, check_not_input, progress, unless_found, write_layers};
-use lamp_pipeline::part_file::PartFile;
-use lamp_pipeline::solid::name_of_all;
 
 /// Slice a part into a stack of layer images
 ///

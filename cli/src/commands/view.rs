@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 use lamp_stack::{Destination, Format, IndexedStack, PrivateFile, write_stack};
 use lamp_view::{Address, Ticket, Token, ViewedStack, Viewer, licences, of_report, serve};
 
@@ -16,7 +17,6 @@ use crate::exit::Exit;
 use crate::options::{Common, parse_memory};
 use crate::progress::Progress;
 use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
-use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
 /// Look at layers in a browser
 ///

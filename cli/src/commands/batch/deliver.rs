@@ -10,12 +10,12 @@ use std::time::UNIX_EPOCH;
 use anyhow::Context;
 use lamp_batch::path_bytes::WrittenPath;
 use lamp_batch::{Damage, Key, Night, NightFormat, NightOutput, Store};
+use lamp_pipeline::Names;
 use lamp_stack::{Destination, digest_of};
 use serde::{Deserialize, Serialize};
 
 use super::plan::{Subject, Wanted};
 use crate::exit::Exit;
-use lamp_pipeline::Names;
 
 /// Delivers results to a folder.
 pub(super) struct Deliverer<'a> {

@@ -2,6 +2,7 @@
 
 use anyhow::anyhow;
 use lamp_batch::{Damage, collect as collect_garbage};
+use lamp_pipeline::memory::in_words;
 
 use super::deliver::check_files;
 use super::night_file::store_of;
@@ -11,7 +12,6 @@ use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
 use crate::streams::print;
-use lamp_pipeline::memory::in_words;
 
 /// Hashes all results anew, and takes away those that are damaged; and what was delivered of them.
 pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {

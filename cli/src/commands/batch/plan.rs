@@ -10,14 +10,14 @@ use anyhow::{Context, anyhow};
 use lamp_batch::{
     Build, Cost, Digests, Graph, InputFile, Key, Kind, Part, Recipe, Stage, Store, Task,
 };
+use lamp_pipeline::documents::without_digest;
+use lamp_pipeline::{Survey, stored_name};
 
 use super::night_file::NightFile;
 use super::work::{What, Work};
 use crate::exit::Exit;
 use crate::stages::Stages;
 use crate::stages::calls::{Checking, JOIN_CODE, PACK_CODE, Tiling};
-use lamp_pipeline::documents::without_digest;
-use lamp_pipeline::{Survey, stored_name};
 
 /// A range takes about so many seconds of a processor, unless the night file says how many there
 /// are: few enough that a crash costs little, enough that starting it costs nothing.

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use lamp_batch::{Cost, Key, Kind, Ledger};
+use lamp_pipeline::heights::time_text;
+use lamp_pipeline::memory::in_words;
 
 use super::deliver::Deliverer;
 use super::night_file::NightFile;
@@ -13,8 +15,6 @@ use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::printable;
 use crate::streams::print;
-use lamp_pipeline::heights::time_text;
-use lamp_pipeline::memory::in_words;
 
 pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;

@@ -7,6 +7,8 @@ use std::path::Path;
 use anyhow::Context;
 use lamp_batch::path_bytes::WrittenPath;
 use lamp_batch::{Event, Key, Store, events};
+use lamp_pipeline::heights::time_text;
+use lamp_pipeline::memory::in_words;
 use lamp_stack::digest_of;
 use maud::{Markup, PreEscaped, html};
 
@@ -21,8 +23,6 @@ use crate::exit::Exit;
 use crate::plots::{Plot, curve, inline_svg, linear};
 use crate::progress::printable;
 use crate::streams::write_file;
-use lamp_pipeline::heights::time_text;
-use lamp_pipeline::memory::in_words;
 
 /// The most findings of a part that are listed.
 const MOST_LINES: usize = 5;

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use lamp_batch::Ledger;
+use lamp_pipeline::memory::in_words;
 
 use super::deliver::Deliverer;
 use super::plan::Plan;
-use lamp_pipeline::memory::in_words;
 
 /// What a task takes besides its result: what it does, its manifest, and three blocks that are not full.
 const TASK_BYTES: u64 = 3 * 4096;

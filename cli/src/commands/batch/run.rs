@@ -7,6 +7,7 @@ use anyhow::{Context, anyhow};
 use lamp_batch::{
     Attempt, End, Engine, Event, Journal, Launcher, Ledger, Local, NamedTasks, Work, host, now,
 };
+use lamp_pipeline::memory::available;
 
 use super::deliver::Deliverer;
 use super::night_file::NightFile;
@@ -19,7 +20,6 @@ use super::{EngineName, RunArgs};
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
-use lamp_pipeline::memory::available;
 
 pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let Some(night) = &args.night else {

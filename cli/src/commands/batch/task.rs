@@ -11,6 +11,7 @@ use lamp_batch::{
     Damage, Digests, Event, Journal, Key, Manifest, Store, Task, Unpublished, Written, host, now,
     status,
 };
+use lamp_pipeline::RangeFindings;
 use lamp_stack::{
     Destination, Format, IndexedStack, KEY_LAYERS, Layer, PackLevel, Page, StackError, join_packed,
     write_packed,
@@ -26,7 +27,6 @@ use crate::exit::Exit;
 use crate::out_of_memory;
 use crate::stages::Stages;
 use crate::stages::calls::{Checking, Tiling};
-use lamp_pipeline::RangeFindings;
 
 type Layers<'a> = dyn Iterator<Item = Result<Layer, Exit>> + 'a;
 type Write<'a> = dyn FnMut(&mut Layers<'_>) -> Result<(), Exit> + 'a;

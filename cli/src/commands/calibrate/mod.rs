@@ -14,6 +14,7 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::calibrate::CsvTable;
 use lamp_grayscale::material::{Given, Material, MaterialError};
 use lamp_grayscale::resin::Intensity;
+use lamp_pipeline::documents::document;
 use lamp_stack::CatalogueError;
 
 use crate::catalogue::read_text;
@@ -22,7 +23,6 @@ use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::plots::{self, Plot, drawn};
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
-use lamp_pipeline::documents::document;
 
 /// Fit a resin's parameters to measured cure depths or widths
 ///

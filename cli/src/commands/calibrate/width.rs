@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::calibrate::{Estimate, WidthFit, WidthPoint, fit_widths, width_points};
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
+use lamp_pipeline::documents::document;
 use lamp_stack::Dpi;
 
 use super::CalibrationFiles;
@@ -14,8 +16,6 @@ use crate::exit::Exit;
 use crate::options::Common;
 use crate::plots::{Plot, PlotAxis, Series, highest};
 use crate::progress::Progress;
-use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_pipeline::documents::document;
 
 /// Fit the cure width of features of several sizes to measured squares
 ///

@@ -1,6 +1,8 @@
 //! A line and a JSON object for each finding.
 
 use lamp_machine::Recoating;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::to_nm;
 use lamp_supports::{
     Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
     PocketKind, Region, WeakJoint,
@@ -9,8 +11,6 @@ use serde_json::{Value, json};
 
 use super::units::Scale;
 use super::{CheckArgs, Kind};
-use lamp_pipeline::heights::significant;
-use lamp_pipeline::to_nm;
 
 /// What is said of a finding.
 pub(crate) struct FindingLine {

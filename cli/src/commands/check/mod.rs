@@ -18,6 +18,7 @@ use lamp_stack::{Layer, Length, MemorySize, Page, PageHeader};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, Findings, IslandMinimum, LoneMinimum,
 };
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::args::slicing::SlicingArgs;
@@ -30,6 +31,7 @@ use crate::stack_notes::doubts;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use lamp_pipeline::documents::{canonical_word, document};
 use lamp_pipeline::solid::at_part;
+use lamp_pipeline::words::{list, optional, path, text, words_of};
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
 pub(crate) use lines::FindingLine;
@@ -46,7 +48,7 @@ pub(super) use units::Scale;
 /// and empty layers; the worst come first. A part is sliced on the way, by the options of `slice`;
 /// its mesh then says where islands must be, too. What rounding to pixels makes, and islands that
 /// never hold a square of --speck pixels, is only in the report.
-#[derive(Args)]
+#[derive(Args, Clone, Serialize)]
 #[command(after_help = "\
 Examples:
   lamp check build.tif
@@ -55,10 +57,12 @@ Examples:
   lamp check night/*.tif --only islands,pockets --report check.json
 
 Exit status: 0 if the work is done, whatever was found; 3 with --strict if something was.")]
+#[serde(rename_all = "kebab-case")]
 pub(crate) struct CheckArgs {
     /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts, each
     /// checked on its own
     #[arg(value_name = "STACK|PART", default_value = "-")]
+    #[serde(skip)]
     inputs: Vec<PathBuf>,
 
     /// What to tell
@@ -71,63 +75,77 @@ pub(crate) struct CheckArgs {
         "Centres of gravity off their base",
         "Stray rows, white at the border, empty layers",
     ]))]
+    #[serde(with = "list")]
     only: Vec<Kind>,
 
     /// Side of the square that a finding must hold, in pixels
     #[arg(long, value_name = "PIXELS", default_value = "3")]
+    #[serde(with = "text")]
     speck: NonZeroU32,
 
     /// Share of white that must rest on white
     #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
+    #[serde(with = "text")]
     least_support: f64,
 
     /// How far white may reach beyond the white below [default: as far as a layer is thick: 45
     /// degrees]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    #[serde(with = "optional")]
     max_overhang: Option<Length>,
 
     /// How wide a way out must be to drain a pocket: narrower ways are found, too, by placing a ball
     /// of this size everywhere; takes several times longer [default: a pixel and a layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    #[serde(with = "optional")]
     drain: Option<Length>,
 
     /// Level from which a gray pixel is white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
+    #[serde(with = "text")]
     threshold: NonZeroU8,
 
     /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
     ///
     /// Its defaults hold where no other resolution, thickness or margin is given
     #[arg(long, value_name = "M", default_value = "alpha")]
+    #[serde(with = "path")]
     machine: PathBuf,
 
     /// Write all findings as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Write pictures of the worst findings into a new folder: what is found in red, other white
     /// without white below in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
     evidence: Option<PathBuf>,
 
     /// Replace a folder of pictures that an earlier run wrote
     #[arg(long)]
+    #[serde(skip)]
     force: bool,
 
     /// End with status 3 if there are findings, or if pages of a folder may be missing
     #[arg(long)]
+    #[serde(skip)]
     strict: bool,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended. The first of them
     /// stands on the platform
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    #[serde(skip)]
     layers: Option<Range<u32>>,
 
     /// Memory for the table of crossings of a part
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    #[serde(skip)]
     memory: Option<u64>,
 
     #[command(flatten)]
+    #[serde(skip)]
     slicing: SlicingArgs,
 }
 
@@ -265,8 +283,8 @@ impl CheckArgs {
 
     /// Returns the options that matter to findings as one text.
     pub(crate) fn canonical(&self) -> String {
-        let (only, machine) = (&self.only, canonical_word::<Machine>(&self.machine));
-        format!("check {only:?} {:?} --machine {machine}", self.options())
+        let machine = canonical_word::<Machine>(&self.machine).into();
+        format!("check{}", words_of(&Self { machine, ..self.clone() }))
     }
 
     fn options(&self) -> CheckOptions {

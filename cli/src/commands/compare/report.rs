@@ -2,13 +2,13 @@
 
 use std::cmp::Reverse;
 
+use lamp_pipeline::to_nm;
 use lamp_stack::{PageHeader, Pairing};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::walk::{DifferenceBox, SectionDifference};
 use crate::progress::printable;
-use lamp_pipeline::to_nm;
 
 /// The most layers, and the most boxes of a layer, that are printed unless all are asked for.
 const MOST_LINES: usize = 20;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use lamp_grayscale::resin::ExposureTime;
+use lamp_pipeline::documents::document;
 use lamp_planning::Light;
 use lamp_planning::learn::{JobFile, digest_of_stack, profile_name};
 use lamp_planning::speed::{PartPages, times_table};
@@ -14,7 +15,6 @@ use crate::exit::Exit;
 use crate::options::Input;
 use crate::progress::Progress;
 use crate::streams::{input_name, new_folder, read_layers};
-use lamp_pipeline::documents::document;
 
 /// Begins a job.
 pub(super) fn begin(

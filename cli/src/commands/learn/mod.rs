@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use lamp_pipeline::memory;
 use lamp_planning::SampleHeight;
 use lamp_planning::learn::{Job, Law, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
@@ -23,8 +24,6 @@ use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::plots;
 use crate::progress::Progress;
 use crate::streams::{check_beside, input_name, is_stream, print, read_beside, write_file};
-use lamp_pipeline::memory;
-
 use report::{lines_of, write_report};
 
 /// Measurements are read whole.

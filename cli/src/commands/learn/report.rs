@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use lamp_pipeline::heights::{significant, time_text};
 use lamp_planning::learn::{Job, JobPrint, Learned, PrintMeasurements};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
-use lamp_pipeline::heights::{significant, time_text};
 
 /// The lines that are printed.
 pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::material::Composition;
+use lamp_pipeline::documents::read_file;
 
 use crate::endings::parse_toml;
 use crate::exit::Exit;
 use crate::options::Common;
 use crate::progress::Progress;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
-use lamp_pipeline::documents::read_file;
 
 /// Make a material from the composition of a suspension
 ///

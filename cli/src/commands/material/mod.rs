@@ -6,8 +6,10 @@ mod profile;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin};
+use lamp_pipeline::documents;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
@@ -16,8 +18,6 @@ use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::options::Common;
 use crate::streams::{input_name, print};
-use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_pipeline::documents;
 
 /// List, show, check or make materials: how deep light cures a resin
 #[derive(Args)]

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::calibrate::format_significant;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
+use lamp_pipeline::documents::document;
 use lamp_stack::Length;
 
 use crate::exit::Exit;
@@ -13,8 +15,6 @@ use crate::lamp_option::LampOption;
 use crate::options::{Common, parse_distance};
 use crate::progress::Progress;
 use crate::streams::print;
-use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_pipeline::documents::document;
 
 /// Print the profile that a line of light cures: how wide at the surface, how deep where
 ///

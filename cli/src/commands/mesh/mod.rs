@@ -10,6 +10,9 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
+use lamp_pipeline::memory::{available, in_words};
+use lamp_pipeline::solid::part_notes;
+use lamp_pipeline::step::ReaderSettings;
 use lamp_slicer::{Part, Units};
 use lamp_stack::Length;
 
@@ -18,9 +21,6 @@ use crate::exit::Exit;
 use crate::options::{Common, one_of, parse_memory};
 use crate::progress::say;
 use crate::streams::{input_name, is_stream};
-use lamp_pipeline::memory::{available, in_words};
-use lamp_pipeline::solid::part_notes;
-use lamp_pipeline::step::ReaderSettings;
 
 /// Check or repair the mesh of a part
 #[derive(Args)]

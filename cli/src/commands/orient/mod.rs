@@ -6,6 +6,8 @@ mod report;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::{Reading, SolidSettings, at_part, name_of_all};
 use lamp_slicer::topology::CornerTable;
 use lamp_stack::{Dpi, Length};
 use lamp_supports::{PoseFacts, PoseLimits, measure, pareto, poses};
@@ -17,8 +19,6 @@ use crate::options::{Common, parse_angle, parse_thickness};
 use crate::plots::{self, sphere_picture};
 use crate::progress::Progress;
 use crate::streams::{check_beside, write_file};
-use lamp_pipeline::part_file::{PartFile, paths};
-use lamp_pipeline::solid::{Reading, SolidSettings, at_part, name_of_all};
 
 /// Find how to turn a part so that few islands float, and little overhangs
 ///

@@ -1,5 +1,8 @@
 //! Tells what poses a part has, as a table or as JSON.
 
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::solid::name_of_all;
+use lamp_pipeline::to_nm;
 use lamp_supports::PoseFacts;
 use serde::Serialize;
 use serde_json::json;
@@ -8,9 +11,6 @@ use super::{Compared, OrientArgs};
 use crate::exit::Exit;
 use crate::json_report::print_answer;
 use crate::streams::print;
-use lamp_pipeline::heights::significant;
-use lamp_pipeline::solid::name_of_all;
-use lamp_pipeline::to_nm;
 
 /// The most poses that the table shows.
 const MOST_ROWS: usize = 20;

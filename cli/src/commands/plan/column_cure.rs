@@ -8,6 +8,9 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::heights::parse_share;
+use lamp_pipeline::words::option;
 use lamp_planning::ShownBitmap;
 use lamp_planning::column::{
     ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
@@ -24,9 +27,6 @@ use crate::options::{Common, one_of_described, parse_count, parse_thickness};
 use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::{GivenTarget, TargetArg};
-use lamp_pipeline::documents::document_and_word;
-use lamp_pipeline::heights::parse_share;
-use lamp_pipeline::words::option;
 
 /// Choose bitmaps and times that cure a part through a glass, without layers
 ///

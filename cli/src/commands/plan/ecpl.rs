@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::material::Material;
+use lamp_pipeline::documents::document;
 use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::{KineticSetting, Method, Profile, RingExposure, RingPlan, plan};
 use lamp_planning::projector::Projector;
@@ -17,7 +18,6 @@ use crate::options::{Common, one_of_described};
 use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::TargetArg;
-use lamp_pipeline::documents::document;
 
 /// Choose bitmaps and times that cure a round part, by the kinetics of resin and oxygen
 ///

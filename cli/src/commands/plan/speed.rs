@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::exposure::MeasuredDoses;
+use lamp_pipeline::memory;
 use lamp_planning::speed::{
     PartError, PartPages, SpeedOptions, SpeedPlanError, TimedPart, plan, recorded_ms, times_table,
 };
@@ -23,7 +24,6 @@ use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
 };
-use lamp_pipeline::memory;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use lamp_grayscale::resin::ExposureTime;
+use lamp_pipeline::heights::{significant, time_text};
 use lamp_planning::speed::{DOSE_BINS, SpeedPlan, Tally, TimedPart, Wrong, recorded_ms};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
-use lamp_pipeline::heights::{significant, time_text};
 
 /// A plan, and what it is for.
 pub(super) struct Planned<'a> {

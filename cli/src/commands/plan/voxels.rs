@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
+use lamp_pipeline::memory;
 use lamp_planning::voxels::{
     Options, Outcome, PlannedStack, Sources, VoxelObjective, VoxelPlanError, plan,
 };
@@ -23,8 +25,6 @@ use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
 };
-use lamp_grayscale::exposure::MeasuredDoses;
-use lamp_pipeline::memory;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///

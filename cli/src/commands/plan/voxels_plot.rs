@@ -1,10 +1,10 @@
 //! Plots what a plan of gray levels reaches.
 
+use lamp_pipeline::heights::significant;
 use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
 
 use super::voxels_report::Planned;
 use crate::plots::{Plot, PlotAxis, Series, curve, linear};
-use lamp_pipeline::heights::significant;
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {

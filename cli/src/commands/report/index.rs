@@ -1,11 +1,11 @@
 //! The index of a folder of reports.
 
+use lamp_pipeline::heights::time_text;
 use maud::html;
 
 use super::gather::StackReport;
 use super::page::document;
 use crate::progress::printable;
-use lamp_pipeline::heights::time_text;
 
 /// A line of the index.
 pub(super) struct Entry {

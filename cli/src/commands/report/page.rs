@@ -1,5 +1,6 @@
 //! The page of a stack, as HTML. maud escapes all texts, which come from files.
 
+use lamp_pipeline::heights::time_text;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::charts::{charts, same_thickness_um};
@@ -7,7 +8,6 @@ use super::gather::{Found, StackReport};
 use super::pictures::Picture;
 use crate::commands::info;
 use crate::progress::printable;
-use lamp_pipeline::heights::time_text;
 
 /// The most findings of a kind that are listed, as `lamp check` does.
 const MOST_LINES: usize = 20;

@@ -12,11 +12,17 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_edit::{Edits, edit};
 use lamp_machine::Machine;
+use lamp_pipeline::RecordedSlicing;
+use lamp_pipeline::documents::document;
+use lamp_pipeline::part_file::{PartFile, paths};
+use lamp_pipeline::solid::name_of_all;
+use lamp_pipeline::words::{text, words_of};
 use lamp_stack::{CompensateRecord, Length, Page, PageInfo};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,
     plan_supports,
 };
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::args::solid::part_file;
@@ -31,11 +37,6 @@ use crate::streams::{
     check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
     write_file, write_layers,
 };
-use lamp_pipeline::RecordedSlicing;
-use lamp_pipeline::documents::document;
-use lamp_pipeline::part_file::{PartFile, paths};
-use lamp_pipeline::solid::name_of_all;
-
 use plan_file::plan_text;
 use report::SupportReport;
 use units::{Curvature, Degrees};
@@ -50,7 +51,7 @@ const CHOICE: &str = "Choice of supports";
 /// that meets the part where it is smooth, even and away from creases, and that can be built. What
 /// has no such way is left, and told. The plan is a list of edits: delete or exchange supports in
 /// it, and let lamp edit draw it.
-#[derive(Args, Clone)]
+#[derive(Args, Serialize, Clone)]
 #[command(after_help = "\
 Examples:
   lamp support blade.tif --part blade.stl -o supported.tif
@@ -59,61 +60,74 @@ Examples:
   lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
 
 Exit status: 0 if the work is done; 3 with --strict if islands are left.")]
+#[serde(rename_all = "kebab-case")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
+    #[serde(skip)]
     pub(crate) stack: PathBuf,
 
     /// The part that the stack was sliced from; repeat it for several parts, as they were given to
     /// slice
     #[arg(long, value_name = "PART", required = true, value_parser = part_file())]
+    #[serde(skip)]
     pub(crate) part: Vec<PartFile>,
 
     /// Write the supports as a list of edits, with alternatives, for people to change
     #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
+    #[serde(skip)]
     plan: Option<PathBuf>,
 
     /// Write the supports as an STL
     #[arg(long, value_name = "FILE.stl", value_parser = solid::parse_stl)]
+    #[serde(skip)]
     stl: Option<PathBuf>,
 
     /// Write islands and supports as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Give up with status 3 if islands are left, or if pages of a folder may be missing: no stack
     /// is written, and the next stage of a pipe fails, too
     #[arg(long)]
+    #[serde(skip)]
     strict: bool,
 
     /// Radius of supports
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    #[serde(with = "text")]
     radius: Length,
 
     /// Largest angle of a support to the vertical
     #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
     #[arg(help_heading = CHOICE)]
+    #[serde(with = "text")]
     max_tilt: Degrees,
 
     /// Greatest length of a support
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().max_length)]
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    #[serde(with = "text")]
     max_length: Length,
 
     /// Least distance of a contact to edges where the surface turns by more than 30 degrees
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().edge_clearance)]
     #[arg(value_parser = parse_distance, help_heading = CHOICE)]
+    #[serde(with = "text")]
     edge_clearance: Length,
 
     /// Largest curvature of the surface around a contact: 1/mm is a radius of 1 mm
     #[arg(long, value_name = "CURVATURE", help_heading = CHOICE)]
     #[arg(default_value_t = Curvature(SupportOptions::default().max_curvature))]
+    #[serde(with = "text")]
     max_curvature: Curvature,
 
     /// Widest piece of an island that one support holds; wider islands are divided
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().hold)]
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    #[serde(with = "text")]
     hold: Length,
 
     /// Directions to try
@@ -128,17 +142,21 @@ pub(crate) struct SupportArgs {
 
     /// Side of the square that an island must hold, in pixels
     #[arg(long, value_name = "PIXELS", default_value = "3")]
+    #[serde(with = "text")]
     speck: NonZeroU32,
 
     /// Level from which a gray pixel is white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
+    #[serde(with = "text")]
     threshold: NonZeroU8,
 
     /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
     #[arg(long, value_name = "M", default_value = "alpha")]
+    #[serde(skip)]
     pub(crate) machine: PathBuf,
 
     #[command(flatten)]
+    #[serde(skip)]
     output: Output,
 }
 
@@ -193,10 +211,9 @@ impl SupportArgs {
         })
     }
 
-    /// Returns the options that matter to bytes as one text. The machine only tells of forces.
+    /// Returns the options that matter to bytes as one text. The machine only decides forces.
     pub(crate) fn canonical(&self) -> String {
-        let Self { threshold, speck, .. } = self;
-        format!("support {:?} --speck {speck} --threshold {threshold}", self.options())
+        format!("support{}", words_of(self))
     }
 
     fn check_files(&self) -> Result<(), Exit> {

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
+use lamp_pipeline::heights::significant;
+use lamp_pipeline::to_nm;
 use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Support};
 use serde_json::{Map, Value, json};
 
@@ -10,8 +12,6 @@ use crate::commands::check::{Scale, drag_mn};
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 use crate::progress::Progress;
-use lamp_pipeline::heights::significant;
-use lamp_pipeline::to_nm;
 
 /// The most islands that are printed, unless all are asked for.
 const MOST_LINES: usize = 20;

@@ -7,6 +7,7 @@ use clap::{ArgGroup, Args};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{TargetExposure, squares};
+use lamp_pipeline::documents::document;
 use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
 
 use super::{parse_gap, whole_pixels};
@@ -14,7 +15,6 @@ use crate::exit::Exit;
 use crate::options::{Common, parse_light};
 use crate::progress::Progress;
 use crate::streams::{new_folder, write_file, written_to};
-use lamp_pipeline::documents::document;
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///

@@ -2,10 +2,10 @@
 
 use lamp_build::StrayRows;
 use lamp_machine::Machine;
+use lamp_pipeline::ranges;
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
-use lamp_pipeline::ranges;
 
 /// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
 pub(super) fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<String> {

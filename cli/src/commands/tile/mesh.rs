@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_build::{CellShape, MeshOptions, MeshPattern, Moat};
 use lamp_grayscale::{DitherMethod, dither_image};
+use lamp_pipeline::words::{optional, path};
 use lamp_stack::{Image, Length, StackError};
+use serde::Serialize;
 
 use crate::exit::Exit;
 use crate::options::{one_of_described, parse_area, parse_distance, parse_thickness};
@@ -14,24 +16,29 @@ use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages};
 const HEADING: &str = "Mesh around the parts";
 
 /// Options of the mesh.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) struct MeshArgs {
     /// Mesh around the parts, which keeps the suspension from sloshing: hexagon, square, an image
     /// that is repeated, or none
     #[arg(long, value_name = "hexagon|square|none|FILE", default_value = "hexagon")]
     #[arg(help_heading = HEADING)]
+    #[serde(with = "path")]
     mesh: PathBuf,
 
     /// Distance between the centres of neighbouring cells [default: 5mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     cell: Option<Length>,
 
     /// Thickness of the walls between cells [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     wall: Option<Length>,
 
     /// Width of the moat that stays free around each part [default: 1mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
+    #[serde(with = "optional")]
     clearance: Option<Length>,
 
     /// What the moat follows [default: rising]
@@ -40,21 +47,25 @@ pub(super) struct MeshArgs {
         "The part in each layer: mesh cures onto faces that look up, and in cross bores",
         "The part's outline over all layers, also below faces that look down; implies --fit",
     ]))]
+    #[serde(with = "optional")]
     moat: Option<Moat>,
 
     /// Least area of a piece of mesh in a layer: smaller ones are left out, and so are those that
     /// hang on no mesh below; 0 keeps all that hang [default: 1mm2]
     #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
+    #[serde(with = "optional")]
     least_piece: Option<f64>,
 
     /// Width of the break lines, which cut the mesh from each part up, down, left and right to the
     /// next part or the area's edge; 0 makes none [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
+    #[serde(with = "optional")]
     break_width: Option<Length>,
 
     /// Distance between the break lines of a part [default: 20mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
+    #[serde(with = "optional")]
     break_pitch: Option<Length>,
 
     /// Number of layers of mesh alone below the parts, for them to break off from [default: 5]

@@ -20,7 +20,10 @@ use std::rc::Rc;
 use clap::Args;
 use lamp_build::{BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe};
 use lamp_machine::Machine;
+use lamp_pipeline::documents::{document, document_and_word, is_file, recorded_name};
+use lamp_pipeline::words::{optional, optional_path, text, words_of};
 use lamp_stack::{Length, Size};
+use serde::Serialize;
 
 use crate::endings::parse_report;
 use crate::exit::Exit;
@@ -29,8 +32,6 @@ use crate::progress::Progress;
 use crate::stack_notes::doubts;
 use crate::streams::Layers;
 use crate::streams::{progress, unless_found, write_file};
-use lamp_pipeline::documents::{document, document_and_word, is_file, recorded_name};
-
 use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::MeshArgs;
 use placing::read_layout;
@@ -49,7 +50,7 @@ use turns_arg::{TurnsArg, TurnsParser};
 /// lines cut through the mesh; the first layers are mesh alone. Pieces of mesh that would float or
 /// are small are left out. The default dimensions of the mesh are
 /// LAMP's own. --mesh none leaves the area black.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Serialize)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
@@ -64,23 +65,28 @@ Examples:
   tile blade.tif --machine beta --recipe build.json
   tile blade.tif --machine mine.toml --report report.json -o build.tif
   tile blade.tif --machine mine.toml --time")]
+#[serde(rename_all = "kebab-case")]
 pub(crate) struct TileArgs {
     /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
     /// for standard input [default count: as many as fit of one stack, one each of several]
     #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
+    #[serde(skip)]
     stacks: Vec<StackArg>,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    #[serde(skip)]
     layers: Option<Range<u32>>,
 
     /// Machine: alpha, beta or a file (see lamp machine). A build beyond its area, height,
     /// resolution or layer thickness is refused
     #[arg(long, value_name = "M")]
+    #[serde(with = "optional_path")]
     machine: Option<PathBuf>,
 
     /// Build area, for example 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]
     #[arg(long, value_name = "WxH")]
+    #[serde(with = "optional")]
     area: Option<Size>,
 
     /// Number of copies of a single stack [default: as many as fit]
@@ -95,11 +101,13 @@ pub(crate) struct TileArgs {
     /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
     /// --mesh none]. With --layout, nearer copies cause a warning
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
+    #[serde(with = "optional")]
     gap: Option<Length>,
 
     /// Smallest distance of copies to the area's edges
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     #[arg(default_value = "0mm")]
+    #[serde(with = "text")]
     edge_gap: Length,
 
     /// Place parts by the extent of what is white in any layer, not by their whole images. Stacks
@@ -112,38 +120,46 @@ pub(crate) struct TileArgs {
         "The boxes around the parts",
         "The parts' outlines, one after another or, of one part, on a lattice, if boxes place fewer",
     ]))]
+    #[serde(with = "text")]
     pack: PackBy,
 
     /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
     /// outline]. An angle below 90deg makes a plan, which packs by outlines
     #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
+    #[serde(with = "optional")]
     turns: Option<TurnsArg>,
 
     /// Place copies as this file says, instead of packing them
     #[arg(long, value_name = "FILE.json")]
     #[arg(conflicts_with_all = ["copies", "shares", "edge_gap", "pack", "turns"])]
+    #[serde(with = "optional_path")]
     layout: Option<PathBuf>,
 
     /// Write the copies' positions, for --layout
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[serde(skip)]
     layout_out: Option<PathBuf>,
 
     /// Draw the numbered copies on the build area, as SVG or PNG
     #[arg(long, value_name = "FILE")]
+    #[serde(skip)]
     layout_picture: Option<PathBuf>,
 
     /// Write all that decides the build's pages but its parts' stacks, for lamp compose, which makes
     /// any of them. Without -o, the build itself is not written
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[serde(skip)]
     recipe: Option<PathBuf>,
 
     /// Write areas and volumes of each copy and layer, and how long the build takes, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Print how long the build takes on the machine, as far as its file says ([times] and
     /// [recoating]). Without -o, the build itself is not written
     #[arg(long)]
+    #[serde(skip)]
     time: bool,
 
     /// Count heights from each stack's first layer, so that all parts stand on the platform
@@ -158,30 +174,37 @@ pub(crate) struct TileArgs {
     /// Give up with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
     /// folder may be missing: no build is written
     #[arg(long)]
+    #[serde(skip)]
     strict: bool,
 
     #[command(flatten)]
+    #[serde(flatten)]
     mesh: MeshArgs,
 
     #[command(flatten)]
+    #[serde(skip)]
     strips: StripArgs,
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
     /// folder), or - for standard output [default: -, or nowhere with --strips,
     /// --recipe or --time]
     #[arg(short, long, value_name = "OUT")]
+    #[serde(skip)]
     output: Option<PathBuf>,
 
     /// Write classic TIFFs (at most 4 GiB) instead of BigTIFFs
     #[arg(long)]
+    #[serde(skip)]
     classic: bool,
 
     /// Write gray pages as PackBits, for readers without Deflate: several times the size
     #[arg(long)]
+    #[serde(skip)]
     packbits: bool,
 
     /// Replace folders that an earlier run wrote, once the new ones are complete
     #[arg(long)]
+    #[serde(skip)]
     force: bool,
 }
 
@@ -240,14 +263,14 @@ impl TileArgs {
     /// Returns the options as one text, the same for all that mean the same; files without their
     /// folders, and no stacks.
     pub(crate) fn canonical(&self) -> String {
-        let mut options = Self { stacks: Vec::new(), ..self.clone() };
+        let mut options = self.clone();
         if let Some(machine) = &mut options.machine {
             *machine = recorded_name::<Machine>(machine).into();
         }
         for file in options.files_mut() {
             *file = file.file_name().unwrap_or_default().into();
         }
-        format!("{options:?}")
+        format!("tile{}", words_of(&options))
     }
 
     /// Checks, before there are stacks, what can be checked of the number of copies of each.

@@ -6,13 +6,12 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, anyhow};
 use lamp_build::{HeightOptions, Layout, MeshOptions, Recipe, RecipePart};
 use lamp_machine::Machine;
+use lamp_pipeline::documents::document_and_word;
 use lamp_stack::digest_of;
 
+use super::TileArgs;
 use crate::exit::Exit;
 use crate::streams::{check_beside, input_name, is_stream};
-use lamp_pipeline::documents::document_and_word;
-
-use super::TileArgs;
 
 impl TileArgs {
     /// Returns whether a stack of the build is written, so that its images are needed.

@@ -2,17 +2,16 @@
 
 use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_machine::Machine;
+use lamp_pipeline::to_nm;
 use lamp_stack::Dpi;
 use serde_json::{Value, json};
 
+use super::TileArgs;
+use super::time;
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 use crate::options::Output;
 use crate::streams::{is_stream, print};
-use lamp_pipeline::to_nm;
-
-use super::TileArgs;
-use super::time;
 
 /// What the layers of a build are made of: numbers of each part and of each layer, whatever the number
 /// of copies.

@@ -8,7 +8,7 @@ use clap::{Arg, Command};
 use lamp_build::{FreeTurns, Turns};
 
 /// The turns that packing may use.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TurnsArg {
     /// Those of images.
     Images(Turns),
@@ -16,7 +16,8 @@ pub(super) enum TurnsArg {
     Free(FreeTurns),
 }
 
-impl fmt::Debug for TurnsArg {
+/// As `--turns` takes it.
+impl fmt::Display for TurnsArg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Images(turns) => turns.fmt(f),

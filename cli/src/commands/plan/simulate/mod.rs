@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::material::Material;
+use lamp_pipeline::documents::document;
 use lamp_planning::PlanFolder;
 use lamp_planning::column::Tracing;
 use lamp_planning::projector::Projector;
@@ -21,8 +22,6 @@ use crate::options::{Common, one_of_described};
 use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::progress::Progress;
 use crate::target_arg::{GivenTarget, TargetReading};
-use lamp_pipeline::documents::document;
-
 use exposures::Exposures;
 
 /// Tell what bitmaps cure on a fixed glass, a plan's or any others

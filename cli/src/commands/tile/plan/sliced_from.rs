@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use lamp_build::{PartStack, TurnedSlicing};
+use lamp_pipeline::{SliceSettings, SlicingRecord};
 use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
 use super::super::stacks::{InputStack, ReadLayers};
 use crate::exit::Exit;
-use lamp_pipeline::{SliceSettings, SlicingRecord};
 
 /// What a stack says of how it was sliced.
 pub(super) struct SlicedFrom {
