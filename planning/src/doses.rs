@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
-use crate::tiled::{Grid, Rect, Tile, Tiled};
+use crate::tiled::{Rect, Tile, TileGrid, Tiled};
 
 /// A tile whose doses differ by less than this share of the largest is stored as one dose.
 const SAME: f32 = 1e-6;
@@ -53,7 +53,7 @@ pub(crate) fn next_layer(
 }
 
 /// Stores a tile as one value if all are nearly the same.
-fn flat_if_same(doses: Box<[f32]>, rect: &Rect, grid: Grid) -> Tile<f32> {
+fn flat_if_same(doses: Box<[f32]>, rect: &Rect, grid: TileGrid) -> Tile<f32> {
     let (mut least, mut most) = (f32::MAX, f32::MIN);
     for line in doses.chunks_exact(grid.side).take(rect.height()) {
         for &dose in &line[..rect.width()] {

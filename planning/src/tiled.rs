@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// How an image is divided into tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Grid {
+pub(crate) struct TileGrid {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// The side of a tile; those at the right and at the bottom may reach beyond the image.
@@ -47,7 +47,7 @@ impl Rect {
     }
 }
 
-impl Grid {
+impl TileGrid {
     pub(crate) fn across(&self) -> usize {
         self.width.div_ceil(self.side)
     }
@@ -96,12 +96,12 @@ pub(crate) enum Tile<V> {
 /// An image in tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tiled<V> {
-    pub(crate) grid: Grid,
+    pub(crate) grid: TileGrid,
     pub(crate) tiles: Vec<Tile<V>>,
 }
 
 impl<V: Copy + PartialEq> Tiled<V> {
-    pub(crate) fn flat(grid: Grid, value: V) -> Self {
+    pub(crate) fn flat(grid: TileGrid, value: V) -> Self {
         Self { grid, tiles: vec![Tile::Flat(value); grid.tile_count()] }
     }
 
@@ -112,7 +112,7 @@ impl<V: Copy + PartialEq> Tiled<V> {
 
     /// Creates an image from rows, which `row` writes one after the other.
     pub(crate) fn of_rows<E>(
-        grid: Grid,
+        grid: TileGrid,
         outside: V,
         mut row: impl FnMut(usize, &mut [V]) -> Result<(), E>,
     ) -> Result<Self, E> {
@@ -212,7 +212,7 @@ impl<V: Copy + PartialEq> Tiled<V> {
 mod tests {
     use super::*;
 
-    const GRID: Grid = Grid { width: 20, height: 11, side: 8 };
+    const GRID: TileGrid = TileGrid { width: 20, height: 11, side: 8 };
 
     fn value(row: isize, column: isize) -> u8 {
         match (row, column) {

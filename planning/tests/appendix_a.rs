@@ -1,7 +1,7 @@
 //! The example of 001 appendix A, as a stack of five layers.
 
 use lamp_grayscale::resin::{Dose, Intensity};
-use lamp_planning::voxels::{Options, PlannedStack, VoxelObjective, VoxelPlanError, plan};
+use lamp_planning::voxels::{Options, VoxelObjective, VoxelPlan, VoxelPlanError, plan};
 use lamp_planning::{IntensityOf, Light, SampleHeight};
 use lamp_stack::{Dpi, Layer, Length, Mask, PageInfo};
 
@@ -37,7 +37,7 @@ fn light() -> Light {
     }
 }
 
-fn planned(options: &Options) -> (PlannedStack, Vec<Layer>) {
+fn planned(options: &Options) -> (VoxelPlan, Vec<Layer>) {
     let mut stack = plan(cylinder(), &light(), options, |_| {}).unwrap();
     let layers = stack.by_ref().collect::<Result<_, _>>().unwrap();
     (stack, layers)

@@ -30,13 +30,13 @@ pub struct TooFewTimes {
 }
 
 /// Sums over the distinct times up to each.
-struct Sums {
+struct PrefixSums {
     /// Mirrors, their times, and the squares of them, told from the mean.
     prefix: Vec<[f64; 3]>,
     mean: f64,
 }
 
-impl Sums {
+impl PrefixSums {
     fn of(times: &[(u64, u64)]) -> Self {
         let count: u64 = times.iter().map(|(_, count)| count).sum();
         let all: f64 = times.iter().map(|&(time, count)| time as f64 * count as f64).sum();
@@ -88,7 +88,7 @@ impl Clusters {
         if distinct.len() < count || count == 0 {
             return Err(TooFewTimes { wanted: count, distinct: distinct.len() });
         }
-        let sums = Sums::of(&distinct);
+        let sums = PrefixSums::of(&distinct);
         let (starts, squares) = best_starts(&distinct, &sums, count);
         let ends = starts.iter().skip(1).copied().chain([distinct.len()]);
         let means = starts.iter().zip(ends).map(|(&from, to)| sums.mean(from, to)).collect();
@@ -103,7 +103,7 @@ impl Clusters {
 }
 
 /// Returns where the best clusters begin, and their sum of squares.
-fn best_starts(times: &[(u64, u64)], sums: &Sums, count: usize) -> (Vec<usize>, f64) {
+fn best_starts(times: &[(u64, u64)], sums: &PrefixSums, count: usize) -> (Vec<usize>, f64) {
     let n = times.len();
     // The least sum of squares of the first times with so many clusters: first with none, off.
     let mut off = 0.0;
@@ -142,7 +142,7 @@ const SHARED: usize = 1 << 12;
 /// One cluster more than before.
 struct Row<'a> {
     before: &'a [f64],
-    sums: &'a Sums,
+    sums: &'a PrefixSums,
 }
 
 impl Row<'_> {

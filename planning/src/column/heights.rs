@@ -4,7 +4,7 @@ use super::curvature::Weighted;
 use super::curve::HeightCurve;
 use super::light::GlassLight;
 use super::times::{MirrorTimes, Stop, frank_wolfe_gap};
-use crate::numeric::{Bounded, Place};
+use crate::numeric::{Bounded, SearchPlace};
 
 /// How far cured heights are from those wanted, in um, on lights that count alike.
 ///
@@ -100,7 +100,7 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
 /// Goes to `next`, or so much of the way there that the error falls.
 fn nearer(
     error: &HeightMisfit<'_>,
-    here: &Place,
+    here: &SearchPlace,
     next: &[f64],
     value: f64,
 ) -> (Vec<f64>, Vec<Squares>) {

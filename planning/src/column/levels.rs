@@ -27,14 +27,14 @@ impl Curvature for Dense {
 }
 
 /// Sums over column voxels of the light that clusters bring to them.
-struct Sums {
+struct ClusterSums {
     /// Of products of two clusters' light.
     square: Vec<Vec<f64>>,
     /// Of products with what is wanted.
     pull: Vec<f64>,
 }
 
-impl Sums {
+impl ClusterSums {
     fn zero(clusters: usize) -> Self {
         Self { square: vec![vec![0.0; clusters]; clusters], pull: vec![0.0; clusters] }
     }
@@ -56,7 +56,7 @@ pub(super) fn best_seconds(
     count: usize,
     max_s: f64,
 ) -> Vec<f64> {
-    let mut sums = Sums::zero(count);
+    let mut sums = ClusterSums::zero(count);
     wishes.iter().for_each(|wish| sums.add(&sums_of(wish, clusters, count)));
     // From clusters, which no two bitmaps share, to bitmaps, which light all clusters above.
     let above = |numbers: &mut [f64]| {
@@ -108,24 +108,24 @@ fn within(mut seconds: Vec<f64>, max_s: f64) -> Vec<f64> {
     seconds
 }
 
-fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> Sums {
+fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> ClusterSums {
     let rows = wish.light.setup().voxels[1];
     let chunks: Vec<_> = (0..rows.div_ceil(ROWS))
         .into_par_iter()
         .map(|chunk| {
-            let mut sums = Sums::zero(count);
+            let mut sums = ClusterSums::zero(count);
             (chunk * ROWS..((chunk + 1) * ROWS).min(rows))
                 .for_each(|row| add_row(&mut sums, wish, clusters, row));
             sums
         })
         .collect();
-    let mut sums = Sums::zero(count);
+    let mut sums = ClusterSums::zero(count);
     chunks.iter().for_each(|chunk| sums.add(chunk));
     sums
 }
 
 /// Adds what clusters bring to a row of column voxels.
-fn add_row(sums: &mut Sums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
+fn add_row(sums: &mut ClusterSums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
     let setup = wish.light.setup();
     let [width, columns] = [setup.mirrors[0], setup.voxels[0]];
     let [along, down] = wish.light.taps();

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::curvature::Normal;
 use super::light::GlassLight;
-use crate::numeric::{Bounded, Place};
+use crate::numeric::{Bounded, SearchPlace};
 
 /// When a search for times ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl MirrorTimes {
 /// Returns the Frank-Wolfe gap: no times between zero and `high` have an error smaller by more.
 ///
 /// The error is convex, so it lies above `error + slopes (t - x)` for all times t.
-pub(super) fn frank_wolfe_gap(place: &Place, high: f64) -> f64 {
+pub(super) fn frank_wolfe_gap(place: &SearchPlace, high: f64) -> f64 {
     let numbers = place.x.par_chunks(1 << 13).zip(place.slopes.par_chunks(1 << 13));
     let of_chunk = |(x, slopes): (&[f64], &[f64])| -> f64 {
         // The largest of slopes (x - t) over all t between zero and the bound: each t is at the end
@@ -73,7 +73,7 @@ pub fn nearest_times(
     // |H t - E|² / 2 = t HᵀH t / 2 - t HᵀE + E E / 2 (000 eq. 4.4, squared): the search needs the
     // first two terms alone.
     let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
-    let error = |place: &Place| dark + fall(place, &pull);
+    let error = |place: &SearchPlace| dark + fall(place, &pull);
     let (mut steps, mut gap) = (0, f64::INFINITY);
     let place = problem.search(vec![0.0; pull.len()], 8, |place, step| {
         (steps, gap) = (step, frank_wolfe_gap(place, max_s));
@@ -100,7 +100,7 @@ fn mean_pull(light: &GlassLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> 
 }
 
 /// Returns x A x / 2 - b x.
-fn fall(place: &Place, pull: &[f64]) -> f64 {
+fn fall(place: &SearchPlace, pull: &[f64]) -> f64 {
     let numbers = place.x.iter().zip(&place.slopes).zip(pull);
     // With slopes A x - b: x A x / 2 - b x = x (slopes - b) / 2, without another product with A.
     numbers.map(|((x, slope), pull)| 0.5 * x * (slope - pull)).sum()

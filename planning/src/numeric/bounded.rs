@@ -27,7 +27,7 @@ pub(crate) struct Bounded<'a, C> {
 }
 
 /// Where a search stands: the numbers, and the slopes there.
-pub(crate) struct Place {
+pub(crate) struct SearchPlace {
     pub(crate) x: Vec<f64>,
     pub(crate) slopes: Vec<f64>,
 }
@@ -67,8 +67,8 @@ impl<C: Curvature> Bounded<'_, C> {
         &self,
         x: Vec<f64>,
         look: usize,
-        mut is_done: impl FnMut(&Place, usize) -> bool,
-    ) -> Place {
+        mut is_done: impl FnMut(&SearchPlace, usize) -> bool,
+    ) -> SearchPlace {
         let mut place = self.place(x);
         // Steps below 2 / |A| lower the value along projected slopes.
         let length = STEP / self.greatest();
@@ -120,10 +120,10 @@ impl<C: Curvature> Bounded<'_, C> {
     }
 
     /// Returns the slopes at `x`.
-    pub(crate) fn place(&self, x: Vec<f64>) -> Place {
+    pub(crate) fn place(&self, x: Vec<f64>) -> SearchPlace {
         let mut slopes = self.curvature.apply(&x);
         slopes.iter_mut().zip(self.pull).for_each(|(slope, pull)| *slope -= pull);
-        Place { x, slopes }
+        SearchPlace { x, slopes }
     }
 
     /// Returns a bound of the greatest eigenvalue: no number of the matrix is negative.
@@ -133,20 +133,20 @@ impl<C: Curvature> Bounded<'_, C> {
         sums.into_iter().fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    fn free(&self, place: &Place) -> Vec<f64> {
+    fn free(&self, place: &SearchPlace) -> Vec<f64> {
         self.slopes(place, |slope| slope.free)
     }
 
-    fn chopped(&self, place: &Place) -> Vec<f64> {
+    fn chopped(&self, place: &SearchPlace) -> Vec<f64> {
         self.slopes(place, |slope| slope.chopped)
     }
 
-    fn slopes(&self, place: &Place, part: impl Fn(Slope) -> f64 + Sync) -> Vec<f64> {
+    fn slopes(&self, place: &SearchPlace, part: impl Fn(Slope) -> f64 + Sync) -> Vec<f64> {
         let numbers = place.x.par_iter().zip(&place.slopes).with_min_len(CHUNK);
         numbers.map(|(&x, &slope)| part(slope_at(x, slope, self.high))).collect()
     }
 
-    fn sums(&self, place: &Place, product: Option<&[f64]>, length: f64) -> Sums {
+    fn sums(&self, place: &SearchPlace, product: Option<&[f64]>, length: f64) -> Sums {
         let of_chunk = |chunk: usize, (x, slopes): (&[f64], &[f64])| {
             let mut sums = Sums::default();
             for (&x, &slope) in x.iter().zip(slopes) {
@@ -176,7 +176,7 @@ impl<C: Curvature> Bounded<'_, C> {
 
     /// Returns the slope along a direction downhill, its curvature, and how far it leads to a
     /// bound.
-    fn along(&self, place: &Place, direction: &[f64], product: &[f64]) -> (f64, f64, f64) {
+    fn along(&self, place: &SearchPlace, direction: &[f64], product: &[f64]) -> (f64, f64, f64) {
         let of_chunk = |chunk: usize| {
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(direction.len());
             let (mut along, mut curvature, mut room) = (0.0, 0.0, f64::INFINITY);
@@ -200,7 +200,7 @@ impl<C: Curvature> Bounded<'_, C> {
     }
 
     /// Goes down a direction whose product is known.
-    fn walk(&self, place: &mut Place, direction: &[f64], product: &[f64], length: f64) {
+    fn walk(&self, place: &mut SearchPlace, direction: &[f64], product: &[f64], length: f64) {
         let numbers = place.x.par_iter_mut().zip(&mut place.slopes);
         let steps = direction.par_iter().zip(product);
         numbers.zip(steps).with_min_len(CHUNK).for_each(|((x, slope), (direction, product))| {
@@ -210,7 +210,7 @@ impl<C: Curvature> Bounded<'_, C> {
     }
 
     /// Goes down the free slopes and stays between the bounds.
-    fn project(&self, place: &mut Place, length: f64) {
+    fn project(&self, place: &mut SearchPlace, length: f64) {
         let numbers = place.x.par_iter_mut().zip(&place.slopes).with_min_len(CHUNK);
         numbers.for_each(|(x, &slope)| {
             let free = slope_at(*x, slope, self.high).free;
@@ -222,7 +222,7 @@ impl<C: Curvature> Bounded<'_, C> {
     }
 
     /// Makes the direction the free slopes, less what is not conjugate to it.
-    fn turn(&self, place: &Place, direction: &mut [f64], turn: f64) {
+    fn turn(&self, place: &SearchPlace, direction: &mut [f64], turn: f64) {
         let numbers = place.x.par_iter().zip(&place.slopes).zip(direction);
         numbers.with_min_len(CHUNK).for_each(|((&x, &slope), direction)| {
             *direction = slope_at(x, slope, self.high).free - turn * *direction;

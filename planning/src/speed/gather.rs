@@ -26,7 +26,7 @@ pub(crate) struct Gather<'a> {
 
 /// Working space of a thread.
 #[derive(Default)]
-struct Room {
+struct TileRoom {
     levels: Vec<u8>,
     /// The levels whose light is known.
     spread_levels: Vec<u8>,
@@ -92,8 +92,9 @@ impl<'a> Gather<'a> {
         // results wait.
         let batch = 2 * rayon::current_num_threads();
         self.tiles.chunks(batch).flat_map(move |corners| {
-            let tile = |room: &mut Room, &corner: &[i64; 2]| each(self.tile(corner, step, room));
-            corners.par_iter().map_init(Room::default, tile).collect::<Vec<_>>()
+            let tile =
+                |room: &mut TileRoom, &corner: &[i64; 2]| each(self.tile(corner, step, room));
+            corners.par_iter().map_init(TileRoom::default, tile).collect::<Vec<_>>()
         })
     }
 
@@ -130,7 +131,7 @@ impl<'a> Gather<'a> {
 
     /// Returns the light at a pixel in each layer.
     pub(crate) fn light_at(&self, pixel: [u32; 2]) -> Vec<f32> {
-        let room = &mut Room::default();
+        let room = &mut TileRoom::default();
         let window =
             TileWindow { corner: pixel.map(i64::from), side: 1, radius: self.blur.radius() };
         let of_layer = |image| {
@@ -141,7 +142,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Computes the light of a window of a layer.
-    fn spread(&self, image: &Image, window: TileWindow, room: &mut Room) {
+    fn spread(&self, image: &Image, window: TileWindow, room: &mut TileRoom) {
         let pixels = window.width() * window.rows();
         room.levels.resize(pixels, 0);
         let corner = window.corner.map(|place| place - window.radius as i64);
@@ -166,7 +167,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Computes the columns of one tile. Columns without light are left out.
-    fn tile(&self, corner: [i64; 2], step: u32, room: &mut Room) -> ColumnSet {
+    fn tile(&self, corner: [i64; 2], step: u32, room: &mut TileRoom) -> ColumnSet {
         let layers = self.part.images.len();
         let places = sampled(corner, self.side, step);
         let window = TileWindow { corner, side: self.side, radius: self.blur.radius() };

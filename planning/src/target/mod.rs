@@ -32,7 +32,7 @@ pub use map::{Grid, HeightMap, Place};
 pub use open::TargetOptions;
 pub use picture::MapScale;
 pub use round::Round;
-pub use shapes::{Base, Channels, Direction, Lens, Shapes, ShapesError};
+pub use shapes::{Base, Channels, Direction, LensShape, Shapes, ShapesError};
 
 use part::PartColumns;
 use picture::HeightPicture;

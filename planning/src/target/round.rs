@@ -8,11 +8,11 @@ use super::{HeightMap, TargetError};
 #[derive(Clone, Debug)]
 pub struct Round {
     radius_um: f64,
-    profile: Profile,
+    profile: RoundHeights,
 }
 
 #[derive(Clone, Debug)]
-enum Profile {
+enum RoundHeights {
     Shapes(Box<Shapes>),
     /// Heights at equal distances from the axis, the first on it.
     Rings {
@@ -34,8 +34,8 @@ impl Round {
     /// Returns the height at a distance from the axis, in micrometres.
     pub fn height_um(&self, r_um: f64) -> f64 {
         match &self.profile {
-            Profile::Shapes(shapes) => shapes.height_um(r_um, 0.0),
-            Profile::Rings { step_um, heights_um } => {
+            RoundHeights::Shapes(shapes) => shapes.height_um(r_um, 0.0),
+            RoundHeights::Rings { step_um, heights_um } => {
                 let at = r_um / step_um;
                 let ring = at as usize;
                 let height = |ring: usize| heights_um.get(ring).copied().unwrap_or(0.0);
@@ -50,7 +50,7 @@ impl Round {
             return Err(TargetError::NotRoundShape { why });
         }
         let radius_um = shapes.size_um()[0] / 2.0;
-        Ok(Self { radius_um, profile: Profile::Shapes(Box::new(shapes.clone())) })
+        Ok(Self { radius_um, profile: RoundHeights::Shapes(Box::new(shapes.clone())) })
     }
 
     /// Returns the profile of a map, as the means of rings one column wide.
@@ -82,7 +82,7 @@ impl Round {
             }
         }
         let filled = heights_um.iter().rposition(|&um| um > 0.0).map_or(0, |ring| ring + 1);
-        let profile = Profile::Rings { step_um, heights_um: heights_um[..filled].to_vec() };
+        let profile = RoundHeights::Rings { step_um, heights_um: heights_um[..filled].to_vec() };
         Ok(Self { radius_um: filled as f64 * step_um, profile })
     }
 }

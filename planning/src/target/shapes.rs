@@ -19,7 +19,7 @@ pub struct Shapes {
     pub base: Vec<Base>,
     /// Lenses, each on the bases below its middle.
     #[serde(default)]
-    pub lens: Vec<Lens>,
+    pub lens: Vec<LensShape>,
     /// Straight channels through all of it.
     #[serde(default)]
     pub channels: Vec<Channels>,
@@ -46,7 +46,7 @@ pub struct Base {
 /// Spherical caps, one or several in rows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Lens {
+pub struct LensShape {
     /// The diameter of a cap's base.
     #[serde(deserialize_with = "length")]
     pub diameter: Length,
@@ -179,7 +179,7 @@ impl Shapes {
     }
 
     /// Returns the height of the nearest cap at a point, with what it stands on.
-    fn lens_height_um(&self, lens: &Lens, x: f64, y: f64) -> f64 {
+    fn lens_height_um(&self, lens: &LensShape, x: f64, y: f64) -> f64 {
         let middle = lens.nearest_um([x, y]);
         match lens.cap_um((x - middle[0]).hypot(y - middle[1])) {
             Some(cap) => self.base_um(middle[0], middle[1]) + cap,
@@ -248,7 +248,7 @@ impl Base {
     }
 }
 
-impl Lens {
+impl LensShape {
     /// Returns the height of a cap at a distance from its middle, if it reaches so far.
     pub(super) fn cap_um(&self, r: f64) -> Option<f64> {
         let (a, sag) = (self.diameter.um() / 2.0, self.sag.um());

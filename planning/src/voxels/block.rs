@@ -3,7 +3,7 @@
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
 use crate::solver::{Operator, Problem, Role, Search, SearchProgress, Shape, Terms, solve};
-use crate::tiled::{Grid, Rect, Tiled};
+use crate::tiled::{Rect, TileGrid, Tiled};
 use crate::voxels::levels::Levels;
 use crate::voxels::roles::{LayerImages, RoleRules};
 
@@ -53,7 +53,7 @@ fn copy_common<V: Copy>(values: &[V], of: &Rect, rect: &Rect, stride: usize, out
 
 /// What all blocks of a window share.
 pub(crate) struct PlannedWindow<'a> {
-    pub(crate) grid: Grid,
+    pub(crate) grid: TileGrid,
     pub(crate) blur: &'a Blur<f32>,
     pub(crate) rules: &'a RoleRules,
     pub(crate) terms: Terms<f32>,

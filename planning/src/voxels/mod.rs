@@ -20,4 +20,4 @@ mod unplanned;
 
 pub use options::{Options, Sources, VoxelObjective, Window};
 pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
-pub use plan::{PlannedStack, VoxelPlanError, plan};
+pub use plan::{VoxelPlan, VoxelPlanError, plan};

@@ -10,7 +10,7 @@ use crate::blur::Blur;
 use crate::light::{LayerTime, Light, LightError};
 use crate::solver::Terms;
 use crate::spool::{Runs, Spool};
-use crate::tiled::{Grid, Tiled};
+use crate::tiled::{TileGrid, Tiled};
 use crate::voxels::bound::Ascent;
 use crate::voxels::descent::{Descended, descend};
 use crate::voxels::levels::Levels;
@@ -86,7 +86,7 @@ pub fn plan<E: From<VoxelPlanError>>(
     light: &Light,
     options: &Options,
     settled: impl FnMut(usize),
-) -> Result<PlannedStack, E> {
+) -> Result<VoxelPlan, E> {
     light.check().map_err(VoxelPlanError::from)?;
     let mut wanted = Spool::new().map_err(VoxelPlanError::from)?;
     let mut pages = Pages::default();
@@ -103,7 +103,7 @@ pub fn plan<E: From<VoxelPlanError>>(
     let ascent = Ascent::new(&setting);
     let next = pages.infos.len();
     let outcome = outcome(&done, &pages);
-    Ok(PlannedStack { setting, wanted, done, pages, ascent, left: next, outcome })
+    Ok(VoxelPlan { setting, wanted, done, pages, ascent, left: next, outcome })
 }
 
 /// What the pages of a stack state.
@@ -189,7 +189,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetti
     let [image_width, image_height] = image;
     let rules = RoleRules::new(options, image_width, image_height, around);
     Some(VoxelSetting {
-        grid: Grid { width, height, side },
+        grid: TileGrid { width, height, side },
         rules,
         terms: Terms { least: least as f32, short_price, most, least_light: 0.0 },
         most_of_dark: if options.objective == VoxelObjective::Wrong { most } else { 0.0 },
@@ -230,7 +230,7 @@ fn outcome(done: &Descended, pages: &Pages) -> Outcome {
 ///
 /// The bound of its [`Outcome`] is complete once all layers were taken.
 #[derive(Debug)]
-pub struct PlannedStack {
+pub struct VoxelPlan {
     setting: VoxelSetting,
     wanted: Spool,
     done: Descended,
@@ -241,7 +241,7 @@ pub struct PlannedStack {
     outcome: Outcome,
 }
 
-impl PlannedStack {
+impl VoxelPlan {
     /// Returns what the plan reaches.
     pub fn outcome(&self) -> Outcome {
         // No light costs less than nothing.
@@ -281,7 +281,7 @@ impl PlannedStack {
     }
 }
 
-impl Iterator for PlannedStack {
+impl Iterator for VoxelPlan {
     type Item = Result<Layer, VoxelPlanError>;
 
     fn next(&mut self) -> Option<Self::Item> {

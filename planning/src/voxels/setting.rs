@@ -6,7 +6,7 @@ use crate::blur::Blur;
 use crate::light::LayerLight;
 use crate::solver::Terms;
 use crate::spool::Spool;
-use crate::tiled::{Grid, Tiled};
+use crate::tiled::{TileGrid, Tiled};
 use crate::voxels::levels::Levels;
 use crate::voxels::options;
 use crate::voxels::roles::RoleRules;
@@ -14,7 +14,7 @@ use crate::voxels::roles::RoleRules;
 /// What stays the same for all layers.
 #[derive(Debug)]
 pub(crate) struct VoxelSetting {
-    pub(crate) grid: Grid,
+    pub(crate) grid: TileGrid,
     pub(crate) blur: Blur<f32>,
     pub(crate) rules: RoleRules,
     pub(crate) terms: Terms<f32>,

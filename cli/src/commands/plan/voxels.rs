@@ -7,7 +7,7 @@ use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_pipeline::memory;
 use lamp_planning::voxels::{
-    Options, Outcome, PlannedStack, Sources, VoxelObjective, VoxelPlanError, plan,
+    Options, Outcome, Sources, VoxelObjective, VoxelPlan, VoxelPlanError, plan,
 };
 use lamp_stack::Layer;
 
@@ -275,7 +275,7 @@ impl VoxelsArgs {
 
     fn write(
         &self,
-        planned: &mut PlannedStack,
+        planned: &mut VoxelPlan,
         map: &mut LayerMap<'_>,
         outcome: &Outcome,
         progress: &Progress,
