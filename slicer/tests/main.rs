@@ -2,6 +2,7 @@
 
 mod edges;
 mod exact;
+mod kernels;
 mod referee;
 mod slicing;
 mod surfaces;

@@ -1,10 +1,13 @@
 //! Compares crossings, boxes and extrema on exact surfaces with closed forms.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use lamp_brep::{Kernel, StepModel, Tessellation};
 use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, step};
 use lamp_slicer::exact::{FacetPoint, PlacedSurfaces, RowContact, polish};
+
+use crate::kernels::OTHERS;
 
 /// A nanometre, in millimetres.
 const NM: f64 = 1e-6;
@@ -26,17 +29,8 @@ fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
         let mesh = kernel.tessellate(chord_mm).unwrap();
         (kernel, mesh)
     };
-    [own].into_iter().chain(by_occt(text)).map(meshed).collect()
-}
-
-#[cfg(feature = "occt")]
-fn by_occt(text: &str) -> Option<Arc<dyn Kernel>> {
-    Some(Arc::new(lamp_brep_occt::OcctModel::read(text.as_bytes()).unwrap()))
-}
-
-#[cfg(not(feature = "occt"))]
-fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
-    None
+    let others = OTHERS.iter().map(|(_, read)| read(text.as_bytes(), 0.0).unwrap().kernel);
+    [own].into_iter().chain(others).map(meshed).collect()
 }
 
 fn placed(part: StepSample, chord_mm: f64, rows: [[f64; 4]; 3]) -> PlacedSurfaces {
@@ -164,10 +158,12 @@ fn crossings_of_a_torus_are_exact_to_a_nanometre() {
 #[test]
 #[ignore = "it measures a rate, which only a release build has"]
 fn how_fast_polish_is() {
-    let blade = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/step/");
-    let blade = std::fs::read_to_string(format!("{blade}synthetic_cooled_blade.step"));
+    // Two packages compile this file, in folders of different depth.
+    let blade = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().find_map(|folder| {
+        std::fs::read_to_string(folder.join("shared/data/step/synthetic_cooled_blade.step")).ok()
+    });
     let torus = step(StepSample::Torus, StepUnit::Millimetre);
-    for (name, text) in [("torus", Some(torus)), ("cooled blade", blade.ok())] {
+    for (name, text) in [("torus", Some(torus)), ("cooled blade", blade)] {
         let Some(text) = text else { continue };
         for (kernel, mesh) in kernels(&text, 0.01) {
             let surfaces = PlacedSurfaces::new(kernel, Arc::new(mesh), AS_IT_IS);

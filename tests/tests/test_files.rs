@@ -9,7 +9,7 @@ use lamp_tests::workspace_root;
 use serde_json::Value;
 
 /// The test programs beside the one of their package. Its `Cargo.toml` has the reasons.
-const ALONE: [&str; 3] = ["check_memory", "false_headers", "real_files"];
+const ALONE: [&str; 4] = ["check_memory", "false_headers", "occt_files", "real_files"];
 
 /// A package's folder of tests, and the names and first files of its test programs.
 struct Package {

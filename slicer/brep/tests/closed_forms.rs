@@ -8,6 +8,8 @@ use lamp_fixtures::{
     StepSample, StepUnit, blade_area_mm2, blade_volume_mm3, step, step_behind_tip, step_thin_tube,
 };
 
+use crate::kernels::OTHERS;
+
 fn read(part: StepSample, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessellation) {
     let model = StepModel::read(step(part, unit).as_bytes()).unwrap();
     let mesh = model.tessellate(chord_mm).unwrap();
@@ -21,17 +23,8 @@ fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
         let mesh = kernel.tessellate(chord_mm).unwrap();
         (kernel, mesh)
     };
-    [own].into_iter().chain(by_occt(text)).map(meshed).collect()
-}
-
-#[cfg(feature = "occt")]
-fn by_occt(text: &str) -> Option<Arc<dyn Kernel>> {
-    Some(Arc::new(lamp_brep_occt::OcctModel::read(text.as_bytes()).unwrap()))
-}
-
-#[cfg(not(feature = "occt"))]
-fn by_occt(_: &str) -> Option<Arc<dyn Kernel>> {
-    None
+    let others = OTHERS.iter().map(|(_, read)| read(text.as_bytes(), 0.0).unwrap().kernel);
+    [own].into_iter().chain(others).map(meshed).collect()
 }
 
 /// Returns a part's bodies, after checking that all kernels agree within the chord.

@@ -4,6 +4,7 @@ mod assemblies;
 mod bad_fillets;
 mod closed_forms;
 mod hostile;
+mod kernels;
 mod mutations;
 mod other_words;
 mod prepared;

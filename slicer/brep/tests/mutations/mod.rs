@@ -12,6 +12,7 @@ use std::path::Path;
 use lamp_brep::{Prepared, prepare, read_step};
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
+use crate::kernels::OTHERS;
 use text::{Mutation, Text};
 
 /// The chord, by the part's size.
@@ -84,7 +85,7 @@ fn described(good: &Good, mutation: Mutation, text: &str) -> Vec<Bodies> {
     let (count, volume_mm3) = (volumes.len(), volumes.iter().sum::<f64>());
     let more = || match good.name.as_str() {
         PAIR => Some((count + 1, volume_mm3 + volumes[0])),
-        _ => by_occt(text, CHORD * good.size_mm),
+        _ => by_another(text, CHORD * good.size_mm),
     };
     match mutation {
         Mutation::Unit => vec![(count, LONGER * volume_mm3)],
@@ -95,14 +96,9 @@ fn described(good: &Good, mutation: Mutation, text: &str) -> Vec<Bodies> {
     }
 }
 
-#[cfg(feature = "occt")]
-fn by_occt(text: &str, chord_mm: f64) -> Option<Bodies> {
-    Some(bodies(&prepare(text.as_bytes(), lamp_brep_occt::read, chord_mm).unwrap()))
-}
-
-#[cfg(not(feature = "occt"))]
-fn by_occt(_: &str, _: f64) -> Option<Bodies> {
-    None
+fn by_another(text: &str, chord_mm: f64) -> Option<Bodies> {
+    let (_, read) = OTHERS.first()?;
+    Some(bodies(&prepare(text.as_bytes(), *read, chord_mm).unwrap()))
 }
 
 fn bodies(prepared: &Prepared) -> Bodies {

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::figures::Figures;
-use crate::one_file::{Answer, ENDED, Part};
+use super::figures::Figures;
+use super::one_file::{Answer, ENDED, Part};
 
 /// The tolerated relative error of volumes, and of boxes by the part's size.
 const SAME: f64 = 1e-3;

@@ -1,7 +1,5 @@
 //! What OpenCASCADE does that the other kernel does not, and that both agree.
 
-#![cfg(feature = "occt")]
-
 use std::fmt::Write;
 
 use lamp_brep::{BodyFault, BrepError, FaceInfo, Jet, Kernel, StepModel, check};

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use lamp_brep::ReadFn;
 
+use crate::kernels::OTHERS;
 use figures::Figures;
 use one_file::{Answer, TASK};
 use verdict::Verdict;
@@ -32,26 +33,28 @@ struct Judged {
     least_right: f64,
 }
 
-const KERNELS: &[Judged] = &[
-    Judged { name: "own", read: lamp_brep::read_step, least_right: 47.0 / 52.0 },
-    #[cfg(feature = "occt")]
-    Judged { name: "occt", read: lamp_brep_occt::read, least_right: 49.0 / 52.0 },
-];
+fn all() -> Vec<Judged> {
+    let own = Judged { name: "own", read: lamp_brep::read_step, least_right: 47.0 / 52.0 };
+    let other = |&(name, read): &_| Judged { name, read, least_right: 49.0 / 52.0 };
+    [own].into_iter().chain(OTHERS.iter().map(other)).collect()
+}
 
-fn main() -> ExitCode {
+/// Judges all files, or one of them in a process of its own, as the arguments ask.
+pub(crate) fn run() -> ExitCode {
+    let all = all();
     let words: Vec<String> = std::env::args().skip(1).collect();
     if let [task, kernel, path, size_mm, heights_mm] = &words[..]
         && task == TASK
     {
-        let judged = KERNELS.iter().find(|judged| judged.name == kernel).expect("a kernel");
+        let judged = all.iter().find(|judged| judged.name == kernel).expect("a kernel");
         one_file::answer(judged.read, Path::new(path), size_mm, heights_mm);
         return ExitCode::SUCCESS;
     }
     if words.iter().any(|word| word == "--list") {
-        list_tests(&words);
+        list_tests(&all, &words);
         return ExitCode::SUCCESS;
     }
-    let is_kernel = |word: &String| KERNELS.iter().any(|judged| judged.name == word);
+    let is_kernel = |word: &String| all.iter().any(|judged| judged.name == word);
     // Those with a dash are libtest's, such as `--nocapture`.
     let words = words.into_iter().filter(|word| !word.starts_with('-'));
     let (kernels, files): (Vec<_>, Vec<_>) = words.partition(is_kernel);
@@ -59,16 +62,16 @@ fn main() -> ExitCode {
         |judged: &&Judged| kernels.is_empty() || kernels.iter().any(|k| k == judged.name);
     let is_good = |judged| judge(judged, &files);
     // Not `all`, which would stop at the first.
-    match KERNELS.iter().filter(is_asked).filter(|judged| !is_good(judged)).count() {
+    match all.iter().filter(is_asked).filter(|judged| !is_good(judged)).count() {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     }
 }
 
 /// Prints the names of tests as libtest does for `cargo nextest`: none is ignored.
-fn list_tests(words: &[String]) {
+fn list_tests(all: &[Judged], words: &[String]) {
     if !words.iter().any(|word| word == "--ignored") {
-        KERNELS.iter().for_each(|judged| println!("{}: test", judged.name));
+        all.iter().for_each(|judged| println!("{}: test", judged.name));
     }
 }
 

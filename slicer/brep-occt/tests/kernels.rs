@@ -1,0 +1,5 @@
+//! The kernels that tests ask beside LAMP's own.
+
+use lamp_brep::ReadFn;
+
+pub(crate) const OTHERS: &[(&str, ReadFn)] = &[("occt", lamp_brep_occt::read)];

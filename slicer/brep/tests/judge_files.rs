@@ -1,0 +1,10 @@
+//! A program that reads files of other programs, each in a process of its own.
+
+mod kernels;
+mod real_files;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    real_files::run()
+}
