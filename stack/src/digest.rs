@@ -10,7 +10,7 @@ use blake3::hazmat::{
 use blake3::{Hash, Hasher};
 use rayon::prelude::*;
 
-use crate::page_info::StackInfo;
+use crate::layer::page_info::StackInfo;
 
 /// Returns the digest of all bytes of an input.
 ///

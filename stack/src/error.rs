@@ -4,12 +4,12 @@ use std::io;
 
 use thiserror::Error;
 
-use crate::check::CheckFault;
-use crate::file_format::FileFormat;
-use crate::folder_list::FOLDER_LIST;
-use crate::g4::G4Error;
+use crate::codec::g4::G4Error;
+use crate::codec::picture_format::PictureFormat;
+use crate::files::file_format::FileFormat;
+use crate::files::folder_list::FOLDER_LIST;
+use crate::layer::check::CheckFault;
 use crate::note::ImagesBeside;
-use crate::picture_format::PictureFormat;
 
 /// What stands before the reason of a stage that gave up.
 pub(crate) const GAVE_UP: &str = "the stage before gave up: ";

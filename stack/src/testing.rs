@@ -3,8 +3,8 @@
 use fax::{Color, VecWriter, decoder, encoder};
 use proptest::prelude::*;
 
-use crate::gray::GrayMask;
-use crate::mask::{Mask, MaskBuilder};
+use crate::image::gray::GrayMask;
+use crate::image::mask::{Mask, MaskBuilder};
 
 pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>) -> Mask {
     let mut mask = MaskBuilder::new(width);

@@ -1,10 +1,10 @@
-//! What `tile` leaves on the first page of a build.
+//! The record that `tile` leaves on the first page of a build.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::value_of;
-use crate::page_info::StackInfo;
+use crate::layer::page_info::StackInfo;
 
 /// Where the copies of parts stand on a build.
 #[derive(Clone, Debug, PartialEq, Serialize)]

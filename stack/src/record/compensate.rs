@@ -1,4 +1,4 @@
-//! What `compensate` leaves on pages.
+//! The record that `compensate` leaves on pages.
 
 use serde::{Deserialize, Serialize};
 

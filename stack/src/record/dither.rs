@@ -1,4 +1,4 @@
-//! What `dither` leaves on pages.
+//! The record that `dither` leaves on pages.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,17 +1,17 @@
-//! What `fix` leaves on pages.
+//! The record that `fix` leaves on pages.
 
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use super::PageRecord;
 
-/// What was corrected on a page.
+/// The rows of a page that were corrected.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FixRecord {
     /// The method's name.
     pub method: String,
-    /// The bands of rows that were corrected, from the top. What is no band is left out.
+    /// The bands of rows that were corrected, from the top. Other values are ignored.
     #[serde(deserialize_with = "bands")]
     pub bands: Vec<FixedBand>,
 }
@@ -50,7 +50,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::page_info::PageInfo;
+    use crate::layer::page_info::PageInfo;
 
     #[test]
     fn rows_that_were_corrected_are_counted() {

@@ -1,4 +1,4 @@
-//! What stages leave on pages and stacks, as types: the keys of a page's line that the format
+//! The records that stages leave on pages and stacks, as types: the keys of a page's line that the format
 //! itself does not know.
 //!
 //! ```
@@ -28,9 +28,9 @@ pub use fix::{FixRecord, FixedBand};
 pub use slice::SliceRecord;
 pub use strip::StripRecord;
 
-use crate::page_info::PageInfo;
+use crate::layer::page_info::PageInfo;
 
-/// What a stage leaves under a key of the pages that it changes.
+/// A record that a stage leaves under a key of the pages that it changes.
 pub trait PageRecord: Serialize + DeserializeOwned {
     /// The key, which is the stage's name.
     const KEY: &'static str;

@@ -1,8 +1,8 @@
-//! What `slice` leaves on pages beside the keys of the format.
+//! The record that `slice` leaves on pages.
 
-use crate::page_info::PageInfo;
+use crate::layer::page_info::PageInfo;
 
-/// What is unusual about a slice.
+/// The unusual properties of a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SliceRecord {
     /// The pixels, if any, that even white does not cure down to the underside within the layer,

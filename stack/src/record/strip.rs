@@ -1,4 +1,4 @@
-//! What `strips` leaves on pages.
+//! The record that `strips` leaves on pages.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,146 @@
+//! Defines layers that pass from one stack to another, decoded only where their image is needed.
+
+use crate::codec::tiff::{EncodedPage, Page, PassedCode};
+use crate::error::StackError;
+use crate::image::Image;
+use crate::layer::Layer;
+use crate::layer::check::rows_that_end_white;
+use crate::layer::page_info::PageInfo;
+use crate::length::Dpi;
+use crate::ordered::MemorySize;
+
+/// A layer on its way to another stack: decoded, or as its page has it.
+///
+/// A page passes as it is if its code is the one that its check was made of, as stages write it: then
+/// its image is that, too. Any other page is decoded, and its image is checked.
+///
+/// ```
+/// use lamp_stack::{
+///     Destination, Format, Layer, Mask, PageInfo, Pages, PassingLayer, StackError, write_stack,
+/// };
+/// # fn main() -> Result<(), StackError> {
+/// # let folder = tempfile::tempdir()?;
+/// # let [from, to] = ["a.tif", "b.tif"].map(|name| folder.path().join(name));
+/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Mask::black(8, 2).into() };
+/// let layers = std::iter::once(Ok::<_, StackError>(layer));
+/// write_stack(layers, Destination::File(from.clone()), Format::Big)?;
+///
+/// let pages = Pages::open(&from)?.map(|page| PassingLayer::of_page(page?));
+/// write_stack(pages, Destination::File(to.clone()), Format::Big)?;
+/// assert_eq!(std::fs::read(from)?, std::fs::read(to)?);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct PassingLayer(State);
+
+#[derive(Clone, Debug)]
+enum State {
+    Decoded(Box<Layer>),
+    /// The page's code is the one that was written.
+    Coded(Box<Page>, PassedCode),
+}
+
+impl PassingLayer {
+    /// Creates a layer from a page, which is decoded if it cannot pass as it is.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Page::decode`], of pages that are decoded.
+    pub fn of_page(page: Page) -> Result<Self, StackError> {
+        Ok(Self(match page.passed() {
+            Some(passed) => State::Coded(Box::new(page), passed),
+            None => State::Decoded(Box::new(page.decode()?)),
+        }))
+    }
+
+    /// Returns the content of the page's JSON line.
+    pub fn info(&self) -> &PageInfo {
+        match &self.0 {
+            State::Decoded(layer) => &layer.info,
+            State::Coded(page, _) => page.info(),
+        }
+    }
+
+    /// Returns the content of the page's JSON line, to be changed.
+    pub fn info_mut(&mut self) -> &mut PageInfo {
+        match &mut self.0 {
+            State::Decoded(layer) => &mut layer.info,
+            State::Coded(page, _) => page.info_mut(),
+        }
+    }
+
+    /// Returns the resolution, if the page states one in inches or centimetres.
+    pub fn dpi(&self) -> Option<Dpi> {
+        match &self.0 {
+            State::Decoded(layer) => layer.dpi,
+            State::Coded(page, _) => page.dpi(),
+        }
+    }
+
+    /// Returns the image's width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        match &self.0 {
+            State::Decoded(layer) => [layer.image.width(), layer.image.height()],
+            State::Coded(page, _) => page.size(),
+        }
+    }
+
+    /// Returns whether the image is gray, not a mask.
+    pub fn is_gray(&self) -> bool {
+        match &self.0 {
+            State::Decoded(layer) => matches!(*layer.image, Image::Gray(_)),
+            State::Coded(page, _) => page.is_gray(),
+        }
+    }
+
+    /// Returns whether the last pixel of every row is black.
+    pub fn rows_end_black(&self) -> bool {
+        match &self.0 {
+            State::Decoded(layer) => rows_that_end_white(&layer.image) == 0,
+            State::Coded(_, passed) => passed.code.ends_white == 0,
+        }
+    }
+
+    /// Returns the layer, if it is decoded.
+    pub fn as_decoded(&self) -> Option<&Layer> {
+        match &self.0 {
+            State::Decoded(layer) => Some(layer),
+            State::Coded(..) => None,
+        }
+    }
+
+    /// Decodes the layer.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Page::decode`], unless it is decoded already.
+    pub fn decode(self) -> Result<Layer, StackError> {
+        match self.0 {
+            State::Decoded(layer) => Ok(*layer),
+            State::Coded(page, _) => page.decode(),
+        }
+    }
+}
+
+impl From<Layer> for PassingLayer {
+    fn from(layer: Layer) -> Self {
+        Self(State::Decoded(Box::new(layer)))
+    }
+}
+
+impl From<PassingLayer> for EncodedPage {
+    fn from(layer: PassingLayer) -> Self {
+        match layer.0 {
+            State::Decoded(layer) => Self::new(&layer),
+            State::Coded(page, passed) => Self::passed(*page, passed),
+        }
+    }
+}
+
+impl MemorySize for PassingLayer {
+    fn bytes(&self) -> usize {
+        match &self.0 {
+            State::Decoded(layer) => layer.bytes(),
+            State::Coded(page, _) => page.bytes(),
+        }
+    }
+}
