@@ -1,5 +1,5 @@
-//! The records that stages leave on pages and stacks, as types: the keys of a page's line that the format
-//! itself does not know.
+//! The records that stages leave on pages and stacks, as types: the keys of a page's line that
+//! the format itself does not know.
 //!
 //! ```
 //! use lamp_stack::{DitherRecord, PageInfo};
