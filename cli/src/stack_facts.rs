@@ -3,7 +3,7 @@
 use lamp_stack::{Compression, Dpi, NumberRange, StackInfo, StackTotals};
 use serde::Serialize;
 
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 
 /// What the pages of a stack say.
 #[derive(Serialize)]

@@ -6,12 +6,14 @@ use lamp_fix::{Band, BandKind, BandOutcome, FixOptions, Fixed};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::pixel_location::{PixelLocation, millimetres, to_nm};
+use lamp_stack::to_nm;
+
+use crate::pixel_location::{PixelLocation, millimetres};
 
 /// The bands of a run of `fix`.
 pub struct FixReport {
     options: FixOptions,
-    bands: Vec<FixedBand>,
+    bands: Vec<ReportedBand>,
     corrected: usize,
     corrected_layers: usize,
     pixels: u64,
@@ -34,7 +36,7 @@ pub struct FixHead {
 
 /// A band of stray rows, for reports.
 #[derive(Clone, Debug, Serialize)]
-pub struct FixedBand {
+pub struct ReportedBand {
     layer: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
     z_mm: Option<f64>,
@@ -146,16 +148,16 @@ impl FixReport {
     }
 
     /// Returns the bands.
-    pub fn bands(&self) -> &[FixedBand] {
+    pub fn bands(&self) -> &[ReportedBand] {
         &self.bands
     }
 
-    fn line(&self, layer: &Layer, band: &Band) -> FixedBand {
+    fn line(&self, layer: &Layer, band: &Band) -> ReportedBand {
         let place = PixelLocation::of(layer);
         let columns = (!band.columns.is_empty()).then(|| band.columns.clone());
         let x_mm = |columns: &Option<Range<u32>>| Some(place?.x_mm(columns.as_ref()?).map(to_nm));
         let first_and_last = |columns: &Range<u32>| [columns.start, columns.end - 1];
-        FixedBand {
+        ReportedBand {
             layer: layer.info.index,
             z_mm: layer.info.z().map(|z| to_nm(z.mm())),
             first_row: band.first_row,

@@ -33,8 +33,3 @@ pub(crate) fn millimetres([low, high]: [f64; 2]) -> String {
     // Beside a minus a dash would read as another.
     if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
 }
-
-/// Rounds to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
-pub fn to_nm(mm: f64) -> f64 {
-    (mm * 1e6).round() / 1e6 + 0.0
-}

@@ -6,7 +6,9 @@ use lamp_offset::{Compensated, Loss, ThinWall};
 use lamp_stack::Layer;
 use serde::Serialize;
 
-use crate::pixel_location::{PixelLocation, millimetres, to_nm};
+use lamp_stack::to_nm;
+
+use crate::pixel_location::{PixelLocation, millimetres};
 
 /// Walls beyond these are only counted.
 const MAX_LISTED: usize = 10_000;

@@ -41,6 +41,7 @@ mod ordered;
 mod plain_text;
 mod record;
 mod shell;
+mod significant;
 mod strut;
 #[cfg(test)]
 mod testing;
@@ -100,5 +101,6 @@ pub use record::{
     PageRecord, SliceRecord, StripRecord,
 };
 pub use shell::{file_word, quoted, words};
+pub use significant::{format_significant, round_significant, to_nm};
 pub use strut::Strut;
 pub use text::{line_of, one_line};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use lamp_machine::{Machine, Recoating};
 use lamp_pipeline::documents::document;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 

@@ -1,12 +1,11 @@
 //! Fits the working curve over the gray level to measured cure depths.
 
-use lamp_stack::Length;
+use lamp_stack::{Length, round_significant};
 
 use super::curve_lines::{CRITICAL_DOSE, CurveLinesFit, LinePoint, PENETRATION_DEPTH};
 use super::extent::Extent;
 use super::fit_curve::{CurveFit, fit_curve};
 use super::measurements::DepthPoint;
-use super::significant::round_significant;
 use super::{Estimate, FitError};
 use crate::material::{CurveLines, GivenLine};
 use crate::resin::{Dose, GrayLevel, Quantity};

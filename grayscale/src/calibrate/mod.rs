@@ -33,18 +33,16 @@ mod made_up;
 mod matrix;
 mod measurements;
 mod regression;
-mod significant;
 mod student_t;
 mod two_depth_curve;
 
 use std::fmt;
 
-use lamp_stack::Length;
+use lamp_stack::{Length, format_significant, round_significant};
 use thiserror::Error;
 
 use crate::material::Given;
 use crate::resin::Quantity;
-use significant::round_significant;
 
 pub use columns::NumberRow;
 pub use csv_table::{CsvTable, TableError};
@@ -57,7 +55,6 @@ pub use fit_widths::{WidthFit, fit_widths};
 pub use measurements::{
     DataError, DepthPoint, LampPoint, Measured, WidthPoint, depth_points, lamp_points, width_points,
 };
-pub use significant::format_significant;
 
 /// The cure models that can be fitted to depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, MutexGuard};
 
-use crate::calibrate::format_significant;
+use lamp_stack::format_significant;
+
 use crate::material::{GivenRange, Material, MeasuredRange};
 use crate::resin::Dose;
 

@@ -1,7 +1,8 @@
 //! Prints the parameters of a calibration with their intervals, as a table.
 
-use lamp_grayscale::calibrate::{Estimate, Measured, format_significant};
+use lamp_grayscale::calibrate::{Estimate, Measured};
 use lamp_grayscale::resin::Quantity;
+use lamp_stack::format_significant;
 
 /// The numbers of a calibration, a line each.
 pub(super) struct EstimateTable {

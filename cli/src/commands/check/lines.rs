@@ -2,7 +2,7 @@
 
 use lamp_machine::Recoating;
 use lamp_pipeline::heights::significant;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_supports::{
     Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
     PocketKind, Region, WeakJoint,

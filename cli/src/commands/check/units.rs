@@ -3,7 +3,7 @@
 use lamp_supports::{Findings, Region};
 
 use lamp_pipeline::heights::significant;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 
 /// How pixels and layers lie in the part's coordinates.
 pub(in crate::commands) struct Scale<'a> {

@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_stack::{PageHeader, Pairing};
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_grayscale::calibrate::format_significant;
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
 use lamp_pipeline::documents::document;
-use lamp_stack::Length;
+use lamp_stack::{Length, format_significant};
 
 use crate::exit::Exit;
 use crate::lamp_option::LampOption;

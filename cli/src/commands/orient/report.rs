@@ -2,7 +2,7 @@
 
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::solid::name_of_all;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_supports::PoseFacts;
 use serde::Serialize;
 use serde_json::json;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use lamp_machine::Recoating;
 use lamp_pipeline::heights::significant;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Support};
 use serde_json::{Map, Value, json};
 

@@ -2,7 +2,7 @@
 
 use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_machine::Machine;
-use lamp_pipeline::to_nm;
+use lamp_stack::to_nm;
 use lamp_stack::Dpi;
 use serde_json::{Value, json};
 

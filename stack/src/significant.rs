@@ -1,4 +1,4 @@
-//! Rounds numbers to significant digits.
+//! Rounds numbers to the digits that say something.
 
 /// Writes a number to `digits` significant digits, with an exponent if it would be long
 /// otherwise, or `-` if it is not finite.
@@ -18,9 +18,17 @@ pub fn format_significant(number: f64, digits: usize) -> String {
 }
 
 /// Rounds a number to `digits` significant digits.
-pub(super) fn round_significant(number: f64, digits: usize) -> f64 {
+///
+/// # Panics
+/// Panics if there is no digit.
+pub fn round_significant(number: f64, digits: usize) -> f64 {
     let text = format!("{number:.*e}", digits - 1);
     text.parse().expect("a written number reads back")
+}
+
+/// Rounds millimetres to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
+pub fn to_nm(mm: f64) -> f64 {
+    (mm * 1e6).round() / 1e6 + 0.0
 }
 
 #[cfg(test)]
