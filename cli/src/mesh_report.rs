@@ -4,9 +4,9 @@
 use std::path::Path;
 
 use lamp_pipeline::slice::Counts;
-use lamp_stack::to_nm;
 use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::Dpi;
+use lamp_stack::to_nm;
 use serde::Serialize;
 
 use crate::exit::Exit;

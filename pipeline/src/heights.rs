@@ -7,9 +7,9 @@ use lamp_adaptive::{
     FoundHeights, Goal, HeightsDoubt, HeightsError, LayeredPart, Measure, SweptLayer, Thicknesses,
     WantedHeights, Watch, row_pitch,
 };
-use lamp_stack::format_significant;
 use lamp_grayscale::exposure::Exposure;
 use lamp_slicer::{FacetIndex, Fill};
+use lamp_stack::format_significant;
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};
 

@@ -24,6 +24,7 @@
 
 mod check;
 mod orient;
+mod record;
 mod support;
 
 pub use check::{
@@ -32,6 +33,12 @@ pub use check::{
     component_at, inner_components,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
+pub use record::{
+    AreaRecord, BorderRecord, BoxRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord,
+    FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace,
+    LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord, PocketRecord,
+    PointRecord, Scale, Shown, StrayRowsRecord, records,
+};
 pub use support::{
     HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, Surface, plan_supports,
 };

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageHeader};
-use lamp_supports::inner_components;
-use serde::Serialize;
+use lamp_supports::{FindingRecord, FoundPixels, inner_components};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::overlay::only_in;
@@ -25,13 +25,27 @@ pub struct Finding {
     pub at: Option<[f64; 2]>,
     /// A line about it.
     pub text: String,
+    /// The pixels of the rectangle that are drawn.
+    #[serde(skip)]
+    pub pixels: FoundPixels,
 }
 
 /// A list that is longer than this cannot be looked through.
 const MOST: usize = 10_000;
 
-/// Reads a report of `lamp check` or `lamp support` about a stack, given its pages. A finding may
-/// have a `text` for people; otherwise its numbers are told.
+/// Returns what a check found in a stack, given its pages.
+///
+/// # Errors
+/// Returns a sentence if the findings are about a stack with other layers.
+pub fn of_records(
+    records: &[FindingRecord],
+    headers: &[PageHeader],
+) -> Result<Vec<Finding>, String> {
+    let found = records.iter().take(MOST);
+    fitting(found.map(|record| of_record(record, record.to_string(), headers)).collect(), headers)
+}
+
+/// Reads a report of `lamp check` or `lamp support` about a stack, given its pages.
 ///
 /// # Errors
 /// Returns a sentence if it is no such report, or one about another stack.
@@ -41,11 +55,15 @@ pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>,
         Some("lamp-support-1") => support_report(report, headers),
         _ => return Err("this is no report of lamp check or lamp support".to_owned()),
     };
-    let fits = |finding: &&Finding| finding.last_layer < headers.len();
-    if found.iter().filter(fits).count() < found.len() {
-        return Err("the report is about a stack with other layers".to_owned());
+    fitting(found, headers)
+}
+
+fn fitting(found: Vec<Finding>, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
+    if found.iter().all(|finding| finding.last_layer < headers.len()) {
+        Ok(found)
+    } else {
+        Err("the report is about a stack with other layers".to_owned())
     }
-    Ok(found)
 }
 
 /// Returns the position of a layer by its index.
@@ -64,40 +82,20 @@ fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, 
         return Err("the report is about a stack of another size".to_owned());
     }
     let findings = report["findings"].as_array().into_iter().flatten().take(MOST);
-    Ok(findings.filter_map(|finding| of_json(finding, headers)).collect())
+    let read = |(number, json): (usize, &Value)| {
+        let record = FindingRecord::deserialize(json)
+            .map_err(|error| format!("finding {} of the report: {error}", number + 1))?;
+        let text = record.size_text();
+        Ok(of_record(&record, text, headers))
+    };
+    findings.enumerate().map(read).collect()
 }
 
-fn of_json(json: &Value, headers: &[PageHeader]) -> Option<Finding> {
-    let layer = json["layer"].as_u64()?;
-    let last = json["last_layer"].as_u64().unwrap_or(layer);
-    let list = |key: &str| -> Option<Vec<f64>> {
-        json[key].as_array()?.iter().map(Value::as_f64).collect()
-    };
-    let bounds = list("box_px").or_else(|| list("base_box_px"));
-    let bounds = bounds.and_then(|bounds| <[f64; 4]>::try_from(bounds).ok()).map(|bounds| {
-        let [left, right, top, bottom] = bounds.map(|at| at as u32);
-        [left, top, right, bottom]
-    });
-    let number = |key: &str, unit: &str| {
-        json[key].as_f64().map(|value| format!("{} {unit}", (value * 1000.0).round() / 1000.0))
-    };
-    let text = json["text"].as_str().map(str::to_owned);
-    let facts = [
-        number("area_mm2", "mm2").or(number("area_px", "px")),
-        number("support_percent", "% rests on white"),
-        number("reach_mm", "mm beyond the layer below"),
-        number("volume_mm3", "mm3"),
-        number("off_mm", "mm off its base"),
-        json["joins"].as_u64().map(|layer| format!("joins in layer {layer}")),
-    ];
-    Some(Finding {
-        kind: json["kind"].as_str()?.to_owned(),
-        layer: position(headers, layer),
-        last_layer: position(headers, last),
-        bounds,
-        at: list("at_px").and_then(|at| at.try_into().ok()),
-        text: text.unwrap_or_else(|| facts.into_iter().flatten().collect::<Vec<_>>().join(", ")),
-    })
+fn of_record(record: &FindingRecord, text: String, headers: &[PageHeader]) -> Finding {
+    let [layer, last_layer] = record.layers().map(|index| position(headers, index.into()));
+    let bounds = record.box_px().map(|[left, right, top, bottom]| [left, top, right, bottom]);
+    let (kind, at, pixels) = (record.kind().to_owned(), record.at_px(), record.pixels());
+    Finding { kind, layer, last_layer, bounds, at, text, pixels }
 }
 
 /// The half side of the square around an island that is held, in pixels.
@@ -132,7 +130,8 @@ fn of_plan(plan: &Value, headers: &[PageHeader]) -> Option<Finding> {
     };
     let number = plan["number"].as_u64().map_or_else(String::new, |n| format!(" {n}"));
     let text = format!("island{number}, {what}");
-    Some(Finding { kind: "support".to_owned(), layer, last_layer: layer, bounds, at, text })
+    let (kind, pixels) = ("support".to_owned(), FoundPixels::All);
+    Some(Finding { kind, layer, last_layer: layer, bounds, at, text, pixels })
 }
 
 impl Finding {
@@ -156,11 +155,11 @@ pub(crate) fn drawn<'a>(
         // A pixel around, so that what is found does not touch the border.
         let frame = around(bounds);
         let here = layer.framed(frame);
-        let found = match finding.kind.as_str() {
-            "trap" | "cup" | "sealed" | "narrow" => inner_components(&here, false),
-            "island" | "weak-joint" => inner_components(&here, true),
-            "overhang" => only_in(&here, &below.framed(frame)),
-            _ => here,
+        let found = match finding.pixels {
+            FoundPixels::Black => inner_components(&here, false),
+            FoundPixels::White => inner_components(&here, true),
+            FoundPixels::Unheld => only_in(&here, &below.framed(frame)),
+            FoundPixels::All => here,
         };
         let found = cut(&found, &frame, bounds, [width, height]);
         all = all.combined(Op::Union, &found).expect("they have one size");
@@ -280,22 +279,29 @@ mod tests {
         // A ring, a block beside it, and a block that hangs over to the right.
         let layer = mask(&[&[], &[1, 5, 7, 8, 9], &[1, 2, 4, 5, 7, 8, 9], &[1, 5, 9], &[]]);
         let below = mask(&[&[], &[9, 10], &[9, 10], &[9, 10], &[]]);
-        let finding = |kind: &str, bounds| Finding {
-            kind: kind.to_owned(),
+        let finding = |pixels, bounds| Finding {
+            kind: String::new(),
             layer: 0,
             last_layer: 0,
             bounds: Some(bounds),
             at: None,
             text: String::new(),
+            pixels,
         };
-        let drawn = |kind, bounds| drawn([finding(kind, bounds)].iter(), &layer, &below);
-        assert_eq!(drawn("trap", [2, 2, 4, 3]), mask(&[&[], &[], &[2, 4], &[], &[]]));
-        assert_eq!(drawn("island", [7, 1, 8, 3]), mask(&[&[], &[7, 8], &[7, 8], &[], &[]]));
+        let drawn = |pixels, bounds| drawn([finding(pixels, bounds)].iter(), &layer, &below);
+        assert_eq!(drawn(FoundPixels::Black, [2, 2, 4, 3]), mask(&[&[], &[], &[2, 4], &[], &[]]));
+        assert_eq!(
+            drawn(FoundPixels::White, [7, 1, 8, 3]),
+            mask(&[&[], &[7, 8], &[7, 8], &[], &[]])
+        );
         let hangs: &[u32] = &[10];
-        assert_eq!(drawn("overhang", [9, 1, 12, 4]), mask(&[&[], hangs, hangs, hangs, &[]]));
+        assert_eq!(
+            drawn(FoundPixels::Unheld, [9, 1, 12, 4]),
+            mask(&[&[], hangs, hangs, hangs, &[]])
+        );
         // Boxes of false reports.
-        assert_eq!(drawn("empty", [50, 50, 60, 60]).white_pixels(), 0);
-        assert_eq!(drawn("island", [8, 3, 7, 1]).white_pixels(), 0);
-        assert_eq!(drawn("island", [0, 0, u32::MAX, u32::MAX]), layer);
+        assert_eq!(drawn(FoundPixels::All, [50, 50, 60, 60]).white_pixels(), 0);
+        assert_eq!(drawn(FoundPixels::White, [8, 3, 7, 1]).white_pixels(), 0);
+        assert_eq!(drawn(FoundPixels::White, [0, 0, u32::MAX, u32::MAX]), layer);
     }
 }

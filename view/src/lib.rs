@@ -26,7 +26,7 @@ mod viewer;
 pub use assets::licences;
 pub use background::Progress;
 pub use error::ViewError;
-pub use findings::{Finding, of_report};
+pub use findings::{Finding, of_records, of_report};
 pub use overlay::Overlay;
 pub use server::{Address, Ticket, Token, serve};
 pub use stack::ViewedStack;

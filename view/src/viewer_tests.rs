@@ -6,6 +6,7 @@ use lamp_stack::{
     Destination, Dpi, Format, GrayMask, Image, IndexedStack, Layer, LevelChange, Mask, MaskBuilder,
     PageInfo, StackError, write_stack,
 };
+use lamp_supports::FoundPixels;
 use serde_json::{Value, json};
 
 use super::*;
@@ -109,6 +110,7 @@ fn findings_appear_once_they_are_there() {
         bounds: Some(bounds),
         at: None,
         text: "white at the border".to_owned(),
+        pixels: FoundPixels::All,
     };
     viewer.set_findings(vec![finding(0, [0, 0, 8, 3]), finding(1, [0, 0, 3, 1])]);
     assert_eq!(drawn(&viewer, 0, 1, Overlay::Findings), Image::Mask(mask([&[1, 3], &[], &[]])));

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use lamp_pipeline::documents;
-use lamp_stack::to_nm;
 use lamp_planning::projector::{Focus, Lens, Projector, SpreadOf};
+use lamp_stack::to_nm;
 use lamp_stack::{Catalogued, Length, Size};
 use serde_json::{Value, json};
 

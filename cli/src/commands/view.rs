@@ -8,7 +8,9 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 use lamp_stack::{Destination, Format, IndexedStack, PrivateFile, write_stack};
-use lamp_view::{Address, Ticket, Token, ViewedStack, Viewer, licences, of_report, serve};
+use lamp_view::{
+    Address, Ticket, Token, ViewedStack, Viewer, licences, of_records, of_report, serve,
+};
 
 use super::check;
 use crate::allocator::give_freed_memory_back;
@@ -183,8 +185,8 @@ fn find(
     let headers = stack.headers();
     progress.expect(headers.len() as u64);
     let pages = (0..headers.len()).map(|position| Ok(stack.page(position)?));
-    let report = check::report_of(headers, pages, || progress.one_done())?;
-    of_report(&report, headers).map_err(|why| Exit::Failed(anyhow!(why)))
+    let found = check::found_in_pages(pages, || progress.one_done())?;
+    of_records(&found, headers).map_err(|why| Exit::Failed(anyhow!(why)))
 }
 
 fn read_json(path: &Path) -> Result<serde_json::Value, Exit> {

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use lamp_build::TILE_CODE;
 use lamp_pipeline::watcher::KeptRemarks;
 use lamp_stack::Layer;
+use lamp_supports::FindingRecord;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 use super::parse::{parse_check, parse_tile};
 use crate::commands::check::CheckArgs;
@@ -87,7 +87,7 @@ pub(crate) struct CheckFindings {
     /// A line for each finding, also for notes, the worst first.
     pub(crate) lines: Vec<String>,
     /// The same as in the report of `lamp check`, without the input's number.
-    pub(crate) findings: Vec<Value>,
+    pub(crate) findings: Vec<FindingRecord>,
 }
 
 impl CheckFindings {
@@ -123,12 +123,12 @@ impl Checking {
     /// Returns an error if the stack cannot be read.
     pub(crate) fn run(&self, stack: &Path) -> Result<CheckFindings, Exit> {
         let mut found = CheckFindings::default();
-        for line in self.0.lines(stack)? {
-            if !line.is_note {
-                *found.kinds.entry(line.word.to_owned()).or_default() += 1;
+        for record in self.0.found_in(stack)? {
+            if !record.is_note() {
+                *found.kinds.entry(record.name().to_owned()).or_default() += 1;
             }
-            found.lines.push(format!("{}: {}", line.word, line.text));
-            found.findings.push(line.json);
+            found.lines.push(format!("{}: {record}", record.name()));
+            found.findings.push(record);
         }
         Ok(found)
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use lamp_stack::{Dpi, PageInfo};
 
 /// A rectangle of pixels.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Region {
     /// The columns, from the left.
     pub columns: Range<u32>,

@@ -1,9 +1,7 @@
 //! `lamp check`: finds what would float away, be trapped or bend as a stack is built.
 
-mod lines;
 mod pictures;
 mod report;
-mod units;
 
 use std::collections::BTreeSet;
 use std::num::{NonZeroU8, NonZeroU32};
@@ -11,15 +9,15 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, FromArgMatches};
-use lamp_machine::Machine;
+use lamp_machine::{Machine, Recoating};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
-use lamp_stack::{Layer, Length, MemorySize, Page, PageHeader};
+use lamp_stack::{Layer, Length, MemorySize, Page};
 use lamp_supports::{
-    CheckError, CheckOptions, Disagreements, Findings, IslandMinimum, LoneMinimum,
+    CheckError, CheckOptions, Disagreements, FindingGroup, FindingRecord, Findings, IslandMinimum,
+    LoneMinimum,
 };
 use serde::Serialize;
-use serde_json::{Value, json};
 
 use crate::args::slicing::SlicingArgs;
 use crate::endings::parse_report;
@@ -34,12 +32,9 @@ use lamp_pipeline::solid::at_part;
 use lamp_pipeline::words::{list, optional, path, text, words_of};
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
-pub(crate) use lines::FindingLine;
-pub(super) use lines::{Shown, drag_mn};
 pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
-pub(super) use units::Scale;
 
 /// Find what would be swept away, trapped or bent as a stack is built
 ///
@@ -67,7 +62,7 @@ pub(crate) struct CheckArgs {
 
     /// What to tell
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
-    #[arg(value_parser = one_of_described::<Kind>(&[
+    #[arg(value_parser = one_of_described::<FindingGroup>(&[
         "White that rests on nothing",
         "White that rests on little",
         "Black without a way out",
@@ -76,7 +71,7 @@ pub(crate) struct CheckArgs {
         "Stray rows, white at the border, empty layers",
     ]))]
     #[serde(with = "list")]
-    only: Vec<Kind>,
+    only: Vec<FindingGroup>,
 
     /// Side of the square that a finding must hold, in pixels
     #[arg(long, value_name = "PIXELS", default_value = "3")]
@@ -149,26 +144,6 @@ pub(crate) struct CheckArgs {
     slicing: SlicingArgs,
 }
 
-/// A kind of findings, as people name it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Islands,
-    Joints,
-    Pockets,
-    Overhangs,
-    Balance,
-    Layers,
-}
-
-lamp_stack::named!(Kind {
-    Islands = "islands",
-    Joints = "joints",
-    Pockets = "pockets",
-    Overhangs = "overhangs",
-    Balance = "balance",
-    Layers = "layers",
-});
-
 pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     for beside in [&args.report, &args.evidence].into_iter().flatten() {
         check_beside(beside, Path::new("-"), &args.inputs)?;
@@ -183,7 +158,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let evidence = evidence.transpose()?;
     let checked = args.inputs.iter().map(|path| {
         let checked = args.checked(path, &machine, common)?;
-        print(&printed(&checked.name, &checked.findings, &checked.lines, common.verbose))?;
+        print(&printed(&checked.name, &checked.findings, &checked.records, common.verbose))?;
         Ok(checked)
     });
     let mut checked = checked.collect::<Result<Vec<_>, Exit>>()?;
@@ -208,49 +183,40 @@ fn found_by_default<T: MemorySize + Send>(
     layers: impl Iterator<Item = Result<T, Exit>>,
     decode: impl Fn(T) -> Result<Layer, Exit> + Sync,
     machine: Option<&Machine>,
-) -> Result<(Findings, Vec<FindingLine>), Exit> {
+) -> Result<(Findings, Vec<FindingRecord>), Exit> {
     let command = CheckArgs::augment_args(clap::Command::new("check").no_binary_name(true));
     let matches = command.get_matches_from([""; 0]);
     let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
     let findings = lamp_supports::check(layers, decode, &args.options())?;
     let usual = document(&args.machine)?;
-    let recoating = machine.unwrap_or(&usual).recoating.as_ref();
-    let lines = lines::of(&findings, &Disagreements::default(), &args, recoating);
-    Ok((findings, lines))
+    let records = args.records(&findings, &Disagreements::default(), machine.unwrap_or(&usual));
+    Ok((findings, records))
 }
 
 /// Finds in layers what [`found_by_default`] does.
 pub(super) fn found(
     layers: impl Iterator<Item = Result<Layer, Exit>>,
     machine: Option<&Machine>,
-) -> Result<(Findings, Vec<FindingLine>), Exit> {
+) -> Result<(Findings, Vec<FindingRecord>), Exit> {
     found_by_default(layers, Ok, machine)
 }
 
-/// Returns what `lamp check` finds in a stack without further options, in the form of its report,
-/// and with a `text` for each finding.
-pub(super) fn report_of(
-    headers: &[PageHeader],
+/// Returns what `lamp check` finds in the pages of a stack without further options.
+pub(super) fn found_in_pages(
     pages: impl Iterator<Item = Result<Page, Exit>>,
     done: impl Fn() + Sync,
-) -> Result<Value, Exit> {
+) -> Result<Vec<FindingRecord>, Exit> {
     let decode = |page: Page| {
         let layer = page.decode()?;
         done();
         Ok::<_, Exit>(layer)
     };
-    let (_, lines) = found_by_default(pages, decode, None)?;
-    let told = lines.into_iter().map(|line| {
-        let mut json = line.json;
-        json["text"] = line.text.into();
-        json
-    });
-    let [width, height] = headers.first().map_or([0; 2], |first| first.size);
-    Ok(json!({
-        "schema": report::SCHEMA,
-        "inputs": [{"width_px": width, "height_px": height}],
-        "findings": told.collect::<Vec<_>>(),
-    }))
+    found_by_default(pages, decode, None).map(|(_, records)| records)
+}
+
+/// Returns the shear stress of a blade on what it passes, for the greatest viscosity, in pascals.
+pub(super) fn greatest_shear_pa(recoating: Option<&Recoating>) -> Option<f64> {
+    recoating.map(|recoating| recoating.shear_pa()[1])
 }
 
 impl CheckArgs {
@@ -267,8 +233,8 @@ impl CheckArgs {
         let minima = self.minima(&input)?;
         let findings = self.check(&mut input, common)?;
         let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
-        let lines = lines::of(&findings, &disagreements, self, machine.recoating.as_ref());
-        Ok(CheckedInput { name: input_name(path), input, findings, lines })
+        let records = self.records(&findings, &disagreements, machine);
+        Ok(CheckedInput { name: input_name(path), input, findings, records })
     }
 
     /// Returns the machine, to be changed.
@@ -277,8 +243,21 @@ impl CheckArgs {
     }
 
     /// Returns what there is in a stack, the worst first.
-    pub(crate) fn lines(&self, stack: &Path) -> Result<Vec<FindingLine>, Exit> {
-        Ok(self.checked(stack, &document(&self.machine)?, &Common::quiet())?.lines)
+    pub(crate) fn found_in(&self, stack: &Path) -> Result<Vec<FindingRecord>, Exit> {
+        Ok(self.checked(stack, &document(&self.machine)?, &Common::quiet())?.records)
+    }
+
+    /// Returns the records of findings that are asked for.
+    fn records(
+        &self,
+        findings: &Findings,
+        disagreements: &Disagreements,
+        machine: &Machine,
+    ) -> Vec<FindingRecord> {
+        let shear_pa = greatest_shear_pa(machine.recoating.as_ref());
+        let mut records = lamp_supports::records(findings, disagreements, shear_pa);
+        records.retain(|record| self.tells(record.group()));
+        records
     }
 
     /// Returns the options that matter to findings as one text.
@@ -346,7 +325,7 @@ impl CheckArgs {
     /// Returns the minima of a part's mesh, if islands are told.
     fn minima(&self, input: &Input) -> Result<Vec<IslandMinimum>, Exit> {
         let Input::Part(part) = input else { return Ok(Vec::new()) };
-        if !self.tells(Kind::Islands) || part.model.is_cut() {
+        if !self.tells(FindingGroup::Islands) || part.model.is_cut() {
             return Ok(Vec::new());
         }
         let solid = &part.settings.solid;
@@ -368,7 +347,7 @@ impl CheckArgs {
             Input::Part(part) if !part.model.is_cut() => part.settings.cut(),
             _ => return Ok(Disagreements::default()),
         };
-        if !self.tells(Kind::Islands) {
+        if !self.tells(FindingGroup::Islands) {
             return Ok(Disagreements::default());
         }
         let mut found = findings.compare_minima(minima, cut);
@@ -392,9 +371,9 @@ impl CheckArgs {
         Ok(found)
     }
 
-    /// Returns whether findings of a kind are told.
-    fn tells(&self, kind: Kind) -> bool {
-        self.only.is_empty() || self.only.contains(&kind)
+    /// Returns whether findings of a group are printed.
+    fn tells(&self, group: FindingGroup) -> bool {
+        self.only.is_empty() || self.only.contains(&group)
     }
 }
 
@@ -421,13 +400,13 @@ struct CheckedInput {
     name: String,
     input: Input,
     findings: Findings,
-    lines: Vec<FindingLine>,
+    records: Vec<FindingRecord>,
 }
 
 impl CheckedInput {
     /// Returns the number of findings that count.
     fn found(&self) -> usize {
-        self.lines.iter().filter(|line| !line.is_note).count()
+        self.records.iter().filter(|record| !record.is_note()).count()
     }
 }
 
@@ -438,7 +417,7 @@ const NEAR: u32 = 2;
 const MOST_LINES: usize = 20;
 
 /// Returns the lines to print for an input.
-fn printed(name: &str, findings: &Findings, lines: &[FindingLine], all: bool) -> String {
+fn printed(name: &str, findings: &Findings, records: &[FindingRecord], all: bool) -> String {
     let layers = match findings.layers.len() {
         1 => "1 layer".to_owned(),
         layers => format!("{layers} layers"),
@@ -448,21 +427,23 @@ fn printed(name: &str, findings: &Findings, lines: &[FindingLine], all: bool) ->
         1 => ", 1 speck".to_owned(),
         specks => format!(", {specks} specks"),
     };
-    let found = match lines.iter().filter(|line| !line.is_note).count() {
+    let found = match records.iter().filter(|record| !record.is_note()).count() {
         0 => "no findings".to_owned(),
         1 => "1 finding".to_owned(),
         found => format!("{found} findings"),
     };
     let mut text = format!("{}: {layers}, {found}{specks}\n", printable(name));
-    for of_word in lines.chunk_by(|a, b| a.word == b.word) {
-        let shown = if all { of_word.len() } else { of_word.len().min(MOST_LINES) };
-        for line in &of_word[..shown] {
-            text += &format!("  {}: {}\n", line.word, line.text);
+    for of_kind in records.chunk_by(|a, b| a.name() == b.name()) {
+        let shown = if all { of_kind.len() } else { of_kind.len().min(MOST_LINES) };
+        for record in &of_kind[..shown] {
+            text += &format!("  {}: {record}\n", record.name());
         }
-        if shown < of_word.len() {
-            let left = of_word.len() - shown;
-            text +=
-                &format!("  {}: {left} more (--verbose or --report lists them)\n", of_word[0].word);
+        if shown < of_kind.len() {
+            let left = of_kind.len() - shown;
+            text += &format!(
+                "  {}: {left} more (--verbose or --report lists them)\n",
+                of_kind[0].name()
+            );
         }
     }
     text

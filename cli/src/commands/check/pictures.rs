@@ -5,9 +5,8 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, white_runs};
-use lamp_supports::{Region, component_at};
+use lamp_supports::{FindingRecord, Region, Shown, component_at};
 
-use super::lines::{FindingLine, Shown};
 use super::{CheckArgs, CheckedInput, Input};
 use crate::exit::Exit;
 use crate::options::Common;
@@ -55,9 +54,9 @@ pub(super) fn write_pictures(
     folder: FolderBeside,
 ) -> Result<(), Exit> {
     let several = checked.len() > 1;
-    for (number, CheckedInput { input, lines, .. }) in checked.iter_mut().enumerate() {
+    for (number, CheckedInput { input, records, .. }) in checked.iter_mut().enumerate() {
         let prefix = if several { format!("{:02}_", number + 1) } else { String::new() };
-        let drawings = drawings(lines);
+        let drawings = drawings(records);
         let is_wanted = |position| drawings.contains_key(&position);
         args.for_each_layer(input, common, is_wanted, |position, below, layer| {
             for (name, shown) in drawings.get(&position).into_iter().flatten() {
@@ -73,13 +72,12 @@ pub(super) fn write_pictures(
 }
 
 /// Returns the names of pictures and what they show, by layer.
-fn drawings(lines: &[FindingLine]) -> BTreeMap<u32, Vec<(String, &Shown)>> {
+fn drawings(records: &[FindingRecord]) -> BTreeMap<u32, Vec<(String, &Shown)>> {
     let mut drawings: BTreeMap<u32, Vec<_>> = BTreeMap::new();
-    let shown = lines.iter().filter_map(|line| Some((line, line.shown.as_ref()?)));
-    for (rank, (line, shown)) in shown.take(MOST_PICTURES).enumerate() {
-        let (rank, word) = (rank + 1, line.word.replace(' ', "_"));
-        let layer = line.json["reach_layer"].as_u64().or(line.json["layer"].as_u64());
-        let name = format!("{rank:02}_{word}_layer_{:05}.png", layer.unwrap_or_default());
+    let shown = records.iter().filter_map(|record| Some((record, record.shown()?)));
+    for (rank, (record, shown)) in shown.take(MOST_PICTURES).enumerate() {
+        let (rank, word) = (rank + 1, record.name().replace(' ', "_"));
+        let name = format!("{rank:02}_{word}_layer_{:05}.png", shown.index);
         drawings.entry(shown.layer).or_default().push((name, shown));
     }
     drawings

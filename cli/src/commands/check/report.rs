@@ -3,16 +3,16 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
-use serde_json::{Value, json};
+use lamp_supports::{FindingRecord, IslandRecord, Scale};
+use serde::Serialize;
+use serde_json::json;
 
-use super::CheckedInput;
-use super::lines::island_json;
-use super::units::Scale;
+use super::{CheckedInput, greatest_shear_pa};
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 
 /// The form of the report.
-pub(super) const SCHEMA: &str = "lamp-check-1";
+const SCHEMA: &str = "lamp-check-1";
 
 /// Writes the findings in all inputs, and the specks.
 pub(super) fn write_report(
@@ -33,24 +33,31 @@ pub(super) fn write_report(
             "left_out": left_out(checked),
         })
     });
-    let named = |number: usize, json: &Value| {
-        let mut json = json.clone();
-        json["input"] = number.into();
-        json
-    };
-    let findings = checked.iter().enumerate().flat_map(|(number, checked)| {
-        checked.lines.iter().map(move |line| named(number, &line.json))
+    let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
+        checked.records.iter().map(move |finding| OfInput { finding, input })
     });
-    let specks = checked.iter().enumerate().flat_map(|(number, checked)| {
+    let shear_pa = greatest_shear_pa(recoating);
+    let specks = checked.iter().enumerate().flat_map(|(input, checked)| {
         let scale = Scale::new(&checked.findings);
         let specks = checked.findings.specks.list.iter();
-        specks.map(move |speck| named(number, &island_json(speck, &scale, recoating)))
+        specks.map(move |speck| OfInput {
+            finding: FindingRecord::Island(IslandRecord::new(speck, &scale, shear_pa)),
+            input,
+        })
     });
     JsonReport::new(&json!({ "schema": SCHEMA }))
         .list("inputs", inputs)
         .list("findings", findings)
         .list("specks", specks)
         .write(path)
+}
+
+/// A finding, and the number of its input.
+#[derive(Serialize)]
+struct OfInput<F> {
+    #[serde(flatten)]
+    finding: F,
+    input: usize,
 }
 
 /// The number of findings and specks that are not listed, for there are too many.

@@ -5,12 +5,12 @@ use std::cell::RefCell;
 use lamp_build::{BuildTime, PixelSize};
 use lamp_machine::Machine;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
-use lamp_supports::{CheckError, Findings};
+use lamp_supports::{CheckError, FindingRecord, Findings};
 use serde_json::{Value, json};
 
 use super::measure::{LayerNumbers, new_pixels};
 use super::pictures::{Picture, of_finding, of_layer};
-use crate::commands::check::{self, FindingLine};
+use crate::commands::check;
 use crate::exit::Exit;
 use crate::progress::Progress;
 use crate::stack_facts::StackFacts;
@@ -33,15 +33,15 @@ pub(super) struct StackReport {
 /// What `lamp check` finds.
 pub(super) struct Found {
     pub(super) findings: Findings,
-    pub(super) lines: Vec<FindingLine>,
-    /// Pictures of the worst, each with the number of its line.
+    pub(super) records: Vec<FindingRecord>,
+    /// Pictures of the worst, each with the number of its record.
     pub(super) pictures: Vec<(usize, Picture)>,
 }
 
 impl Found {
     /// Returns the number of findings that count.
     pub(super) fn count(&self) -> usize {
-        self.lines.iter().filter(|line| !line.is_note).count()
+        self.records.iter().filter(|record| !record.is_note()).count()
     }
 }
 
@@ -59,7 +59,7 @@ impl StackReport {
         let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
         let mut layers = measured(stack, &numbers, &sheet, progress);
         let found = match check::found(&mut layers, machine) {
-            Ok((findings, lines)) => Ok((findings, lines)),
+            Ok(found) => Ok(found),
             Err(error) => match error.cause::<CheckError>() {
                 Some(why) => Err(why.to_string()),
                 None => return Err(error),
@@ -69,9 +69,9 @@ impl StackReport {
         layers.try_for_each(|layer| layer.map(drop))?;
         drop(layers);
         let found = match found {
-            Ok((findings, lines)) => {
-                let pictures = drawn(stack, &lines)?;
-                Ok(Found { findings, lines, pictures })
+            Ok((findings, records)) => {
+                let pictures = drawn(stack, &records)?;
+                Ok(Found { findings, records, pictures })
             }
             Err(why) => Err(why),
         };
@@ -129,7 +129,7 @@ impl StackReport {
             "unchecked": self.found.as_ref().err(),
             "finding_count": found.map(Found::count),
             "specks": found.map(|found| found.findings.specks.count()),
-            "findings": found.map(|found| found.lines.iter().map(|line| &line.json).collect::<Vec<_>>()),
+            "findings": found.map(|found| &found.records),
             "by_layer": {
                 "index": column(&|layer| layer.index.into()),
                 "z_um": column(&|layer| layer.z_um.into()),
@@ -164,9 +164,10 @@ impl StackReport {
 
 /// `3 islands, 1 cup were found ...`
 fn found_text(found: &Found) -> Option<String> {
-    let told: Vec<_> = found.lines.iter().filter(|line| !line.is_note).collect();
-    let kinds = told.chunk_by(|a, b| a.word == b.word);
-    let kinds: Vec<_> = kinds.map(|lines| format!("{} ({})", lines[0].word, lines.len())).collect();
+    let told: Vec<_> = found.records.iter().filter(|record| !record.is_note()).collect();
+    let kinds = told.chunk_by(|a, b| a.name() == b.name());
+    let kinds: Vec<_> =
+        kinds.map(|records| format!("{} ({})", records[0].name(), records.len())).collect();
     let count = match told.len() {
         0 => return None,
         1 => "1 finding".to_owned(),
@@ -216,9 +217,9 @@ fn is_on_sheet(position: usize, count: usize) -> bool {
 }
 
 /// Draws the worst findings, as `lamp check --evidence` does.
-fn drawn(stack: &IndexedStack, lines: &[FindingLine]) -> Result<Vec<(usize, Picture)>, Exit> {
+fn drawn(stack: &IndexedStack, records: &[FindingRecord]) -> Result<Vec<(usize, Picture)>, Exit> {
     let shown =
-        lines.iter().enumerate().filter_map(|(number, line)| Some((number, line.shown.as_ref()?)));
+        records.iter().enumerate().filter_map(|(number, record)| Some((number, record.shown()?)));
     let worst = shown.take(MOST_DRAWN).map(|(number, shown)| {
         let mask = |position: u32| {
             let layer = stack.layer(position as usize).map_err(failed)?;

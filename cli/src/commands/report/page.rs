@@ -117,16 +117,16 @@ fn build_time(report: &StackReport) -> Markup {
 }
 
 fn findings(found: &Found) -> Markup {
-    let kinds = found.lines.chunk_by(|a, b| a.word == b.word);
+    let kinds = found.records.chunk_by(|a, b| a.name() == b.name());
     let specks = found.findings.specks.count();
     html! {
-        @if found.lines.is_empty() { p { "lamp check finds nothing." } }
+        @if found.records.is_empty() { p { "lamp check finds nothing." } }
         @if !found.pictures.is_empty() {
             div.evidence {
                 @for (number, picture) in &found.pictures {
                     figure {
-                        img src=(picture.address) alt=(found.lines[*number].word);
-                        figcaption { b { (found.lines[*number].word) } ": " (with_signs(&found.lines[*number].text)) }
+                        img src=(picture.address) alt=(found.records[*number].name());
+                        figcaption { b { (found.records[*number].name()) } ": " (with_signs(&found.records[*number].to_string())) }
                     }
                 }
             }
@@ -135,12 +135,12 @@ fn findings(found: &Found) -> Markup {
             }
         }
         table.findings {
-            @for lines in kinds {
-                @for line in &lines[..lines.len().min(MOST_LINES)] {
-                    tr { th { (line.word) } td { (with_signs(&line.text)) } }
+            @for records in kinds {
+                @for record in &records[..records.len().min(MOST_LINES)] {
+                    tr { th { (record.name()) } td { (with_signs(&record.to_string())) } }
                 }
-                @if lines.len() > MOST_LINES {
-                    tr { th { (lines[0].word) } td { (lines.len() - MOST_LINES) " more (lamp check --report lists them)" } }
+                @if records.len() > MOST_LINES {
+                    tr { th { (records[0].name()) } td { (records.len() - MOST_LINES) " more (lamp check --report lists them)" } }
                 }
             }
         }

@@ -1,9 +1,10 @@
 //! Pictures within a page.
 
 use lamp_stack::{Layer, Mask};
+use lamp_supports::Shown;
 use serde::{Deserialize, Serialize};
 
-use crate::commands::check::{Shown, draw};
+use crate::commands::check::draw;
 use crate::picture::{self, PictureScale, Region};
 
 /// The longer side of a layer on the sheet, in pixels.

@@ -3,9 +3,7 @@
 use std::fmt::Write;
 
 use lamp_stack::{Length, one_line};
-use lamp_supports::{Findings, IslandPlan, Support};
-
-use crate::commands::check::Scale;
+use lamp_supports::{Findings, IslandPlan, Scale, Support};
 
 /// Returns the plan as a list of edits: a strut for each support, alternatives as comments.
 pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> String {
@@ -25,8 +23,8 @@ pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> S
     }
     for plan in plans {
         let island = &plan.island;
-        let layer = scale.layer_text(island.layer);
-        let area = scale.area_text(island.area);
+        let layer = scale.layer(island.layer);
+        let area = scale.area(island.area);
         let places = match plan.places.len() {
             1 => String::new(),
             places => format!(", in {places} places"),

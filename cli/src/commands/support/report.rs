@@ -5,10 +5,10 @@ use std::path::Path;
 use lamp_machine::Recoating;
 use lamp_pipeline::heights::significant;
 use lamp_stack::to_nm;
-use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Support};
+use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Scale, Support};
 use serde_json::{Map, Value, json};
 
-use crate::commands::check::{Scale, drag_mn};
+use crate::commands::check::greatest_shear_pa;
 use crate::exit::Exit;
 use crate::json_report::JsonReport;
 use crate::progress::Progress;
@@ -22,17 +22,18 @@ pub(super) struct SupportReport<'a> {
     /// Islands that are too many to be listed, and so are left.
     unlisted: u64,
     scale: Scale<'a>,
-    recoating: Option<&'a Recoating>,
+    shear_pa: Option<f64>,
 }
 
 impl<'a> SupportReport<'a> {
     pub(super) fn new(
         plans: &'a [IslandPlan],
         found: &'a Findings,
-        recoating: Option<&'a Recoating>,
+        recoating: Option<&Recoating>,
     ) -> Self {
         let unlisted = found.islands.left_out;
-        Self { plans, unlisted, scale: Scale::new(found), recoating }
+        let shear_pa = greatest_shear_pa(recoating);
+        Self { plans, unlisted, scale: Scale::new(found), shear_pa }
     }
 
     /// Prints what is done: first of all what that means.
@@ -77,8 +78,8 @@ impl<'a> SupportReport<'a> {
         let count = left.clone().count() as u64 + self.unlisted;
         let first = left.next().map(|plan| {
             let island = &plan.island;
-            let layer = self.scale.layer_text(island.layer);
-            format!(", the first in {layer} at {}", self.scale.point_text(island.centroid))
+            let layer = self.scale.layer(island.layer);
+            format!(", the first in {layer} at {}", self.scale.point(island.centroid))
         });
         let are = if count == 1 { "island is" } else { "islands are" };
         let first = first.unwrap_or_default();
@@ -116,14 +117,13 @@ impl<'a> SupportReport<'a> {
 
     /// Returns how hard the blade drags on what each support of an island holds, in millinewtons.
     fn drag_mn(&self, plan: &IslandPlan) -> Option<f64> {
-        let drag = drag_mn(&plan.island, &self.scale, self.recoating)?;
+        let drag = self.scale.drag_mn(&plan.island, self.shear_pa)?;
         Some(drag / plan.supports().count().max(1) as f64)
     }
 
     fn line(&self, plan: &IslandPlan) -> String {
         let island = &plan.island;
-        let (layer, at) =
-            (self.scale.layer_text(island.layer), self.scale.point_text(island.centroid));
+        let (layer, at) = (self.scale.layer(island.layer), self.scale.point(island.centroid));
         let start = format!("island {} in {layer} at {at}: ", island.number);
         if let [place] = &plan.places[..] {
             return start + &held(place, self.drag_mn(plan));
@@ -145,15 +145,16 @@ impl<'a> SupportReport<'a> {
 
     fn island_json(&self, plan: &IslandPlan) -> Value {
         let island = &plan.island;
+        let layer = self.scale.layer(island.layer);
         let drag = self.drag_mn(plan).map(to_nm);
         let places: Vec<Value> = plan.places.iter().map(|place| place_json(place, drag)).collect();
         json!({
             "island": island.number,
-            "layer": self.scale.index(island.layer),
-            "z_mm": self.scale.z_mm(island.layer),
-            "at_mm": self.scale.point_mm(island.centroid),
-            "area_mm2": self.scale.area_mm2(island.area),
-            "drag_mn": drag_mn(island, &self.scale, self.recoating),
+            "layer": layer.layer,
+            "z_mm": layer.z_mm,
+            "at_mm": self.scale.point(island.centroid).at_mm,
+            "area_mm2": self.scale.area(island.area).area_mm2,
+            "drag_mn": self.scale.drag_mn(island, self.shear_pa),
             "left": plan.is_left(),
             "places": places,
         })

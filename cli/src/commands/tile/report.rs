@@ -2,8 +2,8 @@
 
 use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_machine::Machine;
-use lamp_stack::to_nm;
 use lamp_stack::Dpi;
+use lamp_stack::to_nm;
 use serde_json::{Value, json};
 
 use super::TileArgs;

@@ -1,0 +1,179 @@
+//! Makes the records of all findings of a stack.
+
+use lamp_stack::to_nm;
+
+use super::scale::Scale;
+use super::{
+    BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord, IslandRecord,
+    Joined, JointRecord, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord, PocketRecord,
+    Shown, StrayRowsRecord,
+};
+use crate::check::{
+    Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
+    PocketKind, Region, WeakJoint,
+};
+
+/// Returns the records of all findings, the worst first, given the shear stress of the recoating
+/// blade in pascals.
+pub fn records(
+    findings: &Findings,
+    disagreements: &Disagreements,
+    shear_pa: Option<f64>,
+) -> Vec<FindingRecord> {
+    use FindingRecord as Record;
+    let scale = &Scale::new(findings);
+    let mut records = stray_rows(findings, scale);
+    let island = |island: &Island| Record::Island(IslandRecord::new(island, scale, shear_pa));
+    records.extend(findings.islands.list.iter().map(island));
+    let minimum = |minimum: &LoneMinimum| Record::MinimumWithoutIsland(of_minimum(minimum, scale));
+    records.extend(disagreements.minima.iter().map(minimum));
+    let doubtful = |island: &Island| Record::IslandWithoutMinimum(without_minimum(island, scale));
+    records.extend(disagreements.islands.iter().map(doubtful));
+    let joint = |joint: &WeakJoint| Record::WeakJoint(of_joint(joint, scale));
+    records.extend(findings.weak_joints.list.iter().map(joint));
+    records.extend(findings.pockets.list.iter().map(|pocket| of_pocket(pocket, scale)));
+    let overhang = |overhang: &Overhang| Record::Overhang(of_overhang(overhang, scale));
+    records.extend(findings.overhangs.list.iter().map(overhang));
+    // Less is rounding to pixels.
+    let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= 1.0);
+    records.extend(off.map(|off| Record::OffBalance(of_balance(off, scale))));
+    records.extend(at_border(findings, scale));
+    records.extend(empty(findings, scale));
+    records
+}
+
+fn shown(layer: u32, region: &Region, pixel: Option<[u32; 2]>, scale: &Scale<'_>) -> Shown {
+    Shown { layer, index: scale.layer(layer).layer, region: region.clone(), pixel }
+}
+
+impl IslandRecord {
+    /// Returns the record of an island, also of a speck, given the shear stress of the recoating
+    /// blade in pascals.
+    pub fn new(island: &Island, scale: &Scale<'_>, shear_pa: Option<f64>) -> Self {
+        let (joins, into) = match island.end {
+            End::Loose => (None, None),
+            End::JoinsPart { layer } => (Some(layer), Some(Joined::Part(PartWord::Part))),
+            End::JoinsIsland { layer, number } => (Some(layer), Some(Joined::Island(number))),
+        };
+        Self {
+            number: island.number,
+            layer: scale.layer(island.layer),
+            at: scale.point(island.centroid),
+            bounds: scale.bounds(&island.region),
+            area: scale.area(island.area),
+            floating_px: island.floating_pixels,
+            floating_mm3: scale.volume_mm3(island.floating_pixels_um),
+            joins: joins.map(|layer| scale.layer(layer).layer),
+            into,
+            largest_px: island.largest_area,
+            largest_mm2: scale.area_mm2(island.largest_area),
+            largest_layer: scale.layer(island.largest_layer).layer,
+            drag_mn: scale.drag_mn(island, shear_pa),
+            shown: shown(island.layer, &island.region, Some(island.first), scale),
+        }
+    }
+}
+
+fn of_minimum(minimum: &LoneMinimum, scale: &Scale<'_>) -> MinimumRecord {
+    let [x, y, z] = minimum.point_mm.map(to_nm);
+    MinimumRecord {
+        layer: scale.layer(minimum.layer).layer,
+        at_mm: [x, y],
+        z_mm: z,
+        depth_mm: minimum.depth_mm,
+    }
+}
+
+fn without_minimum(island: &Island, scale: &Scale<'_>) -> DoubtfulIslandRecord {
+    DoubtfulIslandRecord {
+        number: island.number,
+        layer: scale.layer(island.layer),
+        at_mm: scale.point(island.centroid).at_mm,
+    }
+}
+
+fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> JointRecord {
+    JointRecord {
+        layer: scale.layer(joint.layer),
+        at: scale.point(joint.centroid),
+        bounds: scale.bounds(&joint.region),
+        area: scale.area(joint.area),
+        support_px: joint.support,
+        support_percent: 100.0 * joint.support as f64 / joint.area as f64,
+        support_mm2: scale.area_mm2(joint.support),
+        shown: shown(joint.layer, &joint.region, Some(joint.first), scale),
+    }
+}
+
+fn of_pocket(pocket: &Pocket, scale: &Scale<'_>) -> FindingRecord {
+    let record = PocketRecord {
+        layers: scale.span(pocket.layers),
+        bounds: scale.bounds(&pocket.region),
+        volume_px: pocket.pixels,
+        volume_mm3: scale.volume_mm3(pocket.pixels_um),
+        middle: scale.middle(&pocket.region),
+        shown: shown(pocket.layers[0], &pocket.region, Some(pocket.first), scale),
+    };
+    match pocket.kind {
+        PocketKind::Trap => FindingRecord::Trap(record),
+        PocketKind::Cup => FindingRecord::Cup(record),
+        PocketKind::Sealed => FindingRecord::Sealed(record),
+        PocketKind::Narrow => FindingRecord::Narrow(record),
+    }
+}
+
+fn of_overhang(overhang: &Overhang, scale: &Scale<'_>) -> OverhangRecord {
+    OverhangRecord {
+        layers: scale.span(overhang.layers),
+        at: scale.point(overhang.farthest.map(|place| f64::from(place) + 0.5)),
+        bounds: scale.bounds(&overhang.region),
+        reach_px: overhang.reach_pixels(),
+        reach_mm: scale.length_mm(overhang.reach_pixels()),
+        reach_layer: scale.layer(overhang.reach_layer).layer,
+        area: scale.area(overhang.area),
+        shown: shown(overhang.reach_layer, &overhang.region, None, scale),
+    }
+}
+
+fn of_balance(off: &OffBalance, scale: &Scale<'_>) -> OffBalanceRecord {
+    let base = scale.bounds(&off.base);
+    OffBalanceRecord {
+        layer: scale.layer(off.layer),
+        worst_layer: scale.layer(off.worst_layer).layer,
+        off_px: off.off_pixels,
+        off_mm: scale.length_mm(off.off_pixels),
+        at: scale.point(off.centre),
+        base_box_mm: base.box_mm,
+        base_box_px: base.box_px,
+    }
+}
+
+fn stray_rows(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingRecord> {
+    let runs = findings.runs_of_layers(|layer| layer.stray_rows > 0);
+    let record = |layers: [u32; 2]| {
+        let of_run = &findings.layers[layers[0] as usize..=layers[1] as usize];
+        let rows = of_run.iter().map(|layer| u64::from(layer.stray_rows)).sum();
+        FindingRecord::StrayRows(StrayRowsRecord { layers: scale.span(layers), rows })
+    };
+    runs.into_iter().map(record).collect()
+}
+
+fn at_border(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingRecord> {
+    let runs = findings.runs_of_layers(|layer| layer.white_at_border);
+    let record = |layers| FindingRecord::Border(BorderRecord { layers: scale.span(layers) });
+    runs.into_iter().map(record).collect()
+}
+
+fn empty(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingRecord> {
+    let runs = findings.runs_of_layers(|layer: &LayerFacts| !layer.has_white);
+    let record = |layers: [u32; 2]| {
+        let is_top = layers[1] as usize + 1 == findings.layers.len();
+        let place = match (is_top, layers[0]) {
+            (false, _) => EmptyPlace::Below,
+            (true, 0) => EmptyPlace::Everywhere,
+            (true, _) => EmptyPlace::Above,
+        };
+        FindingRecord::Empty(EmptyRecord { layers: scale.span(layers), place })
+    };
+    runs.into_iter().map(record).collect()
+}

@@ -1,0 +1,393 @@
+//! Findings as people and programs read them: a line, and a JSON object.
+//!
+//! A kind of findings is a variant of [`FindingRecord`], and all that is said of it is here.
+
+mod makes;
+mod places;
+mod scale;
+mod texts;
+
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::check::Region;
+
+pub use makes::records;
+pub use places::{AreaRecord, BoxRecord, LayerPlace, LayerSpan, PointRecord};
+pub use scale::Scale;
+
+/// A finding of [`check`](crate::check).
+///
+/// Its JSON is an object with its `kind`, such as `weak-joint`; its text is a line about it without
+/// its [name](Self::name). JSON leaves out some numbers of the text, so text is made before
+/// records are written. Keys that are absent in JSON are read as zero or null.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum FindingRecord {
+    /// Rows that pages call stray.
+    StrayRows(StrayRowsRecord),
+    /// White that rests on nothing.
+    Island(IslandRecord),
+    /// A minimum of the mesh without an island.
+    MinimumWithoutIsland(MinimumRecord),
+    /// An island without a minimum of the mesh.
+    IslandWithoutMinimum(DoubtfulIslandRecord),
+    /// White that rests on little.
+    WeakJoint(JointRecord),
+    /// Black that nothing leads out of.
+    Trap(PocketRecord),
+    /// Black that opens at the top only.
+    Cup(PocketRecord),
+    /// Black that the platform closes.
+    Sealed(PocketRecord),
+    /// Black with ways out that are too narrow.
+    Narrow(PocketRecord),
+    /// White that reaches far beyond the white below.
+    Overhang(OverhangRecord),
+    /// A body whose centre of gravity leaves its base.
+    OffBalance(OffBalanceRecord),
+    /// White at the border of images.
+    Border(BorderRecord),
+    /// Layers without white.
+    Empty(EmptyRecord),
+}
+
+/// Kinds of findings that belong together, as people name them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FindingGroup {
+    /// White that rests on nothing.
+    Islands,
+    /// White that rests on little.
+    Joints,
+    /// Black without a way out.
+    Pockets,
+    /// White far from the white below.
+    Overhangs,
+    /// Centres of gravity off their base.
+    Balance,
+    /// Stray rows, white at the border, empty layers.
+    Layers,
+}
+
+lamp_stack::named!(FindingGroup {
+    Islands = "islands",
+    Joints = "joints",
+    Pockets = "pockets",
+    Overhangs = "overhangs",
+    Balance = "balance",
+    Layers = "layers",
+});
+
+/// The pixels of its box that a finding is about, in a layer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FoundPixels {
+    /// Components of white within the box.
+    White,
+    /// Components of black within the box.
+    Black,
+    /// White without white below.
+    Unheld,
+    /// All white.
+    #[default]
+    All,
+}
+
+/// What a picture of a finding shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shown {
+    /// The layer, from the first that was checked.
+    pub layer: u32,
+    /// The index that its page states.
+    pub index: u32,
+    /// The rectangle around the finding.
+    pub region: Region,
+    /// A pixel of the component that is marked; if none, the region's white without white below is.
+    pub pixel: Option<[u32; 2]>,
+}
+
+/// Layers with stray rows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StrayRowsRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The number of rows, which JSON does not have.
+    #[serde(skip)]
+    pub rows: u64,
+}
+
+/// White that rests on nothing when it is built.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct IslandRecord {
+    /// Its number among islands, as they begin.
+    pub number: u64,
+    /// The layer where it begins.
+    #[serde(flatten)]
+    pub layer: LayerPlace,
+    /// The mean of its pixels there.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around them.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// Their area.
+    #[serde(flatten)]
+    pub area: AreaRecord,
+    /// The pixels of the layers until it joins.
+    pub floating_px: u64,
+    /// Their volume.
+    pub floating_mm3: Option<f64>,
+    /// The layer in which it joins.
+    pub joins: Option<u32>,
+    /// What it joins.
+    pub into: Option<Joined>,
+    /// The most pixels that float in one layer.
+    pub largest_px: u64,
+    /// Their area.
+    pub largest_mm2: Option<f64>,
+    /// The first layer that has them.
+    pub largest_layer: u32,
+    /// How hard the recoating blade drags on them, in millinewtons.
+    pub drag_mn: Option<f64>,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// What an island joins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Joined {
+    /// An elder island, by its number.
+    Island(u64),
+    /// What stands on the platform.
+    Part(PartWord),
+}
+
+/// The word `part`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PartWord {
+    /// The only one.
+    Part,
+}
+
+/// A minimum of a part's mesh where no island begins.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MinimumRecord {
+    /// The index of its layer.
+    pub layer: u32,
+    /// x and y in the part's coordinates.
+    pub at_mm: [f64; 2],
+    /// Its height.
+    pub z_mm: f64,
+    /// How far the surface rises from it.
+    #[serde(serialize_with = "to_nm")]
+    pub depth_mm: f64,
+}
+
+/// An island that begins at no minimum of a part's mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DoubtfulIslandRecord {
+    /// Its number among islands.
+    pub number: u64,
+    /// The layer where it begins.
+    #[serde(flatten)]
+    pub layer: LayerPlace,
+    /// x and y of the mean of its pixels there.
+    pub at_mm: Option<[f64; 2]>,
+}
+
+/// White that rests on little.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct JointRecord {
+    /// The layer.
+    #[serde(flatten)]
+    pub layer: LayerPlace,
+    /// The mean of the component's pixels.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around it.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// Its area.
+    #[serde(flatten)]
+    pub area: AreaRecord,
+    /// The pixels above white.
+    pub support_px: u64,
+    /// Their share.
+    pub support_percent: f64,
+    /// Their area, which JSON does not have.
+    #[serde(skip)]
+    pub support_mm2: Option<f64>,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// Black without a way to the image's frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PocketRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The rectangle around it.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// Its pixels in all layers.
+    pub volume_px: u64,
+    /// Their volume.
+    pub volume_mm3: Option<f64>,
+    /// The middle of the rectangle, which JSON does not have.
+    #[serde(skip)]
+    pub middle: PointRecord,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// White that reaches far beyond the white below.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct OverhangRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The centre of the pixel that reaches farthest.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around all.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// How far it is from white below, in pixels.
+    pub reach_px: f64,
+    /// The same in millimetres.
+    pub reach_mm: Option<f64>,
+    /// The index of the first layer that reaches so far.
+    pub reach_layer: u32,
+    /// The area of pixels that lie too far from white below.
+    #[serde(flatten)]
+    pub area: AreaRecord,
+    /// The picture of it, which JSON does not have.
+    #[serde(skip)]
+    pub shown: Shown,
+}
+
+/// A body whose centre of gravity leaves its base as it is built.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct OffBalanceRecord {
+    /// The first layer after which it is off.
+    #[serde(flatten)]
+    pub layer: LayerPlace,
+    /// The index of the layer after which it is farthest off.
+    pub worst_layer: u32,
+    /// How far it is then from its base, in pixels.
+    pub off_px: f64,
+    /// The same in millimetres.
+    pub off_mm: Option<f64>,
+    /// The centre of gravity then.
+    #[serde(flatten)]
+    pub at: PointRecord,
+    /// The rectangle around the body's first layer, as in [`BoxRecord::box_mm`].
+    pub base_box_mm: Option<[f64; 4]>,
+    /// The same in pixels, as in [`BoxRecord::box_px`].
+    pub base_box_px: [u32; 4],
+}
+
+/// Layers with white at the border of the image.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct BorderRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+}
+
+/// Layers without white.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EmptyRecord {
+    /// The layers.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// Where they are, which JSON does not have.
+    #[serde(skip)]
+    pub place: EmptyPlace,
+}
+
+/// Where layers without white are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EmptyPlace {
+    /// Below layers with white.
+    #[default]
+    Below,
+    /// Above all white, which harms nothing.
+    Above,
+    /// Everywhere.
+    Everywhere,
+}
+
+fn to_nm<S: Serializer>(mm: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(lamp_stack::to_nm(*mm))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn each_kind_is_written_by_its_name_and_read_back() {
+        let pocket = PocketRecord::default;
+        for record in [
+            FindingRecord::StrayRows(StrayRowsRecord::default()),
+            FindingRecord::Island(IslandRecord::default()),
+            FindingRecord::MinimumWithoutIsland(MinimumRecord::default()),
+            FindingRecord::IslandWithoutMinimum(DoubtfulIslandRecord::default()),
+            FindingRecord::WeakJoint(JointRecord::default()),
+            FindingRecord::Trap(pocket()),
+            FindingRecord::Cup(pocket()),
+            FindingRecord::Sealed(pocket()),
+            FindingRecord::Narrow(pocket()),
+            FindingRecord::Overhang(OverhangRecord::default()),
+            FindingRecord::OffBalance(OffBalanceRecord::default()),
+            FindingRecord::Border(BorderRecord::default()),
+            FindingRecord::Empty(EmptyRecord::default()),
+        ] {
+            let json = serde_json::to_value(&record).unwrap();
+            assert_eq!(json["kind"], record.kind());
+            assert_eq!(serde_json::from_value::<FindingRecord>(json).unwrap(), record);
+        }
+    }
+
+    #[test]
+    fn keys_stand_in_their_order() {
+        let island = IslandRecord {
+            number: 3,
+            layer: LayerPlace { layer: 80, z_mm: Some(8.0) },
+            into: Some(Joined::Part(PartWord::Part)),
+            joins: Some(82),
+            ..IslandRecord::default()
+        };
+        let text = serde_json::to_string(&FindingRecord::Island(island.clone())).unwrap();
+        assert_eq!(
+            text,
+            "{\"kind\":\"island\",\"number\":3,\"layer\":80,\"z_mm\":8.0,\"at_mm\":null,\
+             \"at_px\":[0.0,0.0],\"box_mm\":null,\"box_px\":[0,0,0,0],\"area_px\":0,\
+             \"area_mm2\":null,\"floating_px\":0,\"floating_mm3\":null,\"joins\":82,\
+             \"into\":\"part\",\"largest_px\":0,\"largest_mm2\":null,\"largest_layer\":0,\
+             \"drag_mn\":null}"
+        );
+        let island = IslandRecord { into: Some(Joined::Island(2)), ..island };
+        assert_eq!(serde_json::to_value(&island).unwrap()["into"], json!(2));
+        assert!(FindingRecord::Island(island).to_string().contains("joins island 2 in layer 82; "));
+    }
+}

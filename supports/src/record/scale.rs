@@ -1,0 +1,90 @@
+//! Pixels as millimetres, where a stack says how large they are.
+
+use std::ops::Range;
+
+use lamp_stack::to_nm;
+
+use super::places::{AreaRecord, BoxRecord, LayerPlace, LayerSpan, PointRecord};
+use crate::check::{Findings, Island, Region};
+
+/// How pixels and layers lie in the part's coordinates. Lengths, areas and volumes are rounded to
+/// six digits after the point.
+pub struct Scale<'a> {
+    findings: &'a Findings,
+    pitch_mm: Option<f64>,
+}
+
+impl<'a> Scale<'a> {
+    /// Returns the scale of a stack in which these findings are.
+    pub fn new(findings: &'a Findings) -> Self {
+        Self { findings, pitch_mm: findings.dpi.map(|dpi| dpi.pitch().mm()) }
+    }
+
+    /// Returns a column and a row, also as x and y.
+    pub fn point(&self, at_px: [f64; 2]) -> PointRecord {
+        let at_mm = self
+            .findings
+            .origin_mm
+            .zip(self.pitch_mm)
+            .map(|([x, y], pitch)| [to_nm(x + at_px[0] * pitch), to_nm(y - at_px[1] * pitch)]);
+        PointRecord { at_mm, at_px }
+    }
+
+    pub(super) fn middle(&self, region: &Region) -> PointRecord {
+        let middle = |range: &Range<u32>| f64::from(range.start + range.end) / 2.0;
+        self.point([middle(&region.columns), middle(&region.rows)])
+    }
+
+    pub(super) fn bounds(&self, region: &Region) -> BoxRecord {
+        let Region { columns, rows } = region;
+        let corner = |column: u32, row: u32| self.point([column.into(), row.into()]).at_mm;
+        let low = corner(columns.start, rows.start);
+        let box_mm = low.zip(corner(columns.end, rows.end));
+        BoxRecord {
+            box_mm: box_mm.map(|([x0, y1], [x1, y0])| [x0, x1, y0, y1]),
+            box_px: [columns.start, columns.end, rows.start, rows.end],
+        }
+    }
+
+    pub(super) fn length_mm(&self, pixels: f64) -> Option<f64> {
+        Some(to_nm(pixels * self.pitch_mm?))
+    }
+
+    /// Returns an area in pixels, also in square millimetres.
+    pub fn area(&self, pixels: u64) -> AreaRecord {
+        AreaRecord { area_px: pixels, area_mm2: self.area_mm2(pixels) }
+    }
+
+    pub(super) fn area_mm2(&self, pixels: u64) -> Option<f64> {
+        Some(to_nm(pixels as f64 * self.pitch_mm?.powi(2)))
+    }
+
+    /// Returns the volume of pixels times thicknesses, if all layers have one.
+    pub(super) fn volume_mm3(&self, pixels_um: f64) -> Option<f64> {
+        let known = self.findings.layers.iter().all(|layer| layer.thickness_um.is_some());
+        let pitch = self.pitch_mm.filter(|_| known)?;
+        Some(to_nm(pixels_um / 1000.0 * pitch.powi(2)))
+    }
+
+    /// Returns a layer by its place among those that were checked, from 0.
+    pub fn layer(&self, layer: u32) -> LayerPlace {
+        let facts = &self.findings.layers[layer as usize];
+        LayerPlace { layer: facts.index, z_mm: facts.z_um.map(|um| to_nm(um / 1000.0)) }
+    }
+
+    pub(super) fn span(&self, layers: [u32; 2]) -> LayerSpan {
+        let [first, last] = layers.map(|layer| self.layer(layer));
+        LayerSpan {
+            layer: first.layer,
+            last_layer: last.layer,
+            z_mm: first.z_mm,
+            last_z_mm: last.z_mm,
+        }
+    }
+
+    /// Returns how hard a recoating blade drags on an island's largest floating area, in
+    /// millinewtons, given the shear stress on what it passes in pascals (002 section 4.2.2).
+    pub fn drag_mn(&self, island: &Island, shear_pa: Option<f64>) -> Option<f64> {
+        Some(self.area_mm2(island.largest_area)? * shear_pa? / 1000.0)
+    }
+}

@@ -1,0 +1,281 @@
+//! What is said of each kind of findings.
+
+use std::fmt;
+
+use super::places::{area_text, length_text, significant, volume_text};
+use super::{
+    DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels,
+    IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan, MinimumRecord, OffBalanceRecord,
+    OverhangRecord, PocketRecord, Shown,
+};
+
+impl FindingRecord {
+    /// Returns the name of its kind, for people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::StrayRows(_) => "stray rows",
+            Self::Island(_) => "island",
+            Self::MinimumWithoutIsland(_) => "minimum without island",
+            Self::IslandWithoutMinimum(_) => "island without minimum",
+            Self::WeakJoint(_) => "weak joint",
+            Self::Trap(_) => "trap",
+            Self::Cup(_) => "cup",
+            Self::Sealed(_) => "sealed pocket",
+            Self::Narrow(_) => "narrow pocket",
+            Self::Overhang(_) => "overhang",
+            Self::OffBalance(_) => "off balance",
+            Self::Border(_) => "border",
+            Self::Empty(_) => "empty",
+        }
+    }
+
+    /// Returns its kind, as JSON has it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::StrayRows(_) => "stray-rows",
+            Self::Island(_) => "island",
+            Self::MinimumWithoutIsland(_) => "minimum-without-island",
+            Self::IslandWithoutMinimum(_) => "island-without-minimum",
+            Self::WeakJoint(_) => "weak-joint",
+            Self::Trap(_) => "trap",
+            Self::Cup(_) => "cup",
+            Self::Sealed(_) => "sealed",
+            Self::Narrow(_) => "narrow",
+            Self::Overhang(_) => "overhang",
+            Self::OffBalance(_) => "off-balance",
+            Self::Border(_) => "border",
+            Self::Empty(_) => "empty",
+        }
+    }
+
+    /// Returns the group of its kind.
+    pub fn group(&self) -> FindingGroup {
+        match self {
+            Self::Island(_) | Self::MinimumWithoutIsland(_) | Self::IslandWithoutMinimum(_) => {
+                FindingGroup::Islands
+            }
+            Self::WeakJoint(_) => FindingGroup::Joints,
+            Self::Trap(_) | Self::Cup(_) | Self::Sealed(_) | Self::Narrow(_) => {
+                FindingGroup::Pockets
+            }
+            Self::Overhang(_) => FindingGroup::Overhangs,
+            Self::OffBalance(_) => FindingGroup::Balance,
+            Self::StrayRows(_) | Self::Border(_) | Self::Empty(_) => FindingGroup::Layers,
+        }
+    }
+
+    /// Returns whether it is printed, but does not count as a finding.
+    pub fn is_note(&self) -> bool {
+        matches!(self, Self::Empty(EmptyRecord { place: EmptyPlace::Above, .. }))
+    }
+
+    /// Returns what a picture of it shows, if there is one.
+    pub fn shown(&self) -> Option<&Shown> {
+        match self {
+            Self::Island(island) => Some(&island.shown),
+            Self::WeakJoint(joint) => Some(&joint.shown),
+            Self::Trap(pocket)
+            | Self::Cup(pocket)
+            | Self::Sealed(pocket)
+            | Self::Narrow(pocket) => Some(&pocket.shown),
+            Self::Overhang(overhang) => Some(&overhang.shown),
+            _ => None,
+        }
+    }
+
+    /// Returns the pixels that it is about.
+    pub fn pixels(&self) -> FoundPixels {
+        match self {
+            Self::Island(_) | Self::WeakJoint(_) => FoundPixels::White,
+            Self::Trap(_) | Self::Cup(_) | Self::Sealed(_) | Self::Narrow(_) => FoundPixels::Black,
+            Self::Overhang(_) => FoundPixels::Unheld,
+            _ => FoundPixels::All,
+        }
+    }
+
+    /// Returns the indices of its first layer and of its last.
+    pub fn layers(&self) -> [u32; 2] {
+        let one = |layer: &LayerPlace| [layer.layer; 2];
+        let span = |layers: &LayerSpan| [layers.layer, layers.last_layer];
+        match self {
+            Self::Island(island) => one(&island.layer),
+            Self::MinimumWithoutIsland(minimum) => [minimum.layer; 2],
+            Self::IslandWithoutMinimum(island) => one(&island.layer),
+            Self::WeakJoint(joint) => one(&joint.layer),
+            Self::Trap(pocket)
+            | Self::Cup(pocket)
+            | Self::Sealed(pocket)
+            | Self::Narrow(pocket) => span(&pocket.layers),
+            Self::Overhang(overhang) => span(&overhang.layers),
+            Self::OffBalance(off) => one(&off.layer),
+            Self::StrayRows(rows) => span(&rows.layers),
+            Self::Border(border) => span(&border.layers),
+            Self::Empty(empty) => span(&empty.layers),
+        }
+    }
+
+    /// Returns the rectangle around it in pixels, as in [`BoxRecord`](super::BoxRecord).
+    pub fn box_px(&self) -> Option<[u32; 4]> {
+        match self {
+            Self::Island(island) => Some(island.bounds.box_px),
+            Self::WeakJoint(joint) => Some(joint.bounds.box_px),
+            Self::Trap(pocket)
+            | Self::Cup(pocket)
+            | Self::Sealed(pocket)
+            | Self::Narrow(pocket) => Some(pocket.bounds.box_px),
+            Self::Overhang(overhang) => Some(overhang.bounds.box_px),
+            Self::OffBalance(off) => Some(off.base_box_px),
+            _ => None,
+        }
+    }
+
+    /// Returns the column and the row of a point within it.
+    pub fn at_px(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Island(island) => Some(island.at.at_px),
+            Self::WeakJoint(joint) => Some(joint.at.at_px),
+            Self::Overhang(overhang) => Some(overhang.at.at_px),
+            Self::OffBalance(off) => Some(off.at.at_px),
+            _ => None,
+        }
+    }
+
+    /// Returns its size in a few words, from what JSON has.
+    pub fn size_text(&self) -> String {
+        let number =
+            |value: f64, unit: &str| format!("{} {unit}", (value * 1000.0).round() / 1000.0);
+        let area = |mm2: Option<f64>, px: u64| {
+            mm2.map_or_else(|| number(px as f64, "px"), |mm2| number(mm2, "mm2"))
+        };
+        let facts = match self {
+            Self::Island(island) => vec![
+                Some(area(island.area.area_mm2, island.area.area_px)),
+                island.joins.map(|layer| format!("joins in layer {layer}")),
+            ],
+            Self::WeakJoint(joint) => vec![
+                Some(area(joint.area.area_mm2, joint.area.area_px)),
+                Some(number(joint.support_percent, "% rests on white")),
+            ],
+            Self::Trap(pocket)
+            | Self::Cup(pocket)
+            | Self::Sealed(pocket)
+            | Self::Narrow(pocket) => {
+                vec![pocket.volume_mm3.map(|mm3| number(mm3, "mm3"))]
+            }
+            Self::Overhang(overhang) => vec![
+                Some(area(overhang.area.area_mm2, overhang.area.area_px)),
+                overhang.reach_mm.map(|mm| number(mm, "mm beyond the layer below")),
+            ],
+            Self::OffBalance(off) => vec![off.off_mm.map(|mm| number(mm, "mm off its base"))],
+            _ => Vec::new(),
+        };
+        facts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl fmt::Display for FindingRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StrayRows(stray) => write!(
+                f,
+                "{}: {}, which may look like islands; correct them with fix first",
+                stray.layers, stray.rows
+            ),
+            Self::Island(island) => island.fmt(f),
+            Self::MinimumWithoutIsland(minimum) => minimum.fmt(f),
+            Self::IslandWithoutMinimum(DoubtfulIslandRecord { number, layer, .. }) => write!(
+                f,
+                "number {number} in {layer} begins at no minimum of the mesh: a gap makes it, or a \
+                 wall too thin for the pixels"
+            ),
+            Self::WeakJoint(joint) => joint.fmt(f),
+            Self::Trap(pocket) => pocket.write(f, "has no way out"),
+            Self::Cup(pocket) => pocket.write(f, "opens at the top only"),
+            Self::Sealed(pocket) => pocket.write(f, "is closed by the platform"),
+            Self::Narrow(pocket) => pocket.write(f, "has only narrow ways out"),
+            Self::Overhang(overhang) => overhang.fmt(f),
+            Self::OffBalance(off) => off.fmt(f),
+            Self::Border(border) => {
+                write!(f, "{}: white there; the image may cut the part off", border.layers)
+            }
+            Self::Empty(empty) => {
+                let what = match empty.place {
+                    EmptyPlace::Below => "nothing holds what is above",
+                    EmptyPlace::Everywhere => "nothing is built",
+                    EmptyPlace::Above => "above the part",
+                };
+                write!(f, "{}: no white; {what}", empty.layers)
+            }
+        }
+    }
+}
+
+impl fmt::Display for IslandRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { number, layer, at, area, .. } = self;
+        write!(f, "number {number} begins in {layer} at {at} with {area}; ")?;
+        match (self.joins, self.into) {
+            (Some(layer), Some(Joined::Part(_))) => write!(f, "joins the part in layer {layer}")?,
+            (Some(layer), Some(Joined::Island(number))) => {
+                write!(f, "joins island {number} in layer {layer}")?;
+            }
+            _ => f.write_str("never joins")?,
+        }
+        let floating = volume_text(self.floating_px, self.floating_mm3);
+        let largest = area_text(self.largest_px, self.largest_mm2);
+        write!(f, "; {floating} float, {largest} at most in a layer")?;
+        let drag = self.drag_mn.map(significant);
+        drag.map_or(Ok(()), |mn| write!(f, "; the blade drags with {mn} mN"))
+    }
+}
+
+impl fmt::Display for MinimumRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { at_mm: [x, y], z_mm: z, depth_mm, .. } = self;
+        write!(
+            f,
+            "the mesh has one {depth_mm:.3} mm deep at x {x:.2}, y {y:.2}, z {z:.2} mm, and no \
+             layer begins an island there: it is too thin for the pixels"
+        )
+    }
+}
+
+impl fmt::Display for JointRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { layer, at, area, .. } = self;
+        let support = area_text(self.support_px, self.support_mm2);
+        let percent = significant(self.support_percent);
+        write!(f, "{layer} at {at}: {area} rest on {support} ({percent}%)")
+    }
+}
+
+impl PocketRecord {
+    fn write(&self, f: &mut fmt::Formatter<'_>, closed: &str) -> fmt::Result {
+        let volume = volume_text(self.volume_px, self.volume_mm3);
+        write!(f, "{} around {}: {volume} {closed}", self.layers, self.middle)
+    }
+}
+
+impl fmt::Display for OverhangRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { layers, at, area, .. } = self;
+        let reach = length_text(self.reach_px, self.reach_mm);
+        write!(f, "{layers} at {at}: reaches {reach} beyond the layer below")?;
+        if layers.layer != layers.last_layer {
+            write!(f, " in layer {}", self.reach_layer)?;
+        }
+        write!(f, "; {area} in all")
+    }
+}
+
+impl fmt::Display for OffBalanceRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { layer, worst_layer, at, .. } = self;
+        let off = length_text(self.off_px, self.off_mm);
+        write!(
+            f,
+            "from {layer} on the centre of gravity lies beyond the base, by {off} after layer \
+             {worst_layer}, at {at}"
+        )
+    }
+}
