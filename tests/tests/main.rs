@@ -1,5 +1,6 @@
 //! Tests that run the real programs end to end: one program, linked once.
 
+mod arrows;
 mod batch;
 mod batch_engines;
 mod batch_kills;
