@@ -10,14 +10,16 @@
 //! - [`fix`] corrects stray rows, [`offset`] moves edges, and [`edit`] changes designs.
 //! - [`build`] lays copies of parts out on the area of a [`machine`].
 //! - [`supports`] finds what floats or is trapped, and holds it.
+//! - [`planning`] chooses exposures, [`pipeline`] runs stages from their settings, [`batch`] keeps the
+//!   results of nights, and [`view`] shows layers in a browser.
 //! - [`stack`] has what they share: images as runs, layers, lengths, files and streams.
 //!
 //! A stage takes and gives an iterator over `Result<Layer, E>`, so stages are chained
-//! without coding images in between:
+//! without coding images in between. [`Error`] takes the errors of all of them.
+//!
+//! # Slice, fix and write
 //!
 //! ```
-//! use std::error::Error;
-//!
 //! use lamp::fix::{FixOptions, fix};
 //! use lamp::slicer::{OpenOptions, Part, SliceOptions, Slices};
 //! use lamp::stack::{Destination, Dpi, Format, Length, Pages, write_stack};
@@ -40,22 +42,23 @@
 //!     thickness: Length::from_um(100.0),
 //!     ..SliceOptions::default()
 //! };
-//! let layers = Slices::new(part, &options)?;
+//! let layers = Slices::new(part, &options)?.map(|layer| Ok::<_, lamp::Error>(layer?));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
 //!     println!("layer {}: {} bands corrected", fixed.before.info.index, fixed.bands.len());
 //! });
 //! let tiff = folder.path().join("wedge.tif");
-//! let fixed = fixed.map(|layer| layer.map_err(Box::<dyn Error + Send + Sync>::from));
 //! write_stack(fixed, Destination::File(tiff.clone()), Format::Big)?;
 //!
 //! assert_eq!(Pages::open(&tiff)?.layers().count(), 90);
-//! # Ok::<(), Box<dyn Error + Send + Sync>>(())
+//! # Ok::<(), lamp::Error>(())
 //! ```
+//!
+//! # Lay out a build
 //!
 //! Stages are adaptors, so a build of corrected layers is a chain of two:
 //!
 //! ```
-//! use lamp::build::{TileError, TileOptions, tile};
+//! use lamp::build::{TileOptions, tile};
 //! use lamp::fix::{FixOptions, fix};
 //! use lamp::stack::{Dpi, Image, Layer, Mask, PageInfo};
 //!
@@ -63,7 +66,7 @@
 //! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
 //! let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: mask.into() };
 //!
-//! let layers = std::iter::once(Ok::<_, TileError>(layer));
+//! let layers = std::iter::once(Ok::<_, lamp::Error>(layer));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
 //!     let band = &fixed.bands[0];
 //!     assert_eq!((band.first_row, band.pixels, band.gap.clone()), (1, 3, Some(5..6)));
@@ -74,16 +77,88 @@
 //! assert_eq!((build.width(), build.height()), (20, 10));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # Check for what floats
+//!
+//! ```
+//! use lamp::stack::{Dpi, Layer, Mask, PageInfo};
+//! use lamp::supports::{CheckOptions, check};
+//!
+//! let layer = |index: u32, changes: Vec<u32>| {
+//!     // All ten rows are alike: white from each first column to the second.
+//!     let rows = (0..=10).map(|row| row * changes.len()).collect();
+//!     let image = Mask::new(20, rows, changes.repeat(10)).unwrap().into();
+//!     let z_um = Some(100.0 * f64::from(index));
+//!     let info = PageInfo { index, z_um, thickness_um: Some(100.0), ..PageInfo::default() };
+//!     Layer { info, dpi: Dpi::new(254.0), image }
+//! };
+//! // The second piece of layer 1 stands on nothing.
+//! let layers = [layer(0, vec![2, 8]), layer(1, vec![2, 8, 12, 18])];
+//! let layers = layers.into_iter().map(Ok::<_, lamp::Error>);
+//! let findings = check(layers, Ok, &CheckOptions::default())?;
+//! assert_eq!(findings.islands.count(), 1);
+//! # Ok::<(), lamp::Error>(())
+//! ```
+//!
+//! # Plan exposures
+//!
+//! ```
+//! use lamp::grayscale::exposure::Exposure;
+//! use lamp::grayscale::material::Material;
+//! use lamp::stack::{Catalogued, Length};
+//!
+//! // White cures half as deep again as a layer.
+//! let material = Material::builtin("lamp-suspension").expect("it is built in");
+//! let exposure = Exposure::by_material(material, None, 1.5)?;
+//! assert_eq!(exposure.time(Length::from_um(100.0))?.ms().round(), 172.0);
+//! # Ok::<(), lamp::Error>(())
+//! ```
+//!
+//! [`planning`] chooses times and gray levels where the light of many layers adds up.
+//!
+//! # Run a pipeline from its settings
+//!
+//! ```
+//! use lamp::pipeline::fix::FixSettings;
+//! use lamp::pipeline::{SliceSettings, Stage};
+//!
+//! // Settings are plain structs; equal texts mean equal results, whatever the spelling was.
+//! let slice: SliceSettings = Default::default();
+//! assert!(slice.canonical().starts_with(" --dpi 1500 --thickness 100um"));
+//! let fix = Stage::Fix(FixSettings { use_neighbours: true, ..FixSettings::default() });
+//! assert!(fix.canonical().ends_with("--use-neighbours"));
+//! ```
+//!
+//! # Read a night
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use lamp::batch::Night;
+//!
+//! let text = "parts = \"parts/*.stl\"\nstages = \"slice --dpi 600 | fix\"\n";
+//! let error = Night::parse(text, Path::new("night.toml")).unwrap_err();
+//! // One sentence, with its line and column.
+//! assert!(error.to_string().starts_with("line "));
+//! ```
 
 #![forbid(unsafe_code)]
 
+mod error;
+
+pub use error::Error;
+
 pub use lamp_adaptive as adaptive;
+pub use lamp_batch as batch;
 pub use lamp_build as build;
 pub use lamp_edit as edit;
 pub use lamp_fix as fix;
 pub use lamp_grayscale as grayscale;
 pub use lamp_machine as machine;
 pub use lamp_offset as offset;
+pub use lamp_pipeline as pipeline;
+pub use lamp_planning as planning;
 pub use lamp_slicer as slicer;
 pub use lamp_stack as stack;
 pub use lamp_supports as supports;
+pub use lamp_view as view;
