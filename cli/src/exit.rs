@@ -21,7 +21,7 @@ use lamp_stack::{JoinError, SplitError, StackError};
 use lamp_supports::{CheckError, SupportError};
 use lamp_view::SurfaceError;
 
-use crate::hints::hint;
+use crate::terminal::hints::hint;
 
 /// Why a command exits early. The cause decides the status.
 #[derive(Debug)]

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use lamp_stack::{Pages, StackError};
 
 use crate::exit::Exit;
-use crate::stack_notes::noting;
 use crate::streams::{failed_at, input_name, is_stream, open_pages, spool_stdin};
+use crate::terminal::stack_notes::noting;
 
 /// A stack that can be read again.
 pub(crate) struct KeptStack {

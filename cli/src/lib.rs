@@ -3,60 +3,32 @@
 //! `lamp` carries every command; `slice`, `fix`, `dither` and `tile` start it under the names of the
 //! pipeline.
 
-mod allocator;
 mod args;
-mod arguments;
-mod band_pictures;
 mod catalogue;
 mod commands;
-mod endings;
 mod exit;
-mod help;
-mod hints;
-mod json_report;
 mod kept_stack;
-mod lamp_option;
-mod licences;
-mod mesh_report;
-#[cfg(feature = "occt")]
-mod occt_process;
-mod options;
-mod options_file;
-mod out_of_memory;
-mod picture;
-mod plan_folder;
-mod planning_options;
-mod platform_options;
-mod plots;
-mod progress;
+mod output;
 mod second_opinion;
-mod section;
-mod shades;
-mod signals;
-mod stack_facts;
-mod stack_notes;
 mod stages;
 mod streams;
 mod strip_folder;
-mod target_arg;
-mod terminal_picture;
-mod thumbnails;
-mod usage;
+mod terminal;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 
+use args::options::{Common, GENERAL};
 use commands::Command;
 use exit::Exit;
-use help::{formed, version};
-use options::{Common, GENERAL};
-use out_of_memory::note_command;
-use progress::say;
-use signals::{clean_up_on_signals, wait_if_ending};
-use stack_notes::print_notes_of;
 use streams::{give_up, print, settle_output};
-use usage::refuse;
+use terminal::help::{formed, version};
+use terminal::out_of_memory::note_command;
+use terminal::progress::say;
+use terminal::signals::{clean_up_on_signals, wait_if_ending};
+use terminal::stack_notes::print_notes_of;
+use terminal::usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
@@ -84,11 +56,11 @@ slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and 
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
-    if licences::are_asked_for() {
+    if terminal::licences::are_asked_for() {
         return finish("lamp", print_licences());
     }
     let lamp = formed(Lamp::command());
-    let matches = match arguments::matches(&lamp, lamp.clone()) {
+    let matches = match args::arguments::matches(&lamp, lamp.clone()) {
         Ok(matches) => matches,
         Err(error) => return finish("lamp", Err(error)),
     };
@@ -102,7 +74,7 @@ pub fn run_lamp() -> ExitCode {
 }
 
 fn print_licences() -> Result<ExitCode, Exit> {
-    print(&licences::licences()).map(|()| ExitCode::SUCCESS)
+    print(&terminal::licences::licences()).map(|()| ExitCode::SUCCESS)
 }
 
 /// Runs one of the pipeline's stages with the process's arguments.
@@ -111,7 +83,7 @@ fn print_licences() -> Result<ExitCode, Exit> {
 /// If `lamp` has no command of that name.
 pub fn run_stage(name: &str) -> ExitCode {
     let lamp = formed(Lamp::command());
-    let matches = match arguments::matches(&lamp, stage(&lamp, name)) {
+    let matches = match args::arguments::matches(&lamp, stage(&lamp, name)) {
         Ok(matches) => matches,
         Err(error) => return finish(name, Err(error)),
     };
@@ -150,7 +122,7 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
     keep_freed_memory();
     clean_up_on_signals()?;
     #[cfg(feature = "occt")]
-    if let Some(status) = occt_process::supervised()? {
+    if let Some(status) = terminal::occt_process::supervised()? {
         return Ok(status);
     }
     common.apply()?;

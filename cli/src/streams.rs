@@ -16,11 +16,11 @@ use lamp_stack::{
     write_packed, write_stack,
 };
 
-use crate::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
+use crate::args::options::{Common, Input, Output};
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output};
-use crate::progress::Progress;
-use crate::stack_notes::{noting, print_note};
+use crate::output::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
+use crate::terminal::progress::Progress;
+use crate::terminal::stack_notes::{noting, print_note};
 
 /// Layers on their way to a writer.
 pub(crate) type Layers<'a> = Box<dyn Iterator<Item = Result<Layer, Exit>> + 'a>;

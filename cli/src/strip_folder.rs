@@ -5,12 +5,12 @@ use std::path::Path;
 use lamp_build::{StripForm, StripWriter, StripsError, is_strips, join_strips};
 use lamp_stack::{PassingLayer, is_stack_name, map_in_order};
 
+use crate::args::options::{Input, Output};
 use crate::exit::Exit;
-use crate::options::{Input, Output};
-use crate::progress::Progress;
 use crate::streams::{
     decoding, format, input_name, is_stream, new_folder, read_passing, write_passing,
 };
+use crate::terminal::progress::Progress;
 
 /// Layers in order, coded or not.
 pub(crate) type PassingLayers = Box<dyn Iterator<Item = Result<PassingLayer, Exit>>>;

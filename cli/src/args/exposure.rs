@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_pipeline::exposure::ExposureSettings;
 
-use crate::lamp_option::LampOption;
+use crate::args::lamp_option::LampOption;
 
 pub(crate) const EXPOSURE: &str = "Exposure";
 

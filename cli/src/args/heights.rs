@@ -5,7 +5,7 @@ use lamp_adaptive::Measure;
 use lamp_pipeline::heights::{HeightSettings, Seconds, parse_share};
 use lamp_stack::Length;
 
-use crate::options::{one_of, parse_thickness};
+use crate::args::options::{one_of, parse_thickness};
 
 pub(crate) const HEIGHTS: &str = "Adaptive layer heights";
 

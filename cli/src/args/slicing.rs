@@ -16,8 +16,8 @@ use lamp_stack::{Dpi, Length, Size};
 use super::exposure::{EXPOSURE, ExposureArgs};
 use super::heights::{HEIGHTS, HeightArgs};
 use super::solid::{STEP, SolidArgs, part_file};
+use crate::args::options::{one_of, parse_layers, parse_memory, parse_thickness};
 use crate::exit::Exit;
-use crate::options::{one_of, parse_layers, parse_memory, parse_thickness};
 
 /// Options that decide the images.
 #[derive(Args, Clone)]

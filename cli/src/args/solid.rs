@@ -13,7 +13,7 @@ use lamp_pipeline::step::{Kernel, ReaderSettings, StepSettings};
 use lamp_slicer::{Axis, Bodies, Fill, Units};
 use lamp_stack::Length;
 
-use crate::options::{one_of, parse_distance};
+use crate::args::options::{one_of, parse_distance};
 
 const PLACEMENT: &str = "Placement of the part, in this order";
 pub(crate) const STEP: &str = "STEP parts";

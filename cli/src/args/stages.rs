@@ -12,8 +12,8 @@ use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_stack::{Length, LengthError, Op};
 
-use crate::lamp_option::LampOption;
-use crate::options::{one_of_described, parse_distance};
+use crate::args::lamp_option::LampOption;
+use crate::args::options::{one_of_described, parse_distance};
 
 /// How rows are corrected.
 #[derive(Args, Clone)]

@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 
 use crate::args::solid::StepArgs;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
+use crate::output::json_report::print_answer;
 use crate::second_opinion;
 use crate::streams::{input_name, print};
 

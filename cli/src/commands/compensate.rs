@@ -6,11 +6,11 @@ use clap::Args;
 use lamp_offset::CompensateError;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
 
+use crate::args::options::{Common, Input, Output};
 use crate::args::stages::CompensateStageArgs;
-use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
-use crate::options::{Common, Input, Output};
+use crate::output::endings::parse_report;
+use crate::output::json_report::JsonReport;
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };

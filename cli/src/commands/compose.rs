@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_build::{Composer, RecipeError};
 
+use crate::args::options::{Common, Output, parse_layers};
 use crate::exit::Exit;
-use crate::options::{Common, Output, parse_layers};
 use crate::streams::{check_not_input, input_name, is_stream, progress, write_layers};
 
 /// Make layers of a build by its recipe

@@ -13,16 +13,16 @@ use lamp_stack::{
     FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
 };
 
+use crate::args::options::{Common, Input, Output, one_of};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
-use crate::endings::is_step_name;
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output, one_of};
-use crate::progress::say;
-use crate::stack_notes::doubts;
+use crate::output::endings::is_step_name;
 use crate::streams::{
     check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
     new_folder, open_pages, progress, unless_found, write_file, write_layers, written_to,
 };
+use crate::terminal::progress::say;
+use crate::terminal::stack_notes::doubts;
 
 /// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
 ///

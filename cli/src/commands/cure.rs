@@ -17,16 +17,16 @@ use lamp_planning::cure_section::{
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::{CompensateRecord, DitherRecord, Length, StackInfo};
 
+use crate::args::lamp_option::LampOption;
+use crate::args::options::{Common, Input, one_of_described};
+use crate::args::planning_options::SAMPLE_HEIGHTS;
 use crate::args::solid::part_file;
-use crate::endings::{PNG, check_ending};
 use crate::exit::Exit;
-use crate::lamp_option::LampOption;
-use crate::options::{Common, Input, one_of_described};
-use crate::picture::PictureScale;
-use crate::planning_options::SAMPLE_HEIGHTS;
-use crate::progress::Progress;
-use crate::section::SectionPicture;
+use crate::output::endings::{PNG, check_ending};
+use crate::output::picture::PictureScale;
+use crate::output::section::SectionPicture;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
+use crate::terminal::progress::Progress;
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///

@@ -17,11 +17,11 @@ use lamp_pipeline::documents::document_and_word;
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, StackError};
 
+use crate::args::options::{Common, Output, parse_count};
 use crate::exit::Exit;
-use crate::options::{Common, Output, parse_count};
-use crate::picture::{Picture, PictureScale, Region};
-use crate::progress::Progress;
+use crate::output::picture::{Picture, PictureScale, Region};
 use crate::streams::{failed_at, print, write_file, write_layers};
+use crate::terminal::progress::Progress;
 
 /// Run the whole pipeline on a built-in blade mould, and draw the result
 #[derive(Args)]

@@ -4,9 +4,9 @@ use clap::Args;
 use lamp_build::{Seam, StripForm};
 use lamp_pipeline::dither::DitherSettings;
 
+use crate::args::options::{Common, Input, Output};
 use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output};
 use crate::streams::{decoding, progress};
 use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
 

@@ -4,9 +4,9 @@ use clap::Args;
 use lamp_edit::EditError;
 use lamp_pipeline::edit::{EditSettings, Editing, unused_text};
 
+use crate::args::options::{Common, Input, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output};
 use crate::streams::{
     check_not_input, decoding, input_name, is_stream, open_beside, progress, read_passing,
     write_passing,

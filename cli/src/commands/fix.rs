@@ -8,15 +8,15 @@ use lamp_pipeline::fix::{FixSettings, Fixing};
 use lamp_pipeline::whereabouts;
 use lamp_stack::PageInfo;
 
+use crate::args::options::{Common, Input, Output};
 use crate::args::stages::FixStageArgs;
-use crate::band_pictures::BandPictures;
-use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
-use crate::options::{Common, Input, Output};
-use crate::stack_notes::doubts;
+use crate::output::band_pictures::BandPictures;
+use crate::output::endings::parse_report;
+use crate::output::json_report::JsonReport;
 use crate::streams::{check_beside, decoding, progress, unless_found};
 use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
+use crate::terminal::stack_notes::doubts;
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///

@@ -21,15 +21,15 @@ use serde_json::json;
 
 use crate::args::exposure::ExposureArgs;
 use crate::args::heights::HeightArgs;
+use crate::args::options::{Common, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
-use crate::endings::parse_table;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::{Common, parse_thickness};
-use crate::plots::{self, Plot, PlotAxis, Series, drawn};
-use crate::progress::Progress;
+use crate::output::endings::parse_table;
+use crate::output::json_report::print_answer;
+use crate::output::plots::{self, Plot, PlotAxis, Series, drawn};
 use crate::streams::{check_beside, print, write_file};
+use crate::terminal::progress::Progress;
 
 /// Find how thick each layer of a part may be, and what that saves
 ///

@@ -8,10 +8,10 @@ use lamp_stack::{
 use serde::Serialize;
 
 use super::info_strips::print_strips;
+use crate::args::options::Input;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::Input;
-use crate::stack_facts::{StackFacts, compression_name};
+use crate::output::json_report::print_answer;
+use crate::output::stack_facts::{StackFacts, compression_name};
 use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 
 /// Describe a stack: pages, size, resolution, heights, area, exposure, checks

@@ -7,8 +7,8 @@ use lamp_stack::{Pages, StackTotals};
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::stack_facts::StackFacts;
+use crate::output::json_report::print_answer;
+use crate::output::stack_facts::StackFacts;
 use crate::streams::{failed_at, input_name, print};
 
 /// A strip, and what its pages say.

@@ -6,14 +6,14 @@ use clap::Args;
 use lamp_build::{is_strips, join_strips};
 use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
 
-use crate::endings::is_packed_name;
+use crate::args::options::{Common, Output};
 use crate::exit::Exit;
-use crate::options::{Common, Output};
-use crate::progress::Progress;
-use crate::stack_notes::print_note;
+use crate::output::endings::is_packed_name;
 use crate::streams::{
     format, input_name, is_stream, packed_destination, progress, write_layers, written_to,
 };
+use crate::terminal::progress::Progress;
+use crate::terminal::stack_notes::print_note;
 
 /// Join stacks of consecutive layers into one stack
 ///

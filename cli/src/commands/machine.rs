@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::catalogue::show;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
+use crate::output::json_report::print_answer;
 use crate::streams::print;
 
 /// List or show machines: build area, height, resolution and layer thickness

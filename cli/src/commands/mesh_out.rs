@@ -8,11 +8,11 @@ use lamp_slicer::write_stl;
 use lamp_stack::IndexedStack;
 use lamp_view::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
 
-use crate::endings::{STL, check_ending};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::Progress;
+use crate::output::endings::{STL, check_ending};
 use crate::streams::{check_not_input, failed_at, input_name, open_indexed, write_mesh};
+use crate::terminal::progress::Progress;
 
 /// Write the surface of a stack as a mesh
 ///

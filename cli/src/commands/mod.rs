@@ -41,8 +41,8 @@ mod view;
 
 use clap::{ArgMatches, FromArgMatches, Subcommand};
 
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
 
 #[derive(Subcommand)]
 pub(crate) enum Command {

@@ -5,11 +5,11 @@ use std::path::Path;
 use clap::Args;
 use lamp_stack::{Format, PackLevel};
 
-use crate::endings::{PACKED_STACK, check_ending};
+use crate::args::options::{Common, Input, Output};
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output};
-use crate::progress::say;
+use crate::output::endings::{PACKED_STACK, check_ending};
 use crate::streams::{is_stream, layers_of_input, open_pages, progress, write_packed_layers};
+use crate::terminal::progress::say;
 
 /// Pack a stack: each layer as what differs from the one below
 ///

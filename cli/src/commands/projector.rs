@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::catalogue;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
+use crate::output::json_report::print_answer;
 use crate::streams::{input_name, print};
 
 /// List, show or check projectors: where and how bright mirrors light the glass

@@ -8,11 +8,11 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lamp_fixtures::{Defect, Mesh, Sample, StepSample, StepUnit, build, inject, step};
 use lamp_stack::Length;
 
-use crate::endings::{SAMPLE, check_ending, is_step_name};
+use crate::args::options::{Common, parse_count};
 use crate::exit::Exit;
-use crate::options::{Common, parse_count};
-use crate::progress::Progress;
+use crate::output::endings::{SAMPLE, check_ending, is_step_name};
 use crate::streams::{is_stream, write_file};
+use crate::terminal::progress::Progress;
 
 /// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
 #[derive(Args)]

@@ -8,13 +8,13 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order};
 
-use crate::endings::{PNG, check_ending};
+use crate::args::options::EveryNth;
 use crate::exit::Exit;
-use crate::options::EveryNth;
-use crate::picture::{Picture, PictureScale, Region};
+use crate::output::endings::{PNG, check_ending};
+use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::thumbnails::{Thumbnail, contact_sheet, write_animation};
 use crate::streams::{failed_at, input_name, is_stream, learning_part, open_pages, write_file};
-use crate::terminal_picture::TerminalForm;
-use crate::thumbnails::{Thumbnail, contact_sheet, write_animation};
+use crate::terminal::terminal_picture::TerminalForm;
 
 /// Show a layer as a PNG picture or in the terminal, or many on one sheet or as an animation
 ///

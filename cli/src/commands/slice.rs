@@ -9,11 +9,11 @@ use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::watcher::Watcher;
 use lamp_slicer::{Bodies, PixelGrid, StrayBand};
 
+use crate::args::options::{Common, Output};
 use crate::args::slicing::SliceStageArgs;
-use crate::endings::parse_report;
 use crate::exit::Exit;
-use crate::mesh_report::{MeshReport, RowPositions};
-use crate::options::{Common, Output};
+use crate::output::endings::parse_report;
+use crate::output::mesh_report::{MeshReport, RowPositions};
 use crate::streams::{check_beside, check_not_input, progress, unless_found, write_layers};
 
 /// Slice a part into a stack of layer images

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use lamp_stack::{SplitError, SplitPoints, write_split};
 
+use crate::args::options::{Common, Input};
 use crate::exit::Exit;
-use crate::options::{Common, Input};
-use crate::progress::Progress;
 use crate::streams::{format, input_name, new_folder, read_layers, written_to};
+use crate::terminal::progress::Progress;
 
 /// Split a stack into files, each with a range of layers
 ///

@@ -9,12 +9,12 @@ use lamp_build::{is_strips, join_strips};
 use lamp_stack::{StackTotals, VerifyError, digest_of, open_ending, stacks_in, verify};
 use serde::Serialize;
 
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::Common;
-use crate::progress::printable;
-use crate::stack_facts::StackFacts;
+use crate::output::json_report::print_answer;
+use crate::output::stack_facts::StackFacts;
 use crate::streams::{input_name, is_stream, learning_part, open_pages, print};
+use crate::terminal::progress::printable;
 
 /// Prove that stacks are whole: every page, image, text and height
 ///

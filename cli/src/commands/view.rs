@@ -13,12 +13,12 @@ use lamp_view::{
 };
 
 use super::check;
-use crate::allocator::give_freed_memory_back;
+use crate::args::options::{Common, parse_memory};
 use crate::args::slicing::SlicingArgs;
 use crate::exit::Exit;
-use crate::options::{Common, parse_memory};
-use crate::progress::Progress;
 use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
+use crate::terminal::allocator::give_freed_memory_back;
+use crate::terminal::progress::Progress;
 
 /// Look at layers in a browser
 ///

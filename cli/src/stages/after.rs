@@ -14,7 +14,7 @@ use lamp_stack::{Layer, Page, Pages, PassingLayer, map_in_order};
 use crate::commands::support::SupportArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::progress::Progress;
+use crate::terminal::progress::Progress;
 
 /// Changes when `support` makes other bytes from the same options, stack and part.
 pub(super) const SUPPORT_CODE: u32 = 3;

@@ -15,7 +15,7 @@ use super::parse::{parse_check, parse_tile};
 use crate::commands::check::CheckArgs;
 use crate::commands::tile::{Build, TileArgs};
 use crate::exit::Exit;
-use crate::progress::Progress;
+use crate::terminal::progress::Progress;
 
 /// Change when other bytes come from the same options and stacks.
 pub(crate) const JOIN_CODE: u32 = 2;

@@ -19,16 +19,16 @@ use lamp_pipeline::{Chain, Stage};
 use super::Stages;
 use super::after::After;
 use crate::Lamp;
+use crate::args::arguments::{settings_of_machine, words_left_open};
 use crate::args::slicing::SliceStageArgs;
 use crate::args::stages::{CompensateStageArgs, DitherStageArgs, EditStageArgs, FixStageArgs};
-use crate::arguments::{settings_of_machine, words_left_open};
 use crate::commands::check::CheckArgs;
 use crate::commands::support::SupportArgs;
 use crate::commands::tile::TileArgs;
 use crate::exit::Exit;
-use crate::help::formed;
 use crate::streams::is_stream;
-use crate::usage::sentence;
+use crate::terminal::help::formed;
+use crate::terminal::usage::sentence;
 
 /// A stage that is refused, and why in one sentence.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -14,8 +14,8 @@ use tempfile::TempDir;
 use super::Stages;
 use super::calls::{CheckFindings, Checking, Tiling};
 use crate::Lamp;
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
 
 /// A folder with a part, and results.
 pub(super) struct Bench {

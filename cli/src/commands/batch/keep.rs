@@ -8,10 +8,10 @@ use super::deliver::check_files;
 use super::night_file::store_of;
 use super::task::named;
 use super::{GcArgs, StoreArgs};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::Progress;
 use crate::streams::print;
+use crate::terminal::progress::Progress;
 
 /// Hashes all results anew, and takes away those that are damaged; and what was delivered of them.
 pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {

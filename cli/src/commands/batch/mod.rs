@@ -21,8 +21,8 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 use lamp_batch::Key;
 
+use crate::args::options::{Common, one_of_described, parse_memory};
 use crate::exit::Exit;
-use crate::options::{Common, one_of_described, parse_memory};
 
 /// Make all parts and builds of a night, whatever crashes meanwhile
 ///

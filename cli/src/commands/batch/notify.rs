@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use serde_json::json;
 
 use super::summary::Summary;
-use crate::progress::Progress;
+use crate::terminal::progress::Progress;
 
 /// Runs a command by the shell, with a summary on its input and the status in its environment.
 /// That it fails changes nothing but is told.

@@ -11,10 +11,10 @@ use super::deliver::Deliverer;
 use super::night_file::NightFile;
 use super::plan::Plan;
 use super::room::Room;
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::printable;
 use crate::streams::print;
+use crate::terminal::progress::printable;
 
 pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;

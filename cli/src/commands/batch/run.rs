@@ -17,9 +17,9 @@ use super::report;
 use super::room::Room;
 use super::summary::{LineState, Summary};
 use super::{EngineName, RunArgs};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::Progress;
+use crate::terminal::progress::Progress;
 
 pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let Some(night) = &args.night else {

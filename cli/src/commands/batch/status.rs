@@ -9,10 +9,10 @@ use super::night_file::NightFile;
 use super::plan::Plan;
 use super::run::counts;
 use super::summary::{Line, LineState, Summary};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::printable;
 use crate::streams::print;
+use crate::terminal::progress::printable;
 
 pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;

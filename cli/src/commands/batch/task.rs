@@ -24,9 +24,9 @@ use super::resources;
 use super::work::{Checked, What, Work};
 use crate::commands::report::{Picture, of_layer};
 use crate::exit::Exit;
-use crate::out_of_memory;
 use crate::stages::Stages;
 use crate::stages::calls::{Checking, Tiling};
+use crate::terminal::out_of_memory;
 
 type Layers<'a> = dyn Iterator<Item = Result<Layer, Exit>> + 'a;
 type Write<'a> = dyn FnMut(&mut Layers<'_>) -> Result<(), Exit> + 'a;

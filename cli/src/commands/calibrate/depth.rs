@@ -11,10 +11,10 @@ use lamp_stack::Length;
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
+use crate::args::options::{Common, one_of_described};
 use crate::exit::Exit;
-use crate::options::{Common, one_of_described};
-use crate::plots::{Plot, PlotAxis, Series, highest};
-use crate::progress::Progress;
+use crate::output::plots::{Plot, PlotAxis, Series, highest};
+use crate::terminal::progress::Progress;
 
 /// Fit a working curve to measured cure depths
 ///

@@ -8,10 +8,10 @@ use lamp_grayscale::resin::{Dose, Intensity};
 use super::CalibrationFiles;
 use super::depth::{levelled, write_line};
 use super::estimate_table::{EstimateTable, in_legend, short};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::plots::{Plot, PlotAxis, Series, highest};
-use crate::progress::Progress;
+use crate::output::plots::{Plot, PlotAxis, Series, highest};
+use crate::terminal::progress::Progress;
 
 /// Fit how the critical dose follows a lamp that ages, from cure depths under several lights
 ///

@@ -17,11 +17,11 @@ use lamp_grayscale::resin::Intensity;
 use lamp_pipeline::documents::document;
 use lamp_stack::CatalogueError;
 
+use crate::args::options::{Common, parse_light};
 use crate::catalogue::read_text;
-use crate::endings::parse_toml;
 use crate::exit::Exit;
-use crate::options::{Common, parse_light};
-use crate::plots::{self, Plot, drawn};
+use crate::output::endings::parse_toml;
+use crate::output::plots::{self, Plot, drawn};
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 
 /// Fit a resin's parameters to measured cure depths or widths

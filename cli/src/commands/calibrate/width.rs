@@ -12,10 +12,10 @@ use lamp_stack::Dpi;
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::plots::{Plot, PlotAxis, Series, highest};
-use crate::progress::Progress;
+use crate::output::plots::{Plot, PlotAxis, Series, highest};
+use crate::terminal::progress::Progress;
 
 /// Fit the cure width of features of several sizes to measured squares
 ///

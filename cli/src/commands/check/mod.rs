@@ -19,14 +19,14 @@ use lamp_supports::{
 };
 use serde::Serialize;
 
+use crate::args::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
 use crate::args::slicing::SlicingArgs;
-use crate::endings::parse_report;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
-use crate::progress::{Progress, printable};
-use crate::stack_notes::doubts;
+use crate::output::endings::parse_report;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
+use crate::terminal::progress::{Progress, printable};
+use crate::terminal::stack_notes::doubts;
 use lamp_pipeline::documents::{canonical_word, document};
 use lamp_pipeline::solid::at_part;
 use lamp_pipeline::words::{list, optional, path, text, words_of};

@@ -8,12 +8,12 @@ use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, white_runs};
 use lamp_supports::{FindingRecord, Region, Shown, component_at};
 
 use super::{CheckArgs, CheckedInput, Input};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::picture;
-use crate::progress::Progress;
-use crate::shades::{Shade, ShadedPicture};
+use crate::output::picture;
+use crate::output::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, in_range, input_name};
+use crate::terminal::progress::Progress;
 
 /// The most pictures of an input.
 const MOST_PICTURES: usize = 24;

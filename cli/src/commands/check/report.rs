@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::{CheckedInput, greatest_shear_pa};
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
+use crate::output::json_report::JsonReport;
 
 /// The form of the report.
 const SCHEMA: &str = "lamp-check-1";

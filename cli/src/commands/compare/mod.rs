@@ -10,12 +10,12 @@ use std::str::FromStr;
 use clap::Args;
 use lamp_stack::{Dpi, IndexedStack, Length, Pairing};
 
-use crate::endings::{PNG, check_ending};
+use crate::args::options::{Common, parse_distance};
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::{Common, parse_distance};
-use crate::progress::Progress;
+use crate::output::endings::{PNG, check_ending};
+use crate::output::json_report::print_answer;
 use crate::streams::{check_beside, failed_at, input_name, is_stream, open_indexed, print};
+use crate::terminal::progress::Progress;
 
 use picture::write_picture;
 use report::{Comparison, answer, text};

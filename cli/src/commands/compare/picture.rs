@@ -6,8 +6,8 @@ use lamp_stack::{Difference, Image, Section, white_runs};
 
 use super::walk::{Compared, Images, NamedStack, shift_of};
 use crate::exit::Exit;
-use crate::picture::Region;
-use crate::shades::{Shade, ShadedPicture};
+use crate::output::picture::Region;
+use crate::output::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, write_file};
 
 /// The longer side of the picture, in pixels.

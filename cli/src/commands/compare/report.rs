@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::walk::{DifferenceBox, SectionDifference};
-use crate::progress::printable;
+use crate::terminal::progress::printable;
 
 /// The most layers, and the most boxes of a layer, that are printed unless all are asked for.
 const MOST_LINES: usize = 20;

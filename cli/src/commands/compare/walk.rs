@@ -8,8 +8,8 @@ use lamp_stack::{
 };
 
 use crate::exit::Exit;
-use crate::progress::Progress;
 use crate::streams::failed_at;
+use crate::terminal::progress::Progress;
 
 /// The most boxes that are kept of a section.
 const MOST_BOXES: usize = 100;

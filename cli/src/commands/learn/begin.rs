@@ -11,10 +11,10 @@ use lamp_planning::speed::{PartPages, times_table};
 use lamp_stack::{Destination, FolderBeside, Format, sealed, write_stack};
 
 use super::KeptOptions;
+use crate::args::options::Input;
 use crate::exit::Exit;
-use crate::options::Input;
-use crate::progress::Progress;
 use crate::streams::{input_name, new_folder, read_layers};
+use crate::terminal::progress::Progress;
 
 /// Begins a job.
 pub(super) fn begin(

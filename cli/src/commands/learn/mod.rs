@@ -14,16 +14,16 @@ use lamp_planning::SampleHeight;
 use lamp_planning::learn::{Job, Law, PrintMeasurements, learn};
 use lamp_planning::speed::{Platform, Speed};
 
+use crate::args::lamp_option::LampOption;
+use crate::args::options::{Common, one_of_described, parse_memory};
+use crate::args::planning_options::{SAMPLE_HEIGHTS, parse_margin};
+use crate::args::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::catalogue::read_text;
-use crate::endings::{parse_report, parse_table};
 use crate::exit::Exit;
-use crate::lamp_option::LampOption;
-use crate::options::{Common, one_of_described, parse_memory};
-use crate::planning_options::{SAMPLE_HEIGHTS, parse_margin};
-use crate::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
-use crate::plots;
-use crate::progress::Progress;
+use crate::output::endings::{parse_report, parse_table};
+use crate::output::plots;
 use crate::streams::{check_beside, input_name, is_stream, print, read_beside, write_file};
+use crate::terminal::progress::Progress;
 use report::{lines_of, write_report};
 
 /// Measurements are read whole.

@@ -7,7 +7,7 @@ use lamp_planning::learn::{Job, JobPrint, Learned, PrintMeasurements};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
+use crate::output::json_report::JsonReport;
 
 /// The lines that are printed.
 pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {

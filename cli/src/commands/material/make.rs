@@ -6,11 +6,11 @@ use clap::Args;
 use lamp_grayscale::material::Composition;
 use lamp_pipeline::documents::read_file;
 
-use crate::endings::parse_toml;
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::progress::Progress;
+use crate::output::endings::parse_toml;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use crate::terminal::progress::Progress;
 
 /// Make a material from the composition of a suspension
 ///

@@ -13,10 +13,10 @@ use lamp_pipeline::documents;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
+use crate::args::options::Common;
 use crate::catalogue;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::Common;
+use crate::output::json_report::print_answer;
 use crate::streams::{input_name, print};
 
 /// List, show, check or make materials: how deep light cures a resin

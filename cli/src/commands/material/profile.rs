@@ -9,11 +9,11 @@ use lamp_grayscale::resin::{Dose, GaussianBeam, QuantityError, WorkingCurve};
 use lamp_pipeline::documents::document;
 use lamp_stack::{Length, format_significant};
 
+use crate::args::lamp_option::LampOption;
+use crate::args::options::{Common, parse_distance};
 use crate::exit::Exit;
-use crate::lamp_option::LampOption;
-use crate::options::{Common, parse_distance};
-use crate::progress::Progress;
 use crate::streams::print;
+use crate::terminal::progress::Progress;
 
 /// Print the profile that a line of light cures: how wide at the surface, how deep where
 ///

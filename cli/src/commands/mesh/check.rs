@@ -5,12 +5,12 @@ use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, ShellOverlap, She
 use lamp_slicer::{Placement, SliceError};
 use lamp_stack::Length;
 
+use crate::args::options::{Common, parse_distance};
 use crate::commands::mesh::MeshPart;
 use crate::commands::mesh::answer::{MAX_LISTED, check_fields};
 use crate::commands::mesh::text::check_text;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::{Common, parse_distance};
+use crate::output::json_report::print_answer;
 use crate::streams::print;
 
 /// Find what is wrong with a mesh, and what its shells enclose

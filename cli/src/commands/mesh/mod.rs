@@ -16,11 +16,11 @@ use lamp_pipeline::step::ReaderSettings;
 use lamp_slicer::{Part, Units};
 use lamp_stack::Length;
 
+use crate::args::options::{Common, one_of, parse_memory};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
-use crate::options::{Common, one_of, parse_memory};
-use crate::progress::say;
 use crate::streams::{input_name, is_stream};
+use crate::terminal::progress::say;
 
 /// Check or repair the mesh of a part
 #[derive(Args)]

@@ -11,15 +11,15 @@ use lamp_slicer::{SliceError, write_stl};
 use lamp_stack::Length;
 use serde_json::{Map, Value, json};
 
+use crate::args::options::{Common, parse_distance};
 use crate::commands::mesh::MeshPart;
 use crate::commands::mesh::answer::{counts, deeds};
 use crate::commands::mesh::text::faults;
-use crate::endings::{STL, check_ending, parse_report};
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
-use crate::options::{Common, parse_distance};
-use crate::progress::say;
+use crate::output::endings::{STL, check_ending, parse_report};
+use crate::output::json_report::JsonReport;
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
+use crate::terminal::progress::say;
 
 /// Mend a mesh: weld, drop, turn over and add facets, and list each
 ///

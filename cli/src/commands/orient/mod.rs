@@ -12,13 +12,13 @@ use lamp_slicer::topology::CornerTable;
 use lamp_stack::{Dpi, Length};
 use lamp_supports::{PoseFacts, PoseLimits, measure, pareto, poses};
 
+use crate::args::options::{Common, parse_angle, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
-use crate::options::{Common, parse_angle, parse_thickness};
-use crate::plots::{self, sphere_picture};
-use crate::progress::Progress;
+use crate::output::plots::{self, sphere_picture};
 use crate::streams::{check_beside, write_file};
+use crate::terminal::progress::Progress;
 
 /// Find how to turn a part so that few islands float, and little overhangs
 ///

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::{Compared, OrientArgs};
 use crate::exit::Exit;
-use crate::json_report::print_answer;
+use crate::output::json_report::print_answer;
 use crate::streams::print;
 
 /// The most poses that the table shows.

@@ -22,11 +22,11 @@ use lamp_stack::{Length, quoted};
 use super::column_measures::doubt;
 use super::column_report::{Reported, lines_of, report_of};
 use super::simulate::parse_rays;
+use crate::args::options::{Common, one_of_described, parse_count, parse_thickness};
+use crate::args::target_arg::{GivenTarget, TargetArg};
 use crate::exit::Exit;
-use crate::options::{Common, one_of_described, parse_count, parse_thickness};
-use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
-use crate::progress::Progress;
-use crate::target_arg::{GivenTarget, TargetArg};
+use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
+use crate::terminal::progress::Progress;
 
 /// Choose bitmaps and times that cure a part through a glass, without layers
 ///

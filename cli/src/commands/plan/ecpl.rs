@@ -13,11 +13,11 @@ use lamp_planning::target::Grid;
 use serde_json::json;
 
 use super::kinetics_report::{Cured, fields, lines_of};
+use crate::args::options::{Common, one_of_described};
+use crate::args::target_arg::TargetArg;
 use crate::exit::Exit;
-use crate::options::{Common, one_of_described};
-use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
-use crate::progress::Progress;
-use crate::target_arg::TargetArg;
+use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
+use crate::terminal::progress::Progress;
 
 /// Choose bitmaps and times that cure a round part, by the kinetics of resin and oxygen
 ///

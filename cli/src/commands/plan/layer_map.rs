@@ -9,8 +9,8 @@ use lamp_planning::{LayerTime, Light, RegionDoses};
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
-use crate::picture::Region;
-use crate::plots::{DoseMap, dose_map};
+use crate::output::picture::Region;
+use crate::output::plots::{DoseMap, dose_map};
 
 /// The options of a map.
 #[derive(Args)]

@@ -16,8 +16,8 @@ mod voxels_report;
 
 use clap::{Args, Subcommand};
 
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::options::Common;
 
 /// Plan exposures, so that the doses of all layers together cure the part and nothing else
 #[derive(Args)]

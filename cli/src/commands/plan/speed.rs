@@ -12,18 +12,18 @@ use lamp_stack::Layer;
 
 use super::speed_plot::plots_of;
 use super::speed_report::{Planned, lines_of, write_report};
-use crate::endings::{parse_report, parse_table};
+use crate::args::options::{Common, Input, Output, parse_memory};
+use crate::args::planning_options::{PlannedResin, PlanningOptions};
+use crate::args::platform_options::PlatformOptions;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::options::{Common, Input, Output, parse_memory};
-use crate::planning_options::{PlannedResin, PlanningOptions};
-use crate::platform_options::PlatformOptions;
-use crate::plots;
-use crate::progress::Progress;
+use crate::output::endings::{parse_report, parse_table};
+use crate::output::plots;
 use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
 };
+use crate::terminal::progress::Progress;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///

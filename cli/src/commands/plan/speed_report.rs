@@ -8,7 +8,7 @@ use lamp_planning::speed::{DOSE_BINS, SpeedPlan, Tally, TimedPart, Wrong, record
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
+use crate::output::json_report::JsonReport;
 
 /// A plan, and what it is for.
 pub(super) struct Planned<'a> {

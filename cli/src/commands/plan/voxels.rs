@@ -14,17 +14,17 @@ use lamp_stack::Layer;
 use super::layer_map::{LayerMap, MapOptions};
 use super::voxels_plot::plots_of;
 use super::voxels_report::{Planned, lines_of, write_report};
-use crate::endings::parse_report;
+use crate::args::options::{Common, Input, Output, one_of_described, parse_memory};
+use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::exit::Exit;
-use crate::options::{Common, Input, Output, one_of_described, parse_memory};
-use crate::planning_options::{PlannedResin, PlanningOptions};
-use crate::plots;
-use crate::progress::Progress;
-use crate::stack_notes::doubts;
+use crate::output::endings::parse_report;
+use crate::output::plots;
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
 };
+use crate::terminal::progress::Progress;
+use crate::terminal::stack_notes::doubts;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///

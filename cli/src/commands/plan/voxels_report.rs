@@ -8,7 +8,7 @@ use lamp_planning::voxels::{
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
+use crate::output::json_report::JsonReport;
 
 /// A plan, and what it was for.
 pub(super) struct Planned<'a> {

@@ -4,7 +4,7 @@ use lamp_stack::Dpi;
 
 use super::gather::StackReport;
 use super::measure::LayerNumbers;
-use crate::plots::{Series, by_layer, curve, inline_svg};
+use crate::output::plots::{Series, by_layer, curve, inline_svg};
 
 /// The most points of a curve; of more, the least and the greatest of neighbours stay.
 const MOST_POINTS: usize = 1200;

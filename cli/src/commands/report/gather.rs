@@ -12,8 +12,8 @@ use super::measure::{LayerNumbers, new_pixels};
 use super::pictures::{Picture, of_finding, of_layer};
 use crate::commands::check;
 use crate::exit::Exit;
-use crate::progress::Progress;
-use crate::stack_facts::StackFacts;
+use crate::output::stack_facts::StackFacts;
+use crate::terminal::progress::Progress;
 
 /// The layers on the contact sheet, and the findings that are drawn.
 const SHEET: usize = 12;

@@ -5,7 +5,7 @@ use maud::html;
 
 use super::gather::StackReport;
 use super::page::document;
-use crate::progress::printable;
+use crate::terminal::progress::printable;
 
 /// A line of the index.
 pub(super) struct Entry {

@@ -16,15 +16,15 @@ use lamp_machine::Machine;
 use lamp_stack::stacks_in;
 use serde_json::json;
 
-use crate::endings::{HTML, check_ending};
+use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::json_report::print_answer;
-use crate::options::Common;
-use crate::progress::Progress;
+use crate::output::endings::{HTML, check_ending};
+use crate::output::json_report::print_answer;
 use crate::streams::{
     check_beside, failed_at, input_name, is_folder, is_stream, new_folder, open_indexed, print,
     write_file,
 };
+use crate::terminal::progress::Progress;
 use lamp_pipeline::documents;
 
 use gather::StackReport;

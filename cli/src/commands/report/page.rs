@@ -7,7 +7,7 @@ use super::charts::{charts, same_thickness_um};
 use super::gather::{Found, StackReport};
 use super::pictures::Picture;
 use crate::commands::info;
-use crate::progress::printable;
+use crate::terminal::progress::printable;
 
 /// The most findings of a kind that are listed, as `lamp check` does.
 const MOST_LINES: usize = 20;

@@ -5,7 +5,7 @@ use lamp_supports::Shown;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::check::draw;
-use crate::picture::{self, PictureScale, Region};
+use crate::output::picture::{self, PictureScale, Region};
 
 /// The longer side of a layer on the sheet, in pixels.
 const SIDE: u32 = 260;

@@ -25,18 +25,18 @@ use lamp_supports::{
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::args::options::{Common, Output, parse_distance, parse_thickness};
 use crate::args::solid::part_file;
-use crate::endings::{parse_report, parse_toml};
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::options::{Common, Output, parse_distance, parse_thickness};
-use crate::progress::Progress;
-use crate::stack_notes::doubts;
+use crate::output::endings::{parse_report, parse_toml};
 use crate::streams::Layers;
 use crate::streams::{
     check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
     write_file, write_layers,
 };
+use crate::terminal::progress::Progress;
+use crate::terminal::stack_notes::doubts;
 use plan_file::plan_text;
 use report::SupportReport;
 use units::{Curvature, Degrees};

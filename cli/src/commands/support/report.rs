@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 
 use crate::commands::check::greatest_shear_pa;
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
-use crate::progress::Progress;
+use crate::output::json_report::JsonReport;
+use crate::terminal::progress::Progress;
 
 /// The most islands that are printed, unless all are asked for.
 const MOST_LINES: usize = 20;

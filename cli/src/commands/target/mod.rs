@@ -7,8 +7,8 @@ use clap::{Args, Subcommand};
 use lamp_grayscale::target::TargetError;
 use lamp_stack::{Dpi, Length};
 
+use crate::args::options::{Common, parse_distance};
 use crate::exit::Exit;
-use crate::options::{Common, parse_distance};
 
 /// Write test images to expose, measure and calibrate with
 #[derive(Args)]

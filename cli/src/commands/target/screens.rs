@@ -6,8 +6,8 @@ use lamp_grayscale::target::screens;
 use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 
 use super::{parse_gap, whole_pixels};
+use crate::args::options::{Common, Output};
 use crate::exit::Exit;
-use crate::options::{Common, Output};
 use crate::streams::{progress, write_layers};
 
 /// Write a gray tile, and screens of it with squares of several sizes

@@ -11,10 +11,10 @@ use lamp_pipeline::documents::document;
 use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
 
 use super::{parse_gap, whole_pixels};
+use crate::args::options::{Common, parse_light};
 use crate::exit::Exit;
-use crate::options::{Common, parse_light};
-use crate::progress::Progress;
 use crate::streams::{new_folder, write_file, written_to};
+use crate::terminal::progress::Progress;
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::Exit;
-use crate::plots;
+use crate::output::plots;
 use crate::streams::{check_beside, check_not_input};
 
 use super::TileArgs;

@@ -9,8 +9,8 @@ use lamp_pipeline::words::{optional, path};
 use lamp_stack::{Image, Length, StackError};
 use serde::Serialize;
 
+use crate::args::options::{one_of_described, parse_area, parse_distance, parse_thickness};
 use crate::exit::Exit;
-use crate::options::{one_of_described, parse_area, parse_distance, parse_thickness};
 use crate::streams::{failed_at, input_name, is_stream, layers_of, open_pages};
 
 const HEADING: &str = "Mesh around the parts";

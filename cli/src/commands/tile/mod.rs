@@ -25,13 +25,13 @@ use lamp_pipeline::words::{optional, optional_path, text, words_of};
 use lamp_stack::{Length, Size};
 use serde::Serialize;
 
-use crate::endings::parse_report;
+use crate::args::options::{Common, Output, one_of_described, parse_distance, parse_layers};
 use crate::exit::Exit;
-use crate::options::{Common, Output, one_of_described, parse_distance, parse_layers};
-use crate::progress::Progress;
-use crate::stack_notes::doubts;
+use crate::output::endings::parse_report;
 use crate::streams::Layers;
 use crate::streams::{progress, unless_found, write_file};
+use crate::terminal::progress::Progress;
+use crate::terminal::stack_notes::doubts;
 use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::MeshArgs;
 use placing::read_layout;

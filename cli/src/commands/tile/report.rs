@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 use super::TileArgs;
 use super::time;
+use crate::args::options::Output;
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
-use crate::options::Output;
+use crate::output::json_report::JsonReport;
 use crate::streams::{is_stream, print};
 
 /// What the layers of a build are made of: numbers of each part and of each layer, whatever the number
@@ -153,7 +153,7 @@ impl TileArgs {
         if self.time {
             let text = time::text(&time, machine);
             if output.is_some_and(|output| is_stream(&output.output)) {
-                text.lines().for_each(crate::progress::say);
+                text.lines().for_each(crate::terminal::progress::say);
             } else {
                 print(&text)?;
             }

@@ -13,10 +13,10 @@ use lamp_stack::{
 };
 
 use crate::exit::Exit;
-use crate::stack_notes::noting;
 use crate::streams::{
     failed_at, input_name, is_stream, layers_of, open_pages, piped_part, spool_stdin,
 };
+use crate::terminal::stack_notes::noting;
 
 /// A stack and the number of its copies: `blade.tif:120`.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,10 +7,10 @@ use lamp_build::{Seam, StripWriter, StripsError};
 use lamp_machine::Machine;
 use lamp_stack::Layer;
 
+use crate::args::options::{Output, one_of_described};
 use crate::exit::Exit;
-use crate::options::{Output, one_of_described};
-use crate::progress::Progress;
 use crate::streams::{format, new_folder, write_layers};
+use crate::terminal::progress::Progress;
 
 const HEADING: &str = "Strips of a projector that scans";
 

@@ -17,11 +17,11 @@ use lamp_planning::target::HeightMap;
 use lamp_stack::named;
 use serde_json::{Map, Value, json};
 
+use crate::args::options::{Common, one_of_described};
+use crate::args::target_arg::{GivenTarget, TargetReading};
 use crate::exit::Exit;
-use crate::options::{Common, one_of_described};
-use crate::plan_folder::{PlanFiles, plan_folder, write_plan};
-use crate::progress::Progress;
-use crate::target_arg::{GivenTarget, TargetReading};
+use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
+use crate::terminal::progress::Progress;
 use exposures::Exposures;
 
 /// Tell what bitmaps cure on a fixed glass, a plan's or any others

@@ -13,10 +13,10 @@ use super::TileArgs;
 use super::stacks::InputStack;
 use super::turns_arg::TurnsArg;
 use crate::Lamp;
-use crate::arguments::words_in_effect;
+use crate::args::arguments::words_in_effect;
 use crate::exit::Exit;
-use crate::progress::Progress;
 use crate::streams::{input_name, is_stream, print};
+use crate::terminal::progress::Progress;
 use sliced_from::SlicedFrom;
 use words::kept;
 

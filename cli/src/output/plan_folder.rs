@@ -8,7 +8,7 @@ use lamp_stack::Length;
 use serde_json::Value;
 
 use crate::exit::Exit;
-use crate::plots::{Colours, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
+use crate::output::plots::{Colours, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 use crate::streams::new_folder;
 
 const REPORT: &str = "report.json";

@@ -7,7 +7,7 @@ use lamp_fix::{Band, BandOutcome, Fixed};
 use lamp_stack::{FolderBeside, Image, write_rgb_png};
 
 use crate::exit::Exit;
-use crate::picture::{Region, levels_of_region};
+use crate::output::picture::{Region, levels_of_region};
 use crate::streams::new_folder;
 
 /// Rows above and below a band, and columns beside it, that are shown with it.

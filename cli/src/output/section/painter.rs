@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lamp_grayscale::{OutlinePiece, SolidHeights};
 
-use crate::picture::PictureScale;
+use crate::output::picture::PictureScale;
 
 /// Black pixels between two pictures.
 const GAP: usize = 8;

@@ -6,8 +6,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lamp_stack::{Pages, StackNote};
 
-use crate::progress::say;
 use crate::streams::input_name;
+use crate::terminal::progress::say;
 
 /// The notes that were printed.
 #[derive(Default)]

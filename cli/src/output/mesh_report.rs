@@ -10,7 +10,7 @@ use lamp_stack::to_nm;
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::json_report::JsonReport;
+use crate::output::json_report::JsonReport;
 
 /// The head of the report: the part's files and the counts.
 #[derive(Serialize)]

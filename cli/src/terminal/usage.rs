@@ -6,7 +6,7 @@ use std::num::ParseIntError;
 
 use clap::error::{ContextKind, ErrorKind};
 
-use crate::progress::{printable, say};
+use crate::terminal::progress::{printable, say};
 
 /// Shows an error of usage, or the help that was asked for, and ends the process.
 pub(crate) fn refuse(error: &clap::Error) -> ! {

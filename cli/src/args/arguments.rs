@@ -12,13 +12,13 @@ use clap::{Arg, ArgMatches, Command, FromArgMatches};
 use lamp_machine::{Defaults, Machine};
 use lamp_pipeline::documents::document;
 
+use crate::args::options::Common;
+use crate::args::options_file::{Setting, option_of, settings_of};
 use crate::catalogue::read_text;
 use crate::exit::Exit;
-use crate::options::Common;
-use crate::options_file::{Setting, option_of, settings_of};
-use crate::progress::say;
 use crate::streams::{input_name, is_stream};
-use crate::usage::show;
+use crate::terminal::progress::say;
+use crate::terminal::usage::show;
 
 /// An options file has a line for each option.
 const MAX_OPTIONS_BYTES: u64 = 1 << 20;

@@ -11,9 +11,9 @@ use lamp_pipeline::words::option;
 use lamp_planning::{Light, SampleHeight};
 use lamp_stack::quoted;
 
+use crate::args::lamp_option::LampOption;
+use crate::args::options::one_of_described;
 use crate::exit::Exit;
-use crate::lamp_option::LampOption;
-use crate::options::one_of_described;
 
 /// What `--help` says of the heights in a layer.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =

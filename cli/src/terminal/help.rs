@@ -2,7 +2,7 @@
 
 use clap::{Arg, ArgAction, Command};
 
-use crate::options::GENERAL;
+use crate::args::options::GENERAL;
 
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
 const LAMP: &str = "\

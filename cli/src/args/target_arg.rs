@@ -13,9 +13,9 @@ use lamp_planning::target::{
 use lamp_slicer::Units;
 use lamp_stack::{Catalogued, Length};
 
+use crate::args::options::{one_of, parse_thickness};
 use crate::exit::Exit;
-use crate::options::{one_of, parse_thickness};
-use crate::progress::Progress;
+use crate::terminal::progress::Progress;
 
 /// How a target's file is read.
 #[derive(Args, Clone, Debug)]

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lamp_pipeline::watcher::{Importance, KeptRemarks, Remark, Watcher};
 
-use crate::options::Common;
+use crate::args::options::Common;
 
 /// Prints messages and a progress bar.
 #[derive(Clone)]

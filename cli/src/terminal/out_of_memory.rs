@@ -15,7 +15,7 @@ use std::time::Duration;
 use lamp_stack::remove_temporaries;
 use signal_hook::low_level::exit;
 
-use crate::signals::say_no_more;
+use crate::terminal::signals::say_no_more;
 
 /// The command's name, for the message.
 static COMMAND: OnceLock<String> = OnceLock::new();

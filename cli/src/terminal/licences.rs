@@ -1,9 +1,9 @@
 //! The licences of what is in the program: `lamp --licences`.
 
 /// The notices of the crates, as `licences/update` wrote them.
-const CRATES: &str = include_str!("../licences/notices.txt");
+const CRATES: &str = include_str!("../../licences/notices.txt");
 
-const OWN: &str = include_str!("../../LICENSE-MIT");
+const OWN: &str = include_str!("../../../LICENSE-MIT");
 
 const RULE: &str =
     "--------------------------------------------------------------------------------";

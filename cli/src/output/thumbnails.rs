@@ -4,8 +4,8 @@ use std::io::{self, Write};
 
 use lamp_stack::{Layer, write_gray_animation};
 
-use crate::picture::{Picture, PictureScale, Region};
-use crate::plots::{CAPTION_HEIGHT, caption};
+use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::plots::{CAPTION_HEIGHT, caption};
 
 /// The level around thumbnails and behind their captions. Neither black nor white, so that the
 /// edges of images show.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use lamp_stack::write_rgb_png;
 
-use crate::picture::Region;
+use crate::output::picture::Region;
 
 /// The least that is shown around a region, in pixels, and the share of its size.
 const LEAST_AROUND: u32 = 16;

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::picture::{Picture, PictureScale, Region};
+use crate::output::picture::{Picture, PictureScale, Region};
 
 /// The width to draw for where the terminal does not tell its own, in characters.
 const USUAL_COLUMNS: u32 = 80;

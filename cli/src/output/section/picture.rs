@@ -8,7 +8,7 @@ use lamp_planning::cure_section::ShownSection;
 use lamp_stack::write_rgb_png;
 
 use super::painter::Scene;
-use crate::picture::PictureScale;
+use crate::output::picture::PictureScale;
 
 /// A section's pictures side by side, and its areas as a table.
 pub(crate) struct SectionPicture(pub(crate) ShownSection);
