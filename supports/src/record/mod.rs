@@ -1,6 +1,6 @@
 //! Findings as people and programs read them: a line, and a JSON object.
 //!
-//! A kind of findings is a variant of [`FindingRecord`], and all that is said of it is here.
+//! A kind of findings is a variant of [`FindingRecord`]; its name, text and JSON are here.
 
 mod makes;
 mod places;
@@ -92,7 +92,7 @@ pub enum FoundPixels {
     All,
 }
 
-/// What a picture of a finding shows.
+/// The place that a picture of a finding shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
     /// The layer, from the first that was checked.
@@ -141,7 +141,7 @@ pub struct IslandRecord {
     pub floating_mm3: Option<f64>,
     /// The layer in which it joins.
     pub joins: Option<u32>,
-    /// What it joins.
+    /// The body that it joins.
     pub into: Option<Joined>,
     /// The most pixels that float in one layer.
     pub largest_px: u64,
@@ -156,13 +156,13 @@ pub struct IslandRecord {
     pub shown: Shown,
 }
 
-/// What an island joins.
+/// The body that an island joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Joined {
     /// An elder island, by its number.
     Island(u64),
-    /// What stands on the platform.
+    /// The part on the platform.
     Part(PartWord),
 }
 
@@ -265,7 +265,7 @@ pub struct OverhangRecord {
     /// The rectangle around all.
     #[serde(flatten)]
     pub bounds: BoxRecord,
-    /// How far it is from white below, in pixels.
+    /// Its distance from white below, in pixels.
     pub reach_px: f64,
     /// The same in millimetres.
     pub reach_mm: Option<f64>,
@@ -288,7 +288,7 @@ pub struct OffBalanceRecord {
     pub layer: LayerPlace,
     /// The index of the layer after which it is farthest off.
     pub worst_layer: u32,
-    /// How far it is then from its base, in pixels.
+    /// The distance of its centre of gravity from its base then, in pixels.
     pub off_px: f64,
     /// The same in millimetres.
     pub off_mm: Option<f64>,

@@ -66,7 +66,7 @@ impl<'a> Scale<'a> {
         Some(to_nm(pixels_um / 1000.0 * pitch.powi(2)))
     }
 
-    /// Returns a layer by its place among those that were checked, from 0.
+    /// Returns a layer by its place among the layers that were checked, from 0.
     pub fn layer(&self, layer: u32) -> LayerPlace {
         let facts = &self.findings.layers[layer as usize];
         LayerPlace { layer: facts.index, z_mm: facts.z_um.map(|um| to_nm(um / 1000.0)) }

@@ -1,4 +1,4 @@
-//! What is said of each kind of findings.
+//! The name and the text of each kind of findings, and its place.
 
 use std::fmt;
 
