@@ -3,21 +3,25 @@
 use std::fmt;
 use std::io;
 
+use lamp_adaptive::HeightsError;
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_grayscale::exposure::{ExposureError, LampError};
-use lamp_machine::MachineLimit;
+use lamp_grayscale::material::MaterialError;
+use lamp_machine::{MachineError, MachineLimit};
 use lamp_offset::CompensateError;
 use lamp_pipeline::ErrorKind;
+use lamp_pipeline::compensate::NoDose;
 use lamp_planning::learn::{JobError, LearnError};
+use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::{PartError, PlatformError, SpeedPlanError};
 use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
-use lamp_stack::{JoinError, SplitError, StackError};
+use lamp_stack::{CatalogueError, JoinError, SplitError, StackError};
 use lamp_supports::{CheckError, SupportError};
 use lamp_view::SurfaceError;
 
@@ -121,14 +125,28 @@ impl fmt::Display for Exit {
     }
 }
 
-/// Makes errors of libraries failures.
+/// Makes errors of libraries failures, and finds their types again behind boxes, so that hints know
+/// them.
 macro_rules! failures {
-    ($($error:ty),+ $(,)?) => {
+    ($($error:ty),+ $(,)?; boxed only: $($boxed:ty),+ $(,)?) => {
         $(impl From<$error> for Exit {
             fn from(error: $error) -> Self {
                 Self::Failed(error.into())
             }
         })+
+
+        /// Returns the error in a box under its own type.
+        pub(crate) fn unboxed(cause: Box<dyn std::error::Error + Send + Sync>) -> anyhow::Error {
+            $(let cause = match cause.downcast::<$error>() {
+                Ok(error) => return anyhow::Error::new(*error),
+                Err(cause) => cause,
+            };)+
+            $(let cause = match cause.downcast::<$boxed>() {
+                Ok(error) => return anyhow::Error::new(*error),
+                Err(cause) => cause,
+            };)+
+            anyhow::Error::from_boxed(cause)
+        }
     };
 }
 
@@ -159,7 +177,9 @@ failures!(
     DataError,
     FitError,
     ExposureError,
-    LampError,
+    LampError;
+    boxed only: StackError, io::Error, HeightsError, NoDose,
+    CatalogueError<MaterialError>, CatalogueError<MachineError>, CatalogueError<ProjectorError>,
 );
 
 /// Tells failures to write from stacks without layers; errors of the layers pass through as they
@@ -178,8 +198,7 @@ impl From<lamp_pipeline::Error> for Exit {
     fn from(error: lamp_pipeline::Error) -> Self {
         let kind = error.kind();
         let (cause, places) = error.into_parts();
-        let error =
-            places.into_iter().fold(anyhow::Error::from_boxed(cause), anyhow::Error::context);
+        let error = places.into_iter().fold(unboxed(cause), anyhow::Error::context);
         match kind {
             ErrorKind::Settings => Self::Usage(error),
             ErrorKind::Work => Self::Failed(error),
