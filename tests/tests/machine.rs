@@ -57,6 +57,9 @@ fn a_part_within_the_limits_is_sliced_as_without_a_machine() {
     let command = &mut stack.commands[0];
     let machine = command.find(" --machine mine.toml@blake3:").expect("the machine");
     command.truncate(machine);
+    let record = stack.other["slice"].as_object_mut().unwrap();
+    let word = record.shift_remove("machine").unwrap();
+    assert!(word.as_str().unwrap().starts_with("mine.toml@blake3:"), "{word}");
     assert!(limited == plain);
 }
 

@@ -175,11 +175,17 @@ fn broken_bytes(mut bytes: Vec<u8>, fault: Fault) -> Vec<u8> {
 }
 
 fn broken_file(mut bytes: Vec<u8>, fault: Fault) -> Vec<u8> {
-    if matches!(fault, Cut | Empty | Changed) {
+    let is_tiff = matches!(bytes[..2], [b'I', b'I']);
+    if matches!(fault, Cut | Empty) || !is_tiff {
         return broken_bytes(bytes, fault);
     }
-    // Each page begins where a link says so: the one in the header, or that of the page before.
+    // Each page begins where a link says so: the one in the header, or the one of the page before.
     let (links, pages) = chain_of(&bytes);
+    if fault == Changed {
+        // Behind its directory, which `info` takes at its word, a page has its text and its code.
+        bytes[links[PAGES / 2].midpoint(pages[PAGES / 2])] ^= 0x10;
+        return bytes;
+    }
     let last = PAGES - 1;
     let order: Vec<usize> = match fault {
         FirstMissing => (1..PAGES).collect(),
