@@ -39,6 +39,7 @@ errors!(
     Edit(EditError),
     Exposure(ExposureError),
     Heights(HeightsError),
+    Io(std::io::Error),
     Layout(LayoutError),
     Light(LightError),
     Machine(MachineLimit),

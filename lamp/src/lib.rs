@@ -86,7 +86,7 @@
 //!
 //! let layer = |index: u32, changes: Vec<u32>| {
 //!     // All ten rows are alike: white from each first column to the second.
-//!     let rows = (0..=10).map(|row| row * changes.len()).collect();
+//!     let rows = (0..=10).map(|row| row * changes.len() as u32).collect();
 //!     let image = Mask::new(20, rows, changes.repeat(10)).unwrap().into();
 //!     let z_um = Some(100.0 * f64::from(index));
 //!     let info = PageInfo { index, z_um, thickness_um: Some(100.0), ..PageInfo::default() };

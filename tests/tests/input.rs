@@ -190,7 +190,7 @@ fn a_wild_vertex_is_refused_at_once_unless_it_is_trusted() {
     assert!(ran.stderr.contains("larger than any machine builds"), "{ran:?}");
     let layers = scratch.layers("out.tif");
     let command = &layers[0].info.stack.as_ref().unwrap().commands[0];
-    assert!(command.ends_with(" --trust-extent"), "{command}");
+    assert!(command.contains(" --trust-extent "), "{command}");
     // Few facets are no reason to doubt one of them, but rows without end are.
     scratch
         .mesh("long.stl", &build(Sample::Cube, 64).unwrap().map(|corner| corner.map(|c| c * 1e4)));
