@@ -7,6 +7,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs::File;
 use std::io::{self, Cursor, Write};
 use std::os::fd::AsFd;
+use std::panic;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering::Relaxed};
 use std::thread;
@@ -20,10 +21,22 @@ use crate::terminal::signals::say_no_more;
 /// The command's name, for the message.
 static COMMAND: OnceLock<String> = OnceLock::new();
 
-/// Notes the name of the command that runs.
+/// Notes the name of the command that runs, and sets up its end where memory runs out.
 pub(crate) fn note_command(name: &str) {
     COMMAND.get_or_init(|| name.to_owned());
+    let usual = panic::take_hook();
+    panic::set_hook(Box::new(move |panic| {
+        // A thread that finds no memory for its signal stack panics in the standard library.
+        let why = panic.payload().downcast_ref::<String>();
+        if why.is_some_and(|why| why.contains("allocate an alternative stack")) {
+            end(SIGNAL_STACK_BYTES);
+        }
+        usual(panic);
+    }));
 }
+
+/// The stack on which a thread of Linux takes signals: `SIGSTKSZ`.
+const SIGNAL_STACK_BYTES: usize = 8192;
 
 /// The status that the process ends with.
 static STATUS: AtomicI32 = AtomicI32::new(1);
