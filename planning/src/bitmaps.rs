@@ -14,12 +14,12 @@ pub struct ShownBitmap {
     pub time: ExposureTime,
 }
 
-/// For how many seconds of white light each mirror is on.
+/// The seconds of white light for which each mirror is on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MirrorSeconds {
-    /// Mirrors along x and y: as far as any is on, and as many on the opposite side of the axis.
+    /// Mirrors along x and y: up to the last one that is on, and as many on the opposite side.
     pub mirrors: [usize; 2],
-    /// Row by row.
+    /// The times, row by row.
     pub seconds: Vec<f64>,
 }
 
@@ -28,7 +28,7 @@ impl MirrorSeconds {
     pub fn of(bitmaps: &[ShownBitmap], share: impl Fn(u8) -> f64) -> Self {
         let first = bitmaps.first().map(|bitmap| &bitmap.image);
         let [width, height] = first.map_or([1, 1], |image| [image.width(), image.height()]);
-        // Dark mirrors between a place and the nearer side.
+        // The number of dark mirrors between a place and the nearer side.
         let beside = |at: u32, count: u32| at.min(count - 1 - at);
         let most = [(width - 1) / 2, (height - 1) / 2];
         let dark = runs(bitmaps).fold(most, |[x, y], (row, columns, ..)| {

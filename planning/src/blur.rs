@@ -57,7 +57,7 @@ real!(f32, f64);
 /// Light is left out where it is less than this share of its peak: beyond 4.8 σ.
 const FAINTEST: f64 = 1e-5;
 
-/// Columns that are summed up together. The width of images is a multiple of it.
+/// Columns that are summed together. The width of images is a multiple of it.
 pub(crate) const LANES: usize = 32;
 
 /// A Gaussian of standard deviation σ, cut off where it is a hundred-thousandth of its peak.
@@ -75,7 +75,7 @@ pub(crate) const LANES: usize = 32;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Blur<T> {
-    /// The weights at distances 0, 1, ...: that at 0 is 1.
+    /// The weights at distances 0, 1, ...: the weight at 0 is 1.
     taps: Vec<T>,
 }
 
@@ -84,36 +84,37 @@ impl<T: Real> Blur<T> {
     pub fn new(sigma: f64) -> Self {
         let tap = |distance: usize| {
             let distance = distance as f64;
-            // Of σ = 0, 0/0 would be no number.
+            // With σ = 0, 0/0 would not be a number.
             if distance == 0.0 { 1.0 } else { (-distance * distance / (2.0 * sigma * sigma)).exp() }
         };
-        // Light that spreads wider is refused: this only bounds the memory until then.
+        // Wider light is rejected elsewhere: this only bounds the memory until then.
         let taps = (0..2048).map(tap).take_while(|&tap| tap >= FAINTEST).map(T::of).collect();
         Self { taps }
     }
 
-    /// Returns the weights at distances 0, 1, ... along a row or a column: that at 0 is 1.
+    /// Returns the weights at distances 0, 1, ... along a row or a column: the weight at 0 is 1.
     pub(crate) fn taps(&self) -> &[T] {
         &self.taps
     }
 
-    /// Returns how far light spreads, in pixels.
+    /// Returns the distance to which light spreads, in pixels.
     pub fn radius(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// Returns what a wide white image has at each pixel: the sum of all weights.
+    /// Returns the light of a wide white image at each pixel: the sum of all weights.
     pub fn sum(&self) -> f64 {
         let side: f64 = self.taps[1..].iter().map(|tap| tap.f64()).sum();
-        // 001 eq. 5 in two dimensions is a product of one along rows and one along columns.
+        // The two-dimensional Gaussian of 001 eq. 5 is the product of one along rows and one along
+        // columns.
         (2.0 * side + 1.0).powi(2)
     }
 
     /// Spreads the light of an image given row by row, with black around it. `width` must be a
-    /// multiple of 32. `room` is working space, whose content is of no matter.
+    /// multiple of 32. `room` is working space, whose content does not matter.
     ///
     /// # Panics
-    /// Panics if the images are not equally large, or no whole number of rows.
+    /// Panics if the images differ in size, or do not consist of whole rows.
     pub fn apply(&self, image: &[T], width: usize, light: &mut [T], room: &mut Vec<T>) {
         assert_eq!(image.len(), light.len(), "both images are equally large");
         assert!(width.is_multiple_of(LANES) && image.len().is_multiple_of(width.max(1)));
@@ -155,8 +156,8 @@ impl<T: Real> Blur<T> {
     }
 }
 
-/// Sums up what lies symmetrically around each place: `out[x]` gets `from[start + x]` and its
-/// neighbours at multiples of `step`.
+/// Adds the values on both sides of each place: `out[x]` gets `from[start + x]` and its neighbors
+/// at multiples of `step`.
 #[inline(always)]
 fn gather<T: Real>(taps: &[T], from: &[T], start: usize, step: usize, out: &mut [T]) {
     for (lanes, out) in out.chunks_exact_mut(LANES).enumerate() {
@@ -164,7 +165,7 @@ fn gather<T: Real>(taps: &[T], from: &[T], start: usize, step: usize, out: &mut 
     }
 }
 
-/// Sums up what lies symmetrically around the places from `centre` on.
+/// Adds the values on both sides of the places from `centre` on.
 #[inline(always)]
 fn around<T: Real>(taps: &[T], from: &[T], centre: usize, step: usize) -> [T; LANES] {
     let mut sums = [T::default(); LANES];
@@ -190,11 +191,11 @@ pub(crate) struct Chunks<T> {
     width: usize,
     /// Where each chunk begins in the image, in order.
     at: Vec<usize>,
-    /// Where light that has spread along rows is needed, to spread across them.
+    /// The places where light that has spread along rows is needed, to spread across them.
     along: Vec<usize>,
 }
 
-/// Room to blur chunks in.
+/// Working space to blur chunks.
 #[derive(Default)]
 pub(crate) struct ChunkRoom<T> {
     lines: Vec<T>,
@@ -202,13 +203,14 @@ pub(crate) struct ChunkRoom<T> {
 }
 
 impl<T: Real> Chunks<T> {
-    /// Creates the chunks of an image of so many rows and columns that begin `at` these pixels.
+    /// Creates the chunks that begin `at` these pixels of an image with this number of rows and
+    /// columns.
     pub(crate) fn new(blur: Blur<T>, rows: usize, width: usize, at: Vec<usize>) -> Self {
         let across = width / LANES;
         let mut is_needed = vec![false; rows * across];
         for chunk in at.iter().map(|at| at / LANES) {
             let (row, column) = (chunk / across, chunk % across);
-            // Light spreads along rows first; the rows that spread into a chunk later are those
+            // Light spreads along rows first; the rows that spread into a chunk later are the rows
             // within the radius.
             let near = row.saturating_sub(blur.radius())..(row + blur.radius() + 1).min(rows);
             near.for_each(|row| is_needed[row * across + column] = true);
@@ -218,7 +220,7 @@ impl<T: Real> Chunks<T> {
         Self { blur, rows, width, at, along }
     }
 
-    /// Returns the pixels of all chunks.
+    /// Returns the number of pixels of all chunks.
     pub(crate) fn pixels(&self) -> usize {
         self.at.len() * LANES
     }

@@ -9,8 +9,8 @@ use crate::tiled::{Rect, Tile, TileGrid, Tiled};
 /// A tile whose doses differ by less than this share of the largest is stored as one dose.
 const SAME: f32 = 1e-6;
 
-/// Returns the doses of a layer from those of the layer above, and its own levels. `light` is the
-/// light of each level.
+/// Returns the doses of a layer from its own levels and the doses of the layer above. `light` is
+/// the light of each level.
 pub(crate) fn next_layer(
     above: &Tiled<f32>,
     levels: &Tiled<u8>,
@@ -23,7 +23,7 @@ pub(crate) fn next_layer(
     let wide = own * blur.sum() as f32;
     let tiles = (0..grid.tile_count()).into_par_iter().map_init(Room::default, |room, tile| {
         let rect = grid.tile(tile);
-        // Deep inside and outside of a part all doses of a tile are one, which needs no memory.
+        // Deep inside and outside of a part, all doses of a tile are equal, and take no memory.
         let from = &above.tiles[tile];
         if let (Tile::Flat(above), Some(level)) =
             (from, levels.value_in(&rect.grown(blur.radius()), 0))
@@ -68,7 +68,7 @@ fn flat_if_same(doses: Box<[f32]>, rect: &Rect, grid: TileGrid) -> Tile<f32> {
     }
 }
 
-/// Room to spread light in.
+/// Working space to spread light.
 #[derive(Default)]
 pub(crate) struct Room {
     levels: Vec<u8>,
@@ -95,8 +95,8 @@ impl SpreadLight<'_> {
 }
 
 impl Room {
-    /// Spreads light over a rectangle. `fill` writes the light of the wider rectangle that it is
-    /// given, in lines of the given stride.
+    /// Spreads light over a rectangle. `fill` writes the light of the wider rectangle that it gets,
+    /// in lines of the given stride.
     pub(crate) fn spread(
         &mut self,
         rect: &Rect,

@@ -1,12 +1,12 @@
-//! Exposure planners: what to expose, so that the doses of all layers together cure the part.
+//! Exposure planners: choose the light so that the doses of all layers together cure the part.
 //!
-//! - [`Light`] is the model that the planners share: what a pixel of a layer adds to the dose of
-//!   each voxel, from a material's numbers.
+//! - [`Light`] is the model that the planners share: the dose that a pixel of a layer adds to each
+//!   voxel, from a material's numbers.
 //! - [`Blur`] spreads the light of an image sideways.
 //! - [`speed`] plans the time of each layer, [`learn`] corrects it after every print.
-//! - [`cure_section`] says what a stack cures along a vertical section.
-//! - [`projector`] and [`target`] are what planners on a fixed glass start from, a [`PlanFolder`] is
-//!   where they end.
+//! - [`cure_section`] computes the resin that a stack cures along a vertical section.
+//! - Planners on a fixed glass start from a [`projector`] and a [`target`], and write a
+//!   [`PlanFolder`].
 
 mod bitmaps;
 mod blur;

@@ -1,4 +1,4 @@
-//! The model of planners: what a pixel of a layer adds to the dose of every voxel.
+//! The model of planners: the dose that a pixel of a layer adds to every voxel.
 
 use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
 use lamp_stack::{Dpi, Length};
@@ -7,39 +7,39 @@ use thiserror::Error;
 
 use crate::blur::Blur;
 
-/// Where in its layer a voxel's dose is told.
+/// The height in each layer at which a voxel's dose is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SampleHeight {
     /// At the top, where light enters.
     #[default]
     Top,
-    /// Half-way.
+    /// Halfway.
     Middle,
-    /// At the bottom, where the layer must reach what it rests on.
+    /// At the bottom, where the layer must reach the layer or platform below it.
     Bottom,
 }
 
 lamp_stack::named!(SampleHeight { Top = "top", Middle = "middle", Bottom = "bottom" });
 
-/// What a resin's intensity is that of.
+/// The light that a resin's intensity describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IntensityOf {
     /// A wide white field, as radiometers read it.
     Field,
-    /// The centre of one lit pixel of this size alone (001 eq. 5).
+    /// The center of one lit pixel of this size alone (001 eq. 5).
     Pixel(Length),
 }
 
 /// How light spreads in a resin, fades with depth, and cures (001 eq. 1 to 6 and 10; 004 eq.
 /// 2.2 to 2.5 and 2.14).
 ///
-/// Doses are told in units of the critical dose: a voxel of dose 1 or more is cured.
+/// Doses are in units of the critical dose: a voxel of dose 1 or more is cured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// The light of full white, `I_0`.
     pub intensity: Intensity,
-    /// What `intensity` is that of.
+    /// The light that `intensity` describes.
     pub intensity_of: IntensityOf,
     /// The dose that cures, `E_c`.
     pub critical_dose: Dose,
@@ -49,7 +49,7 @@ pub struct Light {
     pub spread: Length,
     /// The exponent `γ` that turns a gray level `g` into light `(g / 255)^γ`.
     pub gamma: f64,
-    /// Where in its layer a voxel's dose is told.
+    /// The height in each layer at which a voxel's dose is computed.
     pub at: SampleHeight,
 }
 
@@ -60,7 +60,7 @@ pub enum LightError {
     /// A number of the model is not above zero, or not finite.
     #[error("{0} must be above zero")]
     NotPositive(&'static str),
-    /// Light spreads over more pixels than can be computed with.
+    /// Light spreads over more pixels than can be computed.
     #[error("light spreads over {pixels} pixels (σ), more than {MOST_SPREAD}")]
     TooWide {
         /// The standard deviation.
@@ -68,10 +68,10 @@ pub enum LightError {
     },
 }
 
-/// The widest spread, in pixels. Real ones are some ten.
+/// The widest spread, in pixels. Real spreads are some ten pixels.
 const MOST_SPREAD: u64 = 256;
 
-/// How thick a layer is and how long it is exposed.
+/// The thickness of a layer and its exposure time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerTime {
     /// Its thickness.
@@ -80,14 +80,14 @@ pub struct LayerTime {
     pub time: ExposureTime,
 }
 
-/// What reaches the voxels of a layer, in units of the critical dose:
+/// The light that reaches the voxels of a layer, in units of the critical dose:
 /// `e = passed * e_above + own * (G a)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerLight {
     /// The share of the dose of the layer above (nearer to the light) that passes down to this
     /// one: `q`.
     pub passed: f64,
-    /// The dose of a lit pixel at its own centre, from its own exposure, for light 1.
+    /// The dose of a lit pixel at its own center, from its own exposure, for light 1.
     pub own: f64,
 }
 
@@ -130,9 +130,10 @@ impl Light {
         self.spread.um() / dpi.pitch().um()
     }
 
-    /// Returns what reaches each layer. Layers count from the light: the last page comes first.
+    /// Returns the light that reaches each layer. Layers count from the light: the last page comes
+    /// first.
     pub fn layers(&self, dpi: Dpi, layers: &[LayerTime]) -> Vec<LayerLight> {
-        // 001 gives the light at the centre of one pixel's Gaussian; radiometers read a wide field,
+        // 001 gives the light at the center of one pixel's Gaussian; radiometers read a wide field,
         // where the Gaussians of all pixels add up.
         let weight = match self.intensity_of {
             IntensityOf::Field => 1.0 / Blur::<f64>::new(self.spread_pixels(dpi)).sum(),
@@ -158,7 +159,7 @@ impl Light {
 
     /// Returns the light of a gray level: 0 to 1 (001 eq. 10, whose factor 3 is in the intensity).
     pub fn of_level(&self, level: u8) -> f64 {
-        // A power of zero light is zero, and of white one, whatever γ: black and white stay.
+        // A power of zero light is zero, and of white light one, whatever γ: black and white stay.
         (f64::from(level) / 255.0).powf(self.gamma)
     }
 
@@ -202,7 +203,7 @@ mod tests {
             let peak = 7.394 / 7.266 / Blur::<f64>::new(5.0).sum();
             let mut share = 1.0;
             for (layer, depth_um) in layers.iter().zip(depths_um) {
-                // The light of the topmost layer at the places of all.
+                // The light of the topmost layer at the places of all layers.
                 share *= if depth_um == depths_um[0] { layer.own / peak } else { layer.passed };
                 let expected = (-depth_um / 877.9_f64).exp();
                 assert!((share - expected).abs() < 1e-12, "{at:?} {depth_um}");

@@ -1,4 +1,4 @@
-//! The folder of a plan on a fixed glass: bitmaps in order, and files beside them.
+//! The folder of a plan on a fixed glass: bitmaps in order, and other files next to the stack.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,22 +11,22 @@ use thiserror::Error;
 
 use crate::bitmaps::ShownBitmap;
 
-/// A folder for a plan, which gets its name when all of it is written.
+/// A folder for a plan, which gets its name when it is completely written.
 pub struct PlanFolder {
     folder: FolderBeside,
     name: PathBuf,
 }
 
-/// The bitmaps of a plan, and what their pages say.
+/// The bitmaps of a plan, and the data of their pages.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanPages<'a> {
-    /// The target's name, or another for what is cured.
+    /// The target's name, or another for the cured part.
     pub part: &'a str,
     /// The command that made the plan.
     pub command: &'a str,
-    /// From the image of a mirror to the image of the next.
+    /// The distance between neighboring mirrors' images.
     pub pitch: Length,
-    /// In the order in which they are displayed.
+    /// The bitmaps, in the order in which they are displayed.
     pub bitmaps: &'a [ShownBitmap],
 }
 
@@ -67,7 +67,7 @@ impl PlanFolder {
     /// The name of the stack of bitmaps.
     pub const BITMAPS: &'static str = "bitmaps.tif";
 
-    /// Takes a folder that is to have a name.
+    /// Takes a folder and the name that it is to get.
     pub fn new(folder: FolderBeside, name: &Path) -> Self {
         Self { folder, name: name.to_owned() }
     }
@@ -97,7 +97,7 @@ impl PlanFolder {
     /// Gives the folder its name.
     ///
     /// # Errors
-    /// Returns an error if the disk cannot take it, or there is something of that name.
+    /// Returns an error if the disk cannot take it, or if the name already exists.
     pub fn finish(self) -> Result<(), PlanFolderError> {
         let folder = self.name;
         self.folder.persist().map_err(|problem| PlanFolderError::Name { folder, problem })
@@ -129,7 +129,7 @@ impl PlanPages<'_> {
     }
 }
 
-/// Mirrors an inch on the glass, to the four decimals that stacks have.
+/// Mirrors per inch on the glass, to the four decimals that stacks have.
 fn resolution(pitch: Length) -> Option<Dpi> {
     Dpi::new((25_400.0 / pitch.um() * 1e4).round() / 1e4)
 }

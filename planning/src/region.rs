@@ -7,10 +7,10 @@ use lamp_stack::{Dpi, Image};
 use crate::blur::{Blur, LANES};
 use crate::light::{LayerTime, Light};
 
-/// The doses of the voxels in a rectangle of one layer, from its own exposure and those of the
-/// layers above it (001 eq. 5 and 6).
+/// The doses of the voxels in a rectangle of one layer, from its own exposure and the exposures of
+/// the layers above it (001 eq. 5 and 6).
 ///
-/// Memory grows with the rectangle and what light reaches it from around.
+/// Memory grows with the rectangle and the surroundings from which light reaches it.
 #[derive(Clone, Debug)]
 pub struct RegionDoses {
     light: Light,
@@ -18,7 +18,7 @@ pub struct RegionDoses {
     columns: Range<u32>,
     rows: Range<u32>,
     blur: Blur<f64>,
-    /// The layer exposed last, and how much of a dose there reaches the rectangle.
+    /// The layer exposed last, and the share of its dose that reaches the rectangle.
     last: Option<(LayerTime, f64)>,
     doses: Vec<f64>,
 }
@@ -31,8 +31,8 @@ impl RegionDoses {
         Self { light, dpi, columns, rows, blur, last: None, doses }
     }
 
-    /// Exposes the layer itself, and then, from the bottom up, those above it. `light_of` says how
-    /// much light a level that is not black passes: 0 to 1.
+    /// Exposes the layer itself, and then, from the bottom up, the layers above it. `light_of`
+    /// returns the light that a level that is not black passes: 0 to 1.
     pub fn expose(&mut self, image: &Image, exposed: LayerTime, light_of: impl Fn(u8) -> f64) {
         let passed = match self.last {
             None => 1.0,
@@ -51,7 +51,8 @@ impl RegionDoses {
         }
     }
 
-    /// Returns the light that has spread in the rectangle and around it, and how wide that is.
+    /// Returns the light that has spread in the rectangle and around it, and the width of that
+    /// area.
     fn spread(&self, image: &Image, light_of: impl Fn(u8) -> f64) -> (Vec<f64>, usize) {
         // Pixels outside the rectangle shine into it from as far as light spreads.
         let reach = self.blur.radius() as i64;

@@ -10,13 +10,13 @@ use crate::light::{IntensityOf, Light, SampleHeight};
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoLight {
-    /// It does not say how far light spreads sideways.
+    /// It does not state the sideways spread of light.
     #[error("{0} does not say how far light spreads sideways: add [spread] to its file")]
     Spread(String),
-    /// It does not say how bright full white is.
+    /// It does not state the intensity of full white.
     #[error("{0} does not say how bright full white is: add [intensity] to its file")]
     Intensity(String),
-    /// It does not say which dose cures, and how deep.
+    /// It does not state which dose cures to which depth.
     #[error("{0} does not say which dose cures how deep: add [working-curve] to its file")]
     WorkingCurve(String),
     /// A number is impossible.
@@ -25,21 +25,21 @@ pub enum NoLight {
 }
 
 impl Light {
-    /// Returns the light of a material, whose doses are told `at` a height of each layer.
+    /// Returns the light of a material, with doses computed `at` a height of each layer.
     ///
     /// # Errors
-    /// Returns an error if the material does not say how light spreads, how bright white is or
+    /// Returns an error if the material does not state how light spreads, how bright white is or
     /// which dose cures, or if one of its numbers is impossible.
     pub fn of(material: &Material, at: SampleHeight) -> Result<Self, NoLight> {
         let spread = material.spread()?.ok_or_else(|| NoLight::Spread(material.name.clone()))?;
         Self::spreading(material, spread, at)
     }
 
-    /// Returns the light of a material as [`Self::of`] does, or, if the material does not say how
-    /// it spreads, light that goes straight down.
+    /// Returns the light of a material as [`Self::of`] does, or, if the material does not state its
+    /// spread, light that goes straight down.
     ///
     /// # Errors
-    /// As [`Self::of`], but for a missing spread.
+    /// As [`Self::of`], except for a missing spread.
     pub fn of_any(material: &Material, at: SampleHeight) -> Result<Self, NoLight> {
         Self::spreading(material, material.spread()?.unwrap_or(Spread::NONE), at)
     }

@@ -6,10 +6,10 @@ use lamp_stack::{Dpi, Image, Length};
 use crate::blur::Blur;
 use crate::light::{LayerTime, Light, SampleHeight};
 
-/// What a stack cures along a row or column of pixels, where doses add up and light spreads
-/// sideways and down (001 eq. 5).
+/// The resin that a stack cures along a row or column of pixels, where doses add up and light
+/// spreads sideways and down (001 eq. 5).
 ///
-/// Memory grows with the places where the light along the line changes.
+/// Memory grows with the number of places where the light along the line changes.
 ///
 /// ```
 /// use lamp_grayscale::PixelLine;
@@ -56,8 +56,8 @@ impl DoseSection {
         Self { light, dpi, line, blur, layers: Vec::new() }
     }
 
-    /// Exposes a layer on top of those before. `light_of` says how much light a level that is
-    /// not black passes: 0 to 1.
+    /// Exposes a layer on top of the layers before. `light_of` returns the light that a level that
+    /// is not black passes: 0 to 1.
     ///
     /// # Panics
     /// Panics if the line does not cross the image.
@@ -74,7 +74,7 @@ impl DoseSection {
         self.layers.push(ExposedLayer { bottom, exposed, spread });
     }
 
-    /// Returns the light that spreads to each pixel of the line from those beside the line.
+    /// Returns the light that spreads to each pixel of the line from the pixels beside the line.
     fn gathered_across(&self, image: &Image, light_of: impl Fn(u8) -> f64) -> Vec<f64> {
         let mut light = vec![0.0; self.line.len(image) as usize];
         let taps = self.blur.taps();
@@ -96,7 +96,7 @@ impl DoseSection {
                 for (row, light) in (0..image.height()).zip(&mut light) {
                     for (start, end, level) in image.runs(row) {
                         let columns = start.max(first)..end.min(end_of_band);
-                        // A run is one level: its weights are added before they are multiplied.
+                        // A run has one level: its weights are added before they are multiplied.
                         let taps = columns.map(|column| taps[column.abs_diff(at) as usize]);
                         *light += taps.sum::<f64>() * light_of(level);
                     }
@@ -124,7 +124,7 @@ impl DoseSection {
     }
 
     /// Calls `each` with every layer's number and the doses at the pixels of the line, in units of
-    /// the critical dose, from the last layer down. The pixels are those of the widest image.
+    /// the critical dose, from the last layer down. The pixels are the pixels of the widest image.
     pub fn for_each_layer(&self, mut each: impl FnMut(usize, &[f64])) {
         let from_top: Vec<_> = self.layers.iter().rev().map(|layer| layer.exposed).collect();
         let ends = self.layers.iter().filter_map(|layer| layer.spread.last());
@@ -132,7 +132,7 @@ impl DoseSection {
         let mut doses = vec![0.0; pixels as usize];
         let lights = self.light.layers(self.dpi, &from_top);
         for ((number, layer), light) in self.layers.iter().enumerate().rev().zip(lights) {
-            // 001 eq. 5 from the light down: the light that all layers above have left fades together.
+            // 001 eq. 5 from the light down: the light passed from all layers above fades together.
             doses.iter_mut().for_each(|dose| *dose *= light.passed);
             let mut start = 0;
             for &(end, spread) in &layer.spread {
@@ -144,8 +144,8 @@ impl DoseSection {
         }
     }
 
-    /// Returns the heights at which each pixel of the line is cured: a layer is where its dose
-    /// is the critical one or more.
+    /// Returns the heights at which each pixel of the line is cured: a layer is cured where its
+    /// dose is the critical one or more.
     pub fn cured(&self) -> Vec<SolidHeights> {
         let mut cured = Vec::new();
         self.for_each_layer(|number, doses| {
@@ -161,10 +161,10 @@ impl DoseSection {
     }
 
     /// Returns the heights at which each pixel of the line is cured, wherever in a layer the dose
-    /// is the critical one or more. Doses must be told at the layers' tops.
+    /// is the critical one or more. Doses must be computed at the layers' tops.
     ///
     /// # Panics
-    /// Panics if they are told elsewhere.
+    /// Panics if they are computed elsewhere.
     pub fn cured_by_height(&self) -> Vec<SolidHeights> {
         assert_eq!(self.light.at, SampleHeight::Top, "doses are those of the tops");
         let depth_um = self.light.penetration_depth.um();
@@ -176,7 +176,7 @@ impl DoseSection {
             cured.resize(doses.len(), SolidHeights::new());
             for (solid, dose) in cured.iter_mut().zip(doses).filter(|(_, dose)| **dose > 1.0) {
                 // 002 eq. 30 for the sum of doses, which all fade over one depth; below the layer,
-                // the next one goes on.
+                // the next one continues.
                 let from = top_um - (depth_um * dose.ln()).min(thick_um);
                 add_below(solid, [from, top_um]);
             }
@@ -243,7 +243,7 @@ mod tests {
         }
         let q = (-50.0_f64 / 300.0).exp();
         for (number, doses) in doses(&section).iter().enumerate() {
-            // 10 mW/cm² for 100 ms of 8 mJ/cm², and what all layers above leave.
+            // 10 mW/cm² for 100 ms of 8 mJ/cm², and the light passed from all layers above.
             let exact = 0.125 * (1.0 - q.powi(20 - number as i32)) / (1.0 - q);
             assert!((doses[30] - exact).abs() < 1e-6, "{number}");
         }
@@ -303,7 +303,7 @@ mod tests {
         Image::Gray(gray)
     }
 
-    /// What a layer's light brings to a place in it, were it not for depth.
+    /// Returns the light that a layer brings to a place in it, without fading over depth.
     fn spread_to([row, column]: [usize; 2], layer: usize, light: &Light) -> f64 {
         let pixels = (0..SIZE[1]).flat_map(|r| (0..SIZE[0]).map(move |c| [r, c]));
         let share = |[r, c]: [usize; 2]| {

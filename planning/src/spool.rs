@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 #[derive(Debug)]
 pub(crate) struct Spool {
     file: File,
-    /// Where each image begins, and how many bytes it has.
+    /// The start of each image, and its number of bytes.
     images: Vec<(u64, usize)>,
     end: u64,
 }
@@ -87,7 +87,7 @@ pub(crate) struct RunReader {
 }
 
 impl RunReader {
-    /// Reads pixels into a row; those after the last run are those of 0.
+    /// Reads pixels into a row; pixels after the last run have the value 0.
     pub(crate) fn row<V>(&mut self, row: &mut [V], of: impl Fn(u32) -> V) {
         let mut rest = row;
         while !rest.is_empty() {

@@ -1,4 +1,4 @@
-//! Images in square tiles, of which most have one value: the dose where nothing is near, say.
+//! Images in square tiles, most of which have one value, for example the dose away from all edges.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use std::ops::Range;
 pub(crate) struct TileGrid {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// The side of a tile; those at the right and at the bottom may reach beyond the image.
+    /// The side of a tile; tiles at the right and at the bottom may reach beyond the image.
     pub(crate) side: usize,
 }
 
@@ -34,7 +34,7 @@ impl Rect {
         Self { columns: grown(&self.columns), rows: grown(&self.rows) }
     }
 
-    /// Returns what both rectangles have in common.
+    /// Returns the intersection of both rectangles.
     pub(crate) fn within(&self, other: &Self) -> Self {
         let common = |a: &Range<isize>, b: &Range<isize>| {
             let start = a.start.max(b.start);
@@ -89,7 +89,7 @@ impl TileGrid {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Tile<V> {
     Flat(V),
-    /// Row by row, each `side` long, also of a tile that reaches beyond the image.
+    /// The values row by row, each row `side` long, even if the tile reaches beyond the image.
     Dense(Box<[V]>),
 }
 
@@ -141,7 +141,8 @@ impl<V: Copy + PartialEq> Tiled<V> {
         Ok(Self { grid, tiles })
     }
 
-    /// Copies a rectangle, row by row into lines of `stride`; `outside` is beyond the image.
+    /// Copies a rectangle, row by row into lines of `stride`; `outside` is the value beyond the
+    /// image.
     pub(crate) fn copy(&self, rect: &Rect, outside: V, stride: usize, out: &mut [V]) {
         out.fill(outside);
         for tile in self.grid.met(rect) {
@@ -165,8 +166,8 @@ impl<V: Copy + PartialEq> Tiled<V> {
         }
     }
 
-    /// Returns the value of all pixels of a rectangle, if they have one; `outside` is beyond the
-    /// image.
+    /// Returns the value of all pixels of a rectangle, if they have one; `outside` is the value
+    /// beyond the image.
     pub(crate) fn value_in(&self, rect: &Rect, outside: V) -> Option<V> {
         let beyond = rect.within(&self.grid.image()) != *rect;
         let mut value = beyond.then_some(outside);
@@ -190,8 +191,8 @@ impl<V: Copy + PartialEq> Tiled<V> {
         value
     }
 
-    /// Calls `each` with the values of a row's stretches within tiles, from the left, and their
-    /// lengths.
+    /// Calls `each` with the value and length of each stretch of a row within a tile, from the
+    /// left.
     pub(crate) fn runs_of_row(&self, row: usize, mut each: impl FnMut(V, usize)) {
         let first = row / self.grid.side * self.grid.across();
         for tile in first..first + self.grid.across() {

@@ -11,7 +11,7 @@ use lamp_stack::{Catalogued, Image, Length, Mask};
 const RAYS: Tracing = Tracing::Rays { points: 9, directions: 15 };
 const CERTAIN: Stop = Stop { gap: 1e-6, steps: 10_000 };
 
-/// 000's 151 x 151 mirrors over a target of so many columns along each side.
+/// 000's 151 x 151 mirrors over a target with this number of columns along each side.
 fn zhao(columns: usize, tracing: Tracing) -> GlassLight {
     let pitch_um = 4210.0 / 151.0;
     GlassLight::new(Setup {
@@ -56,7 +56,7 @@ fn measures(doses: &[f64], target: &HeightMap) -> Measures {
 
 #[test]
 fn exact_light_gives_the_smoother_sphere() {
-    // Worked out apart from this code, in Python.
+    // Computed separately from this code, in Python.
     let target = map("sphere", 300);
     let planned = |tracing| {
         plan(&zhao(300, tracing), &target, pegda(), &options(ColumnObjective::Dose)).unwrap()
@@ -68,7 +68,7 @@ fn exact_light_gives_the_smoother_sphere() {
     assert!((best.ra_um - 7.381).abs() < 0.002, "{best:?}");
     assert!((best.relative_rms - 0.04631).abs() < 1e-4, "{best:?}");
     assert!((best.highest_um - 84.998).abs() < 0.05, "{best:?}");
-    // Times planned by rays, in exact light: rays call 7.7 um 10.5.
+    // Times planned by rays, in exact light: rays report 10.5 um where it is 7.7.
     let rays = planned(RAYS);
     assert!((rays.best.error / 31232.8738 - 1.0).abs() < 1e-6, "{}", rays.best.error);
     let counted = measures(&rays.best_doses, &target);
@@ -100,7 +100,8 @@ fn five_gray_bitmaps_are_as_good_as_any_times() {
     assert!(gray.excess() < 1e-4, "{}", gray.excess());
     let measured = measures(&gray.doses, &target);
     assert!((measured.ra_um - 7.380).abs() < 0.002, "{measured:?}");
-    // 000's clusters, which have none at zero and times that are not solved again, give 18.6 um.
+    // 000's clusters, which have no cluster at zero and whose times are not solved again, give 18.6
+    // um.
     let white = plan(&light, &target, pegda(), &five).unwrap();
     assert!(measures(&white.doses, &target).ra_um < 15.2);
 }
@@ -154,7 +155,7 @@ fn what_cannot_be_planned_is_told() {
     let error = |light: &GlassLight, target: &HeightMap, options: &ColumnOptions| {
         plan(light, target, pegda(), options).unwrap_err().to_string()
     };
-    // 151 mirrors reach over 4.2 mm.
+    // 151 mirrors cover 4.2 mm.
     let wide = Grid { columns: 500, rows: 500, pitch_um: 10.0 };
     let wide = HeightMap { heights_um: vec![300.0; wide.count()], grid: wide };
     let said = error(&zhao(500, Tracing::Exact), &wide, &options(ColumnObjective::Dose));

@@ -1,4 +1,4 @@
-//! The helix and the slope of 001, planned, with its numbers and those of others' rules.
+//! The helix and the slope of 001, planned, compared with its numbers and with other rules.
 
 use lamp_fixtures::{HELIX_CURED, Voxels, dna_helix, overhang_slope};
 use lamp_grayscale::resin::{Dose, Intensity};
@@ -12,10 +12,10 @@ use lamp_stack::Length;
 /// A part and its light. Layers count from the light.
 struct Case {
     part: Voxels,
-    /// Light that passes a layer is 10 to the minus this.
+    /// The light that passes a layer is 10 to the minus this.
     fade: f64,
     sigma: f64,
-    /// The dose that cures, where a lit pixel alone has 1.
+    /// The dose that cures, where a single lit pixel has 1.
     critical: f64,
 }
 
@@ -105,7 +105,7 @@ impl Case {
     }
 }
 
-/// Returns by how many percent overcured voxels, and the cured volume, become fewer.
+/// Returns the reductions of overcured voxels and of the cured volume, in percent.
 fn percent_less(part: &Voxels, outcome: &Outcome) -> [f64; 2] {
     let less = |before: f64, after: f64| 100.0 * (1.0 - after / before);
     let [before, after] = [outcome.before.counts, outcome.after.counts];
@@ -151,8 +151,8 @@ fn nearly_nothing_of_the_helix_is_wrong_in_the_end() {
     assert!(outcome.bound <= outcome.after.cost && outcome.gap() <= 1.2e-3, "{}", outcome.gap());
 }
 
-/// What users of UVtools do against light from above: they dim pixels by the number of lit layers
-/// above, or light them above some lit layers only.
+/// The rules of UVtools users against light from above: dim pixels by the number of lit layers
+/// above, or light them only above some lit layers.
 #[test]
 fn rules_of_thumb_leave_most_overcured_voxels() {
     let helix = Case::helix();
@@ -172,7 +172,7 @@ fn rules_of_thumb_leave_most_overcured_voxels() {
     let less = percent_less((0..white.len()).map(dimmed).collect());
     assert!((less - 13.0).abs() < 2.0, "{less}");
 
-    // What lies below the part counts as lit: it is the platform.
+    // The space below the part counts as lit: it is the platform.
     let below =
         |voxel: usize, down: usize| white.get(voxel + down * plane).is_none_or(|&w| w > 0.0);
     let above_five =

@@ -1,5 +1,5 @@
-//! The numbers of 003 that its text or a solver of the same equations gives, with the tolerances
-//! that docs/plan.md tells.
+//! The numbers of 003 that its text or a solver of the same equations gives, with the tolerances of
+//! docs/plan.md.
 
 use std::sync::LazyLock;
 
@@ -83,7 +83,7 @@ fn with_the_light_of_table_1_the_same_plan_fills_the_chamber() {
     near(blurred.cure(&figure_11()).sag_um(), 179.3, 2.0);
 }
 
-/// From 90 to 10 % of the height in the middle of a line, 560 um wide, after 10 s.
+/// The width from 90 to 10 % of the height in the middle of a line, 560 um wide, after 10 s.
 fn edge_um(oxygen_diffusion: Diffusivity) -> f64 {
     let cells = Cells {
         shape: ChamberShape::Straight,
@@ -108,7 +108,7 @@ fn edge_um(oxygen_diffusion: Diffusivity) -> f64 {
 
 #[test]
 fn oxygen_rounds_the_edge_of_a_sharp_line() {
-    // Without diffusion the edge is as wide as the cells can tell.
+    // Without diffusion, the edge is as wide as the cells can resolve.
     near(edge_um(Diffusivity::from_m2_per_s(0.0)), 3.2, 0.2 * 3.0);
     near(edge_um(tmpta().oxygen_diffusion), 19.0, 0.2 * 19.0);
 }
@@ -233,7 +233,7 @@ fn a_part_aside_is_off_by_more_the_farther_it_lies() {
 fn bitmap_after_bitmap_begins_with_twelve_pixels() {
     let planned = plan(setting(LIGHT, BLUR_UM), 100.0, cap(100.0, 100.0), Method::Seed).unwrap();
     let first = &planned.exposures[0];
-    // The text has 7.9 s; its own equation 15 would take a film of 18 um.
+    // The text has 7.9 s; its own equation 15 would choose a film of 18 um.
     assert_eq!((first.reach(), first.time), (12, seconds(10.0)));
     assert!(planned.wanted.rms_um(&planned.cured) < 5.0);
 }

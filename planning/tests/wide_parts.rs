@@ -25,7 +25,7 @@ fn slab() -> impl Iterator<Item = Result<Layer, VoxelPlanError>> {
     })
 }
 
-/// Light that cures nothing of the topmost layers: white has 0.4, 0.69, 0.89, 1.04 E_c there.
+/// Light that cures no part of the topmost layers: white has 0.4, 0.69, 0.89, 1.04 E_c there.
 fn weak() -> Light {
     Light {
         intensity: Intensity::from_mw_per_cm2(4.0),

@@ -4,26 +4,26 @@ use lamp_stack::{GrayMask, Image, MaskBuilder};
 
 use super::clusters::Clusters;
 
-/// A bitmap, and how long it is shown.
+/// A bitmap and the time for which it is shown.
 #[derive(Clone, Debug)]
 pub struct Bitmap {
     /// White, or a gray level, where mirrors are on, on the whole display.
     pub image: Image,
-    /// In steps of the display.
+    /// The time, in steps of the display.
     pub steps: u64,
 }
 
-/// The mirrors that times are told for, in the middle of a display.
+/// The mirrors that get times, in the middle of a display.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mirrors {
     /// Along x and y.
     pub(super) count: [usize; 2],
-    /// The whole display's.
+    /// The same for the whole display.
     pub(super) display: [usize; 2],
 }
 
 impl Mirrors {
-    /// Returns the bitmap of mirrors that are on. `is_on` is asked by mirror.
+    /// Returns the bitmap of the mirrors for which `is_on` returns true.
     pub(super) fn mask(&self, is_on: impl Fn(usize) -> bool) -> Image {
         let [left, top] = [0, 1].map(|axis| (self.display[axis] - self.count[axis]) / 2);
         let mut image = MaskBuilder::new(self.display[0] as u32);
@@ -48,7 +48,7 @@ impl Mirrors {
         Image::Mask(image.finish())
     }
 
-    /// Returns the bitmap of gray levels, told by mirror.
+    /// Returns the bitmap of gray levels, where `level` returns the level of a mirror.
     pub(super) fn gray(&self, level: impl Fn(usize) -> u8) -> Image {
         let [left, top] = [0, 1].map(|axis| (self.display[axis] - self.count[axis]) / 2);
         let mut image = GrayMask::new(self.display[0] as u32);
@@ -66,8 +66,8 @@ impl Mirrors {
     }
 }
 
-/// Returns the bitmaps of clusters whose times, all together up to each, are `ends`, and for how
-/// many steps each mirror is on. Bitmaps that are shown for no step are left out.
+/// Returns the bitmaps of clusters, and the number of steps for which each mirror is on. `ends` are
+/// the sums of the times up to each cluster. Bitmaps that are shown for no step are left out.
 pub(super) fn black_and_white(
     mirrors: Mirrors,
     clusters: &[u16],
@@ -86,12 +86,12 @@ pub(super) fn black_and_white(
     (bitmaps, clusters.iter().map(of).collect())
 }
 
-/// Returns bitmaps of gray levels for times in steps of the display, and what these levels add up
-/// to. `shares` are the light of each level as a share of white's.
+/// Returns bitmaps of gray levels for times in steps of the display, and the times that these
+/// levels add up to. `shares` are the light of each level as a share of white's.
 ///
-/// 000 eq. 5.1 and 5.2, with the index put right: a bitmap lasts from the least time of its own
-/// cluster to that of the next, or to the longest time, and levels share that out. The first
-/// begins at zero, so that no time is below it.
+/// 000 eq. 5.1 and 5.2, with the index corrected: a bitmap lasts from the least time of its own
+/// cluster to the least time of the next one, or to the longest time, and gray levels divide that
+/// interval. The first bitmap begins at zero, so that no time is below it.
 pub(super) fn gray(
     mirrors: Mirrors,
     times: &[f64],

@@ -2,8 +2,8 @@
 
 use rayon::join;
 
-/// The clusters of times for which the sum of squares of how far times are from the mean of their
-/// cluster is least. Mirrors below the first are off, which is a cluster at time zero.
+/// The clusters of times with the least sum of squared distances from each time to the mean of its
+/// cluster. Mirrors below the first are off, which is a cluster at time zero.
 ///
 /// 000 finds clusters by k-means, which stays in a local minimum, and has no cluster at zero.
 /// Times along a line allow dynamic programming, which finds the least sum.
@@ -23,15 +23,15 @@ pub struct Clusters {
     "{wanted} bitmaps are more than the mirrors have distinct times: ask for {distinct} at most"
 )]
 pub struct TooFewTimes {
-    /// Clusters that are wanted.
+    /// The number of clusters that are wanted.
     pub wanted: usize,
-    /// Times above zero that differ by a step of the display.
+    /// The number of times above zero that differ by a step of the display.
     pub distinct: usize,
 }
 
 /// Sums over the distinct times up to each.
 struct PrefixSums {
-    /// Mirrors, their times, and the squares of them, told from the mean.
+    /// The number of mirrors, their times and the squares of these, relative to the mean.
     prefix: Vec<[f64; 3]>,
     mean: f64,
 }
@@ -43,7 +43,7 @@ impl PrefixSums {
         let mean = all / count as f64;
         let mut sums = [0.0; 3];
         let prefix = std::iter::once(sums).chain(times.iter().map(|&(time, count)| {
-            // Counted from the mean, squares lose no digits when large sums are subtracted.
+            // Relative to the mean, squares lose no digits when large sums are subtracted.
             let (time, count) = (time as f64 - mean, count as f64);
             sums = [sums[0] + count, sums[1] + count * time, sums[2] + count * time * time];
             sums
@@ -57,7 +57,7 @@ impl PrefixSums {
         [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
     }
 
-    /// Returns the sum of squares of how far times are from their mean.
+    /// Returns the sum of the squared distances of times from their mean.
     fn cost(&self, from: usize, to: usize) -> f64 {
         let [count, sum, squares] = self.between(from, to);
         // Σ (t - mean)² = Σ t² - (Σ t)² / n.
@@ -96,7 +96,8 @@ impl Clusters {
         Ok(Self { lowest, means, squares })
     }
 
-    /// Returns how many bitmaps light a mirror of a time: its cluster, from 1, or 0 if it is off.
+    /// Returns the number of bitmaps that light a mirror of a time: its cluster, from 1, or 0 if it
+    /// is off.
     pub fn of_time(&self, time: u64) -> usize {
         self.lowest.partition_point(|lowest| *lowest <= time)
     }
@@ -105,7 +106,8 @@ impl Clusters {
 /// Returns where the best clusters begin, and their sum of squares.
 fn best_starts(times: &[(u64, u64)], sums: &PrefixSums, count: usize) -> (Vec<usize>, f64) {
     let n = times.len();
-    // The least sum of squares of the first times with so many clusters: first with none, off.
+    // The least sum of squares of the first times with a number of clusters: first with no cluster,
+    // all off.
     let mut off = 0.0;
     let mut best: Vec<f64> = std::iter::once(0.0)
         .chain(times.iter().map(|&(time, mirrors)| {
@@ -136,7 +138,7 @@ fn best_starts(times: &[(u64, u64)], sums: &PrefixSums, count: usize) -> (Vec<us
     (found, best[n])
 }
 
-/// Numbers of times below which rows are not shared between threads.
+/// Rows of fewer times are not shared between threads.
 const SHARED: usize = 1 << 12;
 
 /// One cluster more than before.
@@ -146,8 +148,9 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Writes the least sums of squares for ends from `end` on, and where their last cluster
-    /// begins, which is within `starts`: later ends have no earlier start, so halves are apart.
+    /// Writes the least sums of squares for ends from `end` on, and the start of their last
+    /// cluster, which is within `starts`. Later ends have no earlier start, so the two halves are
+    /// independent.
     fn fill(&self, end: usize, starts: [usize; 2], best: &mut [f64], start: &mut [u32]) {
         if best.is_empty() {
             return;
@@ -169,8 +172,8 @@ impl Row<'_> {
         let mut low = || self.fill(end, [starts[0], at.1], best_low, start_low);
         let (best_high, start_high) = (&mut best_high[1..], &mut start_high[1..]);
         let mut high = || self.fill(middle + 1, [at.1, starts[1]], best_high, start_high);
-        // Halves of the ends need halves of the starts: the row takes n log n costs in place of n².
-        // That later ends start no earlier follows from the costs' quadrangle inequality.
+        // Halves of the ends need halves of the starts, so the row takes n log n costs instead of
+        // n². Later ends start no earlier because the costs satisfy the quadrangle inequality.
         if half > SHARED {
             join(low, high);
         } else {

@@ -1,4 +1,4 @@
-//! The second derivatives of how far doses are from those that are wanted.
+//! The second derivatives of the squared differences between doses and the wanted doses.
 
 use super::light::{GlassLight, product};
 use super::taps::Taps;
@@ -11,8 +11,8 @@ pub(super) struct Normal<'a> {
 }
 
 impl<'a> Normal<'a> {
-    /// Creates the mean of the products for lights that are `light` shifted along x by each of
-    /// some lengths, and along y by each of them.
+    /// Creates the mean of the products for `light` shifted by each of some lengths along x, and by
+    /// each of them along y.
     pub(super) fn mean(light: &'a GlassLight, shifts_um: &[f64]) -> Self {
         let shifted: Vec<_> = shifts_um.iter().map(|&um| light.shifted([um; 2])).collect();
         let mean = |axis: usize| {
@@ -34,7 +34,7 @@ impl Curvature for Normal<'_> {
     }
 }
 
-/// The same with a weight for each column voxel of each of some lights, added up.
+/// The sum of these products over some lights, with a weight for each column voxel.
 pub(super) struct Weighted<'a> {
     pub(super) lights: &'a [GlassLight],
     pub(super) weights: &'a [&'a [f64]],

@@ -10,7 +10,7 @@ use thiserror::Error;
 pub struct HeightCurve {
     /// The model, for all heights.
     model: TwoDepth,
-    /// The heights that it is known for.
+    /// The range of heights for which it was measured.
     known: DepthRange,
 }
 
@@ -48,8 +48,8 @@ impl HeightCurve {
         self.model.depth(Dose::from_mj_per_cm2(dose)).um()
     }
 
-    /// Returns the dose in mJ/cm2 that cures a height in um, zero for none, or nothing if no dose
-    /// does.
+    /// Returns the dose in mJ/cm2 that cures a height in um: zero for a height of zero, `None` if
+    /// no dose cures it.
     pub fn dose(&self, height_um: f64) -> Option<f64> {
         self.model.dose(Length::from_um(height_um)).ok().map(Dose::mj_per_cm2)
     }
@@ -64,13 +64,13 @@ impl HeightCurve {
         self.known
     }
 
-    /// Returns a height and its change with the dose, where the curve goes on straight below the
-    /// critical dose, so that it has a slope there.
+    /// Returns a height and its derivative by the dose. Below the critical dose, the curve
+    /// continues as a straight line, so that it has a slope there.
     pub(super) fn straight_below(&self, dose: f64) -> (f64, f64) {
         let (critical, liquid) = (self.critical_dose(), self.model.liquid_depth().um());
         let above = dose / critical - 1.0;
         if above <= 0.0 {
-            // The slope of eq. 3.9 at the critical dose, carried on: without it no light would pull
+            // The slope of eq. 3.9 at the critical dose, continued: without it, no light would pull
             // a dark column up.
             return (liquid * above, liquid / critical);
         }

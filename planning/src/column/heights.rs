@@ -6,20 +6,20 @@ use super::light::GlassLight;
 use super::times::{MirrorTimes, Stop, frank_wolfe_gap};
 use crate::numeric::{Bounded, SearchPlace};
 
-/// How far cured heights are from those wanted, in um, on lights that count alike.
+/// The difference between cured and wanted heights, in um, on lights that count equally.
 ///
-/// A column with a height counts by how far it is, also below the critical dose, where the curve
-/// goes on straight; an empty one by what is cured in it, so that light below the critical dose
-/// costs nothing.
+/// A column with a height counts by its difference, also below the critical dose, where the curve
+/// continues as a straight line. An empty column counts by the height cured in it, so that light
+/// below the critical dose costs nothing.
 pub(super) struct HeightMisfit<'a> {
     pub(super) lights: &'a [GlassLight],
     pub(super) heights_um: &'a [f64],
     pub(super) curve: HeightCurve,
 }
 
-/// A square for each column voxel that is as high and as steep as its error.
+/// A square for each column voxel with the same value and slope as its error.
 pub(super) struct Squares {
-    /// mJ/cm2 at which each is zero.
+    /// The dose in mJ/cm2 at which each square is zero.
     pub(super) wanted: Vec<f64>,
     pub(super) weights: Vec<f64>,
     error: f64,
@@ -30,22 +30,22 @@ impl HeightMisfit<'_> {
         1.0 / self.lights.len() as f64
     }
 
-    /// Returns the error, and squares like it, for the doses of one light.
+    /// Returns the error, and squares that approximate it, for the doses of one light.
     pub(super) fn squares(&self, doses: &[f64]) -> Squares {
         let share = self.share();
         let mut squares = Squares { wanted: Vec::new(), weights: Vec::new(), error: 0.0 };
         for (&dose, &wanted) in doses.iter().zip(self.heights_um) {
             let (height, slope) = self.curve.straight_below(dose);
-            // 000 eq. 3.9: below the critical dose nothing is cured, so that an empty column may
-            // have any such dose.
+            // 000 eq. 3.9: nothing is cured below the critical dose, so an empty column may have
+            // any such dose.
             let counts = wanted > 0.0 || height > 0.0;
             let left = if counts { height - wanted } else { 0.0 };
             squares.error += share * 0.5 * left * left;
             // The second derivative of the curve is left out, so that no weight is negative and
             // each step's problem stays convex.
             squares.weights.push(if counts { share * slope * slope } else { 0.0 });
-            // Gauss and Newton's square: with the slope at this dose, the height would be right
-            // there.
+            // The Gauss-Newton square: with the slope at this dose, it is zero where the height is
+            // right.
             squares.wanted.push(dose - left / slope);
         }
         squares
@@ -61,8 +61,8 @@ impl HeightMisfit<'_> {
     }
 }
 
-/// Finds the times, at most `max_s` seconds, whose heights are nearest: Newton's method, whose
-/// squares are found as those of doses are.
+/// Finds the times, at most `max_s` seconds, whose heights are nearest to the target's: Newton's
+/// method, which minimizes its squares as squares of doses are.
 pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) -> MirrorTimes {
     let mirrors = error.lights[0].setup().mirrors.iter().product();
     let mut x = vec![0.0; mirrors];
@@ -84,8 +84,8 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
         if gap <= stop.gap * value || steps >= stop.steps {
             return MirrorTimes { seconds: here.x, error: value, gap, steps };
         }
-        // A step that leaves a tenth of the gap gains no more by being exact: the squares change
-        // with it.
+        // A step that leaves less than a tenth of the gap gains nothing: the squares change with
+        // it.
         let enough = (0.1 * gap).max(0.3 * stop.gap * value);
         let before = steps;
         let next = problem.search(here.x.clone(), 8, |place, step| {
@@ -97,7 +97,7 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
     }
 }
 
-/// Goes to `next`, or so much of the way there that the error falls.
+/// Goes to `next`, or a share of the way there for which the error falls.
 fn nearer(
     error: &HeightMisfit<'_>,
     here: &SearchPlace,
@@ -110,7 +110,7 @@ fn nearer(
         let x: Vec<_> = between.collect();
         let squares = error.all_squares(&x);
         let there: f64 = squares.iter().map(|squares| squares.error).sum();
-        // Steps that are all rounding may not fall any more.
+        // Steps as small as rounding may not lower the error any more.
         if there <= value || share < 1e-3 {
             return (x, squares);
         }

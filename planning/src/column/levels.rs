@@ -1,4 +1,4 @@
-//! How long each of some bitmaps is on, so that their doses are nearest to those wanted.
+//! The time of each of some bitmaps for which their doses are nearest to the wanted doses.
 
 use rayon::prelude::*;
 
@@ -8,12 +8,12 @@ use crate::numeric::{Bounded, Curvature, dot};
 /// Rows of column voxels that a thread takes at a time.
 const ROWS: usize = 16;
 
-/// What doses should be, on one light.
+/// The wanted doses on one light.
 pub(super) struct Wish<'a> {
     pub(super) light: &'a GlassLight,
-    /// mJ/cm2 of each column voxel.
+    /// The dose of each column voxel, in mJ/cm2.
     pub(super) wanted: &'a [f64],
-    /// What a square of each counts; empty: 1.
+    /// The weight of each one's square; empty: 1.
     pub(super) weights: &'a [f64],
 }
 
@@ -28,9 +28,9 @@ impl Curvature for Dense {
 
 /// Sums over column voxels of the light that clusters bring to them.
 struct ClusterSums {
-    /// Of products of two clusters' light.
+    /// Products of two clusters' light.
     square: Vec<Vec<f64>>,
-    /// Of products with what is wanted.
+    /// Products with the wanted doses.
     pull: Vec<f64>,
 }
 
@@ -47,9 +47,9 @@ impl ClusterSums {
     }
 }
 
-/// Returns for how many seconds each of `count` nested bitmaps is on: bitmap k lights the mirrors
-/// whose `clusters` are k and above, from 1. They are none below zero, together at most `max_s`,
-/// and of these those whose doses are nearest to the wishes (least squares).
+/// Returns the seconds for which each of `count` nested bitmaps is on: bitmap k lights the mirrors
+/// whose `clusters` are k and above, from 1. No time is below zero, all together are at most
+/// `max_s`, and the doses are as near as possible to the wishes (least squares).
 pub(super) fn best_seconds(
     wishes: &[Wish<'_>],
     clusters: &[u16],
@@ -58,7 +58,8 @@ pub(super) fn best_seconds(
 ) -> Vec<f64> {
     let mut sums = ClusterSums::zero(count);
     wishes.iter().for_each(|wish| sums.add(&sums_of(wish, clusters, count)));
-    // From clusters, which no two bitmaps share, to bitmaps, which light all clusters above.
+    // From clusters, whose mirrors no two clusters share, to bitmaps, which light all clusters
+    // above.
     let above = |numbers: &mut [f64]| {
         for k in (1..numbers.len()).rev() {
             // 000 eq. 4.3 with nested bitmaps: a mirror of cluster k is on in the bitmaps 1 to k.
@@ -74,9 +75,9 @@ pub(super) fn best_seconds(
     within(nonnegative(&Dense(sums.square), &sums.pull, max_s), max_s)
 }
 
-/// Returns the numbers above zero that are nearest.
+/// Returns the nearest numbers of zero or more.
 fn nonnegative(square: &Dense, pull: &[f64], max_s: f64) -> Vec<f64> {
-    // Bitmaps of one size to the eye have one scale: each is told in shares of its own light.
+    // Each bitmap counts in shares of its own light, so that all have one scale.
     let scale: Vec<_> =
         square.0.iter().enumerate().map(|(k, row)| row[k].sqrt().max(f64::MIN_POSITIVE)).collect();
     let scaled =
@@ -97,11 +98,11 @@ fn nonnegative(square: &Dense, pull: &[f64], max_s: f64) -> Vec<f64> {
     found.x.iter().zip(&scale).map(|(x, by)| x / by).collect()
 }
 
-/// Shortens the last bitmaps, until all together are within the limit.
+/// Shortens the last bitmaps until all together are within the limit.
 fn within(mut seconds: Vec<f64>, max_s: f64) -> Vec<f64> {
     let mut left = max_s;
     for seconds in &mut seconds {
-        // The first bitmaps light the most mirrors, so that the last ones are cut.
+        // The first bitmaps light the most mirrors, so the last ones are cut.
         *seconds = seconds.min(left);
         left -= *seconds;
     }
@@ -124,7 +125,7 @@ fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> ClusterSums {
     sums
 }
 
-/// Adds what clusters bring to a row of column voxels.
+/// Adds the light that clusters bring to a row of column voxels.
 fn add_row(sums: &mut ClusterSums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
     let setup = wish.light.setup();
     let [width, columns] = [setup.mirrors[0], setup.voxels[0]];
@@ -134,8 +135,8 @@ fn add_row(sums: &mut ClusterSums, wish: &Wish<'_>, clusters: &[u16], row: usize
     for column in 0..columns {
         let (left, widths) = along.row(column);
         light.clear();
-        // Light separates into a factor for each axis (`spread.rs`): of a mirror it is the product
-        // of both.
+        // Light separates into a factor for each axis (`spread.rs`): the light of a mirror is the
+        // product of both.
         for (mirror_row, &by) in (top..).zip(heights) {
             let start = mirror_row * width + left;
             for (mirror, &share) in (start..start + widths.len()).zip(widths) {
@@ -155,8 +156,8 @@ fn add_row(sums: &mut ClusterSums, wish: &Wish<'_>, clusters: &[u16], row: usize
         for &(cluster, share) in &light {
             sums.pull[cluster] += weight * share * wish.wanted[voxel];
             for &(other, too) in &light {
-                // A column sees few clusters, so that the sums of products cost less than a matrix
-                // of columns by clusters would.
+                // A column sees few clusters, so the sums of products cost less than a matrix of
+                // columns by clusters.
                 sums.square[cluster][other] += weight * share * too;
             }
         }

@@ -9,21 +9,21 @@ use crate::projector::{Projector, SpreadOf};
 use crate::target::Grid;
 use crate::wide::wide;
 
-/// A display as its image stands on the glass, and the column voxels that it lights. Both
-/// lattices have their middle on the optical axis.
+/// A display as its image appears on the glass, and the column voxels that it lights. The middles
+/// of both lattices are on the optical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
-    /// Mirrors along x and y that are used: those in the middle of the display.
+    /// Mirrors along x and y that are used: the ones in the middle of the display.
     pub mirrors: [usize; 2],
     /// Mirrors of the whole display.
     pub display: [usize; 2],
     /// From one mirror to the next, on the glass, in um.
     pub pitch_um: f64,
-    /// The side of what a mirror reflects, on the glass, in um.
+    /// The side of the reflecting area of a mirror, on the glass, in um.
     pub lit_um: f64,
     /// How light from a point of a mirror spreads.
     pub spread: MirrorSpread,
-    /// How light is found.
+    /// How light is computed.
     pub tracing: Tracing,
     /// Irradiance of a wide white field, in mW/cm2.
     pub irradiance: f64,
@@ -36,8 +36,8 @@ pub struct Setup {
     pub voxel_um: f64,
 }
 
-/// The light of mirrors on column voxels: 000's matrix H. It separates into a matrix for each
-/// axis, so products take a few numbers a mirror and axis.
+/// The light of mirrors on column voxels: 000's matrix H. It separates into a matrix for each axis,
+/// so products take a few operations for each mirror and axis.
 #[derive(Clone, Debug)]
 pub struct GlassLight {
     setup: Setup,
@@ -60,12 +60,12 @@ impl GlassLight {
         &self.setup
     }
 
-    /// Returns the light, found in another way.
+    /// Returns the same light, computed in another way.
     pub(super) fn by(&self, tracing: Tracing) -> Self {
         Self::new(Setup { tracing, ..self.setup.clone() })
     }
 
-    /// Returns the light on column voxels that stand so far from where they should, in um.
+    /// Returns the light on column voxels that are displaced by this distance, in um.
     #[must_use]
     pub fn shifted(&self, shift_um: [f64; 2]) -> Self {
         let taps = self.setup.taps(shift_um);
@@ -88,8 +88,8 @@ impl GlassLight {
         mirrors
     }
 
-    /// Returns which mirrors light a column voxel: the first of them and the one past the last,
-    /// along x and y. None light any if a range is empty.
+    /// Returns the mirrors that light some column voxel: the first and the one past the last, along
+    /// x and y. If a range is empty, no mirror does.
     pub fn reaching(&self) -> [std::ops::Range<usize>; 2] {
         let range = |taps: &Taps| {
             let sums = taps.row_sums();
@@ -115,7 +115,7 @@ impl GlassLight {
     }
 }
 
-/// A grid that no plan can be made for.
+/// A grid for which no plan is possible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
@@ -129,7 +129,7 @@ pub enum GridError {
         /// The side of one, in um.
         pitch_um: f64,
     },
-    /// Columns that do not tell mirrors from each other: doses could be met, and heights not.
+    /// Columns too wide to distinguish mirrors: doses could be met, but not heights.
     #[error(
         "columns of {pitch_um} um are wider than a mirror's {mirror_um:.2} um: make them narrower"
     )]
@@ -141,15 +141,15 @@ pub enum GridError {
     },
 }
 
-/// A grid of more columns is refused: doses alone would take a gigabyte.
+/// A grid of more columns is rejected: doses alone would take a gigabyte.
 const MOST_COLUMNS: usize = 1 << 26;
 
 impl Setup {
-    /// Returns the grid that holds a part of some size, and around it all light of the mirrors
-    /// that light the part.
+    /// Returns the grid that holds a part of some size, and around it all light of the mirrors that
+    /// light the part.
     ///
     /// # Errors
-    /// Returns an error if these are too many columns, or too wide ones.
+    /// Returns an error if these columns are too many or too wide.
     pub fn grid_around(
         projector: &Projector,
         size: [Length; 2],
@@ -160,7 +160,8 @@ impl Setup {
         if pitch_um > mirror_um {
             return Err(GridError::Wide { pitch_um, mirror_um });
         }
-        // Light that misses the part cures resin next to it, which must be seen to be avoided.
+        // Light that misses the part cures resin next to it; the plan must see that light to avoid
+        // it.
         let margin = (Self::reach(projector).um() / pitch_um).ceil() as usize;
         let Grid { columns, rows, .. } = Grid::over(size, voxel);
         let [columns, rows] = [columns, rows].map(|count| count.saturating_add(2 * margin));
@@ -170,7 +171,7 @@ impl Setup {
         Ok(Grid { columns, rows, pitch_um })
     }
 
-    /// Returns how wide the light of a mirror is.
+    /// Returns the distance that a mirror's light reaches.
     pub fn reach(projector: &Projector) -> Length {
         let spread = 2.0 * spread_of(projector).reach();
         Length::from_um(spread + projector.mirror_image().um())
@@ -187,7 +188,7 @@ impl Setup {
             let side = voxels[axis] as f64 * grid.pitch_um + lit_um + 2.0 * spread.reach();
             // Mirrors that cannot reach the grid would be columns of zeros in H.
             let spare = display[axis] as f64 - (side / pitch_um).ceil() - 1.0;
-            // As many to both sides, so that the middle stays.
+            // An equal number on both sides, so that the middle stays.
             display[axis] - 2 * (spare / 2.0).max(0.0) as usize
         };
         Self {
@@ -230,7 +231,7 @@ pub(super) fn product([along, down]: &[Taps; 2], image: &[f64]) -> Vec<f64> {
         || vec![0.0; along.columns()],
         |line, (row, out)| {
             wide(|| {
-                // H is the product of a matrix for each axis: two passes of a few numbers in place
+                // H is the product of a matrix for each axis: two passes of a few numbers instead
                 // of mirrors times columns.
                 down.apply_across(row, image, line);
                 along.apply(line, out);

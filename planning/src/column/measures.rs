@@ -1,21 +1,21 @@
-//! How far what is cured lies from the target (000 eq. 4.12 to 4.15).
+//! The differences between the cured shape and the target (000 eq. 4.12 to 4.15).
 
 use super::curve::HeightCurve;
 
-/// How far doses and heights of column voxels are from those wanted.
+/// Differences of doses and heights of column voxels from the wanted ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Root mean square of how far doses are, in mJ/cm2 (eq. 4.12).
+    /// The root mean square of the difference of doses, in mJ/cm2 (eq. 4.12).
     pub dose_rms: f64,
-    /// The same as a share of the dose wanted, of columns that have a height (eq. 4.13).
+    /// The same as a share of the wanted dose, over columns that have a height (eq. 4.13).
     pub relative_rms: f64,
-    /// Mean of how far heights are, in um (eq. 4.14).
+    /// The mean absolute difference of heights, in um (eq. 4.14).
     pub ra_um: f64,
-    /// Root mean square of how far heights are, in um (eq. 4.15).
+    /// The root mean square of the difference of heights, in um (eq. 4.15).
     pub rms_um: f64,
-    /// The most that a column is too low, below zero, in um.
+    /// The height by which the lowest column is too low, as a negative number, in um.
     pub lowest_um: f64,
-    /// The most that a column is too high, in um.
+    /// The height by which the highest column is too high, in um.
     pub highest_um: f64,
     /// Columns that have a height and are not cured.
     pub missing: u64,

@@ -13,7 +13,7 @@ use super::spread::Tracing;
 use super::times::{MirrorTimes, Stop, nearest_times};
 use crate::target::{HeightMap, Place};
 
-/// What should be nearest to that of the target.
+/// The quantity that should be nearest to the target's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColumnObjective {
     /// Doses: 000's "optimize E".
@@ -28,20 +28,20 @@ lamp_stack::named!(ColumnObjective { Dose = "dose", Height = "height" });
 /// How to plan.
 #[derive(Clone, Debug)]
 pub struct ColumnOptions {
-    /// What should be nearest.
+    /// The quantity that should be nearest to the target's.
     pub objective: ColumnObjective,
     /// How many bitmaps are shown.
     pub bitmaps: usize,
-    /// Whether fewer will do where mirrors have fewer distinct times.
+    /// Whether fewer are enough where mirrors have fewer distinct times.
     pub fewer: bool,
     /// For gray bitmaps: the light of each level as a share of white's, rising.
     pub gray: Option<Box<[f64; 256]>>,
-    /// For how long a mirror may be on, in seconds.
+    /// The longest time for which a mirror may be on, in seconds.
     pub max_s: f64,
-    /// How far the glass may stand off along each axis: errors are means over this, none and
-    /// this to the other side.
+    /// The distance by which the glass may be displaced along each axis: errors are means over no
+    /// displacement and this displacement in both directions.
     pub robust: Length,
-    /// What all times are multiples of, in seconds.
+    /// The display's step, in seconds: all times are multiples of it.
     pub step_s: f64,
     /// When the search for times ends.
     pub stop: Stop,
@@ -54,7 +54,7 @@ pub enum ColumnError {
     /// A column has a height that no mirror reaches.
     #[error("no light reaches {0}: the target is wider than what the display lights")]
     Dark(Place),
-    /// A column that has a height, and light, but not at the points where it is counted.
+    /// A column has a height and receives light, but not at the points where light is counted.
     #[error("no ray reaches {0}: count more rays of each mirror")]
     NoRay(Place),
     /// A height that no dose cures.
@@ -69,7 +69,7 @@ pub enum ColumnError {
          allowed: allow more"
     )]
     MaxTime {
-        /// Mirrors that are on for all of it.
+        /// The number of mirrors that are on for all of it.
         mirrors: usize,
         /// The longest time, in seconds.
         max_s: f64,
@@ -90,13 +90,14 @@ pub enum ColumnError {
 /// A plan of bitmaps.
 #[derive(Clone, Debug)]
 pub struct ColumnPlan {
-    /// The times without clusters, which no bitmaps can beat by more than their gap.
+    /// The times without clusters. No bitmaps can have an error smaller than theirs by more than
+    /// their gap.
     pub best: MirrorTimes,
     /// Doses of the best times, in mJ/cm2.
     pub best_doses: Vec<f64>,
     /// The bitmaps, in the order of their display.
     pub bitmaps: Vec<Bitmap>,
-    /// For how long each mirror is on, in seconds of white light.
+    /// The time for which each mirror is on, in seconds of white light.
     pub seconds: Vec<f64>,
     /// The error of the bitmaps, as [`MirrorTimes::error`].
     pub error: f64,
@@ -105,16 +106,17 @@ pub struct ColumnPlan {
 }
 
 impl ColumnPlan {
-    /// Returns by what share of the least error the bitmaps' error is above it.
+    /// Returns the excess of the bitmaps' error over the least error, as a share of the least
+    /// error.
     pub fn excess(&self) -> f64 {
         if self.error > self.best.error { self.error / self.best.error - 1.0 } else { 0.0 }
     }
 }
 
-/// What a plan is for.
+/// The target, light and options of a plan.
 struct ColumnProblem<'a> {
     light: &'a GlassLight,
-    /// The light, shifted by what the plan has to bear.
+    /// The light at each displacement that the plan must tolerate.
     lights: Vec<GlassLight>,
     heights_um: &'a [f64],
     wanted: Vec<f64>,
@@ -195,7 +197,7 @@ impl<'a> ColumnProblem<'a> {
         }
     }
 
-    /// Returns the bitmaps of times, and for how many steps each mirror is on.
+    /// Returns the bitmaps for the times, and the number of steps for which each mirror is on.
     fn bitmaps(&self, best: &MirrorTimes) -> Result<(Vec<Bitmap>, Vec<f64>), ColumnError> {
         let setup = self.light.setup();
         let mirrors = Mirrors { count: setup.mirrors, display: setup.display };
@@ -211,8 +213,8 @@ impl<'a> ColumnProblem<'a> {
         let ends: Vec<_> = seconds
             .iter()
             .map(|seconds| {
-                // Ends are rounded, not durations: rounding errors do not add up from bitmap to
-                // bitmap.
+                // Ends are rounded, not durations, so that rounding errors do not add up from
+                // bitmap to bitmap.
                 end += seconds;
                 (end / self.options.step_s).round() as u64
             })
@@ -228,8 +230,8 @@ impl<'a> ColumnProblem<'a> {
             Err(too_few) => too_few,
         };
         let mirrors = best.at_most(max_s);
-        // Where most mirrors are at the longest time, that limit and not the part makes times
-        // alike.
+        // Where most mirrors are at the longest time, times are equal because of that limit, not
+        // because of the part.
         if 2 * mirrors > steps.iter().filter(|steps| **steps > 0).count() {
             return Err(ColumnError::MaxTime { mirrors, max_s });
         }
@@ -281,7 +283,7 @@ impl<'a> ColumnProblem<'a> {
 }
 
 impl ColumnOptions {
-    /// Returns how far the light may be shifted along an axis.
+    /// Returns the displacements of the light along an axis.
     fn shifts_um(&self) -> Vec<f64> {
         let um = self.robust.um();
         if um > 0.0 { vec![-um, 0.0, um] } else { vec![0.0] }

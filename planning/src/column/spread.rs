@@ -1,27 +1,28 @@
-//! How a mirror's light falls along one axis of the glass.
+//! The distribution of a mirror's light along one axis of the glass.
 
 use super::taps::Taps;
 
 /// How light from a point of a mirror spreads on the glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MirrorSpread {
-    /// Evenly over a square that reaches so far to each side, in um.
+    /// Evenly over a square that reaches this distance to each side, in um.
     Cone(f64),
     /// As a Gaussian of this standard deviation, in um.
     Gaussian(f64),
 }
 
-/// How the light of mirrors is found.
+/// How the light of mirrors is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Tracing {
     /// As the integral over mirror, spread and column voxel.
     #[default]
     Exact,
-    /// By counting rays (000 eq. 3.11): so many points and directions along each axis of a mirror.
+    /// By counting rays (000 eq. 3.11): this number of points and directions along each axis of a
+    /// mirror.
     Rays {
         /// Points of a mirror, at the middles of its equal parts.
         points: usize,
-        /// Directions over the cone, with both ends.
+        /// Directions over the cone, both ends included.
         directions: usize,
     },
 }
@@ -32,7 +33,7 @@ pub(super) struct MirrorLine {
     pub(super) count: usize,
     /// From a mirror to the next.
     pub(super) pitch: f64,
-    /// What of the pitch reflects.
+    /// The reflecting part of the pitch.
     pub(super) lit: f64,
 }
 
@@ -48,17 +49,17 @@ impl MirrorLine {
 pub(super) struct VoxelLine {
     pub(super) count: usize,
     pub(super) pitch: f64,
-    /// How far the line stands from the optical axis.
+    /// The distance of the line from the optical axis.
     pub(super) shift: f64,
 }
 
 impl VoxelLine {
-    /// Returns where a position lies, in voxels from the first.
+    /// Returns a position in voxels from the first.
     fn place(&self, um: f64) -> f64 {
         (um - self.shift) / self.pitch + self.count as f64 / 2.0
     }
 
-    /// Returns where voxel `edge` begins.
+    /// Returns the position where voxel `edge` begins.
     fn edge(&self, edge: usize) -> f64 {
         (edge as f64 - self.count as f64 / 2.0) * self.pitch + self.shift
     }
@@ -66,8 +67,8 @@ impl VoxelLine {
 
 /// Returns the light of each voxel (rows) by the mirrors (columns).
 ///
-/// Numbers are shares of the light of a wide white field: those of a voxel that all
-/// neighbours light add up to 1.
+/// Numbers are shares of the light of a wide white field: the numbers of a voxel that all neighbors
+/// light add up to 1.
 pub(super) fn taps(
     mirrors: MirrorLine,
     voxels: VoxelLine,
@@ -104,7 +105,7 @@ pub(super) fn taps(
                     .collect()
             }
         };
-        // A wide white field brings a mirror's light to as much glass as its pitch: shares of a
+        // In a wide white field, each mirror's light covers glass as wide as its pitch: shares of a
         // voxel are relative to that.
         row.iter_mut().for_each(|(_, share)| *share *= scale);
         row
@@ -113,35 +114,35 @@ pub(super) fn taps(
     Taps::new(voxels.count, &rows).transposed()
 }
 
-/// A smaller share of a mirror's light is none.
+/// A smaller share of a mirror's light counts as zero.
 const LEAST_SHARE: f64 = 1e-9;
 
-/// Returns which shares of a mirror's light fall on voxels.
+/// Returns the shares of a mirror's light that fall on voxels.
 fn shares(middle: f64, lit: f64, voxels: VoxelLine, spread: MirrorSpread) -> Vec<(usize, f64)> {
     let reach = lit / 2.0 + spread.reach();
     let place = |um| voxels.place(um).clamp(0.0, voxels.count as f64);
     let first = place(middle - reach).floor() as usize;
     let last = place(middle + reach).ceil() as usize;
-    // The share between two edges is a difference of what falls below each: shares of all voxels
-    // add up to one.
+    // The share between two edges is the difference of the light below each, so the shares of all
+    // voxels add up to one.
     let below = |edge| spread.light_below(voxels.edge(edge) - middle, lit);
-    // What is only rounding would let a mirror shine forever at nothing.
+    // Shares that are only rounding would let a mirror shine forever at no effect.
     let shares = (first..last).map(|voxel| (voxel, below(voxel + 1) - below(voxel)));
     shares.filter(|(_, share)| *share > LEAST_SHARE).collect()
 }
 
 impl MirrorSpread {
-    /// Returns how far light spreads, in um.
+    /// Returns the distance to which light spreads, in um.
     pub(super) fn reach(self) -> f64 {
         match self {
             Self::Cone(half) => half,
-            // What is left out is 2e-9 of the light.
+            // The light left out is 2e-9 of the whole.
             Self::Gaussian(sigma) => 6.0 * sigma,
         }
     }
 
-    /// Returns the share of a mirror's light that falls below a position, told from the
-    /// middle of its image, which is `lit` wide.
+    /// Returns the share of a mirror's light that falls below a position relative to the middle of
+    /// the mirror's image, which is `lit` wide.
     fn light_below(self, um: f64, lit: f64) -> f64 {
         (self.integral(um + lit / 2.0) - self.integral(um - lit / 2.0)) / lit
     }
@@ -153,8 +154,8 @@ impl MirrorSpread {
             Self::Cone(half) if um.abs() < half => (um + half).powi(2) / (4.0 * half),
             Self::Cone(_) => um.max(0.0),
             Self::Gaussian(sigma) if sigma > 0.0 => {
-                // ∫ Φ = z Φ(z) + φ(z), with Φ by the complementary error function: exact also far
-                // below zero.
+                // ∫ Φ = z Φ(z) + φ(z), with Φ by the complementary error function: exact far below
+                // zero as well.
                 let z = um / sigma;
                 let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
                 sigma * (z * (0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)) + density)
@@ -185,7 +186,7 @@ mod tests {
         {
             for tracing in [Tracing::Exact, rays] {
                 let [of_mirrors, _] = sums(spread, tracing);
-                // 1200 um of columns see some 40 mirrors; those at the ends lose some.
+                // Columns over 1200 um see some 40 mirrors; the ones at the ends lose some light.
                 for (mirror, light) in of_mirrors.iter().enumerate().take(34).skip(7) {
                     let off = light / (MIRRORS.pitch / VOXELS.pitch) - 1.0;
                     assert!(off.abs() < 1e-7, "{spread:?} {tracing:?} {mirror}: {off:e}");

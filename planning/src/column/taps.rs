@@ -1,4 +1,4 @@
-//! How mirrors light column voxels along one axis, as matrices of a few numbers a row.
+//! How mirrors light column voxels along one axis, as matrices with a few numbers in each row.
 
 /// A matrix whose rows hold a few numbers side by side.
 ///
@@ -7,9 +7,9 @@
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Taps {
     columns: usize,
-    /// Numbers a row.
+    /// The numbers in each row.
     width: usize,
-    /// Where the numbers of each row begin.
+    /// The column where the numbers of each row begin.
     first: Vec<usize>,
     weights: Vec<f64>,
 }
@@ -30,7 +30,7 @@ impl Taps {
         let mut weights = vec![0.0; width * rows.len()];
         for ((row, &first), weights) in rows.iter().zip(&first).zip(weights.chunks_mut(width)) {
             for &(column, weight) in row.iter().filter(|(_, weight)| *weight != 0.0) {
-                // Entries of one column add up, as of several rays on one voxel.
+                // Entries of one column add up, for example when several rays hit one voxel.
                 weights[column - first] += weight;
             }
         }

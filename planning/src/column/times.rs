@@ -1,4 +1,4 @@
-//! Seconds that mirrors are on, and a proof of how near they are to the best (000 section 4.2).
+//! Times of mirrors, and a bound on their distance from the best (000 section 4.2).
 
 use rayon::prelude::*;
 
@@ -9,33 +9,33 @@ use crate::numeric::{Bounded, SearchPlace};
 /// When a search for times ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// The gap to the least error that is allowed, as a share of the error.
+    /// The largest gap to the least error, as a share of the error.
     pub gap: f64,
-    /// Steps after which it ends however near it is.
+    /// The most steps, whatever the gap is then.
     pub steps: usize,
 }
 
-/// Seconds that mirrors are on.
+/// The seconds for which mirrors are on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MirrorTimes {
-    /// Of each mirror, rows from the first.
+    /// The time of each mirror, rows from the first.
     pub seconds: Vec<f64>,
-    /// The error that was minimised: half the sum of squares of how far doses are from those
-    /// wanted, in (mJ/cm2)2.
+    /// The error that was minimized: half the sum of the squared differences between doses and
+    /// wanted doses, in (mJ/cm2)2.
     pub error: f64,
-    /// How much smaller the least error can be, at most: the Frank-Wolfe gap.
+    /// The most by which the least error can be smaller: the Frank-Wolfe gap.
     pub gap: f64,
-    /// Steps of the search.
+    /// The number of steps of the search.
     pub steps: usize,
 }
 
 impl MirrorTimes {
-    /// Returns the gap as a share of the error; none if there is no error.
+    /// Returns the gap as a share of the error, or 0 if there is no error.
     pub fn relative_gap(&self) -> f64 {
         if self.gap > 0.0 { self.gap / self.error } else { 0.0 }
     }
 
-    /// Returns how many mirrors are on for the longest time that is allowed.
+    /// Returns the number of mirrors that are on for the longest time.
     pub fn at_most(&self, max_s: f64) -> usize {
         self.seconds.iter().filter(|seconds| **seconds >= max_s).count()
     }
@@ -47,14 +47,14 @@ impl MirrorTimes {
 pub(super) fn frank_wolfe_gap(place: &SearchPlace, high: f64) -> f64 {
     let numbers = place.x.par_chunks(1 << 13).zip(place.slopes.par_chunks(1 << 13));
     let of_chunk = |(x, slopes): (&[f64], &[f64])| -> f64 {
-        // The largest of slopes (x - t) over all t between zero and the bound: each t is at the end
-        // that its slope wants.
+        // The largest value of slopes (x - t) over all t between zero and the bound: each t is at
+        // the end that its slope prefers.
         x.iter().zip(slopes).map(|(x, slope)| slope * x + high * (-slope).max(0.0)).sum()
     };
     numbers.map(of_chunk).collect::<Vec<_>>().into_iter().sum()
 }
 
-/// An error below this share of that without light counts as none.
+/// An error below this share of the error without light counts as zero.
 const NOTHING: f64 = 1e-12;
 
 /// Finds the times, at most `max_s` seconds, whose doses are nearest to `wanted` in mJ/cm2: the
@@ -70,8 +70,8 @@ pub fn nearest_times(
     let curvature = Normal::mean(light, shifts_um);
     let pull = mean_pull(light, wanted, shifts_um);
     let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
-    // |H t - E|² / 2 = t HᵀH t / 2 - t HᵀE + E E / 2 (000 eq. 4.4, squared): the search needs the
-    // first two terms alone.
+    // |H t - E|² / 2 = t HᵀH t / 2 - t HᵀE + E E / 2 (000 eq. 4.4, squared): the search needs only
+    // the first two terms.
     let dark = 0.5 * wanted.iter().map(|dose| dose * dose).sum::<f64>();
     let error = |place: &SearchPlace| dark + fall(place, &pull);
     let (mut steps, mut gap) = (0, f64::INFINITY);
@@ -79,13 +79,13 @@ pub fn nearest_times(
         (steps, gap) = (step, frank_wolfe_gap(place, max_s));
         gap <= stop.gap * error(place).max(NOTHING * dark) || step >= stop.steps
     });
-    // Slopes that steps have added up carry rounding: the proof is made of fresh ones.
+    // Slopes summed over steps carry rounding errors: the proof uses newly computed ones.
     let place = problem.place(place.x);
     let gap = frank_wolfe_gap(&place, max_s);
     MirrorTimes { error: error(&place).max(0.0), gap, steps, seconds: place.x }
 }
 
-/// Returns the mean of H's transposes times the doses.
+/// Returns the mean over shifts of H's transpose times the doses.
 fn mean_pull(light: &GlassLight, wanted: &[f64], shifts_um: &[f64]) -> Vec<f64> {
     let mut pull = vec![0.0; light.setup().mirrors.iter().product()];
     for &x in shifts_um {

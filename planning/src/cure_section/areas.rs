@@ -1,4 +1,4 @@
-//! The areas of a section: what is cured, and how that differs from the part.
+//! The areas of a section: the cured area and its difference from the part.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use super::error::CureSectionError;
 use super::exposures::{CureRule, CureSection};
 use super::line::SectionLine;
 
-/// What is cured at each pixel of a section, with a name.
+/// The cured heights at each pixel of a section, with a name.
 pub type CuredPanel = (&'static str, Vec<SolidHeights>);
 
-/// A stretch of a section, with what is cured there.
+/// A stretch of a section, with the resin cured there.
 #[derive(Debug)]
 pub struct ShownSection {
     /// The line of pixels.
@@ -23,31 +23,31 @@ pub struct ShownSection {
     pub pixels: Range<u32>,
     /// The heights from the bottom of the lowest layer to the top of the highest.
     pub heights_um: Range<f64>,
-    /// What is cured within these heights, of all pixels along the line.
+    /// The resin cured within these heights, at all pixels along the line.
     pub cured: Vec<CuredPanel>,
-    /// Where the part is within each pixel, if it is known.
+    /// Where the part is within each pixel, if the part is known.
     pub part: Option<Vec<Vec<OutlinePiece>>>,
 }
 
-/// The areas of a section, in square millimetres.
+/// The areas of a section, in square millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionAreas {
-    /// What they are of: `white`, `gray` or `pixels`.
+    /// The exposures that they are of: `white`, `gray` or `pixels`.
     pub name: &'static str,
-    /// What is cured.
+    /// The cured area.
     pub cured_mm2: f64,
-    /// How that differs from the part, if it is known.
+    /// The difference between the cured area and the part, if the part is known.
     pub beside_part: Option<PartAreas>,
 }
 
-/// How the cured area differs from the part, in square millimetres.
+/// The difference between the cured area and the part, in square millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartAreas {
-    /// The part.
+    /// The area of the part.
     pub part_mm2: f64,
-    /// What is cured outside the part.
+    /// The cured area outside the part.
     pub overshoot_mm2: f64,
-    /// What is part and not cured.
+    /// The area of the part that is not cured.
     pub missing_mm2: f64,
 }
 
@@ -55,7 +55,7 @@ impl ShownSection {
     /// Returns a stretch of a section: `along_mm`, or all of it.
     ///
     /// # Errors
-    /// Returns an error if the stretch holds no pixel's centre.
+    /// Returns an error if the stretch holds no pixel's center.
     pub fn new(
         section: &CureSection<'_>,
         part: Option<Vec<Vec<OutlinePiece>>>,
@@ -74,8 +74,8 @@ impl ShownSection {
         Ok(Self { course, rule, pixels, heights_um, cured, part })
     }
 
-    /// Returns the areas of all that is cured, and of `pixels` that cure just the part at their
-    /// centres: as exact as pixels can be.
+    /// Returns the areas of everything cured, and of `pixels` that cure just the part at their
+    /// centers: as exact as pixels can be.
     pub fn areas(&self) -> Vec<SectionAreas> {
         let Some(part) = &self.part else {
             let areas = |(name, cured): &CuredPanel| SectionAreas {
@@ -91,7 +91,7 @@ impl ShownSection {
         let areas = |(name, cured): &CuredPanel| {
             let shared = self.area_mm2(|pixel| shared_height(&cured[pixel], &part[pixel]));
             let cured_mm2 = self.cured_mm2(cured);
-            // Rounding may leave less than nothing.
+            // Rounding may make the difference negative.
             let [overshoot_mm2, missing_mm2] =
                 [cured_mm2, part_mm2].map(|area| (area - shared).max(0.0));
             let beside_part = Some(PartAreas { part_mm2, overshoot_mm2, missing_mm2 });
@@ -110,8 +110,8 @@ impl ShownSection {
         pixels.map(|pixel| height_at(pixel).mm()).sum::<f64>() * self.course.dpi.pitch().mm()
     }
 
-    /// Returns the heights of the part at each pixel's centre: what pixels would cure if each cured
-    /// just the part below and above its centre.
+    /// Returns the heights of the part at each pixel's center: the heights cured if each pixel
+    /// cured just the part below and above its center.
     fn centres(&self, part: &[Vec<OutlinePiece>]) -> Vec<SolidHeights> {
         let shown = |[from, to]: [f64; 2]| {
             let heights = [from.max(self.heights_um.start), to.min(self.heights_um.end)];
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::cure_section::SectionPlane;
 
-    /// Two layers of 100 um, 4 x 4 pixels of 0.1 mm, that are exposed for so long.
+    /// Two layers of 100 um and 4 x 4 pixels of 0.1 mm, exposed for this time.
     fn layers(ms: f64) -> [Layer; 2] {
         [0, 1].map(|index| {
             let info = PageInfo {

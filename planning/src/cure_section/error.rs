@@ -6,14 +6,14 @@ use thiserror::Error;
 
 use super::line::SectionPlane;
 
-/// Why a text is not a section's plane.
+/// Why a text does not name a section's plane.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum UnknownPlane {
     /// It names no axis.
     #[error("`{0}` is not a section: write y=12mm or x=12mm")]
     NoAxis(String),
-    /// What stands behind the axis is not a length.
+    /// The text after the axis is not a length.
     #[error(transparent)]
     Length(#[from] LengthError),
 }
@@ -25,7 +25,7 @@ pub enum CureSectionError {
     /// Pages do not say where on the part they are.
     #[error("its pages do not state their position on the part")]
     NoPosition,
-    /// Pages do not say how large pixels are.
+    /// Pages do not state the size of pixels.
     #[error("its pages do not state their resolution")]
     NoResolution,
     /// The plane misses the images.
@@ -38,10 +38,10 @@ pub enum CureSectionError {
         /// Where they end.
         high_mm: f64,
     },
-    /// The stretch that is to be shown holds no pixel's centre.
+    /// The requested stretch holds no pixel's center.
     #[error("no pixel of the section lies in this stretch")]
     EmptyStretch,
-    /// A layer does not say where it is.
+    /// A layer does not state its height and thickness.
     #[error("{0} does not state its height and thickness")]
     NoHeight(String),
     /// A layer's thickness or time is impossible.
@@ -50,7 +50,7 @@ pub enum CureSectionError {
     /// A layer's image does not reach the section.
     #[error("{0} is smaller than the first")]
     TooSmall(String),
-    /// A layer states no time, and the resin says none.
+    /// A layer states no time, and the resin states none either.
     // No source: this message contains the problem's text.
     #[error("{layer} states no exposure: {problem}")]
     NoExposure {

@@ -1,4 +1,4 @@
-//! What a stack's layers cure along a section.
+//! The resin that a stack's layers cure along a section.
 
 use std::ops::Range;
 
@@ -16,18 +16,18 @@ use crate::section::DoseSection;
 /// How exposures cure.
 #[derive(Clone, Copy, Debug)]
 pub enum CureRule {
-    /// Each by itself, as deep as its gray level reaches.
+    /// Each layer by itself, to the depth that its gray level reaches.
     Alone,
-    /// Together, where their doses add up to the critical one; light goes straight down.
+    /// Together, where the sum of doses is at least the critical dose; light goes straight down.
     Straight(FadingLight),
     /// The same with light that spreads sideways.
     Spread(Light),
-    /// The same, but whole layers, by the dose at one height of each.
+    /// The same, but only whole layers, by the dose at one height of each.
     Voxels(Light),
 }
 
 impl CureRule {
-    /// Returns the doses at which the numbers of a material were measured that the rule cures by.
+    /// Returns the doses at which the material's numbers that the rule uses were measured.
     pub fn measured_doses(&self, material: &Material) -> MeasuredDoses {
         match self {
             Self::Alone | Self::Straight(_) => MeasuredDoses::of_depths(material),
@@ -35,7 +35,7 @@ impl CureRule {
         }
     }
 
-    /// Returns it in words.
+    /// Returns the rule in words.
     pub fn text(&self) -> &'static str {
         match self {
             Self::Alone => "each layer alone",
@@ -46,8 +46,8 @@ impl CureRule {
     }
 }
 
-/// The resin that a stack cures along a section, twice: with every pixel that is not black exposed in full,
-/// and by gray levels.
+/// The resin that a stack cures along a section, twice: with every pixel that is not black exposed
+/// in full, and by gray levels.
 #[derive(Debug)]
 pub struct CureSection<'a> {
     resin: &'a Resin,
@@ -58,7 +58,7 @@ pub struct CureSection<'a> {
     heights_um: Range<f64>,
 }
 
-/// What exposures cure: in full, and by gray levels.
+/// The cured resin of an exposure: in full, and by gray levels.
 #[derive(Debug)]
 enum Cured {
     Alone { depths: Option<(ExposureTime, Vec<Length>)>, lines: [CuredLine; 2] },
@@ -98,11 +98,11 @@ impl<'a> CureSection<'a> {
         self.heights_um.clone()
     }
 
-    /// Exposes a layer, and returns the dose of its white. They come from the bottom up.
+    /// Exposes a layer, and returns the dose of its white. Layers come from the bottom up.
     ///
     /// # Errors
-    /// Returns an error if the layer does not state its height and thickness, or no time where the
-    /// resin says none, or if the section misses its image.
+    /// Returns an error if the layer does not state its height and thickness, if neither the layer
+    /// nor the resin states a time, or if the section misses its image.
     pub fn add(&mut self, layer: &Layer) -> Result<Dose, CureSectionError> {
         let (bottom, LayerTime { thickness, time }) = self.exposure(layer)?;
         let (line, image) = (self.course.line, &layer.image);
@@ -139,8 +139,8 @@ impl<'a> CureSection<'a> {
         Ok(self.resin.light() * time)
     }
 
-    /// The height of a layer's bottom, its thickness and its time. Without a time, white cures
-    /// just the layer.
+    /// Returns the height of a layer's bottom, its thickness and its time. Without a time, white
+    /// cures just the layer.
     fn exposure(&self, layer: &Layer) -> Result<(Length, LayerTime), CureSectionError> {
         let name = || layer.info.name();
         let of_page = layer.info.z().zip(layer.info.thickness_um.map(Length::from_um));
@@ -162,8 +162,8 @@ impl<'a> CureSection<'a> {
         Ok((bottom, LayerTime { thickness, time }))
     }
 
-    /// Returns what is cured at each pixel, with a name: in full, and by gray levels if there are
-    /// any.
+    /// Returns the cured heights at each pixel, with a name: in full, and by gray levels if there
+    /// are any.
     pub fn cured(&self) -> Vec<(&'static str, Vec<SolidHeights>)> {
         let of = |k: usize| match &self.cured {
             Cured::Alone { lines, .. } => lines[k].pixels().to_vec(),
@@ -178,7 +178,7 @@ impl<'a> CureSection<'a> {
     }
 }
 
-/// Returns the runs at full white, neighbours joined.
+/// Returns the runs at full white, neighbors joined.
 fn whitened(runs: &[LineRun]) -> Vec<LineRun> {
     let touching = |a: &LineRun, b: &LineRun| a.1 == b.0;
     let white = |runs: &[LineRun]| (runs[0].0, runs[runs.len() - 1].1, 255);

@@ -52,7 +52,7 @@ pub struct SectionLine {
     corner_mm: [f64; 2],
     /// The resolution of the images.
     pub dpi: Dpi,
-    /// How many pixels lie along it.
+    /// The number of pixels along it.
     pub pixels: u32,
 }
 
@@ -84,7 +84,7 @@ impl SectionLine {
         Ok(Self { line, corner_mm, dpi, pixels })
     }
 
-    /// Returns the plane through the centres of its pixels.
+    /// Returns the plane through the centers of its pixels.
     pub fn plane(&self) -> SectionPlane {
         let pitch = self.dpi.pitch().mm();
         let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
@@ -98,7 +98,7 @@ impl SectionLine {
         }
     }
 
-    /// Returns the pixels whose centres lie in a stretch of the section.
+    /// Returns the pixels whose centers lie in a stretch of the section.
     pub fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
         let pitch = self.dpi.pitch().mm();
         let [from, to] = match self.line {

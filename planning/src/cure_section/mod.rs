@@ -1,5 +1,5 @@
-//! Vertical sections of what a stack cures, each layer alone or with doses that add up, and their
-//! areas.
+//! Vertical sections of the resin that a stack cures, each layer alone or with doses that add up,
+//! and their areas.
 
 mod areas;
 mod error;

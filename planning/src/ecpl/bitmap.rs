@@ -20,8 +20,8 @@ pub struct NotRound {
 }
 
 impl RingExposure {
-    /// Draws its rings around the middle of an image. A pixel belongs to the ring in which its
-    /// middle lies; what lies beyond the image is cut off.
+    /// Draws its rings around the middle of an image. A pixel belongs to the ring that contains its
+    /// middle; parts outside the image are cut off.
     ///
     /// # Panics
     /// Never: runs rise, and end within the image.
@@ -35,14 +35,13 @@ impl RingExposure {
         image.finish()
     }
 
-    /// Returns the transitions of a row, whose middle is so many half pixels from that of the
-    /// image.
+    /// Returns the transitions of a row whose middle is `half_pixels` from the middle of the image.
     fn transitions(&self, columns: u32, half_pixels: u32) -> Vec<u32> {
         let half = columns.div_ceil(2);
         let reach = |pixels: u32| chord(pixels, columns % 2, half_pixels).min(half);
         let runs = self.rings.iter().map(|ring| reach(ring.start)..reach(ring.end));
         let runs: Vec<Range<u32>> = runs.filter(|run| !run.is_empty()).collect();
-        // Pixels to the left of the middle one, or of the middle, and to the right of it.
+        // Pixels to the left of the middle pixel or the middle line, and to the right of it.
         let (left, right) = (half, columns / 2);
         let mut ends: Vec<u32> =
             runs.iter().rev().flat_map(|run| [left - run.end, left - run.start]).collect();
@@ -70,8 +69,8 @@ impl RingExposure {
     }
 }
 
-/// Returns how many pixels of a half row have their middles within a circle of `pixels`; with
-/// `odd`, the first one lies on the axis.
+/// Returns the number of pixels of a half row whose middles are within a circle of `pixels`; with
+/// `odd`, the first one is on the axis.
 fn chord(pixels: u32, odd: u32, half_pixels: u32) -> u32 {
     if half_pixels >= 2 * pixels {
         return 0;

@@ -1,37 +1,37 @@
 //! The cells of a chamber: across from the axis, deep from the glass.
 
-/// What a section of the chamber stands for.
+/// The shape that a section of the chamber represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChamberShape {
-    /// Turned around its axis: coordinates (r, z).
+    /// Rotated around its axis: coordinates (r, z).
     Round,
-    /// Drawn out into a line that is alike on both sides: coordinates (x, z).
+    /// Extruded along a line, symmetric on both sides: coordinates (x, z).
     Straight,
 }
 
 /// A chamber in cells, row by row from the glass; a row begins at the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
-    /// What the section stands for.
+    /// The shape that the section represents.
     pub shape: ChamberShape,
     /// Cells of a row.
     pub across: usize,
     /// Cells from the glass to the other wall.
     pub deep: usize,
-    /// The width of a cell, in micrometres.
+    /// The width of a cell, in micrometers.
     pub width_um: f64,
-    /// The height of a cell, in micrometres.
+    /// The height of a cell, in micrometers.
     pub height_um: f64,
 }
 
 impl Cells {
-    /// Returns how far the middle of a cell lies from the axis, in micrometres.
+    /// Returns the distance of the middle of a cell from the axis, in micrometers.
     pub fn middle_um(&self, across: usize) -> f64 {
         (across as f64 + 0.5) * self.width_um
     }
 
-    /// Returns the part of the glass that a cell stands for: its ring's area or its width, in
-    /// units of the first cell's.
+    /// Returns the part of the glass that a cell represents: the area of its ring or its width, in
+    /// units of the first cell.
     pub fn weight(&self, across: usize) -> f64 {
         match self.shape {
             ChamberShape::Round => (2 * across + 1) as f64,
@@ -39,7 +39,7 @@ impl Cells {
         }
     }
 
-    /// Returns how many cells there are.
+    /// Returns the number of cells.
     pub const fn count(&self) -> usize {
         self.across * self.deep
     }

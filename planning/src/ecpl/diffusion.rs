@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 
-/// Rows that are solved at once: a row's cells wait for each other, rows do not.
+/// Rows that are solved at once: the cells of a row depend on each other, rows do not.
 const TOGETHER: usize = 4;
 
 /// The factors of a tridiagonal matrix `1 + D dt L`, where nothing leaves at the ends.
@@ -14,7 +14,7 @@ struct Line {
 }
 
 impl Line {
-    /// Factors the matrix, whose rows exchange with those before and after them.
+    /// Factors the matrix, whose rows exchange with the rows before and after them.
     fn new(exchange: impl Iterator<Item = [f64; 2]>) -> Self {
         let [mut before, mut over, mut after] = [const { Vec::<f64>::new() }; 3];
         for [left, right] in exchange {
@@ -71,8 +71,8 @@ impl Line {
     }
 }
 
-/// Steps of diffusion of one length in time: the steps along rows and along columns commute, so
-/// one after the other they are a whole step.
+/// A step of diffusion. Its parts along rows and along columns commute, so that one after the other
+/// makes a whole step.
 #[derive(Clone, Debug)]
 pub(super) struct Diffusion {
     across: Line,
@@ -80,7 +80,7 @@ pub(super) struct Diffusion {
 }
 
 impl Diffusion {
-    /// Makes the step of `area_um2`: diffusivity times time. Returns nothing if nothing spreads.
+    /// Makes the step of `area_um2`: diffusivity times time. Returns `None` if nothing spreads.
     pub(super) fn new(cells: &Cells, area_um2: f64) -> Option<Self> {
         if area_um2 == 0.0 {
             return None;
@@ -95,7 +95,7 @@ impl Diffusion {
         })
     }
 
-    /// Spreads what is in the cells.
+    /// Spreads the contents of the cells.
     pub(super) fn spread(&self, cells: &mut [f64]) {
         let width = self.across.over.len();
         self.deep.solve_columns(cells, width);
@@ -117,7 +117,7 @@ mod tests {
         Cells { shape, across: 9, deep: 7, width_um: 3.0, height_um: 2.0 }
     }
 
-    /// The matrix of a step along both directions, times what it gave.
+    /// The matrix of a step along both directions, multiplied with the result of that step.
     fn undone(cells: &Cells, area: f64, after: &[f64]) -> Vec<f64> {
         let along =
             |from: &[f64], step: usize, place: &dyn Fn(usize) -> (usize, usize, [f64; 2])| {

@@ -1,19 +1,19 @@
-//! What is off when the part lies off its place.
+//! Errors of a part that is cured away from its place.
 
 use std::f64::consts::TAU;
 
 use super::profile::{Profile, WantedProfile};
 
-/// Directions in which a part is compared: enough for a mean of squares that change like a
-/// cosine and its square.
+/// Directions in which a part is compared: enough for a mean of squares that change like a cosine
+/// and its square.
 const DIRECTIONS: usize = 16;
 
 impl WantedProfile {
-    /// Returns the root mean square of cured minus wanted height, in micrometres, when all that
-    /// is cured lies `aside_um` off its place.
+    /// Returns the root mean square of cured minus wanted height, in micrometers, when the whole
+    /// cured part is displaced by `aside_um`.
     ///
-    /// All bitmaps come from one display, so that one shift moves the whole part and leaves its
-    /// shape as it is.
+    /// All bitmaps come from one display, so one displacement moves the whole part and leaves its
+    /// shape unchanged.
     pub fn rms_aside_um(&self, cured: &Profile, aside_um: f64) -> f64 {
         let [mut sum, mut area] = [0.0; 2];
         for x in 0..self.heights_um.len() {

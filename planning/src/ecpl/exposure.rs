@@ -1,4 +1,4 @@
-//! A bitmap of discs and rings, and how long it is shown.
+//! A bitmap of discs and rings, and the time for which it is shown.
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -6,35 +6,35 @@ use std::str::FromStr;
 use lamp_grayscale::resin::ExposureTime;
 use thiserror::Error;
 
-/// A bitmap of rings around the axis, and how long it is shown (003 section 5: `B_i`, `L_i`,
-/// `R_i` and `T_i`).
+/// A bitmap of rings around the axis, and the time for which it is shown (003 section 5: `B_i`,
+/// `L_i`, `R_i` and `T_i`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RingExposure {
-    /// From which to which pixel from the axis each ring is white, inner ones first and apart. A
-    /// disc begins at zero.
+    /// The range of white pixels of each ring, counted from the axis, inner rings first and apart.
+    /// A disc begins at zero.
     pub rings: Vec<Range<u32>>,
-    /// How long.
+    /// The time for which it is shown.
     pub time: ExposureTime,
 }
 
 impl RingExposure {
-    /// Returns a disc of so many pixels, shown for a time.
+    /// Returns a disc with a radius of `pixels`, shown for a time.
     pub fn disc(pixels: u32, time: ExposureTime) -> Self {
         Self { rings: std::iter::once(0..pixels).collect(), time }
     }
 
-    /// Returns how many pixels from the axis its light ends.
+    /// Returns the distance from the axis where its light ends, in pixels.
     pub fn reach(&self) -> u32 {
         self.rings.last().map_or(0, |ring| ring.end)
     }
 
-    /// Returns whether the ring of pixels that begins so far from the axis is white.
+    /// Returns whether the ring of pixels that begins `ring` pixels from the axis is white.
     pub fn is_white(&self, ring: u32) -> bool {
         self.rings.iter().any(|rings| rings.contains(&ring))
     }
 }
 
-/// Why a text is no disc or ring.
+/// Why a text is not a disc or ring.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "`{0}` is neither a disc nor a ring: write the mirrors of its radius and its time, as \
@@ -48,7 +48,7 @@ impl FromStr for RingExposure {
     /// Parses a disc, as `12:7.9s`, or a ring, as `5-12:7.9s`.
     ///
     /// # Errors
-    /// Returns an error if it is neither, or empty, or has no unit of time.
+    /// Returns an error if the text is neither, is empty, or has no unit of time.
     fn from_str(text: &str) -> Result<Self, NoExposure> {
         let parsed = || {
             let (ring, time) = text.trim().split_once(':')?;
@@ -62,7 +62,7 @@ impl FromStr for RingExposure {
 }
 
 /// Makes the bitmaps of rings that are white for a number of the display's steps each, the
-/// innermost first: all begin together, so each bitmap lies within the one before.
+/// innermost ring first. All rings begin together, so each bitmap is contained in the one before.
 pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<RingExposure> {
     let mut ends: Vec<u32> = steps.iter().copied().filter(|&steps| steps > 0).collect();
     ends.sort_unstable();
@@ -76,7 +76,7 @@ pub(super) fn nested(steps: &[u32], step: ExposureTime) -> Vec<RingExposure> {
     ends.iter().map(exposure).collect()
 }
 
-/// Returns the rings of pixels that are white one by one from the axis.
+/// Returns the rings of white pixels, given for each pixel from the axis on whether it is white.
 pub(super) fn rings_of(white: impl Iterator<Item = bool>) -> Vec<Range<u32>> {
     let mut rings: Vec<Range<u32>> = Vec::new();
     for (ring, _) in (0..).zip(white).filter(|&(_, white)| white) {

@@ -1,6 +1,7 @@
 //! All times at once: bounded Gauss-Newton over the times of rings of pixels.
 //!
-//! Parts of many rings have times at fewer knots, and between them straight lines.
+//! Parts of many rings have times at fewer knots; the times between knots are interpolated
+//! linearly.
 
 use rayon::prelude::*;
 
@@ -14,24 +15,24 @@ use crate::numeric::{DescentEnd, descend, dot};
 /// Light that does not reach the wanted height in this time, in seconds, never will in practice.
 const LONGEST_S: f64 = 300.0;
 
-/// No ring shines longer than so many times what a wide field needs for the greatest height:
-/// against blur, endless light on an edge would gain little.
+/// No ring shines longer than this many times the time in which a wide field cures the greatest
+/// height: against blur, longer light on an edge would gain little.
 const LONGER: f64 = 2.0;
 
-/// Rounds of the search at most.
+/// The most rounds of the search.
 const ROUNDS: usize = 25;
 
 /// The search ends when a round lowers the mean square by less than this share.
 const ENOUGH: f64 = 1e-2;
 
-/// The search ends below this root mean square, in micrometres: whole steps of the display leave
+/// The search ends below this root mean square, in micrometers: whole steps of the display leave
 /// more.
 const FINE_UM: f64 = 0.02;
 
-/// How strongly a first step is held back, as a share of the largest square of a slope.
+/// The initial damping of a step, as a share of the largest square of a slope.
 const HELD: f64 = 1e-2;
 
-/// Knots at most: each costs a simulation in every round.
+/// The most knots: each costs a simulation in every round.
 const MOST_KNOTS: usize = 48;
 
 /// Rounds of the search among whole steps of the display.
@@ -48,10 +49,10 @@ struct KnotSearch<'a> {
     knots: usize,
 }
 
-/// What some times cure, and how that follows the times.
+/// The result of some times, and its derivatives by the times.
 struct Slopes {
     residuals: Vec<f64>,
-    /// The change of all residuals for a second more of each knot.
+    /// The change of all residuals for one more second at each knot.
     by_knot: Vec<Vec<f64>>,
 }
 
@@ -73,20 +74,20 @@ impl<'a> KnotSearch<'a> {
         let cells = simulation.reaction().cells();
         let is_part = |x: &usize| wanted.heights_um[*x] > 0.0;
         let area: f64 = (0..cells.across).filter(is_part).map(|x| cells.weight(x)).sum();
-        // A cell of a round chamber stands for a ring: squares count by its area.
+        // A cell of a round chamber stands for a ring: squares are weighted by its area.
         let weights = (0..cells.across).map(|x| (cells.weight(x) / area).sqrt()).collect();
         let step_s = simulation.setting().step.ms() / 1000.0;
         let knots = simulation.rings().min(MOST_KNOTS);
         Self { simulation, wanted, weights, step_s, longest_s, knots }
     }
 
-    /// Returns between which rings knots lie, as a share of the rings for each knot.
+    /// Returns the distance between knots, in rings.
     fn apart(&self) -> f64 {
         let spans = |count: usize| count.saturating_sub(1).max(1) as f64;
         spans(self.simulation.rings()) / spans(self.knots)
     }
 
-    /// Returns the times of rings, from those of knots.
+    /// Returns the times of rings from the times of knots.
     fn by_ring(&self, knots: &[f64]) -> Vec<f64> {
         let time = |ring: usize| {
             let at = ring as f64 / self.apart();
@@ -97,7 +98,7 @@ impl<'a> KnotSearch<'a> {
         (0..self.simulation.rings()).map(time).collect()
     }
 
-    /// Returns for each knot the time in which a wide field cures what is wanted there.
+    /// Returns for each knot the time in which a wide field cures the height wanted there.
     fn first_times(&self, wide: &[(f64, f64)]) -> Vec<f64> {
         let pixel_um = self.simulation.setting().pixel_um;
         let time = |knot: usize| {
@@ -109,10 +110,11 @@ impl<'a> KnotSearch<'a> {
         (0..self.knots).map(time).collect()
     }
 
-    /// Returns what is shown when rings shine so long.
+    /// Returns the light that is shown when rings shine for these times.
     fn shown(&self, times: &[f64]) -> Vec<Shown> {
         let mut rings: Vec<usize> = (0..times.len()).filter(|&ring| times[ring] > 0.0).collect();
-        // Longest first: light is added up from the last bitmap to the first, as rings only go
+        // Longest first: light is added up from the last bitmap to the first, since rings only go
+        // dark.
         // dark.
         rings.sort_by(|&a, &b| times[b].total_cmp(&times[a]));
         let mut light = vec![0.0; self.simulation.reaction().cells().across];
@@ -141,13 +143,13 @@ impl<'a> KnotSearch<'a> {
         self.residuals(&chamber)
     }
 
-    /// Finds the slopes by one step of the display more for each knot. What is cured before its
-    /// rings go dark does not change, so each begins there.
+    /// Finds the slopes by lengthening each knot by one step of the display. The cure before its
+    /// rings go dark does not change, so each simulation begins there.
     fn slopes(&self, knots: &[f64]) -> Slopes {
         let seconds = self.simulation.reaction().seconds();
         let times = self.by_ring(knots);
         let longer: Vec<Vec<f64>> = (0..knots.len()).map(|knot| self.longer(knots, knot)).collect();
-        // Chambers are kept where times part: all before is the same for every knot.
+        // Chambers are kept where times diverge: everything before is the same for every knot.
         let first_dark = |longer: &Vec<f64>| {
             let changed = longer.iter().zip(&times).filter(|(longer, time)| longer != time);
             let first = changed.map(|(_, time)| *time).fold(f64::INFINITY, f64::min);
@@ -180,8 +182,8 @@ impl<'a> KnotSearch<'a> {
         self.by_ring(&longer)
     }
 
-    /// Moves the times of knots towards the least mean square, by Gauss-Newton held back as K. Levenberg
-    /// and D. Marquardt do.
+    /// Moves the times of knots toward the least mean square, by Gauss-Newton steps damped as by K.
+    /// Levenberg and D. Marquardt.
     fn smooth(&self, times: &mut Vec<f64>) {
         let mut held = HELD;
         let mut slopes = self.slopes(times);
@@ -190,8 +192,8 @@ impl<'a> KnotSearch<'a> {
             let next = slopes.step(times, held, self.longest_s);
             let then = square(&self.cured(&self.by_ring(&next)));
             if then >= now {
-                // Levenberg and Marquardt: a step that fails is held back more, and one that helps
-                // less.
+                // Levenberg and Marquardt: a step that fails raises the damping, and one that helps
+                // lowers it.
                 held *= 8.0;
                 continue;
             }
@@ -205,8 +207,8 @@ impl<'a> KnotSearch<'a> {
         }
     }
 
-    /// Returns the times of rings in whole steps of the display, near those of knots: the best
-    /// ones, where each ring has its knot.
+    /// Returns the times of rings in whole steps of the display, near the times of knots: the best
+    /// ones, if each ring has its own knot.
     fn whole(&self, knots: &[f64]) -> Vec<u32> {
         if self.knots < self.simulation.rings() {
             return self.rounded(&self.by_ring(knots));
@@ -229,13 +231,13 @@ impl<'a> KnotSearch<'a> {
         best
     }
 
-    /// Rounds times to whole steps of the display; what one ring loses, the next one gets.
+    /// Rounds times to whole steps of the display; the next ring gets the time that a ring loses.
     fn rounded(&self, times: &[f64]) -> Vec<u32> {
         let mut lost = 0.0;
         let step = |time: &f64| {
             let wanted = time / self.step_s + lost;
             let steps = if *time > 0.0 { wanted.round().max(0.0) } else { 0.0 };
-            // Errors of rounding go on to the neighbour, whose light overlaps this ring's.
+            // Rounding errors go on to the neighbor, whose light overlaps this ring's.
             lost = if *time > 0.0 { wanted - steps } else { 0.0 };
             steps as u32
         };
@@ -244,11 +246,11 @@ impl<'a> KnotSearch<'a> {
 }
 
 impl Slopes {
-    /// Returns the times of knots that make the linear model's mean square least, not below zero, while
-    /// steps are held back.
+    /// Returns the times of knots, not below zero, that minimize the linear model's mean square
+    /// plus the damping.
     fn step(&self, times: &[f64], held: f64, longest_s: f64) -> Vec<f64> {
         let steepest = self.by_knot.iter().map(|slope| square(slope)).fold(0.0, f64::max);
-        // In shares of the steepest slope the factor has no unit.
+        // As a share of the steepest slope, the factor has no unit.
         let held = held * steepest;
         let bounds = [vec![0.0; times.len()], vec![longest_s; times.len()]];
         let mut next = times.to_vec();
@@ -272,8 +274,7 @@ impl Slopes {
         left
     }
 
-    /// Moves single rings and pairs of neighbours by whole steps, as long as the linear model
-    /// gains.
+    /// Moves single rings and pairs of neighbors by whole steps, as long as the linear model gains.
     fn whole_steps(&self, steps: &[u32], step_s: f64) -> Vec<u32> {
         let mut best = steps.to_vec();
         let mut left = self.residuals.clone();
@@ -309,7 +310,7 @@ impl Slopes {
     }
 }
 
-/// Lists moves of one ring, and of two neighbours against each other.
+/// Lists moves of one ring, and of two neighbors against each other.
 fn moves(rings: usize) -> impl Iterator<Item = Vec<(usize, i32)>> {
     let one = (0..rings).flat_map(|ring| [1, -1].map(|by| vec![(ring, by)]));
     let two = (1..rings).flat_map(|ring| [1, -1].map(|by| vec![(ring - 1, by), (ring, -by)]));

@@ -17,10 +17,10 @@ const RULE: [(f64, f64); 5] = [
 /// Light is left out where it is less than this share of full light.
 const FAINTEST: f64 = 1e-9;
 
-/// Beyond so many standard deviations there is no light.
+/// Light ends beyond this many standard deviations.
 const FARTHEST: f64 = 6.5;
 
-/// Returns the share of full light at each column of cells when what lies between two distances
+/// Returns the share of full light at each column of cells when the range between two distances
 /// from the axis shines, blurred by a Gaussian of `sigma_um`. Without blur, it is the share of a
 /// cell that shines.
 pub(super) fn light_of(cells: &Cells, shining_um: Range<f64>, sigma_um: f64) -> Vec<f64> {
@@ -39,7 +39,7 @@ fn sharp(cells: &Cells, x: usize, shining: &Range<f64>) -> f64 {
     let cell = [x as f64, x as f64 + 1.0].map(|edge| edge * cells.width_um);
     let [from, to] = [shining.start, shining.end].map(|edge| edge.clamp(cell[0], cell[1]));
     let whole = |[from, to]: [f64; 2]| match cells.shape {
-        // Areas of rings, less the π that both have.
+        // Areas of rings, without the π that both have.
         ChamberShape::Round => to * to - from * from,
         ChamberShape::Straight => to - from,
     };
@@ -64,14 +64,14 @@ fn blurred(shape: ChamberShape, at: f64, shining: &Range<f64>, sigma: f64) -> f6
     (0..pieces as usize).map(piece).sum()
 }
 
-/// Returns what a line or ring of unit width at `from` gives at `at`.
+/// Returns the light at `at` of a line or ring of unit width at `from`.
 fn kernel(shape: ChamberShape, at: f64, from: f64, sigma: f64) -> f64 {
     let bell = |far: f64| (-0.5 * (far / sigma).powi(2)).exp();
     match shape {
         ChamberShape::Round => {
             let x = at * from / (sigma * sigma);
             // The Gaussian integrated around a ring: exp(-(r² + s²) / 2σ²) I₀(r s / σ²) s / σ². The
-            // exponents of both factors are taken together: alone, I₀ overflows where the other
+            // exponents of both factors are combined: alone, I₀ overflows where the other factor
             // vanishes.
             bell(at - from) * scaled_bessel_i0(x) * from / (sigma * sigma)
         }

@@ -9,7 +9,7 @@ use super::setting::{KineticSetting, SettingError};
 use super::simulation::RingSimulation;
 use super::{joint, seed};
 
-/// Columns that see the part's edge: pixels that a plan may light beyond it.
+/// Pixels that a plan may light beyond the part's edge, for the columns that see the edge.
 const BEYOND: f64 = 1.0;
 
 /// How to plan.
@@ -56,7 +56,7 @@ pub enum RingPlanError {
         /// Half of the display's shorter side.
         lit_um: f64,
     },
-    /// No bitmap would better the part.
+    /// No bitmap would improve the part.
     #[error("the target is too small for pixels of {pixel_um:.2} um that are white for {step}")]
     TooSmall {
         /// The side of a pixel.
@@ -64,7 +64,7 @@ pub enum RingPlanError {
         /// The display's step.
         step: ExposureTime,
     },
-    /// The best plan is as far from the part as nothing is.
+    /// The best plan is no nearer to the part than an empty chamber.
     #[error(
         "the best bitmaps cure {cured_um:.1} um where {wanted_um:.1} um are wanted, which is no \
          better than nothing: light spreads too far, or cures too much in the display's step of {step}"
@@ -83,7 +83,7 @@ pub enum RingPlanError {
     /// A time that the display cannot keep.
     #[error("bitmap {bitmap} is shown for {time}: the display's step is {step}")]
     TooShort {
-        /// Which, from 1.
+        /// The number of the bitmap, from 1.
         bitmap: usize,
         /// Its time.
         time: ExposureTime,
@@ -93,17 +93,17 @@ pub enum RingPlanError {
     /// A plan that would take too long to follow.
     #[error("the bitmaps take {seconds:.0} s together: an hour is the most")]
     TooLong {
-        /// All of them.
+        /// The sum of their times.
         seconds: f64,
     },
     /// A ring beyond the display.
     #[error("bitmap {bitmap} reaches {reach} pixels from the middle, the display only {pixels}")]
     BeyondDisplay {
-        /// Which, from 1.
+        /// The number of the bitmap, from 1.
         bitmap: usize,
-        /// Pixels from the middle to where its light ends.
+        /// The pixels from the middle to the end of its light.
         reach: u32,
-        /// Pixels from the middle to the display's nearest side.
+        /// The pixels from the middle to the nearest side of the display.
         pixels: u32,
     },
     /// The light is too weak.
@@ -111,14 +111,14 @@ pub enum RingPlanError {
     TooDim {
         /// The longest time.
         seconds: f64,
-        /// What it cures.
+        /// The height that it cures.
         cured_um: f64,
-        /// What is wanted.
+        /// The wanted height.
         wanted_um: f64,
     },
 }
 
-/// Bitmaps and times, and what they cure.
+/// Bitmaps and times, and the profile that they cure.
 #[derive(Clone, Debug)]
 pub struct RingPlan {
     /// The chamber.
@@ -127,12 +127,12 @@ pub struct RingPlan {
     pub wanted: WantedProfile,
     /// The bitmaps in order.
     pub exposures: Vec<RingExposure>,
-    /// What they cure.
+    /// The profile that they cure.
     pub cured: Profile,
 }
 
 /// Plans a round part of `radius_um`, whose height at each distance from its axis is given in
-/// micrometres.
+/// micrometers.
 ///
 /// # Errors
 /// Returns an error if a height is impossible, the part does not fit the chamber or the display,
@@ -159,7 +159,7 @@ pub fn plan(
     if exposures.is_empty() {
         return Err(RingPlanError::TooSmall { pixel_um: setting.pixel_um, step: setting.step });
     }
-    // As anyone prepares it who has the bitmaps alone: the same heights to the last bit.
+    // Prepared from the bitmaps alone, as by any later reader: the same heights to the last bit.
     let simulation = RingSimulation::of_plan(setting, &exposures, radius_um)?;
     let wanted = WantedProfile::new(simulation.reaction().cells(), height_um);
     let cured = simulation.cure(&exposures);
@@ -175,11 +175,11 @@ pub fn plan(
 const LONGEST_S: f64 = 3600.0;
 
 impl RingSimulation {
-    /// Prepares a chamber for a plan, and for a part of `radius_um`, zero if there is none.
+    /// Prepares a chamber for a plan, and for a part of `radius_um`, zero if there is no part.
     ///
     /// # Errors
-    /// Returns an error if nothing is shown, a time is below the display's step, a ring lies
-    /// beyond the display, all take more than an hour, or the setting is impossible.
+    /// Returns an error if nothing is shown, a time is below the display's step, a ring is outside
+    /// the display, all bitmaps take more than an hour, or the setting is impossible.
     pub fn of_plan(
         setting: KineticSetting,
         plan: &[RingExposure],

@@ -4,14 +4,14 @@ use super::cells::Cells;
 use super::reactor::{Chamber, Reaction};
 use crate::target::{Grid, HeightMap};
 
-/// What is cured: the height of each column of cells.
+/// The cured shape: the height of each column of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// The chamber's cells.
     pub cells: Cells,
-    /// Heights above the glass, in micrometres, from the axis.
+    /// Heights above the glass, in micrometers, from the axis.
     pub heights_um: Vec<f64>,
-    /// How far it is solid on the glass, in micrometres from the axis.
+    /// The radius of the solid on the glass, in micrometers.
     pub base_um: f64,
 }
 
@@ -24,17 +24,17 @@ impl Profile {
         }
     }
 
-    /// Returns the height at the axis, in micrometres.
+    /// Returns the height at the axis, in micrometers.
     pub fn sag_um(&self) -> f64 {
         self.heights_um.first().copied().unwrap_or(0.0)
     }
 
-    /// Returns the greatest height, in micrometres.
+    /// Returns the greatest height, in micrometers.
     pub fn highest_um(&self) -> f64 {
         self.heights_um.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Returns the height at a distance from the axis, in micrometres.
+    /// Returns the height at a distance from the axis, in micrometers.
     pub fn height_um(&self, radius_um: f64) -> f64 {
         height_um(&self.cells, &self.heights_um, radius_um)
     }
@@ -58,7 +58,7 @@ fn height_um(cells: &Cells, heights_um: &[f64], radius_um: f64) -> f64 {
 pub struct WantedProfile {
     /// The chamber's cells.
     pub cells: Cells,
-    /// Heights above the glass, in micrometres, from the axis.
+    /// Heights above the glass, in micrometers, from the axis.
     pub heights_um: Vec<f64>,
 }
 
@@ -69,29 +69,29 @@ impl WantedProfile {
         Self { cells: *cells, heights_um }
     }
 
-    /// Returns the height at a distance from the axis, in micrometres.
+    /// Returns the height at a distance from the axis, in micrometers.
     pub fn height_um(&self, radius_um: f64) -> f64 {
         height_um(&self.cells, &self.heights_um, radius_um)
     }
 
-    /// Returns the greatest height, in micrometres.
+    /// Returns the greatest height, in micrometers.
     pub fn highest_um(&self) -> f64 {
         self.heights_um.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Returns how far what is cured is too low and too high at most, in micrometres.
+    /// Returns the most by which the cured profile is too low and too high, in micrometers.
     pub fn extremes_um(&self, cured: &Profile) -> [f64; 2] {
         let off = || self.heights_um.iter().zip(&cured.heights_um).map(|(wanted, um)| um - wanted);
         [off().fold(0.0, |most: f64, off| most.max(-off)), off().fold(0.0, f64::max)]
     }
 
-    /// Returns the root mean square of cured minus wanted height, in micrometres, over the glass
+    /// Returns the root mean square of cured minus wanted height, in micrometers, over the glass
     /// where either is above zero.
     pub fn rms_um(&self, cured: &Profile) -> f64 {
         self.rms_below(cured, f64::INFINITY)
     }
 
-    /// Returns the same for what is wanted below a height.
+    /// Returns the same for the part up to a height.
     pub(super) fn rms_below(&self, cured: &Profile, most_um: f64) -> f64 {
         let [mut sum, mut area] = [0.0; 2];
         for (x, (wanted, height)) in self.heights_um.iter().zip(&cured.heights_um).enumerate() {

@@ -6,16 +6,16 @@ use super::cells::Cells;
 use super::diffusion::Diffusion;
 use crate::wide::wide;
 
-/// Cells whose radicals are found together.
+/// Cells whose radicals are computed together.
 const LANES: usize = 8;
 
-/// Radicals are known this well before the last step of Newton's method, which squares it.
+/// Relative error of radicals before the last step of Newton's method, which squares it.
 const NEAR: f64 = 1e-6;
 
 /// The greatest power for which [`faded`] is exact to 2e-11.
 const SMALL: f64 = 0.1;
 
-/// A step of Newton's method from above at least takes a third of the way: enough for any number.
+/// A Newton step from above covers at least a third of the way: enough steps for any number.
 const MOST_STEPS: usize = 100;
 
 /// How a chamber reacts within one step of time.
@@ -24,9 +24,9 @@ pub struct Reaction {
     cells: Cells,
     /// The step, in seconds.
     seconds: f64,
-    /// The share of the initiator that a W/m² splits in a step.
+    /// The share of the initiator that 1 W/m² splits in a step.
     split: f64,
-    /// By which power of e light fades in half a cell of a mol/m³ of initiator.
+    /// The exponent by which light fades in half a cell with 1 mol/m³ of initiator.
     fade: f64,
     /// `2 k_t dt`.
     ended: f64,
@@ -43,7 +43,7 @@ impl Reaction {
     /// Prepares steps of `seconds`.
     pub fn new(kinetics: &Kinetics, cells: Cells, seconds: f64) -> Self {
         // Constants of 003 table 1 are in W/m², mol/m³ and seconds; lengths of cells are in
-        // micrometres.
+        // micrometers.
         let watt_per_m2 = Intensity::from_mw_per_cm2(0.1);
         let um2_per_s = 1e12 * kinetics.oxygen_diffusion.number();
         Self {
@@ -66,20 +66,20 @@ impl Reaction {
         &self.cells
     }
 
-    /// Returns how long a step is, in seconds.
+    /// Returns the length of a step, in seconds.
     pub const fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Returns how far the conversion is beyond the critical one.
+    /// Returns the difference between the conversion and the critical one.
     fn beyond_critical(&self, growth: f64) -> f64 {
-        // 003 eq. 11 integrated: [DB] falls by exp(-k_p ∫ [R] dt), and conversion is one less that
+        // 003 eq. 11 integrated: [DB] falls by exp(-k_p ∫ [R] dt), and conversion is one minus that
         // (eq. 14, whose sign is lost).
         -(-self.propagation * growth).exp_m1() - self.critical
     }
 }
 
-/// What is in a chamber: concentrations in mol/m³, cell by cell.
+/// The contents of a chamber: concentrations in mol/m³, cell by cell.
 #[derive(Clone, Debug)]
 pub struct Chamber {
     initiator: Vec<f64>,
@@ -87,7 +87,7 @@ pub struct Chamber {
     oxygen: Vec<f64>,
     /// The time integral of the radicals.
     growth: Vec<f64>,
-    /// Columns from here on never had light.
+    /// Columns from this one on never had light.
     reach: usize,
 }
 
@@ -104,8 +104,8 @@ impl Chamber {
         }
     }
 
-    /// Lets a step pass under light, in W/m² at the glass of each column: oxygen spreads, then
-    /// light splits initiator, then radicals come to terms with each other and with oxygen, each
+    /// Advances one step under light, in W/m² at the glass of each column: oxygen diffuses, then
+    /// light splits initiator, then radicals react with each other and with oxygen, each
     /// implicitly.
     pub fn pass(&mut self, reaction: &Reaction, light: &[f64]) {
         let lit = light.iter().rposition(|&light| light > 0.0).map_or(0, |last| last + 1);
@@ -115,7 +115,7 @@ impl Chamber {
             #[inline(always)]
             || {
                 if let Some(diffusion) = &reaction.diffusion {
-                    // Splitting of operators: oxygen alone spreads in 003 eq. 12 and 13.
+                    // Operator splitting: only oxygen diffuses in 003 eq. 12 and 13.
                     diffusion.spread(&mut self.oxygen);
                 }
                 self.react(reaction, light);
@@ -143,7 +143,7 @@ impl Chamber {
         }
     }
 
-    /// Returns how high each column is solid from the glass, in micrometres: up to where the
+    /// Returns the height to which each column is solid from the glass, in micrometers: where the
     /// conversion first falls below the critical one, linearly between middles of cells.
     pub fn heights_um(&self, reaction: &Reaction) -> Vec<f64> {
         (0..reaction.cells.across).map(|x| self.height_um(reaction, x)).collect()
@@ -155,14 +155,14 @@ impl Chamber {
         let Some(liquid) = (0..deep).find(|&z| beyond(z) < 0.0) else {
             return deep as f64 * height_um;
         };
-        // Resin that is solid above a liquid cell does not hold on the glass.
+        // Solid resin above a liquid cell has no hold on the glass.
         let Some(solid) = liquid.checked_sub(1) else { return 0.0 };
         let share = beyond(solid) / (beyond(solid) - beyond(liquid));
         (solid as f64 + 0.5 + share) * height_um
     }
 
-    /// Returns how far resin is solid on the glass, in micrometres from the axis, linearly
-    /// between middles of cells.
+    /// Returns the radius to which resin is solid on the glass, in micrometers from the axis,
+    /// linearly between middles of cells.
     pub fn base_um(&self, reaction: &Reaction) -> f64 {
         let Cells { across, width_um, .. } = reaction.cells;
         let beyond = |x: usize| reaction.beyond_critical(self.growth[x]);
@@ -175,15 +175,15 @@ impl Chamber {
     }
 }
 
-/// Lets light through a row of cells and splits their initiator; `left` is the share that it
-/// would split where it enters, and then where it leaves. `made` gets the new radicals.
+/// Passes light through a row of cells and splits their initiator. `left` is the share that the
+/// light would split where it enters, and then where it leaves. `made` gets the new radicals.
 #[inline(always)]
 fn split(reaction: &Reaction, left: &mut [f64], initiator: &mut [f64], made: &mut [f64]) {
     // Initiator is never made.
     let is_small = reaction.fade * reaction.initiator <= SMALL;
     for ((left, initiator), made) in left.iter_mut().zip(initiator).zip(made) {
         let power = reaction.fade * *initiator;
-        // Initiator reacts by the light at its cell's middle: half of the cell fades it before,
+        // Initiator reacts to the light at its cell's middle: half of the cell fades it before,
         // half after (003 eq. 4).
         let half = if is_small { faded(power) } else { (-power).exp() };
         let share = *left * half;
@@ -202,7 +202,8 @@ fn faded(power: f64) -> f64 {
     terms.into_iter().fold(0.0, |sum, term| sum * power + term)
 }
 
-/// Finds the radicals `R` of some cells, where `source` is what was there and what light made:
+/// Finds the radicals `R` of some cells, where `source` is the sum of the old radicals and the ones
+/// that light made:
 ///
 /// ```text
 /// R + 2 k_t dt R² + k dt R O / (1 + k dt R) = source,   k = k_t,O2

@@ -1,4 +1,4 @@
-//! Bitmap after bitmap, as 003 section 5 plans.
+//! Plans one bitmap after the other, as in 003 section 5.
 
 use lamp_grayscale::resin::ExposureTime;
 use rayon::prelude::*;
@@ -8,20 +8,20 @@ use super::profile::{Profile, WantedProfile};
 use super::reactor::Chamber;
 use super::simulation::{RingSimulation, Shown};
 
-/// Whole seconds of the database of single discs (003 table 2).
+/// The longest time in the database of single discs, in whole seconds (003 table 2).
 const DATABASE_S: u32 = 30;
 
-/// Pixels of its largest disc.
+/// The radius of its largest disc, in pixels.
 const DATABASE_PIXELS: u32 = 45;
 
-/// A later disc shines this long at most, in seconds.
+/// The longest time of a later disc, in seconds.
 const LONGEST_S: f64 = 10.0;
 
-/// A disc that made the part worse for so many seconds is not shown on.
+/// A disc that made the part worse for this many seconds is not shown any longer.
 const WORSE_S: f64 = 1.0;
 
-/// Plans a first disc from the database, and then one smaller disc after the other, until what is
-/// cured is as high as wanted, or none betters it.
+/// Plans a first disc from the database, and then one smaller disc after the other, until the cured
+/// height is the wanted one, or no disc improves it.
 pub(super) fn plan(simulation: &RingSimulation, wanted: &WantedProfile) -> Vec<RingExposure> {
     let Some((pixels, seconds)) = first_disc(simulation, wanted) else { return Vec::new() };
     let mut plan =
@@ -41,8 +41,8 @@ fn disc(simulation: &RingSimulation, pixels: u32, until_s: f64) -> Shown {
     Shown { until_s, light: simulation.light(|ring| ring < pixels as usize) }
 }
 
-/// Returns how far a profile is from the part up to its own height, as a share of that height
-/// (003 equation 15). Not divided, the thinnest films would be best.
+/// Returns the difference between a profile and the part up to the profile's own height, as a share
+/// of that height (003 equation 15). Without the division, the thinnest films would be best.
 fn misfit(wanted: &WantedProfile, profile: &Profile) -> f64 {
     let highest = profile.highest_um();
     if highest == 0.0 { f64::INFINITY } else { wanted.rms_below(profile, highest) / highest }
@@ -82,7 +82,7 @@ struct Next {
     chamber: Chamber,
 }
 
-/// Returns the smaller disc that fits best (003 section 5.2, equations 16 and 17), if one betters
+/// Returns the smaller disc that fits best (003 section 5.2, equations 16 and 17), if one improves
 /// the part.
 fn next_disc(
     simulation: &RingSimulation,
@@ -94,8 +94,8 @@ fn next_disc(
     let rms_now = wanted.rms_um(&now);
     let tries = (1..reach).into_par_iter().filter_map(|pixels| {
         try_disc(simulation, wanted, chamber, pixels).filter(|next| {
-            // The fit is a share of the height, which a higher film can lower and yet be farther
-            // off.
+            // The misfit is a share of the height: a higher film can lower it although its
+            // difference from the part is larger.
             wanted.rms_um(&Profile::of(&next.chamber, simulation.reaction())) < rms_now
         })
     });
@@ -116,7 +116,7 @@ fn try_disc(
     let mut shown_s = 0.0;
     while shown_s < LONGEST_S {
         simulation.expose(&mut chamber, &[disc(simulation, pixels, step_s)], 0, |_, _| ());
-        // The chamber goes on from step to step, so that all times of a disc take one simulation.
+        // The chamber continues from step to step, so that all times of a disc take one simulation.
         shown_s += step_s;
         let misfit = misfit(wanted, &Profile::of(&chamber, simulation.reaction()));
         let time = ExposureTime::from_ms((shown_s * 1e6).round() / 1e3);

@@ -1,4 +1,4 @@
-//! What exposes a chamber: light, blur, pixels and times of the display, and the resin.
+//! The exposure of a chamber: light, blur, pixels and times of the display, and the resin.
 
 use lamp_grayscale::resin::{ExposureTime, Intensity, Kinetics};
 use thiserror::Error;
@@ -9,38 +9,38 @@ use crate::projector::{Projector, SpreadOf};
 /// The longest step of a display: 003's resin cures its part in some 20 s.
 const LONGEST_DISPLAY_S: f64 = 2.0;
 
-/// The longest step of the reaction, in seconds. Heights are then within 0.1 µm of those of
-/// steps ten times as short.
+/// The longest step of the reaction, in seconds. Heights are then within 0.1 µm of the heights at a
+/// tenth of this step.
 const LONGEST_STEP_S: f64 = 0.025;
 
-/// About how wide a cell is, in micrometres: half as much moves heights by less than 0.1 µm.
+/// About the width of a cell, in micrometers: half of it changes heights by less than 0.1 µm.
 const WIDTH_UM: f64 = 4.0;
 
-/// About how high a cell is, in micrometres.
+/// About the height of a cell, in micrometers.
 const HEIGHT_UM: f64 = 1.0;
 
-/// The cells of the largest chamber.
+/// The number of cells of the largest chamber.
 const MOST_CELLS: f64 = 4e6;
 
-/// Oxygen matters that comes in so many seconds.
+/// Oxygen that arrives within this many seconds matters.
 const OXYGEN_S: f64 = 40.0;
 
-/// What exposes a chamber, and what is in it.
+/// The light on a chamber, and the resin in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KineticSetting {
     /// The rates of the resin.
     pub kinetics: Kinetics,
     /// The light of a wide white field on the glass.
     pub light: Intensity,
-    /// The standard deviation of the blur, in micrometres.
+    /// The standard deviation of the blur, in micrometers.
     pub sigma_um: f64,
-    /// The side of a pixel on the glass, in micrometres.
+    /// The side of a pixel on the glass, in micrometers.
     pub pixel_um: f64,
-    /// Pixels from the middle of the display to its nearest side.
+    /// The pixels from the middle of the display to its nearest side.
     pub pixels: u32,
     /// The display's step: times are multiples of it.
     pub step: ExposureTime,
-    /// From one glass of the chamber to the other, in micrometres.
+    /// The distance between the two glasses of the chamber, in micrometers.
     pub chamber_um: f64,
 }
 
@@ -54,13 +54,13 @@ pub enum SettingError {
     /// The projector's light spreads over a cone.
     #[error("its light spreads over a cone: kinetics need `sigma` in [spread]")]
     Cone,
-    /// The projector does not tell of a chamber.
+    /// The projector has no chamber.
     #[error("it does not say how high the resin is: add [chamber] to its file")]
     NoChamber,
     /// The blur is below zero, or not finite.
     #[error("the blur must be zero or more")]
     Blur,
-    /// A step of the display that is too coarse for any plan.
+    /// The step of the display is too coarse for any plan.
     #[error(
         "the display's step is {0}: {LONGEST_DISPLAY_S} s is the most that parts can be planned with"
     )]
@@ -68,7 +68,7 @@ pub enum SettingError {
     /// Cells of a useful size would be too many.
     #[error("a chamber of {wide_um:.0} x {deep_um:.0} um is too large to compute")]
     TooLarge {
-        /// How far it would have to reach from the axis.
+        /// The radius that it would need.
         wide_um: f64,
         /// Its height.
         deep_um: f64,
@@ -79,8 +79,8 @@ impl KineticSetting {
     /// Takes the numbers of a projector and of its resin.
     ///
     /// # Errors
-    /// Returns an error if the projector spreads light otherwise than by a Gaussian, or does not
-    /// tell how high its chamber is.
+    /// Returns an error if the projector does not spread light by a Gaussian, or does not state the
+    /// height of its chamber.
     pub fn of(projector: &Projector, kinetics: Kinetics) -> Result<Self, SettingError> {
         let SpreadOf::Gaussian(sigma) = projector.spread() else {
             return Err(SettingError::Cone);
@@ -100,7 +100,7 @@ impl KineticSetting {
     /// Checks that the numbers are possible.
     ///
     /// # Errors
-    /// Returns an error that names the number otherwise.
+    /// Returns an error that names the impossible number.
     pub fn check(&self) -> Result<(), SettingError> {
         for (number, what) in [
             (self.light.mw_per_cm2(), "the light"),
@@ -123,8 +123,8 @@ impl KineticSetting {
         }
     }
 
-    /// Returns a step of the reaction, in seconds: whole ones make up the display's, or the other
-    /// way round.
+    /// Returns the step of the reaction, in seconds: a whole number of them makes up the display's
+    /// step, or the other way round.
     pub(super) fn seconds(&self) -> f64 {
         let step = self.step.ms() / 1000.0;
         if step > LONGEST_STEP_S {
@@ -134,7 +134,7 @@ impl KineticSetting {
         }
     }
 
-    /// Returns the cells of a chamber for what lies within `radius_um` of the axis.
+    /// Returns the cells of a chamber for everything up to `radius_um` from the axis.
     pub(super) fn cells(&self, radius_um: f64) -> Result<Cells, SettingError> {
         let um2_per_s = 1e12 * self.kinetics.oxygen_diffusion.m2_per_s();
         let wide_um = radius_um + 4.0 * self.sigma_um + (um2_per_s * OXYGEN_S).sqrt();

@@ -1,4 +1,4 @@
-//! What bitmaps cure, one after the other.
+//! Simulates the cure by bitmaps, one after the other.
 
 use lamp_grayscale::resin::Intensity;
 
@@ -19,7 +19,7 @@ pub struct RingSimulation {
     rings: Vec<Vec<f64>>,
 }
 
-/// What is shown until a time in seconds: the light of each column.
+/// The light of each column, shown until a time in seconds.
 #[derive(Clone, Debug)]
 pub(super) struct Shown {
     pub(super) until_s: f64,
@@ -48,7 +48,7 @@ impl RingSimulation {
         Ok(Self { setting, reaction, rings: (0..pixels).map(ring).collect() })
     }
 
-    /// Returns the same with so many times the light.
+    /// Returns the same with the light multiplied by `times`.
     pub fn under(&self, times: f64) -> Self {
         let mut other = self.clone();
         other.setting.light = Intensity::from_mw_per_cm2(times * self.setting.light.mw_per_cm2());
@@ -56,29 +56,29 @@ impl RingSimulation {
         other
     }
 
-    /// Returns what it was made for.
+    /// Returns the setting that it was made for.
     pub const fn setting(&self) -> &KineticSetting {
         &self.setting
     }
 
-    /// Returns its steps.
+    /// Returns the steps of its reaction.
     pub const fn reaction(&self) -> &Reaction {
         &self.reaction
     }
 
-    /// Returns how many rings of pixels it knows.
+    /// Returns the number of rings of pixels that it knows.
     pub(super) fn rings(&self) -> usize {
         self.rings.len()
     }
 
-    /// Returns what a plan cures when its last bitmap goes dark.
+    /// Returns the profile that a plan cures when its last bitmap goes dark.
     pub fn cure(&self, plan: &[RingExposure]) -> Profile {
         let mut chamber = Chamber::new(&self.reaction);
         self.expose(&mut chamber, &self.shown(plan), 0, |_, _| ());
         Profile::of(&chamber, &self.reaction)
     }
 
-    /// Returns what a plan cures up to the end of each of its bitmaps.
+    /// Returns the profiles that a plan cures up to the end of each of its bitmaps.
     pub fn growth(&self, plan: &[RingExposure]) -> Vec<Profile> {
         let shown = self.shown(plan);
         let step_of = |shown: &Shown| (shown.until_s / self.reaction.seconds()).round() as usize;
@@ -92,15 +92,15 @@ impl RingSimulation {
         grown
     }
 
-    /// Returns the times, in seconds, and heights that a wide white field cures, step by step of
-    /// the display until it reaches `wanted_um`.
+    /// Returns the times, in seconds, and heights that a wide white field cures, at each step of
+    /// the display, until it reaches `wanted_um`.
     pub(super) fn wide_field(
         &self,
         wanted_um: f64,
         longest_s: f64,
     ) -> Result<Vec<(f64, f64)>, RingPlanError> {
-        // A wide field is the same at every column, so that one stands for all, and oxygen has
-        // nowhere to go sideways.
+        // A wide field is the same at every column: one column stands for all, and oxygen does not
+        // move sideways.
         let column = Cells { across: 1, ..*self.reaction.cells() };
         let step_s = self.setting.step.ms() / 1000.0;
         let reaction = Reaction::new(&self.setting.kinetics, column, self.reaction.seconds());
@@ -138,7 +138,7 @@ impl RingSimulation {
         &self.rings[ring]
     }
 
-    /// Returns the light of those rings that are white.
+    /// Returns the light of the rings that are white.
     pub(super) fn light(&self, is_white: impl Fn(usize) -> bool) -> Vec<f64> {
         let mut light = vec![0.0; self.reaction.cells().across];
         for (_, ring) in self.rings.iter().enumerate().filter(|&(ring, _)| is_white(ring)) {
@@ -147,8 +147,8 @@ impl RingSimulation {
         light
     }
 
-    /// Exposes a chamber from a step on, and shows it to `before` each step. The light of a step
-    /// is the mean of what is shown in it.
+    /// Exposes a chamber from a step on, and passes it to `before` before each step. The light of a
+    /// step is the mean of the light shown in it.
     pub(super) fn expose(
         &self,
         chamber: &mut Chamber,
@@ -158,7 +158,7 @@ impl RingSimulation {
     ) {
         let seconds = self.reaction.seconds();
         let end_s = shown.last().map_or(0.0, |last| last.until_s);
-        // A plan of whole steps must not get another one by rounding.
+        // Rounding must not add a step to a plan of whole steps.
         let steps = (end_s / seconds - 1e-6).ceil().max(0.0) as usize;
         let mut light = Vec::new();
         for step in from..steps {

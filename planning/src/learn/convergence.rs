@@ -1,8 +1,9 @@
-//! Tells whether a law's changes shrink the errors of the next prints.
+//! Checks whether a law's changes shrink the errors of the next prints.
 //!
 //! If the times change by `L e`, the errors `e` become `(I - G L) e`. The spectral radius of that
-//! matrix says what becomes of them in the end; its 2-norm, whether they may grow first. Errors are
-//! counted in voxels, and those of the model's step in shares of its noise, which it makes least.
+//! matrix gives their long-run decay; its 2-norm shows whether they may grow first. Errors are
+//! counted in voxels; for the model's step, they are counted in shares of its noise, in which units
+//! the step minimizes them.
 
 use super::law::Law;
 use super::response::Response;
@@ -10,27 +11,29 @@ use super::response::Response;
 /// How a law's errors shrink from print to print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convergence {
-    /// The spectral radius of `I - G L`: in the end, errors shrink by this with each print.
+    /// The spectral radius of `I - G L`: the factor by which errors shrink with each print in the
+    /// long run.
     pub radius: f64,
-    /// Its 2-norm: no print's errors are larger than those of the print before, times this.
+    /// Its 2-norm: the largest factor between the errors of a print and the errors of the print
+    /// before.
     pub norm: f64,
 }
 
 impl Convergence {
-    /// Returns whether errors may grow from a print to the next. Rounding aside, a norm of 1 is
-    /// that of layers that no light changes.
+    /// Returns whether errors may grow from a print to the next. Layers that no light changes have
+    /// a norm of 1, up to rounding.
     pub fn may_grow(&self) -> bool {
         self.norm > 1.0 + 1e-6
     }
 }
 
-/// How often the matrix is applied for its norm.
+/// The number of times that the matrix is applied for its norm.
 const NORM_ROUNDS: usize = 200;
-/// How often it is applied before and while the radius is read off.
+/// The number of times that it is applied before, and during, the measurement of the radius.
 const RADIUS_ROUNDS: [usize; 2] = [400, 400];
 
-/// Returns how a law's errors shrink where the model says `assumed` and `real` is true. The law of
-/// several layers depends on the signs of the present `errors`.
+/// Returns the decay of a law's errors where the model says `assumed` and `real` is true. The law
+/// of several layers depends on the signs of the present `errors`.
 pub fn convergence(
     law: &Law,
     times: &[f64],
@@ -50,8 +53,8 @@ pub fn convergence(
     Convergence { radius, norm: shrink.norm(1.0) }
 }
 
-/// Returns by how much a law's gains may be multiplied until errors may grow, up to a thousand.
-/// It is zero if any gain lets them grow.
+/// Returns the factor by which a law's gains may be multiplied before errors may grow, up to a
+/// thousand. It is zero if any gain lets them grow.
 pub fn largest_safe_gain(law: &Law, times: &[f64], errors: &[f64], response: &Response) -> f64 {
     let shrink = Shrink::new(law, times, errors, [response, response]);
     let safe = |gain: f64| shrink.norm(gain) <= 1.0 + 1e-6;
@@ -61,7 +64,7 @@ pub fn largest_safe_gain(law: &Law, times: &[f64], errors: &[f64], response: &Re
         return high;
     }
     for _ in 0..60 {
-        // Quarters first: safe gains may lie orders of magnitude below.
+        // Quarters first: safe gains may be orders of magnitude smaller.
         let middle = if low == 0.0 { high / 4.0 } else { 0.5 * (low + high) };
         *(if safe(middle) { &mut low } else { &mut high }) = middle;
         if high < 1e-9 {
@@ -148,8 +151,8 @@ impl Shrink {
             }
             x.iter_mut().for_each(|x| *x /= next);
             if round >= before {
-                // A pair of complex eigenvalues makes the length swing: the mean of its logarithm
-                // does not.
+                // A pair of complex eigenvalues makes the length oscillate, but not the mean of its
+                // logarithm.
                 growth += next.ln();
             }
         }
@@ -157,11 +160,11 @@ impl Shrink {
     }
 }
 
-/// A vector that no matrix of ours is likely to have no share of.
+/// A vector that is unlikely to be orthogonal to any matrix's leading direction.
 fn start(size: usize) -> Vec<f64> {
     let x: Vec<_> = (0..size).map(|k| 1.0 + (k as f64 * 0.754_877_666).fract()).collect();
     let length = length(&x);
-    // Signs that change let fast changes from layer to layer show as soon as slow ones.
+    // Alternating signs make fast changes from layer to layer show as soon as slow ones.
     let signed = |(k, x): (usize, f64)| if k % 3 == 0 { -x / length } else { x / length };
     x.into_iter().enumerate().map(signed).collect()
 }

@@ -1,4 +1,4 @@
-//! Why nothing can be learnt from a print.
+//! Why nothing can be learned from a print.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use super::heights::FaceError;
 use crate::resin_light::NoLight;
 use crate::speed::{PartError, PlatformError, SpeedPlanError};
 
-/// Why a text is no table of what was measured on a print.
+/// Why a text is not a table of measurements of a print.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeasuredError {
@@ -22,7 +22,7 @@ pub enum MeasuredError {
     /// A column or a cell is wrong.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// It has a header alone.
+    /// It has only a header.
     #[error("there are no measurements below the header")]
     Empty,
     /// A standard deviation is not above zero.
@@ -33,12 +33,12 @@ pub enum MeasuredError {
         /// The standard deviation.
         sd_um: f64,
     },
-    /// A place stands twice.
+    /// A place is listed twice.
     #[error("line {line}: this place was measured in line {first}, too")]
     SamePlace {
         /// The line, from 1.
         line: usize,
-        /// The line where it stands first.
+        /// The line of its first entry.
         first: usize,
     },
     /// A layer's number is not one.
@@ -55,30 +55,30 @@ pub enum MeasuredError {
         /// The line, from 1.
         line: usize,
     },
-    /// A layer stands twice.
+    /// A layer is listed twice.
     #[error("line {line}: layer {layer} stands in line {first}, too")]
     SameLayer {
         /// The line, from 1.
         line: usize,
         /// The layer.
         layer: u32,
-        /// The line where it stands first.
+        /// The line of its first entry.
         first: usize,
     },
 }
 
 /// Why a file of a job cannot be used.
-// No sources: messages that contain them stand before their text.
+// No sources: messages that contain them come before their text.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JobFileError {
     /// It cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// It is longer than such a file gets.
+    /// It is too long for such a file.
     #[error("more than {mib} MiB is not {what}")]
     TooLong {
-        /// The most that such files have.
+        /// The largest size of such files.
         mib: u64,
         /// The words for such a file.
         what: &'static str,
@@ -98,7 +98,7 @@ pub enum JobFileError {
     /// It is not the material of the job.
     #[error("this is not the resin that the job was begun with: begin another job")]
     OtherResin,
-    /// It is no material.
+    /// It is not a material.
     #[error(transparent)]
     Material(#[from] CatalogueError<MaterialError>),
     /// It is not a table.
@@ -107,10 +107,10 @@ pub enum JobFileError {
     /// A column or a cell is wrong.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// It is not what was measured.
+    /// It is not a table of measurements.
     #[error(transparent)]
     PrintMeasurements(#[from] MeasuredError),
-    /// Its rows are those of other layers.
+    /// Its rows belong to other layers.
     #[error("its layers are not those of the job's stack")]
     OtherLayers,
     /// A time is not above zero.
@@ -121,7 +121,7 @@ pub enum JobFileError {
     Part(#[from] PartError),
 }
 
-/// Why a job cannot be opened or go on.
+/// Why a job cannot be opened or continued.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JobError {
@@ -137,7 +137,7 @@ pub enum JobError {
         /// Why.
         problem: JobFileError,
     },
-    /// The material says no light for plans.
+    /// The material states no light for plans.
     #[error(transparent)]
     Light(#[from] NoLight),
     /// The stack has no layers to time.
@@ -151,7 +151,7 @@ pub enum JobError {
         /// The file of the first print's times.
         name: String,
     },
-    /// A later print than the last was measured.
+    /// The measured print is later than the last one.
     #[error(
         "{}: print {print} was never planned, and so not printed: the last is {last}",
         folder.display()
@@ -164,7 +164,7 @@ pub enum JobError {
         /// The last print.
         last: usize,
     },
-    /// An earlier print than the last was measured.
+    /// The measured print is earlier than the last one.
     #[error("{}: print {print} was learnt from already: print {last} is the last", folder.display())]
     LearntFrom {
         /// The job.
@@ -174,7 +174,7 @@ pub enum JobError {
         /// The last print.
         last: usize,
     },
-    /// The measurements are those of an earlier print, word for word.
+    /// The measurements repeat an earlier print's, word for word.
     #[error(
         "{}: these are the measurements of print {earlier}, given twice: measure print {print}",
         folder.display()
@@ -187,7 +187,7 @@ pub enum JobError {
         /// The print that they are given for now.
         print: usize,
     },
-    /// The same measurements were learnt from with other options.
+    /// The same measurements were used before with other options.
     #[error(
         "{}: print {print} was learnt from with other options: {name} is there already, and print \
          {} is the next to be measured",
@@ -204,7 +204,7 @@ pub enum JobError {
     },
 }
 
-/// Why nothing can be learnt from what was measured.
+/// Why nothing can be learned from the measurements.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LearnError {
@@ -220,10 +220,10 @@ pub enum LearnError {
         /// The highest layer.
         last: u32,
     },
-    /// The stack's pages do not say where on the part they are.
+    /// The stack's pages do not state their position on the part.
     #[error("the stack's pages do not state their position on the part")]
     NoPosition,
-    /// A place is beside the images.
+    /// A place is outside the images.
     #[error("line {line}, z {z_mm} mm: the place {}, {} mm is outside the images", place_mm[0], place_mm[1])]
     Outside {
         /// The line of the table, from 1.
@@ -233,14 +233,14 @@ pub enum LearnError {
         /// The place, in part coordinates.
         place_mm: [f64; 2],
     },
-    /// A measured face is none of the part's, or was not cured.
+    /// A measured face is not on the part, or was not cured.
     #[error("line {line}, z {z_mm} mm: {problem}")]
     Face {
         /// The line of the table, from 1.
         line: usize,
         /// The height of the face.
         z_mm: f64,
-        /// What is wrong with it.
+        /// The problem with the face.
         problem: FaceError,
     },
     /// The model cannot expose the part.

@@ -1,8 +1,8 @@
-//! Learns from the measured heights of faces that look down.
+//! Learns from the measured heights of down-facing faces.
 //!
-//! Light that passes a face cures below it, down to where its dose is the critical one. A dose
-//! larger by a factor reaches deeper by the factor's logarithm times the penetration depth. So
-//! heights tell the logarithm of how far the doses differ from the model's. A step ω of the
+//! Light that passes a face cures below it, down to the depth where its dose is the critical one. A
+//! dose larger by a factor reaches deeper by the factor's logarithm times the penetration depth. So
+//! heights give the logarithm of the ratio between the doses and the model's. A step ω of the
 //! correction leaves 1 - ω D_true / D_model of the errors.
 
 use lamp_stack::Length;
@@ -25,11 +25,11 @@ pub struct Height {
     pub sd: Length,
 }
 
-/// Why a height tells nothing.
+/// Why a height gives no information.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FaceError {
-    /// No face looks down at the place.
+    /// The part has no down-facing face at the place.
     #[error("the part has no face there that looks down")]
     NoFace,
     /// By the model, nothing is cured above the face.
@@ -37,10 +37,10 @@ pub enum FaceError {
     NothingCured,
 }
 
-/// Returns the layer, counted from the light, whose bottom is a face of the part that looks down.
+/// Returns the layer, counted from the light, whose bottom is a down-facing face of the part.
 ///
 /// # Errors
-/// Returns an error if there is none within half a layer.
+/// Returns an error if no such face is within half a layer.
 pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, FaceError> {
     let is_face = |layer: &usize| {
         let below = layer + 1;
@@ -56,7 +56,7 @@ pub fn face_at(part: &TimedPart, pixel: [u32; 2], z: Length) -> Result<usize, Fa
     nearest.filter(|&layer| away(layer) <= 0.5).ok_or(FaceError::NoFace)
 }
 
-/// Returns the heights down to which the resin is cured at faces that look down, each given by its
+/// Returns the heights down to which the resin is cured at down-facing faces, each given by its
 /// pixel and the layer above it. Times are in seconds, from the light on.
 ///
 /// # Errors
@@ -88,21 +88,22 @@ pub fn heights_of(
     faces.iter().map(height).collect()
 }
 
-/// What measurements add to the logarithm of each layer's dose: smooth over the height.
+/// The correction that measurements add to the logarithm of each layer's dose: smooth over the
+/// height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogDoses {
     z_um: Vec<f64>,
     values: Vec<f64>,
 }
 
-/// The standard deviation of doses before anything is measured: light and resin differ from
-/// their material's numbers by so much, as a logarithm.
+/// The standard deviation of doses before any measurement, as a logarithm: the uncertainty of light
+/// and resin about their material's numbers.
 const UNSURE: f64 = 0.5;
-/// The share of the part's height over which doses differ alike.
+/// The correlation length of dose errors, as a share of the part's height.
 const ALIKE_OVER: f64 = 0.25;
 
 impl LogDoses {
-    /// Begins with doses as the model has them.
+    /// Begins with the model's doses.
     pub fn none(part: &TimedPart) -> Self {
         let z_um: Vec<_> = part.layers().iter().map(|layer| layer.z.um()).collect();
         Self { values: vec![0.0; z_um.len()], z_um }
@@ -111,7 +112,7 @@ impl LogDoses {
     /// Continues with known corrections, from the light on.
     ///
     /// # Panics
-    /// Panics if there are not as many as layers.
+    /// Panics if the number of corrections is not the number of layers.
     pub fn known(part: &TimedPart, values: Vec<f64>) -> Self {
         assert_eq!(values.len(), part.layers().len(), "each layer has a correction");
         Self { values, ..Self::none(part) }
@@ -122,17 +123,17 @@ impl LogDoses {
         &self.values
     }
 
-    /// Takes a Kalman step: a share `step` of the way to what measurements say, given the layers
-    /// of the faces, by how far the resin is cured deeper than the model says, and the standard
-    /// deviation of each, in micrometres.
+    /// Takes a Kalman step: a share `step` of the way to the measured values. Each of `deeper` has
+    /// the layer of a face, the distance by which the resin is cured deeper there than in the
+    /// model, and the standard deviation of that distance, both in micrometers.
     pub fn step(&mut self, deeper: &[(usize, f64, f64)], light: &Light, step: f64) {
         let depth_um = light.penetration_depth.um();
-        // Measurements of one layer are one, as exact as all of them together.
+        // Measurements of one layer are combined into one, as exact as all of them together.
         let mut layers: Vec<(usize, f64, f64)> = Vec::new();
         let mut sorted = deeper.to_vec();
         sorted.sort_by_key(|measured| measured.0);
         for same in sorted.chunk_by(|a, b| a.0 == b.0) {
-            // Measurements of one layer count by their precision, 1 / sd².
+            // Measurements of one layer are weighted by their precision, 1 / sd².
             let precision: f64 = same.iter().map(|(_, _, sd)| sd.powi(-2)).sum();
             let mean = same.iter().map(|(_, um, sd)| um * sd.powi(-2)).sum::<f64>() / precision;
             layers.push((same[0].0, mean / depth_um, precision.recip() / (depth_um * depth_um)));
@@ -155,8 +156,8 @@ impl LogDoses {
         self.values.iter_mut().zip(gained).for_each(|(value, gained)| *value += step * gained);
     }
 
-    /// How alike two layers differ from the model: a Matérn covariance of once differentiable
-    /// functions.
+    /// The covariance of two layers' deviations from the model: a Matérn covariance of once
+    /// differentiable functions.
     fn covariance(&self, a: usize, b: usize) -> f64 {
         let ends = self.z_um[0] - self.z_um[self.z_um.len() - 1];
         let range = (ALIKE_OVER * ends).max(f64::MIN_POSITIVE);

@@ -1,4 +1,4 @@
-//! A job: a folder that keeps a stack and what was learnt from its prints.
+//! A job: a folder that keeps a stack and the results of learning from its prints.
 //!
 //! ```text
 //! job.toml                what the job is for
@@ -27,7 +27,7 @@ use super::step::Learned;
 use crate::light::{Light, SampleHeight};
 use crate::speed::{PartPages, Platform, TimedLayer, TimedPart, times_table};
 
-/// Materials and what a job is for are texts of a few kilobytes.
+/// Materials and job files are texts of a few kilobytes.
 const MAX_FILE: u64 = 1 << 20;
 /// Tables of times have a line for each layer.
 const MAX_TABLE: u64 = 64 << 20;
@@ -47,15 +47,15 @@ pub struct JobFile {
     pub origin_mm: Option<[f64; 2]>,
     /// The lowest gray level of pixels that are wanted.
     pub wanted: u8,
-    /// Where in its layer a voxel's dose is told.
+    /// The height in each layer at which a voxel's dose is computed.
     pub at: SampleHeight,
-    /// How far from the critical dose plans keep voxels, as a share of it.
+    /// The distance from the critical dose that plans keep voxels at, as a share of it.
     pub margin: f64,
     /// The slowest speed of the platform.
     pub slowest_um_per_s: f64,
     /// The fastest speed of the platform.
     pub fastest_um_per_s: f64,
-    /// By which share the speeds of neighbouring layers may differ.
+    /// By which share the speeds of neighboring layers may differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_change: Option<f64>,
 }
@@ -67,7 +67,7 @@ pub struct JobPrint {
     pub times: Vec<f64>,
     /// The measurements, and their text.
     pub measured: Option<(PrintMeasurements, String)>,
-    /// The corrections of doses that heights had taught before, from the light on.
+    /// The corrections of doses that heights gave before, from the light on.
     pub log_doses: Vec<f64>,
 }
 
@@ -91,7 +91,7 @@ pub fn profile_name(print: usize) -> String {
     format!("print-{print:03}.csv")
 }
 
-/// Reads a text that is short enough to be read whole.
+/// Reads a text that is short enough to read at once.
 fn read_text(file: &Path, max: u64, what: &'static str) -> Result<String, JobFileError> {
     let mut bytes = Vec::new();
     File::open(file)?.take(max + 1).read_to_end(&mut bytes)?;
@@ -124,7 +124,7 @@ impl JobFile {
     /// The name of the job's material.
     pub const MATERIAL: &'static str = "material.toml";
 
-    /// Reads what a job's folder is for.
+    /// Reads the purpose of a job's folder.
     ///
     /// # Errors
     /// Returns an error if there is no job, or its file was changed.
@@ -204,7 +204,7 @@ impl Job {
             vec![0.0; times.len()]
         };
         let measured = self.folder.join(measured_name(number));
-        // Without a next print, what was measured was kept by a run that did not end.
+        // Without a next print, the measurements were kept by a run that did not end.
         let next = self.folder.join(profile_name(number + 1));
         let is_learnt_from = measured.exists() && next.exists();
         let read = || -> Result<_, JobFileError> {
@@ -245,7 +245,7 @@ impl Job {
         read().map_err(at(&file))
     }
 
-    /// Returns the print that was measured: the last, unless another is asked for.
+    /// Returns the print that was measured: the last one, unless another is requested.
     ///
     /// # Errors
     /// Returns an error if it is not the last.
@@ -259,10 +259,10 @@ impl Job {
         }
     }
 
-    /// Refuses what was given for an earlier print, word for word.
+    /// Rejects measurements that were given for an earlier print, word for word.
     ///
     /// # Errors
-    /// Returns an error if it was.
+    /// Returns an error if they were.
     pub fn refuse_known(&self, print: usize, text: &str) -> Result<(), JobError> {
         let same = |print: &JobPrint| {
             print.measured.as_ref().is_some_and(|(_, known)| is_same(known, text))
@@ -275,7 +275,7 @@ impl Job {
         }
     }
 
-    /// Returns the files that keep what was measured and learnt, in the order in which they must be
+    /// Returns the files that keep the measurements and results, in the order in which they must be
     /// written.
     pub fn files_to_keep(
         &self,
@@ -290,7 +290,7 @@ impl Job {
         }
         let end = if text.ends_with('\n') { "" } else { "\n" };
         files.push(file(measured_name(print), &format!("{text}{end}")));
-        // The print is there once its times are.
+        // The print exists once its times do.
         files.push(file(profile_name(print + 1), &self.profile(&learned.times)));
         files
     }
@@ -301,10 +301,10 @@ impl Job {
         format!("{}\n{}", DOSES.join(","), lines.collect::<String>())
     }
 
-    /// Goes back to where the last print was still to be learnt from, if these are its measurements.
-    /// Returns its number.
+    /// Goes back to the state before the last print was learned from, if these are its
+    /// measurements. Returns its number.
     ///
-    /// So the same call again, after one that did not end, gives the same.
+    /// So a repeated call, after one that did not end, gives the same result.
     pub fn take_back(&mut self, text: &str) -> Option<usize> {
         let print = self.prints.len().checked_sub(2)?;
         let (_, known) = self.prints[print].measured.as_ref()?;
@@ -316,10 +316,10 @@ impl Job {
         Some(print)
     }
 
-    /// Checks that what is learnt from a print again is what was learnt before.
+    /// Checks that the repeated results for a print equal the earlier ones.
     ///
     /// # Errors
-    /// Returns an error if it is not.
+    /// Returns an error if they differ.
     pub fn check_again(&self, print: usize, learned: &Learned) -> Result<(), JobError> {
         let name = profile_name(print + 1);
         let file = self.folder.join(&name);

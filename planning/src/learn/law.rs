@@ -24,43 +24,43 @@ pub enum Law {
 
 /// The numbers of 004 eq. 3.6 to 3.8, as listing A.6 has them.
 ///
-/// What 004 misprints: eq. 3.6 divides a + 2 terms by a; here, the error is a mean. Eq. 3.8 lost its
-/// coefficient, which listing A.6 has as `coef2`. The listing weighs layers by the inverse square
-/// of their number from the light; that of their distance must be meant.
+/// Misprints of 004: eq. 3.6 divides a + 2 terms by a; here, the error is a mean. Eq. 3.8 lost its
+/// coefficient, which listing A.6 has as `coef2`. The listing weights layers by the inverse square
+/// of their number from the light; the inverse square of their distance must be meant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MultiLaw {
     /// The gain of a layer's own mean error, in seconds a pixel.
     pub gain: f64,
-    /// The layers of a mean: `interv`. It takes those below where too much is cured, those above
-    /// where too little is.
+    /// The number of layers in a mean: `interv`. The mean takes the layers below where too much is
+    /// cured, and the layers above where too little is.
     pub mean_of: usize,
-    /// How many layers above change with a layer: `chng`.
+    /// The number of layers above that change with a layer: `chng`.
     pub reach: usize,
     /// Their gain at a distance of one layer, in seconds a pixel; it falls with the square of
     /// the distance: `coef2`.
     pub reach_gain: f64,
 }
 
-/// What the model's step weighs: least |(e - G dt) / noise|² + ρ |dt / t|².
+/// The weights of the model's step: least |(e - G dt) / noise|² + ρ |dt / t|².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelLaw {
-    /// How exact errors are: to the voxels that such a change of all doses cures, as a logarithm,
-    /// and at least to one voxel.
+    /// The exactness of errors: the number of voxels that such a change of all doses cures, as a
+    /// logarithm, and at least one voxel.
     pub noise: f64,
     /// The weight of changes, `ρ`.
     pub stiffness: f64,
-    /// No time changes by a larger share of itself, for the response holds near the present times
-    /// only.
+    /// No time changes by a larger share of itself, since the response is valid only near the
+    /// present times.
     pub most_change: f64,
 }
 
 impl Law {
-    /// The gain of eq. 3.5 in 004's prints, in seconds a pixel of 10 um.
+    /// The gain of eq. 3.5 in 004's prints, in seconds per pixel of 10 um.
     pub const GAIN: f64 = 6e-6;
 
-    /// Returns 004's numbers of several layers.
+    /// Returns 004's numbers for several layers.
     pub fn multi(gain: f64) -> Self {
-        // Both gains change together, so that one number sets the law.
+        // Both gains change together, so one number sets the law.
         let reach_gain = 8e-5 * gain / Self::GAIN;
         Self::Multi(MultiLaw { gain, mean_of: 10, reach: 350, reach_gain })
     }
@@ -70,9 +70,9 @@ impl Law {
         Self::Model(ModelLaw { noise: 0.05, stiffness: 1.0, most_change: 0.5 })
     }
 
-    /// Returns the next times, in seconds, from the errors of a print with the present ones:
-    /// voxels that should have been cured less those that should not, in each layer from the
-    /// light on. `low` and `high` bound the times.
+    /// Returns the next times, in seconds, from the errors of a print with the present ones. An
+    /// error is the number of voxels that should have been cured minus the number that should not,
+    /// for each layer from the light on. `low` and `high` bound the times.
     pub fn next(
         &self,
         times: &[f64],
@@ -103,8 +103,8 @@ impl Law {
         .collect()
     }
 
-    /// Returns the changes of times that errors lead to, without bounds; it is linear in
-    /// `errors`. Where `signs` are negative, too much is cured.
+    /// Returns the changes of times that errors cause, without bounds; they are linear in `errors`.
+    /// Where `signs` are negative, too much is cured.
     pub fn linear(
         &self,
         times: &[f64],
@@ -131,7 +131,7 @@ impl MultiLaw {
             };
             let count = around.len() as f64;
             let mean = errors[around].iter().sum::<f64>() / count;
-            // 004 eq. 3.5, with the mean error of eq. 3.6 in place of the layer's own.
+            // 004 eq. 3.5, with the mean error of eq. 3.6 instead of the layer's own.
             changes[layer] += self.gain * mean;
             for distance in 1..=self.reach.min(layer) {
                 // 004 eq. 3.8: layers nearer to the light change as well, since part of their dose

@@ -4,7 +4,7 @@ use super::law::ModelLaw;
 use super::response::Response;
 use crate::numeric::{DescentEnd, descend, dot, solve_by_conjugate_gradients};
 
-/// What a step weighs, layer by layer.
+/// The weights of a step, layer by layer.
 pub(crate) struct Weights {
     /// 1 / noise².
     errors: Vec<f64>,
@@ -13,7 +13,7 @@ pub(crate) struct Weights {
 }
 
 impl ModelLaw {
-    /// Returns how exact the errors of each layer are, in voxels.
+    /// Returns the standard deviation of the errors of each layer, in voxels.
     pub(crate) fn noise_of(&self, response: &Response) -> Vec<f64> {
         response.per_log_dose().iter().map(|voxels| (self.noise * voxels).max(1.0)).collect()
     }
@@ -29,8 +29,8 @@ impl ModelLaw {
 impl Weights {
     /// Returns the matrix of the step's equations times a step: `Gᵀ W G dt + ρ dt / t²`.
     fn apply(&self, response: &Response, changes: &[f64]) -> Vec<f64> {
-        // `G` is never written down: it and its transpose are two passes over the layers, a matrix
-        // would have the square of their number.
+        // `G` is never written out: it and its transpose are two passes over the layers, but a
+        // matrix would have the square of the number of layers.
         let mut cured = response.apply(changes);
         cured.iter_mut().zip(&self.errors).for_each(|(cured, weight)| *cured *= weight);
         let mut sums = response.transposed(&cured);
@@ -48,7 +48,7 @@ impl Weights {
 
     /// Returns the step without bounds, by conjugate gradients.
     pub(crate) fn solve(&self, response: &Response, errors: &[f64]) -> Vec<f64> {
-        // In shares of the times the equations are well scaled.
+        // In shares of the times, the equations are well scaled.
         let scale: Vec<_> = self.changes.iter().map(|weight| weight.sqrt().recip()).collect();
         let scaled =
             |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a * scale).collect::<Vec<_>>();
@@ -70,13 +70,13 @@ pub(crate) fn bounded_step(
     let shares = |a: &[f64]| a.iter().zip(&scale).map(|(a, scale)| a / scale).collect::<Vec<_>>();
     let pull = weights.pull(response, errors);
     let [low, high] = bounds.map(shares);
-    // The step without bounds is a good start: most layers keep away from theirs.
+    // The step without bounds is a good start: most layers stay away from their bounds.
     let mut step = shares(&weights.solve(response, errors));
     let stop = DescentEnd { steps: 500, fall: 1e-12 };
     descend(&mut step, [&low, &high], stop, |step| {
         let changes = times(step);
         let bent = weights.apply(response, &changes);
-        // The quadratic whose slopes are the step's equations; constants are left out.
+        // The quadratic whose slopes are the step's equations, without constants.
         let value = 0.5 * dot(&bent, &changes) - dot(&pull, &changes);
         let slopes: Vec<_> = bent.iter().zip(&pull).map(|(bent, pull)| bent - pull).collect();
         (value, times(&slopes))

@@ -1,4 +1,4 @@
-//! Reads what was measured on a print.
+//! Reads the measurements of a print.
 
 use lamp_grayscale::calibrate::{CsvTable, NumberRow};
 
@@ -6,7 +6,7 @@ use super::error::MeasuredError;
 
 const HEIGHTS: [&str; 5] = ["x_mm", "y_mm", "z_mm", "measured_mm", "sd_um"];
 const AREAS: [&str; 3] = ["layer", "over_px", "under_px"];
-/// The standard deviation of heights that state none.
+/// The standard deviation of heights that do not state one.
 const USUAL_SD_UM: f64 = 20.0;
 
 /// The measurements of a print.
@@ -40,9 +40,9 @@ pub struct AreaRow {
     pub line: usize,
     /// The number of the layer.
     pub layer: u32,
-    /// Pixels that are cured and not wanted.
+    /// Pixels that are cured but not wanted.
     pub over: f64,
-    /// Pixels that are wanted and not cured.
+    /// Pixels that are wanted but not cured.
     pub under: f64,
 }
 
@@ -51,7 +51,7 @@ impl PrintMeasurements {
     ///
     /// # Errors
     /// Returns an error if a column is missing or unknown, a number is impossible, or a place or
-    /// layer stands twice.
+    /// layer is listed twice.
     pub fn parse(text: &str) -> Result<Self, MeasuredError> {
         let table = CsvTable::parse(text)?;
         let has = |column: &str| table.columns().iter().any(|name| name == column);

@@ -1,11 +1,12 @@
-//! Learns from prints: the times of the next from what the last one cured (004 chapter 3).
+//! Learns from prints: corrects the times of the next print by the result of the last (004 chapter
+//! 3).
 //!
 //! - [`Law`] turns the wrong voxels of each layer into changes of its time.
-//! - [`Response`] is what a change of times does to the wrong voxels, by the model.
-//! - [`convergence`] tells whether a law's changes shrink the errors of the next prints.
+//! - [`Response`] is the model's effect of a change of times on the wrong voxels.
+//! - [`convergence`] checks whether a law's changes shrink the errors of the next prints.
 //! - [`LogDoses`] learns from measured heights.
-//! - A [`Job`] keeps a stack and all its prints in a folder; [`learn`] turns what was
-//!   [`PrintMeasurements`] on the last into the times of the next.
+//! - A [`Job`] keeps a stack and all its prints in a folder; [`learn`] turns the
+//!   [`PrintMeasurements`] of the last print into the times of the next.
 
 mod convergence;
 mod error;

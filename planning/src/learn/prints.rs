@@ -1,4 +1,4 @@
-//! The prints of 004 chapter 3, simulated: its numbers, and what becomes of errors.
+//! The prints of 004 chapter 3, simulated: its numbers, and the course of the errors.
 
 use lamp_fixtures::{Voxels, cavity_staircase, narrow_cross, square_prism};
 use lamp_stack::Length;
@@ -12,15 +12,15 @@ const LAYERS: usize = 50;
 /// Bounds that only the shortest time of 004 limits.
 const FREE: [[f64; LAYERS]; 2] = [[SHORTEST; LAYERS], [1e3; LAYERS]];
 
-/// Seconds that bring a wide prism's layers to a dose in the long run, and the first layer at
-/// once where `at_once`.
+/// Seconds that bring a wide prism's layers to a dose in the long run; with `at_once`, the first
+/// layer gets that dose from the start.
 fn prism_times(dose: f64, light: &Light, at_once: bool) -> [f64; LAYERS] {
     let first = dose * light.critical_dose.mj_per_cm2() / light.intensity.mw_per_cm2();
     let rest = first * (1.0 - (-120.0 / light.penetration_depth.um()).exp());
     std::array::from_fn(|k| if k == 0 && at_once { first } else { rest })
 }
 
-/// Prints again and again: the wrong voxels of each print.
+/// Prints repeatedly, and returns the wrong voxels of each print.
 fn prints(
     plant: &Simulation<'_>,
     model: &Simulation<'_>,

@@ -1,16 +1,16 @@
-//! What a change of times does to the number of cured voxels.
+//! The effect of a change of times on the number of cured voxels.
 
 use lamp_stack::Length;
 
 use crate::light::{LayerLight, Light};
 use crate::speed::{PartError, Simulation, TimedPart};
 
-/// The doses over which voxels that cross the critical dose are counted: 1 / 1.3 to 1.3 times
-/// the present. Edges are pixels apart, so that a smaller range would see all or none of them.
+/// The doses over which voxels that cross the critical dose are counted: 1 / 1.3 to 1.3 times the
+/// present. Edges are pixels apart, so a smaller range would see all of them or none.
 const RANGE: f64 = 1.3;
 
-/// The matrix `G`: by how many voxels of layer k more are cured when layer n gets a second more.
-/// `G_kn = s_k q^(k-n)` for n ≤ k, the layers counted from the light.
+/// The matrix `G`: the number of voxels of layer k that are cured for one more second of layer n.
+/// `G_kn = s_k q^(k-n)` for n ≤ k, with layers counted from the light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// The voxels of each layer that cross the critical dose as all doses rise by a factor, per
@@ -18,19 +18,18 @@ pub struct Response {
     per_log_dose: Vec<f64>,
     /// The same per unit of dose of a wide white field.
     per_dose: Vec<f64>,
-    /// What passes from the layer above, and the dose of a second.
+    /// The share that passes from the layer above, and the dose of a second.
     layers: Vec<LayerLight>,
 }
 
 impl Response {
-    /// Computes it where a part's layers have these times, in seconds.
+    /// Computes the response at a part's times, in seconds.
     pub fn of(simulation: &Simulation<'_>, times: &[f64]) -> Self {
         let scaled = |share: f64| times.iter().map(|time| time * share).collect::<Vec<_>>();
         let (more, less) = (scaled(RANGE), scaled(1.0 / RANGE));
         let [more, less] = simulation.tally([&more, &less]);
         let doses = simulation.field_doses(times);
-        // Voxels that turn cured, wanted or not, count the same: they are what a change of dose
-        // moves.
+        // All voxels that become cured count, wanted or not: a change of dose moves both.
         let crossed = more
             .layers
             .iter()
@@ -77,7 +76,7 @@ impl Response {
         &self.per_log_dose
     }
 
-    /// Returns by how many voxels more are cured in each layer: `G dt`.
+    /// Returns the number of additional voxels that are cured in each layer: `G dt`.
     pub fn apply(&self, changes: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
         let layers = self.layers.iter().zip(&self.per_dose).zip(changes);

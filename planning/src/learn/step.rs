@@ -1,4 +1,4 @@
-//! Turns what was measured into the times of the next print.
+//! Turns measurements into the times of the next print.
 
 use lamp_stack::Length;
 
@@ -11,28 +11,28 @@ use super::measured::{AreaRow, HeightRow, PrintMeasurements};
 use super::response::Response;
 use crate::speed::{Simulation, SpeedOptions, plan_corrected};
 
-/// How near the best plan a corrected one comes, as a share of the unplanned error.
+/// The gap of a corrected plan, as a share of the unplanned error.
 const GAP: f64 = 0.001;
-/// The penetration depths, as shares of the model's, for which errors are told to shrink or grow.
+/// The penetration depths, as shares of the model's, for which the decay of errors is reported.
 const DEPTHS: [f64; 3] = [1.0, 0.7, 1.3];
 
-/// The next print, and what is known of it.
+/// The next print, and its properties.
 #[derive(Clone, Debug)]
 pub struct Learned {
     /// The times in seconds, from the light on.
     pub times: Vec<f64>,
-    /// What heights have taught, from the light on.
+    /// The corrections of doses from heights, from the light on.
     pub log_doses: Vec<f64>,
-    /// How errors shrink with each print, by what the penetration depth is.
+    /// The decay of errors with each print, for each penetration depth.
     pub shrink: Vec<(f64, Convergence)>,
-    /// The largest gain with which no print's errors grow, where the law has a gain.
+    /// The largest gain with which no print's errors grow, if the law has a gain.
     pub safe_gain: Option<f64>,
-    /// By how far measured heights are below those that the model says, in micrometres.
+    /// The distances by which measured heights are below the model's heights, in micrometers.
     pub deeper_um: Vec<f64>,
 }
 
-/// Learns from what was measured on a print of a job: `law` turns wrong pixels into times, `step`
-/// is the share of the way that measured heights move the doses.
+/// Learns from the measurements of a print of a job. `law` turns wrong pixels into times. `step` is
+/// the share of the measured correction that is applied to the doses.
 ///
 /// # Errors
 /// Returns an error if the stack lacks a measured layer or face, or if the model cannot plan
@@ -51,7 +51,8 @@ pub fn learn(
     }
 }
 
-/// The errors of each layer from the light on; layers that are not told have none.
+/// Returns the errors of each layer from the light on; the errors of layers that are not listed are
+/// zero.
 fn errors_by_layer(job: &Job, rows: &[AreaRow]) -> Result<Vec<f64>, LearnError> {
     let layers = job.part.layers();
     let mut errors = vec![0.0; layers.len()];
@@ -138,7 +139,7 @@ fn from_heights(
     })
 }
 
-/// The pixel and the layer of a face that was measured.
+/// Returns the pixel and the layer of a measured face.
 fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), LearnError> {
     let corner = job.origin_mm().ok_or(LearnError::NoPosition)?;
     let pitch = job.part.pitch().mm();

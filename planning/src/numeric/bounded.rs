@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
-/// Numbers that a thread takes at a time. Sums are those of chunks, in order, so that the number
-/// of threads changes no bit.
+/// The numbers that a thread takes at a time. Sums are added chunk by chunk in order, so that the
+/// number of threads changes no bit.
 const CHUNK: usize = 1 << 13;
-/// Steps along the slopes, as a share of what cannot raise the value.
+/// The length of steps along the slopes, in units of 1 / |A|: below 2, it cannot raise the value.
 const STEP: f64 = 1.9;
 
 /// A matrix that is symmetric and has no negative eigenvalue, as a product.
@@ -37,7 +37,7 @@ pub(crate) struct SearchPlace {
 struct Slope {
     /// The slope of a number between its bounds.
     free: f64,
-    /// The slope of a number at a bound that leads away from it.
+    /// The slope of a number at a bound, if it leads away from that bound.
     chopped: f64,
 }
 
@@ -51,18 +51,18 @@ fn slope_at(x: f64, slope: f64, high: f64) -> Slope {
     }
 }
 
-/// The sums that choose what the next step is.
+/// The sums that select the next step.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     chopped: f64,
     reduced: f64,
-    /// Of free slopes times the product of the last direction.
+    /// The sum of free slopes times the product of the last direction.
     conjugate: f64,
 }
 
 impl<C: Curvature> Bounded<'_, C> {
-    /// Searches from `x` until `is_done`, which is asked at every `look`th step and told how many
-    /// steps there were.
+    /// Searches from `x` until `is_done` returns true. It is called at every `look`th step with the
+    /// number of steps so far.
     pub(crate) fn search(
         &self,
         x: Vec<f64>,
@@ -79,13 +79,13 @@ impl<C: Curvature> Bounded<'_, C> {
             if (step % look == 0 && is_done(&place, step)) || is_still {
                 break;
             }
-            // The proportioning test with Γ = 1: as long as numbers at their bounds gain less than
-            // free ones, stay in the face.
+            // The proportioning test with Γ = 1: stay in the face as long as numbers at their
+            // bounds gain less than free ones.
             if sums.chopped <= sums.reduced {
                 let product = self.curvature.apply(&direction);
                 let (along, curvature, room) = self.along(&place, &direction, &product);
                 let best = along / curvature;
-                // With one number free, nothing is conjugate to the last direction but zero.
+                // With one free number, only zero is conjugate to the last direction.
                 let leads_down = along > 0.0 && curvature > 0.0;
                 if !leads_down {
                     self.project(&mut place, length);
@@ -94,8 +94,8 @@ impl<C: Curvature> Bounded<'_, C> {
                 } else if best <= room {
                     self.walk(&mut place, &direction, &product, best);
                     sums = self.sums(&place, Some(&product), length);
-                    // The new direction is conjugate to the last: its product with A times the last
-                    // one is zero.
+                    // The new direction is conjugate to the last one: its product with A times the
+                    // last one is zero.
                     let turn = sums.conjugate / curvature;
                     self.turn(&place, &mut direction, turn);
                 } else {
@@ -126,7 +126,7 @@ impl<C: Curvature> Bounded<'_, C> {
         SearchPlace { x, slopes }
     }
 
-    /// Returns a bound of the greatest eigenvalue: no number of the matrix is negative.
+    /// Returns a bound on the greatest eigenvalue: no number of the matrix is negative.
     fn greatest(&self) -> f64 {
         // The greatest sum of a row bounds the greatest eigenvalue (Gershgorin).
         let sums = self.curvature.apply(&vec![1.0; self.pull.len()]);
@@ -151,7 +151,7 @@ impl<C: Curvature> Bounded<'_, C> {
             let mut sums = Sums::default();
             for (&x, &slope) in x.iter().zip(slopes) {
                 let Slope { free, chopped } = slope_at(x, slope, self.high);
-                // How far it can go before it meets a bound.
+                // The slope, limited to the way to the next bound.
                 let reduced = free.clamp((x - self.high) / length, x / length);
                 sums.chopped += chopped * chopped;
                 sums.reduced += free * reduced;
@@ -166,7 +166,7 @@ impl<C: Curvature> Bounded<'_, C> {
         };
         let chunks = place.x.par_chunks(CHUNK).zip(place.slopes.par_chunks(CHUNK)).enumerate();
         let sums: Vec<_> = chunks.map(|(chunk, numbers)| of_chunk(chunk, numbers)).collect();
-        // Chunk after chunk: the sum is the same on any number of threads.
+        // Chunks are added in order: the sum is the same on any number of threads.
         sums.into_iter().fold(Sums::default(), |all, some| Sums {
             chopped: all.chopped + some.chopped,
             reduced: all.reduced + some.reduced,
@@ -174,8 +174,7 @@ impl<C: Curvature> Bounded<'_, C> {
         })
     }
 
-    /// Returns the slope along a direction downhill, its curvature, and how far it leads to a
-    /// bound.
+    /// Returns the slope along a direction downhill, its curvature, and the distance to a bound.
     fn along(&self, place: &SearchPlace, direction: &[f64], product: &[f64]) -> (f64, f64, f64) {
         let of_chunk = |chunk: usize| {
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(direction.len());
@@ -199,7 +198,7 @@ impl<C: Curvature> Bounded<'_, C> {
         chunks.into_iter().fold((0.0, 0.0, f64::INFINITY), add)
     }
 
-    /// Goes down a direction whose product is known.
+    /// Moves down a direction whose product is known.
     fn walk(&self, place: &mut SearchPlace, direction: &[f64], product: &[f64], length: f64) {
         let numbers = place.x.par_iter_mut().zip(&mut place.slopes);
         let steps = direction.par_iter().zip(product);
@@ -209,19 +208,19 @@ impl<C: Curvature> Bounded<'_, C> {
         });
     }
 
-    /// Goes down the free slopes and stays between the bounds.
+    /// Moves down the free slopes and stays between the bounds.
     fn project(&self, place: &mut SearchPlace, length: f64) {
         let numbers = place.x.par_iter_mut().zip(&place.slopes).with_min_len(CHUNK);
         numbers.for_each(|(x, &slope)| {
             let free = slope_at(*x, slope, self.high).free;
             *x = (*x - length * free).clamp(0.0, self.high);
         });
-        // After a projection the slopes do not follow from a product that is known, so that they
-        // are computed anew. That also clears what rounding has gathered.
+        // After a projection, the slopes do not follow from a known product, so they are computed
+        // anew. That also clears accumulated rounding errors.
         *place = self.place(std::mem::take(&mut place.x));
     }
 
-    /// Makes the direction the free slopes, less what is not conjugate to it.
+    /// Sets the direction to the free slopes, minus the component that is not conjugate to it.
     fn turn(&self, place: &SearchPlace, direction: &mut [f64], turn: f64) {
         let numbers = place.x.par_iter().zip(&place.slopes).zip(direction);
         numbers.with_min_len(CHUNK).for_each(|((&x, &slope), direction)| {

@@ -3,8 +3,8 @@
 //! Source: N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. (2002), chapter
 //! 10: without pivots, since no factor of such a matrix grows.
 
-/// Solves the equations of a symmetric positive definite matrix, whose rows follow each other, and
-/// leaves its Cholesky factor there.
+/// Solves the equations of a symmetric positive definite matrix, given row by row, and leaves its
+/// Cholesky factor there.
 pub(crate) fn solve_positive(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64> {
     let size = right.len();
     for column in 0..size {

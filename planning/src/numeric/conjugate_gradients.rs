@@ -1,17 +1,19 @@
-//! Equations of a large matrix that is known by its products.
+//! Equations of a large matrix that is given by its products.
 //!
 //! Source: M. R. Hestenes and E. Stiefel, *Methods of conjugate gradients for solving linear
 //! systems*, J. Res. Natl. Bur. Stand. 49 (1952), section 3.
 
 use super::{add_times, dot};
 
-/// Squares of what is left end the search at this share of the first: rounding errors of
+/// The search ends when squared residuals fall to this share of the first: rounding errors of
 /// 64-bit numbers leave little less.
 const LEFT: f64 = 1e-22;
-/// Steps for each number. Without rounding one would be enough (Hestenes and Stiefel, theorem 4:1).
+/// Steps for each number. Without rounding, one would be enough (Hestenes and Stiefel, theorem
+/// 4:1).
 const STEPS: usize = 4;
 
-/// Solves `A x = right` for a symmetric positive matrix, whose product with numbers `apply` returns.
+/// Solves `A x = right` for a symmetric positive matrix, where `apply` returns its product with
+/// numbers.
 pub(crate) fn solve_by_conjugate_gradients(
     apply: impl Fn(&[f64]) -> Vec<f64>,
     right: Vec<f64>,
@@ -42,7 +44,7 @@ mod tests {
 
     #[test]
     fn equations_of_a_chain_are_solved() {
-        // Each number against its neighbours, as of diffusion.
+        // Each number against its neighbors, as in diffusion.
         let apply = |x: &[f64]| -> Vec<f64> {
             let at = |k: Option<usize>| k.and_then(|k| x.get(k)).unwrap_or(&0.0);
             (0..x.len()).map(|k| 2.1 * x[k] - at(k.checked_sub(1)) - at(Some(k + 1))).collect()

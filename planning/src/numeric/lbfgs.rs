@@ -8,16 +8,16 @@ use std::collections::VecDeque;
 
 use super::{add_times, dot};
 
-/// Pairs of steps and changes of the slopes that are remembered.
+/// The number of pairs of steps and slope changes that are kept.
 const MEMORY: usize = 12;
-/// The share of the fall that the slopes promise which a step must bring.
+/// The share of the fall predicted by the slopes that a step must bring.
 const ENOUGH: f64 = 1e-4;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DescentEnd {
     pub(crate) steps: usize,
-    /// A fall of the value over a step, as a share of the value.
+    /// The relative fall of the value in a step.
     pub(crate) fall: f64,
 }
 
@@ -27,7 +27,7 @@ struct Pair {
     scale: f64,
 }
 
-/// Moves `x` towards the least value between the bounds. `function` returns a value and its
+/// Moves `x` toward the least value between the bounds. `function` returns a value and its
 /// slopes.
 pub(crate) fn descend(
     x: &mut Vec<f64>,
@@ -59,8 +59,8 @@ pub(crate) fn descend(
                 .zip(&slopes)
                 .map(|((next, x), slope)| (next - x) * slope)
                 .sum();
-            // Armijo's rule along the projected path: the fall is promised for the way left between
-            // the bounds.
+            // Armijo's rule along the projected path: the predicted fall is for the way left
+            // between the bounds.
             if next_value <= value + ENOUGH * promised.min(0.0) {
                 break (next, next_value, next_slopes);
             }
@@ -79,7 +79,7 @@ pub(crate) fn descend(
             next_slopes.iter().zip(&slopes).map(|(next, now)| next - now).collect();
         let curve = dot(&step, &change);
         if step.iter().all(|&step| step == 0.0) {
-            // What is remembered misleads: begin anew along the slopes.
+            // The kept pairs mislead: begin anew along the slopes.
             pairs.clear();
             continue;
         }
@@ -98,7 +98,7 @@ pub(crate) fn descend(
     }
 }
 
-/// Returns the direction of the two loops of L-BFGS, among the free numbers alone.
+/// Returns the direction of the two loops of L-BFGS, among only the free numbers.
 fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -> Vec<f64> {
     let only_free = |mut numbers: Vec<f64>| {
         numbers.iter_mut().zip(free).filter(|(_, free)| !**free).for_each(|(n, _)| *n = 0.0);
@@ -108,8 +108,8 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
     let along = |a: &[f64], b: &[f64]| dot(&only_free(a.to_vec()), b);
     let mut shares = Vec::with_capacity(pairs.len());
     for pair in pairs.iter().rev() {
-        // The two loops of Nocedal (1980), with products among the free numbers alone: Bertsekas's
-        // condition that bounds in force take no part in the curvature.
+        // The two loops of Nocedal (1980), with products among only the free numbers: Bertsekas's
+        // condition that active bounds take no part in the curvature.
         let share = pair.scale * along(&pair.step, &direction);
         add_times(&mut direction, -share, &pair.change);
         shares.push(share);
@@ -119,7 +119,7 @@ fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -
     // 7.20).
     let first = match pairs.back() {
         Some(pair) => 1.0 / (pair.scale * dot(&pair.change, &pair.change)),
-        // A tenth of the largest number is a step that no start makes too far.
+        // A tenth of the largest number is not too large a step from any start.
         None => {
             let most = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
             0.1 * most(x) / most(&direction).max(f64::MIN_POSITIVE)

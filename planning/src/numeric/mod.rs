@@ -1,8 +1,8 @@
-//! Numerical methods that know nothing of light: descent between bounds, conjugate gradients, and
-//! equations of small matrices.
+//! Numerical methods that are independent of light: descent between bounds, conjugate gradients,
+//! and equations of small matrices.
 //!
-//! Each adds numbers in one order, whatever the number of threads, so that plans are the same to the
-//! last bit.
+//! Each adds numbers in one order, whatever the number of threads, so that plans are the same to
+//! the last bit.
 
 mod bounded;
 mod cholesky;
@@ -19,7 +19,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Adds a multiple of numbers to others.
+/// Adds a multiple of some numbers to others.
 pub(crate) fn add_times(to: &mut [f64], times: f64, what: &[f64]) {
     to.iter_mut().zip(what).for_each(|(to, what)| *to += times * what);
 }

@@ -11,59 +11,59 @@ use super::{GrayLight, Lens, Projector, Rays};
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ProjectorError {
-    /// No mirrors, or more than any display has.
+    /// The display has no mirrors, or more than any display has.
     #[error("display: columns and rows must be between 1 and 32768, 67 million mirrors at most")]
     Display,
-    /// A number that must be above zero, and of a size that projectors have.
+    /// A number is not above zero, or too large for a projector.
     #[error("{0} must be above zero, and at most {1}")]
     Impossible(&'static str, &'static str),
-    /// A number that must be zero or more, and of a size that projectors have.
+    /// A number is negative, or too large for a projector.
     #[error("{0} must be zero or more, and at most {1}")]
     Negative(&'static str, &'static str),
-    /// Light that spreads in no way, or in two.
+    /// The file gives no spread of light, or two.
     #[error("spread: give either cone or sigma")]
     Spread,
-    /// No light, or two that may contradict each other.
+    /// The file gives no light, or two that may contradict each other.
     #[error("give either [rays] or [light]")]
     Light,
-    /// Rays that nothing can count.
+    /// The numbers of rays cannot be counted.
     #[error("rays: points and directions must be between 1 and 99")]
     Rays,
-    /// Light that no projector has: a unit may be wrong.
+    /// No projector has this light: a unit may be wrong.
     #[error("the light of a wide white field is {0}: no projector has so little or so much")]
     Implausible(Intensity),
-    /// Shares of gray levels that are none.
+    /// The shares of gray levels are invalid.
     #[error(
         "gray: shares must go from level 0 to 255, levels rising, shares from 0 to 1 and never falling"
     )]
     Gray,
-    /// Rays leave a point in a wider or narrower beam than any lens takes.
+    /// Rays leave a point in a wider or narrower beam than any lens accepts.
     #[error("lens: divergence must be above 0 and below 90 degrees")]
     Divergence,
-    /// A lens that bends no light together.
+    /// The lens does not focus light.
     #[error("lens: index must be above 1 and at most 5")]
     Index,
-    /// A lens that images the mirrors nowhere behind it.
+    /// The lens images the mirrors nowhere behind it.
     #[error("lens: {object} is too near to it: it images the mirrors nowhere")]
     NoImage {
-        /// From the mirrors to the middle of the lens.
+        /// The distance from the mirrors to the middle of the lens.
         object: Length,
     },
-    /// A lens that is out of focus.
+    /// The lens is out of focus.
     #[error(
         "lens: it is out of focus by {off}: it images mirrors {object} away at {image}, not at \
          {wanted}, where a point's light would be {blur} wide and a mirror's image is {mirror}"
     )]
     OutOfFocus {
-        /// How far the image is off.
+        /// The distance by which the image is off.
         off: Length,
-        /// From the mirrors to the middle of the lens.
+        /// The distance from the mirrors to the middle of the lens.
         object: Length,
-        /// Where the image is.
+        /// The distance of the image.
         image: Length,
-        /// Where it is wanted.
+        /// The distance at which the image is wanted.
         wanted: Length,
-        /// How wide the light of a point is there.
+        /// The width of the light of a point there.
         blur: Length,
         /// The side of a mirror's image.
         mirror: Length,

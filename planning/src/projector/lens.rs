@@ -4,7 +4,7 @@ use lamp_grayscale::material::{Given, GivenNumber};
 use lamp_stack::Length;
 use serde::{Deserialize, Serialize};
 
-/// A plano-convex lens, its curved side towards the mirrors.
+/// A plano-convex lens, its curved side toward the mirrors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lens {
@@ -14,22 +14,22 @@ pub struct Lens {
     pub thickness: Given<Length>,
     /// Its refractive index for the projector's light.
     pub index: GivenNumber,
-    /// From the mirrors to the middle of the lens.
+    /// The distance from the mirrors to the middle of the lens.
     pub object: Given<Length>,
-    /// From the middle of the lens to the glass where light enters the resin.
+    /// The distance from the middle of the lens to the glass where light enters the resin.
     pub image: Given<Length>,
     /// The angle between the outermost rays that leave a point of a mirror, in degrees.
     pub divergence: GivenNumber,
 }
 
-/// Where a lens images the mirrors, and how blurred they are where they are wanted.
+/// Where a lens images the mirrors, and their blur where the image is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Focus {
-    /// From the middle of the lens to the image.
+    /// The distance from the middle of the lens to the image.
     pub image: Length,
-    /// From where the image is wanted to the image.
+    /// The distance from the wanted place of the image to the image.
     pub off: Length,
-    /// How far from its middle the light of a point reaches where it is wanted.
+    /// The radius of the light of a point at the wanted place of the image.
     pub blur: Length,
 }
 
@@ -42,15 +42,16 @@ impl Lens {
         let object = self.object.value.um() - half;
         // The curved side first; vergences in glass, then in air behind the plane side.
         let in_glass = (index - 1.0) / radius - 1.0 / object;
-        // By the plane side, distances in glass shorten to their part in air, less the thickness
-        // that lies before.
+        // Through the plane side, distances in glass shrink to their equivalent in air, less the
+        // thickness before it.
         let behind_plane = (index / in_glass - thickness) / index;
         let image = behind_plane + half;
         if !(image > half && image.is_finite()) {
             return None;
         }
         let off = image - self.image.value.um();
-        // A beam that is wide by the object's distance comes together over the image's.
+        // A beam as wide as the divergence over the object distance converges over the image
+        // distance.
         let slope = (self.divergence.value.to_radians() / 2.0).tan() * object / behind_plane;
         let [image, off, blur] = [image, off, off.abs() * slope].map(Length::from_um);
         Some(Focus { image, off, blur })
@@ -80,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_lens_of_000_is_out_of_focus() {
-        // 1.460 is the index of silica for visible light, 1.4816 that for 325 nm.
+        // 1.460 is the index of silica for visible light, 1.4816 the index at 325 nm.
         let visible = lens(1.460).focus().unwrap();
         assert!((visible.image.mm() - 147.22).abs() < 0.01, "{visible:?}");
         assert!((visible.off.mm() - 15.22).abs() < 0.01, "{visible:?}");

@@ -1,5 +1,5 @@
-//! Projectors: how many mirrors a display has, where and how bright their light falls on the
-//! glass, in TOML files.
+//! Projectors: the number of mirrors of a display, and where and how bright their light falls on
+//! the glass, in TOML files.
 //!
 //! ```
 //! use lamp_planning::projector::Projector;
@@ -20,22 +20,22 @@ use serde::{Deserialize, Serialize};
 pub use file::ProjectorError;
 pub use lens::{Focus, Lens};
 
-/// What is known of a projector. Lengths are on the glass where light enters the resin, unless
-/// they say otherwise.
+/// The numbers of a projector. Lengths are on the glass where light enters the resin, unless stated
+/// otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Projector {
     /// Its name, for commands: small letters, digits and `-`.
     pub name: String,
-    /// What it is, in a line.
+    /// A description of one line.
     pub description: String,
     /// Its mirrors.
     pub display: Display,
-    /// What a mirror is on the display; without it, mirrors leave no gaps.
+    /// The size of a mirror on the display; without it, mirrors leave no gaps.
     pub mirror: Option<Mirror>,
-    /// From the middle of a mirror's image to that of the next one's.
+    /// The distance between the middles of neighboring mirrors' images.
     pub pitch: Given<Length>,
-    /// The side of the square columns that heights are told for (000 section 3.3.1).
+    /// The side of the square columns for which heights are computed (000 section 3.3.1).
     pub voxel: Option<Given<Length>>,
     /// How the light of a point spreads.
     pub spread: PointSpread,
@@ -43,11 +43,11 @@ pub struct Projector {
     pub rays: Option<Rays>,
     /// The light of a wide white field.
     pub light: Option<Given<Intensity>>,
-    /// What all times are multiples of.
+    /// The display's step: all times are multiples of it.
     pub step: Given<ExposureTime>,
     /// The height of the resin above the glass.
     pub chamber: Option<Given<Length>>,
-    /// The light of gray levels; without it, light is in proportion to the level.
+    /// The light of gray levels; without it, light is proportional to the level.
     pub gray: Option<GrayLight>,
     /// The lens that images the display.
     pub lens: Option<Lens>,
@@ -57,11 +57,11 @@ pub struct Projector {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Display {
-    /// How many there are along x.
+    /// The number of mirrors along x.
     pub columns: u32,
-    /// How many there are along y.
+    /// The number of mirrors along y.
     pub rows: u32,
-    /// The section, table or data sheet.
+    /// The source: the section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
@@ -72,7 +72,7 @@ pub struct Display {
 pub struct Mirror {
     /// Its side.
     pub side: Given<Length>,
-    /// What is between it and the next.
+    /// The gap between it and the next.
     pub gap: Given<Length>,
 }
 
@@ -80,7 +80,7 @@ pub struct Mirror {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointSpread {
-    /// Evenly over a square of twice this side.
+    /// Evenly over a square whose side is twice this length.
     pub cone: Option<Given<Length>>,
     /// By a Gaussian of this standard deviation.
     pub sigma: Option<Given<Length>>,
@@ -89,14 +89,14 @@ pub struct PointSpread {
 /// [`PointSpread`], checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpreadOf {
-    /// Evenly, up to so far from the point along x and along y.
+    /// Evenly, up to this distance from the point along x and along y.
     Cone(Length),
     /// By a Gaussian of this standard deviation.
     Gaussian(Length),
 }
 
-/// The rays of a mirror: from each of `points` x `points` points at the middles of equal cells
-/// of it, `directions` x `directions` ones, spread evenly over the cone with both its ends.
+/// The rays of a mirror: `points` x `points` points at the middles of equal cells of it, and from
+/// each, `directions` x `directions` rays, spread evenly over the cone with both its ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rays {
@@ -106,42 +106,42 @@ pub struct Rays {
     pub directions: u32,
     /// The power of one ray.
     pub power: Given<Power>,
-    /// The section, table or listing of both numbers.
+    /// The source of both numbers: the section, table or listing.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
-/// The light of gray levels, measured at some and linear between.
+/// The light of gray levels, measured at some of them and linear between.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GrayLight {
     /// Levels from 0 to 255, rising, each with its share of white's light.
     pub shares: Vec<(u8, f64)>,
-    /// The measurement.
+    /// The source: the measurement.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
 
 impl Projector {
-    /// Returns the light of a wide white field, in which the light of neighbours adds up to the
-    /// same everywhere but for moiré.
+    /// Returns the light of a wide white field, in which the light of neighbors adds up to the same
+    /// everywhere except for moiré.
     ///
     /// # Panics
     /// Panics if there are neither rays nor light, which [`check`](lamp_stack::Catalogued::check)
-    /// refuses.
+    /// rejects.
     pub fn irradiance(&self) -> Intensity {
         if let Some(light) = &self.light {
             return light.value;
         }
         let rays = self.rays.as_ref().expect("a checked projector has light");
-        // In a wide field each mirror lights as much glass as a pitch squared, wherever its light
-        // spreads.
+        // In a wide field, the light of each mirror covers an area of glass equal to the squared
+        // pitch, however it spreads.
         let pitch_cm = self.pitch.value.mm() / 10.0;
         Intensity::from_mw_per_cm2(rays.of_mirror().mw() / (pitch_cm * pitch_cm))
     }
 
-    /// Returns the share of the pitch that a mirror takes, along x as along y: the light of a
-    /// mirror comes from so much.
+    /// Returns the share of the pitch that a mirror takes, equal along x and y: the light of a
+    /// mirror comes from this share.
     pub fn fill(&self) -> f64 {
         self.mirror.as_ref().map_or(1.0, |mirror| {
             let side = mirror.side.value.um();
@@ -154,7 +154,7 @@ impl Projector {
         Length::from_um(self.pitch.value.um() * self.fill())
     }
 
-    /// Returns the width and height of the glass that the display's image takes.
+    /// Returns the width and height of the display's image on the glass.
     pub fn image(&self) -> [Length; 2] {
         let side = |mirrors: u32| Length::from_um(self.pitch.value.um() * f64::from(mirrors));
         [side(self.display.columns), side(self.display.rows)]
@@ -163,8 +163,8 @@ impl Projector {
     /// Returns how the light of a point spreads.
     ///
     /// # Panics
-    /// Panics if not exactly one way is given, which
-    /// [`check`](lamp_stack::Catalogued::check) refuses.
+    /// Panics if not exactly one way is given, which [`check`](lamp_stack::Catalogued::check)
+    /// rejects.
     pub fn spread(&self) -> SpreadOf {
         match (&self.spread.cone, &self.spread.sigma) {
             (Some(cone), None) => SpreadOf::Cone(cone.value),
@@ -189,7 +189,7 @@ impl Rays {
 }
 
 impl GrayLight {
-    /// Returns the share of a level, from the two measured ones that it lies between.
+    /// Returns the share of a level, from the two measured levels around it.
     fn share(&self, level: u8) -> f64 {
         let after = self.shares.partition_point(|&(of, _)| of < level);
         let (high, share) = self.shares[after];
@@ -197,7 +197,8 @@ impl GrayLight {
             return share;
         }
         let (low, low_share) = self.shares[after - 1];
-        // A checked table begins at black and ends at white: a level has one on either side.
+        // A checked table begins at black and ends at white, so a level has an entry on either
+        // side.
         let along = f64::from(level - low) / f64::from(high - low);
         low_share + along * (share - low_share)
     }

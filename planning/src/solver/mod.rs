@@ -1,4 +1,4 @@
-//! Finds the light of each pixel of a few layers that costs least, with a bound on the best.
+//! Finds the light of each pixel of a few layers that costs least, with a bound on the best cost.
 
 mod operator;
 mod problem;

@@ -1,4 +1,4 @@
-//! The doses that light makes, and what a price of doses makes of the light: the transpose.
+//! The doses that light makes, and the transpose: the cost of light from the prices of doses.
 
 use crate::blur::{Blur, ChunkRoom, Chunks, LANES, Real};
 use crate::light::LayerLight;
@@ -7,8 +7,8 @@ use crate::wide::wide;
 
 /// The doses of a block of voxels from the light of its pixels, without matrices.
 ///
-/// Voxels stand layer by layer from the light, each row by row; or only some chunks of 32 of
-/// each layer, the same in all. A layer whose own light is 0 costs little.
+/// Voxels are ordered layer by layer from the light, and row by row in each layer; or only some
+/// chunks of 32 of each layer, the same in all layers. A layer whose own light is 0 costs little.
 ///
 /// ```
 /// use lamp_planning::solver::{Operator, Shape};
@@ -32,15 +32,14 @@ impl<T: Real> Operator<T> {
     /// Creates the operator of a block. `layers` are from the light.
     ///
     /// # Panics
-    /// Panics if there are not as many layers as the shape has, or its width is not a multiple
-    /// of 32.
+    /// Panics if the number of layers is not the shape's, or its width is not a multiple of 32.
     pub fn new(shape: Shape, blur: Blur<T>, layers: Vec<LayerLight>) -> Self {
         let all = (0..shape.plane()).step_by(LANES).collect();
         Self::of_chunks(shape, blur, layers, all)
     }
 
-    /// Creates the operator of the chunks of 32 voxels that begin at these places of each layer,
-    /// in order: all other pixels are black, and other doses are of no matter.
+    /// Creates the operator of the chunks of 32 voxels that begin at these places of each layer, in
+    /// order: all other pixels are black, and other doses do not matter.
     ///
     /// # Panics
     /// As [`new`](Self::new) does.
@@ -55,12 +54,12 @@ impl<T: Real> Operator<T> {
         Self { layers, chunks: Chunks::new(blur, shape.rows, shape.width, chunks) }
     }
 
-    /// Returns the voxels of a layer.
+    /// Returns the number of voxels of a layer.
     pub fn plane(&self) -> usize {
         self.chunks.pixels()
     }
 
-    /// Returns the voxels of all layers.
+    /// Returns the number of voxels of all layers.
     pub fn voxels(&self) -> usize {
         self.layers.len() * self.plane()
     }
@@ -103,7 +102,7 @@ impl<T: Real> Operator<T> {
         room: &mut ChunkRoom<T>,
     ) {
         let LayerLight { own, passed } = self.layers[layer];
-        // Layers beyond a window are dark: only what passes reaches them, and blurring black would
+        // Layers beyond a window are dark: only passed light reaches them, and blurring black would
         // cost as much as blurring light.
         let is_dark = own == 0.0;
         let (own, passed) = (T::of(own), T::of(passed));
@@ -118,15 +117,15 @@ impl<T: Real> Operator<T> {
                 }
                 for (dose, &above) in doses.iter_mut().zip(above) {
                     // 001 eq. 5: light of the layers above fades by the same factor wherever it
-                    // comes from, so that one product with the dose above stands for the sum over
-                    // all of them.
+                    // comes from, so one product with the dose above stands for the sum over all of
+                    // them.
                     *dose += above * passed;
                 }
             },
         );
     }
 
-    /// Computes what one unit of light of each pixel costs, where `prices` are those of doses.
+    /// Computes the cost of one unit of light of each pixel from `prices`, the prices of doses.
     pub fn prices_of_light(&self, prices: &[T], of_light: &mut [T]) {
         let (plane, mut room) = (self.plane(), self.room());
         if plane == 0 {
@@ -139,8 +138,8 @@ impl<T: Real> Operator<T> {
         }
     }
 
-    /// Computes what the light of a layer costs. `sums` has the prices of all doses below, as
-    /// they count in the layer below, and gets this layer's.
+    /// Computes the cost of the light of a layer. `sums` has the prices of all doses below, as they
+    /// count in the layer below, and gets this layer's.
     pub(crate) fn prices_of_layer(
         &self,
         layer: usize,
@@ -157,14 +156,14 @@ impl<T: Real> Operator<T> {
             || {
                 for (sum, &price) in sums.iter_mut().zip(prices) {
                     // The transpose of the recursion down: a pixel pays for its own layer and for
-                    // all below, each time less by what passes.
+                    // all layers below, each time reduced by the share that passes.
                     *sum = *sum * passed + price;
                 }
                 if is_dark {
                     of_light.fill(T::default());
                     return;
                 }
-                // The Gaussian is symmetric, and so its own transpose.
+                // The Gaussian is symmetric, so it is its own transpose.
                 self.chunks.spread(sums, of_light, room);
                 of_light.iter_mut().for_each(|price| *price = *price * own);
             },

@@ -1,4 +1,4 @@
-//! What the voxels of a block want, and what light their pixels may have.
+//! The dose wanted at each voxel of a block, and the light allowed at its pixel.
 
 use crate::blur::{LANES, Real};
 use crate::solver::operator::Operator;
@@ -6,37 +6,37 @@ use crate::solver::operator::Operator;
 /// The size of a block of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
-    /// Its layers.
+    /// The number of layers.
     pub layers: usize,
-    /// The rows of each layer.
+    /// The number of rows of each layer.
     pub rows: usize,
-    /// The columns of each row: a multiple of 32.
+    /// The number of columns of each row: a multiple of 32.
     pub width: usize,
 }
 
 impl Shape {
-    /// Returns the least shape with at least so many columns.
+    /// Returns the smallest shape with at least this many columns.
     pub fn holding(layers: usize, rows: usize, columns: usize) -> Self {
         Self { layers, rows, width: columns.next_multiple_of(LANES) }
     }
 
-    /// Returns the voxels of a layer.
+    /// Returns the number of voxels of a layer.
     pub fn plane(self) -> usize {
         self.rows * self.width
     }
 
-    /// Returns the voxels of all layers.
+    /// Returns the number of voxels of all layers.
     pub fn voxels(self) -> usize {
         self.layers * self.plane()
     }
 }
 
-/// What a voxel wants, and what light the pixel at its place may have: a set of flags.
+/// The dose wanted at a voxel, and the light allowed at its pixel: a set of flags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Role(u8);
 
 impl Role {
-    /// No matter, and no light.
+    /// The dose does not matter, and the pixel has no light.
     pub const NONE: Self = Self(0);
     /// A dose below [`Terms::least`] costs [`Terms::short_price`] a unit.
     pub const CURED: Self = Self(1);
@@ -48,7 +48,7 @@ impl Role {
     pub const LIT: Self = Self(8);
     /// The pixel has light 1.
     pub const WHITE: Self = Self(16 | 8);
-    /// The pixel may have no less than [`Terms::least_light`].
+    /// The pixel may not have less light than [`Terms::least_light`].
     pub const NEVER_DIM: Self = Self(32 | 8);
 
     /// Returns both roles together.
@@ -80,18 +80,18 @@ impl Role {
     }
 }
 
-/// What doses cost, and the least light of a pixel that may not be dim:
+/// The cost of doses, and the least light of a pixel that may not be dim:
 ///
 /// - a voxel that is to be cured costs (least - dose)₊ times the price,
-/// - one that is not to be, (dose - most)₊,
-/// - one that is to be dark, its dose (001 eq. 11).
+/// - a voxel that is not to be cured costs (dose - most)₊,
+/// - a voxel that is to be dark costs its dose (001 eq. 11).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Terms<T> {
-    /// The dose that voxels which are to be cured should have.
+    /// The dose that voxels to be cured should have.
     pub least: T,
-    /// What they cost a unit below it.
+    /// Their cost for each unit below it.
     pub short_price: T,
-    /// The dose that voxels which are not to be cured may have.
+    /// The dose that voxels not to be cured may have.
     pub most: T,
     /// The light of a pixel that may not be dim.
     pub least_light: T,
@@ -104,13 +104,13 @@ pub struct Problem<T> {
     pub operator: Operator<T>,
     /// The role of each voxel.
     pub roles: Vec<Role>,
-    /// The dose that each voxel has from elsewhere.
+    /// The dose that each voxel gets from other light.
     pub incoming: Vec<T>,
-    /// What doses cost.
+    /// The cost of doses.
     pub terms: Terms<T>,
 }
 
-/// Bounds of a number.
+/// The bounds of a number.
 #[derive(Clone, Copy)]
 pub(crate) struct Bounds<T> {
     pub(crate) low: T,
@@ -118,15 +118,15 @@ pub(crate) struct Bounds<T> {
 }
 
 impl<T: Real> Terms<T> {
-    /// Returns what light a pixel may have.
+    /// Returns the bounds of a pixel's light.
     #[inline(always)]
     pub(crate) fn light_bounds(&self, role: Role) -> Bounds<T> {
         let white: T = role.flag(4);
-        // White and never dim do not stand together, so that the sum is one of them.
+        // White and never dim do not occur together, so the sum is one of them.
         Bounds { low: white + self.least_light * role.flag(5), high: role.flag(3) }
     }
 
-    /// Returns what a unit of a voxel's dose may cost: the slopes of its cost.
+    /// Returns the bounds of the price of a voxel's dose: the slopes of its cost.
     #[inline(always)]
     pub(crate) fn price_bounds(&self, role: Role) -> Bounds<T> {
         // Flags become factors of 0 and 1, so that loops over voxels have no branch and use the
@@ -135,36 +135,36 @@ impl<T: Real> Terms<T> {
         Bounds { low: dark - self.short_price * role.flag(0), high: dark + role.flag(1) }
     }
 
-    /// Returns the dose from which on a voxel's cost changes.
+    /// Returns the dose at which the slope of a voxel's cost changes.
     #[inline(always)]
     pub(crate) fn aim(&self, role: Role) -> T {
         // A dose that only counts as darkness has its kink at zero, where doses begin.
         self.least * role.flag(0) + self.most * role.flag(1)
     }
 
-    /// Returns what a voxel's dose costs.
+    /// Returns the cost of a voxel's dose.
     #[inline(always)]
     pub(crate) fn cost(&self, role: Role, dose: T) -> f64 {
         let (bounds, beyond) = (self.price_bounds(role), (dose - self.aim(role)).f64());
-        // A convex cost with one kink is the larger of its two lines through the kink, and the
-        // slopes of these are the bounds of the price.
+        // A convex cost with one kink is the larger of its two lines through the kink, and their
+        // slopes are the bounds of the price.
         (beyond * bounds.low.f64()).max(beyond * bounds.high.f64())
     }
 }
 
 impl<T: Real> Problem<T> {
-    /// Returns what doses cost, those of all voxels or of the first ones.
+    /// Returns the cost of doses, of all voxels or of the first ones.
     pub fn cost(&self, doses: &[T]) -> f64 {
         let voxels = doses.iter().zip(self.roles.iter().zip(&self.incoming));
         voxels.map(|(&dose, (&role, &from))| self.terms.cost(role, dose + from)).sum()
     }
 
-    /// Returns a bound that no light's cost is below, from any prices within their bounds and
-    /// what they make of light.
+    /// Returns a lower bound on the cost of any light, from any prices within their bounds and the
+    /// cost of light at these prices.
     pub fn bound(&self, prices: &[T], of_light: &[T]) -> f64 {
         // Weak duality: for any price within the slopes, price (dose - aim) is at most the cost.
-        // Summed over all voxels, doses become light times what it costs, and each pixel alone
-        // takes the end that makes that least.
+        // Summed over all voxels, doses become light times its cost, and each pixel alone takes the
+        // end with the least cost.
         let term = |((&price, &of_light), (&role, &incoming)): ((&T, &T), (&Role, &T))| {
             let light = self.terms.light_bounds(role);
             let of_light = of_light.f64();
@@ -174,7 +174,7 @@ impl<T: Real> Problem<T> {
         prices.iter().zip(of_light).zip(self.roles.iter().zip(&self.incoming)).map(term).sum()
     }
 
-    /// Returns the light of all pixels as bright as they may be.
+    /// Returns the light of all pixels at their upper bounds.
     pub fn brightest(&self) -> Vec<T> {
         self.roles.iter().map(|&role| self.terms.light_bounds(role).high).collect()
     }

@@ -1,8 +1,8 @@
 //! The search for the least cost: the primal-dual hybrid gradient, reflected, anchored and
 //! restarted, with steps for each pixel and voxel.
 //!
-//! Every iterate has a cost, and a bound from the prices of doses, so the search knows how far
-//! it is from the best.
+//! Every iterate has a cost, and a bound from the prices of doses, so the search knows its distance
+//! from the best.
 
 use std::ops::Range;
 
@@ -22,11 +22,11 @@ pub struct Search {
 /// The cost and the bound after some iterations: the best so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchProgress {
-    /// Iterations.
+    /// The number of iterations.
     pub iteration: usize,
     /// The cost of the best light.
     pub cost: f64,
-    /// What no light costs less than.
+    /// The bound: no light costs less.
     pub bound: f64,
 }
 
@@ -37,7 +37,7 @@ pub struct Solution<T> {
     pub light: Vec<T>,
     /// The price of each voxel's dose that gives the bound.
     pub prices: Vec<T>,
-    /// How cost and bound came together.
+    /// The course of cost and bound.
     pub progress: Vec<SearchProgress>,
 }
 
@@ -45,27 +45,27 @@ impl<T> Solution<T> {
     /// Returns the cost and the bound at the end.
     ///
     /// # Panics
-    /// Never: a search notes where it starts.
+    /// Never: a search records its start.
     pub fn end(&self) -> SearchProgress {
         *self.progress.last().expect("a search notes where it starts")
     }
 }
 
-/// Iterations between two looks at cost and bound.
+/// The number of iterations between two checks of cost and bound.
 const LOOK_AFTER: usize = 5;
-/// Steps are no longer than those of a pixel or voxel that sees this share of the most light.
+/// Steps are no longer than the steps of a pixel or voxel that sees this share of the most light.
 const LEAST_SHARE: f64 = 1e-3;
 // cuPDLP.jl restarts by the same three shares (Lu and Yang 2023).
 /// A restart follows when the gap has shrunk to this share,
 const SHRUNK: f64 = 0.2;
-/// or to this share without shrinking since the last look,
+/// or to this share without shrinking since the last check,
 const SHRUNK_AND_STUCK: f64 = 0.8;
 /// or when the iterations since the last restart are this share of all.
 const LONG: f64 = 0.36;
-/// Steps in light are at first longer than those in prices by 1 over this.
+/// Steps in light are at first longer than steps in prices by 1 over this.
 const FIRST_WEIGHT: f64 = 0.3;
 
-/// Light, prices and what they make of each other.
+/// Light and prices, and the doses and light costs that follow from them.
 #[derive(Clone)]
 struct Iterate<T> {
     light: Vec<T>,
@@ -92,8 +92,9 @@ impl<T: Real> Iterate<T> {
     }
 }
 
-/// How far a step goes in the light of a pixel and the price of a voxel (Pock and Chambolle
-/// 2011): one over the sum of what it sees, which makes all steps together just short enough.
+/// The length of a step in the light of a pixel and the price of a voxel (Pock and Chambolle 2011):
+/// one over the sum of the matrix entries that it sees, which makes all steps together just short
+/// enough.
 struct Steps<T> {
     light: Vec<T>,
     prices: Vec<T>,
@@ -110,22 +111,22 @@ impl<T: Real> Steps<T> {
         let (light, prices) = problem.roles.iter().map(|&role| moves(role)).unzip();
         let seen = Iterate::new(problem, light, prices);
         // Pock and Chambolle's steps with α = 1, over the sums of the matrix's rows and columns. No
-        // number of the matrix is negative, so that its product with ones is those sums. Pixels
-        // that cannot move, and voxels whose dose costs nothing, are left out: they would shorten
-        // the steps of the rest.
+        // number of the matrix is negative, so its product with ones gives these sums. Pixels that
+        // cannot move, and voxels whose dose costs nothing, are left out: they would shorten the
+        // steps of the rest.
         let over = |sums: &[T]| {
             let most = sums.iter().fold(0.0_f64, |most, sum| most.max(sum.f64()));
-            // Where nothing sees anything, any step will do that is a number.
+            // Where all sums are zero, any finite step will do.
             let least = if most > 0.0 { LEAST_SHARE * most } else { 1.0 };
             sums.iter().map(|sum| T::of(1.0 / sum.f64().max(least))).collect()
         };
         Self { light: over(&seen.of_light), prices: over(&seen.doses) }
     }
 
-    /// Returns how far apart two iterates are in light and in prices, in steps.
+    /// Returns the distances between two iterates in light and in prices, in steps.
     fn distances(&self, a: &Iterate<T>, b: &Iterate<T>) -> [f64; 2] {
         let distance = |a: &[T], b: &[T], steps: &[T]| {
-            // The norm in which a step has length one: |apart|² / step, as the theory of PDHG
+            // The norm in which a step has length one: |difference|² / step, as the theory of PDHG
             // measures.
             let squares = a.iter().zip(b).zip(steps).map(|((&a, &b), step)| {
                 let apart = (a - b).f64();
@@ -183,9 +184,9 @@ pub fn solve<T: Real>(
         let long = f64::from(since) > LONG * iteration as f64;
         if gap < SHRUNK * gap_at_restart || stuck || long {
             let [light, prices] = steps.distances(&next, &anchor);
-            // The mean, as logarithms, of the old weight and of the ratio of the ways that prices
-            // and light have gone since the restart: the primal weight of PDLP (Applegate et al.
-            // 2021), smoothed by a half.
+            // The mean, as logarithms, of the old weight and of the ratio of the distances that
+            // prices and light have moved since the restart: the primal weight of PDLP (Applegate
+            // et al. 2021), smoothed by a half.
             weight = match (light > 1e-9, prices > 1e-9) {
                 (true, true) => (weight * prices / light).sqrt(),
                 // Only prices move, and too slowly: light stays at its bounds.
@@ -223,8 +224,8 @@ impl<T: Real> Best<T> {
         let mut progress = SearchProgress { iteration, ..self.last() };
         if cost < progress.cost {
             progress.cost = cost;
-            // Cost and bound are each of the best so far, whichever iterate had them: together they
-            // still hold the optimum between them.
+            // Cost and bound are each the best so far, from whichever iterate: the optimum is still
+            // between them.
             self.light.copy_from_slice(&next.light);
         }
         if bound > progress.bound {
@@ -242,7 +243,7 @@ struct Step<'a, T> {
     /// Factors of steps in light and in prices.
     in_light: T,
     in_prices: T,
-    /// What the iterate after next is made of: the next, the one now, and the anchor.
+    /// Weights of the iterate after next: of the next, the present, and the anchor.
     onwards: T,
     back: T,
     rest: T,
@@ -262,11 +263,11 @@ impl<'a, T: Real> Step<'a, T> {
         }
     }
 
-    /// Goes down through the layers for light and prices, and up for the prices of light. `now`
-    /// becomes what `next` reflects it to, drawn towards the anchor.
+    /// Goes down through the layers for light and prices, and up for the prices of light. Reflects
+    /// `now` at `next`, and draws the result toward the anchor.
     fn take(&self, now: &mut Iterate<T>, next: &mut Iterate<T>, anchor: &Iterate<T>) {
         let operator = &self.problem.operator;
-        // One pass down and one up take all that an iteration needs while a layer is in the cache.
+        // One pass down and one up do all the work of an iteration while a layer is in the cache.
         let (plane, mut room) = (operator.plane(), operator.room());
         for layer in 0..operator.layer_count() {
             let here = layer * plane..(layer + 1) * plane;
@@ -293,7 +294,7 @@ impl<'a, T: Real> Step<'a, T> {
         }
     }
 
-    /// A step of a layer's light against its price.
+    /// Moves a layer's light against its price.
     fn step_light(&self, here: Range<usize>, now: &Iterate<T>, next: &mut Iterate<T>) {
         let terms = self.problem.terms;
         let roles = &self.problem.roles[here.clone()];
@@ -306,8 +307,8 @@ impl<'a, T: Real> Step<'a, T> {
                 let pixels = next.iter_mut().zip(light).zip(prices.iter().zip(steps)).zip(roles);
                 for (((next, &light), (&price, &step)), &role) in pixels {
                     let bounds = terms.light_bounds(role);
-                    // Light goes against what it costs, and back between its bounds: the primal
-                    // half of Chambolle and Pock's iteration (2011).
+                    // Light moves against its cost, and back between its bounds: the primal half of
+                    // Chambolle and Pock's iteration (2011).
                     let by = step * self.in_light * price;
                     *next = (light - by).within(bounds.low, bounds.high);
                 }
@@ -315,8 +316,8 @@ impl<'a, T: Real> Step<'a, T> {
         );
     }
 
-    /// A step of a layer's prices towards the slopes of the cost, at the doses that the light is
-    /// going to make.
+    /// Moves a layer's prices toward the slopes of the cost, at the doses that the light is going
+    /// to make.
     fn step_prices(&self, here: Range<usize>, now: &Iterate<T>, next: &mut Iterate<T>) {
         let (two, terms) = (T::of(2.0), self.problem.terms);
         let roles = &self.problem.roles[here.clone()];
@@ -331,8 +332,8 @@ impl<'a, T: Real> Step<'a, T> {
                 let voxels = next.iter_mut().zip(prices).zip(steps.iter().zip(roles)).zip(doses);
                 for (((next, &price), (&step, &role)), ((&from, &to), &incoming)) in voxels {
                     let bounds = terms.price_bounds(role);
-                    // Prices go by doses extrapolated to 2 next - now: without that, light and
-                    // prices circle each other.
+                    // Prices follow the doses extrapolated to 2 next - now: without that, light and
+                    // prices oscillate around each other.
                     let beyond = two * to - from + incoming - terms.aim(role);
                     let by = step * self.in_prices * beyond;
                     *next = (price + by).within(bounds.low, bounds.high);
@@ -341,7 +342,7 @@ impl<'a, T: Real> Step<'a, T> {
         );
     }
 
-    /// Reflects values at the next ones, and draws the result towards the anchor.
+    /// Reflects values at the next ones, and draws the result toward the anchor.
     fn draw(&self, now: &mut [T], next: &[T], anchor: &[T]) {
         wide(
             #[inline(always)]

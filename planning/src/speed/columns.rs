@@ -1,7 +1,7 @@
 //! Stores the light of pixel columns through all layers.
 //!
 //! Layers that are alike at many pixels give many equal columns: deep inside a part, far outside,
-//! along a straight wall. Equal columns are stored once, with their number.
+//! along a straight wall. Equal columns are stored once, with their count.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
@@ -9,8 +9,8 @@ use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 /// Columns that are worked on at once: their doses through all layers stay in the cache.
 pub(crate) const LANES: usize = 256;
 
-/// The light of pixel columns, for a second of every layer's light, with signs: negative where a
-/// voxel is wanted, and zero of either sign where there is no light.
+/// The light of pixel columns for a second of every layer's light. Its sign is the role: negative
+/// where a voxel is wanted, positive elsewhere. Without light it is zero, of either sign.
 #[derive(Clone, Debug)]
 pub(crate) struct Columns {
     layers: usize,
@@ -20,7 +20,7 @@ pub(crate) struct Columns {
 /// [`LANES`] columns side by side.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// How many pixels each column stands for.
+    /// The number of pixels that each column stands for.
     pub(crate) weights: Vec<f32>,
     /// Layer by layer.
     pub(crate) light: Vec<f32>,
@@ -43,7 +43,7 @@ pub(crate) struct ColumnSet {
     /// The columns one after another.
     light: Vec<f32>,
     weights: Vec<f64>,
-    /// Columns by their hash; those with the same hash form a chain.
+    /// Columns by their hash; columns with the same hash form a chain.
     by_hash: HashMap<u64, usize, BuildHasherDefault<DefaultHasher>>,
     next: Vec<usize>,
 }
@@ -68,7 +68,7 @@ impl ColumnSet {
 
     /// Adds a column that stands for `weight` pixels.
     pub(crate) fn add(&mut self, column: &[f32], weight: f64) {
-        // Bits, not values: a negative zero is a wanted voxel, a positive one is not.
+        // Compares bits, not values: a negative zero is a wanted voxel, a positive one is not.
         let same = |a: &[f32]| a.iter().zip(column).all(|(a, b)| a.to_bits() == b.to_bits());
         let bits: Vec<u32> = column.iter().map(|light| light.to_bits()).collect();
         let hash = self.by_hash.hasher().hash_one(&bits);
@@ -87,7 +87,7 @@ impl ColumnSet {
         self.weights.push(weight);
     }
 
-    /// Adds another set's columns, `times` as many of each.
+    /// Adds the columns of another set, each with `times` its weight.
     pub(crate) fn add_all(&mut self, other: &Self, times: f64) {
         for (number, weight) in other.weights.iter().enumerate() {
             self.add(other.column(number), weight * times);
@@ -101,7 +101,7 @@ impl ColumnSet {
             let mut block =
                 Block { weights: vec![0.0; LANES], light: vec![0.0; LANES * self.layers] };
             for (lane, number) in numbers.enumerate() {
-                // Lanes beyond the last column weigh nothing.
+                // Lanes beyond the last column have weight zero.
                 block.weights[lane] = self.weights[number] as f32;
                 for (layer, &light) in self.column(number).iter().enumerate() {
                     block.light[layer * LANES + lane] = light;

@@ -5,18 +5,18 @@ use thiserror::Error;
 
 use super::part::TimedLayer;
 
-/// A speed of the platform, in micrometres a second.
+/// A speed of the platform, in micrometers per second.
 pub type Speed = f64;
 
-/// What the platform can do.
+/// The limits of the platform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Platform {
     /// The slowest speed: a layer's thickness divided by its time.
     pub slowest: Speed,
     /// The fastest.
     pub fastest: Speed,
-    /// By how much the speed may differ from that of a neighbouring layer: 0.2 allows a fifth
-    /// more than the slower of the two.
+    /// The largest change of speed between neighboring layers: 0.2 allows a fifth more than the
+    /// slower speed of the two.
     pub max_change: Option<f64>,
 }
 
@@ -24,16 +24,16 @@ pub struct Platform {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlatformError {
-    /// The bounds leave nothing between them, or are not above zero.
+    /// The bounds have nothing between them, or are not above zero.
     #[error("the speeds must be above zero and rise: {0} to {1} um/s")]
     Speeds(Speed, Speed),
-    /// The speed may not change at all, or by a number that is none.
+    /// The allowed change of speed is not above zero, or not a number.
     #[error("the change of speed must be above zero: {0}")]
     Change(f64),
 }
 
 impl Platform {
-    /// Returns the least and the longest time of each layer, in seconds.
+    /// Returns the shortest and the longest time of each layer, in seconds.
     ///
     /// # Errors
     /// Returns an error if the platform's numbers are impossible.
@@ -57,7 +57,7 @@ pub(crate) struct Feasible {
     pub(crate) low: Vec<f64>,
     pub(crate) high: Vec<f64>,
     um: Vec<f64>,
-    /// How much larger the time of a micrometre may be than a neighbour's.
+    /// The largest ratio between the time per micrometer of a layer and of its neighbor.
     ratio: Option<f64>,
 }
 
@@ -76,24 +76,24 @@ impl Feasible {
         Ok(Self { low, high, um, ratio: max_change.map(|change| 1.0 + change) })
     }
 
-    /// Returns whether nothing but the bounds limits the times.
+    /// Returns whether only the bounds limit the times.
     pub(crate) fn is_box(&self) -> bool {
         self.ratio.is_none()
     }
 
-    /// Returns the mean seconds of a micrometre.
+    /// Returns the mean time per micrometer, in seconds.
     pub(crate) fn pace(&self, times: &[f64]) -> f64 {
         times.iter().sum::<f64>() / self.um.iter().sum::<f64>()
     }
 
-    /// Returns times that are possible, near those given, and equal to them if they are.
+    /// Returns possible times near the given ones, and equal to them if these are possible.
     pub(crate) fn nearest(&self, times: &[f64]) -> Vec<f64> {
         let clamped = times.iter().zip(self.low.iter().zip(&self.high));
         let mut times: Vec<_> =
             clamped.map(|(time, (&low, &high))| time.clamp(low, high)).collect();
         let Some(ratio) = self.ratio else { return times };
-        // The least slowness that no layer's neighbours forbid is below the clamped one; the
-        // largest is above. Any power mean of both keeps the ratios.
+        // The least slowness that no layer's neighbors forbid is below the clamped one; the largest
+        // is above. Any power mean of both keeps the ratios.
         let spread = |up: bool| {
             let mut pace: Vec<_> = times.iter().zip(&self.um).map(|(time, um)| time / um).collect();
             let mut limit = |from: usize, to: usize| {
@@ -104,14 +104,14 @@ impl Feasible {
                 };
             };
             let count = self.um.len();
-            // Two passes are enough: a layer that limits another lies above or below it, and limits
-            // all between on the way.
+            // Two passes are enough: a layer that limits another is above or below it, and limits
+            // all layers between on the way.
             (1..count).for_each(|k| limit(k - 1, k));
             (1..count).rev().for_each(|k| limit(k, k - 1));
             pace
         };
-        // Their geometric mean breaks no ratio, since both keep it, and is the times themselves
-        // where these are possible: then nothing is lowered and nothing raised.
+        // Their geometric mean breaks no ratio, since both keep it. It equals the times where these
+        // are possible: then nothing is lowered and nothing raised.
         let (low, high) = (spread(false), spread(true));
         for (k, time) in times.iter_mut().enumerate() {
             *time = ((low[k] * high[k]).sqrt() * self.um[k]).clamp(self.low[k], self.high[k]);
@@ -119,8 +119,8 @@ impl Feasible {
         times
     }
 
-    /// Returns by how much each pair of neighbours breaks the ratio, in seconds a micrometre:
-    /// first those whose upper layer is too slow.
+    /// Returns the amount by which each pair of neighbors breaks the ratio, in seconds per
+    /// micrometer: first where the upper layer is too slow.
     pub(crate) fn excess(&self, times: &[f64]) -> Vec<[f64; 2]> {
         let Some(ratio) = self.ratio else { return Vec::new() };
         let pace = |k: usize| times[k] / self.um[k];
@@ -131,7 +131,7 @@ impl Feasible {
             .collect()
     }
 
-    /// Adds the slopes of a sum of excesses, each multiplied with its price.
+    /// Adds the slopes of a sum of excesses, each multiplied by its price.
     pub(crate) fn add_slopes(&self, prices: &[[f64; 2]], slopes: &mut [f64]) {
         let Some(ratio) = self.ratio else { return };
         for (pair, [above, below]) in prices.iter().enumerate() {
@@ -140,10 +140,10 @@ impl Feasible {
         }
     }
 
-    /// Returns the least sum of possible times, each multiplied with its slope.
+    /// Returns the least sum of possible times, each multiplied by its slope.
     ///
-    /// It is exact: layer by layer, the least sum of the layers so far is a convex function of
-    /// the last layer's pace, straight between corners.
+    /// The sum is exact: layer by layer, the least sum of the layers so far is a convex function of
+    /// the last layer's pace, linear between corners.
     pub(crate) fn least(&self, slopes: &[f64]) -> f64 {
         let Some(ratio) = self.ratio else {
             let each = slopes.iter().zip(self.low.iter().zip(&self.high));
@@ -156,8 +156,8 @@ impl Feasible {
                 corners = widened(&corners, ratio, [low, high]);
             }
             for (pace, least) in &mut corners {
-                // A straight line more keeps a convex function convex and its corners where they
-                // are.
+                // Adding a straight line to a convex function keeps it convex and its corners in
+                // place.
                 *least += slope * um * *pace;
             }
         }
@@ -169,8 +169,8 @@ impl Feasible {
 fn widened(corners: &[(f64, f64)], ratio: f64, [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
     let best = (0..corners.len()).min_by(|&a, &b| corners[a].1.total_cmp(&corners[b].1));
     let best = best.expect("there are two corners or more");
-    // The least within a ratio: to the left of the bottom it comes from the farthest place to the
-    // right, to the right from the farthest to the left. So the two flanks move apart by the ratio,
+    // The least within a ratio: left of the bottom, it comes from the farthest place to the right,
+    // and right of it, from the farthest to the left. So the two flanks move apart by the ratio,
     // and between them the bottom is level.
     let falling = corners[..=best].iter().map(|&(pace, least)| (pace / ratio, least));
     let rising = corners[best..].iter().map(|&(pace, least)| (pace * ratio, least));
@@ -226,12 +226,12 @@ mod tests {
         }
     }
 
-    /// Against all times on a grid of steps of the ratio.
+    /// Compares with all times on a grid of steps of the ratio.
     #[test]
     fn the_least_sum_is_that_of_an_exhaustive_search() {
         for seed in 0..40 {
             let mut feasible = feasible(4, Some(0.5));
-            // On this grid of paces the least of straight pieces is met.
+            // This grid of paces contains the least of straight pieces.
             for k in 0..4 {
                 feasible.low[k] = feasible.um[k];
                 feasible.high[k] = feasible.um[k] * 1.5_f64.powi(6);

@@ -8,19 +8,19 @@ use super::part::{TimedPart, fill_window};
 use crate::blur::{Blur, LANES};
 use crate::light::Light;
 
-/// Sides of tiles. Where light spreads far, small ones have rims that cost more than they.
+/// Sides of tiles. Where light spreads far, the rims of small tiles cost more than the tiles.
 const SIDES: [usize; 4] = [64, 128, 256, 512];
-/// The most bytes of a tile, with all layers, unless it is of the least side.
+/// The most bytes of a tile, with all layers, except for tiles of the least side.
 const MOST_TILE_BYTES: usize = 32 << 20;
 
 /// A part's images under a light, from which columns are computed.
 pub(crate) struct Gather<'a> {
     part: &'a TimedPart,
     blur: Blur<f32>,
-    /// The light of each level, so that a wide white field has 1.
+    /// The light of each level, scaled so that a wide white field has 1.
     light_of: Vec<f32>,
     side: usize,
-    /// The rows and columns where any layer is not black, and as far as light spreads around.
+    /// The rows and columns where any layer is not black, and around them as far as light spreads.
     tiles: Vec<[i64; 2]>,
 }
 
@@ -41,7 +41,7 @@ impl<'a> Gather<'a> {
         let sum = blur.sum();
         let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
         let bytes = |side: usize| side * side * part.images.len() * size_of::<f32>();
-        // A tile is computed with a rim as wide as light spreads. At four radii the rim makes the
+        // A tile is computed with a rim as wide as light spreads. At four radii, the rim makes the
         // work (6/4)² = 2.25 times as much, and wider tiles save little of that.
         let fits = |&side: &usize| side <= 4 * blur.radius() && bytes(side) <= MOST_TILE_BYTES;
         let side = SIDES.into_iter().rev().find(fits).unwrap_or(SIDES[0]);
@@ -50,7 +50,7 @@ impl<'a> Gather<'a> {
         gather
     }
 
-    /// Returns the tiles that light reaches in some layer: their corners.
+    /// Returns the corners of the tiles that light reaches in some layer.
     fn lit_tiles(&self) -> Vec<[i64; 2]> {
         let radius = self.blur.radius() as i64;
         let [width, height] = self.part.size().map(i64::from);
@@ -80,15 +80,15 @@ impl<'a> Gather<'a> {
     }
 
     /// Calls `each` with the columns of every tile, on all threads, and returns the results in
-    /// order. One pixel in each `step` x `step` is taken, at a place that differs from square to
-    /// square, and stands for all of them.
+    /// order. One pixel in each `step` x `step` square is taken, at a place that differs from
+    /// square to square, and stands for all of them.
     pub(crate) fn tiles<T: Send>(
         &self,
         step: u32,
         each: impl Fn(ColumnSet) -> T + Sync,
     ) -> impl Iterator<Item = T> {
         // A batch's results are merged before the next begins.
-        // Twice as many tiles as threads: a thread that is done early takes another, and few
+        // Twice as many tiles as threads: a thread that finishes early takes another, and few
         // results wait.
         let batch = 2 * rayon::current_num_threads();
         self.tiles.chunks(batch).flat_map(move |corners| {
@@ -98,13 +98,13 @@ impl<'a> Gather<'a> {
         })
     }
 
-    /// Returns all columns, or a sample of them that takes no more than `bytes`; and how many
-    /// pixels each sampled one stands for.
+    /// Returns all columns, or a sample of them that takes no more than `bytes`, and the number of
+    /// pixels that each sampled column stands for.
     pub(crate) fn columns(&self, bytes: usize) -> (Columns, u32) {
         let layers = self.part.images.len();
         let most = (bytes / (layers * size_of::<f32>())).max(1);
         let mut step = 1;
-        // Merging would have to make one column of more than 64 pixels: such samples are not tried.
+        // Merging would have to join over 64 pixels in each column: such samples are not tried.
         while self.pixels() / (step as usize * step as usize) > 64 * most {
             step *= 2;
         }
@@ -116,12 +116,12 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Returns the columns of a sample, if there are at most so many.
+    /// Returns the columns of a sample, if there are at most `most`.
     fn sample(&self, step: u32, most: usize) -> Option<Columns> {
         let mut all = ColumnSet::new(self.part.images.len());
         for tile in self.tiles(step, |tile| tile) {
             all.add_all(&tile, 1.0);
-            // With a pixel of each tile, no coarser sample is left.
+            // With one pixel of each tile, no coarser sample exists.
             if all.len() > most && step < self.side as u32 {
                 return None;
             }
@@ -147,13 +147,13 @@ impl<'a> Gather<'a> {
         room.levels.resize(pixels, 0);
         let corner = window.corner.map(|place| place - window.radius as i64);
         fill_window(image, corner, window.width(), &mut room.levels);
-        // Walls that stand straight give the same window layer after layer.
+        // Straight vertical walls give the same window layer after layer.
         if room.levels == room.spread_levels {
             return;
         }
         room.spread_levels.clone_from(&room.levels);
         let first = room.levels[0];
-        // Inside and outside of the part, blur is a sum that is known.
+        // Inside and outside of the part, the blur is a known sum.
         if room.levels.iter().all(|&level| level == first) {
             let field = self.light_of[usize::from(first)] * self.blur.sum() as f32;
             room.spread.clear();
@@ -178,7 +178,7 @@ impl<'a> Gather<'a> {
             for (number, &place) in places.iter().enumerate() {
                 let place = window.place(place);
                 let wanted = room.levels[place] >= self.part.wanted();
-                // A zero has a sign as well, so that voxels without light keep their role.
+                // Zeros carry the sign too, so that voxels without light keep their role.
                 let sign = if wanted { -1.0 } else { 1.0 };
                 light[number * layers + layer] = room.spread[place] * sign;
             }
@@ -193,7 +193,7 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// Pixels whose light is computed, and as far around as it comes from.
+/// Pixels whose light is computed, and the surrounding pixels that contribute to it.
 #[derive(Clone, Copy)]
 struct TileWindow {
     corner: [i64; 2],
@@ -210,18 +210,19 @@ impl TileWindow {
         self.rows().next_multiple_of(LANES)
     }
 
-    /// Returns where a pixel is, counted from the corner.
+    /// Returns the place of a pixel, counted from the corner.
     fn place(self, [column, row]: [usize; 2]) -> usize {
         (row + self.radius) * self.width() + column + self.radius
     }
 }
 
-/// Returns the places in a tile that are taken: one of each `step` x `step` pixels.
+/// Returns the sampled places in a tile: one of each `step` x `step` pixels.
 fn sampled(corner: [i64; 2], side: usize, step: u32) -> Vec<[usize; 2]> {
     let step = step as usize;
     let squares = || (0..side).step_by(step);
     let place = |column: usize, row: usize| {
-        // Places must not repeat with the part's: a mix of the square's coordinates chooses.
+        // Places must not repeat in step with the part's features: a hash of the square's
+        // coordinates chooses.
         let [x, y] = [corner[0] + column as i64, corner[1] + row as i64].map(|at| at as u64);
         let mut mix = x.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
         mix = (mix ^ (mix >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -239,7 +240,7 @@ mod tests {
     use super::*;
     use crate::speed::testing::{part, pegda};
 
-    /// Returns the light of a pixel, summed up over all others.
+    /// Returns the light of a pixel, summed over all others.
     fn light(part: &TimedPart, layer: usize, [column, row]: [i64; 2], sigma: f64) -> f64 {
         let one = (-60..=60).map(|at: i64| (-0.5 * (at as f64 / sigma).powi(2)).exp());
         let field = one.sum::<f64>().powi(2);

@@ -1,7 +1,7 @@
-//! The error that times leave, its slopes, and what they prove of any other times.
+//! The error of some times, its slopes, and the bound that they give for all other times.
 //!
-//! The error is Σ_in (1 + m - e)₊ + Σ_out (e - 1 + m)₊ over the voxels of the part and those
-//! around, with their doses e and a margin m. A smoothed (x)₊ has slopes within 0 to 1. With any
+//! The error is Σ_in (1 + m - e)₊ + Σ_out (e - 1 + m)₊ over the voxels of the part and the voxels
+//! around it, with their doses e and a margin m. A smoothed (x)₊ has slopes from 0 to 1. With any
 //! such slopes y, Σ y x is at most the error, whatever the times: they are multipliers.
 
 use rayon::prelude::*;
@@ -10,12 +10,12 @@ use super::columns::{Block, Columns, LANES};
 use crate::light::LayerLight;
 use crate::wide::wide;
 
-/// What reaches a layer's voxels.
+/// The light that reaches a layer's voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reach {
-    /// What passes, and the dose of a second under a wide white field.
+    /// The share that passes, and the dose of a second under a wide white field.
     pub(crate) light: LayerLight,
-    /// What the dose is multiplied with before it is compared: 1, or as measurements say.
+    /// The factor on the dose before it is compared: 1, or a factor from measurements.
     pub(crate) scale: f64,
 }
 
@@ -24,18 +24,18 @@ pub(crate) struct Reach {
 pub(crate) struct Priced {
     /// The smoothed error.
     pub(crate) error: f64,
-    /// By each layer's time.
+    /// The slope by each layer's time.
     pub(crate) slopes: Vec<f64>,
     /// Σ y x: the errors at the smoothed one's slopes.
     pub(crate) priced: f64,
 }
 
 impl Priced {
-    /// Returns an error that no times are below, given the least value of a sum of times, each
-    /// multiplied with its slope.
+    /// Returns a bound that no times have an error below, given the least value of a sum of times,
+    /// each multiplied by its slope.
     pub(crate) fn bound(&self, times: &[f64], least: f64) -> f64 {
-        // Errors are linear in times where multipliers are fixed: Σ y x at other times is what it
-        // is here plus slopes times the difference. The least of that over all possible times is a
+        // Errors are linear in times where multipliers are fixed: Σ y x at other times is its value
+        // here plus slopes times the difference. The least of that over all possible times is a
         // bound, and no error is negative.
         let here: f64 = self.slopes.iter().zip(times).map(|(slope, time)| slope * time).sum();
         (self.priced - here + least).max(0.0)
@@ -58,9 +58,9 @@ impl Priced {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hinge<'a> {
     pub(crate) layers: &'a [Reach],
-    /// How far doses must stay away from 1.
+    /// The distance that doses must keep from 1.
     pub(crate) margin: f64,
-    /// The error is exact this far from the kink and farther; zero leaves the kink.
+    /// The error is exact at this distance from the kink and farther; zero leaves the kink.
     pub(crate) smoothing: f64,
 }
 
@@ -69,7 +69,7 @@ impl Hinge<'_> {
     pub(crate) fn of(&self, columns: &Columns, times: &[f64]) -> Priced {
         let price = |room: &mut Vec<f32>, block: &Block| self.of_block(block, times, room);
         let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, price).collect();
-        // Blocks are added in order, so that the sum is the same on any number of threads.
+        // Blocks are added in order, so the sum is the same on any number of threads.
         let mut all = Priced::none(columns.layers());
         for block in &blocks {
             all.add(block);
@@ -87,7 +87,7 @@ impl Hinge<'_> {
         )
     }
 
-    /// Runs from the last layer to the first with what a dose more would cost.
+    /// Runs from the last layer to the first with the cost of an additional dose.
     #[inline(always)]
     fn price(&self, block: &Block, doses: &[f32]) -> Priced {
         let mut priced = Priced::none(self.layers.len());
@@ -99,8 +99,8 @@ impl Hinge<'_> {
             let scale = reach.scale as f32;
             let [mut error, mut linear, mut slope] = [[0.0_f32; 16]; 3];
             for lane in 0..LANES {
-                // Sixteen sums side by side are two wide registers. One sum would wait for itself,
-                // and differ with the width of the registers.
+                // Sixteen sums side by side are two wide registers. A single sum would wait for
+                // itself, and differ with the width of the registers.
                 let sum = lane % 16;
                 let weight = block.weights[lane];
                 let sign = 1.0_f32.copysign(light[lane]);
@@ -111,7 +111,7 @@ impl Hinge<'_> {
                 error[sum] += self.smoothed(x) * weight;
                 linear[sum] += x * y;
                 // The transpose of the recursion in `expose`: a second of this layer's light also
-                // reaches all layers below it, less what is absorbed between (004 eq. 2.5).
+                // reaches all layers below it, reduced by the absorption between (004 eq. 2.5).
                 cost[lane] = cost[lane] * below + sign * y * scale;
                 slope[sum] += cost[lane] * light[lane].abs();
             }
@@ -136,7 +136,7 @@ impl Hinge<'_> {
     #[inline(always)]
     fn smoothed(&self, x: f32) -> f32 {
         // Nesterov's smoothing (2005): the largest of y x + s y (1 - y) over 0 ≤ y ≤ 1, which the
-        // clamped slope reaches. It exceeds (x)₊ by s/4 at most, at the kink, and stays convex.
+        // clamped slope attains. It exceeds (x)₊ by s/4 at most, at the kink, and stays convex.
         let slope = self.slope(x);
         slope * x + self.smoothing as f32 * slope * (1.0 - slope)
     }
@@ -152,7 +152,7 @@ pub(crate) fn expose(block: &Block, layers: &[Reach], times: &[f64], doses: &mut
         let light = &block.light[layer * LANES..(layer + 1) * LANES];
         let doses = &mut doses[layer * LANES..(layer + 1) * LANES];
         for lane in 0..LANES {
-            // 004 eq. 2.5 from layer to layer: the light that the layers above leave, and the
+            // 004 eq. 2.5 from layer to layer: the light passed from the layers above, and the
             // layer's own.
             above[lane] = above[lane] * passed + own * light[lane].abs();
             doses[lane] = above[lane];

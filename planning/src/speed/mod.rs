@@ -1,7 +1,7 @@
-//! Plans the time of each layer: what the platform's speed is as light cures the part (004).
+//! Plans the time of each layer, which sets the platform's speed during exposure (004).
 //!
-//! Every layer's image stays as it is; its light passes through to the layers below, and adds to
-//! their doses. [`plan`] finds the times with the least error and bounds what any others could do.
+//! Every layer's image stays unchanged; its light passes through to the layers below, and adds to
+//! their doses. [`plan`] finds the times with the least error, and bounds the error of any others.
 
 mod columns;
 mod feasible;

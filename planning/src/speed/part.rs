@@ -1,4 +1,4 @@
-//! Gathers what planners of times need of a stack's pages.
+//! Gathers the data of a stack's pages that planners of times need.
 
 use lamp_grayscale::resin::ExposureTime;
 use lamp_stack::{Change, Dpi, Image, Layer, Length, RunImage};
@@ -15,7 +15,7 @@ pub struct TimedPart {
     wanted: u8,
 }
 
-/// What a page says about its layer.
+/// The data that a page states about its layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedLayer {
     /// The layer's index in its stack.
@@ -28,7 +28,7 @@ pub struct TimedLayer {
     pub time: Option<ExposureTime>,
 }
 
-/// Why pages get no times.
+/// Why pages cannot get times.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PartError {
@@ -135,8 +135,8 @@ impl TimedPart {
         self.images[layer].level(column, row) >= self.wanted
     }
 
-    /// Returns the dose that each second adds to a layer under a wide white field, and what
-    /// passes from the layer above.
+    /// Returns the dose that each second adds to a layer under a wide white field, and the share
+    /// that passes from the layer above.
     pub(crate) fn per_second(&self, light: &Light) -> Result<Vec<LayerLight>, PartError> {
         light.check()?;
         light.check_spread(self.dpi)?;
@@ -180,7 +180,7 @@ fn fill_row<C: Change>(
     level: impl Fn(C::Pixel) -> u8,
 ) {
     let changes = image.row(row);
-    // The level at the window's left edge is the one after the last change before it.
+    // The level at the window's left edge is the level after the last change before the edge.
     let past = changes.partition_point(|change| i64::from(change.column()) <= column);
     let end = (column + line.len() as i64).min(i64::from(image.width()));
     let (mut from, mut pixel) = (column.max(0), C::last_pixel(&changes[..past]));

@@ -11,18 +11,19 @@ use super::tally::Tally;
 use crate::light::Light;
 use crate::numeric::{DescentEnd, descend};
 
-/// What to plan for.
+/// The light, platform and limits to plan for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedOptions {
     /// The model of light and resin.
     pub light: Light,
-    /// What the platform can do.
+    /// The limits of the platform.
     pub platform: Platform,
-    /// How far doses should stay from the critical one, as a share of it.
+    /// The distance that doses should keep from the critical one, as a share of it.
     pub margin: f64,
-    /// How far from the bound the error may be, as a share of the best single time's error.
+    /// The largest allowed distance between error and bound, as a share of the best single time's
+    /// error.
     pub gap: f64,
-    /// The bytes to work in.
+    /// The memory to use, in bytes.
     pub memory: u64,
 }
 
@@ -46,7 +47,7 @@ pub enum SpeedPlanError {
 pub struct SearchStage {
     /// The least error so far.
     pub error: f64,
-    /// What no times of the platform can be below.
+    /// The bound: no times of the platform have a smaller error.
     pub bound: f64,
 }
 
@@ -55,24 +56,24 @@ pub struct SearchStage {
 pub struct SpeedPlan {
     /// The times, of the layer nearest to the light first.
     pub times: Vec<ExposureTime>,
-    /// The best time that is the same for all layers, whatever `max_change` says.
+    /// The best time that is the same for all layers, ignoring `max_change`.
     pub single: ExposureTime,
-    /// What the best single time does.
+    /// The result of the best single time.
     pub before: Tally,
-    /// What the plan does.
+    /// The result of the plan.
     pub after: Tally,
     /// The error of the best single time in the columns that the search sees, `P0`.
     pub single_error: f64,
     /// The search's stages; the last has the plan's error and bound.
     pub stages: Vec<SearchStage>,
-    /// How many pixels each column that the search sees stands for. With 1, it sees all, and the
-    /// bound holds for the whole part.
+    /// The number of pixels that each column in the search stands for. With 1, the search sees all
+    /// pixels, and the bound holds for the whole part.
     pub sampled: u32,
 }
 
 impl SpeedPlan {
-    /// Returns how far the plan's error may be from the least, as a share of the best single
-    /// time's.
+    /// Returns the largest distance of the plan's error from the least, as a share of the best
+    /// single time's error.
     pub fn gap(&self) -> f64 {
         self.stages.last().map_or(0.0, |last| gap(*last, self.single_error))
     }
@@ -97,8 +98,8 @@ pub fn plan(part: &TimedPart, options: &SpeedOptions) -> Result<SpeedPlan, Speed
     plan_corrected(part, options, &none)
 }
 
-/// Finds the times of a part's layers, given what measurements add to the logarithm of each
-/// layer's dose.
+/// Finds the times of a part's layers, given the correction that measurements add to the logarithm
+/// of each layer's dose.
 ///
 /// # Errors
 /// As [`plan`].
@@ -142,7 +143,7 @@ impl TimesProblem<'_> {
     }
 
     /// Returns the best time that is the same for all layers, and its error. The error is convex,
-    /// so that its slope tells on which side the best is.
+    /// so its slope shows on which side the best time is.
     fn best_single(&self) -> (Vec<f64>, f64) {
         let (low, high) = (&self.feasible.low, &self.feasible.high);
         let layers = low.len();
@@ -150,7 +151,7 @@ impl TimesProblem<'_> {
         let mut high = high.iter().copied().fold(0.0, f64::max);
         let mut best = (low, f64::INFINITY);
         while high / low > 1.0 + 1e-5 {
-            // Times span orders of magnitude: halve their logarithm.
+            // Times span orders of magnitude: bisect their logarithm.
             let time = (low * high).sqrt();
             let priced = self.price(&vec![time; layers], 0.0);
             if priced.error < best.1 {
@@ -162,10 +163,10 @@ impl TimesProblem<'_> {
         (vec![best.0; layers], best.1)
     }
 
-    /// Goes from the best single time to the least error, which is smoothed less and less.
+    /// Moves from the best single time to the least error, with less and less smoothing.
     fn search(&self, single: &[f64], single_error: f64) -> (Vec<f64>, Vec<SearchStage>) {
-        // Twice the critical dose at every layer is what a wide prism wants: its walls then get
-        // half of it, the critical dose.
+        // A wide prism needs twice the critical dose at every layer: its walls then get half of it,
+        // the critical dose.
         let starts = [single.to_vec(), self.simulation.times_for(2.0)];
         let starts = starts.map(|times| {
             let times = self.feasible.nearest(&times);
@@ -176,11 +177,11 @@ impl TimesProblem<'_> {
         let mut times = best.1.clone();
         let (mut bound, mut stages) = (0.0_f64, Vec::new());
         let mut prices = Prices::new(&self.feasible, &times, single_error);
-        // From smooth to sharp: a sharp error has slopes that do not see kinks far away, and
-        // the times of the smoother stage start near the optimum of the next.
+        // From smooth to sharp: a sharp error has slopes that do not see kinks far away, and the
+        // times of the smoother stage start near the optimum of the next.
         for smoothing in SMOOTHINGS {
-            // Each round raises the prices of broken ratios; after four the rest is removed by
-            // going to the nearest possible times.
+            // Each round raises the prices of broken ratios. After four rounds, moving to the
+            // nearest possible times removes the rest.
             let rounds = if self.feasible.is_box() { 1 } else { 4 };
             for _ in 0..rounds {
                 self.descend(&mut times, smoothing, &prices);
@@ -192,7 +193,7 @@ impl TimesProblem<'_> {
                 best = (error, near);
             }
             let priced = self.price(&times, smoothing);
-            // A stage may bound worse than an earlier one.
+            // A later stage may have a worse bound.
             bound = bound.max(priced.bound(&times, self.feasible.least(&priced.slopes)));
             let stage = SearchStage { error: best.0, bound: bound.min(best.0) };
             stages.push(stage);
@@ -204,7 +205,7 @@ impl TimesProblem<'_> {
     }
 
     fn descend(&self, times: &mut Vec<f64>, smoothing: f64, prices: &Prices) {
-        // In units of the times there, all layers' slopes are alike.
+        // In units of the times there, all layers' slopes have similar sizes.
         let scale = times.clone();
         let bounds = [&self.feasible.low, &self.feasible.high]
             .map(|ends| ends.iter().zip(&scale).map(|(end, scale)| end / scale).collect());
@@ -223,11 +224,11 @@ impl TimesProblem<'_> {
     }
 }
 
-/// The cost of breaking a ratio, and how much heavier it gets from round to round.
+/// The cost of breaking a ratio, and the factor by which it grows from round to round.
 const WEIGHT: f64 = 100.0;
 const HEAVIER: f64 = 1.5;
 
-/// What breaking the ratios of neighbours costs: an augmented Lagrangian.
+/// The cost of breaking the ratios of neighbors: an augmented Lagrangian.
 struct Prices {
     of_pairs: Vec<[f64; 2]>,
     weight: f64,
@@ -236,7 +237,7 @@ struct Prices {
 impl Prices {
     fn new(feasible: &Feasible, single: &[f64], single_error: f64) -> Self {
         let pairs = feasible.excess(single).len();
-        // An excess as large as the pace of the single time costs the error of many layers.
+        // An excess equal to the pace of the single time costs the error of many layers.
         let pace = feasible.pace(single);
         let weight = WEIGHT * (single_error + 1.0) / (pairs.max(1) as f64 * pace * pace);
         Self { of_pairs: vec![[0.0; 2]; pairs], weight }
@@ -264,7 +265,7 @@ impl Prices {
 
     fn update(&mut self, feasible: &Feasible, times: &[f64]) {
         self.of_pairs = self.raised(feasible, times);
-        // A heavier weight keeps ratios sooner, and makes the descent stiffer.
+        // A heavier weight restores ratios sooner, and makes the descent stiffer.
         self.weight *= HEAVIER;
     }
 }
@@ -290,7 +291,7 @@ mod tests {
         let [before, after] = [&plan.before, &plan.after].map(|tally| tally.wrong().sum());
         assert!(10 * after <= 3 * before, "{after} of {before}");
         assert!(plan.gap() <= 0.01 && plan.sampled == 1, "{}", plan.gap());
-        // Nor does any other single time come near, by count.
+        // By count, no other single time comes near either.
         let simulation = Simulation::new(&part, &options.light, 1 << 30).unwrap();
         for step in 0..20 {
             let [tally] = simulation.tally([&[0.1 * 1.1_f64.powi(step); 60]]);

@@ -1,4 +1,4 @@
-//! Computes what times cure.
+//! Computes the cure by given times.
 
 use super::columns::Columns;
 use super::gather::Gather;
@@ -8,7 +8,7 @@ use super::tally::Tally;
 use crate::blur::Blur;
 use crate::light::Light;
 
-/// The share of the memory for columns, and the most that is of use.
+/// The share of the memory for columns, and the most that is useful.
 const COLUMNS_SHARE: u64 = 4;
 const MOST_COLUMN_BYTES: u64 = 64 << 20;
 
@@ -29,7 +29,8 @@ impl<'a> Simulation<'a> {
         Self::corrected(part, light, &vec![0.0; part.layers().len()], memory)
     }
 
-    /// Prepares a part, given what measurements add to the logarithm of each layer's dose.
+    /// Prepares a part, given the correction that measurements add to the logarithm of each layer's
+    /// dose.
     ///
     /// # Errors
     /// Returns an error if the model's numbers are impossible.
@@ -53,10 +54,10 @@ impl<'a> Simulation<'a> {
         Ok(Self { gather, layers, columns, sampled })
     }
 
-    /// Counts what times do, each in seconds, of the layer nearest to the light first.
+    /// Counts the result of each set of times, in seconds, the layer nearest to the light first.
     ///
     /// # Panics
-    /// Panics if there are not as many times as layers.
+    /// Panics if the number of times is not the number of layers.
     pub fn tally<const N: usize>(&self, times: [&[f64]; N]) -> [Tally; N] {
         assert!(times.iter().all(|times| times.len() == self.layers.len()));
         let of = |columns: &Columns| times.map(|times| Tally::of(columns, &self.layers, times));
@@ -76,22 +77,23 @@ impl<'a> Simulation<'a> {
         let mut dose = 0.0;
         let of_layer = |(reach, time): (&Reach, &f64)| {
             // 004 eq. 2.5 from layer to layer. A correction by measurements is a factor of the
-            // dose, and passes on to no other layer.
+            // dose, and does not pass on to other layers.
             dose = dose * reach.light.passed + reach.light.own * time;
             dose * reach.scale
         };
         self.layers.iter().zip(times).map(of_layer).collect()
     }
 
-    /// Returns the times that bring every layer to a dose under a wide white field. A layer that the
-    /// layers above bring there has none.
+    /// Returns the times that bring every layer to a dose under a wide white field. A layer that
+    /// the layers above bring to this dose has time zero.
     ///
     /// With the dose 2, a wide prism has its critical dose at its walls, where light has fallen to
     /// a half.
     pub fn times_for(&self, dose: f64) -> Vec<f64> {
         let mut above = 0.0;
         let of_layer = |reach: &Reach| {
-            // A layer can get more light, but none that reaches it from above can be taken away.
+            // A layer can get more light, but the light that reaches it from above cannot be
+            // removed.
             let passed = above * reach.light.passed;
             above = passed.max(dose / reach.scale);
             (above - passed) / reach.light.own
@@ -110,7 +112,7 @@ impl<'a> Simulation<'a> {
         self.layers.iter().zip(times).zip(light).map(of_layer).collect()
     }
 
-    /// Returns what reaches each layer in a second.
+    /// Returns the light that reaches each layer in a second.
     pub(crate) fn layers(&self) -> &[Reach] {
         &self.layers
     }
@@ -120,7 +122,7 @@ impl<'a> Simulation<'a> {
         &self.columns
     }
 
-    /// Returns how many pixels each column of a search stands for.
+    /// Returns the number of pixels that each column of a search stands for.
     pub(crate) fn sampled(&self) -> u32 {
         self.sampled
     }

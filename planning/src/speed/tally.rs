@@ -1,4 +1,4 @@
-//! Counts what times cure and what they should.
+//! Counts the voxels that times cure, and the voxels that they should cure.
 
 use rayon::prelude::*;
 
@@ -6,24 +6,24 @@ use super::columns::{Block, Columns, LANES};
 use super::hinge::{Reach, expose};
 use crate::wide::wide;
 
-/// How much the light of a count differs from that of the model: counts are made at all of these.
+/// The light of each count, as a share of the model's light: counts are made at all of these.
 pub const LIGHT_SHARES: [f64; 3] = [1.0, 0.95, 1.05];
 /// The number of bins of a dose histogram.
 pub const DOSE_BINS: usize = 40;
-/// The dose where a histogram's last bin begins, in units of the critical dose. Each bin but the
-/// last is a fortieth of it wide.
+/// The dose where a histogram's last bin begins, in units of the critical dose. Each other bin is
+/// 1/39 of it wide.
 const LAST_DOSE: f32 = 3.9;
 
 /// The wrong voxels of a layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wrong {
-    /// Cured, and not of the part.
+    /// Cured voxels outside the part.
     pub over: u64,
-    /// Of the part, and not cured.
+    /// Voxels of the part that are not cured.
     pub under: u64,
 }
 
-/// What times do to a part's voxels.
+/// The effect of times on a part's voxels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
     /// The wrong voxels of each layer, the one nearest to the light first.
@@ -32,8 +32,8 @@ pub struct Tally {
     pub wanted: Vec<u64>,
     /// All wrong voxels at each of [`LIGHT_SHARES`].
     pub at_light: [Wrong; 3],
-    /// Voxels by their dose: those of the part, and those of none that light reaches. Bins are
-    /// 0.1 critical doses wide; the last has all beyond.
+    /// Voxels by their dose: the voxels of the part, and the other voxels that light reaches. Bins
+    /// are 0.1 critical doses wide; the last one has all higher doses.
     pub doses: [[u64; DOSE_BINS]; 2],
 }
 
@@ -85,7 +85,7 @@ impl Tally {
         };
         let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, count).collect();
         let mut all = Self::none(columns.layers());
-        // Counts are whole numbers: any order gives the same.
+        // Counts are whole numbers: any order gives the same result.
         blocks.iter().for_each(|block| all.add(block));
         all
     }
@@ -98,7 +98,7 @@ impl Tally {
             let mut wrong = [Wrong::default(); 3];
             for lane in 0..LANES {
                 let (place, count) = (layer * LANES + lane, block.weights[lane] as u64);
-                // The sign of a column's light is the voxel's role, also of zero light.
+                // The sign of a column's light is the voxel's role, even for zero light.
                 let (dose, wanted) = (doses[place] * scale, block.light[place].is_sign_negative());
                 for (wrong, share) in wrong.iter_mut().zip(LIGHT_SHARES) {
                     // 004 eq. 2.15: at the critical dose resin begins to cure.
@@ -107,7 +107,7 @@ impl Tally {
                     wrong.under += count * u64::from(wanted && !cured);
                 }
                 tally.wanted[layer] += count * u64::from(wanted);
-                // Voxels that no light reaches are without end around the part: they are not
+                // Around the part, there is no end of voxels that no light reaches: they are not
                 // counted.
                 if dose > 0.0 {
                     let bin = (dose.min(LAST_DOSE) * 10.0) as usize;

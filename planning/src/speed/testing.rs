@@ -1,4 +1,4 @@
-//! What tests of times share.
+//! Shared parts of the tests of times.
 
 use lamp_fixtures::Voxels;
 use lamp_grayscale::resin::{Dose, Intensity};
@@ -21,8 +21,8 @@ pub(crate) fn pegda(spread_um: f64) -> Light {
     }
 }
 
-/// What a print may differ from its model by: the light is 10 % brighter, light reaches a quarter
-/// deeper, and 15 % less dose cures.
+/// A possible deviation of a print from its model: the light is 10 % brighter, light reaches a
+/// quarter deeper, and 15 % less dose cures.
 pub(crate) fn plant(model: &Light) -> Light {
     Light {
         intensity: Intensity::from_mw_per_cm2(1.1 * model.intensity.mw_per_cm2()),

@@ -1,4 +1,4 @@
-//! Why something is no target.
+//! Why something is not a target.
 
 use std::io;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::map::Place;
 use super::{Grid, ShapesError};
 
-/// Why a target cannot be read, or its heights be told. Each names the place.
+/// Why a target cannot be read, or its heights cannot be computed. Each error names the place.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TargetError {
@@ -37,17 +37,17 @@ pub enum TargetError {
         /// Rows.
         height: u32,
     },
-    /// A picture whose pixels are no heights.
+    /// A picture whose pixels are not heights.
     #[error(
         "a height map has gray pixels of 16 or 8 bits: this has {colour:?} ones of {bits} bits"
     )]
     NotGray {
-        /// Bits of a colour.
+        /// Bits of each color.
         bits: u8,
-        /// The colours.
+        /// The color type.
         colour: ColorType,
     },
-    /// A picture whose pixels mean nothing yet.
+    /// A picture whose pixels have no scale yet.
     #[error("a PNG is a height map, and says neither how wide a pixel is nor how high white is")]
     NoScale,
     /// Pixels or heights that no target has.
@@ -77,7 +77,7 @@ pub enum TargetError {
     NotOnGlass {
         /// The column.
         place: Place,
-        /// Where it begins.
+        /// The height where it begins.
         from: Length,
     },
     /// A column has a gap.
@@ -87,9 +87,9 @@ pub enum TargetError {
     Overhang {
         /// The column.
         place: Place,
-        /// Where the gap begins.
+        /// The height where the gap begins.
         from: Length,
-        /// Where it ends.
+        /// The height where it ends.
         to: Length,
     },
     /// A column enters the part more often than it leaves it.
@@ -100,20 +100,20 @@ pub enum TargetError {
         /// The column.
         place: Place,
     },
-    /// Facets upon facets.
+    /// Too many facets above each other.
     #[error("columns meet more than {most} facets each: too many for a target")]
     Crowded {
-        /// The most on average.
+        /// The largest allowed average.
         most: usize,
     },
-    /// A column above the resin.
+    /// A column higher than the resin.
     #[error("{place} is {height} high, and the chamber {chamber}")]
     AboveChamber {
         /// The highest column.
         place: Place,
         /// Its height.
         height: Length,
-        /// The chamber's.
+        /// The chamber's height.
         chamber: Length,
     },
     /// A target wider than the light.
@@ -127,7 +127,7 @@ pub enum TargetError {
     /// Shapes that are not round about the axis.
     #[error("it is not round about the axis: {why}")]
     NotRoundShape {
-        /// What is not.
+        /// The shape that is not.
         why: String,
     },
     /// A map that is not round about the axis.
@@ -137,9 +137,9 @@ pub enum TargetError {
     NotRound {
         /// The first column that differs.
         place: Place,
-        /// Its height, in micrometres.
+        /// Its height, in micrometers.
         height: f64,
-        /// The mean of all columns so far from the axis, in micrometres.
+        /// The mean height of all columns at the same distance from the axis, in micrometers.
         mean: f64,
     },
 }

@@ -6,7 +6,7 @@ use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
 use super::TargetError;
 
-/// A picture of more pixels is none of ours.
+/// A picture with more pixels is rejected.
 const MAX_PIXELS: u64 = 1 << 26;
 
 /// A picture of gray levels.
@@ -24,7 +24,7 @@ impl GrayPicture {
     /// Reads a PNG of gray levels, of 16 bits or 8.
     ///
     /// # Errors
-    /// Returns an error if the file is no PNG, has colours, or has too many pixels.
+    /// Returns an error if the file is not a PNG, has colors, or has too many pixels.
     pub fn read(from: impl BufRead + Seek) -> Result<Self, TargetError> {
         let mut decoder = Decoder::new_with_limits(from, Limits { bytes: 1 << 28 });
         decoder.set_transformations(Transformations::IDENTITY);

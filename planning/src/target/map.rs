@@ -5,49 +5,51 @@ use rayon::prelude::*;
 
 use super::TargetError;
 
-/// Square columns on the glass, their middle on the optical axis. x grows along a row; the first
-/// row has the greatest y.
+/// Square columns on the glass, with their middle on the optical axis. x grows along a row; the
+/// first row has the greatest y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// How many columns a row has.
+    /// Columns in a row.
     pub columns: usize,
-    /// How many rows there are.
+    /// The number of rows.
     pub rows: usize,
     /// The side of a column.
     pub pitch_um: f64,
 }
 
 impl Grid {
-    /// Returns the least grid that holds a rectangle about the axis.
+    /// Returns the smallest grid that holds a rectangle centered on the axis.
     pub fn over(size: [Length; 2], pitch: Length) -> Self {
-        // Sizes that are written as decimals may be more than whole columns by rounding.
+        // Rounding may raise decimal sizes slightly above whole columns.
         let count = |side: Length| (side.um() / pitch.um() - 1e-9).ceil().max(1.0) as usize;
         Self { columns: count(size[0]), rows: count(size[1]), pitch_um: pitch.um() }
     }
 
-    /// Returns the least odd grid that holds a rectangle: the middle of one column is on the axis.
+    /// Returns the smallest odd grid that holds a rectangle: the middle of one column is on the
+    /// axis.
     pub(super) fn around([width, height]: [Length; 2], pitch: Length) -> Self {
-        // An odd number, so that the middle of a column lies on the axis.
+        // An odd number, so that the middle of a column is on the axis.
         let count = |side: Length| 2 * (side.um() / pitch.um() / 2.0).ceil() as usize + 1;
         Self { columns: count(width), rows: count(height), pitch_um: pitch.um() }
     }
 
-    /// Returns how many columns there are in all.
+    /// Returns the number of columns in all.
     pub fn count(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// Returns the x of the middle of a column, in micrometres.
+    /// Returns the x of the middle of a column, in micrometers.
     pub fn x_um(&self, column: usize) -> f64 {
         (column as f64 - (self.columns as f64 - 1.0) / 2.0) * self.pitch_um
     }
 
-    /// Returns the y of the middle of a row, in micrometres.
+    /// Returns the y of the middle of a row, in micrometers.
     pub fn y_um(&self, row: usize) -> f64 {
         ((self.rows as f64 - 1.0) / 2.0 - row as f64) * self.pitch_um
     }
 
-    /// Returns the map of what is round about the axis, by its height at a distance from it.
+    /// Returns the map of a shape that is round about the axis, by its height at a distance from
+    /// it.
     pub fn round(&self, height_um: impl Fn(f64) -> f64 + Sync) -> HeightMap {
         HeightMap { grid: *self, heights_um: self.map(|x, y| height_um(x.hypot(y))) }
     }
@@ -70,7 +72,7 @@ impl Grid {
 pub struct HeightMap {
     /// Where the columns are.
     pub grid: Grid,
-    /// Their heights in micrometres, row by row; 0 where nothing is wanted.
+    /// Their heights in micrometers, row by row; 0 where nothing is wanted.
     pub heights_um: Vec<f64>,
 }
 
@@ -78,7 +80,7 @@ impl HeightMap {
     /// Returns the row nearest to the middle that holds a highest column.
     pub fn highest_row(&self) -> usize {
         let (grid, most) = (self.grid, self.highest_um());
-        // Shapes that are alike differ by rounding.
+        // Rounding makes equal shapes differ.
         let is_highest = |row: &usize| {
             self.heights_um[row * grid.columns..][..grid.columns]
                 .iter()
@@ -89,27 +91,27 @@ impl HeightMap {
         (0..grid.rows).filter(is_highest).min_by_key(from_middle).unwrap_or(grid.rows / 2)
     }
 
-    /// Returns by how much each column is higher than in a map of the same grid.
+    /// Returns each column's height minus its height in another map of the same grid.
     pub fn less(&self, other: &Self) -> Vec<f64> {
         self.heights_um.iter().zip(&other.heights_um).map(|(one, other)| one - other).collect()
     }
 
-    /// Returns the height of a column, in micrometres.
+    /// Returns the height of a column, in micrometers.
     pub fn height_um(&self, column: usize, row: usize) -> f64 {
         self.heights_um[row * self.grid.columns + column]
     }
 
-    /// Returns the greatest height, in micrometres.
+    /// Returns the greatest height, in micrometers.
     pub fn highest_um(&self) -> f64 {
         self.heights_um.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Returns how many columns have a height, but a lower one than this.
+    /// Returns the number of columns that have a height below `least`.
     pub fn lower_than(&self, least: Length) -> usize {
         self.heights_um.iter().filter(|&&um| um > 0.0 && um < least.um()).count()
     }
 
-    /// Returns how many columns have a height, but one outside of a range.
+    /// Returns the number of columns that have a height outside of a range.
     pub fn outside(&self, least: Length, most: Length) -> usize {
         let range = least.um()..=most.um();
         self.heights_um.iter().filter(|&um| *um > 0.0 && !range.contains(um)).count()
@@ -137,9 +139,9 @@ pub struct Place {
     pub column: usize,
     /// Its row, from 0.
     pub row: usize,
-    /// Where its middle is.
+    /// The x of its middle.
     pub x: Length,
-    /// Where its middle is.
+    /// The y of its middle.
     pub y: Length,
 }
 

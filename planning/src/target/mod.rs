@@ -1,7 +1,7 @@
-//! Targets of planners on a fixed glass: what is to be cured, as a height above each point of
-//! the glass (000 section 3.3).
+//! Targets of planners on a fixed glass: the shape to be cured, as a height above each point of the
+//! glass (000 section 3.3).
 //!
-//! A target is one of three: shapes by their measures ([`Shapes`]), a height map as a PNG, or a
+//! A target is one of three: shapes by their dimensions ([`Shapes`]), a height map as a PNG, or a
 //! part with a flat bottom. All give heights at the middles of square columns.
 //!
 //! ```
@@ -39,7 +39,7 @@ use picture::HeightPicture;
 
 use crate::projector::Projector;
 
-/// What is to be cured, centred on the optical axis.
+/// The shape to be cured, centered on the optical axis.
 #[derive(Debug)]
 pub struct Target(Source);
 
@@ -56,7 +56,7 @@ impl Target {
         Shapes::builtin(name).map(Self::from)
     }
 
-    /// Returns its name: that in its file, or of the file.
+    /// Returns its name: the one in its file, or the file's.
     pub fn name(&self) -> &str {
         match &self.0 {
             Source::Shapes(shapes) => &shapes.name,
@@ -65,7 +65,7 @@ impl Target {
         }
     }
 
-    /// Returns the part that it was read from, if it is one.
+    /// Returns the part that it was read from, if any.
     pub fn part(&self) -> Option<&Part> {
         match &self.0 {
             Source::Part(columns) => Some(columns.part()),
@@ -73,7 +73,7 @@ impl Target {
         }
     }
 
-    /// Returns the width and height of the rectangle on the glass that holds it.
+    /// Returns the width and height of its bounding rectangle on the glass.
     pub fn size(&self) -> [Length; 2] {
         let size_um = match &self.0 {
             Source::Shapes(shapes) => shapes.size_um(),
@@ -99,12 +99,12 @@ impl Target {
         })
     }
 
-    /// Returns the height of each column of a grid, at its middle (000 section 3.3.1). What lies
-    /// beyond the grid is left out.
+    /// Returns the height of each column of a grid, at its middle (000 section 3.3.1). Everything
+    /// outside the grid is left out.
     ///
     /// # Errors
-    /// Returns an error if no column has any, or if a column of a part has an overhang, a hole or
-    /// no bottom on the glass.
+    /// Returns an error if no column has a height, or if a column of a part has an overhang, a hole
+    /// or no bottom on the glass.
     pub fn heights(&self, grid: &Grid) -> Result<HeightMap, TargetError> {
         let heights_um = match &self.0 {
             Source::Shapes(shapes) => grid.map(|x, y| shapes.height_um(x, y)),
@@ -115,7 +115,7 @@ impl Target {
         if map.highest_um() > 0.0 { Ok(map) } else { Err(TargetError::Empty { grid: *grid }) }
     }
 
-    /// Returns its height over the distance from the axis. Height maps and parts are seen at
+    /// Returns its height over the distance from the axis. Height maps and parts are sampled at
     /// points `step` apart.
     ///
     /// # Errors

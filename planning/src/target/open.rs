@@ -14,7 +14,7 @@ use super::{Shapes, Source, Target, TargetError};
 /// Options for reading targets from files.
 #[derive(Clone, Debug, Default)]
 pub struct TargetOptions {
-    /// What the pixels of a height map mean. Only a height map needs it.
+    /// The scale of the pixels of a height map. Only a height map needs it.
     pub scale: Option<MapScale>,
     /// The unit of coordinates of a part whose file states none.
     pub units: Units,
@@ -29,8 +29,8 @@ impl Target {
     /// Opens a file of shapes (by its extension `.toml`), a PNG, or a part.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read or is none of these; if a picture has no scale
-    /// or other pixels than gray ones; if shapes contradict each other.
+    /// Returns an error if the file cannot be read or is not one of these; if a picture has no
+    /// scale or its pixels are not gray; if shapes contradict each other.
     pub fn open(path: &Path, options: &TargetOptions) -> Result<Self, TargetError> {
         let mut file = File::open(path)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();

@@ -9,21 +9,21 @@ use lamp_stack::Length;
 use super::TargetError;
 use super::map::{Grid, Place};
 
-/// Facets closer than this count as touching, and a bottom as flat: far more than rounding, far
-/// less than anything cures.
+/// Facets closer than this count as touching, and a bottom this even counts as flat: far more than
+/// rounding, far less than any cured height.
 const TOUCHING_UM: f64 = 1.0;
 
-/// Lines that meet more facets than this each, on average, are no target.
+/// Parts whose lines meet more facets than this each, on average, are not targets.
 const MOST_CROSSINGS: usize = 64;
 
-/// A part, its lowest point on the glass and the middle of its box on the axis.
+/// A part with its lowest point on the glass and the middle of its box on the axis.
 #[derive(Debug)]
 pub(super) struct PartColumns {
     part: Part,
     facets: FacetIndex,
 }
 
-/// Where a vertical line meets the surface.
+/// A point where a vertical line meets the surface.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     column: u32,
@@ -70,7 +70,7 @@ impl PartColumns {
         let [half_columns, half_rows] =
             [grid.columns, grid.rows].map(|count| (count as f64 - 1.0) / 2.0);
         let mut rows = vec![Vec::new(); grid.rows];
-        // A file of millions of facets over each other must not take memory without end.
+        // A file of millions of facets above each other must not take unlimited memory.
         let mut room = MOST_CROSSINGS * grid.count();
         self.facets.for_each(|facet, _| {
             let corners = facet
@@ -86,7 +86,8 @@ impl PartColumns {
         if room == 0 { Err(TargetError::Crowded { most: MOST_CROSSINGS }) } else { Ok(rows) }
     }
 
-    /// Returns the height of a column, whose line meets the surface here, from the bottom up.
+    /// Returns the height of a column from the points where its line meets the surface, bottom
+    /// first.
     fn height_of(&self, line: &[Crossing], place: impl Fn() -> Place) -> Result<f64, TargetError> {
         let bottom_um = self.facets.min()[2];
         let above = |z_um: f64| Length::from_um(z_um - bottom_um).to_whole_nm();
@@ -96,8 +97,8 @@ impl PartColumns {
         }
         let (mut depth, mut top) = (0, line[0].z_um);
         for crossing in line {
-            // The part was left and is entered again. No light cures the upper stretch without the
-            // gap below it.
+            // The line left the part and enters it again. No light cures the upper stretch without
+            // the gap below it.
             if depth == 0 && crossing.z_um > top + TOUCHING_UM {
                 let (from, to) = (above(top), above(crossing.z_um));
                 return Err(TargetError::Overhang { place: place(), from, to });
@@ -112,7 +113,8 @@ impl PartColumns {
     }
 }
 
-/// Adds where lines meet a facet in a row, between the points (x in columns, z) of its edges.
+/// Adds the points where the lines of a row meet a facet, between the points (x in columns, z) of
+/// its edges.
 fn cross_row(
     [long, short]: [[f64; 2]; 2],
     columns: u32,
@@ -126,7 +128,7 @@ fn cross_row(
     let Range { start, end } = first(from[0])..first(to[0]);
     let enters = if is_reversed == is_flipped { 1 } else { -1 };
     for column in (start..end).take(room) {
-        // The same order of ends for both facets at an edge gives both the same height.
+        // The same order of ends for both facets at an edge gives the same height for both.
         let along = (f64::from(column) - from[0]) / (to[0] - from[0]);
         let z_um = from[1] + along * (to[1] - from[1]);
         crossings.push(Crossing { column, z_um, enters });
@@ -161,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_block_is_as_high_in_every_column() {
-        // Off the axis, and not on the platform.
+        // Away from the axis, and not on the platform.
         let found = heights(block([5.0, 7.0, 3.0], [4.0, 2.0, 0.25]), &GRID).unwrap();
         assert!(found.iter().all(|&um| um == 250.0), "{found:?}");
         let wide = Grid { columns: 42, rows: 22, ..GRID };
@@ -173,7 +175,7 @@ mod tests {
     fn blocks_on_each_other_are_one() {
         let mut facets = block([0.0; 3], [4.0, 2.0, 0.25]);
         facets.extend(block([1.0, 0.5, 0.25], [1.0, 1.0, 0.1]));
-        // One that overlaps both.
+        // A block that overlaps both.
         facets.extend(block([1.0, 0.5, 0.2], [0.5, 0.5, 0.2]));
         let found = heights(facets, &GRID).unwrap();
         let count = |height: f64| found.iter().filter(|&&um| (um - height).abs() < 0.01).count();

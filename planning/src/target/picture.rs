@@ -6,7 +6,7 @@ use lamp_stack::Length;
 
 use super::{GrayPicture, TargetError};
 
-/// What the pixels of a height map mean.
+/// The scale of the pixels of a height map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapScale {
     /// The side of a pixel on the glass.
@@ -15,7 +15,7 @@ pub struct MapScale {
     pub full: Length,
 }
 
-/// A height map, its middle on the axis.
+/// A height map, with its middle on the axis.
 #[derive(Debug)]
 pub(super) struct HeightPicture {
     name: String,
@@ -45,7 +45,7 @@ impl HeightPicture {
         [self.picture.columns, self.picture.rows].map(|count| count as f64 * self.scale.pixel.um())
     }
 
-    /// Returns the height of the pixel that holds a point, 0 beyond the picture.
+    /// Returns the height of the pixel that holds a point, 0 outside the picture.
     pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
         let pixel = self.scale.pixel.um();
         let [width, height] = [self.picture.columns, self.picture.rows].map(|count| count as f64);
@@ -55,7 +55,7 @@ impl HeightPicture {
             return 0.0;
         }
         let level = self.picture.levels[row as usize * self.picture.columns + column as usize];
-        // Pictures of 8 bits were widened to 16: white is the same.
+        // Pictures of 8 bits were widened to 16 bits: full white is the same.
         f64::from(level) / f64::from(u16::MAX) * self.scale.full.um()
     }
 }

@@ -21,17 +21,17 @@ enum RoundHeights {
     },
 }
 
-/// A column may differ from its ring's neighbours by this share of the greatest height: facets of
+/// A column may differ from its ring's neighbors by this share of the greatest height: facets of
 /// a mesh are flat, and levels of a picture are steps.
 const OUT_OF_ROUND: f64 = 0.02;
 
 impl Round {
-    /// Returns the distance from the axis beyond which nothing is wanted, in micrometres.
+    /// Returns the distance from the axis beyond which nothing is wanted, in micrometers.
     pub fn radius_um(&self) -> f64 {
         self.radius_um
     }
 
-    /// Returns the height at a distance from the axis, in micrometres.
+    /// Returns the height at a distance from the axis, in micrometers.
     pub fn height_um(&self, r_um: f64) -> f64 {
         match &self.profile {
             RoundHeights::Shapes(shapes) => shapes.height_um(r_um, 0.0),
@@ -44,7 +44,7 @@ impl Round {
         }
     }
 
-    /// Returns the profile of shapes that are discs and lenses about the axis.
+    /// Returns the profile of shapes, if they are discs and lenses about the axis.
     pub(super) fn of_shapes(shapes: &Shapes) -> Result<Self, TargetError> {
         if let Some(why) = why_not_round(shapes) {
             return Err(TargetError::NotRoundShape { why });
@@ -53,14 +53,14 @@ impl Round {
         Ok(Self { radius_um, profile: RoundHeights::Shapes(Box::new(shapes.clone())) })
     }
 
-    /// Returns the profile of a map, as the means of rings one column wide.
+    /// Returns the profile of a map, from the means of rings one column wide.
     pub(super) fn of_map(map: &HeightMap) -> Result<Self, TargetError> {
         let (grid, step_um) = (&map.grid, map.grid.pitch_um);
         let distance =
             |at: usize| grid.x_um(at % grid.columns).hypot(grid.y_um(at / grid.columns)) / step_um;
         let mut rings: Vec<Ring> = Vec::new();
         for (at, &height) in map.heights_um.iter().enumerate() {
-            // Rings are as wide as columns, so that each holds some.
+            // Rings have the width of a column, so that each holds some.
             let ring = distance(at).round() as usize;
             if rings.len() <= ring {
                 rings.resize(ring + 1, Ring::default());
@@ -71,8 +71,8 @@ impl Round {
         let slack = OUT_OF_ROUND * map.highest_um();
         for (at, &height) in map.heights_um.iter().enumerate() {
             let ring = distance(at).round() as usize;
-            // A column lies up to half a ring off, and walls fall within one: heights of two rings
-            // to either side may be its own.
+            // A column may be half a ring away, and walls fall within a ring: the heights of two
+            // rings to either side may be its own.
             let near = &heights_um[ring.saturating_sub(2)..(ring + 3).min(heights_um.len())];
             let [least, most] = [(f64::min as fn(f64, f64) -> f64), f64::max]
                 .map(|of| near.iter().copied().reduce(of).unwrap_or(0.0));
@@ -105,7 +105,7 @@ impl Ring {
     }
 }
 
-/// Returns what of some shapes is not round about the axis.
+/// Returns the shape that is not round about the axis, if any.
 fn why_not_round(shapes: &Shapes) -> Option<String> {
     let off_axis = |centre: [lamp_stack::Length; 2]| centre.iter().any(|it| it.um() != 0.0);
     for (base, of) in shapes.base.iter().zip(1..) {

@@ -1,4 +1,4 @@
-//! Targets by their measures: bases, lenses on them, and channels cut into both.
+//! Targets by their dimensions: bases, lenses on them, and channels cut into both.
 
 use lamp_stack::{Length, Size};
 use serde::Deserialize;
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::file::{length, lengths, some_length, some_size};
 
-/// Bases and lenses, united, and channels cut into them.
+/// The union of bases and lenses, with channels cut into it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shapes {
@@ -20,7 +20,7 @@ pub struct Shapes {
     /// Lenses, each on the bases below its middle.
     #[serde(default)]
     pub lens: Vec<LensShape>,
-    /// Straight channels through all of it.
+    /// Straight channels across the whole target.
     #[serde(default)]
     pub channels: Vec<Channels>,
 }
@@ -35,10 +35,10 @@ pub struct Base {
     /// The diameter of a disc.
     #[serde(default, deserialize_with = "some_length")]
     pub diameter: Option<Length>,
-    /// How high it is.
+    /// Its height.
     #[serde(deserialize_with = "length")]
     pub height: Length,
-    /// Where its middle is: x and y.
+    /// The x and y of its middle.
     #[serde(default, deserialize_with = "lengths")]
     pub centre: [Length; 2],
 }
@@ -50,16 +50,16 @@ pub struct LensShape {
     /// The diameter of a cap's base.
     #[serde(deserialize_with = "length")]
     pub diameter: Length,
-    /// How high a cap is above what it stands on.
+    /// The height of a cap above its base.
     #[serde(deserialize_with = "length")]
     pub sag: Length,
-    /// How many there are along x and y.
+    /// The number of caps along x and y.
     #[serde(default = "one_by_one")]
     pub count: [u32; 2],
-    /// From the middle of one to the next, along x and y.
+    /// The distance between neighboring middles, along x and y.
     #[serde(default, deserialize_with = "lengths")]
     pub pitch: [Length; 2],
-    /// Where the middle of them all is: x and y.
+    /// The x and y of the middle of them all.
     #[serde(default, deserialize_with = "lengths")]
     pub centre: [Length; 2],
 }
@@ -68,17 +68,17 @@ pub struct LensShape {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channels {
-    /// Along which axis they run.
+    /// The axis along which they run.
     pub along: Direction,
-    /// How many there are.
+    /// The number of channels.
     pub count: u32,
-    /// How wide each is.
+    /// The width of each.
     #[serde(deserialize_with = "length")]
     pub width: Length,
-    /// How wide the wall between two is.
+    /// The width of the wall between two.
     #[serde(deserialize_with = "length")]
     pub wall: Length,
-    /// What is left below them.
+    /// The height that is left below them.
     #[serde(deserialize_with = "length")]
     pub floor: Length,
 }
@@ -97,20 +97,20 @@ fn one_by_one() -> [u32; 2] {
     [1, 1]
 }
 
-/// Lengths on the glass beyond which no projector reaches.
+/// No projector reaches lengths on the glass beyond this.
 const MOST_UM: f64 = 1e6;
 
-/// More lenses or channels than any target has.
+/// No target has more lenses or channels.
 const MOST: u32 = 10_000;
 
-/// Why shapes are no target.
+/// Why shapes are not a target.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ShapesError {
-    /// Nothing to cure.
+    /// There is nothing to cure.
     #[error("there is nothing to cure: add a [[base]] or a [[lens]]")]
     Nothing,
-    /// A length that no shape has. `of` is the shape, from 1.
+    /// A shape has an impossible length. `of` is the number of the shape, from 1.
     #[error("{shape} {of}: {key} must be above zero, and at most 1 m")]
     Impossible {
         /// The kind of the shape.
@@ -120,7 +120,7 @@ pub enum ShapesError {
         /// The key.
         key: &'static str,
     },
-    /// A place that no projector reaches.
+    /// No projector reaches this place.
     #[error("{shape} {of}: centre must be within 1 m of the axis")]
     Far {
         /// The kind of the shape.
@@ -128,10 +128,10 @@ pub enum ShapesError {
         /// Its number, from 1.
         of: usize,
     },
-    /// A plate that is no rectangle and no disc, or both.
+    /// A plate is neither a rectangle nor a disc, or both.
     #[error("base {0}: give either size or diameter")]
     Outline(usize),
-    /// A cap that is more than half a ball.
+    /// A cap is more than half a ball.
     #[error("lens {of}: sag {sag} is more than half its diameter {diameter}: it would overhang")]
     Overhang {
         /// Its number, from 1.
@@ -141,7 +141,7 @@ pub enum ShapesError {
         /// Its diameter.
         diameter: Length,
     },
-    /// More or fewer than any target has.
+    /// The count is out of range.
     #[error("{shape} {of}: count must be between 1 and {MOST}")]
     Count {
         /// The kind of the shape.
@@ -149,7 +149,7 @@ pub enum ShapesError {
         /// Its number, from 1.
         of: usize,
     },
-    /// Channels above all that they could cut.
+    /// Channels are above everything that they could cut.
     #[error("channels {of}: the floor {floor} is not below the top at {top}")]
     HighFloor {
         /// Its number, from 1.
@@ -162,11 +162,11 @@ pub enum ShapesError {
 }
 
 impl Shapes {
-    /// Returns the height at a point of the glass, in micrometres. Outlines belong to bases and
-    /// lenses, walls to what is beside channels.
+    /// Returns the height at a point of the glass, in micrometers. Outlines belong to bases and
+    /// lenses, walls of channels to the solid next to them.
     pub(super) fn height_um(&self, x: f64, y: f64) -> f64 {
         let lens = self.lens.iter().map(|lens| self.lens_height_um(lens, x, y));
-        // Shapes unite: the highest counts, and channels cut last.
+        // Shapes unite: the highest counts. Channels cut last.
         let whole = lens.fold(self.base_um(x, y), f64::max);
         let in_it = self.channels.iter().filter(|channels| channels.hold(x, y));
         in_it.map(|channels| channels.floor.um()).fold(whole, f64::min)
@@ -178,7 +178,7 @@ impl Shapes {
         at.map(|base| base.height.um()).fold(0.0, f64::max)
     }
 
-    /// Returns the height of the nearest cap at a point, with what it stands on.
+    /// Returns the height of the nearest cap at a point, including the base below it.
     fn lens_height_um(&self, lens: &LensShape, x: f64, y: f64) -> f64 {
         let middle = lens.nearest_um([x, y]);
         match lens.cap_um((x - middle[0]).hypot(y - middle[1])) {
@@ -210,7 +210,7 @@ impl Shapes {
         self.channels.iter().zip(1..).try_for_each(|(channels, of)| channels.check(of, top))
     }
 
-    /// Returns the greatest height of bases and of lenses in their middles.
+    /// Returns the greatest height of bases, and of lenses at their middles.
     fn top_um(&self) -> f64 {
         let bases = self.base.iter().map(|base| base.height.um());
         let sags = self.lens.iter().map(|lens| {
@@ -249,7 +249,7 @@ impl Base {
 }
 
 impl LensShape {
-    /// Returns the height of a cap at a distance from its middle, if it reaches so far.
+    /// Returns the height of a cap at a distance from its middle, if the cap reaches this distance.
     pub(super) fn cap_um(&self, r: f64) -> Option<f64> {
         let (a, sag) = (self.diameter.um() / 2.0, self.sag.um());
         let radius = (a * a + sag * sag) / (2.0 * sag);
@@ -369,7 +369,7 @@ mod tests {
             [250.0, 450.0, 250.0, 250.0]
         );
         assert_eq!(Shapes::builtin("lens-array").unwrap().size_um(), [3300.0, 3300.0]);
-        // Half-way up the ball: at cos 30° of its radius.
+        // Halfway up the ball: at cos 30° of its radius.
         assert_eq!(heights("hemisphere", &[[86.602_54, 0.0], [100.0, 0.0]]), [50.0, 0.0]);
     }
 

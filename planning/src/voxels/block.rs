@@ -1,4 +1,4 @@
-//! Plans a tile of a window's layers, and some way around it.
+//! Plans a tile of a window's layers, together with its surroundings.
 
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
@@ -9,13 +9,13 @@ use crate::voxels::roles::{LayerImages, RoleRules};
 
 /// The most iterations in a block.
 const MOST_ITERATIONS: usize = 5000;
-/// An error of white light that is less than this a voxel is no reason to search longer.
+/// If white light has an error below this per voxel, the search need not go on longer.
 const LEAST_ERROR: f64 = 0.002;
 
-/// The most iterations once dim pixels are black or brighter.
+/// The most iterations after dim pixels are made black or brighter.
 const AGAIN: usize = 100;
 
-/// What was planned for a tile of some layers, from the light.
+/// The plan of a tile in some layers, from the light.
 #[derive(Clone, Debug)]
 pub(crate) struct TilePlan {
     pub(crate) rect: Rect,
@@ -40,7 +40,7 @@ impl TilePlan {
     }
 }
 
-/// Copies what a rectangle of values has in common with another.
+/// Copies the intersection of a rectangle of values with another rectangle.
 fn copy_common<V: Copy>(values: &[V], of: &Rect, rect: &Rect, stride: usize, out: &mut [V]) {
     let common = of.within(rect);
     let start = |of: &Rect| (common.columns.start - of.columns.start) as usize;
@@ -51,7 +51,7 @@ fn copy_common<V: Copy>(values: &[V], of: &Rect, rect: &Rect, stride: usize, out
     }
 }
 
-/// What all blocks of a window share.
+/// The data that all blocks of a window share.
 pub(crate) struct PlannedWindow<'a> {
     pub(crate) grid: TileGrid,
     pub(crate) blur: &'a Blur<f32>,
@@ -64,18 +64,20 @@ pub(crate) struct PlannedWindow<'a> {
     pub(crate) first: usize,
     /// The window's layers whose light is chosen.
     pub(crate) lit: usize,
-    /// All layers of the window. Those at the end have no light: they tell what the light above
-    /// does to voxels that are not to be cured, so far as it reaches.
+    /// All layers of the window. The ones at the end have no light: they show the effect of the
+    /// light above on voxels that are not to be cured, for as many layers as it reaches.
     pub(crate) lights: &'a [LayerLight],
     /// The images of the window's layers, and of those near them.
     pub(crate) images: &'a [&'a LayerImages],
-    /// Where the window's first layer is among the images.
+    /// The index of the window's first layer among the images.
     pub(crate) at: usize,
-    /// What is planned so far, of each tile.
+    /// The plan of each tile so far.
     pub(crate) plans: &'a [Option<TilePlan>],
-    /// How far around a tile light is chosen together with it, to be chosen again.
+    /// The distance around a tile within which light is chosen together with it, to be chosen
+    /// again.
     pub(crate) overlap: usize,
-    /// How far from where a layer is not like its neighbours light may change.
+    /// The distance from places where a layer differs from its neighbors within which light may
+    /// change.
     pub(crate) near: usize,
     /// The gap to end at, as a share of the cost of white light.
     pub(crate) gap: f64,
@@ -84,7 +86,7 @@ pub(crate) struct PlannedWindow<'a> {
     pub(crate) has_min_level: bool,
 }
 
-/// A tile's plan, and how it came about.
+/// A tile's plan, and figures of the search for it.
 pub(crate) struct BlockResult {
     pub(crate) plan: TilePlan,
     /// The cost of white light in the block.
@@ -92,7 +94,7 @@ pub(crate) struct BlockResult {
     pub(crate) progress: Vec<SearchProgress>,
 }
 
-/// What is planned of a tile in a layer.
+/// The plan of a tile in a layer.
 struct PlanOfLayer<'a> {
     rect: &'a Rect,
     levels: &'a [u8],
@@ -102,14 +104,14 @@ struct PlanOfLayer<'a> {
 /// The chunks of a block that are planned.
 struct Area {
     rect: Rect,
-    /// Its layers in full.
+    /// The shape of its complete layers.
     shape: Shape,
     /// Where the chunks begin in each layer.
     starts: Vec<usize>,
 }
 
 impl Area {
-    /// Returns the values of the chunks of a layer in full.
+    /// Returns the values of the chunks, from a complete layer.
     fn chunks<'a, V>(&'a self, layer: &'a [V]) -> impl Iterator<Item = &'a [V]> {
         self.starts.iter().map(|&start| &layer[start..start + LANES])
     }
@@ -137,7 +139,7 @@ impl PlannedWindow<'_> {
         problem.operator.doses(&problem.brightest(), &mut doses);
         // Layers without light are planned in a later window.
         let lit = self.lit * area.starts.len() * LANES;
-        // The gap is a share of what white light costs, so that it means the same for all parts.
+        // The gap is a share of the cost of white light, so that it means the same for all parts.
         let unplanned = problem.cost(&doses[..lit]);
         let (light, prices) = self.start(&area, &problem, &doses);
         let least = LEAST_ERROR * lit as f64;
@@ -146,7 +148,7 @@ impl PlannedWindow<'_> {
         let progress = std::mem::take(&mut solution.progress);
         let mut light = solution.light;
         if self.has_min_level && self.without_dim_light(&mut problem, &mut light) {
-            // The prices of the first search are near: few iterations are left to go.
+            // The prices of the first search are near the solution: few iterations are needed.
             let again = Search { iterations: AGAIN, ..until };
             light = solve(&problem, light, solution.prices.clone(), again).light;
         }
@@ -154,7 +156,7 @@ impl PlannedWindow<'_> {
         BlockResult { plan, unplanned, progress }
     }
 
-    /// Returns a tile's plan: what was planned already outside the chunks.
+    /// Returns a tile's plan; outside the chunks, it keeps the earlier plan.
     fn written(&self, core: Rect, area: &Area, light: &[f32], prices: &[f32]) -> TilePlan {
         let pixels = core.width() * core.height();
         let mut levels = vec![0; self.lit * pixels];
@@ -195,8 +197,8 @@ impl PlannedWindow<'_> {
         if self.round_up { self.levels.at_least(light) } else { self.levels.nearest(light) }
     }
 
-    /// Finds the chunks near a tile whose light or doses can matter: those near places where a
-    /// layer is not like its neighbours.
+    /// Finds the chunks near a tile whose light or doses can matter: the chunks near places where a
+    /// layer differs from its neighbors.
     fn area(&self, core: &Rect) -> Area {
         let rect = core.grown(self.overlap).within(&self.grid.image());
         let shape = Shape::holding(self.lights.len(), rect.height(), rect.width());
@@ -213,7 +215,7 @@ impl PlannedWindow<'_> {
                 let differs = |other: usize| wanted[place] != wanted[other];
                 let at_right = place % width + 1 < width && differs(place + 1);
                 let at_bottom = place + width < wanted.len() && differs(place + width);
-                // Where a layer differs from the window's first, light goes past an edge above or
+                // Where a layer differs from the window's first, light passes an edge above or
                 // below.
                 edges[place] |= at_right || at_bottom || wanted[place] != first[place];
             }
@@ -287,7 +289,7 @@ impl PlannedWindow<'_> {
         incoming
     }
 
-    /// Writes the levels planned so far of a layer of the window: white where nothing is.
+    /// Writes the levels planned so far of a layer of the window: white where there is no plan.
     fn planned(&self, layer: usize, rect: &Rect, stride: usize, levels: &mut [u8]) {
         self.images[self.at + layer].wanted.copy(rect, 0, stride, levels);
         for tile in self.grid.met(rect) {
@@ -297,8 +299,9 @@ impl PlannedWindow<'_> {
         }
     }
 
-    /// Returns the light and the prices to start from: those planned so far. Where nothing is, the
-    /// light is that of the part, and prices are halfway to those of the doses of white light.
+    /// Returns the light and the prices to start from: the planned ones so far. Where there is no
+    /// plan, the light is the part's, and prices are halfway to the prices of the doses of white
+    /// light.
     fn start(&self, area: &Area, problem: &Problem<f32>, white: &[f32]) -> (Vec<f32>, Vec<f32>) {
         let mut levels = vec![0; area.shape.plane()];
         let mut of_layer = vec![0.0; area.shape.plane()];
@@ -326,14 +329,14 @@ impl PlannedWindow<'_> {
         for (voxel, (light, price)) in light.iter_mut().zip(&mut prices).enumerate() {
             let role = problem.roles[voxel];
             let of_light = self.terms.light_bounds(role);
-            // Plans of neighbouring tiles may have been made with other bounds.
+            // Plans of neighboring tiles may have been made with other bounds.
             *light = light.clamp(of_light.low, of_light.high);
             let of_price = self.terms.price_bounds(role);
             if price.is_nan() {
                 let is_above = white[voxel] + problem.incoming[voxel] >= self.terms.aim(role);
                 let slope = if is_above { of_price.high } else { of_price.low };
-                // The true price lies between no price and the slope at white light. Half-way is as
-                // near to either.
+                // The true price is between zero and the slope at white light. Halfway is equally
+                // near to both.
                 *price = 0.5 * slope.clamp(-1.0, 1.0);
             }
             *price = price.clamp(of_price.low, of_price.high);
@@ -341,14 +344,14 @@ impl PlannedWindow<'_> {
         (light, prices)
     }
 
-    /// Returns what is planned of a tile in a layer of the window.
+    /// Returns the plan of a tile in a layer of the window.
     fn plan_of(&self, tile: usize, layer: usize) -> Option<PlanOfLayer<'_>> {
         let plan = self.plans[tile].as_ref()?;
         let (levels, prices) = plan.layer(self.first + layer)?;
         Some(PlanOfLayer { rect: &plan.rect, levels, prices })
     }
 
-    /// Makes dim pixels black, or bright enough, whichever is nearer, and keeps them so. Returns
+    /// Makes dim pixels black or bright enough, whichever is nearer, and keeps them there. Returns
     /// whether there are any.
     fn without_dim_light(&self, problem: &mut Problem<f32>, light: &mut [f32]) -> bool {
         let least = self.levels.least_light();
@@ -359,8 +362,8 @@ impl PlannedWindow<'_> {
                 continue;
             }
             any |= *light > 0.0 && *light < least;
-            // Rounding to the nearer of black and the least level, and then searching with what is
-            // left to choose: the choice itself would be a problem of whole numbers.
+            // Rounds to the nearer of black and the least level, then searches with the remaining
+            // freedom: the choice itself would be an integer problem.
             if *light < least / 2.0 {
                 (*light, *role) = (0.0, role.without_light());
             } else {

@@ -1,4 +1,4 @@
-//! The way up through a stack: what no plan costs less than.
+//! The way up through a stack: the bound that no plan costs less than.
 
 use rayon::prelude::*;
 
@@ -7,12 +7,13 @@ use crate::solver::Role;
 use crate::tiled::{Tile, Tiled};
 use crate::voxels::setting::VoxelSetting;
 
-/// Adds up, from the bottom up, what doses' prices make of the light of each layer.
+/// Adds up, from the bottom up, the cost of the light of each layer at the prices of doses.
 #[derive(Debug)]
 pub(crate) struct Ascent {
-    /// The prices of the doses of the last layer, and of what passes from it to those below.
+    /// The prices of the doses of the last layer, and of the light that it passes to the layers
+    /// below.
     prices: Tiled<f32>,
-    /// The share that passes to the last layer from that above it.
+    /// The share that passes to the last layer from the layer above it.
     passed: f32,
     /// The bound so far.
     pub(crate) bound: f64,
@@ -55,7 +56,7 @@ fn sum_tile(prices: &Tile<f32>, below: &Tile<f32>, passed: f32) -> Tile<f32> {
         (Tile::Flat(price), Tile::Flat(below)) => Tile::Flat(sum(*price, *below)),
         (Tile::Flat(price), Tile::Dense(below)) => {
             let sums: Box<[f32]> = below.iter().map(|&below| sum(*price, below)).collect();
-            // What has faded away is nothing.
+            // Faded sums count as zero.
             let is_gone = sums.iter().all(|sum| sum.abs() < 1e-12);
             if is_gone { Tile::Flat(0.0) } else { Tile::Dense(sums) }
         }
@@ -68,7 +69,7 @@ fn sum_tile(prices: &Tile<f32>, below: &Tile<f32>, passed: f32) -> Tile<f32> {
     }
 }
 
-/// Returns what the prices of a tile's doses add to the bound by themselves.
+/// Returns the amount that the prices of a tile's doses add to the bound by themselves.
 fn of_doses(setting: &VoxelSetting, tile: usize, prices: &Tiled<f32>) -> f64 {
     let of = |price: f32| -f64::from(price) * f64::from(setting.aim(price));
     let rect = setting.grid.tile(tile);
@@ -103,7 +104,7 @@ fn of_light(
     if let (Some(role), Some(price)) =
         (of_all, sums.value_in(&rect.grown(setting.blur.radius()), 0.0))
     {
-        // Of a wide field of one price, blur is a sum.
+        // In a wide field of one price, blur is a sum.
         let price = own * setting.blur.sum() * f64::from(price);
         return least(role, price) * (rect.width() * rect.height()) as f64;
     }

@@ -1,4 +1,4 @@
-//! The way down through a stack: window after window is planned, layer after layer settled.
+//! The way down through a stack: plans window after window, and settles layer after layer.
 
 use std::collections::VecDeque;
 use std::io;
@@ -17,7 +17,7 @@ use crate::voxels::search_sums::SearchSums;
 use crate::voxels::setting::{VoxelSetting, code};
 use crate::voxels::unplanned::price_unplanned;
 
-/// A layer as it was settled.
+/// A settled layer.
 #[derive(Debug, Default)]
 pub(crate) struct SettledLayer {
     pub(crate) before: VoxelTally,
@@ -26,7 +26,7 @@ pub(crate) struct SettledLayer {
     pub(crate) targets: u64,
 }
 
-/// What the way down has gathered.
+/// The results of the way down.
 #[derive(Debug)]
 pub(crate) struct Descended {
     /// Levels and prices of each layer, from the light.
@@ -36,12 +36,13 @@ pub(crate) struct Descended {
     pub(crate) search: Vec<GapAt>,
 }
 
-/// Tiles near a surface in some layer of a window, for each that a surface runs through in one.
+/// The number of tiles near a surface in some layer of a window, for each tile in which a surface
+/// runs through one layer.
 const NEAR_SURFACE: u64 = 3;
 /// The bytes of a planned pixel.
 const BYTES_PLANNED: u64 = 5;
 
-/// Where the way down is.
+/// The state of the way down.
 struct Descent<'a> {
     setting: &'a VoxelSetting,
     wanted: &'a mut Spool,
@@ -104,7 +105,7 @@ pub(crate) fn descend(
 }
 
 impl Descent<'_> {
-    /// Returns how many layers a window can settle that begins at a layer, within the memory.
+    /// Returns the number of layers that a window from layer `first` can settle within the memory.
     fn layers_in_memory(&mut self, first: usize) -> io::Result<usize> {
         let setting = self.setting;
         let Some(memory) = setting.memory else { return Ok(setting.window.settled) };
@@ -112,12 +113,12 @@ impl Descent<'_> {
         let side = setting.grid.side;
         let tile = (side * side) as u64;
         let of_doses = [&self.white_ahead, &self.white, &self.doses];
-        // The next layer's doses are made before the last one's go.
+        // The next layer's doses are allocated before the last one's are freed.
         let doses: u64 = of_doses.iter().map(|doses| doses.dense_count()).sum::<u64>() * 8 * tile;
         let images = &self.images[first - self.first_image];
         let near_surface = NEAR_SURFACE * images.wanted.dense_count();
         let a_layer = tile * (2 * images.wanted.dense_count() + BYTES_PLANNED * near_surface);
-        // Layers ahead and below are in memory as well as the settled ones.
+        // Layers ahead and below are in memory together with the settled ones.
         let layers = memory.saturating_sub(doses) / a_layer.max(1);
         let others = setting.window.ahead + setting.tail;
         let settled = usize::try_from(layers).unwrap_or(usize::MAX).saturating_sub(others);
@@ -138,13 +139,13 @@ impl Descent<'_> {
         Ok(())
     }
 
-    /// Plans the tiles near surfaces: every second one across and down at once, so that none
+    /// Plans the tiles near surfaces: every second one across and down at once, so that no tile
     /// sees another that is being planned.
     fn plan_window(&mut self, first: usize, end: usize, reached: usize) {
         let setting = self.setting;
         let images: Vec<&LayerImages> = self.images.iter().collect();
         let mut lights = setting.lights[first..reached].to_vec();
-        // The layers that follow are planned later: only what falls through to them counts now.
+        // The following layers are planned later: only light that passes to them counts now.
         lights[end - first..].iter_mut().for_each(|dark| dark.own = 0.0);
         let at = first - self.first_image;
         let reach = setting.blur.radius().max(setting.rules.reach());
@@ -161,8 +162,8 @@ impl Descent<'_> {
         let mut plans = std::mem::take(&mut self.plans);
         for turn in 0..4 {
             let across = setting.grid.across();
-            // A chessboard of four colours: tiles of one colour lie a whole tile apart, farther
-            // than light spreads.
+            // A chessboard of four colors: tiles of one color are a whole tile apart, farther than
+            // light spreads.
             let has_turn = |tile: usize| tile / across % 2 * 2 + tile % across % 2 == turn;
             let now: Vec<usize> = tiles.iter().copied().filter(|&tile| has_turn(tile)).collect();
             let window = PlannedWindow {
@@ -191,14 +192,14 @@ impl Descent<'_> {
                 plans[tile] = Some(result.plan);
             }
         }
-        // A plan of earlier layers is not one of these.
+        // A plan of earlier layers is not a plan of these layers.
         for plan in &mut plans {
             plan.take_if(|plan| plan.first != first);
         }
         self.plans = plans;
     }
 
-    /// Makes a layer final: computes its doses, counts, and writes it down.
+    /// Makes a layer final: computes its doses, counts its voxels, and writes it down.
     fn settle(&mut self, layer: usize) -> io::Result<()> {
         let setting = self.setting;
         let at = layer - self.first_image;
@@ -225,7 +226,7 @@ impl Descent<'_> {
         Ok(())
     }
 
-    /// Returns a layer's levels and prices: those of the part where nothing was planned.
+    /// Returns a layer's levels and prices: the part's image where nothing was planned.
     fn planned(&self, layer: usize, wanted: &Tiled<u8>) -> PlannedLayer {
         let grid = self.setting.grid;
         let tile = |tile: usize| {
@@ -304,7 +305,7 @@ impl Descent<'_> {
         };
         let tiles: Vec<SettledLayer> =
             (0..setting.grid.tile_count()).into_par_iter().map(of_tile).collect();
-        // Sums in one order are the same for any number of threads.
+        // Sums in a fixed order are the same for any number of threads.
         let mut all = SettledLayer::default();
         for tile in tiles {
             all.before += &tile.before;
@@ -333,7 +334,7 @@ fn dense<V: Copy + PartialEq>(values: &[V], width: usize, side: usize, outside: 
     Tile::Dense(tile)
 }
 
-/// Returns where white light cures the part.
+/// Returns the places where white light cures the part.
 fn targets(wanted: &Tiled<u8>, white: &Tiled<f32>) -> Tiled<u8> {
     let tile = |(wanted, white): (&Tile<u8>, &Tile<f32>)| match (wanted, white) {
         (Tile::Flat(0), _) => Tile::Flat(0),

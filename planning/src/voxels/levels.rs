@@ -40,7 +40,7 @@ impl Levels {
     /// Returns the lowest level that has at least a light.
     pub(crate) fn at_least(&self, light: f64) -> u8 {
         let nearest = self.model.level_of(light);
-        // A light that is a level's but for its last bits stays that level.
+        // A light equal to a level's up to its last bits stays at that level.
         let enough = self.model.of_level(nearest) >= light - 1e-6;
         // Rounding down could leave a target just short of its dose.
         self.without_dim(if enough { nearest } else { nearest.saturating_add(1) })

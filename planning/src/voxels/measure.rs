@@ -1,13 +1,13 @@
-//! Counts what doses come to.
+//! Counts the results of doses.
 
 use crate::solver::{Role, Terms};
 use crate::tiled::Rect;
 use crate::voxels::outcome::{Counts, DoseHistogram, VoxelTally};
 
-/// The share by which light may be off.
+/// The share by which light may vary.
 const LIGHT_OFF: f32 = 0.05;
 
-/// A voxel, or many alike.
+/// A voxel, or many equal ones.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Voxel {
     pub(crate) wanted: bool,
@@ -23,8 +23,8 @@ impl VoxelTally {
             (&mut self.dimmer, 1.0 - LIGHT_OFF),
             (&mut self.brighter, 1.0 + LIGHT_OFF),
         ];
-        // Every dose is linear in the light: a lamp that is off by a share needs no doses of its
-        // own.
+        // Every dose is linear in the light: a lamp that is a share brighter or dimmer needs no
+        // doses of its own.
         for (counts, light) in cases {
             counts.add(voxel, dose * light >= 1.0, count);
         }
@@ -33,7 +33,7 @@ impl VoxelTally {
         let step = step.min(DoseHistogram::STEPS - 1);
         if voxel.wanted {
             self.doses.wanted[step] += count;
-        // Resin that no light reaches is without end.
+        // The resin that no light reaches has no end.
         } else if dose > 0.0 {
             self.doses.other[step] += count;
         }
@@ -63,7 +63,7 @@ pub(crate) struct TileValues<'a> {
 }
 
 impl TileValues<'_> {
-    /// Returns what doses come to.
+    /// Returns the results of doses.
     pub(crate) fn tally(&self, doses: &[f32], terms: &Terms<f32>) -> VoxelTally {
         let mut tally = VoxelTally::default();
         for row in 0..self.rect.height() {

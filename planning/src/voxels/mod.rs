@@ -1,9 +1,9 @@
 //! Chooses the gray level of each pixel from the doses of all layers together (001).
 //!
-//! Layers are planned a few at a time, from the light down: what they get from above is known
-//! then, and layers below them are looked ahead. In each, tiles near the part's surfaces are
-//! planned together with some way around them. A second pass, from the bottom up, adds up the
-//! prices of doses, which gives what no plan costs less than.
+//! Layers are planned a few at a time, from the light down: the light that they get from above is
+//! known then, and the plan looks ahead at the layers below. In each layer, tiles near the part's
+//! surfaces are planned together with their surroundings. A second pass, from the bottom up, adds
+//! up the prices of doses, which gives a bound that no plan costs less than.
 
 mod block;
 mod bound;

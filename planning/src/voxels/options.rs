@@ -1,12 +1,12 @@
-//! What a plan of gray levels is to reach, and what it may change.
+//! The goal of a plan of gray levels, and the pixels that it may change.
 
 use std::num::NonZeroU8;
 
-/// What a plan makes least.
+/// The quantity that a plan minimizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VoxelObjective {
-    /// How far doses of wanted voxels lie below the critical dose, and others above it, each with
-    /// a margin.
+    /// The sum of the amounts by which doses of wanted voxels are below the critical dose, and of
+    /// others above it, each with a margin.
     #[default]
     Wrong,
     /// The dose of the voxels next to targets, while every target is cured (001 eq. 11 to 15).
@@ -18,12 +18,12 @@ lamp_stack::named!(VoxelObjective { Wrong = "wrong", Boundary = "boundary" });
 /// Pixels whose light a plan chooses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sources {
-    /// Those of the part.
+    /// The pixels of the part.
     #[default]
     Lit,
-    /// Those of the part, and so many around it.
+    /// The pixels of the part, and this number around it.
     Grow(u32),
-    /// So many of the part along its outline; the others stay white.
+    /// This number of pixels of the part along its outline; the others stay white.
     Shell(u32),
 }
 
@@ -32,33 +32,35 @@ pub enum Sources {
 pub struct Window {
     /// Layers that a window settles.
     pub settled: usize,
-    /// Layers below them that it looks ahead.
+    /// Layers below them up to which it looks ahead.
     pub ahead: usize,
 }
 
-/// What a plan is to reach, and what it may change.
+/// The goal of a plan, and the pixels that it may change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// The lowest level of a wanted pixel.
     pub wanted: NonZeroU8,
-    /// What the plan makes least.
+    /// The quantity that the plan minimizes.
     pub objective: VoxelObjective,
-    /// How far beyond the critical dose a voxel should be to be surely cured or not: 0.05 is 5 %.
+    /// The distance from the critical dose at which a voxel is surely cured or surely not: 0.05 is
+    /// 5 %.
     pub margin: f64,
     /// Pixels whose light is chosen.
     pub sources: Sources,
     /// The lowest level of a pixel that is not black.
     pub min_level: u8,
-    /// So many pixels of the part along its outline stay white.
+    /// This number of pixels of the part along its outline stay white.
     pub keep_wall: u32,
-    /// How far from the best a plan may be, as a share of the unplanned error.
+    /// The largest allowed distance of a plan from the best, as a share of the unplanned error.
     pub gap: f64,
-    /// How many voxels around the images count: light reaches them, but no pixel.
+    /// The number of voxels around the images that count: light reaches them, but they have no
+    /// pixel.
     pub around: Option<u32>,
-    /// About how many bytes to use at most: with less, fewer layers are planned at a time, which
-    /// takes longer and moves gray levels a little.
+    /// About the most bytes to use: with fewer, fewer layers are planned at a time, which takes
+    /// longer and changes gray levels a little.
     pub memory: Option<u64>,
-    /// How many layers are planned at a time; by the light's depth where `None`.
+    /// The number of layers that are planned at a time; `None` chooses it by the light's depth.
     pub window: Option<Window>,
 }
 

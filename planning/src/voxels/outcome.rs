@@ -1,13 +1,13 @@
-//! What a plan reaches, counted by layer.
+//! The result of a plan, counted by layer.
 
 use std::ops::AddAssign;
 
 /// Voxels of a layer, or of all, that are cured wrongly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Voxels that are cured and not wanted.
+    /// Voxels that are cured but not wanted.
     pub overcured: u64,
-    /// Voxels that are wanted and not cured.
+    /// Voxels that are wanted but not cured.
     pub undercured: u64,
     /// Targets that are not cured. A target is a wanted voxel that white light cures.
     pub lost: u64,
@@ -33,7 +33,7 @@ pub struct DoseHistogram {
 impl DoseHistogram {
     /// The number of steps. The last one also has all higher doses.
     pub const STEPS: usize = 80;
-    /// The steps of a critical dose.
+    /// The number of steps in a critical dose.
     pub const PER_CRITICAL_DOSE: usize = 20;
 }
 
@@ -53,16 +53,16 @@ impl AddAssign<&Self> for DoseHistogram {
     }
 }
 
-/// What the doses of a layer, or of all, come to.
+/// The result of the doses of a layer, or of all layers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VoxelTally {
     /// Voxels cured wrongly.
     pub counts: Counts,
-    /// The same if all light were 5 % less.
+    /// The same with 5 % less light.
     pub dimmer: Counts,
-    /// The same if all light were 5 % more.
+    /// The same with 5 % more light.
     pub brighter: Counts,
-    /// What the plan makes least.
+    /// The quantity that the plan minimizes.
     pub cost: f64,
     /// The doses.
     pub doses: DoseHistogram,
@@ -78,7 +78,7 @@ impl AddAssign<&Self> for VoxelTally {
     }
 }
 
-/// What a plan reaches in a layer.
+/// The result of a plan in a layer.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerOutcome {
     /// The layer's index, 0 at the bottom.
@@ -93,26 +93,26 @@ pub struct LayerOutcome {
     pub after: Counts,
 }
 
-/// How cost and bound of all blocks of voxels came together, in the iterations of the search.
+/// The gap between cost and bound of all blocks of voxels, after some iterations of the search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GapAt {
     /// Iterations of each block.
     pub iteration: usize,
-    /// The sum of the differences between cost and bound of all blocks, as a share of what white
-    /// light costs them.
+    /// The sum of the differences between cost and bound of all blocks, as a share of the cost of
+    /// white light in them.
     pub gap: f64,
 }
 
-/// What a plan reaches.
+/// The result of a plan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Every layer, bottom first.
     pub layers: Vec<LayerOutcome>,
-    /// What white light comes to: its cost is `P_0`.
+    /// The result of white light: its cost is `P_0`.
     pub before: VoxelTally,
-    /// What the plan comes to, in gray levels as they are written: its cost is `P`.
+    /// The result of the plan, in gray levels as they are written: its cost is `P`.
     pub after: VoxelTally,
-    /// What no light of the same sources costs less than: `D`.
+    /// The bound `D`: no light of the same sources costs less.
     pub bound: f64,
     /// How the search went.
     pub search: Vec<GapAt>,
@@ -121,7 +121,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Returns how far the plan may be from the best, as a share of the unplanned error:
+    /// Returns the largest distance of the plan from the best, as a share of the unplanned error:
     /// `(P - D) / P_0`, or 0 where there is no error.
     pub fn gap(&self) -> f64 {
         if self.before.cost > 0.0 { (self.after.cost - self.bound) / self.before.cost } else { 0.0 }

@@ -1,4 +1,4 @@
-//! Plans a stack: reads it, goes down and up, and gives its layers bottom first.
+//! Plans a stack: reads it, goes down and up, and returns its layers bottom first.
 
 use std::io;
 
@@ -26,18 +26,18 @@ pub enum VoxelPlanError {
     /// It has no layers.
     #[error("there are no layers to plan")]
     NoLayers,
-    /// A page is not as large as the first, or has another resolution.
+    /// A page has another size or resolution than the first.
     #[error("{layer} is not as large as the first layer, or of another resolution")]
     Unlike {
         /// The layer's name.
         layer: String,
     },
-    /// A page lacks what the model needs.
+    /// A page lacks a number that the model needs.
     #[error("{layer} does not state its {what}")]
     Silent {
         /// The layer's name.
         layer: String,
-        /// What it does not state.
+        /// The number that it lacks.
         what: &'static str,
     },
     /// A page states a number that is not above zero.
@@ -45,7 +45,7 @@ pub enum VoxelPlanError {
     NotPositive {
         /// The layer's name.
         layer: String,
-        /// What it states.
+        /// The number that it states.
         what: &'static str,
     },
     /// The model's numbers are wrong.
@@ -56,10 +56,11 @@ pub enum VoxelPlanError {
     Io(#[from] io::Error),
 }
 
-/// What a unit of dose costs that a target lacks, with [`VoxelObjective::Boundary`].
+/// The cost of each unit of dose that a target lacks, with [`VoxelObjective::Boundary`].
 ///
-/// 001 makes each target a constraint. None has a higher multiplier than 17.2 in its appendix A,
-/// so all of them are kept there; elsewhere about 1 % of targets, those that white light only
+/// 001 makes each target a constraint. No target of its appendix A has a multiplier above 17.2, so
+/// all of them are kept there. Elsewhere, about 1 % of targets, the ones that white light only just
+/// cures, are given up for the sake of the voxels that keeping them would cure around them.
 /// just cures, are given up for what keeping them would cure around them.
 const PRICE_OF_TARGETS: f32 = 50.0;
 /// The most voxels of a window that are planned in one piece.
@@ -68,19 +69,19 @@ const ONE_PIECE: usize = 4 << 20;
 const LEAST_SIDE: usize = 64;
 /// Layers of a window whose light is chosen.
 const WINDOW: usize = 24;
-/// The most of them that are chosen again.
+/// The most of these layers that are chosen again.
 const MOST_AHEAD: usize = 10;
-/// A window looks ahead until this share of light is left.
+/// A window looks ahead until only this share of light is left.
 const LEFT: f64 = 0.1;
-/// The most layers below a window that its light is followed to.
+/// The most layers below a window to which its light is followed.
 const MOST_TAIL: usize = 60;
 
 /// Plans the gray levels of a stack's layers. `part` gives the wanted images, bottom first;
-/// `settled` is called with the number of layers that are done.
+/// `settled` is called with the number of finished layers.
 ///
 /// # Errors
-/// Returns the part's own error, or a [`VoxelPlanError`] if a layer is unlike the first, or lacks its
-/// thickness or exposure, or if a temporary file fails.
+/// Returns the part's own error, or a [`VoxelPlanError`] if a layer differs from the first, lacks
+/// its thickness or exposure, or if a temporary file fails.
 pub fn plan<E: From<VoxelPlanError>>(
     part: impl IntoIterator<Item = Result<Layer, E>>,
     light: &Light,
@@ -106,7 +107,7 @@ pub fn plan<E: From<VoxelPlanError>>(
     Ok(VoxelPlan { setting, wanted, done, pages, ascent, left: next, outcome })
 }
 
-/// What the pages of a stack state.
+/// The numbers that the pages of a stack state.
 #[derive(Debug, Default)]
 struct Pages {
     infos: Vec<PageInfo>,
@@ -169,7 +170,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetti
         let ahead = (LEFT.ln() / passed.ln()).ceil().clamp(4.0, MOST_AHEAD as f64) as usize;
         Window { settled: WINDOW - ahead, ahead }
     });
-    // As far as the highest dose that white light can make stays above the critical dose.
+    // Up to the depth where the highest dose of white light falls below the critical dose.
     let own = lights.iter().map(|layer| layer.own).fold(0.0, f64::max) * blur.sum();
     // All layers white without end: the geometric series of own passed^n.
     let highest = own / (1.0 - passed);
@@ -228,7 +229,7 @@ fn outcome(done: &Descended, pages: &Pages) -> Outcome {
 
 /// A planned stack: an iterator over its layers, bottom first.
 ///
-/// The bound of its [`Outcome`] is complete once all layers were taken.
+/// The bound of its [`Outcome`] is complete once all layers are taken.
 #[derive(Debug)]
 pub struct VoxelPlan {
     setting: VoxelSetting,
@@ -242,9 +243,9 @@ pub struct VoxelPlan {
 }
 
 impl VoxelPlan {
-    /// Returns what the plan reaches.
+    /// Returns the result of the plan.
     pub fn outcome(&self) -> Outcome {
-        // No light costs less than nothing.
+        // No light costs less than zero.
         Outcome { bound: self.ascent.bound.max(0.0), ..self.outcome.clone() }
     }
 

@@ -1,13 +1,13 @@
-//! What each voxel of a rectangle wants, and what light its pixel may have.
+//! The dose wanted at each voxel of a rectangle, and the light allowed at its pixel.
 
 use crate::solver::Role;
 use crate::tiled::{Rect, Tiled};
 use crate::voxels::options::{Options, Sources, VoxelObjective};
 
-/// How far from a target a boundary voxel lies, in voxels along each axis.
+/// The distance of a boundary voxel from a target, in voxels along each axis.
 ///
-/// 001 shows boundary voxels in a lost drawing (A.19b). With two, all 28 unlit voxels of the
-/// layers of its appendix A are among them, and the sums of appendix A come out.
+/// 001 shows boundary voxels in a lost drawing (A.19b). With two, all 28 unlit voxels of the layers
+/// of its appendix A are among them, and the sums of appendix A are reproduced.
 pub(crate) const REACH: usize = 2;
 
 /// A layer's images.
@@ -19,13 +19,13 @@ pub(crate) struct LayerImages {
     pub(crate) targets: Tiled<u8>,
 }
 
-/// Which pixels along an outline, and around it, [`Options`] ask for.
+/// The pixels along an outline, and around it, that [`Options`] ask for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoleRules {
     objective: VoxelObjective,
     sources: Sources,
     keep_wall: usize,
-    /// Where pixels can be lit: the image without what lies around it.
+    /// Where pixels can be lit: the image without the voxels around it.
     image: [isize; 4],
 }
 
@@ -39,7 +39,7 @@ impl RoleRules {
         Self { objective, sources, keep_wall, image: [left, right, top, bottom] }
     }
 
-    /// Returns how far around a voxel its role depends on images.
+    /// Returns the distance around a voxel within which images determine its role.
     pub(crate) fn reach(&self) -> usize {
         let boundary = if self.objective == VoxelObjective::Boundary { REACH } else { 0 };
         self.outline().max(boundary)
@@ -53,8 +53,8 @@ impl RoleRules {
         by_sources.max(self.keep_wall)
     }
 
-    /// Writes the roles of the voxels of a rectangle: in lines of `stride`, those outside the
-    /// image have none. `layers` are those within reach of `layer`, from the light.
+    /// Writes the roles of the voxels of a rectangle, in lines of `stride`; voxels outside the
+    /// image have no role. `layers` are the layers within reach of `layer`, from the light.
     pub(crate) fn write(
         &self,
         layers: &[&LayerImages],
@@ -83,8 +83,8 @@ impl RoleRules {
         }
     }
 
-    /// Returns the role of all voxels of a rectangle in the image, if it is plain that they have
-    /// the same.
+    /// Returns the common role of all voxels of a rectangle in the image, if it is plain that they
+    /// have one.
     pub(crate) fn role_of_all(
         &self,
         layers: &[&LayerImages],
@@ -103,15 +103,16 @@ impl RoleRules {
         Some(role[0])
     }
 
-    /// Returns what light all pixels of a rectangle in the image may have, if it is plain that
-    /// they may have the same.
+    /// Returns the common light allowed at all pixels of a rectangle in the image, if it is plain
+    /// that they have one.
     pub(crate) fn light_of_all(&self, wanted: &Tiled<u8>, rect: &Rect) -> Option<Role> {
-        // Roles depend on pixels as far as outlines reach: where these are alike, so are the roles.
+        // Roles depend on pixels up to the reach of outlines: where these pixels are alike, so are
+        // the roles.
         wanted.value_in(&rect.grown(self.outline()), 0)?;
         self.light_roles_of(wanted, &first_pixel(rect), 1).first().copied()
     }
 
-    /// Returns what light the pixels of a rectangle may have, in lines of `stride`.
+    /// Returns the light allowed at the pixels of a rectangle, in lines of `stride`.
     pub(crate) fn light_roles_of(
         &self,
         image: &Tiled<u8>,
@@ -207,7 +208,7 @@ fn boundary_roles(
 }
 
 /// Returns for each pixel of a rectangle whether a pixel within `by` rows and columns has a value
-/// that `is`. Black lies beyond the image.
+/// for which `is` returns true. Outside the image, all is black.
 fn around(
     image: &Tiled<u8>,
     rect: &Rect,

@@ -1,14 +1,14 @@
-//! Adds up how cost and bound of all blocks come together.
+//! Adds up the gaps between cost and bound of all blocks during the search.
 
 use crate::solver::SearchProgress;
 use crate::voxels::outcome::GapAt;
 
-/// How cost and bound of blocks come together, added up.
+/// The gaps between cost and bound of blocks, added up.
 #[derive(Default)]
 pub(crate) struct SearchSums {
-    /// The sum of gaps at each look of the blocks that were not done before.
+    /// The sum of gaps at each check of the blocks that were not done before.
     gaps: Vec<f64>,
-    /// What the blocks that were done have left, from the next look on.
+    /// The gap that finished blocks have left, from the next check on.
     left: Vec<f64>,
     iterations: Vec<usize>,
     unplanned: f64,
@@ -34,8 +34,8 @@ impl SearchSums {
         let mut left = 0.0;
         let looks = self.gaps.iter().zip(&self.left).zip(&self.iterations);
         let share = |((gap, done), &iteration): ((&f64, &f64), &usize)| {
-            // Blocks end after different numbers of looks. An ended block still counts with the gap
-            // that it left.
+            // Blocks end after different numbers of checks. A finished block still counts with its
+            // last gap.
             let all = gap + left;
             left += done;
             GapAt { iteration, gap: if self.unplanned > 0.0 { all / self.unplanned } else { 0.0 } }

@@ -1,4 +1,4 @@
-//! What stays the same for all layers of a plan.
+//! The settings that are the same for all layers of a plan.
 
 use std::io;
 
@@ -11,14 +11,14 @@ use crate::voxels::levels::Levels;
 use crate::voxels::options;
 use crate::voxels::roles::RoleRules;
 
-/// What stays the same for all layers.
+/// The settings that are the same for all layers.
 #[derive(Debug)]
 pub(crate) struct VoxelSetting {
     pub(crate) grid: TileGrid,
     pub(crate) blur: Blur<f32>,
     pub(crate) rules: RoleRules,
     pub(crate) terms: Terms<f32>,
-    /// The dose from which on voxels cost that are not to be cured.
+    /// The dose from which on voxels that are not to be cured have a cost.
     pub(crate) most_of_dark: f32,
     pub(crate) levels: Levels,
     /// The layers, from the light.
@@ -29,13 +29,14 @@ pub(crate) struct VoxelSetting {
     pub(crate) window: options::Window,
     /// Layers below a window that its light reaches.
     pub(crate) tail: usize,
-    /// How far around a tile light is chosen together with it.
+    /// The distance around a tile within which light is chosen together with it.
     pub(crate) overlap: usize,
-    /// How far from where a layer is not like its neighbours light may change.
+    /// The distance from places where a layer differs from its neighbors within which light may
+    /// change.
     pub(crate) near: usize,
-    /// About how many bytes to use at most.
+    /// About the most bytes to use.
     pub(crate) memory: Option<u64>,
-    /// How many voxels lie around the images.
+    /// The number of voxels around the images.
     pub(crate) around: usize,
     /// The size of the images.
     pub(crate) image: [usize; 2],
@@ -55,15 +56,15 @@ impl VoxelSetting {
         })
     }
 
-    /// Returns the dose from which on a voxel's cost changes, by the price of its dose: prices
-    /// below 0 are those of voxels that are to be cured.
+    /// Returns the dose at which the slope of a voxel's cost changes, by the price of its dose:
+    /// prices below 0 belong to voxels that are to be cured.
     pub(crate) fn aim(&self, price: f32) -> f32 {
         if price < 0.0 { self.terms.least } else { self.most_of_dark }
     }
 }
 
-/// Bits of a price that are not written down: it then has 12 significant ones. Any prices give a
-/// bound, and whole numbers stay what they are.
+/// The bits of a price that are not written down: it then has 12 significant ones. Any prices give
+/// a bound, and whole numbers stay unchanged.
 const LEFT_OUT: u32 = 12;
 
 /// Returns the code of a price.

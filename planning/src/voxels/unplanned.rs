@@ -9,7 +9,7 @@ use crate::voxels::roles::LayerImages;
 use crate::voxels::setting::VoxelSetting;
 
 /// Gives voxels that were not planned, far from surfaces, the slope of their cost as their price:
-/// without it the bound would lack what they cost. `images` are those within reach of `at`.
+/// without it, the bound would lack their cost. `images` are the images within reach of `at`.
 pub(crate) fn price_unplanned(
     setting: &VoxelSetting,
     images: &[&LayerImages],
@@ -22,7 +22,7 @@ pub(crate) fn price_unplanned(
         let rect = grid.tile(tile);
         let of_all = setting.rules.role_of_all(images, at, &rect);
         if let (Tile::Flat(0.0), Tile::Flat(dose), Some(role)) =
-            // Voxels that are alike in dose and role have one slope.
+            // Voxels of equal dose and role have one slope.
             (&*prices, &doses.tiles[tile], of_all)
         {
             *prices = Tile::Flat(slope(&setting.terms, role, *dose));
@@ -50,9 +50,9 @@ pub(crate) fn price_unplanned(
     });
 }
 
-/// Prices the voxels of a row that have no price and are no fewer side by side than a block's
-/// chunk, which a tile's edge may cut off: others were planned, and have the price 0. Returns
-/// whether there are any.
+/// Sets the price of the voxels in a row that have no price and form a run at least as long as a
+/// block's chunk, which a tile's edge may cut off: others were planned, and have the price 0.
+/// Returns whether there are any.
 fn price_row(terms: &Terms<f32>, roles: &[Role], doses: &[f32], prices: &mut [f32]) -> bool {
     let slopes: Vec<f32> =
         roles.iter().zip(doses).map(|(&role, &dose)| slope(terms, role, dose)).collect();
@@ -71,7 +71,7 @@ fn price_row(terms: &Terms<f32>, roles: &[Role], doses: &[f32], prices: &mut [f3
     any
 }
 
-/// Returns by how much a voxel's cost grows with its dose.
+/// Returns the slope of a voxel's cost over its dose.
 fn slope(terms: &Terms<f32>, role: Role, dose: f32) -> f32 {
     let bounds = terms.price_bounds(role);
     // Any price between the slopes at a voxel's dose gives a bound; the slope itself gives the best
@@ -95,7 +95,7 @@ mod tests {
         assert!(price_row(&terms, &roles, &doses, &mut prices));
         assert!(prices[..LANES + 3].iter().all(|&price| price == -1.0));
         assert_eq!(prices[LANES + 3], -0.25);
-        // A run goes on where the slope changes its sign.
+        // A run continues where the slope changes its sign.
         assert!(prices[LANES + 4..2 * LANES].iter().all(|&price| price == -1.0));
         assert!(prices[2 * LANES..].iter().all(|&price| price == 1.0));
         let mut few = vec![0.0; 3 * LANES];

@@ -62,7 +62,7 @@ fn overcured(doses: &[f64]) -> usize {
 
 #[test]
 fn the_printed_doses_come_out_and_nothing_overcures() {
-    // Figure A.21. Both of its pictures are symmetric: a quarter tells all.
+    // Figure A.21. Both of its pictures are symmetric: a quarter shows all.
     let before =
         [[174, 177, 178, 179], [177, 180, 181, 182], [178, 181, 183, 183], [179, 182, 183, 184]];
     let after =

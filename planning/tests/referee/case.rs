@@ -1,10 +1,10 @@
-//! A small problem, and what a referee says that its best light costs.
+//! A small problem, and the referee's cost of its best light.
 
 use lamp_planning::solver::{Operator, Problem, Role, Search, Shape, Solution, Terms, solve};
 use lamp_planning::{Blur, LayerLight, Real};
 use microlp::{ComparisonOp, OptimizationDirection};
 
-/// A block of voxels with what each of them wants.
+/// A block of voxels with the role of each.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) rows: usize,
@@ -24,7 +24,7 @@ impl Case {
         Shape::holding(self.layers.len(), self.rows, self.columns)
     }
 
-    /// Returns where voxels stand in padded images.
+    /// Returns the places of voxels in padded images.
     pub(crate) fn padded(&self) -> impl Iterator<Item = usize> + use<> {
         let (width, columns) = (self.shape().width, self.columns);
         (0..self.roles.len()).map(move |voxel| voxel / columns * width + voxel % columns)
@@ -49,7 +49,7 @@ impl Case {
         }
     }
 
-    /// Solves the problem to a gap, as a share of what white light costs.
+    /// Solves the problem to a gap, as a share of the cost of white light.
     pub(crate) fn solve<T: Real>(&self, gap: f64) -> (Solution<T>, f64) {
         let problem = self.problem::<T>();
         let white = problem.brightest();
@@ -84,7 +84,7 @@ impl Case {
         (0..light.len()).map(of_voxel).collect()
     }
 
-    /// Returns what doses cost.
+    /// Returns the cost of doses.
     pub(crate) fn cost(&self, doses: &[f64]) -> f64 {
         let cost = |(role, dose): (&Role, f64)| {
             let short = (1.0 + self.margin - dose).max(0.0) * self.short_price;

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::case::Case;
 
-/// What voxels may want, and what light their pixels may have, with either objective.
+/// The roles that voxels and their pixels may have, with either objective.
 fn roles(boundary: bool) -> impl Strategy<Value = Role> {
     let wants = match boundary {
         true => [Role::NONE, Role::DARK, Role::CURED],
@@ -20,7 +20,7 @@ fn roles(boundary: bool) -> impl Strategy<Value = Role> {
 
 fn cases() -> impl Strategy<Value = Case> {
     let layer = (0.3..1.0, 0.05..0.5).prop_map(|(passed, own)| LayerLight { passed, own });
-    // Light of all pixels reaches all others: the referee does not cut off what is faint.
+    // Light of all pixels reaches all others: the referee does not cut off faint light.
     let shape = (1..5usize, 1..5usize, 1..5usize, 1.0..3.0, any::<bool>());
     (shape, 0.0..0.2, 0.1..0.5).prop_flat_map(move |(shape, margin, least_light)| {
         let (deep, rows, columns, sigma, boundary) = shape;
@@ -39,8 +39,8 @@ fn cases() -> impl Strategy<Value = Case> {
     })
 }
 
-/// Checks a case's cost and bound against the referee, to a share of what white light costs.
-/// `rounding` is how far sums may be off.
+/// Checks a case's cost and bound against the referee, to a share of the cost of white light.
+/// `rounding` is the tolerance of sums.
 fn check<T: Real>(case: &Case, gap: f64, rounding: f64) -> Result<(), TestCaseError> {
     let (solution, unplanned) = case.solve::<T>(gap);
     let (end, optimum) = (solution.end(), case.optimum());
@@ -71,7 +71,7 @@ proptest! {
     }
 }
 
-/// Checks that light times the price of light is doses times the price of doses.
+/// Checks that light times the price of light equals doses times the price of doses.
 fn agree<T: Real>(case: &Case, seed: u64, tolerance: f64) -> Result<(), TestCaseError> {
     let operator = case.problem::<T>().operator;
     let voxels = operator.voxels();

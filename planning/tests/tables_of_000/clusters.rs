@@ -1,4 +1,4 @@
-//! Clusters against all that there are, and times of bitmaps against an interior-point method.
+//! Clusters against all possible ones, and times of bitmaps against an interior-point method.
 
 use lamp_planning::column::{
     Clusters, ColumnObjective, ColumnPlan, GlassLight, Setup, Tracing, plan,
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use super::times::least_error;
 use super::zhao::{Part, options, pegda, zhao};
 
-/// The least sum of squares of so many clusters and one at zero, by trying all.
+/// The least sum of squares of this number of clusters and one at zero, by trying all.
 fn least_squares(times: &[u64], clusters: usize) -> f64 {
     let kinds = clusters + 1;
     let all = kinds.pow(u32::try_from(times.len()).unwrap());
@@ -53,7 +53,7 @@ proptest! {
     }
 }
 
-/// The light of each bitmap, as that of a mirror.
+/// The light of each bitmap, like the light of a mirror.
 fn of_bitmaps(light: &GlassLight, planned: &ColumnPlan) -> Vec<Vec<f64>> {
     let width = light.setup().mirrors[0] as u32;
     let doses = |image: &Image| match image {
@@ -71,7 +71,7 @@ fn no_other_times_of_the_bitmaps_are_better() {
     let part = Part::cap(60, 250.0, 200.0);
     let light = GlassLight::new(zhao(23, 60, Tracing::Exact));
     for bitmaps in [2, 5, 12] {
-        // Steps so fine that they do not count.
+        // Steps too fine to matter.
         let fine = lamp_planning::column::ColumnOptions {
             step_s: 1e-7,
             ..options(ColumnObjective::Dose, bitmaps)

@@ -11,7 +11,7 @@ fn light_of(light: &GlassLight, mirror: usize) -> Vec<f64> {
     light.doses(&on)
 }
 
-/// Equations 3.11 and 3.12, ray by ray: what 9 x 9 points send in 15 x 15 directions.
+/// Equations 3.11 and 3.12, ray by ray: the light of 9 x 9 points in 15 x 15 directions.
 fn counted(setup: &Setup, mirror: usize, cone_um: f64, rays: [usize; 2]) -> Vec<f64> {
     let [points, directions] = rays;
     let place = |axis: usize, mirror: usize, point: usize, direction: usize| {
@@ -56,7 +56,7 @@ fn rays_are_those_that_are_counted_one_by_one() {
 
 #[test]
 fn a_mirror_near_the_middle_has_these_rays() {
-    // Worked out apart from this code: rays an axis on the voxels from 147.
+    // Computed separately from this code: rays along an axis on the voxels from 147.
     let light = GlassLight::new(zhao(151, 300, RAYS));
     let rays = [4.0, 21.0, 42.0, 43.0, 21.0, 4.0];
     let found = light_of(&light, 75 * 151 + 75);

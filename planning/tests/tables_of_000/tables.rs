@@ -1,6 +1,6 @@
-//! The rows that 000 prints. `docs/plan.md` sets them beside what comes out.
+//! The rows that 000 prints. `docs/plan.md` compares them with the results.
 //!
-//! Numbers that are held closer than the printed ones were worked out apart from this code.
+//! Numbers checked more closely than the printed ones were computed separately from this code.
 
 use lamp_planning::column::{ColumnObjective, GlassLight, Measures, Setup, Tracing, plan};
 use lamp_planning::projector::Projector;
@@ -49,7 +49,7 @@ fn appendix_a_gives_the_dose_for_450_um() {
     assert_within("dose", pegda().dose(450.0).unwrap(), 28.8203, 1e-3);
 }
 
-/// Doses of the times in so many clusters, and RMS(T - Bt) over all mirrors.
+/// Doses of the times in this number of clusters, and RMS(T - Bt) over all mirrors.
 fn in_clusters(light: &GlassLight, seconds: &[f64], clusters: usize) -> (Vec<f64>, f64) {
     let bitmaps = seeds_k_means(seconds, clusters);
     let apart = rms(seconds.iter().zip(&bitmaps).map(|(time, shown)| time - shown));

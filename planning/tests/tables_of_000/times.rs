@@ -1,4 +1,4 @@
-//! Times against the interior-point method of `clarabel`, and what must hold for any.
+//! Times against the interior-point method of `clarabel`, and properties that any times must have.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, ZeroConeT};
@@ -17,7 +17,7 @@ fn of_mirrors(light: &GlassLight) -> Vec<Vec<f64>> {
 /// The least half sum of squares of HT - E0 for times up to `high`, by `clarabel`, where `light`
 /// holds H's columns.
 ///
-/// What is missing, r = HT - E0, is a variable of its own.
+/// The residual, r = HT - E0, is a variable of its own.
 pub(crate) fn least_error(light: &[Vec<f64>], wanted: &[f64], high: f64) -> f64 {
     let [mirrors, voxels] = [light.len(), wanted.len()];
     let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
@@ -62,7 +62,7 @@ fn planned(setup: Setup, wanted: &[f64], high: f64) -> (GlassLight, Vec<f64>, f6
 fn times_of_a_lens_are_as_near_as_those_of_an_interior_point_method() {
     let part = Part::cap(60, 250.0, 200.0);
     for tracing in [RAYS, Tracing::Exact] {
-        // Below 60 s some mirrors are on for as long as they may.
+        // Below 60 s, some mirrors are on for the longest time allowed.
         for high in [600.0, 60.0] {
             let (light, seconds, error) = planned(zhao(23, 60, tracing), &part.doses, high);
             assert!(seconds.iter().all(|time| (0.0..=high).contains(time)));

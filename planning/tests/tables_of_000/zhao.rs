@@ -10,17 +10,18 @@ use lamp_stack::{Catalogued, Length};
 
 /// 000's rays: 9 x 9 points of a mirror, 15 x 15 directions.
 pub(crate) const RAYS: Tracing = Tracing::Rays { points: 9, directions: 15 };
-/// From mirror to mirror on the glass, in um: 421 voxels of 10 um over 151 mirrors (appendix B).
+/// The distance from mirror to mirror on the glass, in um: 421 voxels of 10 um over 151 mirrors
+/// (appendix B).
 pub(crate) const PITCH_UM: f64 = 4210.0 / 151.0;
-/// What reflects of a mirror: 12.65 of 13.65 um.
+/// The reflecting share of a mirror: 12.65 of 13.65 um.
 pub(crate) const LIT: f64 = 12.65 / 13.65;
 /// Power of a ray, in mW (appendix C).
 const RAY_MW: f64 = 8.0275e-11;
-/// No optimum of these tests comes near: 000 has no bound.
+/// No optimum of these tests gets near this: 000 has no bound.
 pub(crate) const LONGEST_S: f64 = 600.0;
 pub(crate) const CERTAIN: Stop = Stop { gap: 1e-6, steps: 10_000 };
 
-/// 000's projector, with so many mirrors and column voxels along both axes.
+/// 000's projector, with this number of mirrors and column voxels along both axes.
 pub(crate) fn zhao(mirrors: usize, voxels: usize, tracing: Tracing) -> Setup {
     setup(mirrors, voxels, PITCH_UM, 12.0, tracing)
 }
@@ -64,10 +65,10 @@ pub(crate) fn options(objective: ColumnObjective, bitmaps: usize) -> ColumnOptio
     }
 }
 
-/// A part that is to be cured on so many column voxels along both axes.
+/// A part to be cured on this number of column voxels along both axes.
 pub(crate) struct Part {
     pub(crate) map: HeightMap,
-    /// mJ/cm2 that cure it.
+    /// The doses in mJ/cm2 that cure it.
     pub(crate) doses: Vec<f64>,
 }
 
@@ -77,7 +78,7 @@ impl Part {
         Self::new(Target::builtin(name).unwrap().heights(&grid).unwrap())
     }
 
-    /// A cap of a sphere: half its base, and its height.
+    /// A cap of a sphere, by half of its base and its height.
     pub(crate) fn cap(voxels: usize, half: f64, high: f64) -> Self {
         let grid = Grid { columns: voxels, rows: voxels, pitch_um: 10.0 };
         let places =
@@ -92,7 +93,7 @@ impl Part {
         Self { map, doses }
     }
 
-    /// Finds the times that 000 optimises E for.
+    /// Finds the times for which 000 optimizes E.
     pub(crate) fn times(&self, light: &GlassLight) -> MirrorTimes {
         let times = nearest_times(light, &self.doses, LONGEST_S, &[0.0], CERTAIN);
         assert!(times.relative_gap() <= CERTAIN.gap, "{:e}", times.relative_gap());
@@ -116,8 +117,8 @@ pub(crate) fn rms(numbers: impl Iterator<Item = f64> + Clone) -> f64 {
     (numbers.map(|number| number * number).sum::<f64>() / count).sqrt()
 }
 
-/// Appendix C's k-means: means begin at the first number, then at those farthest from all means.
-/// Returns the mean of each number's cluster.
+/// Appendix C's k-means: means begin at the first number, then at the numbers farthest from all
+/// means. Returns the mean of each number's cluster.
 pub(crate) fn seeds_k_means(numbers: &[f64], clusters: usize) -> Vec<f64> {
     let mut means = vec![numbers[0]];
     let mut far: Vec<_> = numbers.iter().map(|number| (number - numbers[0]).abs()).collect();
