@@ -9,11 +9,11 @@ use super::part_stack::white_of;
 pub struct LayerAreas {
     /// The index of the build's layer.
     pub index: u32,
-    /// The height of its bottom in micrometres.
+    /// The height of its bottom in micrometers.
     pub z_um: Option<f64>,
-    /// Its thickness in micrometres.
+    /// Its thickness in micrometers.
     pub thickness_um: Option<f64>,
-    /// How long it is exposed, in milliseconds.
+    /// The exposure in milliseconds.
     pub exposure_ms: Option<f64>,
     /// The pixels of one copy of each part, in the order of the parts.
     pub part_px: Vec<u64>,
@@ -29,7 +29,7 @@ pub(super) struct Areas {
 }
 
 impl Areas {
-    /// Returns the pixels of the parts' `images`, and those of the mesh.
+    /// Counts the pixels of the parts' `images`; the mesh has `mesh_px`.
     pub(super) fn new(parts: usize, images: &[(usize, Image)], mesh_px: u64) -> Self {
         let mut part_px = vec![0; parts];
         for (part, image) in images {
@@ -59,7 +59,7 @@ impl Areas {
 pub struct CuredPixels {
     /// The number of pixels.
     pub pixels: u64,
-    /// The sum of pixels times thicknesses in micrometres, if all thicknesses are known.
+    /// The sum of pixels times thicknesses in micrometers, if all thicknesses are known.
     pixel_um: Option<f64>,
 }
 
@@ -77,12 +77,12 @@ impl CuredPixels {
         self.pixel_um = self.pixel_um.zip(added).map(|(sum, added)| sum + added);
     }
 
-    /// Returns their area in square millimetres, added up over all layers.
+    /// Returns their area in square millimeters, added up over all layers.
     pub fn area_mm2(&self, dpi: Dpi) -> f64 {
         self.pixels as f64 * dpi.pitch().mm().powi(2)
     }
 
-    /// Returns their volume in cubic millimetres, if all thicknesses are known.
+    /// Returns their volume in cubic millimeters, if all thicknesses are known.
     pub fn volume_mm3(&self, dpi: Dpi) -> Option<f64> {
         Some(self.pixel_um? * dpi.pitch().mm().powi(2) / 1000.0)
     }

@@ -5,7 +5,7 @@ use lamp_stack::Layer;
 use super::areas::Areas;
 use super::{BuildFinding, TileError};
 
-/// What is told of a layer, and the pixels that make it up.
+/// A layer, its findings, and the pixels that make it up.
 pub(super) type Made = (Layer, (Vec<BuildFinding>, Areas));
 
 /// Passes on layers. After the last comes an error if a part was black in all of them.

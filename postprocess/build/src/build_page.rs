@@ -1,4 +1,4 @@
-//! The pages of a build: where rows and copies are, and what each part's page said.
+//! The pages of a build: the places of rows and copies, and the entries of each part's page.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -143,8 +143,8 @@ impl Layout {
         BuildRecord { parts, base_layers: self.mesh.as_ref().map_or(0, |mesh| mesh.base_layers) }
     }
 
-    /// Returns the number of layers if all stacks say theirs: they start together, so it
-    /// is that of the longest.
+    /// Returns the number of layers if all stacks state theirs. They start together, so the longest
+    /// stack gives the number.
     fn layer_count(&self) -> Option<u32> {
         if self.resampled {
             return None;
@@ -191,8 +191,8 @@ fn exposure(step: &LayerSet, here: &[PartLayer<'_>]) -> Result<Option<f64>, Tile
     }
 }
 
-/// Returns the other entries of the parts' pages: those that are equal in all as they
-/// are, the rest under `of_parts`, a map for each part.
+/// Returns the other entries of the parts' pages. Entries that are equal in all parts stay as they
+/// are, the rest go under `of_parts`, a map for each part.
 fn common(here: &[PartLayer<'_>], parts: usize) -> Map<String, Value> {
     let Some((_, _, first)) = here.first() else { return Map::new() };
     let is_common = |key: &str, value: &Value| {

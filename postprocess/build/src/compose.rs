@@ -30,7 +30,7 @@ pub enum ComposeError {
     TooManyRuns,
 }
 
-/// Puts images on a build, which is gray if any of them is, and black around them except for a
+/// Puts images on a build. The build is gray if any image is, and black around them except for a
 /// mesh.
 pub(super) fn compose(
     images: &[PlacedImage],

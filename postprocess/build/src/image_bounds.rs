@@ -9,7 +9,7 @@ use lamp_stack::{Dpi, Frame, Layer, Length, Orientation, PageInfo, PassingLayer}
 /// It is written as `x 1.000 to 4.000 and y 3.000 to 5.000 mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageBounds {
-    /// The top left corner, in millimetres.
+    /// The top left corner, in millimeters.
     pub origin_mm: [f64; 2],
     /// The resolution, if it is known.
     pub dpi: Option<Dpi>,
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn turning_moves_the_corner_about_zero() {
-        // One pixel is one millimetre: x 1 to 4, y 3 to 5.
+        // One pixel is one millimeter: x 1 to 4, y 3 to 5.
         let image = place([1.0, 5.0], 3, 2);
         for (turn, origin) in [
             ("0", [1.0, 5.0]),

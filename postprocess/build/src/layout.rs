@@ -200,7 +200,7 @@ impl Layout {
         self.pixels
     }
 
-    /// Returns each copy's number among those of its part, from 1.
+    /// Returns each copy's number among the copies of its part, from 1.
     pub fn numbers(&self) -> impl Iterator<Item = u32> {
         let mut counts = vec![0; self.parts.len()];
         self.placements.iter().map(move |placement| {
@@ -295,7 +295,7 @@ mod tests {
     use super::super::testing::mask_of;
     use super::*;
 
-    /// At 25.4 dpi, one pixel is one millimetre.
+    /// At 25.4 dpi, one pixel is one millimeter.
     fn part(outline: bool) -> PartStack {
         let image =
             Image::Mask(mask_of(&["........", ".##.....", ".##.....", ".####...", "........"]));

@@ -9,11 +9,11 @@
 //! }
 //! ```
 //!
-//! `x_mm` and `y_mm` are the distances from the build area's lower left corner to that
-//! of the copy's image, as it lies there, rounded to pixels. The image is the whole
-//! page with its black margin, which may reach beyond the area where the part does
-//! not. `turn` is 0, 90, 180 or 270 degrees anticlockwise; `"mirror": true` mirrors the
-//! image left to right before it is turned. `serial` is a copy's serial number, if it has one.
+//! `x_mm` and `y_mm` are the distances from the build area's lower left corner to the lower left
+//! corner of the copy's image, as it lies there, rounded to pixels. The image is the whole page
+//! with its black margin, which may reach beyond the area where the part does not. `turn` is 0, 90,
+//! 180 or 270 degrees counterclockwise; `"mirror": true` mirrors the image left to right before it
+//! is turned. `serial` is a copy's serial number, if it has one.
 
 use std::collections::HashMap;
 
@@ -37,7 +37,7 @@ use super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LayoutFile {
-    /// The width and height of the build area in millimetres.
+    /// The width and height of the build area in millimeters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     area_mm: Option<[f64; 2]>,
     copies: Vec<CopyEntry>,
@@ -49,11 +49,11 @@ pub struct LayoutFile {
 pub struct CopyEntry {
     /// The part's stack.
     pub part: String,
-    /// From the area's left edge to that of the copy's image.
+    /// From the area's left edge to the left edge of the copy's image.
     pub x_mm: f64,
-    /// From the area's lower edge to that of the copy's image.
+    /// From the area's lower edge to the lower edge of the copy's image.
     pub y_mm: f64,
-    /// Degrees anticlockwise, after it is mirrored.
+    /// Degrees counterclockwise, after it is mirrored.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub turn: u32,
     /// Whether its image is mirrored left to right.
@@ -108,7 +108,7 @@ pub enum LayoutError {
     SerialTwice {
         /// The copy's index, from 0.
         copy: usize,
-        /// That of the first with this serial number.
+        /// The index of the first copy with this serial number, from 0.
         first: usize,
         /// The serial number.
         serial: String,
@@ -144,7 +144,7 @@ impl LayoutFile {
     /// Reads a layout.
     ///
     /// # Errors
-    /// Returns an error if the text is none, or a value cannot stand on a build area.
+    /// Returns an error if the text is not a layout, or a value cannot stand on a build area.
     pub fn from_json(text: &str) -> Result<Self, LayoutError> {
         let file: Self = serde_json::from_str(text)
             .map_err(|error| LayoutError::Json { problem: one_line(&error.to_string()) })?;
@@ -295,7 +295,7 @@ fn margins(part: &PartStack, turn: Orientation) -> (i64, i64) {
         (left, right) = (right, left);
     }
     for _ in 0..turn.quarters() {
-        // A quarter anticlockwise brings the right edge to the top.
+        // A quarter counterclockwise brings the right edge to the top.
         (left, top, right, bottom) = (top, right, bottom, left);
     }
     (left, top)

@@ -1,8 +1,8 @@
 //! Reads several stacks layer by layer, by height.
 //!
-//! A layer of the build takes from each stack the layer that spans the same heights.
-//! The first stack leads, and where it has ended the next one that goes on; so
-//! shorter parts just end. One layer of each stack is in memory.
+//! A layer of the build takes from each stack the layer that spans the same heights. The first
+//! stack leads. Where it ends, the next stack that goes on leads, so shorter parts just end. One
+//! layer of each stack is in memory.
 
 use std::sync::Arc;
 
@@ -16,9 +16,9 @@ pub struct HeightOptions {
     /// Counts heights from each stack's first layer, so that all parts stand on the
     /// platform.
     pub settle: bool,
-    /// Joins layers that do not match. The build has the heights of the first stack,
-    /// above it layers as thick as its last, and takes of each other stack the layer
-    /// that holds the top of the build's.
+    /// Joins layers that do not match. The build has the heights of the first stack, and above it
+    /// layers as thick as its last. Each other stack gives the layer that holds the top of the
+    /// build's layer.
     pub resample: bool,
 }
 
@@ -34,13 +34,13 @@ impl HeightOptions {
     }
 }
 
-/// Heights nearer than this are the same, in micrometres.
+/// Heights nearer than this are the same, in micrometers.
 const TOLERANCE_UM: f64 = 1.0;
 
 /// The layers of all stacks at one height of the build.
 pub(super) struct LayerSet {
     pub(super) index: u32,
-    /// The layer's bottom and thickness in micrometres, if they are known.
+    /// The layer's bottom and thickness in micrometers, if they are known.
     pub(super) z_um: Option<f64>,
     pub(super) thickness_um: Option<f64>,
     /// The layer of each stack that has one here.
@@ -97,7 +97,7 @@ struct SteppedStack<S> {
     /// The number of copies on the build.
     copies: usize,
     next: Option<Arc<Layer>>,
-    /// What its heights are raised by, in micrometres.
+    /// Amount by which its heights are raised, in micrometers.
     up: f64,
 }
 
@@ -177,7 +177,7 @@ where
         Ok(())
     }
 
-    /// Checks that the next layers of all stacks span what the leader's does.
+    /// Checks that the next layers of all stacks span the heights of the leader's layer.
     fn check_heights(&self, leader: usize) -> Result<(), TileError> {
         let build = self.stacks[leader].span();
         let all = self.stacks.iter().filter(|stack| stack.next.is_some());
@@ -258,7 +258,7 @@ where
 }
 
 impl<S> SteppedStack<S> {
-    /// Returns the next layer's bottom and top on the build, in micrometres.
+    /// Returns the next layer's bottom and top on the build, in micrometers.
     fn span(&self) -> Option<[f64; 2]> {
         let info = &self.next.as_ref()?.info;
         let bottom = info.z_um? + self.up;

@@ -40,8 +40,8 @@ impl PartStack {
         Ok(Self { name, dpi, image, frame, is_fit: false, outline: None, origin_mm, stack })
     }
 
-    /// Creates a part whose extents are placed, the least frame that holds what is white
-    /// in any of its layers. Returns `None` if there are no layers.
+    /// Creates a part whose extents are placed: the least frame that holds the white pixels of all
+    /// its layers. Returns `None` if there are no layers.
     ///
     /// # Errors
     /// Returns the layers' errors, and one if they have no resolution, differ in
@@ -85,8 +85,8 @@ impl PartStack {
         self.is_fit
     }
 
-    /// Returns it as its images at another angle show it: with another outline, in images of the
-    /// outline's size at another place.
+    /// Returns the part as its images at another angle show it: with another outline, in images of
+    /// the outline's size, at another place.
     pub(super) fn of_turned(&self, outline: &Mask, origin_mm: [f64; 2], name: String) -> Self {
         let image = PixelSize { width: outline.width(), height: outline.height() };
         let frame = extents(outline).expect("an outline has a pixel");
@@ -102,7 +102,7 @@ impl PartStack {
         }
     }
 
-    /// Places another part of the images, which holds what is white.
+    /// Places another part of the images, which holds all white pixels.
     #[cfg(test)]
     pub(super) fn on(self, frame: Frame) -> Self {
         let outline = self.outline.map(|outline| {
@@ -173,10 +173,10 @@ impl PartStack {
         Ok(())
     }
 
-    /// What is placed of a layer.
+    /// Returns the placed part of a layer.
     ///
     /// # Errors
-    /// Where it is not within the extents that were found.
+    /// Returns an error if the layer is not within the extents that were found.
     pub(super) fn framed(&self, layer: &Layer) -> Result<Image, TileError> {
         self.check(layer)?;
         if self.is_fit && !is_within(&layer.image, self.frame) {
@@ -185,8 +185,8 @@ impl PartStack {
         Ok(layer.image.framed(self.frame))
     }
 
-    /// What is placed of a layer below those that are built. Where a range's extents are
-    /// placed, the layers below may be wider, and are cut off.
+    /// Returns the placed part of a layer that lies below the built ones. Where a range's extents
+    /// are placed, the layers below may be wider, and are cut off.
     pub(super) fn framed_below(&self, layer: &Layer) -> Result<Image, TileError> {
         self.check(layer)?;
         Ok(layer.image.framed(self.frame))

@@ -42,7 +42,7 @@ impl Default for TileOptions {
 }
 
 /// Lays copies of one stack's layers out on a black build area, in rows from the top
-/// left, centred. The first layer decides where the copies stand; its page says so, in
+/// left, centered. The first layer decides where the copies stand; its page says so, in
 /// pixels.
 ///
 /// ```
@@ -81,7 +81,7 @@ pub fn tile<E: From<TileError> + Send>(
     build.flatten()
 }
 
-/// What a layer of the build is made of.
+/// The parts and the mesh of a layer of the build.
 pub(crate) struct MeshedStep {
     pub(crate) set: LayerSet,
     /// The images of parts that have a layer here.
@@ -89,13 +89,13 @@ pub(crate) struct MeshedStep {
     pub(crate) mesh: Option<MeshRows>,
     /// The pixels of the mesh, if they are wanted.
     pub(crate) mesh_px: u64,
-    /// The pieces of mesh that hang on nothing, if they are others than in the layer below.
+    /// The pieces of mesh that hang on nothing, if they differ from the pieces in the layer below.
     pub(crate) loose: Option<LoosePieces>,
     /// Whether it is the build's first.
     pub(crate) is_first: bool,
 }
 
-/// What is told while the layers of a build are made.
+/// A finding reported while the layers of a build are made.
 #[derive(Clone, Debug)]
 pub enum BuildFinding {
     /// Rows that a part's page calls stray.
@@ -104,15 +104,15 @@ pub enum BuildFinding {
     Loose(LoosePieces),
     /// Nothing is left of the mesh in this layer of the build.
     NoMesh(String),
-    /// What a layer is made of, if that is wanted: for every layer, in order, those of mesh alone
-    /// among them.
+    /// The areas of a layer, if they are wanted: for every layer in order, also for layers of mesh
+    /// alone.
     Areas(LayerAreas),
 }
 
-/// What is wanted of a build beside the pages of its layers.
+/// The outputs that are wanted of a build besides the pages of its layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildWanted {
-    /// The images of the layers. Without them these are left empty: then the stacks are read and
+    /// The images of the layers. Without them the images stay empty: the stacks are only read and
     /// checked, at a fraction of the cost.
     pub images: bool,
     /// How many pixels the parts and the mesh of each layer have.
@@ -160,8 +160,9 @@ impl Layout {
         })
     }
 
-    /// Makes the build's layers as [`build`](Self::build) does, or what is `wanted` of them, and
-    /// tells what a [`Recipe`](crate::Recipe) needs. What is told of a layer is told before it comes.
+    /// Makes the build's layers as [`build`](Self::build) does, or only the outputs `wanted` of
+    /// them, and reports the findings that a [`Recipe`](crate::Recipe) needs. The findings of a
+    /// layer come before the layer.
     ///
     /// # Panics
     /// Panics if there are not as many stacks as parts.
@@ -192,7 +193,7 @@ impl Layout {
         let made = mesh.as_ref().filter(|mesh| images || areas || mesh.tells_loose());
         let mut kept = made.map(|mesh| KeptMesh::new(mesh, &layout));
         let (mut is_first, mut known) = (true, Vec::new());
-        // In order, as the mesh of a layer is made from that of the one below.
+        // In order, because the mesh of a layer is made from the mesh of the layer below.
         let steps = std::iter::from_fn(move || {
             loop {
                 let step = match steps.next()? {
@@ -274,7 +275,7 @@ impl Layout {
         Ok(MeshedStep { set, images, mesh, mesh_px: 0, loose: None, is_first: false })
     }
 
-    /// Returns what is placed of the parts' layers at a height.
+    /// Returns the placed images of the parts' layers at a height.
     pub(crate) fn framed(
         &self,
         set: &LayerSet,
@@ -296,7 +297,7 @@ impl Layout {
         let composed = compose(&placed, self.pixels, step.mesh.as_ref());
         composed.map_err(|fault| match fault {
             ComposeError::TooManyRuns => self.too_many_runs(&step.set),
-            // The layout was checked by outlines, so a layer is white outside its own.
+            // The layout was checked by outlines, so a layer is white outside its outline.
             ComposeError::Overlap => {
                 let name = self.parts[step.images[0].0].name().to_owned();
                 TileError::Changed { name, layer: step.set.some_layer().info.name() }

@@ -49,7 +49,7 @@ pub enum TileError {
     /// The walls leave no holes, or cells are smaller than a few pixels.
     #[error("a mesh of cells {cell} apart with walls of {wall} has no holes")]
     NoCells {
-        /// The distance between the centres of neighbouring cells.
+        /// The distance between the centers of neighboring cells.
         cell: Length,
         /// The thickness of the walls.
         wall: Length,
@@ -89,7 +89,7 @@ pub enum TileError {
     /// No piece of mesh can be so large.
     #[error("a least piece of {least_mm2} mm2 of mesh is larger than the build area of {area_mm}")]
     LargePiece {
-        /// The area of the least piece that is wanted, in square millimetres.
+        /// The area of the least piece that is wanted, in square millimeters.
         least_mm2: f64,
         /// The area as lengths.
         area_mm: Size,
@@ -254,7 +254,7 @@ pub enum TileError {
 pub struct CopyName {
     /// The part.
     pub name: String,
-    /// The copy's number among those of the part, from 1.
+    /// The copy's number among the copies of the part, from 1.
     pub number: u32,
 }
 
@@ -264,7 +264,7 @@ impl fmt::Display for CopyName {
     }
 }
 
-/// Tells that fewer copies fit than were asked for.
+/// Says that fewer copies fit than were asked for.
 fn fewer(asked: u32, most: u32) -> String {
     match most {
         0 => "no copy found a place".to_owned(),
@@ -272,7 +272,7 @@ fn fewer(asked: u32, most: u32) -> String {
     }
 }
 
-/// Returns a length in millimetres, rounded to a tenth of a micrometre.
+/// Returns a length in millimeters, rounded to a tenth of a micrometer.
 fn mm(length: Length) -> f64 {
     (length.um() * 10.0).round() / 1e4
 }

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::testing::{layer, mask_of};
 use super::*;
 
-/// At 25.4 dpi, one pixel is one millimetre.
+/// At 25.4 dpi, one pixel is one millimeter.
 fn options(area: &str, copies: Option<u32>, gap_mm: f64) -> TileOptions {
     TileOptions { area: area.parse().unwrap(), copies, gap: Length::from_mm(gap_mm) }
 }
@@ -80,7 +80,7 @@ fn stray_rows_are_named_where_they_are_now() {
     let build = tiled(part.clone(), &options("100x50mm", None, 2.0)).unwrap();
     assert_eq!(build.info.stray_rows, [7, 29]);
     assert_eq!(build.info.open_rows, [7, 24, 29, 46]);
-    // Upside down, the row below an end is another; on its side it is none.
+    // Upside down, the row below an end is another one; on its side, the part has no such row.
     let turned = |turn: u32| {
         let line =
             format!(r#"{{"copies": [{{"part": "p", "x_mm": 0, "y_mm": 0, "turn": {turn}}}]}}"#);

@@ -24,7 +24,7 @@ pub struct BuildTime {
 pub struct SwathTime {
     /// The number of swaths of a layer.
     pub count: u32,
-    /// How long a swath is, in millimetres.
+    /// The length of a swath, in millimeters.
     pub length_mm: f64,
     /// All swaths of all layers, and the steps between them, in seconds.
     pub seconds: f64,
@@ -33,8 +33,8 @@ pub struct SwathTime {
 impl BuildTime {
     /// Adds up the time of layers with these exposures in milliseconds, whose images have one size.
     ///
-    /// A layer is recoated once. A machine with a swath speed v exposes it in n swaths of the images'
-    /// height L, which take n L / v and n - 1 steps.
+    /// A layer is recoated once. A machine with a swath speed v exposes it in n swaths of the
+    /// images' height L, which take n L / v and n - 1 steps.
     pub fn new(
         machine: Option<&Machine>,
         exposures_ms: impl IntoIterator<Item = Option<f64>>,
@@ -60,9 +60,9 @@ impl BuildTime {
         }
     }
 
-    /// Returns the time of the build in seconds, if that of its light is known. Swaths take the time
-    /// that they take: the exposure of a place passes while a swath goes over it. Recoating
-    /// counts if it is known.
+    /// Returns the time of the build in seconds, if the time of its light is known. Swaths take
+    /// their own time: the exposure of a place passes while a swath goes over it. Recoating counts
+    /// if it is known.
     pub fn sum_s(&self) -> Option<f64> {
         let light_s = self.swaths.map(|swaths| swaths.seconds).or(self.exposure_s);
         Some(light_s? + self.recoating_s.unwrap_or(0.0))
@@ -97,7 +97,7 @@ mod tests {
 
     fn time(more: &str, exposures_ms: &[Option<f64>]) -> BuildTime {
         let machine = machine(more).unwrap();
-        // 10 pixels a millimetre.
+        // 10 pixels a millimeter.
         BuildTime::new(Some(&machine), exposures_ms.iter().copied(), SIZE, Dpi::new(254.0))
     }
 

@@ -37,7 +37,7 @@ impl Cone {
         [reach(-1.0, 0).min(reach(-1.0, 1)), reach(1.0, 0).max(reach(1.0, 1))]
     }
 
-    /// Returns the pixels whose centres are in its section at a height: at most one run a row, as
+    /// Returns the pixels whose centers are in its section at a height: at most one run a row, as
     /// the row, the first column and the column after the last, from the top. The image's
     /// resolution is known.
     pub(super) fn section(
@@ -49,7 +49,7 @@ impl Cone {
         let dpi = image.dpi.expect("shapes are drawn in known resolutions");
         let pitch_mm = dpi.pitch().mm();
         let up_mm = height.mm() - self.from_mm[2];
-        // Pixel centres are whole numbers; the casts make negative values zero.
+        // Pixel centers are whole numbers; the casts make negative values zero.
         let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
         let [low, high] = self.reach_mm(1);
         let end = (pixels(y1 - low).floor() + 1.0) as u32;

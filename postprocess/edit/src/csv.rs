@@ -23,8 +23,8 @@ impl CsvRow {
 /// cells that have no quotes are removed; cells in quotes may hold commas and lines.
 ///
 /// # Errors
-/// Returns an error if quotes do not pair, cells are separated by something else than commas, or
-/// a row has another number of cells than the first.
+/// Returns an error if quotes do not pair, cells are separated by anything but commas, or a row has
+/// another number of cells than the first.
 pub(super) fn csv_rows(text: &str) -> Result<Vec<CsvRow>, ListProblem> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = CsvReader { rest: text.chars().peekable(), line: 1 };

@@ -36,7 +36,7 @@ pub enum EditError {
     Edit {
         /// The edit's number, from 1.
         number: usize,
-        /// What is wrong with it.
+        /// The problem.
         problem: EditProblem,
     },
     /// The pages do not say how large pixels are, so lengths mean nothing.
@@ -56,7 +56,7 @@ pub enum EditError {
     Layer {
         /// The layer's name.
         layer: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: LayerProblem,
     },
 }
@@ -113,10 +113,10 @@ pub enum EditProblem {
     /// The shape has more runs than an image can hold.
     #[error("it has more runs than an image can hold")]
     TooManyRuns,
-    /// The shape covers no pixel's centre.
+    /// The shape covers no pixel's center.
     #[error("no pixel is in it: the image is {0}")]
     NoPixel(ImageBounds),
-    /// The box to keep lies beside the image.
+    /// The box to keep lies outside the image.
     #[error("nothing is left: the image is {0}")]
     NothingLeft(ImageBounds),
     /// The padded image would be larger than the largest image.
@@ -148,7 +148,7 @@ pub enum EditProblem {
     List {
         /// The list's file.
         list: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: ListProblem,
     },
     /// A label is not all on the image.
@@ -156,7 +156,7 @@ pub enum EditProblem {
     LabelOutside {
         /// The label's text.
         text: String,
-        /// The image, or that of the part whose copy has the label.
+        /// The image, or the image of the part whose copy has the label.
         image: ImageBounds,
     },
     /// A picture is not all on the image.
@@ -164,7 +164,7 @@ pub enum EditProblem {
     PictureOutside {
         /// The name of the picture's file.
         picture: String,
-        /// The image, or that of the part whose copies have the picture.
+        /// The image, or the image of the part whose copies have the picture.
         image: ImageBounds,
     },
     /// A file of a picture has more than one.
@@ -237,7 +237,7 @@ pub enum LayerProblem {
         /// The edit's number, from 1.
         edit: usize,
     },
-    /// The other stack is white beside the image.
+    /// The other stack is white outside the image.
     #[error("what is added to it reaches beside its image: pad it first")]
     BesideImage,
     /// Rotating would make columns of stray rows.

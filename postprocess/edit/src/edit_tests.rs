@@ -1,4 +1,4 @@
-//! Whole lists of edits beside a referee that looks at each pixel.
+//! Whole lists of edits against a referee that looks at each pixel.
 
 use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, Op, PageInfo, StackInfo};
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ use super::*;
 const WIDTH: u32 = 12;
 const HEIGHT: u32 = 9;
 
-/// At 25.4 dpi a pixel is a millimetre: x 3 to 15, y -2 to 7, layers of 1 mm.
+/// At 25.4 dpi a pixel is a millimeter: x 3 to 15, y -2 to 7, layers of 1 mm.
 fn layer(index: u32, image: Image) -> Layer {
     let stack = StackInfo { part: "bars".to_owned(), ..StackInfo::default() };
     let info = PageInfo {
@@ -23,7 +23,7 @@ fn layer(index: u32, image: Image) -> Layer {
     Layer { info, dpi: Dpi::new(25.4), image: image.into() }
 }
 
-/// The middle of a pixel and its layer, in millimetres.
+/// The middle of a pixel and its layer, in millimeters.
 fn middle(column: u32, row: u32, index: u32) -> [f64; 3] {
     [3.5 + f64::from(column), 6.5 - f64::from(row), f64::from(index) + 0.5]
 }
@@ -70,7 +70,7 @@ fn stamped(layers: Vec<Layer>, list: &str, pages: Vec<Layer>) -> Result<Vec<Laye
     edit(layers.into_iter().map(Ok), edits, vec![], pictures, |_, _| {}).collect()
 }
 
-/// Quarters of a millimetre, so that many edges lie on centres.
+/// Quarters of a millimeter, so that many edges lie on centers.
 fn span(from: std::ops::Range<i32>) -> impl Strategy<Value = [f64; 2]> {
     (from, 1i32..20)
         .prop_map(|(start, length)| [f64::from(start), f64::from(start + length)].map(|q| q / 4.0))
@@ -157,7 +157,7 @@ proptest! {
         (from, to) in ([4i32..60, -16..36, -8..24], [4i32..60, -16..36, -8..24]),
         (diameter, op) in (1i32..24, op()),
     ) {
-        // No end plane and no side passes through a centre.
+        // No end plane and no side passes through a center.
         let place = |end: [i32; 3], off: f64| end.map(|q| f64::from(q) / 4.0 + off);
         let (from, to, radius) = (place(from, 0.0137), place(to, 0.0271), f64::from(diameter) / 8.0);
         let list = format!(
@@ -189,7 +189,7 @@ proptest! {
         diameters in [0i32..24, 1i32..24],
         upside_down in any::<bool>(),
     ) {
-        // No end plane and no side passes through a centre.
+        // No end plane and no side passes through a center.
         let place = |end: [i32; 3], off: f64| end.map(|q| f64::from(q) / 4.0 + off);
         let (from, to) = (place(from, 0.0137), place(to, 0.0271));
         let mut radii = diameters.map(|diameter| f64::from(diameter) / 8.0);
@@ -241,7 +241,7 @@ proptest! {
         (quarters, align, turn) in (prop::option::of(1i32..30), 0usize..3, 0usize..8),
         op in op(),
     ) {
-        // No edge of a pixel of the picture lies on a centre.
+        // No edge of a pixel of the picture lies on a center.
         let places: Vec<[f64; 2]> = places.into_iter()
             .map(|(x, y)| [f64::from(x) / 4.0 + 0.013, f64::from(y) / 4.0 + 0.017]).collect();
         let (columns, rows) = (levels[0].len() as f64, levels.len() as f64);

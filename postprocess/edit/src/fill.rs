@@ -1,4 +1,4 @@
-//! Fills outlines: finds the pixels whose centres are inside.
+//! Fills outlines: finds the pixels whose centers are inside.
 
 use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
@@ -47,7 +47,7 @@ impl RunSet {
 
     /// Adds the pixels inside closed lines, by the non-zero rule.
     ///
-    /// As in slicing, a point on a row of pixel centres counts as below it. So shapes that
+    /// As in slicing, a point on a row of pixel centers counts as below it. So shapes that
     /// share a point or an edge leave no gap between them and share no pixel.
     pub(super) fn add_polygons(&mut self, lines: &[Vec<Point>]) {
         let mut crossings = Vec::new();
@@ -80,7 +80,7 @@ impl RunSet {
         }
     }
 
-    /// Makes one run of those that touch or overlap.
+    /// Unites the runs that touch or overlap.
     fn unite(&mut self) {
         self.runs.sort_unstable();
         self.runs.dedup_by(|next, last| {
@@ -151,7 +151,7 @@ mod tests {
         runs.into_mask().unwrap()
     }
 
-    /// How often lines wind about a pixel's centre, by its definition.
+    /// How often lines wind about a pixel's center, by its definition.
     fn winding(lines: &[Vec<Point>], x: f64, y: f64) -> i32 {
         let mut winding = 0;
         for line in lines {
@@ -160,7 +160,7 @@ mod tests {
                     continue;
                 }
                 let at = a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
-                // No centre is that near to a line by chance.
+                // No center is that near to a line by chance.
                 assert!((at - x).abs() > 1e-9);
                 winding += if at > x {
                     0

@@ -53,12 +53,12 @@ pub(super) fn frame_of(
     };
     let [x, y] = from.origin_mm;
     let [left, top] = grid.to_pixels([x + by[0].mm(), y + by[1].mm()]);
-    // The centres of its first column and row lie half a pixel further.
+    // The centers of its first column and row lie half a pixel further.
     let [left, top] = [left, top].map(|pixels| -(pixels + 0.5).round() as i64);
     Ok(Frame { left, top, width: place.width, height: place.height })
 }
 
-/// Returns the frame of the pixels whose centres are in a box.
+/// Returns the frame of the pixels whose centers are in a box.
 pub(super) fn cropped(
     crop: Rectangle,
     number: usize,

@@ -43,8 +43,9 @@ pub(super) fn outlines(
     let mut pen = Pen { lines: Vec::new(), x: 0.0, shift: 0.0, scale, tolerance };
     for letter in text.chars() {
         let id = glyph(&font, letter).ok_or(letter)?;
-        // Rasterizers of screens, whom skrifa follows, move an outline to where the letter's bearing
-        // says that it begins. In this font some bearings are off by a unit: it stays where it is.
+        // Rasterizers of screens, which skrifa follows, move an outline to where the letter's
+        // bearing says that it begins. In this font some bearings are off by a unit, so the outline
+        // stays where it is.
         let (bounds, bearing) = (metrics.bounds(id), metrics.left_side_bearing(id));
         pen.shift = bounds.zip(bearing).map_or(0.0, |(bounds, bearing)| bounds.x_min - bearing);
         if let Some(outline) = glyphs.get(id) {

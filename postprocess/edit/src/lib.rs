@@ -45,7 +45,7 @@ use plan::EditPlan;
 /// edits name, in order, and `pictures` the pictures. `done` is called with each
 /// layer's page and the indices of the edits that were made in it.
 ///
-/// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its centre
+/// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its center
 /// is, a layer in a range of heights if its middle is.
 ///
 /// ```
@@ -88,8 +88,7 @@ pub fn edit<E: From<EditError> + Send>(
         .map(|layer| Ok(layer?.decode().map_err(EditError::from)?))
 }
 
-/// Makes a list of edits as [`edit`] does, in layers of which those are decoded whose image an
-/// edit changes.
+/// Makes a list of edits as [`edit`] does, and decodes only layers whose image an edit changes.
 ///
 /// # Errors
 /// A layer comes with the errors of [`edit`], or with one if it cannot be decoded and must be.

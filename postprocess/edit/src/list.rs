@@ -119,7 +119,7 @@ impl Edits {
     /// ```
     ///
     /// # Errors
-    /// Returns an error that names the line if a list is none of serial numbers.
+    /// Returns an error that names the line if a list is not a list of serial numbers.
     ///
     /// # Panics
     /// Panics if there are fewer `lists` than the labels name.

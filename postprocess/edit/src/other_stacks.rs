@@ -13,8 +13,8 @@ pub struct OtherLayers<E> {
     pub name: String,
     /// The layers, from the bottom.
     pub layers: Box<dyn Iterator<Item = Result<Layer, E>>>,
-    /// Whether layers below the edited ones, and those above, may be lost if the stack is
-    /// added over all heights.
+    /// Whether layers below or above the edited ones may be lost if the stack is added over all
+    /// heights.
     pub may_reach_beyond: [bool; 2],
 }
 
@@ -34,10 +34,10 @@ impl<E: From<EditError>> AlignedStack<E> {
         Self { name, layers, up, current: None, place: None }
     }
 
-    /// Returns the first layer. `number` is that of the edit that names the stack.
+    /// Returns the first layer. `number` is the number of the edit that names the stack.
     ///
     /// # Errors
-    /// Returns an error if there is none or it cannot be read.
+    /// Returns an error if the stack is empty or the layer cannot be read.
     pub(super) fn first(&mut self, number: usize) -> Result<&Layer, E> {
         if self.place.is_none() {
             self.advance()?;
@@ -107,7 +107,7 @@ impl<E: From<EditError>> AlignedStack<E> {
         Ok(is_below.then(|| layer.info.name()))
     }
 
-    /// Returns a layer's bottom and top in micrometres, or by its index if heights are
+    /// Returns a layer's bottom and top in micrometers, or by its index if heights are
     /// unknown.
     fn span(&self, info: &PageInfo, by_height: bool) -> Result<[f64; 2], EditError> {
         match (info.z_um, info.thickness_um) {

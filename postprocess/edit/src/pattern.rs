@@ -24,7 +24,7 @@ pub(super) struct Repeat {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     Step([Length; 3]),
-    /// About an axis of length 1 through a point, anticlockwise as seen from its tip.
+    /// About an axis of length 1 through a point, counterclockwise as seen from its tip.
     Turn {
         centre: [Length; 3],
         axis: [f64; 3],
@@ -144,8 +144,8 @@ impl Repeat {
     }
 }
 
-/// Returns the motions from a shape to each of its repeats, itself first. Each pattern repeats what
-/// those before it make.
+/// Returns the motions from a shape to each of its repeats, itself first. Each pattern repeats the
+/// shapes that the patterns before it make.
 pub(super) fn motions(repeats: &[Repeat]) -> Vec<Motion> {
     let mut motions = vec![Motion::NONE];
     for repeat in repeats {
@@ -168,8 +168,8 @@ impl Motion {
     pub(super) const NONE: Self =
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], by_um: [0.0; 3] };
 
-    /// Rotates about an axis of length 1 through a point, by Rodrigues' formula. Quarter turns about
-    /// x, y and z are exact.
+    /// Rotates about an axis of length 1 through a point, by Rodrigues' formula. Quarter turns
+    /// about x, y and z are exact.
     fn about(centre_um: [f64; 3], axis: [f64; 3], degrees: f64) -> Self {
         let [sin, cos] = sin_cos(degrees);
         let [x, y, z] = axis;
@@ -227,7 +227,7 @@ impl Motion {
     }
 }
 
-/// Returns the sine and cosine of an angle; those of quarter turns are exact.
+/// Returns the sine and cosine of an angle; they are exact for quarter turns.
 fn sin_cos(degrees: f64) -> [f64; 2] {
     let degrees = degrees.rem_euclid(360.0);
     if degrees % 90.0 == 0.0 {
@@ -260,7 +260,7 @@ pub(super) fn repeats<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Repeat>,
     from.deserialize_any(Repeats)
 }
 
-/// Reads a point or step `[x, y]` or `[x, y, z]`; without z that is 0.
+/// Reads a point or step `[x, y]` or `[x, y, z]`; without z, z is 0.
 fn some_point<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[Length; 3]>, D::Error> {
     match lengths_of(from)?[..] {
         [x, y] => Ok(Some([x, y, Length::default()])),
@@ -286,7 +286,7 @@ mod tests {
         table.map(|table| table.repeat).map_err(|error| error.message().to_owned())
     }
 
-    /// Returns where the point (1, 0, 2) mm lies in each repeat, in millimetres.
+    /// Returns where the point (1, 0, 2) mm lies in each repeat, in millimeters.
     fn places(text: &str) -> Vec<[f64; 3]> {
         let point = [1.0, 0.0, 2.0].map(Length::from_mm);
         let at = |motion: Motion| motion.of(point).map(Length::mm);

@@ -1,4 +1,4 @@
-//! Patterns beside the same shapes written one by one, and beside turned images.
+//! Patterns against the same shapes written one by one, and against turned images.
 
 use lamp_stack::{Dpi, Image, Layer, Mask, MaskBuilder, Op, Orientation, PageInfo};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use super::*;
 
 const SIDE: u32 = 40;
 
-/// At 25.4 dpi a pixel is a millimetre: x and y -20 to 20, layers of 1 mm from -4.
+/// At 25.4 dpi a pixel is a millimeter: x and y -20 to 20, layers of 1 mm from -4.
 fn layer(index: u32, mask: Mask) -> Layer {
     let info = PageInfo {
         index,
@@ -49,13 +49,13 @@ fn lengths(mm: &[f64]) -> String {
     format!("[{}]", texts.join(", "))
 }
 
-/// The shapes, each with the places that tell where it is: as its corners, in order, or its ends.
+/// The shapes, each with the places that define it: its corners, in order, or its ends.
 const SHAPES: [&str; 8] =
     ["box", "disc", "line", "polygon", "strut", "cone", "sphere", "lying cylinder"];
 
-/// Returns a shape's places in millimetres. None of its edges runs through a centre.
+/// Returns a shape's places in millimeters. None of its edges runs through a center.
 fn places(shape: &str, q: [i32; 6]) -> Vec<[f64; 3]> {
-    // Each has an offset of its own: the end of a diagonal line would run through centres.
+    // Each has an offset of its own: the end of a diagonal line would run through centers.
     let offsets = [0.0137, 0.0171, 0.0193, 0.0113, 0.0071, 0.0229];
     let [x, y, z, a, b, c] = std::array::from_fn(|i| f64::from(q[i]) * 0.25 + offsets[i]);
     match shape {

@@ -9,8 +9,8 @@ use super::pattern::Motion;
 use super::pixel_map::PixelMap;
 use super::schema::Picture;
 
-/// Edges this near to a pixel's centre, in pixels, are on it: rounding must not make one
-/// pixel of a picture two columns wide, and its neighbour none.
+/// Edges this near to a pixel's center, in pixels, are on it: rounding must not make one
+/// pixel of a picture two columns wide, and its neighbor none.
 const ON_CENTRE: f64 = 1e-6;
 
 /// A picture that an edit names.
@@ -24,8 +24,8 @@ pub struct OtherPicture<E> {
 }
 
 impl<E: From<EditError>> OtherPicture<E> {
-    /// Reads the picture; a gray one is white where it is at least half as bright as
-    /// white. `number` is that of the edit that names it.
+    /// Reads the picture; a gray one is white where it is at least half as bright as white.
+    /// `number` is the number of the edit that names it.
     ///
     /// # Errors
     /// Returns an error if it cannot be read, or the file has several pages or none.
@@ -45,7 +45,7 @@ impl<E: From<EditError>> OtherPicture<E> {
 }
 
 /// Returns a picture at each of its places on a part's image, and at each repeat of these, which
-/// turn it by quarters. A pixel is white if the pixel of the picture is that its centre lies in.
+/// turn it by quarters. A pixel is white if its center lies in a white pixel of the picture.
 ///
 /// # Errors
 /// Returns an error if the picture reaches outside the image, or has more runs there than
@@ -107,7 +107,7 @@ struct PixelEdges {
 }
 
 impl PixelEdges {
-    /// Returns the first of the stack's columns or rows with its centre in the `k`th of the
+    /// Returns the first of the stack's columns or rows with its center in the `k`th of the
     /// picture, or after it.
     fn at(self, k: u32) -> i64 {
         (self.start + f64::from(k) * self.side - ON_CENTRE).ceil() as i64
@@ -125,7 +125,7 @@ fn scaled(picture: &Mask, columns: PixelEdges, rows: PixelEdges, room: &mut usiz
         let count = (rows.at(k + 1) - rows.at(k)) as usize;
         row.clear();
         for column in transitions.iter().map(|&column| (columns.at(column) - left) as u32) {
-            // A run without a centre in it is none.
+            // A run without a center in it is dropped.
             if row.pop_if(|last| *last == column).is_none() {
                 row.push(column);
             }

@@ -5,7 +5,7 @@ use lamp_stack::{Dpi, Length};
 
 use super::edit_error::EditError;
 
-/// Maps points in millimetres to pixels.
+/// Maps points in millimeters to pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelMap {
     origin_mm: [f64; 2],
@@ -22,8 +22,8 @@ impl PixelMap {
         Ok(Self { origin_mm: image.origin_mm, dpi })
     }
 
-    /// Returns a point in pixels. Pixel centres are whole numbers, as in slicing: columns
-    /// from the first coordinate on have their centres at or right of the point, rows from
+    /// Returns a point in pixels. Pixel centers are whole numbers, as in slicing: columns
+    /// from the first coordinate on have their centers at or right of the point, rows from
     /// the second on at or below it.
     pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
         let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;

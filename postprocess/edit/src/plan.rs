@@ -244,8 +244,8 @@ impl PlannedEdit {
     /// Returns the edited image, or `None` if it has more runs than an image can hold.
     ///
     /// # Errors
-    /// Returns an error if a shape depends on the layer's height and that is unknown, or
-    /// if another stack would be added beside the image.
+    /// Returns an error if a shape depends on the layer's height and that is unknown, or if another
+    /// stack would be added outside the image.
     fn of_image(
         &self,
         image: &Image,

@@ -25,7 +25,7 @@ pub(super) struct Edit {
     pub(super) layers: Option<[u32; 2]>,
     #[serde(default)]
     pub(super) copies: CopySelection,
-    /// Patterns of the shape, each of what those before it make.
+    /// Patterns of the shape. Each repeats the shapes that the patterns before it make.
     #[serde(default, deserialize_with = "repeats")]
     pub(super) repeat: Vec<Repeat>,
     #[serde(rename = "box")]
@@ -53,11 +53,11 @@ pub(super) struct Edit {
                  { part = \"NAME\", numbers = [1, 5] }"
 )]
 pub(super) enum CopySelection {
-    /// Those of the only part, if true.
+    /// The copies of the only part, if true.
     Any(bool),
-    /// Those of the part of this name.
+    /// The copies of the part of this name.
     Of(String),
-    /// Those of the only part that have these numbers, from 1.
+    /// The copies of the only part that have these numbers, from 1.
     Numbered(BTreeSet<u32>),
     Chosen(ChosenCopies),
 }
@@ -156,7 +156,7 @@ pub(super) struct ConeEnds {
     pub(super) from: [Length; 3],
     #[serde(deserialize_with = "lengths")]
     pub(super) to: [Length; 3],
-    /// Those at its ends, not both zero.
+    /// The diameters at its ends, not both zero.
     #[serde(deserialize_with = "distances")]
     pub(super) diameters: [Length; 2],
 }

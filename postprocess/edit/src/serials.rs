@@ -111,7 +111,7 @@ pub enum ListProblem {
     CopyNumber {
         /// The line, from 1.
         line: usize,
-        /// What stands there.
+        /// The text in its place.
         cell: String,
     },
     /// Two rows are for one copy.
@@ -129,9 +129,9 @@ pub enum ListProblem {
     TooMany {
         /// The line, from 1.
         line: usize,
-        /// What a row is for: a copy, or a place.
+        /// The object of a row: a copy, or a place.
         what: &'static str,
-        /// The number of what it is for.
+        /// The number of the copy or place.
         number: u32,
         /// How many there are.
         count: u32,
@@ -141,7 +141,7 @@ pub enum ListProblem {
     TooFew {
         /// The last line, from 1.
         line: usize,
-        /// What a row is for: a copy, or a place.
+        /// The object of a row: a copy, or a place.
         what: &'static str,
         /// The number of the first without one.
         number: u32,
@@ -202,12 +202,12 @@ impl SerialList {
         Ok(Self { name, digest, rows, is_numbered: copy.is_some(), last_line })
     }
 
-    /// Returns the serial numbers of those that are `wanted`, of `count` of them, from 1. `what`
+    /// Returns the serial numbers of the `wanted` ones of `count` copies or places, from 1. `what`
     /// is the word for them.
     ///
     /// # Errors
-    /// Returns an error if there are more rows than these, or if one is missing: of all if rows do
-    /// not say what they are for, else of those that are wanted.
+    /// Returns an error if there are more rows than `count`, or if a row is missing: of any of them
+    /// if rows do not say which one they are for, else of a wanted one.
     pub(super) fn of(
         &self,
         wanted: impl Iterator<Item = u32>,

@@ -28,7 +28,7 @@ pub(super) enum EditShape {
     Solids { solids: Vec<Solid>, copies: Vec<BuildCopy>, place: ImageBounds, grid: PixelMap },
 }
 
-/// What an edit takes from the files that it names.
+/// The picture and serial numbers that an edit takes from the files that it names.
 #[derive(Default)]
 pub(super) struct FromFiles<'a> {
     pub(super) picture: Option<Mask>,
@@ -150,8 +150,8 @@ fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec
     vec![corner(from, -half), corner(to, -half), corner(to, half), corner(from, half)]
 }
 
-/// Returns the serial number of a label in a copy and at a place there, both from 0. All places of a
-/// copy have the copy's; in the whole image each place has its own, and each repeat of it.
+/// Returns the serial number of a label in a copy and at a place there, both from 0. All places of
+/// a copy have the copy's; in the whole image each place has its own, and each repeat of it.
 ///
 /// # Errors
 /// Returns an error if the label's list has too few or too many.
@@ -177,8 +177,8 @@ fn serials<'a>(
     })
 }
 
-/// Draws a label at each of its places in a copy, and at each repeat of these, which have the serial
-/// numbers `serial`.
+/// Draws a label at each of its places in a copy, and at each repeat of these, which have the
+/// serial numbers `serial`.
 fn letters<'a>(
     label: &Label,
     BuildCopy { part, index, .. }: &BuildCopy,

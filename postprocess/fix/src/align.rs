@@ -20,7 +20,7 @@ pub(super) struct Alignment {
 /// Returns the crossing of `b` on the same contour for each crossing of `a`, if there is one.
 /// Both are sorted and even in number.
 ///
-/// Crossings keep their order and direction, so those without a partner come in neighbouring
+/// Crossings keep their order and direction, so crossings without a partner come in neighboring
 /// pairs: the two sides of a contour that ends or begins between the rows. Of all such matchings
 /// this is the cheapest, by dynamic programming: partners cost their distance, pairs without a
 /// partner their width.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// A band of neighbouring stray rows.
+/// A band of neighboring stray rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
     /// The first row, counted from the top of the image.
@@ -56,12 +56,12 @@ pub enum BandKind {
     Unbalanced,
     /// The row ends black, but lacks two or four contours that cross the rows above and below.
     Paired,
-    /// A run one row high between pixels of the other colour above and below (002 section
+    /// A run one row high between pixels of the other color above and below (002 section
     /// 2.4.1, the first algorithm), which the layers below and above do not have either.
     Sliver,
     /// The band reaches the image's first or last row: good rows are on one side only.
     AtEdge,
-    /// Neighbouring rows lack different contours: the bands of two gaps touch.
+    /// Neighboring rows lack different contours: the bands of two gaps touch.
     Touching,
 }
 

@@ -19,7 +19,7 @@ const NEAR: f64 = 1.5;
 const DRIFT: f64 = 8.0;
 /// The ratio by which a missing crossing may be further off than the present ones.
 const BEND: f64 = 2.5;
-/// Pixels of room beside a missing crossing that are always granted.
+/// Pixels of room next to a missing crossing that are always granted.
 const MIN_ROOM: f64 = 8.0;
 /// The confidence in a row that lies between two alike ones.
 const BETWEEN: f64 = 0.95;
@@ -65,11 +65,11 @@ impl Beside<'_> {
         alike(&few).or_else(|| nearer(&mine, &few)).or_else(|| alike(&sides(MAX_MISSING)))
     }
 
-    /// Holds a band's correction against what the layers show. Rows that they contradict become
-    /// the rows that they show.
+    /// Checks a band's correction against the layers. Rows that they contradict become the rows
+    /// that they show.
     ///
-    /// A row that a later stage ended has a crossing there, as at the edge of a copy's image in a build:
-    /// layers that lack it show nothing of the row.
+    /// A row that a later stage ended has a crossing there, as at the edge of a copy's image in a
+    /// build: layers that lack it show nothing of the row.
     pub(super) fn judge(
         &self,
         band: &Range<u32>,
@@ -204,8 +204,8 @@ impl Shown {
     }
 }
 
-/// Returns the nearest layer's row that is whole and has the crossings of this one, and not more than
-/// `most` others.
+/// Returns the nearest layer's row that is whole and has the crossings of this one, and not more
+/// than `most` others.
 fn whole(side: &[&Layer], row: u32, mine: &[f64], band: &Range<u32>, most: usize) -> Option<Whole> {
     side.iter().zip(1_usize..).find_map(|(layer, away)| {
         if layer.info.stray_rows.binary_search(&row).is_ok() {
@@ -215,8 +215,8 @@ fn whole(side: &[&Layer], row: u32, mine: &[f64], band: &Range<u32>, most: usize
         if columns.len() % 2 == 1 || columns.len() > mine.len() + most {
             return None;
         }
-        // A layer whose contours break off near by may miss the same crossings, and a row that looks
-        // whole in itself is judged by layers that are beyond doubt.
+        // A layer whose contours break off near by may miss the same crossings, and a row that
+        // looks whole in itself is judged by layers that are beyond doubt.
         if mine.len().is_multiple_of(2) && is_open_near(layer, band) {
             return None;
         }
@@ -307,8 +307,8 @@ fn missing_from(partners: &[usize], count: usize) -> Vec<usize> {
     (0..count).filter(|which| partners.binary_search(which).is_err()).collect()
 }
 
-/// Matches all crossings of a row with crossings of a longer row, in order, so that they lie as near
-/// to each other as possible. `None` if one lies further off than `most`.
+/// Matches all crossings of a row with crossings of a longer row, in order, so that they lie as
+/// near to each other as possible. `None` if one lies further off than `most`.
 fn inject(row: &[f64], longer: &[f64], most: f64) -> Option<Vec<usize>> {
     let more = longer.len().checked_sub(row.len()).filter(|&more| more <= MAX_MISSING)?;
     // cost[i][k]: the cheapest way to match the first i crossings if k of the longer row's were

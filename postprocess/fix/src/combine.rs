@@ -2,7 +2,7 @@
 
 use lamp_stack::{Op, combine_rows, white_in_row};
 
-/// Returns the row whose pixels have the colour of at least two of three rows.
+/// Returns the row whose pixels have the color of at least two of three rows.
 pub(super) fn majority(rows: [&[u32]; 3]) -> Vec<u32> {
     let mut out = Vec::new();
     combine_rows(rows, |[a, b, c]| a & b | b & c | a & c, &mut out);

@@ -46,7 +46,7 @@ pub(super) struct LineId {
 pub(super) struct Outlook {
     /// The crossings, from the left.
     pub(super) crossings: Vec<Expected>,
-    /// Columns whose colour in this row is unknown, as a contour ends or begins there in the
+    /// Columns whose color in this row is unknown, as a contour ends or begins there in the
     /// band: from the left, without overlap.
     pub(super) unknown: Vec<Range<f64>>,
 }
@@ -57,7 +57,7 @@ pub(super) struct Contours {
     /// The band and the good rows around it.
     rows: Range<u32>,
     band: Range<u32>,
-    /// The number of good rows beside it, on the side that has fewer.
+    /// The number of good rows next to it, on the side that has fewer.
     pub(super) good_rows: usize,
     contours: Vec<Contour>,
 }
@@ -86,7 +86,7 @@ enum ContourPath {
 
 impl Contours {
     /// Follows the contours around a band, through rows that are good. Returns `None` if no good
-    /// row lies beside the band.
+    /// row is next to the band.
     pub(super) fn around(
         mask: &Mask,
         band: Range<u32>,
@@ -225,7 +225,7 @@ impl Contours {
     }
 }
 
-/// Sorts ranges and merges those that overlap.
+/// Sorts ranges and merges overlapping ones.
 fn merged(mut ranges: Vec<Range<f64>>) -> Vec<Range<f64>> {
     ranges.sort_by(|a, b| a.start.total_cmp(&b.start));
     ranges.dedup_by(|next, last| {
@@ -247,7 +247,7 @@ fn span(sides: &[KnownColumns; 2], now: [Guess; 2]) -> Range<f64> {
     low..high
 }
 
-/// A line's crossings, from the row beside the band outwards: (row, column).
+/// A line's crossings, from the row next to the band outwards: (row, column).
 type LinePoints = Vec<(f64, f64)>;
 
 /// Follows every crossing of the first row through the others, and returns the lines.

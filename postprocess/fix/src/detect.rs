@@ -20,10 +20,10 @@ const MAX_PAIRED_ROWS: u32 = 30;
 /// Effort after which the search for paired rows ends, as a multiple of the layer's rows and
 /// crossings: no part's section takes more, but noise would take the square.
 const MAX_EFFORT: usize = 2;
-/// The share of pixels that must agree for a neighbouring layer to agree.
+/// The share of pixels that must agree for a neighboring layer to agree.
 const MIN_AGREEMENT: f64 = 0.9;
 
-/// What is known of a layer before its rows are corrected.
+/// The known data of a layer before its rows are corrected.
 pub(super) struct Scene<'a> {
     /// The exposed pixels.
     pub(super) mask: &'a Mask,
@@ -57,7 +57,7 @@ impl Strays {
         self.kinds(row).contains(BandKind::Unbalanced) && mask.row(row).len().is_multiple_of(2)
     }
 
-    /// Returns the bands of neighbouring stray rows, from the top.
+    /// Returns the bands of neighboring stray rows, from the top.
     pub(super) fn bands(&self) -> Vec<Range<u32>> {
         runs((0..self.kinds.len() as u32).filter(|&row| !self.is_good(row)))
     }
@@ -198,7 +198,7 @@ impl Scene<'_> {
             let touches = [rows.start.checked_sub(1), Some(rows.end)].into_iter().flatten();
             let beside_strays = touches.into_iter().any(|row| !strays.is_good(row));
             let is_certain = match self.open_rows {
-                // What is not between open rows is the part's own.
+                // Rows that are not between open rows are the part's own.
                 Some(open) if !is_between(open, &rows) => continue,
                 Some(_) => true,
                 None if beside_strays => true,
@@ -217,7 +217,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Finds rows with a run that neither the rows nor the layers beside them have.
+    /// Finds rows with a run that neither the neighboring rows nor the neighboring layers have.
     fn find_slivers(&self, strays: &mut Strays, crossings: &[u32]) {
         for (row, crossings) in (1..).zip(crossings.windows(3)) {
             if crossings[1] <= crossings[0] || crossings[1] <= crossings[2] {
@@ -240,7 +240,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Returns whether a neighbouring layer has the colours of the first of two versions of a
+    /// Returns whether a neighboring layer has the colors of the first of two versions of a
     /// row where they differ.
     fn is_in_another_layer(&self, row: u32, had: &[u32], mended: &[u32]) -> bool {
         let width = self.mask.width();
@@ -277,8 +277,8 @@ fn runs(rows: impl Iterator<Item = u32>) -> Vec<Range<u32>> {
     runs
 }
 
-/// Returns a row without its long runs that lie between pixels of the other colour above and
-/// below. The row must have neighbours on both sides.
+/// Returns a row without its long runs that lie between pixels of the other color above and
+/// below. The row must have neighbors on both sides.
 ///
 /// Source: 002 section 2.4.1, the first algorithm.
 pub(super) fn without_slivers(mask: &Mask, row: u32) -> Vec<u32> {

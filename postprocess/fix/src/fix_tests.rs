@@ -36,7 +36,7 @@ fn ring(row: f64) -> Vec<f64> {
     }
 }
 
-/// Two bars beside each other, one upright and one leaning.
+/// Two bars next to each other, one upright and one leaning.
 fn bars(row: f64) -> Vec<f64> {
     if !(20.0..480.0).contains(&row) {
         return vec![];
@@ -278,7 +278,7 @@ fn a_sliver_goes_only_if_contours_break_off_there_and_no_other_layer_has_it() {
     assert_eq!(layers, unknown);
     assert_eq!((bands[0].kinds, bands[0].outcome), (sliver, BandOutcome::Doubtful));
 
-    // Its neighbour above has more of it: the top of a bar that lies there.
+    // Its neighbor above has more of it: the top of a bar that lies there.
     let top = of(vec![clean(), with_sliver(), with_sliver()]);
     assert_eq!(fixed(top.clone(), FixOptions::default()), (top, vec![]));
 }

@@ -21,8 +21,8 @@ impl GrayRow<'_> {
 
 /// Returns the runs of a gray row with new exposed pixels: (length, level).
 ///
-/// Along an edge that the row had, its levels stay. Along a new edge they are those of the good
-/// row `beside` along its nearest edge of that direction, up to full exposure or half its run.
+/// Along an edge that the row had, its levels stay. Along a new edge, the levels come from the good
+/// row `beside`, along its nearest edge of that direction, up to full exposure or half its run.
 /// Further inside, pixels that were black take the good row's levels, or full exposure.
 pub(super) fn levels(had: &GrayRow<'_>, beside: &GrayRow<'_>, exposed: &[u32]) -> Vec<(u32, u8)> {
     let mut runs = Vec::new();

@@ -1,10 +1,10 @@
 //! Detection and correction of stray rows.
 //!
 //! A gap in a mesh loses crossings, and each lost crossing inverts all pixels to its right.
-//! `detect` finds the rows where that happened. `contours` follows the part's contours
-//! from the good rows above and below through a band of stray rows, and `mend` decides which
-//! crossings a row missed. A row begins and ceases to miss crossings only where a contour
-//! breaks off: that tells stray rows from the part's own slits.
+//! `detect` finds the rows where that happened. `contours` follows the part's contours from the
+//! good rows above and below through a band of stray rows, and `mend` decides which crossings a row
+//! missed. A row begins and ceases to miss crossings only where a contour breaks off: this
+//! separates stray rows from the part's own slits.
 //!
 //! Source: 002 section 2.4.1, algorithms 10 and 11, figures 28 and 29.
 
@@ -40,9 +40,9 @@ use rebuild::Correction;
 pub use window::FIX_REACH;
 use window::{decode_unsettled, windows};
 
-/// Bands of at least this many rows are adjusted to the neighbouring layers, if asked for.
+/// Bands of at least this many rows are adjusted to the neighboring layers, if asked for.
 ///
-/// Crossings of narrower bands lie within a pixel or two of their curves anyway.
+/// Crossings of narrower bands are within a pixel or two of their curves anyway.
 const MIN_ADJUSTED_ROWS: u32 = 3;
 /// The confidence in the correction of rows that may be right as they are: below the default
 /// limit, so that they are reported and stay.
@@ -59,8 +59,8 @@ pub struct FixOptions {
     pub max_width: Option<u32>,
     /// Bands whose correction has a lower confidence, from 0 to 1, stay as they are.
     pub min_confidence: f64,
-    /// Whether added crossings of bands of three rows and more are kept between those of the
-    /// layers below and above.
+    /// Whether added crossings of bands of three rows and more are kept between the crossings of
+    /// the layers below and above.
     pub use_neighbours: bool,
 }
 
@@ -89,7 +89,7 @@ impl Default for FixOptions {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FixMethod {
-    /// Pixels take the colour that the good rows above and below share (002, algorithm 11).
+    /// Pixels take the color that the good rows above and below share (002, algorithm 11).
     Nearest,
     /// C1 cubic Hermite curves along the contours (002, figure 29c) give the missed crossings;
     /// the others stay.
@@ -115,11 +115,11 @@ pub struct Fixed<'a> {
 /// The page of a changed layer lists the corrections under `fix` and no longer lists the
 /// corrected rows as stray. All other layers pass unchanged.
 ///
-/// In gray layers the exposed pixels, whatever their level, are corrected as in a mask; levels
-/// along a rebuilt edge are those of a good row beside it.
+/// In gray layers the exposed pixels, whatever their level, are corrected as in a mask. Levels
+/// along a rebuilt edge come from a good row next to it.
 ///
-/// The layers below and above tell a sliver from the part's own features and, if asked for,
-/// where contours cross a band. They are used as they were before correction, so the result
+/// The layers below and above separate a sliver from the part's own features and, if asked for,
+/// show where contours cross a band. They are used as they were before correction, so the result
 /// depends on no order.
 ///
 /// ```
@@ -306,7 +306,7 @@ fn decide(
     (band, rows)
 }
 
-/// Corrects a band by the method asked for. `None` if no good row lies beside it.
+/// Corrects a band by the method asked for. Returns `None` if no good row is next to it.
 fn correct(
     scene: &Scene<'_>,
     strays: &Strays,

@@ -74,7 +74,7 @@ impl RowEvent {
         !matches!(self.what, EventKind::Missing { .. })
     }
 
-    /// Returns whether the expected colour changes here.
+    /// Returns whether the expected color changes here.
     fn is_expected(&self) -> bool {
         matches!(
             self.what,
@@ -92,7 +92,7 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Men
     let mut mended = Mended { found, ..Mended::default() };
     for (event, &crosses) in events.iter().zip(&crossings) {
         if crosses {
-            // Two crossings at one column leave the colour as it is.
+            // Two crossings at one column leave the color as it is.
             if mended.row.last() == Some(&event.column) {
                 mended.row.pop();
             } else {
@@ -116,7 +116,7 @@ pub(super) fn mend(row: &[u32], outlook: &Outlook, width: u32, drop: u32) -> Men
     mended
 }
 
-/// Returns all crossings that the row has or should have, from the left, and those found.
+/// Returns all crossings that the row has or should have, from the left, and the found ones.
 fn events(
     row: &[u32],
     outlook: &Outlook,
@@ -215,11 +215,11 @@ fn off(crossings: &[bool], pixels: &[[u32; 2]]) -> u32 {
 }
 
 /// Returns at which events the cheapest row crosses, by dynamic programming over the row's
-/// colour (Viterbi's algorithm).
+/// color (Viterbi's algorithm).
 fn cheapest(events: &[RowEvent], pixels: &[[u32; 2]]) -> Vec<bool> {
     const NEVER: u32 = u32::MAX / 4;
     let mut cost = [pixels[0][0], NEVER];
-    // For each event and the colour after it: whether the cheapest way there crosses.
+    // For each event and the color after it: whether the cheapest way there crosses.
     let mut crosses: Vec<[bool; 2]> = Vec::with_capacity(events.len());
     for (event, pixels) in events.iter().zip(&pixels[1..]) {
         let [stay, cross] = event.prices().map(|price| price.unwrap_or(NEVER));

@@ -1,4 +1,4 @@
-//! Correction of a band from the good rows beside it.
+//! Correction of a band from the good rows next to it.
 //!
 //! Source: 002 section 2.4.1, algorithm 11.
 
@@ -8,7 +8,7 @@ use lamp_stack::{Mask, white_in_row};
 
 use super::combine::{difference, majority};
 
-/// Gives each pixel the colour that the good rows above and below the band share, and leaves it
+/// Gives each pixel the color that the good rows above and below the band share, and leaves it
 /// where they differ. Rows outside the image are black. Returns the rows and the confidence in
 /// them, which is lower the more the good rows differ.
 pub(super) fn nearest(mask: &Mask, band: &Range<u32>) -> (Vec<Vec<u32>>, f64) {

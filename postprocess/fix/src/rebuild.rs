@@ -20,20 +20,20 @@ pub(super) struct Correction {
     pub(super) gap: Option<Range<u32>>,
     /// The confidence in the least certain row, from 0 to 1.
     pub(super) confidence: f64,
-    /// Whether neighbouring rows lack different contours.
+    /// Whether neighboring rows lack different contours.
     pub(super) touching: bool,
     /// The confidence in each row. Empty if other layers show none of them.
     pub(super) by_row: Vec<f64>,
 }
 
-/// Rebuilds the rows of a band. Returns `None` if no good row lies beside it.
+/// Rebuilds the rows of a band. Returns `None` if no good row is next to it.
 ///
 /// Crossings near a contour's curve stay as they are, and the curve is then led through them;
 /// only missed crossings come from the curve.
 ///
-/// Between two rows of `open_rows`, where contours break off, all rows miss the same contours.
-/// So a line that one of these rows crosses is missed by none: where another row does not cross
-/// it, the part itself has a slit or a wall.
+/// Between two rows of `open_rows`, where contours break off, all rows miss the same contours. So
+/// no row misses a line that one of these rows crosses: where another row does not cross it, the
+/// part itself has a slit or a wall.
 pub(super) fn rebuild(
     mask: &Mask,
     band: &Range<u32>,
@@ -105,7 +105,7 @@ fn lack_others(a: &Mended, b: &Mended) -> bool {
 /// It falls if an added crossing may lie further off than the next one (the worst counts), if
 /// more was changed than one gap explains, and if the row still differs from what was expected.
 fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
-    /// Pixels of room beside an added crossing that are always granted.
+    /// Pixels of room next to an added crossing that are always granted.
     const MIN_ROOM: f64 = 8.0;
     let placed = mended.added.iter().map(|added| {
         let left = mended.row.partition_point(|&c| f64::from(c) < added.column - 1.0);
@@ -128,10 +128,10 @@ fn confidence(mended: &Mended, had: &[u32], width: u32, is_ended: bool) -> f64 {
     placed.fold(1.0, f64::min) * edits * 0.8f64.powi(mended.absent as i32) * explained
 }
 
-/// Moves each expected crossing between those of the layers below and above, if both have one
-/// near it.
+/// Moves each expected crossing between the crossings of the layers below and above, if both have
+/// one near it.
 fn adjust(outlook: &mut Outlook, rows: &[Cow<'_, [u32]>; 2]) {
-    // A row that ends white is stray itself and tells nothing.
+    // A row that ends white is stray itself and shows nothing.
     if rows.iter().any(|row| !row.len().is_multiple_of(2)) {
         return;
     }

@@ -166,8 +166,8 @@ pub(super) fn trace(
     Some(Correction { rows: new_rows, gap, confidence, ..Correction::default() })
 }
 
-/// Returns how well corrected rows agree with those of a neighbouring layer, from 0 to 1: how much
-/// nearer they came to it, compared with what good rows beside the band differ by.
+/// Returns how well corrected rows agree with the rows of a neighboring layer, from 0 to 1: how
+/// much nearer they came to it, compared with the difference of good rows next to the band.
 fn agreement(mask: &Mask, band: &Range<u32>, new: &[Vec<u32>], image: &Image, beside: u32) -> f64 {
     let off = |row: &[u32], other: &[u32]| white_in_row(&difference(row, other), mask.width());
     let is_whole = |row: &[u32]| row.len().is_multiple_of(2);
@@ -235,7 +235,7 @@ impl<'a> Lines<'a> {
         self.continues[self.on[(row - self.rows.start) as usize][which]]
     }
 
-    /// Joins the lines above a break with those below, and notes the ends that are loose.
+    /// Joins the lines above a break with the lines below, and notes the ends that are loose.
     fn cross(&mut self, row: u32) {
         let end = |line: &Line, row: u32, down: bool| {
             let points = line.points(row, down);
@@ -246,7 +246,7 @@ impl<'a> Lines<'a> {
             lines.map(|line| end(&self.lines[line], row, down)).collect()
         };
         let (above, below) = (ends(row - 1, false), ends(row, true));
-        // The side with more rows tells more of where contours are going.
+        // The side with more rows shows better where contours are going.
         let depth = |side: &[(f64, usize)]| side.iter().map(|s| s.1).max().unwrap_or(0).max(1);
         let share = depth(&above) as f64 / (depth(&above) + depth(&below)) as f64;
         let moved = |columns: Vec<f64>, slopes: &[(f64, usize)], rows: f64| -> Vec<f64> {
@@ -376,7 +376,7 @@ impl<'a> Lines<'a> {
         let (columns, confidence) = match (a.is_below, b.is_below) {
             (false, true) => {
                 let chord = (b.point.1 - a.point.1) / (b.point.0 - a.point.0);
-                // Rounded columns tell a slope to about a pixel in the rows of its line.
+                // Rounded columns show a slope to about a pixel in the rows of its line.
                 let lead = |end: &LooseEnd| {
                     let is_same = (end.slope - chord).abs() * (end.known as f64) < 1.2;
                     if is_same { chord } else { end.slope }

@@ -44,7 +44,7 @@ impl MemorySize for Window {
     }
 }
 
-/// Puts each layer between its neighbours. Ends after the first error.
+/// Puts each layer between its neighbors. Ends after the first error.
 pub(super) fn windows<E>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
 ) -> impl Iterator<Item = Result<Window, E>> {
@@ -102,7 +102,7 @@ pub(super) fn is_settled(layer: &PassingLayer) -> bool {
         && layer.rows_end_black()
 }
 
-/// Decodes the layers that are to be looked at, and those below and above them.
+/// Decodes the layers that are to be looked at, and the layers below and above them.
 pub(super) fn decode_unsettled<E: Send>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
     decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,

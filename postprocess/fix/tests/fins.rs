@@ -227,9 +227,9 @@ impl Wrong {
 #[derive(Clone, Copy, Debug, Default)]
 struct Score {
     all: Wrong,
-    /// Those in rows that can be known.
+    /// Wrong pixels in rows that can be known.
     knowable: Wrong,
-    /// Those that were right before.
+    /// Wrong pixels that were right before.
     harmed: u64,
     /// Pixels of new runs where the row should be black.
     invented: u64,

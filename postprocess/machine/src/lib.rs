@@ -21,14 +21,14 @@ pub use file::MachineError;
 pub use limit::MachineLimit;
 pub use times::Times;
 
-/// What is known of a machine. What a source does not give is absent, and then
-/// anything goes.
+/// The known data of a machine. A value that a source does not give is absent, and then anything
+/// goes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Machine {
     /// Its name, for commands: small letters, digits and `-`.
     pub name: String,
-    /// What it is, in a line.
+    /// Its description, in a line.
     pub description: String,
     /// The build area.
     pub area: Area,
@@ -136,9 +136,9 @@ pub struct Recoating {
     /// How far the blade goes, as `26cm`.
     #[serde(deserialize_with = "file::length")]
     pub travel: Length,
-    /// How long that takes.
+    /// The time of this travel.
     pub seconds: f64,
-    /// How high the blade is above what it covers, as `200um`.
+    /// The height of the blade above the surface that it covers, as `200um`.
     #[serde(deserialize_with = "file::length")]
     pub gap: Length,
     /// The section, table or data sheet.

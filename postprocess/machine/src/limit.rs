@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::{BuildHeight, DpiRange, Machine, ThicknessRange};
 
-/// What a machine does not build. Every limit has its name, and both figures.
+/// A limit that a build exceeds. Every message has the machine's name, and both figures.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MachineLimit {
@@ -19,12 +19,12 @@ pub enum MachineLimit {
         /// Its area.
         most: Size,
     },
-    /// A part or an image that does not lie within the area, turned by 90 degrees or not.
+    /// A part or an image that is not inside the area, turned by 90 degrees or not.
     #[error("{what} takes {footprint}, and the machine {machine} builds on {most}")]
     Footprint {
-        /// What is too large.
+        /// The object that is too large.
         what: String,
-        /// What it takes along x and y.
+        /// Its size along x and y.
         footprint: Size,
         /// The machine's name.
         machine: String,
@@ -34,7 +34,7 @@ pub enum MachineLimit {
     /// More than the height of a build.
     #[error("{what} is {height} high, and the machine {machine} builds {most} high")]
     Height {
-        /// What is too high.
+        /// The object that is too high.
         what: String,
         /// From the platform to its top.
         height: Length,
@@ -46,7 +46,7 @@ pub enum MachineLimit {
     /// Another resolution.
     #[error("{what} has {dpi} dpi, and the machine {machine} builds in {least} to {most} dpi")]
     Dpi {
-        /// What has the resolution.
+        /// The object with the resolution.
         what: String,
         /// The resolution.
         dpi: f64,
@@ -62,7 +62,7 @@ pub enum MachineLimit {
         "{what} is {thickness} thick, and the machine {machine} builds in layers of {least} to {most}"
     )]
     Thickness {
-        /// What has the thickness.
+        /// The object with the thickness.
         what: String,
         /// The thickness.
         thickness: Length,
@@ -75,7 +75,7 @@ pub enum MachineLimit {
     },
 }
 
-/// What lengths may miss a limit by, in micrometres: they are sums and differences of
+/// The amount by which lengths may miss a limit, in micrometers: they are sums and differences of
 /// heights.
 const SLACK: f64 = 1e-3;
 
@@ -99,7 +99,8 @@ impl Machine {
         }
     }
 
-    /// Checks that the machine builds in a resolution. `what` has it: `layer 12`.
+    /// Checks that the machine builds in a resolution. `what` names the object that has it: `layer
+    /// 12`.
     ///
     /// # Errors
     /// Returns an error if it does not.
@@ -113,7 +114,8 @@ impl Machine {
         }
     }
 
-    /// Checks that the machine builds layers of a thickness. `what` has it: `layer 12`.
+    /// Checks that the machine builds layers of a thickness. `what` names the object that has it:
+    /// `layer 12`.
     ///
     /// # Errors
     /// Returns an error if it does not.
@@ -141,8 +143,8 @@ impl Machine {
         Err(MachineLimit::Area { area, machine: self.name.clone(), most })
     }
 
-    /// Checks that a footprint lies within the area, as it is or turned by 90 degrees. `what` has
-    /// it: `the part`.
+    /// Checks that a footprint is inside the area, as it is or turned by 90 degrees. `what` names
+    /// the object that has it: `the part`.
     ///
     /// # Errors
     /// Returns an error if it does not.
@@ -156,7 +158,8 @@ impl Machine {
         Err(MachineLimit::Footprint { what, footprint, machine, most })
     }
 
-    /// Checks that a build may be as high. `what` reaches up to there: `layer 12`.
+    /// Checks that a build may be as high. `what` names the object that reaches up to there: `layer
+    /// 12`.
     ///
     /// # Errors
     /// Returns an error if it may not.

@@ -5,16 +5,16 @@ use serde::Deserialize;
 
 use super::MachineError;
 
-/// How long the steps of a layer take. What is absent is not known.
+/// How long the steps of a layer take. Absent values are unknown.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Times {
-    /// Seconds from the end of a layer's exposure to the start of the next one's; in its absence,
-    /// those of the blade's way count.
+    /// Seconds from the end of a layer's exposure to the start of the next one's; if absent, the
+    /// seconds of the blade's travel count.
     pub recoat_s: Option<f64>,
     /// The exposure of layers that state none, in seconds.
     pub expose_s: Option<f64>,
-    /// How fast a scanning projector goes along a swath, in millimetres a second.
+    /// The speed of a scanning projector along a swath, in millimeters a second.
     pub swath_speed_mm_per_s: Option<f64>,
     /// Seconds from the end of a swath to the start of the next one; none if absent.
     pub swath_step_s: Option<f64>,

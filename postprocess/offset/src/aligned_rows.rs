@@ -1,8 +1,8 @@
-//! A fast path for rows whose edges run along those of the rows above and below, as in most rows
-//! of a part.
+//! A fast path for rows whose edges run along the edges of the rows above and below, as in most
+//! rows of a part.
 //!
-//! If each row that a disc reaches has as many runs as the row at its centre, and no run comes
-//! near another one's neighbour, each end of a run is cut only by the same end in the other rows.
+//! If each row that a disc reaches has as many runs as the row at its center, and no run comes
+//! near another one's neighbor, each end of a run is cut only by the same end in the other rows.
 
 use super::erode::{Disc, Sources};
 use super::row_runs::Run;
@@ -21,7 +21,7 @@ pub(super) struct AlignedRows<'a> {
 }
 
 /// A run of a row that runs along the others: the columns that lie in no source's outer disc, and
-/// those that lie in no source's inner disc, at least one.
+/// the columns that lie in no source's inner disc, at least one.
 type AlignedRun = [Run; 2];
 
 impl<'a> AlignedRows<'a> {

@@ -1,13 +1,13 @@
 //! Distances of pixels from the nearest point of an outline.
 //!
-//! A side of an outline is nearest only to pixels straight above it, and a corner to those in the
-//! wedge between its two sides: both are filled row by row (closest point transform, Mauch
+//! A side of an outline is nearest only to pixels straight above it, and a corner only to pixels in
+//! the wedge between its two sides: both are filled row by row (closest point transform, Mauch
 //! 2000). So each pixel near an edge is visited about once, however far edges move.
 
 use super::edge_map::{Cut, EdgeMap, Near};
 use super::outline::Outline;
 
-/// How far beyond the outline pixels may lie, in pixels: their colour and the mean line disagree
+/// How far beyond the outline pixels may lie, in pixels: their color and the mean line disagree
 /// by less.
 const BEYOND: f64 = 1.5;
 /// Up to this length in pixels a side may stand for the wedge beyond its end.

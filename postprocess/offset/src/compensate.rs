@@ -220,7 +220,7 @@ fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensatePr
     Ok(true)
 }
 
-/// What is to be reported of a layer whose edges moved.
+/// The findings to report of a layer whose edges moved.
 #[derive(Default)]
 struct MovedEdges {
     walls: Vec<ThinWall>,
@@ -247,7 +247,7 @@ fn move_edges(
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
     let depth = most + min_feature / 2.0;
     if most > 0.0 && min_feature > 0.0 && depth > MAX_DEPTH {
-        // Only if edges would still move too far with walls of two pixels are they to blame.
+        // Edges are to blame only if they would still move too far with walls of two pixels.
         let max_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
         if most > max_moved {
             let max = Length::from_um((max_moved * dpi.pitch().um()).floor());

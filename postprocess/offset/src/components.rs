@@ -1,6 +1,6 @@
 //! The connected components of a shape, and what becomes of each as edges move.
 //!
-//! Pixels are connected if they touch at sides or corners. Runs of neighbouring rows are joined
+//! Pixels are connected if they touch at sides or corners. Runs of neighboring rows are joined
 //! (union-find), so the cost follows the runs.
 
 use std::ops::Range;
@@ -23,8 +23,8 @@ pub struct Loss {
     pub left: usize,
 }
 
-/// Returns the components that vanish and those that break apart, from the top. All pixels that
-/// are white `after` must be white `before`.
+/// Returns the components that vanish or break apart, from the top. All pixels that are white
+/// `after` must be white `before`.
 pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
     let [before, after] = [before, after].map(|mask| Components::of(RowRuns::white(mask)));
     let mut left = vec![0; before.first.len()];

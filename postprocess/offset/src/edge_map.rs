@@ -93,8 +93,8 @@ impl EdgeMap {
         map
     }
 
-    /// Finds the pixels outside of the first disc around each source, and of these as runs deep
-    /// inside those outside of the second.
+    /// Finds the pixels outside of the first disc around each source. Of these, the pixels outside
+    /// of the second disc become runs deep inside.
     fn runs(sources: &Sources, region: &RowRuns, width: u32, discs: &[Disc; 2]) -> Self {
         let mut map = Self { ends: vec![0], ..Self::default() };
         let [mut outer, mut inner] = [Erosion::default(), Erosion::default()];
@@ -131,8 +131,9 @@ impl EdgeMap {
         }
     }
 
-    /// Calls `look` with each pixel near an edge and its level, in some columns of a row, from the first up to,
-    /// but without, the second. `place` is the place of a run near there, as in the row before.
+    /// Calls `look` with each pixel near an edge and its level, in some columns of a row, from the
+    /// first up to, but without, the second. `place` is the place of a run near there, as in the
+    /// row before.
     pub(super) fn for_each_near(
         &mut self,
         row: u32,
@@ -207,7 +208,7 @@ impl EdgeMap {
     }
 
     /// Returns the map as an image of `width` columns. Pixels outside the regions have
-    /// `level_outside`, 0 or 255, and those deep inside the other.
+    /// `level_outside`, 0 or 255, and pixels deep inside have the other level.
     pub(super) fn gray(&self, width: u32, level_outside: u8) -> GrayMask {
         let mut gray = GrayMask::new(width);
         let mut changes = Vec::new();
@@ -249,7 +250,7 @@ impl EdgeMap {
     }
 }
 
-/// Returns the pixels of those runs of a row that are near an edge.
+/// Returns the pixels of the runs of a row that are near an edge.
 pub(super) fn near_pixels<'a>(
     row: u32,
     runs: impl IntoIterator<Item = &'a EdgeRun>,

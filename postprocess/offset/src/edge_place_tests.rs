@@ -1,11 +1,11 @@
-//! Edges beside closed forms: squares at seven angles, and discs.
+//! Edges against closed forms: squares at seven angles, and discs.
 
 use lamp_stack::GrayMask;
 
 use super::offset_tests::drawn;
 use super::*;
 
-/// Micrometres of a pixel at 1500 dpi.
+/// Micrometers of a pixel at 1500 dpi.
 const PITCH: f64 = 25_400.0 / 1500.0;
 
 /// The exposed pixels, by their shares.
@@ -35,7 +35,7 @@ fn disc(radius: f64) -> Mask {
     disc_at(radius, [0.13, -0.29])
 }
 
-/// A disc whose middle is so far from that of the image.
+/// A disc whose middle is `off` from the middle of the image.
 fn disc_at(radius: f64, off: [f64; 2]) -> Mask {
     let size = 2 * radius as u32 + 80;
     let middle = off.map(|off| f64::from(size) / 2.0 + off);

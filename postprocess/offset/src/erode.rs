@@ -11,7 +11,7 @@ use super::row_runs::{RowRuns, Run, subtract};
 const BEYOND: i32 = 1 << 29;
 const EVERYTHING: [Run; 1] = [(-BEYOND, BEYOND)];
 
-/// The colour of the pixels that distances are measured from.
+/// The color of the pixels that distances are measured from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SourceColour {
     /// Black. Outside the image all is black.
@@ -20,11 +20,11 @@ pub(super) enum SourceColour {
     White,
 }
 
-/// The pixels that distances are measured from, centre to centre.
+/// The pixels that distances are measured from, center to center.
 #[derive(Debug)]
 pub(super) struct Sources {
     colour: SourceColour,
-    /// The runs of the other colour. If black ones, they continue past the image's edges.
+    /// The runs of the other color. If black ones, they continue past the image's edges.
     between: RowRuns,
 }
 
@@ -120,10 +120,10 @@ impl Erosion {
     }
 }
 
-/// The pixels nearer to a centre than a distance.
+/// The pixels nearer to a center than a distance.
 #[derive(Debug)]
 pub(super) struct Disc {
-    /// The columns it reaches to each side, by the distance in rows from its centre.
+    /// The columns it reaches to each side, by the distance in rows from its center.
     halves: Vec<i32>,
     /// The distances in rows, in an order that is likely to show early that nothing stays.
     order: Vec<u32>,
@@ -133,7 +133,7 @@ pub(super) struct Disc {
 const MAX_RADIUS: f64 = (1 << 27) as f64;
 
 /// Squared lengths in pixels this close to a whole number are whole: lengths come from
-/// micrometres and are rounded.
+/// micrometers and are rounded.
 const ROUNDING: f64 = 1e-7;
 
 /// Returns the squared distance from which on pixels are at least `radius` away.
@@ -149,12 +149,12 @@ pub(super) fn more_than(radius: f64) -> u64 {
 }
 
 impl Disc {
-    /// Returns the columns it reaches to each side, by the distance in rows from its centre.
+    /// Returns the columns it reaches to each side, by the distance in rows from its center.
     pub(super) fn halves(&self) -> &[i32] {
         &self.halves
     }
 
-    /// Returns the pixels whose squared distance from the centre is below `square`, as far as an
+    /// Returns the pixels whose squared distance from the center is below `square`, as far as an
     /// image of `height` rows needs them.
     pub(super) fn below(square: u64, height: u32) -> Self {
         let rows = (0..u64::from(height) + 1).take_while(|away| away * away < square);

@@ -1,10 +1,10 @@
 //! The size of the feature at each place of an outline, and how far edges move there.
 //!
-//! Across a feature, a ray from its edge along the normal finds the other edge. At the tip of a
-//! rib the ray runs along the rib: there the largest disc that touches the edge from inside
-//! tells the width. Towards a convex corner those discs shrink though the feature does not, so
-//! the width is carried on along the edge, but never beyond what the ray finds: into no rib from
-//! the block that it stands on, and into no corner that is thinner.
+//! Across a feature, a ray from its edge along the normal finds the other edge. At the tip of a rib
+//! the ray runs along the rib: there the largest disc that touches the edge from inside gives the
+//! width. Towards a convex corner those discs shrink though the feature does not, so the width is
+//! carried on along the edge, but never beyond what the ray finds: into no rib from the block that
+//! it stands on, and into no corner that is thinner.
 
 use super::outline::Outline;
 use super::row_runs::RowRuns;
@@ -12,9 +12,9 @@ use super::widths::Widths;
 
 /// The greatest distance in pixels between places whose size is taken.
 const STEP: f64 = 6.0;
-/// What a disc reaches into less deeply than this, in pixels, is the roughness of its own edge.
+/// Overlaps of a disc with black up to this depth, in pixels, are the roughness of its own edge.
 const ROUGHNESS: f64 = 3.0;
-/// Sides of outlines that are shorter, in pixels, take the size of those beside.
+/// Sides of outlines that are shorter, in pixels, take the size of their neighbors.
 const SHORT: f64 = 2.5;
 /// The cosine of a turn that is sharp.
 const SHARP: f64 = 0.9;
@@ -151,9 +151,9 @@ fn across(white: &RowRuns, [x, y]: [f64; 2], [right, down]: [f64; 2], most: f64)
     most
 }
 
-/// Returns at which places of an outline the size is found; others take those beside. What cuts
-/// a corner by a pixel or two has no direction of its own, and of short sides of a curve one in
-/// each step is enough.
+/// Returns the places of an outline at which the size is found; others take the size of their
+/// neighbors. A side that cuts a corner by a pixel or two has no direction of its own, and of short
+/// sides of a curve one in each step is enough.
 fn known(places: &[Place]) -> Vec<bool> {
     let are_short = places.iter().all(|place| place.length < SHORT);
     let mut since = STEP;

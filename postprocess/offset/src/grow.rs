@@ -2,9 +2,9 @@
 //!
 //! Runs that follow each other row by row, one on one, are a sheet. In any row a sheet's discs are
 //! one run, whose ends are the farthest that a disc of an end reaches there. Of two discs of equal
-//! size the lower one reaches farther from some row on, so those that reach farthest are found in
-//! one pass over the ends, with a stack (the lower envelope of P. Felzenszwalb and D. Huttenlocher,
-//! Theory of Computing 8, 2012, of circles instead of parabolas).
+//! size the lower one reaches farther from some row on. So the discs that reach farthest are found
+//! in one pass over the ends, with a stack (the lower envelope of P. Felzenszwalb and D.
+//! Huttenlocher, Theory of Computing 8, 2012, of circles instead of parabolas).
 //!
 //! Dots make sheets of a row or two. There, rows are cut by one row of the disc after the other
 //! ([`erode`](super::erode)), which soon leaves nothing.
@@ -24,7 +24,7 @@ const SHEET_ROWS: usize = 4;
 /// only large discs have, are cut by rows.
 const MAX_RUNS: usize = 1 << 22;
 
-/// The pixels around a centre whose squared distance from it is below a limit.
+/// The pixels around a center whose squared distance from it is below a limit.
 #[derive(Debug)]
 pub(super) struct Reach {
     disc: Disc,
@@ -34,7 +34,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Returns the pixels whose squared distance is below `square`, the centre at least, as far as
+    /// Returns the pixels whose squared distance is below `square`, the center at least, as far as
     /// an image of `height` rows needs them.
     pub(super) fn below(square: u64, height: u32) -> Self {
         let square = square.max(1);
@@ -151,7 +151,7 @@ impl Reach {
     }
 }
 
-/// Neighbouring rows of a sheet with the same end.
+/// Neighboring rows of a sheet with the same end.
 #[derive(Clone, Copy, Debug)]
 struct Arc {
     end: i32,
@@ -178,7 +178,8 @@ struct SheetEnds {
 }
 
 impl SheetEnds {
-    /// Finds the ends of a sheet's discs in those of `rows` that they reach. Returns the first.
+    /// Finds the ends of a sheet's discs in each of `rows` that they reach. Returns the first such
+    /// row.
     fn of(&mut self, reach: &Reach, sheet: &[Run], first_row: i32, rows: &Range<i32>) -> i32 {
         let past = first_row + sheet.len() as i32 + reach.rows();
         let rows = rows.start.max(first_row - reach.rows())..rows.end.min(past);
@@ -218,7 +219,7 @@ fn farthest(
     }
 }
 
-/// Adds an arc below others, in place of those that it leaves no row.
+/// Adds an arc below others, in place of the arcs that it leaves no row.
 fn push(reach: &Reach, mut arc: Arc, arcs: &mut Vec<Arc>) {
     while let Some(upper) = arcs.last() {
         arc.from = reach.crossing(&arc, upper, upper.from);

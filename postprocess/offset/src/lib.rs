@@ -2,19 +2,19 @@
 //!
 //! Source: 002 section 3.4: every cured region is wider than its image.
 //!
-//! An edge lies on the mean line of its stair of pixels, so at no angle is it off. `contours`
+//! An edge lies on the mean line of its stair of pixels, so it is exact at every angle. `contours`
 //! follows the stairs, `straight` splits them into the longest that straight edges leave, and
-//! `outline` joins their mean lines. When an edge moves inwards by `r`, a pixel whose middle is
-//! `d` inside of it keeps the share `d - r + 1/2`, from 0 to 1, as its level: a straight edge moves
-//! by exactly `r`. Growing is the shrinking of what is black, within the image. Outside the image
-//! all is black.
+//! `outline` joins their mean lines. When an edge moves inwards by `r`, a pixel whose middle is `d`
+//! inside of it keeps the share `d - r + 1/2`, from 0 to 1, as its level: a straight edge moves by
+//! exactly `r`. Growing is the shrinking of black, within the image. Outside the image all is
+//! black.
 //!
-//! `erode` cuts rows by the disc around each pixel of the other colour, which finds the pixels
-//! near edges (`aligned_rows` is faster for plain rows, `grow` where only the shape counts);
-//! `closest` measures them, and `edge_map` keeps the result. `skeleton` finds thin walls, unless `wide` tells that the
-//! image has none, or `plain` that a place has none, and `walls` measures them. Where walls
-//! are not kept, `components` finds those that vanish or break. `feature_size` gives the size
-//! of the feature at each edge, and `scale` makes up for firing.
+//! `erode` cuts rows by the disc around each pixel of the other color, which finds the pixels near
+//! edges (`aligned_rows` is faster for plain rows, `grow` where only the shape counts). `closest`
+//! measures them, and `edge_map` keeps the result. `skeleton` finds thin walls, unless `wide` shows
+//! that the image has none, or `plain` that a place has none, and `walls` measures them. Where
+//! walls are not kept, `components` finds components that vanish or break. `feature_size` gives the
+//! size of the feature at each edge, and `scale` makes up for firing.
 
 mod aligned_rows;
 mod closest;
@@ -83,7 +83,7 @@ pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
 
 /// Moves all edges of a mask inwards by `inwards` pixels, outwards if below zero, to the nearest
 /// pixel. Edges are taken as the stairs that they are: of what is left, no pixel's middle is
-/// nearer than the distance and half a pixel to the middle of one of the other colour.
+/// nearer than the distance and half a pixel to the middle of one of the other color.
 pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
     let reach = Reach::below(erode::at_least(inwards.abs() + 0.5), mask.height());
     let [width, height] = [mask.width() as i32, mask.height() as i32];

@@ -1,4 +1,4 @@
-//! Offsets beside a slow twin that measures every pixel against every other.
+//! Offsets against a slow twin that measures every pixel against every other.
 
 use lamp_stack::{Mask, MaskBuilder};
 use proptest::prelude::*;
@@ -16,8 +16,8 @@ pub(super) fn drawn(width: u32, height: u32, is_white: impl Fn(i32, i32) -> bool
     mask.finish()
 }
 
-/// The squared distance of a pixel from the nearest of the other colour. Of
-/// what is outside the image only the pixels around it count, as black.
+/// The squared distance of a pixel from the nearest pixel of the other color. Outside the image,
+/// only the pixels around it count, as black.
 fn square(mask: &Mask, column: u32, row: u32) -> Option<i64> {
     let colour = mask.is_white(column, row);
     let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
@@ -30,7 +30,7 @@ fn square(mask: &Mask, column: u32, row: u32) -> Option<i64> {
         .min()
 }
 
-/// What an offset of stairs makes of a pixel, by its definition.
+/// The level of a pixel after an offset of stairs, by its definition.
 fn referee(mask: &Mask, inwards: f64, column: u32, row: u32) -> f64 {
     let white = mask.is_white(column, row);
     if white != (inwards > 0.0) {
@@ -250,7 +250,7 @@ fn a_thin_wall_stays_as_wide_as_the_least_feature_at_any_angle() {
             assert!((walls[0].width - width).abs() <= 1.0, "{width} at {degrees}: {walls:?}");
             assert!(walls[0].columns.len().max(walls[0].rows.len()) > 70);
         }
-        // Wide walls are narrowed as asked, and there is nothing to tell.
+        // Wide walls are narrowed as asked, and there is nothing to report.
         let (_, walls) = shrink(&wall(12.0, degrees), &Widths::uniform(3.5), 2.0);
         assert_eq!(walls, []);
     }

@@ -14,7 +14,7 @@ pub(super) type Outline = Vec<[f64; 2]>;
 const SMOOTH: f64 = 0.75;
 /// The least cosine of a turn at which lines that cross need not cross near the corner.
 const BLUNT: f64 = 0.7;
-/// How far the tip of a corner may lie beyond its pixels, in pixels.
+/// The most by which the tip of a corner may exceed its pixels, in pixels.
 const MAX_TIP: f64 = 1.0;
 /// The greatest rise of an arc above its chord, in pixels, that a straight part can hide.
 const MAX_RISE: f64 = 1.1;

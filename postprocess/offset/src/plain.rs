@@ -21,8 +21,8 @@ struct ShapeRun {
     edge_runs_end: usize,
 }
 
-/// Returns for each run of an edge map whether it and all that lies within `margin` rows is
-/// plain. On each side up to `beside` pixels may not be deep inside.
+/// Returns for each run of an edge map whether it and all runs up to `margin` rows away are plain.
+/// On each side up to `beside` pixels need not be deep inside.
 pub(super) fn plain_runs(edge: &EdgeMap, beside: i32, margin: u32) -> Vec<bool> {
     let (shape, mut runs) = shape_runs(edge, beside);
     let mut pairs = Vec::new();

@@ -31,8 +31,8 @@ impl RowRuns {
         rows
     }
 
-    /// Returns the black runs of a mask and of a frame of a pixel around it, so that the mask's first
-    /// row is the second.
+    /// Returns the black runs of a mask and of a frame of a pixel around it, so that the mask's
+    /// first row is the second.
     pub(super) fn black_around(mask: &Mask) -> Self {
         let whole = (-1, mask.width() as i32 + 1);
         let white = Self::white(mask);
@@ -102,7 +102,7 @@ impl RowRuns {
         runs.get(place).filter(|run| run.0 <= column).map(|_| place)
     }
 
-    /// Calls `touch` with the indices of each two runs of neighbouring rows that touch, at sides
+    /// Calls `touch` with the indices of each two runs of neighboring rows that touch, at sides
     /// or corners: the upper one, then the lower one.
     pub(super) fn for_each_touching(&self, mut touch: impl FnMut(usize, usize)) {
         for row in self.ends.windows(3) {
@@ -165,7 +165,7 @@ pub(super) fn first_past<T>(
     place
 }
 
-/// Sorts runs and joins those that touch.
+/// Sorts runs and joins touching ones.
 pub fn join_runs<T: Copy + Ord>(runs: &mut Vec<(T, T)>) {
     runs.sort_unstable();
     runs.dedup_by(|next, last| {

@@ -17,7 +17,7 @@ impl AxisScale {
         Self { left: 1.0 - shrinkage, before }
     }
 
-    /// Returns the first pixel of the larger image whose centre, when it is fired, is past the
+    /// Returns the first pixel of the larger image whose center, when it is fired, is past the
     /// near edge of pixel `before`. Increases strictly, as pixels only become larger.
     pub(super) fn first_past(&self, before: u32) -> u64 {
         (f64::from(before) / self.left - 0.5).ceil().max(0.0) as u64
@@ -29,8 +29,8 @@ impl AxisScale {
     }
 }
 
-/// Enlarges an image so that the fired part has the image's size. Each pixel takes the colour of
-/// the pixel that its centre lies in after firing.
+/// Enlarges an image so that the fired part has the image's size. Each pixel takes the color of
+/// the pixel that its center lies in after firing.
 pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
     const APART: &str = "columns move apart";
     match image {

@@ -41,7 +41,7 @@ fn a_rib_on_a_block_is_as_wide_along_its_length() {
     }
 }
 
-/// What of the block's right side is taken away.
+/// The part of the block's right side that is taken away.
 fn gap(gray: &GrayMask, row: u32) -> f64 {
     (480..510).map(|column| 1.0 - f64::from(gray.level(column, row)) / 255.0).sum()
 }
@@ -79,6 +79,6 @@ fn places_of_one_layer_move_by_their_own_sizes() {
     };
     assert!((made(0..130, 60) - 94.0).abs() < 0.05);
     assert!((made(130..175, 60) - 17.2).abs() < 0.05);
-    // The disc of 160 pixels, to what its stairs tell of its size.
+    // The disc of 160 pixels, to the accuracy that its stairs allow.
     assert!((made(176..400, 100) - (159.5 - 8.4)).abs() < 0.6, "{}", made(176..400, 100));
 }

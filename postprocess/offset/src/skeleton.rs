@@ -2,9 +2,9 @@
 //!
 //! Pixels are removed from the edges inwards, by distance-ordered homotopic thinning (Pudney
 //! 1998): a pixel goes if that neither breaks a wall nor joins two gaps (a simple point of the
-//! (8, 4) topology: Yokoi's number is one), unless it lies furthest inside among its neighbours.
+//! (8, 4) topology: Yokoi's number is one), unless it lies furthest inside among its neighbors.
 //! The remaining pixels that are not deep inside are the cores of thin walls. A convex corner
-//! leaves none, as each pixel there has a neighbour further inside.
+//! leaves none, as each pixel there has a neighbor further inside.
 
 use lamp_stack::Grouped;
 
@@ -13,11 +13,11 @@ use super::plain::plain_runs;
 use super::walls::{Across, ThinWall};
 use super::wide::is_wide;
 
-/// The steps to the neighbours, (column, row), counter-clockwise from the right.
+/// The steps to the neighbors, (column, row), counterclockwise from the right.
 const AROUND: [(i32, i32); 8] =
     [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
 
-/// Neighbours are black, deep inside, or, from `FIRST` on, an index in the edge map.
+/// Neighbors are black, deep inside, or, from `FIRST` on, an index in the edge map.
 const BLACK: u32 = 0;
 const DEEP: u32 = 1;
 const FIRST: u32 = 2;
@@ -28,7 +28,7 @@ const SAFE_WIDTH: f64 = 1.5;
 /// The cores of thin walls: groups of connected skeleton pixels.
 #[derive(Debug)]
 pub(super) struct Cores {
-    /// The neighbours of each pixel near an edge, unless its run is plain.
+    /// The neighbors of each pixel near an edge, unless its run is plain.
     around: Vec<[u32; 8]>,
     /// The pixels of each core.
     cores: Vec<Vec<EdgePixel>>,
@@ -57,8 +57,8 @@ impl Cores {
         Self { around, cores }
     }
 
-    /// Exposes the walls of the cores where they would become thinner than `width` pixels: to
-    /// that, or as wide as they are. Returns them.
+    /// Exposes the walls of the cores where they would become thinner than `width` pixels: up to
+    /// that width, or up to their own if it is less. Returns them.
     pub(super) fn keep(&self, edge: &mut EdgeMap, width: f64) -> Vec<ThinWall> {
         let is_thin =
             |core: &&EdgePixel| Across::at(edge, core).asked < f64::max(width, SAFE_WIDTH);
@@ -100,8 +100,8 @@ impl Ball {
         Self { radius, reach, seen, open: Vec::new() }
     }
 
-    /// Exposes the pixels that are near a pixel of a core and connected to it by others that
-    /// are, which leaves out those of a wall beside.
+    /// Exposes the pixels that are near a pixel of a core and connected to it by others that are,
+    /// which leaves out pixels of a wall next to it.
     fn expose(&mut self, core: u32, around: &[[u32; 8]], levels: &mut [u8]) {
         self.seen.fill(false);
         self.open.push((0, 0, core));
@@ -127,7 +127,7 @@ impl Ball {
     }
 }
 
-/// Returns the neighbours of each pixel that is not in a plain run.
+/// Returns the neighbors of each pixel that is not in a plain run.
 fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
     let mut all = vec![[BLACK; 8]; edge.near_count()];
     let mut plain = plain.iter();
@@ -168,7 +168,7 @@ fn neighbours(edge: &EdgeMap, plain: &[bool]) -> Vec<[u32; 8]> {
     all
 }
 
-/// Removes all pixels that may go, and those in plain runs. Returns which are left.
+/// Removes all pixels that may go, and all pixels in plain runs. Returns which are left.
 fn thinned(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let mut left = vec![false; edge.near_count()];
     edge.for_each(plain, |pixel| left[pixel.index as usize] = true);
@@ -195,8 +195,8 @@ fn outside_first(edge: &EdgeMap, there: &[bool]) -> Vec<u32> {
     Grouped::new(most + 1, || those().map(|of| (edge.depth(of) as usize, of))).into_items()
 }
 
-/// Returns which pixels must stay so that walls keep their length: those furthest inside among
-/// their neighbours, except in corners.
+/// Returns which pixels must stay so that walls keep their length: the pixels furthest inside among
+/// their neighbors, except in corners.
 fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     let depth = |index: u32| match index {
         BLACK => 0,
@@ -213,7 +213,7 @@ fn ends(edge: &EdgeMap, plain: &[bool], around: &[[u32; 8]]) -> Vec<bool> {
     ends
 }
 
-/// Returns whether no neighbour of a pixel is further inside.
+/// Returns whether no neighbor of a pixel is further inside.
 fn is_deepest(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     let own = edge.depth(pixel.index);
     AROUND.iter().all(|&(right, down)| {
@@ -222,14 +222,14 @@ fn is_deepest(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     })
 }
 
-/// Returns whether a pixel furthest inside among its neighbours is the end of a wall. One that
+/// Returns whether a pixel furthest inside among its neighbors is the end of a wall. One that
 /// stays exposed anyway must stay connected.
 fn stays_at_end(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     edge.levels[pixel.index as usize] >= 128 || !is_in_corner(edge, pixel)
 }
 
 /// Returns whether a pixel lies in a corner, a blunt tip or a knob no longer than it is wide:
-/// within twice the radius from a pixel that is deep inside, or the centre of a disc inside the
+/// within twice the radius from a pixel that is deep inside, or the center of a disc inside the
 /// shape that is larger than its own by a pixel.
 fn is_in_corner(edge: &EdgeMap, pixel: &EdgePixel) -> bool {
     let larger = edge.depth(pixel.index) + SIXTEENTHS;
@@ -306,7 +306,7 @@ mod tests {
     use super::super::row_runs::RowRuns;
     use super::*;
 
-    /// Whether a mask is told to be wide, and whether thinning leaves nothing.
+    /// Whether a mask is found to be wide, and whether thinning leaves nothing.
     fn wide_and_empty(mask: &lamp_stack::Mask, by: f64, depth: f64) -> [bool; 2] {
         let white = RowRuns::white(mask);
         let outlines = outlines(&white);

@@ -1,10 +1,10 @@
 //! Stairs that a straight edge may have left, and their mean lines.
 //!
-//! Pixels are white if their centres are inside, so a straight edge leaves a path whose corners
-//! lie between two parallel lines: a standard digital line. Such lines are recognised corner by
-//! corner (Debled-Rennesson and Reveilles 1995), as far as they go. The true edge lies at the
-//! middle of the stair's treads, or risers where it is steep: rounding to whole pixels errs to
-//! both sides alike. So their line of least squares has the stair's own area.
+//! Pixels are white if their centers are inside, so a straight edge leaves a path whose corners lie
+//! between two parallel lines: a standard digital line. Such lines are recognized corner by corner
+//! (Debled-Rennesson and Reveilles 1995), each as long as possible. The true edge lies at the
+//! middle of the stair's treads, or risers where it is steep: rounding to whole pixels errs to both
+//! sides alike. So their line of least squares has the stair's own area.
 
 use super::contours::{Contour, Direction};
 

@@ -1,18 +1,18 @@
-//! Differences of images that are more than edges a little apart.
+//! Differences of images beyond small shifts of edges.
 
 use lamp_stack::{Difference, GrayMask, Image, Mask, Op};
 
 use super::erode::{Disc, SourceColour, Sources, more_than};
 use super::row_runs::RowRuns;
 
-/// Returns what of the difference of two images lies farther than `distance` pixels from their
-/// edges, centre to centre.
+/// Returns the part of the difference of two images that is farther than `distance` pixels from
+/// their edges, center to center.
 ///
 /// A pixel that differs is forgiven if, within the distance of it, the first image somewhere has
-/// the colour that the second has at the pixel, and the second somewhere that of the first. So an
-/// edge may move by the distance, but a gap may not close, nor a wall appear or vanish. Of gray
-/// pixels, the darker image must somewhere be as bright as the brighter one is at the pixel, and
-/// the brighter one as dark. Beyond the images all is black.
+/// the color that the second has at the pixel, and the second somewhere has the color of the first.
+/// So an edge may move by the distance, but a gap may not close, nor a wall appear or vanish. Of
+/// gray pixels, the darker image must somewhere be as bright as the brighter one is at the pixel,
+/// and the brighter one as dark. Beyond the images all is black.
 ///
 /// ```
 /// use lamp_offset::beyond_tolerance;
@@ -46,7 +46,8 @@ pub fn beyond_tolerance(
     })
 }
 
-/// Returns the pixels of a region, in which `bright` is brighter than `dark`, that are not forgiven.
+/// Returns the pixels of a region, in which `bright` is brighter than `dark`, that are not
+/// forgiven.
 fn beyond(region: &Mask, dark: &Image, bright: &Image, disc: &Disc) -> Option<Mask> {
     if region.change_count() == 0 {
         return Some(region.clone());
@@ -75,7 +76,7 @@ fn brighter_than(gray: &GrayMask, level: u8) -> Mask {
     gray.at_least(level.saturating_add(1))
 }
 
-/// Returns the pixels of a region that no pixel of a colour is near to.
+/// Returns the pixels of a region that no pixel of a color is near to.
 fn far_from(mask: &Mask, colour: SourceColour, region: &Mask, disc: &Disc) -> Mask {
     let far = Sources::new(mask, colour).erode_all(disc, &RowRuns::white(region));
     far.mask(region.width())

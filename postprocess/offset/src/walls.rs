@@ -71,7 +71,7 @@ impl Across {
             let column = i64::from(pixel.column) + right * steps;
             edge.at(column as i32, i64::from(pixel.row) + down * steps)
         };
-        // What lies between the pixels at the ends, and beyond them up to the edges.
+        // The length between the pixels at the ends, and beyond them up to the edges.
         let own = edge.near(pixel.index);
         let mut sum = f64::from(edge.levels[pixel.index as usize]);
         let mut sides = 0.0;

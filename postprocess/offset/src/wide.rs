@@ -1,18 +1,18 @@
-//! Shapes that are wide everywhere, told without thinning them.
+//! Shapes that are wide everywhere, found without thinning them.
 //!
-//! Thinning takes simple pixels away, in any order. So it leaves nothing but what is deep inside
-//! if no pixel must stay as the end of a wall, and if what is deep inside is connected as the
-//! shape is: exactly one component of it lies in each component of the shape, and exactly one
-//! hole of the shape in each of its holes (Ronse 1986, "A topological characterization of
-//! thinning"). Pixels near an edge are connected with the black nearby, so no hole of what is deep
-//! inside is without one of the shape, and equal numbers of holes are enough.
+//! Thinning takes simple pixels away, in any order. So it leaves only the pixels deep inside if no
+//! pixel must stay as the end of a wall, and if the pixels deep inside are connected as the shape
+//! is: exactly one component of them is in each component of the shape, and exactly one hole of the
+//! shape is in each of their holes (Ronse 1986, "A topological characterization of thinning").
+//! Pixels near an edge are connected with the black nearby, so each hole of the pixels deep inside
+//! has a hole of the shape, and equal numbers of holes are enough.
 
 use super::components::Components;
 use super::edge_map::{EdgeMap, EdgePixel, EdgeRun, near_pixels};
 use super::row_runs::{RowRuns, first_past};
 
-/// Returns whether thinning leaves nothing but what is deep inside, if no pixel for which
-/// `must_stay` holds is the deepest among its neighbours.
+/// Returns whether thinning leaves only the pixels deep inside, if no pixel for which `must_stay`
+/// holds is the deepest among its neighbors.
 pub(super) fn is_wide(edge: &EdgeMap, must_stay: impl Fn(&EdgePixel) -> bool) -> bool {
     is_connected_alike(edge) && !has_end(edge, must_stay)
 }
@@ -45,7 +45,7 @@ fn is_connected_alike(edge: &EdgeMap) -> bool {
     shape.firsts().all(|run| deep_parts[run] == 1) && shape.holes() == deep.holes()
 }
 
-/// Returns whether a pixel that must stay is the deepest among its neighbours.
+/// Returns whether a pixel that must stay is the deepest among its neighbors.
 fn has_end(edge: &EdgeMap, must_stay: impl Fn(&EdgePixel) -> bool) -> bool {
     (0..edge.height()).any(|row| {
         let runs = edge.row(row.into());
@@ -60,7 +60,7 @@ fn has_end(edge: &EdgeMap, must_stay: impl Fn(&EdgePixel) -> bool) -> bool {
     })
 }
 
-/// Returns whether each pixel of a run has a deeper one beside it, up to what is deep inside.
+/// Returns whether each pixel of a run has a deeper one next to it, up to the pixels deep inside.
 fn deepens(edge: &EdgeMap, runs: &[EdgeRun], run: usize) -> bool {
     let EdgeRun { columns: (start, end), first: Some(first) } = runs[run] else { return true };
     let depths = (first..first + (end - start) as u32).map(|index| edge.depth(index));

@@ -28,8 +28,8 @@ impl Widths {
     }
 
     /// Returns the distance `width` for each size, in pixels, between the first and the last of
-    /// `sizes`: smooth between two of these. Smaller features move like those of the first size,
-    /// larger ones like those of the last.
+    /// `sizes`: smooth between two of these. Smaller features move like features of the first size,
+    /// larger ones like features of the last.
     ///
     /// Distances below zero count as zero.
     pub fn by_size(sizes: &[f64], width: impl Fn(f64) -> f64) -> Self {

@@ -1,4 +1,4 @@
-//! Layers of mesh alone below those of the parts.
+//! Layers of mesh alone, below the parts' layers.
 
 use lamp_stack::{Image, Layer, Length, PageInfo};
 
@@ -8,9 +8,9 @@ use super::BuildMesh;
 
 /// Puts a mesh's base layers before a build's layers, and numbers all of them.
 ///
-/// Base layers are as thick as the first layer and exposed as long. They lie below
-/// it, so that heights stay the parts'. A range of layers that does not begin at
-/// layer 0 gets no base, but counts with it: so ranges can be joined later.
+/// Base layers have the thickness and exposure of the first layer. They lie below it, so the parts'
+/// heights stay as they are. A range of layers that does not begin at layer 0 gets no base, but
+/// counts with it, so ranges can be joined later.
 pub(crate) fn on_base<E>(
     layers: impl Iterator<Item = Result<Made, E>>,
     mesh: Option<BuildMesh>,
@@ -46,8 +46,8 @@ pub(crate) fn on_base<E>(
     })
 }
 
-/// Returns the page of the layer with this index of a base of `count` layers below the parts' first.
-/// The first page describes the stack: now that is the base's first.
+/// Returns the page of the layer with this index in a base of `count` layers below the parts' first
+/// layer. The first page describes the stack, and is now the first page of the base.
 pub(crate) fn base_page(first: &mut PageInfo, index: u32, count: u32) -> PageInfo {
     let below = f64::from(count - index);
     let z_um = first.z_um.zip(first.thickness_um).map(|(z, t)| z - below * t);

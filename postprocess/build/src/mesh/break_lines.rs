@@ -28,10 +28,10 @@ pub(crate) struct BreakLines {
 }
 
 impl BreakLines {
-    /// Creates the lines of parts, `width` wide: up, down, left and right through the
-    /// middle of each part's box and at every `pitch` from there, to the middle of the
-    /// next part's box, whose outline they meet before, or to the build's edge. Lengths
-    /// are in pixels. Returns `None` if there are too many.
+    /// Creates the lines of parts, `width` wide. They go up, down, left and right through the
+    /// middle of each part's box and at every `pitch` from there. They end in the middle of the
+    /// next part's box, whose outline they meet before, or at the build's edge. Lengths are in
+    /// pixels. Returns `None` if there are too many.
     pub(crate) fn new(parts: &[Rect], area: [u32; 2], width: u32, pitch: u32) -> Option<Self> {
         let of_part = |part: &Rect| {
             let sides = [part.right - part.left, part.bottom - part.top];

@@ -1,4 +1,4 @@
-//! What is kept of a mesh, against a pixel-by-pixel referee.
+//! The kept pieces of a mesh, against a pixel-by-pixel referee.
 
 use lamp_stack::{Image, Layer, Length, Mask, Op};
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ fn pieces(white: &Pixels) -> Vec<Vec<usize>> {
     all
 }
 
-/// Returns what is kept of a layer's mesh on that of the layer below.
+/// Returns the pixels of a layer's mesh that are kept on the mesh of the layer below.
 fn kept(white: &Pixels, below: &Pixels, least: usize) -> Pixels {
     let mut out = vec![false; white.len()];
     for piece in pieces(white) {
@@ -58,7 +58,7 @@ fn standing(layout: &Layout) -> Pixels {
     pixels().map(|(x, y)| rows.row(y).partition_point(|&column| column <= x) % 2 == 1).collect()
 }
 
-/// What the moats of two copies leave in each layer, and what is part.
+/// The pixels that the moats of two copies leave in each layer, and the pixels of the parts.
 fn cut(images: &[Mask], copies: &[Copy], moat: Moat, wide: f64) -> Vec<[Pixels; 2]> {
     let drawn = |copy: &Copy| -> Vec<Mask> {
         images.iter().map(|image| drawn_alone(std::slice::from_ref(image), *copy)).collect()

@@ -11,7 +11,7 @@ use super::{BuildMesh, Moat, cut};
 
 /// The mesh of the layer that was made last.
 pub(crate) struct KeptMesh {
-    /// What the moat of each part follows.
+    /// The pixels that the moat of each part follows.
     followed: Vec<Mask>,
     /// The moat of each part in each way in which its copies lie, on an image that is larger than
     /// the build by the mesh's reach on every side.
@@ -20,9 +20,9 @@ pub(crate) struct KeptMesh {
     cut: MeshRows,
     /// The pieces of these that hang together with the mesh below; none before the first layer.
     hanging: Option<MeshRows>,
-    /// How many pixels these have, once they are counted.
+    /// The number of their pixels, once it is counted.
     pixels: Option<u64>,
-    /// Where pieces begin that are not small, but hang on nothing.
+    /// The starts of pieces that are not small, but hang on nothing.
     loose: Vec<[u32; 2]>,
 }
 
@@ -67,14 +67,15 @@ impl KeptMesh {
         }
         let holds = match &self.hanging {
             Some(below) if mesh.moat == Moat::Layer => Holds::Below(below),
-            // Other moats only grow, so the mesh lies within that below.
+            // Other moats only grow, so the mesh is inside the mesh of the layer below.
             _ => Holds::All,
         };
         Some(self.keep(hanging_pieces(&self.cut, holds, mesh.least_piece)))
     }
 
-    /// Returns the mesh of any layer, given what each part's moat follows in it and where pieces
-    /// begin that are not small but hang on nothing; `None` if a moat has too many runs.
+    /// Returns the mesh of any layer, given the pixels that each part's moat follows in it, and the
+    /// starts of pieces that are not small but hang on nothing. Returns `None` if a moat has too
+    /// many runs.
     pub(crate) fn at(
         &mut self,
         mesh: &BuildMesh,
@@ -89,12 +90,12 @@ impl KeptMesh {
         Some(self.keep(hanging_pieces(&self.cut, Holds::AllBut(loose), mesh.least_piece)))
     }
 
-    /// Returns where pieces of the layer's mesh begin that are not small, but hang on nothing.
+    /// Returns the starts of pieces of the layer's mesh that are not small, but hang on nothing.
     pub(crate) fn loose(&self) -> &[[u32; 2]] {
         &self.loose
     }
 
-    /// Returns how many pixels the mesh of the layer that was made last has.
+    /// Returns the number of pixels of the mesh in the layer that was made last.
     pub(crate) fn pixels(&mut self) -> u64 {
         let Self { hanging, pixels, .. } = self;
         *pixels.get_or_insert_with(|| hanging.as_ref().map_or(0, MeshRows::white_pixels))
@@ -107,8 +108,8 @@ impl KeptMesh {
         kept
     }
 
-    /// Makes moats around what they follow now. Returns whether any has changed, or `None` if one has
-    /// too many runs.
+    /// Makes moats around the pixels that they follow now. Returns whether any has changed, or
+    /// `None` if one has too many runs.
     fn cut_moats(
         &mut self,
         mesh: &BuildMesh,
@@ -135,8 +136,8 @@ impl KeptMesh {
         Some(!changed.is_empty())
     }
 
-    /// Returns what the moat of a part follows in the next layer, or `None` if it has too many
-    /// runs.
+    /// Returns the pixels that the moat of a part follows in the next layer, or `None` if they have
+    /// too many runs.
     fn followed(
         &self,
         mesh: &BuildMesh,

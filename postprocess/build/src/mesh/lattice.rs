@@ -18,21 +18,21 @@ pub(crate) enum Lattice {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cells {
     shape: CellShape,
-    /// The distance between the centres of neighbouring holes.
+    /// The distance between the centers of neighboring holes.
     pitch: f64,
-    /// The distance from a hole's centre to its left and right wall.
+    /// The distance from a hole's center to its left and right wall.
     reach: f64,
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl Cells {
-    /// Creates cells whose centres are `pitch` apart, with walls between them.
+    /// Creates cells whose centers are `pitch` apart, with walls between them.
     pub(crate) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
         Self { shape, pitch, reach: 0.5 * (pitch - wall) }
     }
 
-    /// Returns the centre and half the width of two holes that a horizontal line
+    /// Returns the center and half the width of two holes that a horizontal line
     /// crosses, from the left. They repeat at every pitch.
     fn holes(&self, y: f64) -> [(f64, f64); 2] {
         let Self { shape, pitch, reach } = *self;
@@ -43,9 +43,8 @@ impl Cells {
                 [(0.5 * pitch, if is_crossed { reach } else { 0.0 }), (pitch, 0.0)]
             }
             CellShape::Hexagon => {
-                // Each row of holes is shifted by half a cell against the next. As
-                // corners of one row reach between those of the other, a line may
-                // cross holes of two rows.
+                // Each row of holes is shifted by half a cell against the next. Corners of one row
+                // reach between the corners of the other, so a line may cross holes of two rows.
                 let row_pitch = 0.5 * SQRT_3 * pitch;
                 let row = (y / row_pitch).floor();
                 let hole = |row: f64| {
@@ -64,7 +63,7 @@ impl Cells {
 
     fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
         let holes = self.holes(f64::from(row) + 0.5);
-        // A pixel is a wall's if its centre is in no hole.
+        // A pixel is a wall's if its center is in no hole.
         let column = |x: f64| ceil(x - 0.5).min(width);
         out.push(0);
         // Holes of the second kind may begin in the cell to the left of the image.
@@ -111,7 +110,7 @@ fn ceil(x: f64) -> u32 {
     whole + u32::from(f64::from(whole) < x)
 }
 
-/// Changes a row's colour from a column on that is at or behind its last transition.
+/// Changes a row's color from a column on that is at or behind its last transition.
 pub(super) fn toggle(column: u32, width: u32, row: &mut Vec<u32>) {
     if column < width && row.pop_if(|last| *last == column).is_none() {
         row.push(column);
@@ -136,7 +135,7 @@ mod tests {
 
     /// Returns a point's distance from the middle of the nearest wall.
     fn from_wall(shape: CellShape, pitch: f64, [x, y]: [f64; 2]) -> f64 {
-        // The cell of a point is that of the nearest middle.
+        // The cell of a point is the cell with the nearest middle.
         let around = |place: f64| (place / pitch) as i32 - 2..(place / pitch * 1.2) as i32 + 4;
         let middles = around(y).flat_map(|row| around(x).map(move |column| (column, row)));
         let middles = middles.map(|(column, row)| {

@@ -35,10 +35,10 @@ pub struct MeshOptions {
     pub pattern: MeshPattern,
     /// The distance between a part and the mesh.
     pub clearance: Length,
-    /// What moats follow.
+    /// The pixels that moats follow.
     pub moat: Moat,
-    /// The least area of a piece of mesh in a layer, in square millimetres. Smaller ones are
-    /// left out, and so is what would hang on them alone.
+    /// The least area of a piece of mesh in a layer, in square millimeters. Smaller pieces are left
+    /// out, and so is mesh that would hang on them alone.
     pub least_piece_mm2: f64,
     /// The width of break lines; zero makes none.
     pub break_width: Length,
@@ -48,15 +48,15 @@ pub struct MeshOptions {
     pub base_layers: u32,
 }
 
-/// What moats follow.
+/// The pixels that moats follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Moat {
-    /// What is white in a layer of the part or in one below it. No mesh stands on faces
-    /// that look up; it carries those that look down.
+    /// The pixels that are white in a layer of the part or in one below it. No mesh stands on faces
+    /// that look up; it carries faces that look down.
     #[default]
     Rising,
-    /// Each layer of the part. Mesh stands on faces that look up, carries those that
-    /// look down, and enters bores that are open to the side.
+    /// Each layer of the part. Mesh stands on faces that look up, carries faces that look down, and
+    /// enters bores that are open to the side.
     Layer,
     /// The part's outline in all layers. No mesh is above, below or in the part.
     Outline,
@@ -71,7 +71,7 @@ pub enum MeshPattern {
     Cells {
         /// Their shape.
         shape: CellShape,
-        /// The distance between the centres of neighbouring cells.
+        /// The distance between the centers of neighboring cells.
         cell: Length,
         /// The thickness of the walls between them.
         wall: Length,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-/// The transitions of each row of a mesh: an even number, as no wall reaches the last column. Copies
-/// share rows that are not changed.
+/// The transitions of each row of a mesh: an even number, as no wall reaches the last column.
+/// Copies share rows that are not changed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MeshRows {
     rows: Arc<Vec<Arc<[u32]>>>,

@@ -9,7 +9,7 @@ use super::super::testing::{layer, mask_of};
 use super::super::{HeightOptions, LayoutFile, Pack, PartStack, Turns};
 use super::*;
 
-/// Millimetres, which are pixels here.
+/// Millimeters, which are pixels here.
 pub(super) fn mesh(shape: CellShape, [cell, wall, clearance]: [f64; 3]) -> MeshOptions {
     let [cell, wall, clearance] = [cell, wall, clearance].map(Length::from_mm);
     MeshOptions {
@@ -113,7 +113,7 @@ proptest! {
     }
 }
 
-/// What is kept from layer to layer changes no pixel: each layer is as if it were alone.
+/// Rows that are kept from layer to layer change no pixel: each layer is as if it were alone.
 #[test]
 fn layers_are_what_they_are_alone() {
     let [wide, narrow] =
@@ -158,8 +158,8 @@ pub(super) fn drawn_alone(
     mask(&built(&layout, vec![vec![layer(0, Image::Mask(part))]])[0]).clone()
 }
 
-/// What is nearer to a copy than its moat is wide, from centre to centre, and what
-/// that encloses. The moat does not reach the edges of a larger plane.
+/// The pixels that are nearer to a copy than its moat is wide, from center to center, and all that
+/// they enclose. The moat does not reach the edges of a larger plane.
 pub(super) fn free(copy: &Mask, moat: f64) -> Vec<bool> {
     let white: Vec<(u32, u32)> = pixels().filter(|&(x, y)| copy.is_white(x, y)).collect();
     let away = |x: i32, y: i32| {
@@ -181,7 +181,7 @@ pub(super) fn free(copy: &Mask, moat: f64) -> Vec<bool> {
     pixels().map(|(x, y)| !outside.contains(&(x as i32, y as i32))).collect()
 }
 
-/// No mesh is where it would not come out.
+/// No mesh is where it could not be removed.
 #[test]
 fn cavities_stay_free() {
     let ring = mask_of(&["#######", "#.....#", "#.....#", "#.....#", "#######"]);

@@ -50,9 +50,9 @@ impl Layout {
     /// Surrounds the copies with a mesh.
     ///
     /// # Errors
-    /// Returns an error if the mesh would have no holes, no room beside the moats or
-    /// more runs than an image can hold, or if moats are to follow outlines and a part
-    /// was read without its outline.
+    /// Returns an error if the mesh would have no holes, no room next to the moats or more runs
+    /// than an image can hold, or if moats are to follow outlines and a part was read without its
+    /// outline.
     pub fn with_mesh(mut self, options: &MeshOptions) -> Result<Self, TileError> {
         let pixels = |length: Length| length.pixels(self.dpi).max(0.0);
         let clearance = pixels(options.clearance);
@@ -118,8 +118,8 @@ impl BuildMesh {
         (self.changes + self.build.height as usize) * size_of::<u32>()
     }
 
-    /// Returns whether pieces may hang on nothing that are not small: other moats only grow, so that
-    /// the mesh of each layer lies within that of the layer below.
+    /// Returns whether pieces that are not small may hang on nothing. Other moats only grow, so the
+    /// mesh of each layer is inside the mesh of the layer below.
     pub(super) fn tells_loose(&self) -> bool {
         self.moat == Moat::Layer
     }
@@ -140,9 +140,9 @@ impl BuildMesh {
         self.clearance.ceil() as u32 + 1
     }
 
-    /// Returns the moat around what is white, on an image that is larger by the
-    /// [`reach`](Self::reach) on every side. Cavities belong to it, as mesh in them
-    /// would not come out.
+    /// Returns the moat around the white pixels, on an image that is larger by the
+    /// [`reach`](Self::reach) on every side. Cavities belong to it, because mesh in them could not
+    /// be removed.
     fn moat(&self, white: &Mask) -> Mask {
         let reach = self.reach();
         let frame = Frame {
@@ -202,7 +202,7 @@ fn cut(mut wall: &[u32], free: &[u32], width: u32, out: &mut Vec<u32>) {
     out.extend_from_slice(wall);
 }
 
-/// Replaces `out` by a row of mesh with a row of parts, all of which lie in its gaps, put in.
+/// Replaces `out` by a row of mesh together with a row of parts, all of which lie in its gaps.
 pub(super) fn inlaid(mut mesh: &[u32], mut parts: &[u32], out: &mut Vec<u32>) {
     out.clear();
     while let Some(&next) = parts.first() {
@@ -224,8 +224,8 @@ pub(super) fn inlaid(mut mesh: &[u32], mut parts: &[u32], out: &mut Vec<u32>) {
     out.extend_from_slice(mesh);
 }
 
-/// Returns the number of transitions before a column. It is found from the left, as there are only
-/// some between two copies, while halving the row would read all over it.
+/// Returns the number of transitions before a column. The search goes from the left: only some
+/// transitions lie between two copies, while halving the row would read all over it.
 fn count_below(row: &[u32], column: u32) -> usize {
     let (groups, _) = row.as_chunks::<16>();
     let before = 16 * groups.iter().take_while(|group| group[15] < column).count();

@@ -1,6 +1,6 @@
-//! Pieces of mesh: what hangs together, in a layer and on the one below.
+//! Pieces of mesh: pixels that hang together, in a layer and on the layer below.
 //!
-//! Runs of neighbouring rows are joined where they share a column (union-find), so the cost follows
+//! Runs of neighboring rows are joined where they share a column (union-find), so the cost follows
 //! the runs. Pixels that only touch at corners do not hang together.
 
 use lamp_stack::sets::{root, unite};
@@ -8,25 +8,26 @@ use lamp_stack::white_runs;
 
 use super::mesh_rows::MeshRows;
 
-/// What pieces hang on.
+/// The pieces that hang on something.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Holds<'a> {
-    /// Each hangs on something: where each layer's mesh lies within that of the layer below, all of
-    /// its pieces hang on pieces that are no smaller.
+    /// All pieces, where the mesh of each layer is inside the mesh of the layer below: every piece
+    /// hangs on a piece that is no smaller.
     All,
-    /// Those that share a pixel with the mesh below hang on it.
+    /// Pieces that share a pixel with the mesh below.
     Below(&'a MeshRows),
-    /// All but those that begin in these rows and columns, which rise.
+    /// All pieces except the ones that begin at these rows and columns, in increasing order.
     AllBut(&'a [[u32; 2]]),
 }
 
 /// The pieces of a layer's mesh.
 pub(super) struct Hanging {
-    /// Those that are not small and hang on something.
+    /// The pieces that are not small and hang on something.
     pub(super) kept: MeshRows,
-    /// How many pixels these have, if they were counted.
+    /// The number of their pixels, if it was counted.
     pub(super) pixels: Option<u64>,
-    /// Where others that are not small begin: their first row, and the first column in it, in order.
+    /// The starts of pieces that are not small but hang on nothing: their first row, and the first
+    /// column in it, in order.
     pub(super) loose: Vec<[u32; 2]>,
 }
 
@@ -81,7 +82,7 @@ struct Pieces {
     labels: Vec<u32>,
     /// The label that stands for the piece of each label.
     roots: Vec<u32>,
-    /// What is known of each piece, by the label that stands for it.
+    /// The data of each piece, by the label that stands for it.
     all: Vec<Piece>,
 }
 
@@ -144,8 +145,8 @@ impl Pieces {
     }
 }
 
-/// Returns whether each run of a row shares columns with the run of the same number in another, and
-/// with no other.
+/// Returns whether each run of a row shares columns with the run of the same number in another row,
+/// and with no other run.
 fn in_step(a: &[u32], b: &[u32]) -> bool {
     let follows = |(a, b): (&[u32], &[u32])| a[0].max(b[0]) < a[1].min(b[1]);
     a.len() == b.len() && a.windows(2).zip(b.windows(2)).all(follows)

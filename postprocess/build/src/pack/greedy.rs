@@ -20,7 +20,7 @@ impl PlacingRule {
 }
 
 /// Places up to `wanted` copies of each part in its ways from the top left, large parts first, and
-/// centres all of them.
+/// centers all of them.
 pub(super) fn place(
     layout: &Layout,
     regions: &mut NoFitRegions,
@@ -49,7 +49,7 @@ pub(super) fn place(
     placements
 }
 
-/// Adds copies of the only part to those that stand, up to `wanted`, and centres all of them.
+/// Adds copies of the only part to the placed ones, up to `wanted`, and centers all of them.
 pub(super) fn fill(
     layout: &Layout,
     regions: &mut NoFitRegions,
@@ -161,7 +161,7 @@ impl TakenPlaces {
     }
 }
 
-/// Adds a run to runs that do not touch, and joins those that it touches.
+/// Adds a run to runs that do not touch, and joins the runs that it touches.
 fn insert(runs: &mut Vec<CellRun>, (mut start, mut end): CellRun) {
     let first = runs.partition_point(|run| run.1 < start);
     let last = first + runs[first..].partition_point(|run| run.0 <= end);

@@ -4,7 +4,7 @@ use lamp_stack::Orientation;
 
 use super::super::{CopyPlacement, Layout};
 
-/// Places up to `wanted` copies of the only part in rows from the top left, centred.
+/// Places up to `wanted` copies of the only part in rows from the top left, centered.
 pub(super) fn grid(
     layout: &Layout,
     turn: Orientation,
@@ -32,7 +32,7 @@ fn most(area: u32, part: u32, gap: u32) -> Option<u32> {
     Some(area.checked_sub(part)? / (part + gap).max(1) + 1)
 }
 
-/// Returns where `count` parts stand along a side, centred.
+/// Returns where `count` parts stand along a side, centered.
 fn positions(area: u32, part: u32, gap: u32, count: u32) -> impl Iterator<Item = u32> + Clone {
     let used = count * part + (count - 1) * gap;
     (0..count).map(move |i| (area - used) / 2 + i * (part + gap))

@@ -20,7 +20,7 @@ pub(super) struct Job<'a> {
     stacks: Option<&'a [Vec<usize>]>,
     boxes: NoFitRegions,
     outlines: NoFitRegions,
-    /// Those of lattices, by the pixels on a side of their cells.
+    /// The regions of lattices, by the pixels on a side of their cells.
     of_lattices: HashMap<u32, NoFitRegions>,
 }
 
@@ -31,7 +31,8 @@ enum Strategy {
     Grid(u32),
     /// Puts copy after copy where there is room.
     Greedy(PackBy, Turns, PlacingRule),
-    /// Puts copies of the only part on a lattice of one of its stacks, and more where there is room.
+    /// Puts copies of the only part on a lattice of one of its stacks, and more where there is
+    /// room.
     Lattice(usize),
 }
 
@@ -146,7 +147,7 @@ impl<'a> Job<'a> {
         all
     }
 
-    /// Returns the copies that the first of the strategies which places most of them places.
+    /// Returns the copies of the strategy that places most of them, the first of several.
     pub(super) fn simply_placed(&mut self, wanted: &[u32]) -> Vec<CopyPlacement> {
         let mut best: Vec<CopyPlacement> = Vec::new();
         for strategy in self.strategies(wanted.len() == 1) {

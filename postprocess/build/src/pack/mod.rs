@@ -23,18 +23,18 @@ type Way = (usize, Orientation);
 /// Options to find places.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pack {
-    /// What keeps the gap from other parts.
+    /// The extent of a part that keeps the gap from other parts.
     pub by: PackBy,
     /// How parts may be turned.
     pub turns: Turns,
     /// The least distance from the copies to the area's edges.
     pub edge_gap: Length,
-    /// Whether the numbers of copies of several parts are shares: as many are placed as fit, those
-    /// of each part within one of its share.
+    /// Whether the numbers of copies of several parts are shares: as many copies as fit are placed,
+    /// and each part's number is within one of its share.
     pub shares: bool,
 }
 
-/// What of a part keeps the gap from other parts.
+/// The extent of a part that keeps the gap from other parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PackBy {
     /// The box around it.

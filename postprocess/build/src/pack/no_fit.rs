@@ -70,8 +70,8 @@ impl NoFitRegions {
         Self { cell, ..Self::new(layout, gap, PackBy::Outlines) }
     }
 
-    /// Returns the displacements at which the outline of `moving` overlaps that of
-    /// `placed` or comes nearer than the gap.
+    /// Returns the displacements at which the outline of `moving` overlaps the outline of `placed`
+    /// or comes nearer than the gap.
     pub(super) fn no_fit(&mut self, layout: &Layout, moving: Way, placed: Way) -> Rc<NoFitRegion> {
         if let Some(known) = self.regions.get(&[moving, placed]) {
             return Rc::clone(known);
@@ -217,8 +217,8 @@ impl NoFitRegion {
         Self::new(height - 1, vec![run; rows as usize])
     }
 
-    /// Returns the displacements by whole multiples of some cells, in these multiples: for each row,
-    /// the union of what each two runs keep from each other.
+    /// Returns the displacements by whole multiples of some cells, in these multiples: for each
+    /// row, the union of what each two runs keep from each other.
     fn of_outlines(moving: &CellOutline, placed: &CellOutline, every: i32) -> Self {
         let margin = placed.margin;
         let ends = |rows: &[Vec<CellRun>]| {

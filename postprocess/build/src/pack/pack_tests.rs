@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::super::testing::{layer, mask_of};
 use super::super::{CopyPlacement, Layout, Pack, PackBy, PartStack, TileError, Turns};
 
-/// At 25.4 dpi, one pixel is one millimetre.
+/// At 25.4 dpi, one pixel is one millimeter.
 fn outlined(mask: &Mask) -> PartStack {
     let layer = layer(0, Image::Mask(mask.clone()));
     PartStack::of_outline("p.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
@@ -79,7 +79,7 @@ fn turning_gains_parts_only_where_it_is_allowed() {
         let pack = Pack { turns, ..Pack::default() };
         packed(&bar, &[None], "14x10mm", 0, pack).unwrap().placements().len()
     };
-    // Two bars, and one upright beside them.
+    // Two bars, and one upright next to them.
     assert_eq!((count(Turns::None), count(Turns::Half), count(Turns::Quarters)), (2, 2, 3));
     let error = packed(&bar, &[None], "9x11mm", 0, Pack::default()).unwrap_err();
     assert!(error.to_string().contains("10 x 4 pixels, larger than the build area of 9 x 11"));
@@ -94,7 +94,7 @@ fn what_finds_no_place_is_counted() {
     let layout = packed(&both, &[Some(5), Some(4)], "9x11mm", 1, Pack::default()).unwrap();
     check(&layout, 1);
     assert_eq!((layout.copies_of(0), layout.copies_of(1)), (5, 4));
-    // What fits of more.
+    // The copies that fit if more are asked for.
     let layout = packed(&both, &[Some(5), Some(5)], "9x11mm", 1, Pack::default()).unwrap();
     check(&layout, 1);
     assert_eq!((layout.copies_of(0), layout.copies_of(1)), (5, 4));

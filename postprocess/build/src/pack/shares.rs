@@ -30,7 +30,7 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32], limit: u32) -> Vec<CopyPla
             step /= 2;
         }
     }
-    // Then those that only the search finds room for.
+    // Then copies that only the search finds room for.
     step = (most / 8).max(1);
     while step > 0 && most < limit {
         let next = (most + step).min(limit);
@@ -57,11 +57,11 @@ pub(super) fn most(job: &mut Job<'_>, shares: &[u32], limit: u32) -> Vec<CopyPla
         }
         (most, best) = (next, found);
     }
-    // Where not even one of each fits, what fits of these tells which does not.
+    // If one of each does not fit, the copies that fit show which part does not.
     if most > 0 { best } else { job.simply_placed(&order.counts(0)) }
 }
 
-/// The order of copies, as far as it is known.
+/// The order of copies, as known so far.
 struct Order {
     shares: Vec<u64>,
     /// The part of each copy.
@@ -79,7 +79,8 @@ impl Order {
         Self { shares, parts: Vec::new(), counts }
     }
 
-    /// Returns how many of the first `copies` are of each part, or one where none is.
+    /// Returns the number of copies of each part among the first `copies`, or one where there is no
+    /// copy.
     fn counts(&mut self, copies: u32) -> Vec<u32> {
         while self.parts.len() < copies as usize {
             self.grow();
@@ -89,7 +90,7 @@ impl Order {
         counts.into_iter().map(|count| count.max(1)).collect()
     }
 
-    /// Adds the copy that is due first: of those parts that are not ahead, the one that is too late
+    /// Adds the copy that is due first: of the parts that are not ahead, the one that is too late
     /// soonest.
     fn grow(&mut self) {
         let whole: u128 = self.shares.iter().map(|&share| u128::from(share)).sum();
@@ -159,8 +160,8 @@ mod tests {
     fn as_many_as_fit_are_placed_by_shares() {
         let parts = [part(&["####"; 4]), part(&["##"; 2])];
         let shares = Pack { shares: true, ..Pack::default() };
-        // Two large ones beside each other, and small ones below them. The room of a third leaves
-        // that of a single small one.
+        // Two large ones next to each other, and small ones below them. The room of a third large
+        // one is enough for a single small one.
         assert_eq!(packed(&parts, &[1, 1], "9x9mm", shares), Some(vec![2, 2]));
         let error = Layout::packed(
             parts.to_vec(),

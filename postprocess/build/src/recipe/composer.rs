@@ -18,15 +18,16 @@ use super::rising::{Rising, RisingError};
 use super::schedule::{Scheduled, schedule};
 use super::{LoosePieces, Recipe, RecipeError};
 
-/// Recipes with more bytes are not read: a copy takes a line, and so does a row of the mesh's image.
+/// Recipes with more bytes are not read: a copy takes a line, and so does a row of the mesh's
+/// image.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// A build whose layers are made one by one, in any order, by its [`Recipe`].
 ///
 /// The parts' stacks are opened and compared with the recipe's digests at the start, and read as
-/// layers are made. What a moat follows has to be gathered from the lowest layer up to the one that is
-/// asked for; it is kept every 64 layers, so that only the first way up reads every layer of the parts.
-/// Layers in sequence cost what they cost in [`Layout::build`].
+/// layers are made. The pixels that a moat follows are gathered from the lowest layer up to the one
+/// that is asked for. They are kept every 64 layers, so only the first way up reads every layer of
+/// the parts. Layers in sequence cost the same as in [`Layout::build`].
 ///
 /// [`Recipe`] has an example.
 pub struct Composer {
@@ -46,7 +47,7 @@ pub struct Composer {
     rising: Vec<Rising>,
 }
 
-/// What layers are drawn on.
+/// The layout and the base that layers are drawn on.
 struct Canvas {
     layout: Layout,
     /// The image of the base.
@@ -86,8 +87,8 @@ impl Composer {
     /// Opens the stacks of a recipe, which are named from a folder.
     ///
     /// # Errors
-    /// Returns an error if a stack cannot be read, if it is not the one that the recipe was made for,
-    /// or if they make no build.
+    /// Returns an error if a stack cannot be read, if it is not the one that the recipe was made
+    /// for, or if they make no build.
     pub fn new(recipe: &Recipe, folder: &Path) -> Result<Self, RecipeError> {
         let layers = recipe.layers();
         let moat = recipe.mesh.as_ref().map(|mesh| mesh.moat);
@@ -151,7 +152,8 @@ impl Composer {
         &self.canvas.layout
     }
 
-    /// Makes the layer with an index, as it stands in the build: the lowest also describes the stack.
+    /// Makes the layer with an index, as it stands in the build: the lowest also describes the
+    /// stack.
     ///
     /// # Errors
     /// Returns an error if there is no such layer, or if a stack cannot be read or has changed.
@@ -165,12 +167,12 @@ impl Composer {
         Ok(layer)
     }
 
-    /// Makes the layers whose indices are in a range, in order and on all threads. The first describes
-    /// the stack that they are, as of any range of layers.
+    /// Makes the layers whose indices are in a range, in order and on all threads. The first layer
+    /// describes the stack that they form, as for any range of layers.
     ///
     /// # Errors
-    /// Returns an error if there is no such layer. Layers come with an error if a stack cannot be read
-    /// or has changed.
+    /// Returns an error if there is no such layer. Layers come with an error if a stack cannot be
+    /// read or has changed.
     pub fn range(
         &mut self,
         layers: Range<u32>,
@@ -253,7 +255,8 @@ impl Composer {
         Ok(Some(rows))
     }
 
-    /// Returns what the moat of a part follows, given what is white of it in the layer.
+    /// Returns the pixels that the moat of a part follows, given the white pixels of the part in
+    /// the layer.
     fn followed(
         &mut self,
         moat: Moat,

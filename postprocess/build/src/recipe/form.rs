@@ -7,10 +7,10 @@ use serde_json::Value;
 use super::super::{CellShape, CopyPlacement, MeshOptions, MeshPattern, Moat};
 use super::{LoosePieces, RecipeError, RecipePart};
 
-/// As many base layers as options may ask for.
+/// The most base layers that options may ask for.
 const MAX_BASE_LAYERS: u32 = 100_000;
 
-/// What tells versions apart, whatever else there is.
+/// The keys that distinguish versions, whatever else there is.
 #[derive(Deserialize)]
 pub(super) struct Version {
     pub(super) schema: String,
@@ -23,7 +23,7 @@ pub(super) struct Version {
 #[serde(deny_unknown_fields)]
 pub(super) struct RecipeForm {
     pub(super) schema: String,
-    /// What changes when the same recipe makes other pages.
+    /// A number that changes when the same recipe makes other pages.
     pub(super) code: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) machine: Option<String>,
@@ -35,7 +35,8 @@ pub(super) struct RecipeForm {
     pub(super) settle: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(super) resample: bool,
-    /// The layers of the parts that are built, if not all are: the first, and the one after the last.
+    /// The layers of the parts that are built, if not all are: the first, and the one after the
+    /// last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) layers: Option<[u32; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -96,12 +97,12 @@ enum PatternForm {
     Image {
         name: String,
         width: u32,
-        /// The columns at which each row changes colour.
+        /// The columns at which each row changes color.
         rows: Vec<Vec<u32>>,
     },
 }
 
-/// Values as the text that they are on the command line, which is exact.
+/// Values as they are written on the command line, which is exact.
 mod as_text {
     use std::fmt::Display;
     use std::str::FromStr;

@@ -1,8 +1,8 @@
-//! Recipes: all that decides the pages of a build but its parts' stacks, and pages made by them.
+//! Recipes: all that decides the pages of a build except its parts' stacks, and pages made by them.
 //!
-//! A build of many copies takes gigabytes, its parts' stacks some megabytes. A [`Recipe`] says where
-//! copies stand and what mesh is around them, and names the parts' stacks with their digests. A
-//! [`Composer`] makes the pages of any layers by it, in any order, the same as [`Layout::build`].
+//! A build of many copies takes gigabytes, its parts' stacks some megabytes. A [`Recipe`] says
+//! where copies stand and what mesh is around them, and names the parts' stacks with their digests.
+//! A [`Composer`] makes the pages of any layers by it, in any order, the same as [`Layout::build`].
 
 mod composer;
 mod form;
@@ -31,7 +31,7 @@ pub const TILE_CODE: u32 = 6;
 /// The form of the text.
 const SCHEMA: &str = "lamp-recipe-1";
 
-/// All that decides the pages of a build but its parts' stacks.
+/// All that decides the pages of a build except its parts' stacks.
 ///
 /// ```
 /// use lamp_build::{
@@ -82,7 +82,7 @@ pub struct Recipe {
     mesh: Option<MeshOptions>,
 }
 
-/// A part of a recipe: its stack's file, and what is placed of its images.
+/// A part of a recipe: its stack's file, and the placed part of its images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipePart {
@@ -113,15 +113,15 @@ impl RecipePart {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoosePieces {
-    /// The first layer in which they are, as the parts count. They are those of all layers up to the
-    /// next for which others are told.
+    /// The first layer with these pieces, as the parts count layers. The pieces are the same in all
+    /// layers up to the next one for which others are reported.
     pub(super) layer: u32,
     /// The first row of each, and its first column in that row, in order.
     pub(super) starts: Vec<[u32; 2]>,
 }
 
 impl Recipe {
-    /// Creates the recipe of a layout, before it has a mesh; with the files of its parts in their
+    /// Creates the recipe of a layout that has no mesh yet, with the files of its parts in their
     /// order, and the layers of them that are built, if not all are.
     ///
     /// # Panics
@@ -137,7 +137,7 @@ impl Recipe {
         assert!(layout.mesh.is_none(), "the recipe adds the mesh");
         let parts = files.into_iter().zip(&layout.parts).map(|(file, part)| {
             let frame = part.frame();
-            // Extents lie within the image.
+            // Extents are inside the image.
             let extents = [frame.left as u32, frame.top as u32, frame.width, frame.height];
             RecipePart { extents: part.is_fit().then_some(extents), ..file }
         });
@@ -166,7 +166,8 @@ impl Recipe {
         self
     }
 
-    /// Adds what [`Layout::build_telling`] tells of pieces of mesh that hang on nothing, in order.
+    /// Adds pieces of mesh that hang on nothing, as [`Layout::build_telling`] reports them, in
+    /// order.
     pub fn add_loose(&mut self, loose: LoosePieces) {
         self.form.loose.push(loose);
     }
@@ -174,8 +175,8 @@ impl Recipe {
     /// Reads a recipe.
     ///
     /// # Errors
-    /// Returns an error if the text is none, if it is of another version, or if its values make no
-    /// build.
+    /// Returns an error if the text is not a recipe, if it is of another version, or if its values
+    /// make no build.
     pub fn from_json(text: &str) -> Result<Self, RecipeError> {
         let json =
             |error: serde_json::Error| RecipeError::Json { problem: one_line(&error.to_string()) };

@@ -46,8 +46,8 @@ impl PartFile {
         Ok(Self { name, stack, pages })
     }
 
-    /// Returns what is known of the part before it is placed, where only some of its `layers` are
-    /// built; the build depends on those below, too, if they are `from_bottom`. With `outline`, all
+    /// Returns the part as it is known before it is placed, if only some of its `layers` are built.
+    /// If `from_bottom`, the build also depends on the layers below them. With `outline`, all
     /// layers that are built are read for it.
     pub(super) fn part(
         &mut self,
@@ -88,7 +88,7 @@ impl PartFile {
         Ok(whole.fit_to(frame))
     }
 
-    /// Returns what is said of the stack, of those `layers`: the last that says it up to a page.
+    /// Returns the stack's description for these `layers`: the last one in the pages up to `page`.
     fn stack_of(&self, page: usize, layers: Option<&Range<u32>>) -> Option<StackInfo> {
         let said = self.stack.headers()[..=page].iter().rev();
         let (index, stack) = said
@@ -100,7 +100,7 @@ impl PartFile {
         })
     }
 
-    /// Returns what the pages say that the build depends on, as layers without images.
+    /// Returns the pages that the build depends on, as layers without images.
     pub(super) fn headers(&self) -> impl Iterator<Item = Result<Layer, TileError>> + use<> {
         let layer = |header: &PageHeader| Layer {
             info: PageInfo { stack: None, ..header.info.clone() },
@@ -117,7 +117,7 @@ impl PartFile {
         self.stack.headers().partition_point(|header| header.info.index < layer.info.index)
     }
 
-    /// Reads a layer by its page. What it says of the stack is left out.
+    /// Reads a layer by its page, without the page's description of the stack.
     pub(super) fn layer(&self, page: usize) -> Result<Layer, RecipeError> {
         let mut layer = self.stack.layer(page).map_err(|source| self.failed(source))?;
         layer.info.stack = None;

@@ -1,4 +1,4 @@
-//! Errors of recipes and of what is composed by them.
+//! Errors of recipes and of composing by them.
 
 use std::io;
 
@@ -20,9 +20,9 @@ pub enum RecipeError {
     /// It has another form.
     #[error("this is no recipe of the form {known} but {found:?}")]
     Schema {
-        /// What it calls itself.
+        /// The form that it names.
         found: String,
-        /// What is read.
+        /// The form that is read.
         known: &'static str,
     },
     /// A value is not as it was written.
@@ -43,7 +43,7 @@ pub enum RecipeError {
     Value {
         /// The key, as `copies[3].part`.
         place: String,
-        /// What is wrong with it.
+        /// The problem.
         why: String,
     },
     /// The recipe cannot be read.
@@ -72,7 +72,7 @@ pub enum RecipeError {
         file: String,
         /// Its digest.
         found: String,
-        /// That in the recipe.
+        /// The digest in the recipe.
         expected: String,
     },
     /// A part's stack cannot be read.

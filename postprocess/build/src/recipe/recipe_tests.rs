@@ -1,4 +1,4 @@
-//! Composed layers against those of the build, and recipes that are none.
+//! Composed layers against the layers of the build, and texts that are not recipes.
 
 use std::fs::{self, File};
 use std::ops::Range;
@@ -184,7 +184,7 @@ impl Plan {
         (build, recipe)
     }
 
-    /// Checks that composed layers are those of the build, in any order.
+    /// Checks that composed layers equal the layers of the build, in any order.
     fn check(&self, folder: &Path) {
         let (build, recipe) = self.made();
         let recipe = Recipe::from_json(&recipe.to_json()).map(|read| {

@@ -1,17 +1,17 @@
-//! What is white in a layer of a part or in one below it, for layers in any order.
+//! The pixels that are white in a layer of a part or in one below it, for layers in any order.
 
 use lamp_stack::{Mask, Op};
 
-/// After so many layers what has risen is kept. Going down takes at most as many layers, each a page
-/// to be decoded.
+/// The number of layers after which the union is kept. Going down takes at most as many layers,
+/// each a page to be decoded.
 const EVERY: usize = 64;
 
-/// What has risen from a part's lowest layer up to one that is asked for.
+/// The union of a part's layers, from the lowest up to one that is asked for.
 #[derive(Debug)]
 pub(super) struct Rising {
-    /// After [`EVERY`] layers, after twice as many, and so on, as far as was asked for.
+    /// The unions after [`EVERY`] layers, after twice as many, and so on, as far as was asked for.
     marks: Vec<Mask>,
-    /// What was asked for last, and the number of layers that it is of.
+    /// The union that was asked for last, after the number of its layers.
     last: (usize, Mask),
     none: Mask,
 }
@@ -32,7 +32,8 @@ impl Rising {
         Self { marks: Vec::new(), last: (0, none.clone()), none }
     }
 
-    /// Returns the union of the lowest `count` layers, given what is white in each, if it has an image.
+    /// Returns the union of the lowest `count` layers, given the white pixels of each, if it has an
+    /// image.
     pub(super) fn up_to<E>(
         &mut self,
         count: usize,
@@ -52,7 +53,8 @@ impl Rising {
         Ok(risen)
     }
 
-    /// Returns the most of what is known that is of no more than `count` layers.
+    /// Returns the largest known union of no more than `count` layers, after the number of its
+    /// layers.
     fn nearest(&self, count: usize) -> (usize, Mask) {
         let marks = (count / EVERY).min(self.marks.len());
         if self.last.0 <= count && self.last.0 >= marks * EVERY {

@@ -1,4 +1,4 @@
-//! Cuts the rows of an image into those of swaths, in one pass from the left.
+//! Cuts the rows of an image into the rows of swaths, in one pass from the left.
 
 use std::ops::Range;
 
@@ -64,8 +64,8 @@ impl Swaths {
         cut
     }
 
-    /// Returns the columns that a swath takes of a row that goes over to the next swath after so
-    /// many of the shared columns.
+    /// Returns the columns of a row that a swath takes, if the row goes over to the next swath
+    /// after so many of the shared columns.
     #[inline]
     fn taken(&self, swath: u32, tooth: u32) -> Range<u32> {
         let start = swath * self.step();
@@ -103,7 +103,7 @@ impl Swaths {
     }
 }
 
-/// The rows of a swath, as those of a [`RunImage`].
+/// The rows of a swath, in the form of a [`RunImage`].
 struct SwathRows<C> {
     width: u32,
     /// The number of changes up to each row's end, after a zero.

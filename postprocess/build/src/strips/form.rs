@@ -1,4 +1,4 @@
-//! What the index of a folder says of its strips.
+//! The strips of a folder, as its index lists them.
 
 use std::ops::Range;
 use std::path::Path;

@@ -26,7 +26,7 @@ pub enum IndexError {
     /// It is not JSON of this form.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// The strips that it lists are not those of a build of its size.
+    /// The strips that it lists do not fit a build of its size.
     #[error("its strips are not those of such a build")]
     Strips,
 }

@@ -28,8 +28,7 @@ impl Swaths {
     /// Adds up the levels of swaths, which gives the layer that they were cut from.
     ///
     /// # Errors
-    /// Returns an error if the swaths are not those of a layer, or add up to more than full
-    /// exposure.
+    /// Returns an error if the swaths do not make a layer, or add up to more than full exposure.
     pub fn join(&self, swaths: &[Image]) -> Result<GrayMask, JoinSwathsError> {
         let height = swaths.first().map_or(0, Image::height);
         let fits = |swath: &Image| swath.width() == self.mirrors && swath.height() == height;

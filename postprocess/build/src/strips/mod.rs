@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A swath is as wide as the projector has mirrors across its path, in columns. It shares some
-//! columns with the next swath, so that no seam shows: there the dose of one falls as that of the
-//! other rises, and their sum is the layer's. [`Seam`] says by what.
+//! columns with the next swath, so that no seam shows: there the dose of one falls as the dose of
+//! the other rises, and their sum is the layer's dose. [`Seam`] gives the amounts.
 
 mod cut;
 mod form;
@@ -116,13 +116,14 @@ impl Swaths {
         within(start)..within(start + u64::from(self.mirrors))
     }
 
-    /// Returns the distance from the first column of a swath to that of the next.
+    /// Returns the distance from the first column of a swath to the first column of the next.
     fn step(&self) -> u32 {
         self.mirrors - self.overlap
     }
 
-    /// Returns some of a layer's swaths. Their pages say under `strip` the swath's number, the number
-    /// of swaths, the columns of the build that it exposes, and the bits of the build's pixels.
+    /// Returns some of a layer's swaths. Their pages say under `strip` the swath's number, the
+    /// number of swaths, the columns of the build that it exposes, and the bits of the build's
+    /// pixels.
     ///
     /// # Panics
     /// Panics if [`cut`](Self::cut) does.

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use lamp_stack::LevelChange;
 
-/// What two swaths expose of each level in the columns that they share.
+/// The part of each level that each of two swaths exposes in the columns that they share.
 pub(super) struct Ramps {
     overlap: u32,
-    /// For each level, once it is used, what the second swath exposes of it, column by column.
+    /// For each level, once it is used, the part that the second swath exposes, column by column.
     second: [Option<Box<[u8]>>; 256],
 }
 
@@ -62,8 +62,8 @@ impl Ramps {
     }
 }
 
-/// Returns what the second of two swaths exposes of a level in a shared column, counted from the
-/// first shared one: it rises in equal steps. The first swath exposes the rest.
+/// Returns the part of a level that the second of two swaths exposes in a shared column, counted
+/// from the first shared one: it rises in equal steps. The first swath exposes the rest.
 fn second_share(level: u8, column: u32, overlap: u32) -> u8 {
     let (steps, all) = (u64::from(column) + 1, u64::from(overlap) + 1);
     // Rounded to the nearest level.

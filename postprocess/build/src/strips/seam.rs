@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer, de};
 
-/// How two swaths share the columns that both reach. What they expose always adds up to the layer.
+/// How two swaths share the columns that both reach. Their exposures always add up to the layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Seam {
     /// Each row goes over to the next swath at a column of its own, so each pixel belongs to one of
@@ -18,8 +18,8 @@ lamp_stack::named!(Seam { Comb = "comb", Gray = "gray" | "grey" });
 /// The fraction of the golden ratio, in 2^-32: its multiples fill a circle evenly, however many
 /// follow each other.
 const A_ROW: u32 = 0x9E37_79B9;
-/// The fraction of the square root of 2, whose multiples are nearly as even and never meet those of
-/// the first.
+/// The fraction of the square root of 2. Its multiples are nearly as even, and never meet the
+/// multiples of the golden ratio.
 const A_LAYER: u32 = 0x6A09_E667;
 
 /// Returns after how many of the shared columns a row goes over to the next swath: 0 to `overlap`,
@@ -34,8 +34,7 @@ pub(super) fn tooth(overlap: u32, row: u32, layer: u32) -> u32 {
 }
 
 impl Seam {
-    /// Returns the seams of strips that say nothing of them, as they were cut when there were no
-    /// others.
+    /// Returns the seams of strips that do not name them: they were cut when there were no others.
     pub(super) fn unnamed() -> Self {
         Self::Gray
     }
@@ -51,7 +50,7 @@ impl<'de> Deserialize<'de> for Seam {
 mod tests {
     use super::*;
 
-    /// Returns the greatest distance between neighbours of some places on a circle of length 1.
+    /// Returns the greatest distance between neighbors of some places on a circle of length 1.
     fn widest_gap(mut places: Vec<f64>) -> f64 {
         places.sort_by(f64::total_cmp);
         let around = places[0] + 1.0 - places[places.len() - 1];

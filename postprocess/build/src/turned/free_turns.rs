@@ -33,7 +33,7 @@ pub struct FreeTurnsError(String);
 const MOST: u32 = 18;
 
 impl FreeTurns {
-    /// Returns the angles at which a part is sliced beside its own, in degrees.
+    /// Returns the angles at which a part is sliced besides its own, in degrees.
     pub fn degrees(self) -> Vec<f64> {
         (1..self.steps).map(|step| self.step() * f64::from(step)).collect()
     }

@@ -37,7 +37,7 @@ pub struct PlannedStack {
 /// How a part is to be sliced for a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurnedSlicing {
-    /// Its turn about z, in degrees anticlockwise as seen from above.
+    /// Its turn about z, in degrees counterclockwise as seen from above.
     pub degrees: f64,
     /// The top left corner of the images in coordinates of the part so turned.
     pub origin_mm: [f64; 2],
@@ -46,8 +46,8 @@ pub struct TurnedSlicing {
 }
 
 impl TurnedPlan {
-    /// Plans a build as [`Layout::packed`] lays it out. Copies may also lie at the angles of `turns`
-    /// if more of them fit then; the turns of `pack` do not count.
+    /// Plans a build as [`Layout::packed`] lays it out. Copies may also lie at the angles of
+    /// `turns` if more of them fit then; the turns of `pack` do not count.
     ///
     /// Each part turns about one of the `centres_mm`, in its coordinates.
     ///
@@ -56,7 +56,7 @@ impl TurnedPlan {
     /// images is not known.
     ///
     /// # Panics
-    /// Panics if there are not as many counts and centres as parts, or no part.
+    /// Panics if there are not as many counts and centers as parts, or no part.
     pub fn new(
         parts: &[PartStack],
         centres_mm: &[[f64; 2]],
@@ -115,7 +115,7 @@ impl TurnedPlan {
         Ok(Self { layout, stacks, plain_copies })
     }
 
-    /// Creates that of a layout of the parts' own stacks.
+    /// Creates the plan of a layout of the parts' own stacks.
     fn of_plain(layout: Layout) -> Self {
         let plain_copies = layout.placements().len();
         let stack = |(part, stack): (usize, &PartStack)| PlannedStack {
@@ -152,8 +152,8 @@ impl TurnedPlan {
 const MARGIN: f64 = 4.0;
 
 impl PartStack {
-    /// Returns the part as it is if it is turned before it is sliced, and how it is sliced then. The
-    /// images hold those of this stack, turned, and so all of the part.
+    /// Returns the part as it is if it is turned before it is sliced, and how it is sliced then.
+    /// Its images hold the turned images of this stack, and so all of the part.
     fn turned(
         &self,
         centre_mm: [f64; 2],
@@ -169,7 +169,7 @@ impl PartStack {
         let [left, top, right, bottom] =
             turn.bounds([0.0, 0.0, image.width.into(), image.height.into()]);
         let nm = |mm: f64| (mm * 1e6).round() / 1e6;
-        // The corner is a whole number of nanometres, as it is written.
+        // The corner is a whole number of nanometers, as it is written.
         let corner_mm = [
             nm(origin_mm[0] + (left - MARGIN).floor() * pitch),
             nm(origin_mm[1] - (top - MARGIN).floor() * pitch),

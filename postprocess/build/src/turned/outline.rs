@@ -4,8 +4,8 @@ use lamp_stack::{Mask, MaskBuilder, white_runs};
 
 use lamp_offset::join_runs;
 
-/// How far, in pixels, what is white may reach beyond the pixels of an outline: a section that is
-/// sliced at another angle has its pixels' centres elsewhere.
+/// How far, in pixels, white may reach beyond the pixels of an outline: a section that is sliced at
+/// another angle has its pixels' centers elsewhere.
 const BEYOND: f64 = 2.0;
 /// More than rounding takes away from a place on the turned outline, in pixels.
 const ROUNDING: f64 = 1e-6;
@@ -20,7 +20,7 @@ pub(super) struct ImageTurn {
 }
 
 impl ImageTurn {
-    /// Creates that by an angle in degrees, anticlockwise, which leaves a point where it is.
+    /// Creates the turn by an angle in degrees, counterclockwise, which leaves a point where it is.
     pub(super) fn about([u, v]: [f64; 2], degrees: f64) -> Self {
         let quarters = (degrees / 90.0).round();
         let (mut sin, mut cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
@@ -77,7 +77,7 @@ impl ImageTurn {
 }
 
 /// Returns an outline whose left column and top row are these, turned into an image of some width
-/// and height. It has all pixels whose centres are up to two pixels from one of the outline.
+/// and height. It has all pixels whose centers are up to two pixels from one of the outline.
 ///
 /// So it holds the pixels of a section that is sliced at that angle as far as this is thicker than
 /// two pixels and has no sharper corners.
@@ -88,7 +88,7 @@ pub(super) fn turned(
     [width, height]: [u32; 2],
 ) -> Mask {
     let mut rows: Vec<Vec<(u32, u32)>> = vec![Vec::new(); height as usize];
-    // The pixels whose centres lie between two places.
+    // The pixels whose centers lie between two places.
     let pixels = |from: f64, to: f64, count: u32| {
         let first = (from - 0.5 - ROUNDING).ceil().max(0.0) as u32;
         let last = (to - 0.5 + ROUNDING).floor() + 1.0;

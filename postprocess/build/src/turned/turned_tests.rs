@@ -6,7 +6,7 @@ use super::super::{PackBy, Turns};
 use super::*;
 use lamp_offset::offset_one_bit;
 
-/// Half a millimetre.
+/// Half a millimeter.
 const DPI: f64 = 50.8;
 const GAP: Length = Length::from_mm(1.0);
 const BY_OUTLINES: Pack = Pack {
@@ -16,7 +16,7 @@ const BY_OUTLINES: Pack = Pack {
     shares: false,
 };
 
-/// Returns corners turned about a centre, anticlockwise.
+/// Returns corners turned about a center, counterclockwise.
 fn turned_quads(plate: Plate, [x0, y0]: [f64; 2], degrees: f64) -> Vec<Quad> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let turned = |[x, y]: [f64; 2]| {
@@ -26,7 +26,7 @@ fn turned_quads(plate: Plate, [x0, y0]: [f64; 2], degrees: f64) -> Vec<Quad> {
     plate.quads().into_iter().map(|quad| quad.map(turned)).collect()
 }
 
-/// Returns the part of quads as one layer, by a look at each pixel's centre.
+/// Returns the part of quads as one layer, by a look at each pixel's center.
 fn sampled(name: &str, quads: &[Quad], origin_mm: [f64; 2], pixels: [u32; 2]) -> PartStack {
     let pitch = 25.4 / DPI;
     let is_in = |[a, b, c, d]: &Quad, [x, y]: [f64; 2]| {

@@ -26,7 +26,7 @@ impl Room {
             as i32;
         let lines = self.0[0] / wide.max(1) + self.0[1] / uy + 1;
         let tried = (STARTS_OF_LINES / lines).clamp(1, STARTS);
-        // Even steps, and those that bring a copy to an edge.
+        // Even steps, and steps that bring a copy to an edge.
         let starts = |axis: usize, period: i32| -> Vec<i32> {
             let last = self.0[axis];
             let aside = lattice.partner.map_or(0, |partner| partner[axis]);
@@ -59,7 +59,7 @@ impl Room {
     }
 
     /// Returns, for a copy and its partner, each multiple of the second vector and the range of
-    /// those of the first that lie on the area.
+    /// multiples of the first that lie on the area.
     fn ranges(
         self,
         lattice: &Lattice,

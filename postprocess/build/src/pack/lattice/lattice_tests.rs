@@ -15,7 +15,7 @@ fn ways(turns: Turns) -> Vec<Way> {
     turns.orientations().into_iter().map(|turn| (0, turn)).collect()
 }
 
-/// An area for a part of 25.4 dpi times `scale`, so that a pixel is a millimetre or less.
+/// An area for a part of 25.4 dpi times `scale`, so that a pixel is a millimeter or less.
 fn layout_of(mask: Mask, scale: f64, area: &str) -> Layout {
     let dpi = Dpi::new(25.4 * scale);
     let layer = Layer { info: PageInfo::default(), dpi, image: Image::Mask(mask).into() };

@@ -1,9 +1,9 @@
 //! Packs copies of one part as lattices: translates of one copy, or of a copy and
 //! its half turn.
 //!
-//! [`search`] finds dense lattices from the no-fit regions, [`area`] counts how many
-//! copies of one the area holds. The best are laid out, and what copies still fit at the
-//! edges are added one by one.
+//! [`search`] finds dense lattices from the no-fit regions, [`area`] counts the copies of a lattice
+//! that the area holds. The best are laid out, and copies that still fit at the edges are added one
+//! by one.
 
 mod area;
 mod motif;
@@ -66,8 +66,8 @@ const CLOSE_CELLS: u32 = 2048;
 /// The number of layouts whose edges are filled up, at most.
 const FILLED: usize = 6;
 
-/// Places up to `wanted` copies of the only part: lattices of one of its stacks, and others at their
-/// edges in any way. The regions are those that are known, by the pixels on a side of their cells.
+/// Places up to `wanted` copies of the only part: lattices of one of its stacks, and others at
+/// their edges in any way. `regions` are the known ones, by the pixels on a side of their cells.
 pub(super) fn place(
     layout: &Layout,
     gap: u32,
@@ -140,7 +140,7 @@ impl View {
     fn placement(self, at: Shift, is_partner: bool, room: Room, cell: u32) -> CopyPlacement {
         let swapped = |[x, y]: Shift| if self.transposed { [y, x] } else { [x, y] };
         let ([x, y], [last, _]) = (swapped(at), swapped(room.0));
-        // A quarter anticlockwise brings the right edge to the top.
+        // A quarter counterclockwise brings the right edge to the top.
         let [left, top] = if self.turned { [y, last - x] } else { [x, y] };
         let quarters = u32::from(self.turned) + if is_partner { 2 } else { 0 };
         let [left, top] = [left, top].map(|cells| cells as u32 * cell);

@@ -1,4 +1,4 @@
-//! What a lattice repeats: a copy, or a copy and its half turn.
+//! The unit that a lattice repeats: a copy, or a copy and its half turn.
 
 use std::rc::Rc;
 
@@ -28,7 +28,7 @@ struct TurnedRegions {
 }
 
 impl Motif {
-    /// Creates that of a stack, as it lies or with rows for columns.
+    /// Creates the motif of a stack, as it lies or with rows for columns.
     pub(super) fn new(
         layout: &Layout,
         regions: &mut NoFitRegions,
@@ -52,12 +52,12 @@ impl Motif {
         }
     }
 
-    /// Returns where half turns do not fit beside a copy, if they are allowed.
+    /// Returns where half turns do not fit next to a copy, if they are allowed.
     pub(super) fn turned(&self) -> Option<&NoFitRegion> {
         self.turned.as_ref().map(|turned| &*turned.moving)
     }
 
-    /// Returns the displacements at which a copy and its partner do not fit beside another two.
+    /// Returns the displacements at which a copy and its partner do not fit next to another two.
     pub(super) fn region(&self, partner: Option<Shift>) -> NoFitRegion {
         let mut all = vec![(&*self.own, [0, 0])];
         if let (Some(turned), Some([x, y])) = (&self.turned, partner) {

@@ -1,8 +1,8 @@
 //! Finds dense lattices.
 //!
-//! The first vector, and the way from a copy to its half turn, lead to the border of a
-//! no-fit region, where copies touch; the second is the one that takes the least area of
-//! those that leave room. The densest are then moved cell by cell.
+//! The first vector, and the way from a copy to its half turn, lead to the border of a no-fit
+//! region, where copies touch. The second vector takes the least area of all vectors that leave
+//! room. The densest lattices are then moved cell by cell.
 
 use super::super::no_fit::{CellRun, NoFitRegion};
 use super::motif::Motif;
@@ -78,14 +78,14 @@ fn alongs(region: &NoFitRegion) -> Vec<Shift> {
     all
 }
 
-/// Whether copies fit beside each other at all multiples of a vector.
+/// Whether copies fit next to each other at all multiples of a vector.
 fn is_row(region: &NoFitRegion, [x, y]: Shift) -> bool {
     let [_, high] = region.reach;
     (1..=high / y.max(1)).all(|k| !region.holds([k * x, k * y]))
 }
 
-/// Completes a lattice by the second vector that takes the least area, of those that lead less
-/// than so far down.
+/// Completes a lattice by the second vector that takes the least area, of the vectors that lead
+/// less than `below` cells down.
 fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -> Option<Lattice> {
     let [ux, uy] = lattice.along;
     let [_, high] = region.reach;

@@ -21,12 +21,12 @@ pub(super) struct Board<'a> {
     /// The depth of each two copies, and how much it counts.
     pub(super) depths: Vec<u16>,
     pub(super) weights: Vec<f32>,
-    /// What was added and looked up.
+    /// The number of additions and look-ups.
     pub(super) work: u64,
     sums: Vec<f32>,
 }
 
-/// A place with what overlaps there.
+/// A place and the overlap there.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     cost: f32,
@@ -37,7 +37,7 @@ struct Spot {
 /// The places that are looked at closely, and how many cells around each.
 const SPOTS: usize = 6;
 const REACH: i32 = 4 * STEP;
-/// What a pair counts at most: sums of all depths stay finite.
+/// The greatest weight of a pair: sums of all depths stay finite.
 const MOST_WEIGHT: f32 = 1e20;
 
 impl<'a> Board<'a> {
@@ -109,7 +109,7 @@ impl<'a> Board<'a> {
         self.depths.iter().map(|&depth| u64::from(depth)).sum::<u64>() / 2
     }
 
-    /// Lets overlaps count more the deeper they are, and what does not overlap less.
+    /// Lets overlaps count more the deeper they are, and pairs that do not overlap less.
     pub(super) fn weigh(&mut self) {
         let most = self.depths.iter().copied().max().unwrap_or(0).max(1);
         for (weight, &depth) in self.weights.iter_mut().zip(&self.depths) {
@@ -264,7 +264,7 @@ impl<'a> Board<'a> {
     }
 }
 
-/// Of places where as much overlaps, those at the top come first.
+/// Of places with equal overlap, the places at the top come first.
 fn rank(spot: &Spot) -> (f32, i32, i32) {
     (spot.cost, spot.at[1], spot.at[0])
 }

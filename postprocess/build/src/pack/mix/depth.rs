@@ -7,10 +7,10 @@ pub(super) const STEP: i32 = 8;
 
 /// The depth of every displacement at which two outlines overlap.
 ///
-/// Depths are distances in fifths of a cell, by steps of 5 to the side and 7 aslant.
+/// Depths are distances in fifths of a cell, by steps of 5 to the side and 7 along a diagonal.
 ///
-/// Those that are [`STEP`] cells apart stand together: a phase has those whose column and row leave
-/// the same remainders.
+/// Depths of displacements that are [`STEP`] cells apart stand together: a phase has the
+/// displacements whose column and row leave the same remainders.
 pub(super) struct DepthMap {
     /// The displacement of the first depth of the first phase.
     first: [i32; 2],
@@ -21,11 +21,12 @@ pub(super) struct DepthMap {
 
 /// The depths of one phase, as far as a grid of places meets them.
 pub(super) struct Phase<'a> {
-    /// The first column and row of the grid that is within it, and those after the last.
+    /// The first column and row of the grid that is within it, and the column and row after the
+    /// last.
     pub(super) from: [i32; 2],
     pub(super) to: [i32; 2],
     depths: &'a [u16],
-    /// What leads from a column and row of the grid to one of the phase.
+    /// The offset from a column and row of the grid to a column and row of the phase.
     by: [i32; 2],
     columns: i32,
 }
@@ -52,7 +53,7 @@ impl DepthMap {
         Self { first: [left, -region.top], size: size.map(|side| side as i32), depths }
     }
 
-    /// Returns that of the opposite displacements.
+    /// Returns the depths of the opposite displacements.
     pub(super) fn reversed(&self) -> Self {
         let last = [0, 1].map(|axis| self.first[axis] + self.size[axis] * STEP - 1);
         Self {

@@ -8,7 +8,7 @@ use super::super::no_fit::NoFitRegions;
 use super::depth::DepthMap;
 use super::*;
 
-/// At 25.4 dpi, one pixel is one millimetre.
+/// At 25.4 dpi, one pixel is one millimeter.
 fn outlined(rows: &[&str]) -> PartStack {
     let layer = layer(0, Image::Mask(mask_of(rows)));
     PartStack::of_outline("p.tif", std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()

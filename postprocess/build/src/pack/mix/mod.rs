@@ -1,9 +1,10 @@
 //! Packs several parts: lets copies overlap, and moves them apart.
 //!
-//! The area is made lower, a little at a time, and the copies are pushed into it. Where they overlap
-//! then, each is moved to the place of the whole area, and to the turn, at which it is least deep in
-//! others ([`board`]). Pairs that go on overlapping count more and more ([`separate`]). Where no way
-//! is found, the area is made lower by less, and two copies change places.
+//! The area is made lower, a little at a time, and the copies are pushed into it. Where they
+//! overlap then, each is moved to the place of the whole area, and to the turn, at which it is
+//! least deep in others ([`board`]). Pairs that go on overlapping count more and more
+//! ([`separate`]). Where no way is found, the area is made lower by less, and two copies change
+//! places.
 //!
 //! Source: S. Umetani et al., Solving the irregular strip packing problem via guided local search
 //! for overlap minimization, Int. Trans. Oper. Res. 16, 2009.

@@ -6,14 +6,15 @@ use super::random::Random;
 use super::separate::separate;
 use super::ways::Ways;
 
-/// What the search may add and look up: for each copy, for each cell of the area that they take at
-/// first, and at most. It is counted, not timed, so that every machine finds the same layout.
+/// The additions and look-ups that the search may make: for each copy, for each cell of the area
+/// that the copies take at first, and at most. They are counted, not timed, so that every machine
+/// finds the same layout.
 const WORK_OF_COPY: u64 = 100_000_000;
 const WORK_OF_CELL: u64 = 20_000;
 const MOST_WORK: u64 = 4_000_000_000;
-/// The part of it, in tenths, in which copies change places where they find no room.
+/// The part of the work, in tenths, in which copies change places where they find no room.
 const EXPLORING: u64 = 7;
-/// The layouts that overlap least which are kept to start from.
+/// The number of layouts with the least overlap that are kept to start from.
 const KEPT: usize = 10;
 
 /// A search for a low layout.
@@ -29,8 +30,8 @@ struct Search<'a> {
     kept: Vec<(u64, Vec<Copy>)>,
 }
 
-/// Returns copies as close to the top as they are found to fit, or as is enough, or nothing if they
-/// stay apart nowhere.
+/// Returns copies as close to the top as the search finds, or as is enough, or nothing if it never
+/// separates them.
 pub(super) fn lowest(
     layout: &Layout,
     ways: &Ways,
@@ -110,7 +111,8 @@ impl Search<'_> {
         self.best.iter().map(moved).collect()
     }
 
-    /// Returns a kept layout, rather one that overlaps little, in which two copies have changed places.
+    /// Returns a kept layout, rather one that overlaps little, in which two copies have changed
+    /// places.
     fn swapped(&mut self) -> Vec<Copy> {
         let [one, other] = [0, 1].map(|_| self.random.below(self.kept.len()));
         let mut copies = self.kept[one.min(other)].1.clone();

@@ -14,7 +14,7 @@ struct Slide<'a> {
     copies: Vec<Copy>,
 }
 
-/// Returns the places of copies that are moved as close to the top and the left as they come.
+/// Moves copies as close to the top and the left as possible, and returns their places.
 pub(super) fn up(layout: &Layout, gap: u32, ways: &Ways, copies: &[Copy]) -> Vec<CopyPlacement> {
     let regions = NoFitRegions::in_cells(layout, gap, ways.fine);
     let times = (ways.cell / ways.fine) as i32;
@@ -31,7 +31,7 @@ pub(super) fn up(layout: &Layout, gap: u32, ways: &Ways, copies: &[Copy]) -> Vec
 }
 
 impl Slide<'_> {
-    /// Moves each copy as far as it goes. Returns whether any moved.
+    /// Moves each copy as far as possible. Returns whether any moved.
     fn pass(&mut self) -> bool {
         let mut moved = false;
         for copy in 0..self.copies.len() {

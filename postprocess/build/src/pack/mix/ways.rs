@@ -66,7 +66,7 @@ impl Ways {
         [width, height]
     }
 
-    /// Returns how deep a way is in another, by how far it is from it.
+    /// Returns how deep a way is in another, by the displacement between them.
     pub(super) fn depths(&self, moving: usize, placed: usize) -> &DepthMap {
         &self.depths[moving * self.all.len() + placed]
     }
@@ -89,10 +89,10 @@ impl Ways {
     }
 }
 
-/// Returns the pixels on a side of a cell, and of those that divide it.
+/// Returns the pixels on a side of a cell, and on a side of the finer cells that divide it.
 fn cells(layout: &Layout, all: &[(Way, PixelSize)]) -> (u32, u32) {
     let sides = all.iter().map(|(_, size)| size.width.max(size.height));
-    // Regions cost the square of the runs in a row, and depths that of the ways.
+    // Regions cost the square of the runs in a row, and depths the square of the ways.
     let runs = layout.parts().iter().map(|part| {
         let outline = part.silhouette(Orientation::default());
         outline.change_count() / (2 * outline.height().max(1) as usize)
@@ -107,7 +107,7 @@ fn cells(layout: &Layout, all: &[(Way, PixelSize)]) -> (u32, u32) {
     divided.expect("every fourth number has four parts")
 }
 
-/// Returns the ways that differ, and those of each part.
+/// Returns the ways that differ, and the ways of each part.
 fn distinct(layout: &Layout, ways: &[Vec<Way>]) -> (Vec<(Way, PixelSize)>, Vec<Vec<usize>>) {
     let mut all = Vec::new();
     let of_part = ways.iter().map(|ways| {
