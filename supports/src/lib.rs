@@ -1,4 +1,4 @@
-//! What of a stack would be swept away, trapped or bent as it is built.
+//! Finds what would be swept away, trapped or bent as a stack is built.
 //!
 //! [`check`] finds islands (white that rests on nothing), weak joints, overhangs, pockets and
 //! bodies off balance, on runs and in one pass.

@@ -1,4 +1,4 @@
-//! The centre of gravity of a body as it is built (002 section 4.1.1).
+//! The center of gravity of a body as it is built (002 section 4.1.1).
 
 use super::contact::Labelled;
 use super::findings::{OffBalance, Region};

@@ -1,7 +1,7 @@
 //! The connected components of a layer, white and black, on runs.
 //!
 //! A row of n transitions has n + 1 segments, black and white in turns; the first is empty if the
-//! row starts white. Segments of one colour that touch in neighbouring rows are joined
+//! row starts white. Segments of one color that touch in neighboring rows are joined
 //! (union-find), so the cost follows the transitions.
 
 use std::ops::Range;
@@ -22,14 +22,14 @@ pub(super) struct Components {
     pub(super) all: Vec<Component>,
 }
 
-/// Pixels of one colour that touch at their sides.
+/// Pixels of one color that touch at their sides.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     pub(super) is_white: bool,
     /// The column and row of the first pixel, by rows.
     pub(super) first: [u32; 2],
     pub(super) area: u64,
-    /// Twice the sum over its pixels of the columns of their centres; not of the background.
+    /// Twice the sum over its pixels of the columns of their centers; not of the background.
     twice_x: f64,
     /// The sum over its pixels of their rows; not of the background.
     sum_y: f64,
@@ -72,12 +72,12 @@ impl Component {
         self.rows.end = self.rows.end.max(other.rows.end);
     }
 
-    /// Returns the sums over its pixels of the columns and rows of their centres.
+    /// Returns the sums over its pixels of the columns and rows of their centers.
     pub(super) fn moments(&self) -> [f64; 2] {
         [self.twice_x / 2.0, self.sum_y + self.area as f64 / 2.0]
     }
 
-    /// Returns the mean of its pixels' centres, as column and row.
+    /// Returns the mean of its pixels' centers, as column and row.
     pub(super) fn centroid(&self) -> [f64; 2] {
         self.moments().map(|moment| moment / self.area as f64)
     }
@@ -153,7 +153,7 @@ impl Components {
 
 /// Returns whether runs, by row and column, hold a full square of pixels.
 pub(super) fn holds_square(runs: impl Iterator<Item = (u32, Range<u32>)>, side: u32) -> bool {
-    // What the last rows have in common, for one row, two rows and so on.
+    // Ranges common to the last rows: to one row, to two rows and so on.
     let mut common: Vec<Vec<Range<u32>>> = vec![Vec::new(); side as usize];
     let mut of_row: Vec<Range<u32>> = Vec::new();
     let mut last_row = None;
@@ -203,7 +203,7 @@ fn segment(row: &[u32], width: u32, k: usize) -> Range<u32> {
 }
 
 /// Calls `met` with the numbers of the segments of two rows that overlap, and the columns that
-/// both have. Segments of one colour have both even or both odd numbers.
+/// both have. Segments of one color have both even or both odd numbers.
 #[inline]
 pub(super) fn for_each_overlap(
     a: &[u32],
@@ -225,7 +225,7 @@ pub(super) fn for_each_overlap(
 }
 
 /// Returns whether each segment of a row overlaps the one of the same number in another, and no
-/// other of its colour.
+/// other of its color.
 #[inline]
 pub(super) fn in_step(a: &[u32], b: &[u32]) -> bool {
     // Only one of the first segments may be empty.
@@ -238,7 +238,7 @@ pub(super) fn in_step(a: &[u32], b: &[u32]) -> bool {
 #[derive(Default)]
 struct Sets {
     parents: Vec<u32>,
-    /// What is known of the pixels of each label.
+    /// The pixel counts and moments of each label so far.
     counts: Vec<Component>,
 }
 
@@ -247,7 +247,7 @@ struct Sets {
 const FIRST: u32 = 0;
 
 impl Sets {
-    /// Labels the segments of a row that touch some of their colour in the row above.
+    /// Labels the segments of a row that touch some of their color in the row above.
     fn join_rows(
         &mut self,
         above: &[u32],
@@ -320,8 +320,7 @@ impl Sets {
     }
 }
 
-/// Sets the background to what the others leave of the image, and its rectangle to that of the
-/// image.
+/// Sets the background to the rest of the image, and its rectangle to the whole image.
 fn infer_background(all: &mut [Component], mask: &Mask) {
     let Some((first, others)) = all.split_first_mut() else { return };
     if first.is_white {

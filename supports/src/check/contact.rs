@@ -1,4 +1,4 @@
-//! What a layer has in common with the layer below.
+//! Compares a layer with the layer below.
 
 use std::ops::Range;
 
@@ -38,7 +38,7 @@ impl Labelled {
             || reaches(&component.rows, self.mask.height())
     }
 
-    /// Returns the components of one colour.
+    /// Returns the components of one color.
     pub(super) fn of_colour(&self, is_white: bool) -> impl Iterator<Item = &Component> {
         self.components.all.iter().filter(move |component| component.is_white == is_white)
     }
@@ -55,7 +55,7 @@ pub(super) struct Joint {
 /// How a layer rests on the one below.
 #[derive(Debug)]
 pub(super) struct Contact {
-    /// By component, then by the component below; of both colours.
+    /// By component, then by the component below; of both colors.
     pub(super) joints: Vec<Joint>,
     /// Of supported components.
     pub(super) patches: Vec<OverhangPatch>,

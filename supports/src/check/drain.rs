@@ -1,9 +1,9 @@
 //! Pockets whose ways out are narrower than a drain must be.
 //!
-//! The places where a ball's centre may be are black, and nowhere nearer to white than its radius.
-//! These places are looked at like the black of the layers: what of them has no way to the frame is
-//! a pocket whose ways, if it has any, are too narrow. The platform is no obstacle: parts drain
-//! once they are off it.
+//! A ball's center fits where black is nowhere nearer to white than the ball's radius. These places
+//! are checked like the black of the layers: a part of them without a way to the frame is a pocket
+//! whose ways out, if any, are too narrow. The platform is no obstacle: parts drain after they are
+//! taken off it.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -22,7 +22,7 @@ use super::pockets::Hollows;
 pub(super) struct Drain {
     radius_um: f64,
     pitch_um: f64,
-    /// The layers within reach of those that are not done.
+    /// The layers within reach of unfinished layers.
     window: VecDeque<Near>,
     /// How many layers of the window are done, and the number of the next.
     done: usize,
@@ -35,7 +35,7 @@ pub(super) struct Drain {
     within: Vec<([u32; 3], u32)>,
 }
 
-/// A layer near those that are not done.
+/// A layer near unfinished layers.
 struct Near {
     layer: Arc<Checked>,
     /// The height of its middle above the platform.
@@ -67,7 +67,7 @@ impl Drain {
         self.window.push_back(Near { layer, middle_um, thickness_um, bodies });
     }
 
-    /// Goes on with the layers that no later one is near, or with all at the end.
+    /// Processes the layers that no later layer is near, or all layers at the end.
     pub(super) fn advance(&mut self, is_end: bool) {
         let Some(last_um) = self.window.back().map(|near| near.middle_um) else { return };
         let is_ready = |near: &&Near| is_end || near.middle_um + self.radius_um <= last_um;
@@ -98,7 +98,7 @@ impl Drain {
         }
     }
 
-    /// Returns the pockets that are none if their ways out count; `hollows` has all black.
+    /// Returns the pockets whose ways out are all too narrow; `hollows` has all black.
     pub(super) fn finish(mut self, hollows: &mut Hollows) -> Listed<Pocket> {
         self.advance(true);
         self.rooms.finish();
@@ -111,8 +111,7 @@ impl Drain {
         Listed { list, left_out }
     }
 
-    /// Returns the image of a layer of the window in which all is white where the ball's centre
-    /// may not be.
+    /// Returns the image of a layer of the window that is white where the ball's center may not be.
     fn crowded(&self, number: usize) -> Mask {
         let mask = &self.window[number].layer.labelled.mask;
         let mut crowded = MaskBuilder::new(mask.width());

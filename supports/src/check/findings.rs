@@ -1,4 +1,4 @@
-//! What a check finds.
+//! Findings of a check.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -44,23 +44,23 @@ pub struct Island {
     pub first: [u32; 2],
     /// Its pixels in that layer.
     pub area: u64,
-    /// The mean of their centres, as column and row: the centre of the first pixel is at (0.5, 0.5).
+    /// The mean of their centers, as column and row: the first pixel's center is at (0.5, 0.5).
     pub centroid: [f64; 2],
     /// The rectangle around them.
     pub region: Region,
     /// The pixels of the layers until it joins. Where two islands join, the elder goes on.
     pub floating_pixels: u64,
-    /// The sum of floating pixels times the thickness of their layers, in micrometres.
+    /// The sum of floating pixels times the thickness of their layers, in micrometers.
     pub floating_pixels_um: f64,
     /// The most pixels that float in one layer.
     pub largest_area: u64,
     /// The first layer that has them.
     pub largest_layer: u32,
-    /// What becomes of it.
+    /// How it ends.
     pub end: End,
 }
 
-/// What becomes of an island.
+/// How an island ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// It never joins.
@@ -123,7 +123,7 @@ impl Overhang {
 /// How a pocket is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PocketKind {
-    /// Nothing leads out: what it holds stays in.
+    /// It has no way out: its content stays in.
     Trap,
     /// It opens at the top only, also off the platform.
     Cup,
@@ -142,7 +142,7 @@ pub struct Pocket {
     pub layers: [u32; 2],
     /// Its pixels, in all layers.
     pub pixels: u64,
-    /// The sum of its pixels times the thickness of their layers, in micrometres.
+    /// The sum of its pixels times the thickness of their layers, in micrometers.
     pub pixels_um: f64,
     /// Its first pixel by rows, column and row, in its first layer.
     pub first: [u32; 2],
@@ -150,29 +150,30 @@ pub struct Pocket {
     pub region: Region,
 }
 
-/// A body whose centre of gravity leaves its base as it is built (002 section 4.1.1).
+/// A body whose center of gravity leaves its base as it is built (002 section 4.1.1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffBalance {
     /// The first layer after which it is off.
     pub layer: u32,
     /// The layer after which it is farthest off.
     pub worst_layer: u32,
-    /// How far it is then from the convex hull of the body's first layer, in pixels.
+    /// The distance of the center of gravity from the convex hull of the body's first layer, in
+    /// pixels, after that layer.
     pub off_pixels: f64,
-    /// The centre of gravity then, as column and row.
+    /// The center of gravity then, as column and row.
     pub centre: [f64; 2],
     /// The rectangle around the body's first layer.
     pub base: Region,
 }
 
-/// What the page of a layer says.
+/// Facts from the page of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerFacts {
     /// The index on the page.
     pub index: u32,
-    /// The height of the layer's bottom in micrometres.
+    /// The height of the layer's bottom in micrometers.
     pub z_um: Option<f64>,
-    /// The layer's thickness in micrometres.
+    /// The layer's thickness in micrometers.
     pub thickness_um: Option<f64>,
     /// The number of stray rows.
     pub stray_rows: u32,
@@ -185,7 +186,7 @@ pub struct LayerFacts {
 /// A list that ends where memory would grow without bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Listed<T> {
-    /// What is listed.
+    /// The entries.
     pub list: Vec<T>,
     /// How many more there are.
     pub left_out: u64,
@@ -214,14 +215,14 @@ impl<T> Listed<T> {
     }
 }
 
-/// What a check finds in a stack. The lists begin with the worst.
+/// Findings of a check of a stack. The lists begin with the worst.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// The layers, from the first.
     pub layers: Vec<LayerFacts>,
     /// The resolution, if the pages state one.
     pub dpi: Option<Dpi>,
-    /// The top left corner of the images in part coordinates, in millimetres, if stated.
+    /// The top left corner of the images in part coordinates, in millimeters, if stated.
     pub origin_mm: Option<[f64; 2]>,
     /// The images' width and height in pixels.
     pub size: [u32; 2],

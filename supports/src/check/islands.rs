@@ -24,10 +24,10 @@ enum Body {
 }
 
 struct Floating {
-    /// What is known of it so far.
+    /// The island as known so far.
     island: Island,
     holds_square: bool,
-    /// What a body will carry that it joins.
+    /// The weight that it adds to a body that it joins.
     weight: Weight,
 }
 

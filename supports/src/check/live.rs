@@ -1,4 +1,4 @@
-//! Bodies of one colour as layers are added: what a layer continues, unites, begins and ends.
+//! Bodies of one color as layers are added: which ones a layer continues, unites, begins and ends.
 
 use lamp_stack::sets::{root, unite};
 
@@ -11,14 +11,14 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Live<B> {
     is_white: bool,
     bodies: Vec<B>,
-    /// The body of each component of the last layer that has the colour.
+    /// The body of each component of the last layer that has the color.
     of_component: Vec<u32>,
 }
 
-/// What a layer makes of the bodies.
+/// The effect of a layer on the bodies.
 pub(super) struct Next<B> {
-    /// The bodies that the layer continues, those that it unites together, and the components
-    /// that do so. A group without a body begins one.
+    /// The bodies that the layer continues, grouped as it unites them, with the components that
+    /// continue them. A group without a body begins one.
     pub(super) groups: Vec<Group<B>>,
     /// The bodies that the layer does not continue.
     pub(super) ended: Vec<B>,
@@ -87,7 +87,7 @@ impl<B> Live<B> {
         self.bodies.push(body);
     }
 
-    /// Returns the body of each component of the last layer, none for those of the other colour.
+    /// Returns the body of each component of the last layer; `None` for the other color.
     pub(super) fn of_components(&self) -> impl Iterator<Item = Option<&B>> {
         self.of_component.iter().map(|&body| self.bodies.get(body as usize))
     }

@@ -1,6 +1,6 @@
 //! Finds what would be lost, trapped or bent as a stack is built, in one pass over its layers.
 //!
-//! Layers are labelled and compared with the layer below many at once; bodies are then joined
+//! Layers are labeled and compared with the layer below many at once; bodies are then joined
 //! layer by layer. Only the last layer is kept, and bodies that it has no part of are done.
 //!
 //! Source: 002 sections 4.1.1, 4.2 and 4.3 (algorithm 16, on images).
@@ -37,7 +37,7 @@ use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
 
-/// What counts as a finding.
+/// Limits from which something counts as a finding.
 #[derive(Clone, Debug)]
 pub struct CheckOptions {
     /// The level from which a gray pixel is white.
@@ -83,7 +83,7 @@ pub enum CheckError {
         layer: String,
         /// Its width and height.
         size: [u32; 2],
-        /// Those of the first layer.
+        /// The width and height of the first layer.
         first: [u32; 2],
     },
     /// A drain has a width, and pixels or layers have none.
@@ -100,7 +100,7 @@ pub enum CheckError {
 /// Checks a stack, given its layers from the first and how to decode one.
 ///
 /// The first layer stands on the platform. Pixels touch at sides, in a layer and from layer to
-/// layer. Memory holds the last layer and those in work: two if they are large.
+/// layer. Memory holds the last layer and the layers in work: two if they are large.
 ///
 /// # Errors
 /// Returns the first error of the layers, or one if layers cannot be compared.
@@ -164,7 +164,7 @@ pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)
     components.runs(mask, component).collect()
 }
 
-/// Returns a mask of the components of a colour that do not touch the image's border.
+/// Returns a mask of the components of a color that do not touch the image's border.
 pub fn inner_components(mask: &Mask, white: bool) -> Mask {
     let components = Components::of(mask);
     let [width, height] = [mask.width(), mask.height()];
@@ -191,10 +191,10 @@ pub fn inner_components(mask: &Mask, white: bool) -> Mask {
     inner.finish()
 }
 
-/// A layer, labelled.
+/// A layer, labeled.
 struct Checked {
     facts: LayerFacts,
-    /// What names it in messages.
+    /// The layer's name in messages.
     name: String,
     dpi: Option<Dpi>,
     origin_mm: Option<[f64; 2]>,
@@ -216,7 +216,7 @@ impl Checked {
     }
 }
 
-/// What is found so far.
+/// The state of a check after the layers so far.
 struct Checker {
     options: CheckOptions,
     layers: Vec<LayerFacts>,

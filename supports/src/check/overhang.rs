@@ -33,9 +33,9 @@ fn is_within(squared: u64, limit: f64) -> bool {
     squared as f64 <= limit * limit * (1.0 + 1e-9)
 }
 
-/// Returns the patches that lie farther than `limit` pixels from the white of `below`, by rows;
-/// those that hold no square of `speck` pixels are left out.
-/// The runs are sorted by row and column, and what white of their own row reaches is left out.
+/// Returns the patches that are farther than `limit` pixels from the white of `below`, by rows.
+/// Patches without a square of `speck` pixels are left out. The runs are sorted by row and column,
+/// and exclude pixels that white of their own row reaches.
 pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> Vec<OverhangPatch> {
     let mut far: Vec<(u32, Range<u32>)> = Vec::new();
     let (mut left, mut next) = (Vec::new(), Vec::new());
@@ -147,7 +147,7 @@ fn patch(below: &Mask, runs: &[(u32, Range<u32>)]) -> OverhangPatch {
     }
 }
 
-/// The pixel found so far that is farthest from white.
+/// The pixel, of those searched, that is farthest from white.
 struct Farthest<'a> {
     below: &'a Mask,
     squared: u64,
@@ -155,8 +155,8 @@ struct Farthest<'a> {
 }
 
 impl Farthest<'_> {
-    /// Searches runs, sorted by row. As a step of a pixel changes the distance by a pixel at most,
-    /// a pixel in their midst tells how far the farthest may be.
+    /// Searches runs, sorted by row. One step to the next pixel changes the distance by at most one
+    /// pixel, so a pixel in their middle bounds the largest distance.
     fn search(&mut self, runs: &[(u32, Range<u32>)]) {
         let (row, columns) = match runs {
             [] => return,
@@ -176,8 +176,8 @@ impl Farthest<'_> {
         }
     }
 
-    /// Searches columns of a row. A step of a pixel changes the distance by a pixel at most, so
-    /// the middle of the columns tells how far the farthest may be.
+    /// Searches columns of a row. One step to the next pixel changes the distance by at most one
+    /// pixel, so the middle of the columns bounds the largest distance.
     fn within(&mut self, row: u32, columns: Range<u32>) {
         let middle = columns.start + (columns.end - columns.start) / 2;
         let half = middle - columns.start;
@@ -191,8 +191,8 @@ impl Farthest<'_> {
         }
     }
 
-    /// Returns the squared distance of a pixel to the nearest white, or one below `enough` that it
-    /// does not exceed. Remembers the first of the largest.
+    /// Returns the squared distance of a pixel to the nearest white, or an upper bound of it below
+    /// `enough`. Remembers the first pixel of the largest distance.
     fn measure(&mut self, column: u32, row: u32, enough: u64) -> u64 {
         let squared = nearest(self.below, column, row, enough);
         if squared > self.squared {
@@ -202,7 +202,7 @@ impl Farthest<'_> {
     }
 }
 
-/// Returns the squared distance in pixels from a pixel's centre to the nearest white one's, or to
+/// Returns the squared distance in pixels from a pixel's center to the nearest white one's, or to
 /// one that is nearer than `enough`, squared.
 fn nearest(mask: &Mask, column: u32, row: u32, enough: u64) -> u64 {
     let mut nearest = u64::MAX;

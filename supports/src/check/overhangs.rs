@@ -15,8 +15,8 @@ pub(super) struct Overhangs {
 }
 
 impl Overhangs {
-    /// Adds a layer's patches. Those whose boxes come within `near` pixels of one of the last
-    /// layer go on with it.
+    /// Adds a layer's patches. A patch whose box is within `near` pixels of a patch of the last
+    /// layer continues it.
     pub(super) fn add(&mut self, patches: &[OverhangPatch], number: u32, near: u32) {
         let before = self.open.len();
         let mut all = std::mem::take(&mut self.open);

@@ -19,16 +19,16 @@ pub struct Disagreements {
 /// A minimum of a mesh, along z, with solid above.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IslandMinimum {
-    /// Its first vertex, in millimetres.
+    /// Its first vertex, in millimeters.
     pub point_mm: [f64; 3],
-    /// How far the surface rises from it until it meets that of a lower one, in millimetres.
+    /// How high the surface rises from it until it meets a lower minimum's, in millimeters.
     pub depth_mm: f64,
-    /// Least and greatest x, and least and greatest y, of its vertices in millimetres.
+    /// Least and greatest x, and least and greatest y, of its vertices in millimeters.
     pub box_mm: [[f64; 2]; 2],
 }
 
 impl IslandMinimum {
-    /// Finds those of a mesh, the lowest first.
+    /// Finds the island minima of a mesh, the lowest first.
     pub fn of_mesh(table: &CornerTable) -> Vec<Self> {
         let mut found = minima(table, [0.0, 0.0, 1.0]);
         found.retain(|minimum| minimum.kind == MinimumKind::Island);
@@ -51,9 +51,9 @@ impl IslandMinimum {
 pub struct LoneMinimum {
     /// The first layer that is cut above it.
     pub layer: u32,
-    /// Its first vertex, in millimetres.
+    /// Its first vertex, in millimeters.
     pub point_mm: [f64; 3],
-    /// How far the surface rises from it until it meets another one, in millimetres.
+    /// How high the surface rises from it until it meets another minimum's, in millimeters.
     pub depth_mm: f64,
     /// The pixel that holds the point, as column and row.
     pub pixel: [u32; 2],
@@ -63,9 +63,9 @@ impl Findings {
     /// Compares the islands with the minima of the mesh, the lowest first, given how far up in each
     /// layer it was cut: 0 at the bottom, 1 at the top.
     ///
-    /// A minimum may show in later layers only, where it has grown as large as a pixel, and then
-    /// somewhat aside. The list of minima may hold some that lie within other bodies. It is empty
-    /// if layers have no known height, thickness, resolution or place.
+    /// A minimum may first show in a later layer, where it has grown as large as a pixel, and
+    /// somewhat to the side. The list of minima may hold some inside other bodies. It is empty if
+    /// layers have no known height, thickness, resolution or place.
     pub fn compare_minima(&self, minima: &[IslandMinimum], cut: f64) -> Disagreements {
         let Some(grid) = Grid::new(self, cut) else { return Disagreements::default() };
         let places: Vec<Place<'_>> =

@@ -19,7 +19,7 @@ pub(super) struct Hollows {
     numbers: Option<Numbers>,
 }
 
-/// Numbers of black bodies, in the order in which they begin. Those that unite have one.
+/// Numbers of black bodies, in the order in which they begin. Bodies that unite share a number.
 #[derive(Default)]
 struct Numbers {
     parents: Vec<u32>,
@@ -38,7 +38,7 @@ impl Numbers {
 /// Black that is joined so far.
 struct Hollow {
     number: u32,
-    /// What it is if nothing more joins; the kind is decided at the end.
+    /// The pocket if nothing more joins; its kind is decided at the end.
     pocket: Pocket,
     is_open: bool,
     is_on_platform: bool,

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::Pose;
 
-/// What counts as an island, a pit or an overhang.
+/// Limits from which a pose counts islands, pits and overhangs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseLimits {
-    /// The thickness of layers, in millimetres: islands and pits less deep are none, nor are
+    /// The thickness of layers, in millimeters. Islands and pits less deep do not count, nor do
     /// islands and overhangs in the layer that stands on the platform.
     pub thickness_mm: f64,
     /// The angle in degrees, from upright, beyond which a facet that faces down is an overhang.
@@ -23,7 +23,7 @@ impl Default for PoseLimits {
     }
 }
 
-/// A pose, and what a build in it would face.
+/// A pose, and the measures of a build in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseFacts {
     /// The pose.
@@ -32,15 +32,15 @@ pub struct PoseFacts {
     pub islands: usize,
     /// How many pits there are, which hold slurry: minima with solid below.
     pub pits: usize,
-    /// The area of the facets that overhang, in square millimetres.
+    /// The area of the facets that overhang, in square millimeters.
     pub overhang_mm2: f64,
-    /// The part's height, in millimetres.
+    /// The part's height, in millimeters.
     pub height_mm: f64,
-    /// The sides of the part's box seen from above, along x and y, in millimetres.
+    /// The sides of the part's box seen from above, along x and y, in millimeters.
     pub footprint_mm: [f64; 2],
 }
 
-/// Measures poses of a part, in their order. All threads share the poses; how many there are
+/// Measures poses of a part, in their order. All threads share the poses; the number of threads
 /// changes nothing.
 ///
 /// Besides the table it takes 28 bytes a facet and 28 a vertex, and each thread 15 a vertex.
@@ -116,7 +116,7 @@ impl Measured<'_> {
         for point in &self.points {
             for ([x, y, z], extent) in axes.iter().zip(&mut extents) {
                 let at = x * point[0] + y * point[1] + z * point[2];
-                // Points are finite, so these need not care for others as min and max do.
+                // Points are finite, so the special cases of min and max are not needed.
                 *extent = [
                     if at < extent[0] { at } else { extent[0] },
                     if at > extent[1] { at } else { extent[1] },
@@ -127,7 +127,7 @@ impl Measured<'_> {
     }
 
     fn overhang(&self, up: [f64; 3], heights: &[f64], platform: f64, max_deg: f64) -> f64 {
-        // Faces that lean by just so much hold, however their normals are rounded.
+        // Faces that lean by exactly the limit count as held, however their normals are rounded.
         let limit = -(max_deg.to_radians().sin() + 1e-6) as f32;
         let [x, y, z] = up.map(|c| c as f32);
         let leans = |&[nx, ny, nz, area]: &[f32; 4]| nx * x + ny * y + nz * z < limit * area;
@@ -142,7 +142,7 @@ impl Measured<'_> {
     }
 }
 
-/// Returns the length of an extent; that of no points is none.
+/// Returns the length of an extent; 0 if there are no points.
 fn length([low, high]: [f64; 2]) -> f64 {
     (high - low).max(0.0)
 }
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn parts_have_their_islands_pits_and_overhangs() {
-        // The beam's underside, without what hangs from it.
+        // The beam's underside, except where something hangs from it.
         assert_eq!(counted(needle(2_000), UP), (1, 0, 96.0 - 16.0));
         assert_eq!(counted(needle(2_000), DOWN), (0, 0, 0.0));
         let undersides = 96.0 - 4.0 + 4.0 + 4.0 + (12.0 - 4.0) * 2.0;

@@ -1,7 +1,7 @@
 //! Compares the poses in which a part can be built, by its mesh alone.
 //!
-//! Slicing a part in each of some hundred poses takes hours. What decides between them (islands,
-//! pits, overhangs, size) is told by heights and facets in milliseconds; only the best need
+//! Slicing a part in each of some hundred poses takes hours. Heights and facets give the measures
+//! that decide between poses (islands, pits, overhangs, size) in milliseconds; only the best need
 //! images.
 //!
 //! Source: 002 section 4.3, which repeats the search for islands for different orientations and

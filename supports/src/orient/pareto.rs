@@ -4,11 +4,11 @@ use std::cmp::Ordering;
 
 use super::PoseFacts;
 
-/// Returns which poses no other one betters, the best first.
+/// Returns the Pareto-optimal poses, the best first.
 ///
-/// One pose betters another if it has no more islands, pits, overhanging area, height and
-/// footprint, and less of one. Among those that remain, the one with the least islands is the
-/// best, then the one with the least overhanging area, pits, height and footprint.
+/// One pose dominates another if it has no more islands, pits, overhanging area, height and
+/// footprint, and less of one. Among the poses that no other dominates, the best has the least
+/// islands, then the least overhanging area, pits, height and footprint.
 pub fn pareto(facts: &[PoseFacts]) -> Vec<usize> {
     let is_bettered = |one: &usize| facts.iter().any(|other| betters(other, &facts[*one]));
     let mut best: Vec<usize> = (0..facts.len()).filter(|one| !is_bettered(one)).collect();
@@ -16,7 +16,7 @@ pub fn pareto(facts: &[PoseFacts]) -> Vec<usize> {
     best
 }
 
-/// What there should be little of, by importance.
+/// The measures to keep low, by importance.
 fn measures(facts: &PoseFacts) -> [f64; 5] {
     let [width, depth] = facts.footprint_mm;
     let counts = [facts.islands, facts.pits].map(|count| count as f64);
@@ -48,7 +48,7 @@ mod tests {
         let all = [
             facts(1, 0, 5.0, 9.0),
             facts(0, 2, 7.0, 9.0),
-            // Bettered by the first.
+            // Dominated by the first.
             facts(1, 0, 5.0, 10.0),
             facts(0, 3, 6.0, 9.0),
             // As good as the first.

@@ -7,7 +7,7 @@ use lamp_slicer::{Axis, Placement};
 
 /// A pose of a part: turns about x and then y, so that some direction of the part points up.
 ///
-/// What a turn about z would change, no layer sees.
+/// A turn about z would change no layer's shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     about_x: f64,
@@ -41,7 +41,7 @@ impl Pose {
         self.turns().fold(Placement::default(), |placed, (axis, by)| placed.rotated(axis, by))
     }
 
-    /// Returns the unit vectors of the part that come to point along x, along y and up.
+    /// Returns the unit vectors of the part that then point along x, along y and up.
     pub fn axes(&self) -> [[f64; 3]; 3] {
         let placed = self.placement();
         let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| placed.at(e));
@@ -55,7 +55,7 @@ impl Pose {
 }
 
 impl fmt::Display for Pose {
-    /// Formats as `slice --rotate` takes it: `x:37.4,y:-81.1`, and nothing for the part as it is.
+    /// Formats as `slice --rotate` takes it: `x:37.4,y:-81.1`; empty for the part as it is.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (k, (axis, degrees)) in self.turns().enumerate() {
             let comma = if k > 0 { "," } else { "" };
@@ -65,7 +65,7 @@ impl fmt::Display for Pose {
     }
 }
 
-/// Returns poses to compare: the given one, those with an axis up, and `count` spread evenly over
+/// Returns poses to compare: the given one, poses with an axis up, and `count` spread evenly over
 /// the directions at most `cone_deg` from the one that points up in the given pose.
 ///
 /// The directions lie on a Fibonacci spiral: at equal steps of height, each turned by the golden
@@ -85,7 +85,7 @@ pub fn poses(count: u32, cone_deg: f64) -> Vec<Pose> {
         axis
     });
     let axes = axes.filter(|&axis| axis[2] >= lowest - 1e-12);
-    // What is up already is the given pose.
+    // The given pose already has this direction up.
     let others = axes.chain(spiral).filter(|up| up[2] < 1.0);
     std::iter::once(Pose::GIVEN).chain(others.map(Pose::with_up)).collect()
 }

@@ -1,4 +1,4 @@
-//! Findings as people and programs read them: a line, and a JSON object.
+//! Findings as people and programs read them: a line of text, and a JSON object.
 //!
 //! A kind of findings is a variant of [`FindingRecord`]; its name, text and JSON are here.
 
@@ -44,7 +44,7 @@ pub enum FindingRecord {
     Narrow(PocketRecord),
     /// White that reaches far beyond the white below.
     Overhang(OverhangRecord),
-    /// A body whose centre of gravity leaves its base.
+    /// A body whose center of gravity leaves its base.
     OffBalance(OffBalanceRecord),
     /// White at the border of images.
     Border(BorderRecord),
@@ -63,7 +63,7 @@ pub enum FindingGroup {
     Pockets,
     /// White far from the white below.
     Overhangs,
-    /// Centres of gravity off their base.
+    /// Centers of gravity off their base.
     Balance,
     /// Stray rows, white at the border, empty layers.
     Layers,
@@ -78,7 +78,7 @@ lamp_stack::named!(FindingGroup {
     Layers = "layers",
 });
 
-/// The pixels of its box that a finding is about, in a layer.
+/// The pixels of its box that a finding marks, in a layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FoundPixels {
     /// Components of white within the box.
@@ -101,7 +101,7 @@ pub struct Shown {
     pub index: u32,
     /// The rectangle around the finding.
     pub region: Region,
-    /// A pixel of the component that is marked; if none, the region's white without white below is.
+    /// A pixel of the marked component; `None` marks the region's white without white below.
     pub pixel: Option<[u32; 2]>,
 }
 
@@ -184,7 +184,7 @@ pub struct MinimumRecord {
     pub at_mm: [f64; 2],
     /// Its height.
     pub z_mm: f64,
-    /// How far the surface rises from it.
+    /// The height by which the surface rises from it.
     #[serde(serialize_with = "to_nm")]
     pub depth_mm: f64,
 }
@@ -259,7 +259,7 @@ pub struct OverhangRecord {
     /// The layers.
     #[serde(flatten)]
     pub layers: LayerSpan,
-    /// The centre of the pixel that reaches farthest.
+    /// The center of the pixel that reaches farthest.
     #[serde(flatten)]
     pub at: PointRecord,
     /// The rectangle around all.
@@ -267,7 +267,7 @@ pub struct OverhangRecord {
     pub bounds: BoxRecord,
     /// Its distance from white below, in pixels.
     pub reach_px: f64,
-    /// The same in millimetres.
+    /// The same in millimeters.
     pub reach_mm: Option<f64>,
     /// The index of the first layer that reaches so far.
     pub reach_layer: u32,
@@ -279,7 +279,7 @@ pub struct OverhangRecord {
     pub shown: Shown,
 }
 
-/// A body whose centre of gravity leaves its base as it is built.
+/// A body whose center of gravity leaves its base as it is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct OffBalanceRecord {
@@ -288,11 +288,11 @@ pub struct OffBalanceRecord {
     pub layer: LayerPlace,
     /// The index of the layer after which it is farthest off.
     pub worst_layer: u32,
-    /// The distance of its centre of gravity from its base then, in pixels.
+    /// The distance of its center of gravity from its base then, in pixels.
     pub off_px: f64,
-    /// The same in millimetres.
+    /// The same in millimeters.
     pub off_mm: Option<f64>,
-    /// The centre of gravity then.
+    /// The center of gravity then.
     #[serde(flatten)]
     pub at: PointRecord,
     /// The rectangle around the body's first layer, as in [`BoxRecord::box_mm`].

@@ -80,13 +80,13 @@ pub struct BoxRecord {
     pub box_px: [u32; 4],
 }
 
-/// An area, written in square millimetres, or in pixels.
+/// An area, written in square millimeters, or in pixels.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct AreaRecord {
     /// In pixels.
     pub area_px: u64,
-    /// In square millimetres.
+    /// In square millimeters.
     pub area_mm2: Option<f64>,
 }
 

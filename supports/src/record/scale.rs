@@ -1,4 +1,4 @@
-//! Pixels as millimetres, where a stack says how large they are.
+//! Pixels as millimeters, where a stack says how large they are.
 
 use std::ops::Range;
 
@@ -50,7 +50,7 @@ impl<'a> Scale<'a> {
         Some(to_nm(pixels * self.pitch_mm?))
     }
 
-    /// Returns an area in pixels, also in square millimetres.
+    /// Returns an area in pixels, also in square millimeters.
     pub fn area(&self, pixels: u64) -> AreaRecord {
         AreaRecord { area_px: pixels, area_mm2: self.area_mm2(pixels) }
     }

@@ -1,7 +1,7 @@
 //! Directions over a cone.
 
-/// Returns unit vectors that lie evenly over a cone about straight down, by a spiral of the golden
-/// angle. The first points straight down, the last ones are tilted by `max_tilt` degrees.
+/// Returns unit vectors, even over a cone about straight down, by a spiral of the golden angle. The
+/// first points straight down, the last ones are tilted by `max_tilt` degrees.
 pub(super) fn directions(count: u32, max_tilt: f64) -> Vec<[f64; 3]> {
     // On a sphere, bands of equal height have equal areas.
     let height = 1.0 - max_tilt.to_radians().cos();
@@ -16,11 +16,11 @@ pub(super) fn directions(count: u32, max_tilt: f64) -> Vec<[f64; 3]> {
     (0..count).map(direction).collect()
 }
 
-/// Returns the directions that lie beside one by an angle in radians, each a sixth of a turn from
-/// the next; those beyond the cone are tilted by `max_tilt` degrees instead.
+/// Returns the directions at an angle in radians from one, each a sixth of a turn from the next;
+/// directions outside the cone are tilted by `max_tilt` degrees instead.
 pub(super) fn beside(direction: [f64; 3], angle: f64, max_tilt: f64) -> [[f64; 3]; 6] {
     let [x, y, z] = direction;
-    // Across, level: any will do straight down.
+    // A level direction across; straight down, any will do.
     let level = x.hypot(y);
     let (turn_x, turn_y) = if level > 1e-9 { (x / level, y / level) } else { (1.0, 0.0) };
     let [across, up] = [[-turn_y, turn_x, 0.0], [z * turn_x, z * turn_y, -level]];
@@ -32,7 +32,7 @@ pub(super) fn beside(direction: [f64; 3], angle: f64, max_tilt: f64) -> [[f64; 3
     })
 }
 
-/// Returns a direction, turned into the cone if it lies beyond.
+/// Returns a direction, turned into the cone if it is outside.
 fn within([x, y, z]: [f64; 3], max_tilt: f64) -> [f64; 3] {
     let (sin, cos) = max_tilt.to_radians().sin_cos();
     let level = x.hypot(y);
@@ -50,7 +50,8 @@ mod tests {
         let tilt = |d: &[f64; 3]| (-d[2]).acos().to_degrees();
         assert!(all.iter().all(|d| tilt(d) < 45.0 + 1e-9));
         assert!((tilt(&all[399]) - 45.0).abs() < 1e-9);
-        // Any direction of the cone has one nearby: 400 over its area are 3.9° apart on a square grid.
+        // Each direction of the cone has one nearby: 400 over its area are 3.9° apart on a square
+        // grid.
         for k in 0..2_000u32 {
             let (tilt, turn) = (45.0 * f64::from(k % 40) / 39.0, f64::from(k / 40) * 7.2);
             let (sin, cos) = tilt.to_radians().sin_cos();

@@ -9,8 +9,8 @@ pub(super) type Runs = Vec<(u32, Range<u32>)>;
 #[derive(Debug, PartialEq)]
 pub(super) struct Piece {
     pub(super) area: u64,
-    /// The point to hold, as column and row: the centroid, or else the centre of the pixel that is
-    /// nearest to it. The first pixel's centre is at (0.5, 0.5).
+    /// The point to hold, as column and row: the centroid, or else the center of the pixel that is
+    /// nearest to it. The first pixel's center is at (0.5, 0.5).
     pub(super) middle: [f64; 2],
 }
 

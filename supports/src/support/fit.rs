@@ -25,7 +25,7 @@ pub(super) struct Surroundings<'a> {
     pub(super) island: &'a Runs,
 }
 
-/// Returns the bottom and the thickness of a layer in millimetres, if its page states them.
+/// Returns the bottom and the thickness of a layer in millimeters, if its page states them.
 pub(super) fn span_mm(layer: &LayerFacts) -> Option<[f64; 2]> {
     Some([layer.z_um? / 1000.0, layer.thickness_um? / 1000.0])
 }
@@ -159,7 +159,7 @@ pub(super) fn distance_mm([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
     let crossed = uu * vv - uv * uv;
     let s = if crossed > 0.0 { ((uv * vw - vv * uw) / crossed).clamp(0.0, 1.0) } else { 0.0 };
     let t = (uv * s + vw) / vv;
-    // The end of one that is nearest to the other's line may lie beyond it.
+    // The point of one axis that is nearest to the other's line may be past its end.
     let s = if (0.0..=1.0).contains(&t) {
         s
     } else {

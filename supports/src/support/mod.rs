@@ -1,6 +1,6 @@
 //! Plans supports that tie floating islands to the part around them.
 //!
-//! Supports stay in the mould and become features of the casting, so there is one for each
+//! Supports stay in the mold and become features of the casting, so there is one for each
 //! island, or for each piece of a wide one, and it is as short as can be. Rays over a cone below
 //! the island look for the surface of the part; where one meets it smooth and even, a straight
 //! round strut is tried in the images, layer by layer, as it will be drawn.
@@ -23,14 +23,14 @@ use crate::check::Island;
 pub use plan::{SupportError, plan_supports};
 pub use surface::Surface;
 
-/// Limits of supports. The seed prints none but the radius: the others' defaults are LAMP's own.
+/// Limits of supports. The seed prints only the radius: the other defaults are LAMP's own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SupportOptions {
     /// The number of directions that are tried, evenly over the cone.
     pub candidates: NonZeroU32,
     /// The largest angle of a support to the vertical, in degrees, below 90.
     pub max_tilt: f64,
-    /// How far supports stay from creases: edges where the surface turns by more than 30°.
+    /// The distance of supports from creases: edges where the surface turns by more than 30°.
     pub edge_clearance: Length,
     /// The largest curvature of the surface that a support may meet, in 1/mm.
     pub max_curvature: f64,
@@ -69,7 +69,7 @@ pub struct Support {
     pub origin_mm: [f64; 3],
     /// The point of the part that its axis meets first.
     pub contact_mm: [f64; 3],
-    /// The ends of the strut to draw, to whole nanometres. It reaches into the island and the part
+    /// The ends of the strut to draw, to whole nanometers. It reaches into the island and the part
     /// until it meets them wholly, and into the part at least by its radius.
     pub ends: [[Length; 3]; 2],
     /// The diameter.
@@ -99,7 +99,7 @@ impl Support {
     }
 }
 
-/// Why a direction is no way for a support. Each that fails counts under the first that applies.
+/// Why a support fails in a direction. Each failure counts under the first reason that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rejection {
     /// The part is farther away than a support may be long, or not in that direction at all.
@@ -110,9 +110,9 @@ pub enum Rejection {
     Curved,
     /// It would come too near to another support.
     Crossing,
-    /// It would meet other solid on the way.
+    /// It would meet other solid parts on the way.
     Blocked,
-    /// It would come out of the part beyond the contact.
+    /// It would exit the part beyond the contact.
     Through,
     /// A layer of it would not rest on half of the one below, or it would not meet the island.
     Unsteady,
@@ -135,8 +135,8 @@ pub struct HeldPlace {
     pub origin_mm: [f64; 3],
     /// Its pixels in the island's first layer.
     pub area: u64,
-    /// The support to build, and then its alternatives, shortest first. They are none if the
-    /// place is left.
+    /// The support to build, and then its alternatives, shortest first. Empty if the place gets no
+    /// support.
     pub supports: Vec<Support>,
     /// How many directions failed, by the cause.
     pub rejected: Vec<(Rejection, u32)>,

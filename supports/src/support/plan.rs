@@ -33,10 +33,10 @@ pub enum SupportError {
         /// The layer's index.
         index: u32,
     },
-    /// There are more islands, or pieces of them, than anybody looks at.
+    /// There are more islands, or pieces of them, than a person can look at.
     #[error("the islands need more than {MOST_SUPPORTS} supports")]
     TooMany,
-    /// The layers are not those that were checked.
+    /// The layers differ from the checked ones.
     #[error("the stack has fewer layers than when it was checked")]
     MissingLayers,
 }
@@ -75,10 +75,10 @@ pub fn plan_supports<E: From<SupportError>>(
     if plans.len() == islands.len() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
 }
 
-/// The most supports of a stack. Drawing takes time for each, and a person looks at each.
+/// The most supports of a stack. Each takes time to draw, and a person looks at each.
 const MOST_SUPPORTS: usize = 10_000;
 
-/// How many radii a strut reaches beyond its contacts at most, where it hardly meets them.
+/// The largest reach of a strut beyond its contacts, in radii, where it hardly meets them.
 const MOST_RADII: f64 = 4.0;
 
 /// The least angle by which supports are turned to make them shorter: some 4 um at 10 mm.
@@ -117,7 +117,7 @@ impl<'a> Planner<'a> {
         span_mm(&self.found.layers[number as usize]).expect("heights were found for all layers")[0]
     }
 
-    /// Returns how far supports reach from an island, to each side and down.
+    /// Returns the reach of supports from an island, to each side and down.
     fn reach_mm(&self) -> [f64; 2] {
         let (radius, length) = (self.options.radius.mm(), self.options.max_length.mm());
         let (sin, _) = self.options.max_tilt.to_radians().sin_cos();
@@ -135,7 +135,7 @@ impl<'a> Planner<'a> {
         above.unwrap_or(0) as u32
     }
 
-    /// Returns what supports may reach in each layer, and what they rest on.
+    /// Returns the region in each layer that supports may reach or rest on.
     fn regions(&self, islands: &[&Island]) -> Vec<Option<Region>> {
         let [aside, _] = self.reach_mm();
         let by = self.raster.pixels(Length::from_mm(aside));
@@ -225,8 +225,8 @@ impl<'a> Planner<'a> {
         HeldPlace { origin_mm, area: piece.area, supports, rejected }
     }
 
-    /// Turns a support in ever smaller steps, from half of what lies between directions, as long
-    /// as that makes it shorter.
+    /// Turns a support in ever smaller steps, beginning with half the angle between directions, as
+    /// long as a turn makes it shorter.
     fn shorten(&self, support: &mut Support, near: &NearSurface, around: &Surroundings<'_>) {
         let cone = 2.0 * PI * (1.0 - self.options.max_tilt.to_radians().cos());
         let mut step = (cone / self.directions.len() as f64).sqrt() / 2.0;
@@ -242,7 +242,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Returns the support in a direction, or why there is none.
+    /// Returns the support in a direction, or the reason that it fails.
     fn support(
         &self,
         origin_mm: Vec3,
@@ -290,8 +290,8 @@ fn direction_of(support: &Support) -> Vec3 {
     along.map(|part| part / length)
 }
 
-/// Returns the ends of the strut to draw. It reaches beyond the level bottom of the island and the
-/// contact's plane until all of its ends is beyond, and into the part at least by its radius.
+/// Returns the ends of the strut to draw. Both ends are wholly beyond the level bottom of the
+/// island and the contact's plane, and the strut enters the part at least by its radius.
 fn ends(origin: Vec3, direction: Vec3, contact: &Contact, radius_mm: f64) -> [[Length; 3]; 2] {
     // The tangent of the angle between the axis and a plane's normal.
     let slope = |cosine: f64| (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;

@@ -216,7 +216,7 @@ fn blocks() -> impl Strategy<Value = Mesh> {
 }
 
 proptest! {
-    // Other seeds find, once in hundreds of parts, an island that is left and not told.
+    // Other seeds find, once in hundreds of parts, an island that is neither held nor reported.
     #![proptest_config(ProptestConfig { cases: 32, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]

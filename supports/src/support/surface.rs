@@ -17,7 +17,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Takes the facets of a part. All of them together tell which side is inside.
+    /// Takes the facets of a part. All facets are needed to decide which side is inside.
     pub fn new(facets: FacetIndex) -> Self {
         let middle = facets.min();
         let mut volume = 0.0;
@@ -35,7 +35,7 @@ impl Surface {
         NearSurface::new(facets.filter_map(NearFacet::new), &AABB::from_corners(low, high))
     }
 
-    /// Returns the corners in millimetres, counter-clockwise seen from outside.
+    /// Returns the corners in millimeters, counter-clockwise seen from outside.
     fn corners(&self, facet: &PlacedFacet) -> [Vec3; 3] {
         // Adding zero turns -0 into 0, so that equal corners have equal bits.
         let [a, b, c] = facet.map(|[x, y, um]| [x + 0.0, y + 0.0, um / 1000.0 + 0.0]);
@@ -74,7 +74,7 @@ pub(super) struct Contact {
     pub(super) at_mm: Vec3,
     pub(super) length_mm: f64,
     pub(super) normal: Vec3,
-    /// That of the facet.
+    /// The curvature of the facet.
     curvature: f64,
 }
 

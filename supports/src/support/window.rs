@@ -16,7 +16,7 @@ pub(super) struct Raster {
 }
 
 impl Raster {
-    /// Returns the x and y of a column and row; the first pixel's centre is at (0.5, 0.5).
+    /// Returns the x and y of a column and row; the first pixel's center is at (0.5, 0.5).
     pub(super) fn place_mm(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         let pitch = self.dpi.pitch().mm();
         let [x0, y1] = self.origin_mm;
@@ -70,7 +70,7 @@ impl Window {
         }
     }
 
-    /// Returns the white runs of a layer within a run of a row. What is not kept is black.
+    /// Returns the white runs of a layer within a run of a row. Pixels not kept are black.
     pub(super) fn white_in(
         &self,
         layer: u32,

@@ -111,7 +111,7 @@ fn islands_agree(block: &Block, limits: &Limits, found: &Findings) {
 }
 
 fn joints_agree(block: &Block, limits: &Limits, found: &Findings) {
-    // Twice the sum of the centres is a whole number.
+    // Twice the sum of the centers is a whole number.
     let twice = |centroid: [f64; 2], area: usize| {
         centroid.map(|mean| (2.0 * mean * area as f64).round() as usize)
     };
@@ -167,7 +167,7 @@ fn pockets_agree(block: &Block, limits: &Limits, found: &Findings) {
 }
 
 fn balance_agrees(block: &Block, found: &Findings) {
-    // What rounding makes of a centre of gravity straight above the side of the base.
+    // Rounding of a center of gravity straight above the side of the base.
     let off = |pixels: &f64| *pixels > 1e-9;
     let ours = found.off_balance.list.iter().filter(|ours| off(&ours.off_pixels));
     let ours = ours.map(|ours| (frame(&ours.base), ours.layer as usize, ours.off_pixels));

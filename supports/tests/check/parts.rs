@@ -14,7 +14,7 @@ use super::referee::{Block, Limits};
 const LIMITS: Limits =
     Limits { speck: 3, least_support: 0.25, max_overhang_um: None, drain_um: None };
 
-/// A tenth of a millimetre.
+/// A tenth of a millimeter.
 const FINE_DPI: f64 = 254.0;
 
 fn slice(mesh: Mesh, dpi: f64, thickness_um: f64, placement: Placement) -> Vec<Layer> {

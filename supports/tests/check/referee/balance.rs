@@ -1,16 +1,16 @@
-//! Centres of gravity beside the hull of what stands on the platform.
+//! Centers of gravity outside the hull of white on the platform.
 
 use super::islands::Growth;
 use super::{Block, Frame};
 
-/// A body whose centre of gravity is not above its base as it grows.
+/// A body whose center of gravity is not above its base as it grows.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tilt {
     /// The frame of all that the body, when done, has in layer 0.
     pub(crate) base: Frame,
     /// The first layer in which it, or what it later joins, leans.
     pub(crate) layer: usize,
-    /// How far the centre of gravity ever is from the base, in µm.
+    /// How far the center of gravity ever is from the base, in µm.
     pub(crate) farthest_um: f64,
 }
 
@@ -71,8 +71,8 @@ impl Weight {
     }
 }
 
-/// Returns how far a body's centre of gravity is outside of its base, in pixels; zero
-/// within it. Weights are those that births had while they were the eldest of their bodies.
+/// Returns the distance of a body's center of gravity from its base, in pixels; zero within it.
+/// Weights are the weights that births had while they were the eldest of their bodies.
 fn off_base(growth: &Growth, weights: &[Weight], body: usize) -> f64 {
     let block = growth.block;
     let its = (0..weights.len()).filter(|&birth| growth.name(birth) == body);

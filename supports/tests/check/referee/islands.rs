@@ -132,7 +132,7 @@ pub(crate) fn islands(block: &Block, limits: &Limits) -> Vec<Island> {
         }
         float(&growth, layer, limits, &mut found);
     }
-    // Births count those that stand, too; islands are numbered among themselves.
+    // Births include bodies that stand; islands are numbered among themselves.
     let numbers: Vec<usize> =
         (0..found.len()).map(|birth| found[..birth].iter().flatten().count()).collect();
     let mut islands: Vec<Island> = found.into_iter().flatten().collect();

@@ -46,7 +46,7 @@ impl fmt::Debug for Block {
     }
 }
 
-/// What the findings depend on.
+/// Limits of the findings.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     /// The side in pixels of the square that more than a speck holds.
@@ -55,7 +55,7 @@ pub(crate) struct Limits {
     pub(crate) least_support: f64,
     /// How far an overhang may reach, in µm; `None` for the layer's thickness.
     pub(crate) max_overhang_um: Option<f64>,
-    /// The width of a drain in µm, if narrow ones are told.
+    /// The width of a drain in µm, if narrow drains are reported.
     pub(crate) drain_um: Option<f64>,
 }
 
@@ -166,7 +166,7 @@ impl Block {
         })
     }
 
-    /// Returns the mean of the centres of some pixels: column and row.
+    /// Returns the mean of the centers of some pixels: column and row.
     fn centroid(&self, voxels: &[usize]) -> [f64; 2] {
         [0, 1].map(|axis| {
             let sum: f64 = voxels.iter().map(|&voxel| self.place(voxel)[axis] as f64 + 0.5).sum();

@@ -60,7 +60,7 @@ fn most_um(block: &Block, limits: &Limits, layer: usize) -> f64 {
     limits.max_overhang_um.unwrap_or(block.thickness_um[layer])
 }
 
-/// Returns the distance from a pixel's centre to that of the nearest white one in the layer
+/// Returns the distance from a pixel's center to the center of the nearest white one in the layer
 /// below, which must have one.
 fn distance_um(block: &Block, voxel: usize) -> f64 {
     let [column, row, layer] = block.place(voxel).map(|at| at as isize);

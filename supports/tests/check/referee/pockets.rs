@@ -36,8 +36,8 @@ pub(crate) fn pockets(block: &Block, limits: &Limits) -> Vec<Pocket> {
     bodies.iter().map(|body| pocket(block, limits, body)).collect()
 }
 
-/// Returns the pockets that there are when black nearer than half of `drain_um` to white is
-/// taken away, but for those within a pocket.
+/// Returns the pockets that exist when black nearer than half of `drain_um` to white is taken away,
+/// except pockets within a pocket.
 pub(crate) fn narrow_pockets(block: &Block, limits: &Limits, drain_um: f64) -> Vec<Pocket> {
     let already = enclosed(block, |voxel| !block.white[voxel]).concat();
     let wide: Vec<bool> = (0..block.white.len())
@@ -77,7 +77,7 @@ fn pocket(block: &Block, limits: &Limits, body: &[usize]) -> Pocket {
     }
 }
 
-/// Returns the distance from a voxel's centre to that of the nearest white one.
+/// Returns the distance from a voxel's center to the center of the nearest white one.
 fn distance_um(block: &Block, voxel: usize) -> f64 {
     let centre = |voxel: usize| {
         let [column, row, layer] = block.place(voxel);
