@@ -1,4 +1,4 @@
-//! Removes what no batch names any more.
+//! Removes results that no batch names any more.
 
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -10,19 +10,19 @@ use crate::key::Key;
 use crate::named::NamedTasks;
 use crate::store::{Store, StoreError, folders_in, remove};
 
-/// What was removed.
+/// Counts of removed and kept results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Removed {
     /// The number of results.
     pub results: u64,
-    /// The number of results that stay.
+    /// The number of results kept.
     pub kept: u64,
     /// The bytes of all files that were removed.
     pub bytes: u64,
 }
 
-/// Removes results that no batch names which was run within `keep`: neither those that it wants,
-/// nor those that it still needs to make them. So ranges go once their part is joined.
+/// Removes results that no batch run within `keep` names: neither as a result that it wants, nor as
+/// one that it still needs to make those. So ranges go once their part is joined.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or removed.
@@ -62,7 +62,7 @@ pub fn collect(store: &Store, keep: Duration) -> Result<Removed, StoreError> {
     Ok(removed)
 }
 
-/// Marks what a batch wants, and what it needs to make what is not there.
+/// Marks the results that a batch wants, and the results that it needs to make missing ones.
 fn mark(batch: &NamedTasks, store: &Store, wanted: &mut HashSet<Key>) {
     let needs: HashMap<Key, &[Key]> =
         batch.tasks.iter().map(|task| (task.key, &task.needs[..])).collect();

@@ -1,7 +1,7 @@
-//! The journal: what was done when, where and by which engine, as lines of JSON.
+//! The journal: which task was done when, where and by which engine, as lines of JSON.
 //!
-//! Each machine appends to a file of its own, so that no two mix. A line that a loss of power cut
-//! is passed over.
+//! Each machine appends to its own file, so that no two mix. A line cut by a loss of power is
+//! skipped.
 
 use std::env;
 use std::fs::{self, File, OpenOptions};
@@ -29,15 +29,15 @@ pub struct Event {
     pub kind: Kind,
     /// The part or build that it was for.
     pub subject: String,
-    /// What it did.
+    /// The work, for people.
     pub label: String,
-    /// How long it took, in seconds.
+    /// The duration, in seconds.
     pub seconds: f64,
-    /// What it took of processors, in seconds, where the system tells.
+    /// The processor time, in seconds, where the system reports it.
     pub cpu_s: Option<f64>,
-    /// The most memory that it held, in bytes, where the system tells.
+    /// The most memory that it held, in bytes, where the system reports it.
     pub memory: Option<u64>,
-    /// Its exit status; none if a signal ended it.
+    /// Its exit status; `None` if a signal ended it.
     pub status: Option<i32>,
     /// Its last words, if it failed.
     pub why: Option<String>,
@@ -122,7 +122,7 @@ fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Returns the name of this machine, as far as files may have it.
+/// Returns the name of this machine, with only characters that file names may have.
 pub fn host() -> String {
     let of_kernel = fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let of_shell = || env::var("HOSTNAME").or_else(|_| env::var("COMPUTERNAME")).ok();
@@ -171,7 +171,7 @@ mod tests {
             fs::write(&path, &text[..text.len() - cut]).unwrap();
             Journal::open(&store).unwrap().append(&event(4.0)).unwrap();
             let times: Vec<_> = events(&store).unwrap().iter().map(|event| event.at).collect();
-            // Without its line break alone, the last line is whole.
+            // The last line is whole, only its line break is missing.
             let whole = if cut == 1 { &[1.0, 2.0, 3.0, 4.0][..] } else { &[1.0, 2.0, 4.0] };
             assert_eq!(times, whole, "{cut}");
         }

@@ -1,4 +1,4 @@
-//! The key of a task: what it does to what, as a digest.
+//! The key of a task: a digest of its work and its inputs.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,16 +6,16 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// What decides the bytes of a task's result, and nothing else.
+/// Everything that decides the bytes of a task's result, and nothing else.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recipe {
-    /// What kind of task it is.
+    /// The kind of task.
     pub kind: Kind,
     /// Options that matter to bytes, in canonical form.
     pub options: Vec<String>,
     /// Digests of files, and keys of tasks whose results are used, in their order.
     pub inputs: Vec<String>,
-    /// Names of the code that works, each with the number that changes when its bytes do.
+    /// Names of the code that runs, each with the number that changes when its output bytes do.
     pub code: Vec<(String, u32)>,
 }
 
@@ -29,7 +29,7 @@ pub enum Kind {
     Join,
     /// A stage that needs the whole stack.
     Whole,
-    /// What needs a person in a part's stack.
+    /// The findings in a part's stack that need a person.
     Check,
     /// A build of parts.
     Tile,
@@ -62,19 +62,19 @@ impl Recipe {
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Returns the key of a note of a kind, given all that it is about.
+    /// Returns the key of a note of a kind, given everything it depends on.
     pub fn of_note(kind: &str, about: &impl Serialize) -> Self {
         let text = serde_json::to_vec(&("lamp-note-1", kind, about));
         Self(*blake3::hash(&text.expect("notes are about texts and numbers")).as_bytes())
     }
 
-    /// Returns where the store has what belongs to the key: a folder and a name in it.
+    /// Returns the place of the key's files in the store: a folder and a name in it.
     pub(crate) fn place(&self, end: &str) -> PathBuf {
         let text = self.to_string();
         PathBuf::from(&text[..2]).join(format!("{text}.{end}"))
     }
 
-    /// Returns the first letters, enough to tell tasks apart for people.
+    /// Returns the first letters, enough for people to distinguish tasks.
     pub fn short(&self) -> String {
         self.to_string()[..12].to_owned()
     }
@@ -92,7 +92,7 @@ impl fmt::Debug for Key {
     }
 }
 
-/// A text is no key.
+/// The error of a text that is no key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is no key: lamp batch status --verbose lists keys, each of 64 digits 0 to 9 and a to f"

@@ -1,4 +1,4 @@
-//! What has become of each task of a run.
+//! The state of each task of a run.
 
 use std::collections::{HashMap, HashSet};
 
@@ -13,17 +13,17 @@ pub enum End {
     Done,
     /// Its input or its options are at fault: another attempt would end alike.
     Bad(String),
-    /// It could not read or write: another attempt may do.
+    /// It could not read or write: another attempt may succeed.
     Failed(String),
-    /// Its process was ended, so that it could tell the journal nothing: another attempt may do.
+    /// Its process was ended before it could write to the journal: another attempt may succeed.
     Crashed(String),
     /// The disk is full.
     NoRoom(String),
-    /// A result that it needs was damaged and is gone: that is to be made again first.
+    /// A result that it needs was damaged and is gone: it must be made again first.
     Damaged(String),
 }
 
-/// What has become of a task.
+/// The state of a task.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
     /// It waits for others, or for its turn.
@@ -34,24 +34,24 @@ pub enum State {
     Done,
     /// It failed for good: its last words.
     Failed(String),
-    /// It is not done since one that it needs failed.
+    /// It is not done because a task that it needs failed.
     Skipped,
 }
 
-/// The states of all tasks that are to be done for the goals of a batch.
+/// The states of all tasks to do for the goals of a batch.
 pub struct Ledger<'a> {
     graph: &'a Graph,
     store: &'a Store,
     goals: Vec<Key>,
     states: HashMap<Key, State>,
     failures: HashMap<Key, u32>,
-    /// How often a task is tried again.
+    /// The number of retries of a task.
     retries: u32,
     no_room: Option<String>,
 }
 
 impl<'a> Ledger<'a> {
-    /// Starts with all that is missing for the goals.
+    /// Starts with all tasks that are missing for the goals.
     pub fn new(graph: &'a Graph, store: &'a Store, goals: &[Key], retries: u32) -> Self {
         let mut ledger = Self {
             graph,
@@ -81,13 +81,13 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// Returns the tasks of this run, each after those that it needs.
+    /// Returns the tasks of this run, each after the tasks that it needs.
     pub fn keys(&self) -> Vec<Key> {
         let keys = self.graph.keys().iter().copied();
         keys.filter(|key| self.states.contains_key(key)).collect()
     }
 
-    /// Returns what has become of a task; one that was done before the run is done.
+    /// Returns the state of a task; a task that was done before the run is done.
     pub fn state(&self, key: Key) -> State {
         self.states.get(&key).cloned().unwrap_or(State::Done)
     }
@@ -104,12 +104,12 @@ impl<'a> Ledger<'a> {
         self.keys().into_iter().filter(is_ready).collect()
     }
 
-    /// Says that a task is being done.
+    /// Records that a task is being done.
     pub fn start(&mut self, key: Key) {
         self.states.insert(key, State::Running);
     }
 
-    /// Says how an attempt at a task ended. Returns whether it is to be tried again.
+    /// Records the end of an attempt at a task. Returns whether it is to be tried again.
     pub fn end(&mut self, key: Key, end: End) -> bool {
         let (state, is_counted) = match end {
             End::Done if self.store.manifest(key).is_some() => (State::Done, false),
@@ -138,7 +138,7 @@ impl<'a> Ledger<'a> {
         false
     }
 
-    /// Sets aside what cannot be done any more, and what is now done for nothing.
+    /// Sets aside tasks that cannot be done any more, and tasks that have become useless.
     fn skip(&mut self) {
         for key in self.keys() {
             let is_lost =
@@ -161,12 +161,12 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// Returns why no task is started any more, if the disk is full.
+    /// Returns the reason why no task is started any more, if the disk is full.
     pub fn no_room(&self) -> Option<&str> {
         self.no_room.as_deref()
     }
 
-    /// Returns the last words of what a task needs that failed, or its own.
+    /// Returns the last words of a failed task that a task needs, or its own.
     pub fn why(&self, key: Key) -> Option<&str> {
         if let Some(State::Failed(why)) = self.states.get(&key) {
             return Some(why);
@@ -235,7 +235,7 @@ mod tests {
         assert!(ledger.end(a, End::Failed("crash".to_owned())));
         assert_eq!(ledger.ready(), [a, b, c, d]);
         assert!(!ledger.end(a, End::Failed("crash again".to_owned())));
-        // The rest of that part would be for nothing.
+        // The rest of that part would be useless.
         for skipped in [b, low, build] {
             assert_eq!(ledger.state(skipped), State::Skipped);
         }
@@ -259,7 +259,7 @@ mod tests {
         assert!(ledger.end(build, End::Damaged("low is damaged".to_owned())));
         assert!(ledger.ready().contains(&a) && !ledger.ready().contains(&b));
         assert_eq!(ledger.state(low), State::Waiting);
-        // A process that says that it is done, and is not, has failed.
+        // A process that reports success without a result has failed.
         for again in [true, true, false] {
             assert_eq!(ledger.end(a, End::Done), again);
         }

@@ -1,10 +1,11 @@
 //! Batches: parts and builds overnight, whatever crashes meanwhile.
 //!
 //! A [`Night`] names parts and builds. Each becomes a few [`Task`]s; a task's [`Key`] is a digest
-//! of all that decides its result. The [`Store`] has results by their keys, each whole or absent,
-//! so the same batch again does only what is missing. An [`Engine`] runs tasks as processes.
+//! of everything that decides its result. The [`Store`] has results by their keys, each whole or
+//! absent, so running the same batch again does only the missing tasks. An [`Engine`] runs tasks as
+//! processes.
 //!
-//! What a stage is, the program that runs tasks knows; this crate does not.
+//! The program that runs tasks knows what a stage is; this crate does not.
 //!
 //! ```
 //! use std::io::Write;

@@ -1,4 +1,4 @@
-//! What a batch names, kept in the store, so that `gc` knows what is still wanted.
+//! Tasks that a batch names, kept in the store, so that `gc` knows which results are still wanted.
 
 use std::fs;
 use std::io;
@@ -20,21 +20,21 @@ pub struct NamedTasks {
     pub night: PathBuf,
     /// The tasks whose results are wanted.
     pub goals: Vec<Key>,
-    /// All tasks, each after those that it needs.
+    /// All tasks, each after the tasks that it needs.
     pub tasks: Vec<NamedTask>,
 }
 
-/// A task, and what it needs.
+/// A task, and the tasks that it needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedTask {
     /// The task.
     pub key: Key,
-    /// What it needs.
+    /// The tasks that it needs.
     pub needs: Vec<Key>,
 }
 
 impl NamedTasks {
-    /// Returns what a batch names.
+    /// Returns the tasks that a batch names.
     pub fn new(night: PathBuf, graph: &Graph, goals: &[Key]) -> Self {
         let named = |&key: &Key| NamedTask { key, needs: graph.task(key).needs.clone() };
         Self { night, goals: goals.to_vec(), tasks: graph.keys().iter().map(named).collect() }
@@ -46,7 +46,7 @@ impl NamedTasks {
         store.root().join("batches").join(format!("{}.json", &name[..16]))
     }
 
-    /// Keeps it. The file's time tells when the batch was last run.
+    /// Keeps it. The file's time is the time when the batch was last run.
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
@@ -66,7 +66,7 @@ impl NamedTasks {
         }
     }
 
-    /// Returns what batches name that were run within a time, and the files of others.
+    /// Returns the tasks of batches that were run within a time, and the files of other batches.
     pub(crate) fn within(store: &Store, keep: Duration) -> io::Result<(Vec<Self>, Vec<PathBuf>)> {
         let (mut recent, mut old) = (Vec::new(), Vec::new());
         let entries = match fs::read_dir(store.root().join("batches")) {
@@ -79,7 +79,7 @@ impl NamedTasks {
             match sealed::read(&entry.path()) {
                 Some(named) if age <= keep => recent.push(named),
                 _ if age <= keep => {
-                    // What it names is not known: nothing is safe to remove.
+                    // The tasks that it names are unknown: nothing is safe to remove.
                     let path = entry.path().display().to_string();
                     let problem = format!("{path} is damaged: run its batch again, or remove it");
                     return Err(io::Error::new(io::ErrorKind::InvalidData, problem));

@@ -1,4 +1,4 @@
-//! Tasks, and the graph of what needs what.
+//! Tasks, and the graph of their needs.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -12,19 +12,19 @@ use crate::path_bytes;
 /// A piece of work with one result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
-    /// What decides the bytes of its result.
+    /// The recipe, which decides the bytes of its result.
     pub recipe: Recipe,
     /// The part or build that it is for, as the night file names it.
     pub subject: String,
-    /// What it does, for people: `layers 0..320`.
+    /// The work, for people: `layers 0..320`.
     pub label: String,
     /// Tasks whose results it uses, in their order.
     pub needs: Vec<Key>,
     /// Files that it reads, with the digests that they have.
     pub files: Vec<InputFile>,
-    /// What it will take.
+    /// The estimated cost.
     pub cost: Cost,
-    /// How to do it, for the program that does it.
+    /// The work, for the program that does it.
     pub work: Value,
 }
 
@@ -38,7 +38,7 @@ pub struct InputFile {
     pub digest: String,
 }
 
-/// What a task will take, estimated.
+/// The estimated cost of a task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Seconds of one processor.
@@ -50,7 +50,7 @@ pub struct Cost {
 }
 
 impl std::iter::Sum for Cost {
-    /// Adds times and results; memory is that of the largest task.
+    /// Adds times and results; memory is the memory of the largest task.
     fn sum<I: Iterator<Item = Self>>(costs: I) -> Self {
         costs.fold(Self::default(), |sum, cost| Self {
             cpu_s: sum.cpu_s + cost.cpu_s,
@@ -60,7 +60,7 @@ impl std::iter::Sum for Cost {
     }
 }
 
-/// Tasks, each after all that it needs, without two of one key.
+/// Tasks, each after all tasks that it needs, without two of one key.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     tasks: Vec<Task>,
@@ -69,10 +69,10 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Adds a task and returns its key. A task of that key that is there already stays as it is.
+    /// Adds a task and returns its key. If the key is there already, that task stays as it is.
     ///
     /// # Panics
-    /// Panics if something that the task needs has not been added before.
+    /// Panics if a task that it needs has not been added before.
     pub fn add(&mut self, task: Task) -> Key {
         let key = task.recipe.key();
         assert!(
@@ -90,24 +90,24 @@ impl Graph {
     /// Returns the task of a key.
     ///
     /// # Panics
-    /// Panics if there is none.
+    /// Panics if the graph has no such task.
     pub fn task(&self, key: Key) -> &Task {
         &self.tasks[self.places[&key]]
     }
 
-    /// Returns all keys, each after those that it needs.
+    /// Returns all keys, each after the keys that it needs.
     pub fn keys(&self) -> &[Key] {
         &self.keys
     }
 
-    /// Returns the tasks that are to be done for `goals`, each after those that it needs: goals
-    /// that are not done, and what they need that is not done.
+    /// Returns the tasks to do for `goals`, each after the tasks that it needs: goals that are not
+    /// done, and unfinished tasks that they need.
     pub fn missing(&self, goals: &[Key], mut is_done: impl FnMut(Key) -> bool) -> Vec<Key> {
         let mut wanted = vec![false; self.tasks.len()];
         for goal in goals {
             wanted[self.places[goal]] = true;
         }
-        // What needs something stands after it.
+        // A task stands after the tasks that it needs.
         for place in (0..self.tasks.len()).rev() {
             wanted[place] = wanted[place] && !is_done(self.keys[place]);
             if wanted[place] {
@@ -126,7 +126,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::key::Kind;
 
-    /// A task by a name, of nothing but what it needs.
+    /// A task with a name, which does nothing and has only needs.
     pub(crate) fn task(name: &str, kind: Kind, needs: &[Key]) -> Task {
         let inputs = needs.iter().map(ToString::to_string).collect();
         let recipe = Recipe { kind, options: vec![name.to_owned()], inputs, code: Vec::new() };

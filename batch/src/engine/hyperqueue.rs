@@ -1,8 +1,7 @@
 //! Tasks by HyperQueue, on one's own machines or inside allocations of a cluster.
 //!
-//! A round is one job, written as a job file. Workers that die are HyperQueue's affair: it starts
-//! their tasks elsewhere. A task whose process dies counts as failed there, and goes into the next
-//! round.
+//! A round is one job, written as a job file. HyperQueue handles workers that die: it starts their
+//! tasks elsewhere. A task whose process dies counts as failed there, and goes into the next round.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -14,7 +13,7 @@ use super::rounds::{RoundTask, Scheduler, SchedulerError, answer_of, not_underst
 use crate::store::Store;
 
 const HQ: &str = "hq";
-/// How many workers a task may lose before it counts as failed.
+/// The number of workers that a task may lose before it counts as failed.
 const CRASH_LIMIT: u32 = 5;
 
 /// A HyperQueue server, as `hq` finds it: by `HQ_SERVER_DIR`, or in the home folder.
@@ -48,7 +47,7 @@ struct Request {
 fn job_file(round: &[RoundTask], store: &Store) -> String {
     let cwd = store.root().display().to_string();
     let entry = |(id, task): (usize, &RoundTask)| {
-        // HyperQueue counts memory in MB, and refuses a request of none.
+        // HyperQueue counts memory in MB, and refuses a request of 0.
         let megabytes = task.cost.memory.div_ceil(1_000_000).max(1);
         JobTask {
             id,
@@ -86,7 +85,7 @@ impl Scheduler for HyperQueue {
         let answer = answer_of(HQ, &["job", "info", &id, "--output-mode", "json"], None)?;
         let jobs = json(&answer)?;
         let jobs = jobs.as_array().ok_or_else(|| not_understood(HQ, &answer))?;
-        // A server that was started again without its journal knows of no job.
+        // A server that was restarted without its journal knows no job.
         let Some(job) = jobs.first() else { return Ok(false) };
         let counts = &job["info"]["task_stats"];
         let count = |state: &str| counts[state].as_u64();

@@ -1,4 +1,4 @@
-//! Tasks as child processes: one that crashes costs itself alone.
+//! Tasks as child processes: a crash ends only its own task.
 
 use std::collections::HashMap;
 use std::process::Command;
@@ -19,7 +19,7 @@ pub struct Local {
     pub memory: u64,
 }
 
-/// What a running task takes.
+/// Threads and memory of a running task.
 #[derive(Clone, Copy)]
 struct Share {
     threads: usize,
@@ -66,8 +66,8 @@ impl Local {
         }
     }
 
-    /// Returns how many threads the next task gets, if there is room for it: its share of those
-    /// that are free, given how many tasks are ready.
+    /// Returns the number of threads of the next task, if there is room for it: its share of the
+    /// free threads, given the number of tasks that are ready.
     fn threads(&self, running: &HashMap<Key, Share>, memory: u64, ready: usize) -> Option<usize> {
         let taken: usize = running.values().map(|share| share.threads).sum();
         let held: u64 = running.values().map(|share| share.memory).sum();

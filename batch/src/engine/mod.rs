@@ -1,4 +1,4 @@
-//! What runs tasks: one file each, all running `lamp batch task KEY`.
+//! Engines, which run tasks: one file each, all running `lamp batch task KEY`.
 
 mod hyperqueue;
 mod local;
@@ -42,7 +42,7 @@ pub mod status {
 }
 
 impl End {
-    /// Returns how a task ended that ended with a status; none is a signal.
+    /// Returns the end of a task with an exit status; `None` means a signal.
     pub fn of_status(status: Option<i32>, why: String) -> Self {
         match status {
             Some(status::DONE) => Self::Done,
@@ -62,7 +62,7 @@ pub enum Engine {
     Local(Local),
     /// HyperQueue, whose server `hq` finds.
     HyperQueue,
-    /// Slurm, by `sbatch` and what comes with it.
+    /// Slurm, by `sbatch` and its companions.
     Slurm,
 }
 
@@ -76,11 +76,10 @@ impl Engine {
         }
     }
 
-    /// Does all tasks of a ledger, as far as they can be done, and tells of each attempt that
-    /// ended.
+    /// Runs all tasks of a ledger that can be done, and reports each attempt that ended.
     ///
     /// # Errors
-    /// Returns an error if the engine itself fails; what tasks do is in the ledger.
+    /// Returns an error if the engine itself fails; failures of tasks are in the ledger.
     pub fn run(
         &self,
         work: &Work<'_>,
@@ -95,7 +94,7 @@ impl Engine {
     }
 }
 
-/// What an engine works on.
+/// The job of an engine.
 pub struct Work<'a> {
     /// All tasks.
     pub graph: &'a Graph,
@@ -116,7 +115,7 @@ pub struct Attempt {
     pub again: bool,
 }
 
-/// Why an engine cannot go on.
+/// An error that stops an engine.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EngineError {

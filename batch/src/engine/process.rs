@@ -45,9 +45,9 @@ fn running() -> MutexGuard<'static, Running> {
     RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the children of this process, which take their temporary files away, and waits for them,
-/// at most 10 s. From then on none is started, and none is told to have ended. Call it before
-/// exiting on a signal.
+/// Ends the children of this process, which remove their temporary files, and waits for them, at
+/// most 10 s. From then on no child is started, and no end is reported. Call it before exiting on a
+/// signal.
 pub fn end_children() {
     let patience = Instant::now() + Duration::from_secs(10);
     running().is_ending = true;
@@ -61,7 +61,7 @@ pub fn end_children() {
 fn ask_to_end() {
     use rustix::process::{Pid, Signal, kill_process};
     for pid in running().children.iter().filter_map(|&pid| Pid::from_raw(pid as i32)) {
-        // One that has ended by itself is as good.
+        // One that has already ended is fine.
         let _ = kill_process(pid, Signal::TERM);
     }
 }
@@ -70,7 +70,7 @@ fn ask_to_end() {
 #[cfg(not(target_os = "linux"))]
 fn ask_to_end() {}
 
-/// Starts a process and sends how it ends, with the words that it left.
+/// Starts a process and sends its end, with its last words.
 pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) -> io::Result<()> {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut now = running();
@@ -91,7 +91,7 @@ pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) ->
     Ok(())
 }
 
-/// The most bytes of last words that are kept.
+/// The most bytes of last words to keep.
 const MOST_WORDS: usize = 4096;
 
 fn wait_for(mut child: Child) -> End {
@@ -113,7 +113,7 @@ fn wait_for(mut child: Child) -> End {
     }
 }
 
-/// Returns the last words of a process: its last line, or what ended it.
+/// Returns the last words of a process: its last line, or the signal that ended it.
 fn why(status: ExitStatus, words: &str) -> String {
     let last = words.lines().last().unwrap_or_default();
     let last = last.trim_start_matches("lamp: ").trim_start_matches("batch: ").to_owned();
@@ -129,7 +129,7 @@ fn why(status: ExitStatus, words: &str) -> String {
     }
 }
 
-/// Returns what a signal mostly means.
+/// Returns the usual meaning of a signal.
 fn guess(signal: i32) -> &'static str {
     if signal == 9 { ", as the system does when memory runs out" } else { "" }
 }

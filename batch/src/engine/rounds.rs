@@ -1,8 +1,8 @@
-//! Tasks by a scheduler of several machines, handed over in rounds.
+//! Tasks by a scheduler of several machines, submitted in rounds.
 //!
-//! A round is all that is still to be done, with what needs what. Schedulers lose some of their own
-//! books when they are killed, so how a task ended is read from the store alone: its manifest, or
-//! its line in the journal. What a round leaves undone goes into the next one.
+//! A round is all unfinished tasks, with the tasks that each needs. Schedulers lose some of their
+//! own books when they are killed, so the end of a task is read from the store alone: its manifest,
+//! or its line in the journal. Tasks that a round leaves unfinished go into the next one.
 
 use std::collections::HashMap;
 use std::ffi::OsString;
@@ -24,11 +24,11 @@ use crate::task::Cost;
 
 /// The shortest and the longest time between two looks at a round.
 const LOOKS: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(5)];
-/// How long a scheduler may be silent: time enough to start it again.
+/// The longest silence of a scheduler: time enough to restart it.
 const SILENCE: Duration = Duration::from_secs(30 * 60);
-/// How long a result may take to be seen from another machine.
+/// The longest time until a result is seen from another machine.
 const LATE: Duration = Duration::from_secs(2);
-/// How long a program of a scheduler may take for an answer. Busy ones take seconds.
+/// The time limit of a scheduler's program. Busy ones take seconds.
 const ANSWER_TIME: Duration = Duration::from_secs(120);
 
 /// A task of a round.
@@ -45,25 +45,25 @@ pub(super) struct RoundTask {
     pub(super) command: Vec<String>,
 }
 
-/// Hands tasks to machines.
+/// Submits tasks to machines.
 pub(super) trait Scheduler {
-    /// What a round is known by.
+    /// The scheduler's handle of a round.
     type Job;
 
     /// The engine's name.
     const NAME: &'static str;
 
-    /// Hands a round over. Each task stands after those that it needs.
+    /// Submits a round. Each task comes after the tasks that it needs.
     fn submit(&self, round: &[RoundTask], store: &Store) -> Result<Self::Job, SchedulerError>;
 
     /// Returns whether tasks of a round wait or run.
     fn is_at_work(&self, job: &Self::Job) -> Result<bool, SchedulerError>;
 
-    /// Takes back what has not been done.
+    /// Cancels the tasks that have not been done.
     fn cancel(&self, job: &Self::Job) -> Result<(), SchedulerError>;
 }
 
-/// Why a scheduler does not do its work.
+/// An error of a scheduler.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SchedulerError {
@@ -81,7 +81,7 @@ pub enum SchedulerError {
         /// Why.
         source: io::Error,
     },
-    /// A path that schedulers cannot be given.
+    /// A path that schedulers do not accept.
     #[error(
         "{path} is not UTF-8, and schedulers take no other names: rename it, or leave --engine out"
     )]
@@ -181,7 +181,7 @@ impl Following<'_, '_, '_> {
         loop {
             thread::sleep(pause);
             pause = (pause * 3 / 2).min(longest);
-            // It is asked first: what it has ended by now is seen below.
+            // The scheduler is asked first: tasks that it has ended by now are seen below.
             let is_at_work = match scheduler.is_at_work(job) {
                 Ok(is_at_work) => {
                     answered = Instant::now();
@@ -209,7 +209,7 @@ impl Following<'_, '_, '_> {
         }
     }
 
-    /// Takes note of what has ended. Returns of how many tasks.
+    /// Records tasks that have ended. Returns their number.
     fn look(&mut self) -> Result<usize, EngineError> {
         let store = self.work.store;
         let (done, pending): (Vec<Key>, Vec<Key>) =
@@ -233,12 +233,12 @@ impl Following<'_, '_, '_> {
                 count += 1;
             }
         }
-        // What needs something that failed for good is not waited for.
+        // Tasks that need a task that failed for good are not waited for.
         self.pending.retain(|&key| self.ledger.state(key) == State::Waiting);
         Ok(count)
     }
 
-    /// Takes note of tasks that could have been done, and were not.
+    /// Records tasks that could have been done, and were not.
     fn give_up(&mut self) {
         let ready = self.ledger.ready();
         for key in std::mem::take(&mut self.pending) {
@@ -302,7 +302,7 @@ fn answer_within(
     // A thread of its own, which is left behind if the program hangs.
     thread::spawn(move || {
         if let (Some(text), Some(mut stdin)) = (text, stdin) {
-            // A program that does not read to the end says why below.
+            // If a program does not read to the end, its error is reported below.
             let _ = io::Write::write_all(&mut stdin, text.as_bytes());
         }
         let _ = sender.send(child.wait_with_output());
@@ -332,7 +332,7 @@ fn kill(pid: u32) {
     }
 }
 
-/// Elsewhere it goes on, unheard.
+/// Elsewhere it runs on, ignored.
 #[cfg(not(target_os = "linux"))]
 fn kill(_: u32) {}
 
@@ -361,7 +361,7 @@ pub(super) mod testing {
     use super::*;
     use crate::task::tests::task;
 
-    /// Two ranges, what joins them, and what checks that.
+    /// Two ranges, the task that joins them, and the task that checks the result.
     pub(in crate::engine) fn round() -> Vec<RoundTask> {
         let kinds = [Kind::Range, Kind::Range, Kind::Join, Kind::Check];
         let needs = [vec![], vec![], vec![0, 1], vec![2]];

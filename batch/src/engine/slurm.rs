@@ -1,7 +1,7 @@
 //! Tasks by Slurm: an array for the ranges of a part, and jobs that depend on it.
 //!
-//! The partition, the account and the like are those of `SBATCH_PARTITION`, `SBATCH_ACCOUNT` and
-//! the other variables that `sbatch` reads.
+//! `SBATCH_PARTITION`, `SBATCH_ACCOUNT` and the other variables that `sbatch` reads set the
+//! partition, the account and the like.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -24,11 +24,11 @@ pub(super) struct Slurm;
 /// Tasks of one kind that need the same, by their places in the round.
 struct Array {
     tasks: Vec<usize>,
-    /// The arrays before that have what they need.
+    /// The arrays that it needs.
     needs: Vec<usize>,
 }
 
-/// Puts a round into arrays, each after those that it needs.
+/// Puts a round into arrays, each after the arrays that it needs.
 fn arrays(round: &[RoundTask]) -> Vec<Array> {
     let mut arrays: Vec<Array> = Vec::new();
     let mut array_of: Vec<usize> = Vec::new();
@@ -62,12 +62,12 @@ fn script(array: &Array, round: &[RoundTask]) -> String {
     script + "esac\n"
 }
 
-/// Returns the words for `sbatch` that say what an array takes.
+/// Returns the words for `sbatch` that state the resources of an array.
 fn limits(array: &Array, round: &[RoundTask]) -> [String; 2] {
     let costs = || array.tasks.iter().map(|&place| round[place].cost);
     let memory = costs().map(|cost| cost.memory).max().unwrap_or(0);
     let seconds = costs().map(|cost| cost.cpu_s).fold(0.0, f64::max);
-    // Slurm ends what exceeds its limits, so there is room for estimates that are too low.
+    // Slurm ends tasks that exceed their limits, so there is room for low estimates.
     let mebibytes = (memory + memory / 2).div_ceil(1 << 20) + 128;
     let minutes = (5.0 * seconds / 60.0).ceil() as u64 + 10;
     [format!("--mem={mebibytes}M"), format!("--time={minutes}")]
@@ -92,7 +92,7 @@ impl Scheduler for Slurm {
         let mut ids: Vec<u64> = Vec::new();
         for array in arrays(round) {
             let id = submit_array(&array, round, store, &name, &ids);
-            // Half a round would be done twice.
+            // Otherwise half a round would be done twice.
             let id = id.inspect_err(|_| drop(self.cancel(&name)))?;
             ids.push(id);
         }
@@ -110,7 +110,7 @@ impl Scheduler for Slurm {
     }
 }
 
-/// Hands an array over, given the numbers of those before. Returns its number.
+/// Submits an array, given the numbers of earlier arrays. Returns its number.
 fn submit_array(
     array: &Array,
     round: &[RoundTask],

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use walk::Walk;
 
-/// What a night file asks for.
+/// The contents of a night file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Night {
     /// Parts in the order of the file, each with a name of its own.
@@ -21,26 +21,26 @@ pub struct Night {
     pub builds: Vec<Build>,
     /// The folder of the store.
     pub store: PathBuf,
-    /// Where it is named, if it is.
+    /// The place that names it, if any.
     pub store_place: Option<Place>,
     /// Where results go.
     pub output: NightOutput,
 }
 
-/// A part, and what becomes of it.
+/// A part, and its stages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     /// The name that builds and results have.
     pub name: String,
     /// The part's file, or a folder that it may be in, from the folder of the night file.
     pub file: PathBuf,
-    /// Why no file can be had, if that is known already.
+    /// Why there is no file, if that is known already.
     pub fault: Option<String>,
     /// The stages, the slicing first.
     pub stages: Vec<Stage>,
     /// The `check` command, with its options.
     pub check: Stage,
-    /// How many ranges of layers it is cut into, if that is given.
+    /// The number of ranges of layers, if given.
     pub ranges: Option<u32>,
     /// Where the file is named.
     pub place: Place,
@@ -75,7 +75,7 @@ pub struct NightOutput {
     pub format: NightFormat,
 }
 
-/// The form of stacks for people.
+/// The form of delivered stacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NightFormat {
     /// As the store has them.
@@ -85,7 +85,7 @@ pub enum NightFormat {
 }
 
 impl NightFormat {
-    /// Returns how names end.
+    /// Returns the extension of file names.
     pub fn end(self) -> &'static str {
         match self {
             Self::Lamp => "lamp",
@@ -109,18 +109,18 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// What is wrong with a night file, and where.
+/// An error in a night file, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{place}: {problem}")]
 pub struct NightError {
-    /// Where.
+    /// The place.
     pub place: Place,
-    /// What, and what to do.
+    /// The problem, and how to solve it.
     pub problem: String,
 }
 
 impl Night {
-    /// Reads the text of a night file. Names of files are those from its folder.
+    /// Reads the text of a night file. File names are relative to its folder.
     ///
     /// # Errors
     /// Returns an error if it is no night file: one sentence, with its place.
@@ -128,7 +128,7 @@ impl Night {
         read::night(text, path)
     }
 
-    /// Returns the part of a name.
+    /// Returns the part with a name.
     pub fn part(&self, name: &str) -> Option<&Part> {
         self.parts.iter().find(|part| part.name == name)
     }
@@ -143,7 +143,7 @@ fn did_you_mean<'a>(word: &str, words: impl IntoIterator<Item = &'a str>) -> Str
     }
 }
 
-/// Returns the first name that stands twice.
+/// Returns the first name that occurs twice.
 fn twice<'a, T>(items: &'a [T], name: impl Fn(&'a T) -> &'a str) -> Option<(&'a T, &'a T)> {
     let mut seen = BTreeMap::new();
     items.iter().find_map(|item| seen.insert(name(item), item).map(|before| (before, item)))

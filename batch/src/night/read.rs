@@ -16,7 +16,7 @@ use super::{
 type Value<'a> = Spanned<DeValue<'a>>;
 type Read<T> = Result<T, NightError>;
 
-/// What a part may say; defaults, too, but for the first two.
+/// The keys of a part; defaults take all except the first two.
 const PART_KEYS: [&str; 5] = ["file", "name", "check", "ranges", "stages"];
 
 const TABLES: [&str; 5] = ["defaults", "part", "build", "store", "output"];
@@ -39,7 +39,7 @@ struct Reader<'a> {
     folder: &'a Path,
 }
 
-/// What a `[[part]]` says, or `[defaults]`.
+/// The contents of a `[[part]]`, or of `[defaults]`.
 #[derive(Clone, Default)]
 struct PartTable {
     name: Option<(String, Place)>,
@@ -50,7 +50,7 @@ struct PartTable {
     options: Vec<(String, Stage)>,
 }
 
-/// A part, as far as it has been read.
+/// A part that is being read.
 struct Draft {
     file: PathBuf,
     fault: Option<String>,
@@ -250,7 +250,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads a `[[part]]`: adds its files, or changes what was said of them before.
+    /// Reads a `[[part]]`: adds its files, or changes their earlier settings.
     fn part(&self, value: &Value<'_>, drafts: &mut Drafts) -> Read<()> {
         let table = self.table(value)?;
         let read = self.part_table(table, &PART_KEYS)?;
@@ -277,7 +277,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Returns the file that a text names, or the files that a pattern matches and the folders that
+    /// Returns the file that a text names, or the files that match a pattern and the folders that
     /// cannot be read, each with the reason.
     fn files(&self, value: &Value<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
         let name = self.text(value)?;
@@ -365,7 +365,7 @@ impl Reader<'_> {
         Ok((name.to_owned(), count))
     }
 
-    /// Reads a table of a folder alone. Returns it with its place.
+    /// Reads a table that holds only a folder. Returns it with its place.
     fn folder_of(&self, table: &DeTable<'_>) -> Read<Option<(PathBuf, Place)>> {
         self.check_keys(table, &["folder"], "a store has no key")?;
         let Some(value) = table.get("folder") else { return Ok(None) };
@@ -415,7 +415,7 @@ impl PartTable {
     }
 }
 
-/// Puts together what is said of a part.
+/// Combines the keys of a part with the defaults.
 fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
     let Draft { file, fault, place, table } = draft;
     let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -10,7 +10,7 @@ use glob::{Pattern, PatternError};
 /// The files that a pattern matches, by name.
 #[derive(Debug, Default)]
 pub(super) struct Walk {
-    /// Files, also links to what is not there.
+    /// Files, including links to missing files.
     pub(super) files: Vec<PathBuf>,
     /// Folders that could not be looked into, and why.
     pub(super) closed: Vec<(PathBuf, io::Error)>,
@@ -50,7 +50,8 @@ impl Walk {
 
     fn go(&mut self, at: &Path, steps: &[Step<'_>]) {
         let Some((step, rest)) = steps.split_first() else {
-            // Also one that cannot be looked at, as in a folder that lets its names be read alone.
+            // Includes entries that cannot be looked at, as in a folder that only lets its names be
+            // read.
             let is_missing = |error: &io::Error| matches!(error.kind(), NotFound | NotADirectory);
             let is_there = at.symlink_metadata().map_or_else(|error| !is_missing(&error), |_| true);
             if is_there && !at.is_dir() {
@@ -92,7 +93,7 @@ impl Walk {
         }
     }
 
-    /// Returns what is in a folder, if it is one.
+    /// Returns the contents of a folder, if it is one.
     fn entries(&mut self, folder: &Path) -> Vec<PathBuf> {
         if !self.is_folder(folder) {
             return Vec::new();

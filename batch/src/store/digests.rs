@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Store, StoreError, is_read_only, sealed};
 
-/// Digests by path, each with what its file looked like.
+/// Digests by path, each with the facts of its file.
 #[derive(Debug)]
 pub struct Digests {
     path: PathBuf,
@@ -25,7 +25,7 @@ struct Known {
     digest: String,
 }
 
-/// What changes when a file does.
+/// Facts that change when a file does.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Stamp {
     bytes: u64,
@@ -36,12 +36,12 @@ struct Stamp {
     inode: Option<[i64; 4]>,
 }
 
-/// A file that changed less long ago may change again without another time: file systems count
-/// time in steps of up to 2 s.
+/// A file that changed less long ago may change again without a new time: file systems count time
+/// in steps of up to 2 s.
 const STEP_NS: u128 = 2_000_000_000;
 
 impl Digests {
-    /// Reads what the store knows.
+    /// Reads the digests that the store knows.
     pub fn of(store: &Store) -> Self {
         let path = store.root().join("digests.json");
         let known = sealed::read(&path).unwrap_or_default();
@@ -73,7 +73,7 @@ impl Digests {
         Ok(digest)
     }
 
-    /// Writes down what is known now.
+    /// Writes the known digests.
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
@@ -145,7 +145,7 @@ mod tests {
         fs::write(&path, "two").unwrap();
         File::options().write(true).open(&path).unwrap().set_modified(before).unwrap();
         assert_ne!(again.digest(&path).unwrap(), one);
-        // What has just changed is not relied on.
+        // A file that has just changed is not relied on.
         write("new", 0);
         again.known.clear();
         again.digest(&path).unwrap();

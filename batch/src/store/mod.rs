@@ -61,7 +61,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Returns the text of an error that a full disk is the cause of.
+    /// Returns the text of an error whose cause is a full disk.
     pub(crate) fn no_room(&self) -> Option<String> {
         use io::ErrorKind::{QuotaExceeded, StorageFull};
         match self {
@@ -77,7 +77,7 @@ impl StoreError {
     }
 }
 
-/// What is wrong with a result.
+/// Damage to a result.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Damage {
@@ -130,7 +130,7 @@ impl Store {
     /// Opens the store in a folder.
     ///
     /// # Errors
-    /// Returns an error if there is none.
+    /// Returns an error if the folder holds no store.
     pub fn open(root: &Path) -> Result<Self, StoreError> {
         match fs::read_to_string(root.join(MARK.0)) {
             Ok(text) if text == MARK.1 => {
@@ -167,8 +167,8 @@ impl Store {
         self.of_task(key, "result")
     }
 
-    /// Returns the manifest of a task that is done: its manifest is whole, and its result has the
-    /// size that stands there. Bytes are compared by [`check`](Self::check).
+    /// Returns the manifest of a task that is done: the manifest is complete, and the result has
+    /// the size that it states. [`check`](Self::check) compares bytes.
     pub fn manifest(&self, key: Key) -> Option<Manifest> {
         self.whole_manifest(key).ok()
     }
@@ -195,7 +195,7 @@ impl Store {
     /// Reads a result anew and compares its digest with its manifest.
     ///
     /// # Errors
-    /// Returns what is wrong with it.
+    /// Returns the damage, if any.
     pub fn check(&self, key: Key) -> Result<Manifest, Damage> {
         let manifest = self.whole_manifest(key)?;
         if let Some(written) = &manifest.result {
@@ -208,7 +208,7 @@ impl Store {
         Ok(manifest)
     }
 
-    /// Takes a damaged result away, so that it is made again.
+    /// Removes a damaged result, so that it is made again.
     ///
     /// # Errors
     /// Returns an error if it cannot be removed.
@@ -220,7 +220,7 @@ impl Store {
         Ok(())
     }
 
-    /// Starts the result of a task, beside its place.
+    /// Starts the result of a task, next to its place.
     ///
     /// # Errors
     /// Returns an error if no file can be made there.
@@ -230,7 +230,7 @@ impl Store {
         Unpublished::new(&path).map_err(StoreError::io(&path))
     }
 
-    /// Says that a task is done. Its result, if it has one, is [`Written`] before.
+    /// Records that a task is done. Its result, if it has one, is [`Written`] before.
     ///
     /// # Errors
     /// Returns an error if the manifest cannot be written.
@@ -239,7 +239,7 @@ impl Store {
         sealed::write(&path, manifest).map_err(StoreError::io(&path))
     }
 
-    /// Writes what a task does, for the process that does it.
+    /// Writes the work of a task, for the process that does it.
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
@@ -251,7 +251,7 @@ impl Store {
         }
     }
 
-    /// Returns what a task does, if a batch has said it.
+    /// Returns the work of a task, if a batch has written it.
     pub fn task(&self, key: Key) -> Option<Task> {
         sealed::read(&self.of_task(key, "task"))
     }
@@ -297,7 +297,7 @@ impl Store {
         }
     }
 
-    /// Returns the keys of all tasks of which the store has a file.
+    /// Returns the keys of all tasks with a file in the store.
     ///
     /// # Errors
     /// Returns an error if a folder cannot be read.
@@ -315,7 +315,7 @@ impl Store {
     }
 }
 
-/// Returns true if a store can only be read there: it still serves what it has.
+/// Returns whether an error means a read-only store: it still serves its results.
 pub(crate) fn is_read_only(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied)
 }
@@ -330,7 +330,7 @@ pub(crate) fn remove(path: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// Returns the folders in a folder, in the order of their names; none if it is not there.
+/// Returns the folders in a folder, in the order of their names; empty if it is not there.
 pub(crate) fn folders_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut folders: Vec<_> = entries

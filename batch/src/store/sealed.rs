@@ -1,4 +1,4 @@
-//! Small files that prove themselves whole: a line of JSON, and a line with its digest.
+//! Small files that detect damage: a line of JSON, and a line with its digest.
 
 use std::fs;
 use std::io::{self, Write};
@@ -8,7 +8,7 @@ use lamp_stack::FileBeside;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Writes a file that is whole or not there, also after a loss of power.
+/// Writes a file that is either whole or absent, even after a loss of power.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     make_folder_of(path)?;
     let beside = FileBeside::new(path)?;
@@ -21,12 +21,12 @@ pub(crate) fn make_folder_of(path: &Path) -> io::Result<()> {
     path.parent().map_or(Ok(()), fs::create_dir_all)
 }
 
-/// Writes a value, sealed, for good.
+/// Writes a sealed value, durably.
 pub(crate) fn write(path: &Path, value: &impl Serialize) -> io::Result<()> {
     write_whole(path, &sealed(value))
 }
 
-/// Writes a value, sealed, that can be made again: a loss of power may take it.
+/// Writes a sealed value that can be made again: a loss of power may lose it.
 pub(crate) fn write_lightly(path: &Path, value: &impl Serialize) -> io::Result<()> {
     make_folder_of(path)?;
     let beside = FileBeside::new(path)?;
@@ -40,7 +40,7 @@ fn sealed(value: &impl Serialize) -> Vec<u8> {
     format!("{line}\n{seal}\n").into_bytes()
 }
 
-/// Reads a value. Returns none if it is not there or not whole.
+/// Reads a value. Returns `None` if it is not there or not whole.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
     let text = fs::read_to_string(path).ok()?;
     let (line, seal) = text.strip_suffix('\n')?.split_once('\n')?;

@@ -177,7 +177,7 @@ impl Night {
     }
 }
 
-/// Returns the name of a file among tasks that is none of theirs.
+/// Returns the name of a file among tasks that belongs to no task.
 fn left_over(store: &Store) -> Option<String> {
     let shards = fs::read_dir(store.root().join("tasks")).unwrap();
     let files = shards.flat_map(|shard| fs::read_dir(shard.unwrap().path()).unwrap());

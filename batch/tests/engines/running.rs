@@ -1,4 +1,4 @@
-//! What tests do with schedulers.
+//! Schedulers that run for tests.
 
 /// A scheduler that runs for a test.
 pub(crate) trait Running {
@@ -11,7 +11,7 @@ pub(crate) trait Running {
     /// Does what a person has to do after a part was killed.
     fn mend(&self) {}
 
-    /// Returns what it tells of its jobs and machines.
+    /// Returns its report of its jobs and machines.
     fn state(&self) -> String {
         String::new()
     }

@@ -1,4 +1,4 @@
-//! A task: it takes a moment, and makes bytes of those that it needs.
+//! A task: it takes a moment, and makes bytes from the results that it needs.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use lamp_batch::{Event, Journal, Key, Manifest, Store, host, now, status};
 use serde::{Deserialize, Serialize};
 
-/// What a task does besides.
+/// The fault of a task, if it has one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Fault {
     None,
