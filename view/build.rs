@@ -30,7 +30,7 @@ fn files_in(folder: &&str) -> Vec<PathBuf> {
     files
 }
 
-/// Returns what browsers are told that a file is; `None` for files that are not served.
+/// Returns the content type of a file for browsers; `None` for files that are not served.
 fn content_type(name: &str) -> Option<&'static str> {
     match name.rsplit_once('.')?.1 {
         "html" => Some("text/html; charset=utf-8"),
@@ -41,7 +41,7 @@ fn content_type(name: &str) -> Option<&'static str> {
     }
 }
 
-/// Compresses bytes without a time or a name, so that builds are alike.
+/// Compresses bytes without a time or a name, so that builds are the same.
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzBuilder::new().write(Vec::new(), Compression::best());
     encoder.write_all(bytes).expect("memory takes all");

@@ -3,7 +3,7 @@
 /// A file of the page.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asset {
-    /// What browsers are told that it is.
+    /// The content type for browsers.
     pub(crate) content_type: &'static str,
     /// Its bytes, compressed as gzip.
     pub(crate) gzip: &'static [u8],
@@ -18,12 +18,12 @@ pub(crate) fn asset(name: &str) -> Option<Asset> {
     Some(Asset { content_type, gzip })
 }
 
-/// Returns the licences of the libraries that are built into the page, as text.
+/// Returns the licenses of the libraries that are built into the page, as text.
 pub fn licences() -> String {
     LIBRARIES.map(|(title, text)| format!("{title}\n\n{}\n", text.trim_end())).join("\n\n")
 }
 
-/// The page's libraries and the texts of their licences; `tests/vendor.rs` compares them with
+/// The page's libraries and the texts of their licenses; `tests/vendor.rs` compares them with
 /// `vendor/libraries.toml`.
 const LIBRARIES: [(&str, &str); 2] = [
     (

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
 
-/// How far work is.
+/// Progress of work.
 #[derive(Debug, Default)]
 pub struct Progress {
     done: AtomicU64,
@@ -14,18 +14,18 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Tells how much there is to do.
+    /// Sets the amount of work.
     pub fn expect(&self, of: u64) {
         self.of.store(of, Ordering::Relaxed);
     }
 
-    /// Tells that one more is done.
+    /// Counts one more unit of work as done.
     pub fn one_done(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Work that goes on while the viewer answers, and what comes of it.
+/// Work that goes on while the viewer answers, and its result.
 pub(crate) struct Background<T> {
     progress: Progress,
     result: Mutex<Stage<T>>,
@@ -45,12 +45,12 @@ impl<T> Default for Background<T> {
 }
 
 impl<T> Background<T> {
-    /// Says that work will run.
+    /// Records that work will run.
     pub(crate) fn start(&self) {
         *self.lock() = Stage::Running;
     }
 
-    /// Says that work will run, unless it was said before. Returns whether it was not.
+    /// Records that work will run, if that is new. Returns whether it is new.
     pub(crate) fn start_once(&self) -> bool {
         let mut stage = self.lock();
         let is_new = matches!(*stage, Stage::NotWanted);
@@ -60,7 +60,7 @@ impl<T> Background<T> {
         is_new
     }
 
-    /// Works, and keeps what comes of it: also that it failed.
+    /// Works, and keeps the result or the failure.
     pub(crate) fn run(&self, work: impl FnOnce(&Progress) -> Result<T, String>) {
         self.start();
         let result = catch_unwind(AssertUnwindSafe(|| work(&self.progress)));
@@ -75,7 +75,7 @@ impl<T> Background<T> {
         !matches!(*self.lock(), Stage::NotWanted)
     }
 
-    /// Returns what `of` takes from the result, if it is there.
+    /// Returns the part of the result that `of` takes, if it is there.
     pub(crate) fn get<U>(&self, of: impl FnOnce(&T) -> U) -> Option<U> {
         match &*self.lock() {
             Stage::Ready(result) => Some(of(result)),
@@ -83,7 +83,7 @@ impl<T> Background<T> {
         }
     }
 
-    /// Returns how far the work is.
+    /// Returns the progress of the work.
     pub(crate) fn state(&self) -> Value {
         let (status, message) = match &*self.lock() {
             Stage::NotWanted => ("none", None),

@@ -7,7 +7,7 @@ use lamp_stack::Image;
 
 use crate::error::ViewError;
 
-/// Which image of a layer.
+/// The key of a layer's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Key<K> {
     pub(crate) stack: usize,
@@ -15,8 +15,8 @@ pub(crate) struct Key<K> {
     pub(crate) kind: K,
 }
 
-/// Images by key. What several threads ask for at once is made once. Where memory runs out, what
-/// was not asked for the longest goes first.
+/// Images by key. An image that several threads request at once is made once. If memory runs out,
+/// the least recently requested image goes first.
 pub(crate) struct Cache<K> {
     slots: Mutex<Slots<K>>,
     made: Condvar,
@@ -25,7 +25,7 @@ pub(crate) struct Cache<K> {
 
 struct Slots<K> {
     of: HashMap<Key<K>, Slot>,
-    /// What images take, and what those in work may come to.
+    /// Bytes of the images, and the most bytes that images in work may take.
     bytes: usize,
     requests: u64,
 }
@@ -43,7 +43,7 @@ impl<K: Copy + Eq + std::hash::Hash> Cache<K> {
         Self { slots: Mutex::new(slots), made: Condvar::new(), most_bytes }
     }
 
-    /// Returns an image, made now if it is not kept. It may take up to `most_bytes` until it is.
+    /// Returns an image, made now if it is not kept. Until it is made, it may take `most_bytes`.
     pub(crate) fn get(
         &self,
         key: Key<K>,
@@ -91,7 +91,7 @@ impl<K: Copy + Eq + std::hash::Hash> Slots<K> {
         self.bytes -= self.of.remove(&key).map_or(0, |slot| slot.bytes);
     }
 
-    /// Lets images go until the rest takes at most so many bytes; not `kept`, nor those in work.
+    /// Drops images until the rest takes at most so many bytes, except `kept` and images in work.
     fn free(&mut self, most_bytes: usize, kept: Key<K>) {
         while self.bytes > most_bytes {
             let made = self.of.iter().filter(|(key, slot)| **key != kept && slot.image.is_some());
@@ -101,7 +101,7 @@ impl<K: Copy + Eq + std::hash::Hash> Slots<K> {
     }
 }
 
-/// An image in work. Whatever becomes of it, those that wait for it learn it.
+/// An image in work. Its waiters learn of its end, whatever that is.
 struct Work<'a, K: Copy + Eq + std::hash::Hash> {
     cache: &'a Cache<K>,
     key: Key<K>,

@@ -1,11 +1,11 @@
-//! The colours of overlays.
+//! The colors of overlays.
 
 use crate::overlay::Overlay;
 
 impl Overlay {
-    /// The overlay's colour: red, green and blue.
+    /// The overlay's color: red, green and blue.
     ///
-    /// A search among strong colours found these seven: they are far apart from each other, and
+    /// A search among strong colors found these seven: they are far apart from each other, and
     /// from black and white, also for eyes that lack the cones for red, green or blue.
     pub fn colour(self) -> [u8; 3] {
         match self {
@@ -26,9 +26,9 @@ mod tests {
 
     type Matrix = [[f64; 3]; 3];
 
-    /// What eyes with all cones see, and those without one kind of them: protanopia, deuteranopia
-    /// and tritanopia, on linear light. Source: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes,
-    /// *A physiologically-based model for simulation of color vision deficiency*, 2009, severity 1.
+    /// Color vision with all cones, and without one kind of them: protanopia, deuteranopia and
+    /// tritanopia, on linear light. Source: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, *A
+    /// physiologically-based model for simulation of color vision deficiency*, 2009, severity 1.
     const EYES: [Matrix; 4] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         [
@@ -60,7 +60,7 @@ mod tests {
         matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
     }
 
-    /// Returns CIE L*a*b* of a colour as an eye sees it.
+    /// Returns CIE L*a*b* of a color as an eye sees it.
     fn lab(colour: [u8; 3], eye: &Matrix) -> [f64; 3] {
         let linear = colour.map(|level| {
             let level = f64::from(level) / 255.0;
@@ -119,7 +119,7 @@ mod tests {
         }
     }
 
-    /// A difference of 2 to 3 can just be seen side by side.
+    /// A difference of 2 to 3 is just visible side by side.
     #[test]
     fn overlays_are_told_apart_in_colour_blindness() {
         let mut colours: Vec<_> = Overlay::ALL.into_iter().map(Overlay::colour).collect();

@@ -26,7 +26,7 @@ pub(crate) struct Copies(Vec<Placed>);
 pub(crate) struct InCopy {
     /// The part's name.
     pub(crate) part: String,
-    /// The copy, counted from 1 among those of the part.
+    /// The copy's number among the copies of the part, from 1.
     pub(crate) number: usize,
     /// The number of copies of the part.
     pub(crate) of: usize,
@@ -36,7 +36,7 @@ pub(crate) struct InCopy {
     pub(crate) y: u32,
 }
 
-/// Returns the places of a part's copies; `name` is that of an only part.
+/// Returns the places of a part's copies; `name` is the name of an only part.
 fn placed(built: &BuiltPart, name: &str) -> Vec<Placed> {
     let of = built.copies.len();
     let part = built.part.as_deref().unwrap_or(name);
@@ -59,7 +59,8 @@ fn placed(built: &BuiltPart, name: &str) -> Vec<Placed> {
 }
 
 impl Copies {
-    /// Reads what `tile` records on the first page of a build. Of other stacks there are none.
+    /// Reads the copies that `tile` records on the first page of a build. Other stacks have no
+    /// copies.
     pub(crate) fn of(info: &PageInfo) -> Self {
         let Some(stack) = &info.stack else { return Self::default() };
         let parts = stack.built_parts().into_iter().flatten().flatten();

@@ -1,4 +1,4 @@
-//! What an overlay is drawn from.
+//! Sources of an overlay's drawing.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,10 +9,10 @@ use crate::cache::image_bytes;
 use crate::findings::{self, Finding};
 use crate::overlay::{only_in, rows};
 
-/// What an overlay is drawn from.
+/// The source of an overlay's drawing.
 pub(crate) enum Drawing {
-    /// What is white in the layer alone, or else in any of the others alone, which have its size;
-    /// what is not there is black.
+    /// White in the layer alone, or else in any of the others alone, which have its size; missing
+    /// images are black.
     Differs {
         layer: Arc<Image>,
         others: Vec<Option<Arc<Image>>>,

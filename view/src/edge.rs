@@ -2,11 +2,11 @@
 
 use lamp_stack::{Mask, Op};
 
-/// The farthest that an edge is looked for, in pixels.
+/// The largest distance of the search for an edge, in pixels.
 pub(crate) const MOST_RADIUS: f64 = 256.0;
 
-/// Returns the point nearest to `at` on the sides of pixels that part black from white, at most
-/// `radius` pixels away. Corners of pixels are at whole numbers; beyond the image all is black.
+/// Returns the point nearest to `at` on the sides of pixels between black and white, at most
+/// `radius` pixels away. Corners of pixels are at whole numbers; outside the image all is black.
 pub(crate) fn nearest_edge(mask: &Mask, at: [f64; 2], radius: f64) -> Option<[f64; 2]> {
     let mut nearest = Nearest { at, squared: radius.min(MOST_RADIUS).powi(2), point: None };
     let reach = nearest.squared.sqrt();
@@ -35,7 +35,7 @@ struct Nearest {
 impl Nearest {
     fn try_point(&mut self, point: [f64; 2]) {
         let squared = (point[0] - self.at[0]).powi(2) + (point[1] - self.at[1]).powi(2);
-        // Of points as near as each other, the first counts.
+        // Of points at equal distances, the first counts.
         if squared < self.squared || (self.point.is_none() && squared == self.squared) {
             (self.squared, self.point) = (squared, Some(point));
         }

@@ -1,16 +1,16 @@
-//! Why something is not shown.
+//! Reasons why something is not shown.
 
 use lamp_stack::StackError;
 use thiserror::Error;
 
-/// A reason that something is not shown.
+/// A reason why something is not shown.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ViewError {
-    /// There is nothing of that number.
+    /// There is nothing with that number.
     #[error("there is no such {0}")]
     NoSuch(&'static str),
-    /// A number of a request is not one, or is out of range.
+    /// A number of a request is malformed or out of range.
     #[error("{0}")]
     Malformed(&'static str),
     /// The stack has changed since it was opened.

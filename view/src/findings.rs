@@ -1,4 +1,4 @@
-//! What `lamp check` and `lamp support` found, in the form that the page shows.
+//! Findings of `lamp check` and `lamp support`, in the form that the page shows.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub struct Finding {
     pub pixels: FoundPixels,
 }
 
-/// A list that is longer than this cannot be looked through.
+/// The longest list that people can look through.
 const MOST: usize = 10_000;
 
 /// Returns what a check found in a stack, given its pages.
@@ -48,7 +48,7 @@ pub fn of_records(
 /// Reads a report of `lamp check` or `lamp support` about a stack, given its pages.
 ///
 /// # Errors
-/// Returns a sentence if it is no such report, or one about another stack.
+/// Returns a sentence if it is no such report, or a report about another stack.
 pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
     let found = match report["schema"].as_str() {
         Some("lamp-check-1") => check_report(report, headers)?,
@@ -152,7 +152,7 @@ pub(crate) fn drawn<'a>(
         let Some([left, top, right, bottom]) = finding.bounds else { continue };
         let [width, height] = [layer.width(), layer.height()];
         let bounds = [left.min(width), top.min(height), right.min(width), bottom.min(height)];
-        // A pixel around, so that what is found does not touch the border.
+        // A margin of a pixel, so that findings do not touch the border.
         let frame = around(bounds);
         let here = layer.framed(frame);
         let found = match finding.pixels {
@@ -177,7 +177,7 @@ fn around([left, top, right, bottom]: [u32; 4]) -> Frame {
     }
 }
 
-/// Puts what a frame holds within bounds back into an image of this size, which holds them.
+/// Puts a frame's content within bounds back into an image of this size, which holds the bounds.
 fn cut(found: &Mask, frame: &Frame, bounds: [u32; 4], [width, height]: [u32; 2]) -> Mask {
     let back = Frame { left: -frame.left, top: -frame.top, width, height };
     let [left, top, right, bottom] = bounds;
@@ -276,7 +276,7 @@ mod tests {
             rows.iter().for_each(|row| mask.push_row(row).unwrap());
             mask.finish()
         };
-        // A ring, a block beside it, and a block that hangs over to the right.
+        // A ring, a block next to it, and a block that hangs over to the right.
         let layer = mask(&[&[], &[1, 5, 7, 8, 9], &[1, 2, 4, 5, 7, 8, 9], &[1, 5, 9], &[]]);
         let below = mask(&[&[], &[9, 10], &[9, 10], &[9, 10], &[]]);
         let finding = |pixels, bounds| Finding {

@@ -1,10 +1,10 @@
-//! What is laid over a layer's picture, as masks.
+//! Overlays on a layer's picture, as masks.
 
 use std::ops::Range;
 
 use lamp_stack::{FixRecord, FixedBand, Mask, MaskBuilder, Op, PageInfo};
 
-/// What is laid over a layer's picture.
+/// An overlay on a layer's picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Overlay {
     /// White in the layer below, and black in this one.
@@ -34,7 +34,7 @@ lamp_stack::named!(Overlay {
 });
 
 impl Overlay {
-    /// What people read.
+    /// Returns the label for people.
     pub fn label(self) -> &'static str {
         match self {
             Self::Below => "Only in the layer below",
@@ -48,7 +48,7 @@ impl Overlay {
     }
 }
 
-/// Returns what is white in `a` alone. Beyond `b`, everything is black in it.
+/// Returns the white of `a` alone. Outside `b`, `b` counts as black.
 pub(crate) fn only_in(a: &Mask, b: &Mask) -> Mask {
     let mut only = MaskBuilder::new(a.width());
     only.reserve(a.height() as usize, a.change_count());
@@ -62,14 +62,14 @@ pub(crate) fn only_in(a: &Mask, b: &Mask) -> Mask {
             ended
         });
         Op::Difference.rows(row, ended.as_deref().unwrap_or(other), &mut out);
-        // Where `b` is wider, it changes beyond the border.
+        // If `b` is wider, it changes beyond the border.
         out.truncate(out.partition_point(|&column| column < a.width()));
         only.push_row(&out).expect("the columns of combined rows increase");
     }
     only.finish()
 }
 
-/// Returns whole rows, which must increase and not meet.
+/// Returns whole rows; bands must increase and not touch.
 pub(crate) fn rows(size: [u32; 2], rows: &[Range<u32>]) -> Mask {
     let [width, height] = size;
     let mut mask = MaskBuilder::new(width);
@@ -86,7 +86,7 @@ pub(crate) fn rows(size: [u32; 2], rows: &[Range<u32>]) -> Mask {
     mask.finish()
 }
 
-/// Returns rows that follow each other as bands.
+/// Returns consecutive rows as bands.
 pub(crate) fn bands(rows: &[u32]) -> Vec<Range<u32>> {
     let follow = rows.chunk_by(|&a, &b| a.checked_add(1) == Some(b));
     follow.map(|band| band[0]..band[band.len() - 1].saturating_add(1)).collect()
@@ -144,7 +144,7 @@ mod tests {
         let mask = rows([7, 6], &stray);
         let white: Vec<bool> = (0..6).map(|row| mask.is_white(6, row)).collect();
         assert_eq!(white, [false, true, true, false, true, false]);
-        // Rows beyond the image, as a false page may name them.
+        // Rows outside the image, as a false page may name them.
         assert_eq!(rows([7, 2], &[5..9, 3..4]).white_pixels(), 0);
         assert_eq!(rows([7, 6], &bands(&[1, 2, 9])).height(), 6);
     }

@@ -8,12 +8,12 @@ use crate::stack::ViewedStack;
 
 /// The layers of the first two stacks that belong together.
 pub(crate) struct Partners {
-    /// For each layer of the first stack those of the second, section by section upward, and the
-    /// other way round; none if their pixels do not lie on each other.
+    /// For each layer of the first stack the layers of the second, section by section upward, and
+    /// the other way round; `None` if their pixels are not aligned.
     of: Option<[Vec<Sections>; 2]>,
 }
 
-/// The other stack's layers along the height of a layer; none where it has no layer.
+/// The other stack's layers along the height of a layer; `None` where it has no layer.
 type Sections = Vec<Option<usize>>;
 
 /// A layer of the other stack that belongs to a layer.
@@ -59,8 +59,8 @@ impl Partners {
         *sections.get(sections.len() / 2)?
     }
 
-    /// Returns the layers of the other stack that belong to a layer of these stacks; none where the
-    /// other one has no layer along its height.
+    /// Returns the layers of the other stack that belong to a layer of these stacks; `None` where
+    /// the other stack has no layer along its height.
     pub(crate) fn of_layer(
         &self,
         stacks: &[ViewedStack],

@@ -16,14 +16,14 @@ pub struct ViewedStack {
 }
 
 impl ViewedStack {
-    /// Takes a stack, and the name by which people know it: that of its file, without folders.
+    /// Takes a stack, and its name for people: the name of its file, without folders.
     pub fn new(name: impl Into<String>, pages: IndexedStack) -> Self {
         let copies =
             pages.headers().first().map_or_else(Copies::default, |first| Copies::of(&first.info));
         Self { name: name.into(), pages, copies }
     }
 
-    /// Returns what the pages say, bottom first.
+    /// Returns the headers of the pages, bottom first.
     pub fn headers(&self) -> &[PageHeader] {
         self.pages.headers()
     }
@@ -34,7 +34,7 @@ impl ViewedStack {
     /// Returns an error if the page cannot be read, or if its file has changed.
     ///
     /// # Panics
-    /// Panics if there are not as many pages.
+    /// Panics if there are fewer pages.
     pub fn page(&self, position: usize) -> Result<Page, StackError> {
         self.pages.page(position)
     }
@@ -59,7 +59,7 @@ impl ViewedStack {
         })
     }
 
-    /// Returns what the stack says of itself.
+    /// Returns the stack's own record.
     pub(crate) fn summary(&self) -> Value {
         let headers = self.headers();
         let largest = |side: usize| headers.iter().map(|header| header.size[side]).max();
@@ -79,7 +79,7 @@ impl ViewedStack {
         })
     }
 
-    /// Returns what is known of all layers, as columns.
+    /// Returns the facts of all layers, as columns.
     pub(crate) fn layers(&self) -> Value {
         let headers = self.headers();
         let column =
@@ -97,7 +97,7 @@ impl ViewedStack {
         })
     }
 
-    /// Returns what is known of a layer without its image.
+    /// Returns the facts of a layer without its image.
     pub(crate) fn layer(&self, layer: usize) -> Result<Value, ViewError> {
         let header = self.header(layer)?;
         let info = &header.info;
@@ -122,7 +122,7 @@ impl ViewedStack {
     }
 }
 
-/// Returns the place of a pixel's centre in part coordinates, in millimetres, if it is known.
+/// Returns the place of a pixel's center in part coordinates, in millimeters, if it is known.
 pub(crate) fn place_mm(header: &PageHeader, x: u32, y: u32) -> Option<[f64; 2]> {
     let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
     Some([left + (f64::from(x) + 0.5) * pitch, top - (f64::from(y) + 0.5) * pitch])

@@ -35,12 +35,12 @@ impl TileAt {
     }
 }
 
-/// How a tile's levels become colours.
+/// How a tile's levels become colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Inks {
     /// Levels are shades of gray.
     Gray,
-    /// Levels are the opacity of one colour.
+    /// Levels are the opacity of one color.
     One([u8; 3]),
 }
 

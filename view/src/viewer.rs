@@ -1,4 +1,4 @@
-//! What the server answers, without the server.
+//! The server's answers, without the server.
 
 use std::num::NonZeroU8;
 use std::sync::Arc;
@@ -40,7 +40,7 @@ pub(crate) enum Kind {
     Over(Overlay),
 }
 
-/// Tells that nobody waits for an answer any more.
+/// Whether nobody waits for an answer any more.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GivenUp(Arc<AtomicBool>);
 
@@ -54,9 +54,9 @@ impl GivenUp {
     }
 }
 
-/// What a viewer takes beside its images: the page, what pages say, answers.
+/// The memory of a viewer besides its images: the page, the text of pages, answers.
 const OTHER_MEMORY: u64 = 32 << 20;
-/// What a thread takes beside the images that it makes.
+/// The memory of a thread besides the images that it makes.
 const MEMORY_A_THREAD: u64 = 48 << 20;
 
 /// Returns how much of the memory decoded images may take: at least half of it.
@@ -248,7 +248,8 @@ impl Viewer {
                         .transpose()
                 };
                 let others = others.into_iter().map(framed).collect::<Result<_, ViewError>>()?;
-                // What is added is in the second stack alone, also where that one is looked at.
+                // Added pixels are white in the second stack alone, also where it is the one looked
+                // at.
                 let in_layer = (overlay == Overlay::Added) == (stack == 1);
                 Drawing::Differs { layer: image(stack, layer)?, others, in_layer }
             }

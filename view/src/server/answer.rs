@@ -1,4 +1,4 @@
-//! Answers: their kinds, and what stands on all of them.
+//! Answers: their kinds, and the headers that all of them have.
 
 use axum::Json;
 use axum::http::header::{CONTENT_ENCODING, CONTENT_TYPE, SET_COOKIE};
@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use crate::assets::Asset;
 use crate::error::ViewError;
 
-/// What browsers may do with an answer: nothing from elsewhere is loaded, nobody frames it, and
-/// nothing is kept on disk.
+/// Policy for browsers: an answer loads nothing from elsewhere, nobody frames it, and nothing is
+/// kept on disk.
 const POLICY: [(&str, &str); 4] = [
     (
         "content-security-policy",
@@ -30,7 +30,7 @@ pub(super) fn with_policy(mut answer: Response) -> Response {
     answer
 }
 
-/// An answer that says why there is no other.
+/// An answer with the reason why there is no other.
 pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
     with_policy((status, Json(json!({"error": why}))).into_response())
 }
@@ -42,7 +42,7 @@ fn bytes(kind: &'static str, bytes: impl IntoResponse) -> Response {
     answer
 }
 
-/// A page that goes on to the layers.
+/// A page that forwards to the layers.
 ///
 /// It gives a cookie that is `SameSite=Strict`. A redirect would not do: when another page led
 /// here, as the file of `lamp view --open` does, browsers keep such cookies back from all redirects

@@ -1,4 +1,4 @@
-//! Connections: how long they may wait, and how many there are.
+//! Connections: their time limits, and their number.
 
 use std::collections::VecDeque;
 use std::io;
@@ -16,14 +16,14 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
 use tower_service::Service;
 
-/// How long a connection may take for the head of a request, or be idle.
+/// The time limit of a connection for the head of a request, and for being idle.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// The most connections at a time: a browser has about six. Beyond, the eldest is closed of those
-/// without a request that was let in.
+/// The most connections at a time: a browser has about six. Beyond it, the oldest connection
+/// without an accepted request is closed.
 const MOST_CONNECTIONS: usize = 256;
 /// The most bytes of the head of a request.
 const MOST_HEAD: usize = 16 << 10;
-/// How long to wait when the system has no room for another connection.
+/// The pause when the system has no room for another connection.
 const BREATH: Duration = Duration::from_millis(50);
 
 /// Answers connections until the process ends.
@@ -38,7 +38,7 @@ pub(super) async fn answer(listener: TcpListener, routes: Router) -> io::Result<
     }
 }
 
-/// Tells whether a connection had a request that was let in.
+/// Whether a connection had a request that was let in.
 #[derive(Clone, Default)]
 pub(super) struct Trust(Arc<AtomicBool>);
 
@@ -80,6 +80,6 @@ async fn serve(stream: TcpStream, routes: Router, trust: Trust) {
         request.extensions_mut().insert(trust.clone());
         routes.clone().call(request)
     });
-    // A connection that breaks off concerns nobody else.
+    // A broken connection concerns nobody else.
     let _ = http.serve_connection(TokioIo::new(stream), service).await;
 }

@@ -1,4 +1,4 @@
-//! Who may ask: requests for the loopback address with the cookie, or once with a token for it.
+//! Access: requests for the loopback address with the cookie, or once with a token for it.
 
 use axum::extract::Request;
 use axum::http::header::{COOKIE, HOST, LOCATION};
@@ -31,7 +31,7 @@ impl Guard {
         Self { tickets, secret, cookie: format!("lamp_view_{port}"), hosts }
     }
 
-    /// Returns why a request is not answered, or the cookie for a token, or none if it may pass.
+    /// Returns the refusal of a request, or the cookie for a token, or `None` if it may pass.
     pub(super) fn answer(&self, request: &Request) -> Option<Response> {
         if !self.is_for_us(request) {
             return Some(refusal(StatusCode::FORBIDDEN, "this address is not the viewer's"));
@@ -54,8 +54,8 @@ impl Guard {
         })
     }
 
-    /// Lets a token become the cookie. Who has that already is only led on; the token is used up
-    /// all the same, and is in no link or history.
+    /// Exchanges a token for the cookie. A browser that has the cookie already is only forwarded;
+    /// the token is used up all the same, and is in no link or history.
     fn answer_to_token(&self, token: &str, headers: &HeaderMap, has_cookie: bool) -> Response {
         if is_loaded_ahead(headers) {
             return refusal(StatusCode::FORBIDDEN, AHEAD);
@@ -76,8 +76,8 @@ impl Guard {
         }
     }
 
-    /// Returns whether the request names this address: a page of another name that leads here
-    /// (DNS rebinding) does not.
+    /// Returns whether the request names this address: a page of another name that leads here (DNS
+    /// rebinding) does not.
     fn is_for_us(&self, request: &Request) -> bool {
         let mut hosts = request.headers().get_all(HOST).iter();
         let host = hosts.next().and_then(|host| host.to_str().ok());
@@ -102,8 +102,9 @@ fn token_in(request: &Request) -> Option<&str> {
     uri.query().filter(|_| uri.path() == "/").and_then(|query| query.strip_prefix("token="))
 }
 
-/// Returns whether a browser asks before its user does, and may throw the answer away: that must
-/// not use the token up. Current browsers say so in `Sec-Purpose`, older ones in the others.
+/// Returns whether a browser asks before its user does, and may discard the answer: such a request
+/// must not use the token up. Current browsers state so in `Sec-Purpose`, older ones in the other
+/// headers.
 fn is_loaded_ahead(headers: &HeaderMap) -> bool {
     let purposes = ["sec-purpose", "purpose", "x-purpose", "x-moz"].map(|name| headers.get(name));
     let mut purposes = purposes.into_iter().flatten().filter_map(|purpose| purpose.to_str().ok());

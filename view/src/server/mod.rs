@@ -38,14 +38,14 @@ impl Address {
     }
 
     /// Returns an address that opens the page once, if [`serve`] gets a ticket of the token. It is
-    /// for the person alone who started the viewer.
+    /// only for the person who started the viewer.
     pub fn with(&self, token: &Token) -> String {
         format!("http://127.0.0.1:{}/?token={token}", self.port)
     }
 }
 
 /// Answers at an address until the process ends, with at most so many threads at work. The browser
-/// that shows a ticket gets a cookie for all else.
+/// that shows a ticket gets a cookie for everything else.
 ///
 /// # Errors
 /// Returns an error if the system does not let it start, or has no random numbers for the cookie.
@@ -57,7 +57,7 @@ pub fn serve(
 ) -> io::Result<()> {
     let cookie = Token::new()?;
     let mut runtime = tokio::runtime::Builder::new_current_thread();
-    // Threads keep memory: no more of them than work at a time.
+    // Threads keep memory: so no more threads than work at a time.
     let runtime = runtime.enable_all().max_blocking_threads(threads.max(1)).build()?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(address.listener)?;

@@ -52,7 +52,7 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
 }
 
 type Answer = Result<Response, ViewError>;
-/// What an address names. What is no number, or no text, is the name of nothing that there is.
+/// The names in an address. A name that is not a number, or not text, names nothing that exists.
 type Named<T> = Result<Path<T>, PathRejection>;
 type Keys<T> = Result<Query<T>, QueryRejection>;
 
@@ -87,7 +87,7 @@ async fn findings(State(workers): State<Arc<Workers>>) -> Answer {
     json(workers, |viewer, _| Ok(viewer.findings())).await
 }
 
-/// The surface is made once somebody asks for it.
+/// The surface is made at its first request.
 async fn surface_state(State(workers): State<Arc<Workers>>) -> Response {
     workers.viewer().want_surface();
     json_of(&workers.viewer().surface_state())

@@ -4,14 +4,14 @@ use std::sync::{Mutex, PoisonError};
 
 use super::token::Token;
 
-/// A token that opens the page once: who finds it later, in a log or a history, has no use for it.
+/// A token that opens the page once: later, from a log or a history, it is useless.
 pub struct Ticket {
     token: Token,
     /// The action at its first use; `None` after that.
     when_used: Mutex<Option<Box<dyn FnOnce() + Send>>>,
 }
 
-/// The outcome of a text that claims to be the token of a ticket.
+/// The result of checking a text as the token of a ticket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Unknown,

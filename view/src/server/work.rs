@@ -1,4 +1,4 @@
-//! Work for answers: so much at a time, none that was given up, and ahead what comes next.
+//! Work for answers: limited in amount, dropped when given up, and ahead for the next layers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -48,7 +48,7 @@ impl Workers {
         done.await.unwrap_or_else(|error| Err(failed(error)))
     }
 
-    /// Tells that a layer is looked at: those beside it are decoded ahead.
+    /// Records that a layer is looked at: the layers next to it are decoded ahead.
     pub(super) fn expect_near(&self, stack: usize, layer: usize) {
         self.wish.set(stack, layer);
     }
@@ -63,7 +63,7 @@ impl Drop for WhenDropped {
     }
 }
 
-/// The layer that was looked at last, until the layers beside it are decoded.
+/// The layer that was looked at last, until the layers next to it are decoded.
 #[derive(Default)]
 struct Wish {
     state: Mutex<Seen>,
@@ -89,8 +89,8 @@ impl Wish {
         self.changed.notify_one();
     }
 
-    /// Decodes layers beside the one that was looked at last, first on the way that it was
-    /// reached by.
+    /// Decodes the layers next to the layer that was looked at last, first in the direction of
+    /// travel.
     fn work(&self, viewer: &Viewer) {
         loop {
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -107,7 +107,7 @@ impl Wish {
                 if is_old() {
                     break;
                 }
-                // Who looks at it will be told what fails.
+                // A viewer of that layer will see the error.
                 let decode = || viewer.image(stack, layer, Kind::Layer, &GivenUp::default());
                 let _ = catch_unwind(AssertUnwindSafe(decode));
             }

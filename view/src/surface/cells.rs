@@ -13,13 +13,13 @@ use super::{Surface, SurfaceError, SurfaceUnit};
 /// The most cells along the longest side.
 pub const MAX_CELLS: u32 = 1024;
 
-/// How fine a surface is.
+/// The fineness of a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceOptions {
     /// About how many cells there are along the longest side, at most [`MAX_CELLS`]. A cell is a
     /// whole number of pixels wide.
     pub cells: NonZeroU32,
-    /// How many layers are read in each cell at most, evenly spread; `None` reads all.
+    /// The most layers read in each cell, evenly spread; `None` reads all.
     pub layers_a_cell: Option<NonZeroU32>,
     /// How many triangles the surface may have.
     pub max_triangles: usize,
@@ -39,7 +39,7 @@ pub struct CellGrid {
     scale: Scale,
     /// The width and height of the largest image.
     size: [u32; 2],
-    /// How many pixels wide a cell is.
+    /// The width of a cell, in pixels.
     side: NonZeroU32,
     /// The number of cells along x, y and z.
     counts: [u32; 3],
@@ -47,7 +47,7 @@ pub struct CellGrid {
     max_triangles: usize,
 }
 
-/// What a layer adds to cells.
+/// A layer's contribution to cells.
 #[derive(Clone, Debug)]
 struct Share {
     position: usize,
@@ -110,7 +110,7 @@ impl CellGrid {
         self.shares.len()
     }
 
-    /// Computes what each layer adds to which planes of cells.
+    /// Computes the share of each layer in the planes of cells.
     fn share_out(&mut self, pages: &[PageHeader], at_most: Option<NonZeroU32>) {
         let cell = self.scale.pitch * f64::from(self.side.get());
         let heights = &self.scale.heights;
@@ -136,7 +136,7 @@ impl CellGrid {
     /// on all threads of the current pool; an error of one ends the work.
     ///
     /// # Errors
-    /// Returns the error of a layer, or one if there is no surface, or too much of it.
+    /// Returns the error of a layer, or an error if there is no surface, or too much of it.
     pub fn surface<L, E>(&self, read: impl Fn(usize) -> Result<L, E> + Sync) -> Result<Surface, E>
     where
         L: Borrow<Layer>,
@@ -167,8 +167,8 @@ impl CellGrid {
         }
     }
 
-    /// Returns part coordinates of a place that is counted in cells from the top left corner of the
-    /// first layer.
+    /// Returns part coordinates of a place given in cells from the top left corner of the first
+    /// layer.
     fn place(&self, [x, y, z]: [f64; 3]) -> [f32; 3] {
         let cell = self.scale.pitch * f64::from(self.side.get());
         let [left, back] = self.scale.corner;
@@ -185,7 +185,7 @@ impl Share {
 }
 
 /// Returns the weights of layers in a cell with their places, at most so many of them, evenly
-/// spread, which then stand for all.
+/// spread, which then represent all.
 fn thinned(
     weights: &[f64],
     at_most: Option<NonZeroU32>,

@@ -22,7 +22,7 @@ pub use cells::{CellGrid, MAX_CELLS, SurfaceOptions};
 /// outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// What coordinates count.
+    /// The unit of coordinates.
     pub unit: SurfaceUnit,
     /// The vertices, x to the right, y to the back and z up, in part coordinates.
     pub vertices: Vec<[f32; 3]>,
@@ -32,10 +32,10 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What the coordinates of a surface count.
+/// The unit of a surface's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceUnit {
-    /// Millimetres.
+    /// Millimeters.
     Millimetres,
     /// Pixels, where the stack does not state its resolution and heights. A layer is then as thick
     /// as a pixel is wide, and the lower left corner of the image is at zero.

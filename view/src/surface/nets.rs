@@ -5,10 +5,10 @@ use fast_surface_nets::{SignedDistance, SurfaceNetsBuffer, surface_nets};
 
 use super::{Surface, SurfaceError, SurfaceUnit};
 
-/// How many planes are worked on at a time.
+/// The number of planes worked on at a time.
 const SLAB: usize = 18;
-/// How many of them the next slab begins with: nets are made between two planes, and one plane of
-/// the nets' vertices is in both slabs.
+/// The number of these with which the next slab begins: nets are made between two planes, and one
+/// plane of the nets' vertices is in both slabs.
 const OVERLAP: usize = 2;
 /// Black cells before the first; the crate leaves out what is at the far border, so there are two
 /// behind the last.
@@ -73,7 +73,7 @@ impl Nets {
         Ok(())
     }
 
-    /// Returns the surface, given where places lie that are counted in cells.
+    /// Returns the surface, given the place of each position in cells.
     pub(super) fn finish(
         mut self,
         place: impl Fn([f64; 3]) -> [f32; 3],
@@ -107,7 +107,8 @@ impl Nets {
         }
     }
 
-    /// Adds the surface in the slab. Its first plane of vertices is the last one of the slab before.
+    /// Adds the surface in the slab. Its first plane of vertices is the last one of the previous
+    /// slab.
     fn net(&mut self) -> Result<(), SurfaceError> {
         let [columns, rows] = self.padded();
         let planes = (self.levels.len() / self.plane_cells()) as u32;

@@ -5,8 +5,8 @@ use std::num::NonZeroU32;
 
 use lamp_stack::{Image, mean_levels};
 
-/// Returns the mean levels of an image's cells, in a plane of that many columns and rows; what lies
-/// beyond the image is black.
+/// Returns the mean levels of an image's cells, in a plane of that many columns and rows; cells
+/// outside the image are black.
 ///
 /// # Panics
 /// Panics if the image is larger than the plane.
@@ -28,7 +28,8 @@ pub(super) fn plane_of(image: &Image, side: NonZeroU32, [columns, rows]: [u32; 2
     plane
 }
 
-/// Returns the mean of the last whole cell of so many pixels, given that of its pixels alone.
+/// Returns the mean of the last cell, `side` pixels wide, from the mean of its part within the
+/// image, whose width is `pixels`.
 fn of_whole(mean: u8, pixels: u32, side: NonZeroU32) -> u8 {
     match pixels % side {
         0 => mean,

@@ -4,7 +4,7 @@ use lamp_stack::PageHeader;
 
 use super::{SurfaceError, SurfaceUnit};
 
-/// Heights and thicknesses in micrometres beyond this are wrong: no machine builds a kilometre.
+/// Heights and thicknesses in micrometers beyond this are wrong: no machine builds a kilometer.
 const MAX_UM: f64 = 1e9;
 
 /// Where the pixels and layers of a stack lie.
@@ -35,7 +35,7 @@ impl Scale {
     }
 }
 
-/// Returns the scale in millimetres, if the pages state their resolution and heights.
+/// Returns the scale in millimeters, if the pages state their resolution and heights.
 fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<Scale>, SurfaceError> {
     let Some(dpi) = pages[0].dpi else { return Ok(None) };
     let Some(heights) = heights_um(pages) else { return Ok(None) };
@@ -64,7 +64,7 @@ fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<Scale>, Surf
     }))
 }
 
-/// Returns the bottom and top of each layer in micrometres, if all are known. A layer without a
+/// Returns the bottom and top of each layer in micrometers, if all are known. A layer without a
 /// thickness reaches up to the next; the last is as thick as the one before it.
 fn heights_um(pages: &[PageHeader]) -> Option<Vec<[f64; 2]>> {
     let bottoms: Vec<f64> = pages.iter().map(|page| page.info.z_um).collect::<Option<_>>()?;

@@ -6,10 +6,10 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Pixels of a tenth of a millimetre.
+/// Pixels of a tenth of a millimeter.
 const DPI: f64 = 254.0;
 
-/// A layer of so many micrometres at a height, whose levels are those of a solid.
+/// A layer of so many micrometers at a height, with the levels of a solid.
 fn layer(
     index: u32,
     [z_um, thickness_um]: [f64; 2],
@@ -34,7 +34,7 @@ fn layer(
     Layer { info, dpi: Dpi::new(DPI), image: Image::Gray(gray).into() }
 }
 
-/// Layers of a tenth of a millimetre.
+/// Layers of a tenth of a millimeter.
 fn stack(layers: u32, size: [u32; 2], level: impl Fn([f64; 3]) -> u8) -> Vec<Layer> {
     let at = |k: u32| layer(k, [f64::from(k) * 100.0, 100.0], size, &level);
     (0..layers).map(at).collect()
