@@ -44,7 +44,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Returns its options as one text, the same for all that mean the same.
+    /// Returns its options as one text, equal for all options of the same meaning.
     pub fn canonical(&self) -> String {
         match self {
             Self::Fix(settings) => settings.canonical(),
@@ -64,7 +64,7 @@ impl Stage {
         }
     }
 
-    /// Returns the files that it reads, also those that a list of edits names.
+    /// Returns the files that it reads, including files that a list of edits names.
     pub fn input_files(&self) -> Result<Vec<PathBuf>, Error> {
         Ok(match self {
             Self::Fix(_) | Self::Dither(_) => Vec::new(),
@@ -73,12 +73,12 @@ impl Stage {
         })
     }
 
-    /// Returns how many layers on each side it looks at.
+    /// Returns the number of layers on each side that it looks at.
     fn reach(&self) -> u32 {
         if matches!(self, Self::Fix(_)) { lamp_fix::FIX_REACH } else { 0 }
     }
 
-    /// Begins the stage; `remarks` takes what it has to say.
+    /// Begins the stage; `remarks` takes its remarks.
     ///
     /// # Errors
     /// Returns an error if the settings contradict each other, or a file that they name is wrong.
@@ -105,11 +105,11 @@ pub enum Working<'a> {
 }
 
 impl Working<'_> {
-    /// Returns the layers that come of `layers`. Findings in layers of `range` count. `is_end` says
+    /// Returns the layers made from `layers`. Findings in layers of `range` count. `is_end` states
     /// whether the first and the last are the first and the last of the whole stack.
     ///
     /// # Errors
-    /// Returns an error if a file beside the layers cannot be opened.
+    /// Returns an error if another file that it needs cannot be opened.
     pub fn layers<'b>(
         &'b self,
         layers: Layers<'b>,
@@ -137,7 +137,7 @@ impl Working<'_> {
         })
     }
 
-    /// Adds what was found; this is the stage of that number.
+    /// Adds the findings; `stage` is the number of this stage.
     pub fn find(&self, stage: usize, name: &str, findings: &mut RangeFindings) {
         match self {
             Self::Fix(fixing) => findings.add_fixed(&fixing.report()),
@@ -154,8 +154,8 @@ impl Working<'_> {
 }
 
 impl Chain {
-    /// Returns the options that matter to bytes, a text for each stage. Equal texts of equal input
-    /// files, by the same code, give equal bytes of the same part.
+    /// Returns the options that matter to bytes, a text for each stage. Equal texts, with equal
+    /// input files and the same code, give equal bytes of the same part.
     pub fn canonical(&self) -> Vec<String> {
         let stages = self.stages.iter().map(Stage::canonical);
         [self.slice.canonical()].into_iter().chain(stages).collect()
@@ -182,7 +182,7 @@ impl Chain {
     /// Reads the part once, for an estimate of the work.
     ///
     /// # Errors
-    /// Returns the error that slicing it would begin with.
+    /// Returns the error with which slicing would begin.
     pub fn survey(&self, part: &Path) -> Result<Survey, Error> {
         let begun = Instant::now();
         let settings = self.settings(part, None);
@@ -197,8 +197,8 @@ impl Chain {
         settings
     }
 
-    /// Makes the layers of a range, and gives them to `write`. Layers around it are made, too, as
-    /// far as stages look at them. A stack records `name` as that of the part's file.
+    /// Makes the layers of a range, and gives them to `write`. Also makes the layers around it that
+    /// stages look at. A stack records `name` as the name of the part's file.
     ///
     /// # Errors
     /// Returns the first error of a stage or of `write`.
@@ -239,7 +239,7 @@ impl Chain {
     }
 }
 
-/// Passes on the layers of a range. The first of them says what the first of all says of the stack.
+/// Passes on the layers of a range. The first one gets the first page's record of the stack.
 fn only(
     layers: impl Iterator<Item = Result<Layer, Error>>,
     range: Range<u32>,
@@ -260,7 +260,7 @@ fn only(
     })
 }
 
-/// Names the part in an error of a stage that does not.
+/// Names the part in a stage's error that does not name it.
 pub fn named(error: Error, part: &Path) -> Error {
     let is_of_edit = error.cause::<EditError>().is_some();
     if is_of_edit || is_of_stage(&error) { error.at(part.display().to_string()) } else { error }

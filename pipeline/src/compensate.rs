@@ -19,10 +19,10 @@ use crate::solid::is_default;
 use crate::wall_report::WallReport;
 use crate::words::{optional, words_of};
 
-/// Changes when other bytes come from the same settings and layers.
+/// Changes when the same settings and layers give other bytes.
 pub const CODE: u32 = 6;
 
-/// By what edges move and images grow.
+/// How edges move and images grow.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct CompensateSettings {
@@ -32,13 +32,13 @@ pub struct CompensateSettings {
     /// Moves edges inwards by the cure width of a material: a built-in one's name, or a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<PathBuf>,
-    /// Dose of full white; none is the page's exposure times the material's intensity.
+    /// Dose of full white; `None` is the page's exposure times the material's intensity.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub dose: Option<Dose>,
-    /// The lamp as it is now; none is the material's.
+    /// The lamp as it is now; `None` is the material's.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub lamp_intensity: Option<LampLight>,
-    /// Walls stay at least this wide, or as they are if thinner; none is two pixels.
+    /// Walls stay at least this wide, or as they are if thinner; `None` is two pixels.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub min_feature: Option<Length>,
     /// Shrinkage in firing, for which images are enlarged.
@@ -144,12 +144,12 @@ impl<'a> Compensating<'a> {
     }
 }
 
-/// Returns whether layers that this stage cannot change are the cause.
+/// Returns whether the cause is layers that this stage cannot change.
 pub fn is_of_stage(error: &Error) -> bool {
     error.cause::<CompensateError>().is_some() || error.cause::<NoDose>().is_some()
 }
 
-/// What was already done to the layers, according to their pages.
+/// Changes already made to the layers, according to their pages.
 #[derive(Default)]
 struct DoneBefore {
     moved: bool,
@@ -179,7 +179,7 @@ impl DoneBefore {
     }
 }
 
-/// By what edges move.
+/// How far edges move.
 enum EdgeMove {
     Uniform(Length),
     CureWidth(Box<ByCureWidth>),
@@ -191,7 +191,7 @@ struct ByCureWidth {
     material: Material,
     dose: Option<Dose>,
     doses: MeasuredDoses,
-    /// What is doubtful about the lamp.
+    /// A doubt about the lamp.
     lamp_doubt: Option<String>,
 }
 
@@ -237,7 +237,7 @@ impl EdgeMove {
         Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, lamp_doubt })))
     }
 
-    /// Returns sentences on a lamp and on doses that the widths were not measured at.
+    /// Returns sentences on a lamp and on doses at which the widths were not measured.
     fn doubts(&self) -> Vec<String> {
         match self {
             Self::Uniform(_) => Vec::new(),
@@ -256,7 +256,7 @@ impl EdgeMove {
                 (&by.width, dose)
             }
         };
-        // The image has the sizes that are wanted, not those that are to be exposed.
+        // The image has the wanted sizes, not the sizes to expose.
         let sizes: Vec<f64> = width.cured_sizes(dose).iter().map(|size| size.pixels(dpi)).collect();
         let pitch = dpi.pitch().um();
         let size = |pixels: f64| Length::from_um(pixels * pitch);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::watcher::{Remark, Watcher};
 use crate::words::{text, words_of};
 
-/// Changes when other bytes come from the same settings and layers.
+/// Changes when the same settings and layers give other bytes.
 pub const CODE: u32 = 3;
 
 /// How dots are made.
@@ -25,7 +25,7 @@ impl DitherSettings {
         format!("dither{}", words_of(self))
     }
 
-    /// Returns the layers as dots, and warns once if these may cure unevenly. Masks are not decoded.
+    /// Returns the layers as dots, and warns once if they may cure unevenly. Masks are not decoded.
     pub fn layers<'a, E: From<DitherError> + Send + 'a>(
         &self,
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
@@ -46,8 +46,7 @@ impl DitherSettings {
     }
 }
 
-/// Returns a warning if the pixels of gray layers are wider than dots that are known to cure
-/// evenly.
+/// Returns a warning if the pixels of gray layers are wider than dots known to cure evenly.
 fn unevenness(dpi: Dpi) -> Option<String> {
     let pitch = dpi.pitch();
     let fear = match homogeneity(pitch) {
@@ -64,7 +63,7 @@ fn unevenness(dpi: Dpi) -> Option<String> {
     ))
 }
 
-/// Formats a length in micrometres, to one decimal.
+/// Formats a length in micrometers, to one decimal.
 fn short(length: Length) -> String {
     let um = (length.um() * 10.0).round() / 10.0;
     um.to_string()

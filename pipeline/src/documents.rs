@@ -10,7 +10,7 @@ use lamp_stack::{Builtin, Catalogued, digest_of, file_word};
 
 use crate::error::{Error, ErrorKind};
 
-/// A file of a catalogue is text of a few kilobytes.
+/// A file of a catalog is text of a few kilobytes.
 const MAX_FILE: u64 = 1 << 20;
 
 /// A document whose errors can be reported.
@@ -28,13 +28,13 @@ pub fn input_name(path: &Path) -> String {
     if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
-/// Returns the built-in document of a name, or that of a file.
+/// Returns the built-in document of a name, or the document in a file.
 pub fn document<T: Document>(path: &Path) -> Result<T, Error> {
     document_and_text(path).map(|(document, _)| document)
 }
 
-/// Returns a document, and the word that stacks record for it: its name as it was given, without
-/// folders, and the digest of its text. The word is taken for the document wherever its name is.
+/// Returns a document, and the word that stacks record for it: its name as given, without folders,
+/// and the digest of its text. The word is accepted wherever the document's name is.
 pub fn document_and_word<T: Document>(path: &Path) -> Result<(T, String), Error> {
     let (document, text) = document_and_text(path)?;
     Ok((document, word_of_text(path, &text)))
@@ -68,7 +68,7 @@ pub fn without_digest(path: &Path) -> (PathBuf, Option<&str>) {
     }
 }
 
-/// Checks that a file has the digest that a word for it states; `found` is the word for it as it is.
+/// Checks that a file has the digest that a word for it states; `found` is its current word.
 pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
     let (name, Some(digest)) = without_digest(path) else { return Ok(()) };
     let found = found.rsplit_once(DIGEST).map_or("", |(_, found)| found);
@@ -114,7 +114,7 @@ pub fn canonical_word<T: Document>(path: &Path) -> String {
     builtin::<T>(&without_digest(path).0).map_or_else(|| "file".to_owned(), word)
 }
 
-/// Returns what of a document's or another file's record its digest does not give: a built-in one's
+/// Returns the facts of a document's or another file's record beyond its digest: a built-in one's
 /// word, or the name of a file.
 pub fn recorded_name<T: Document>(path: &Path) -> OsString {
     match is_file::<T>(path) {
@@ -141,7 +141,7 @@ pub fn read_file<T: Document>(path: &Path) -> Result<(T, String), Error> {
     read().map_err(|error| error.at(input_name(path)))
 }
 
-/// Reads a text of at most `max` bytes. `what` is the word for it in messages.
+/// Reads a text of at most `max` bytes. `what` names it in messages.
 ///
 /// # Errors
 /// Returns an error if it cannot be read, is longer, or is no text.

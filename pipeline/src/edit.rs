@@ -16,7 +16,7 @@ use crate::documents::{input_name, is_stream, read_text};
 use crate::error::{Error, ErrorKind};
 use crate::words::text;
 
-/// Changes when other bytes come from the same settings and layers.
+/// Changes when the same settings and layers give other bytes.
 pub const CODE: u32 = 3;
 
 /// A list of edits is text of a few kilobytes.
@@ -98,7 +98,7 @@ impl EditSettings {
 pub struct Editing {
     list: Option<PathBuf>,
     files: EditFiles,
-    /// How many layers each edit was made in.
+    /// The number of layers in which each edit was made.
     counts: RefCell<Vec<usize>>,
 }
 
@@ -127,9 +127,9 @@ impl Editing {
     }
 
     /// Returns the edited layers. Layers whose image no edit changes are not decoded. Edits in
-    /// layers of `counted` are counted. `is_end` says whether the first and the last layer are
-    /// the first and the last of the whole stack, so that other stacks that are added must not reach
-    /// beyond.
+    /// layers of `counted` are counted. `is_end` states whether the first and the last layer are
+    /// the first and the last of the whole stack, beyond which other stacks that are added must not
+    /// reach.
     ///
     /// # Errors
     /// Returns an error if another stack or a picture cannot be opened.
@@ -186,7 +186,7 @@ fn layers_beside<E: From<Error> + Send + 'static>(
 /// Reads a label's list.
 fn open_list(path: &Path) -> Result<LabelList, Error> {
     let name = path.display().to_string();
-    // Standard input, which may be the stack, is no file beside the list of edits.
+    // Standard input, which may be the stack, is not a file next to the list of edits.
     let path = if is_stream(path) { &Path::new(".").join(path) } else { path };
     let text = read_text(path, MAX_LIST_BYTES, "a list of serial numbers");
     let text = text.map_err(|error| error.at(name.clone()))?;
@@ -194,7 +194,7 @@ fn open_list(path: &Path) -> Result<LabelList, Error> {
     Ok(LabelList { name, digest, text })
 }
 
-/// Opens a picture. A copy in a temporary file is read, so that the digest is of what is stamped.
+/// Opens a picture. Reads a copy in a temporary file, so that the digest fits the stamped picture.
 fn open_picture<E: From<Error> + Send + 'static>(path: &Path) -> Result<OtherPicture<E>, Error> {
     let name = path.display().to_string();
     let max = Limits::default().png_bytes;

@@ -12,7 +12,7 @@ use lamp_offset::CompensateError;
 use lamp_slicer::SliceError;
 use lamp_stack::StackError;
 
-/// Why a stage cannot begin, or ends early: the cause, and the places that it was met at.
+/// Why a stage cannot begin, or ends early: the cause, and the places where it occurred.
 #[derive(Debug)]
 pub struct Error {
     kind: ErrorKind,
@@ -21,10 +21,10 @@ pub struct Error {
     cause: Box<dyn StdError + Send + Sync>,
 }
 
-/// The side that an error is on.
+/// Whether the settings or the work are at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// Settings contradict each other, or what they are for: others may do.
+    /// Settings contradict each other, or their input: other settings may work.
     Settings,
     /// A file cannot be used, or a stage failed on its layers.
     Work,
@@ -53,7 +53,7 @@ impl Error {
         self
     }
 
-    /// Returns the side that the error is on.
+    /// Returns whether the settings or the work are at fault.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }
@@ -63,7 +63,7 @@ impl Error {
         self.cause.downcast_ref()
     }
 
-    /// Returns the cause, and the places that it was met at, from the cause outwards.
+    /// Returns the cause, and the places where it occurred, from the cause outwards.
     pub fn into_parts(self) -> (Box<dyn StdError + Send + Sync>, Vec<String>) {
         (self.cause, self.places)
     }
@@ -86,7 +86,7 @@ impl StdError for Error {
     // The message has the whole chain.
 }
 
-/// Errors of libraries are errors of the work, unless a stage says otherwise.
+/// Errors of libraries count as errors of the work, unless a stage states otherwise.
 macro_rules! of_work {
     ($($error:ty),+ $(,)?) => {
         $(impl From<$error> for Error {

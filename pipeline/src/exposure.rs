@@ -18,7 +18,7 @@ use crate::words::{optional, path, text};
 /// A table has a row for each thickness.
 const MAX_TABLE_BYTES: u64 = 1 << 20;
 
-/// What decides exposure times and gray levels.
+/// Settings that decide exposure times and gray levels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, rename_all_fields = "kebab-case")]
 pub enum ExposureSettings {
@@ -30,7 +30,7 @@ pub enum ExposureSettings {
         /// Depth that full white cures, in layers.
         #[serde(with = "text")]
         overcure: f64,
-        /// The lamp as it is now; none is the material's.
+        /// The lamp as it is now; `None` is the material's.
         #[serde(with = "optional", default, skip_serializing_if = "Option::is_none")]
         lamp_intensity: Option<LampLight>,
     },
@@ -99,7 +99,7 @@ impl ExposureSettings {
         }
     }
 
-    /// Puts words of the same meaning, whatever the folders, in the place of paths.
+    /// Replaces paths by words of the same meaning, whatever the folders.
     pub(crate) fn make_canonical(&mut self) {
         if let Some(path) = self.path_mut() {
             *path = recorded_name::<Material>(path).into();
@@ -127,7 +127,7 @@ impl ExposureSettings {
     /// Returns the exposure, if a material or a table is given.
     ///
     /// # Errors
-    /// Returns an error if the material or the table cannot be read, or says no exposures.
+    /// Returns an error if the material or the table cannot be read, or gives no exposures.
     pub fn exposure(&self) -> Result<Option<RecordedExposure>, Error> {
         fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
             Error::new(ErrorKind::Work, error)

@@ -1,5 +1,5 @@
-//! Bridges layers whose sections have gaps: cuts them again beside their planes, or takes
-//! them from another file of the same part.
+//! Bridges layers whose sections have gaps: cuts them again next to their planes, or takes them
+//! from another file of the same part.
 
 use std::ops::Range;
 use std::path::Path;
@@ -14,13 +14,12 @@ use crate::slice_settings::SliceSettings;
 use crate::solid::part_notes;
 use crate::watcher::{Remark, Watcher};
 
-/// Distances that planes are moved by, in micrometres, the nearest first.
+/// Distances by which planes are moved, in micrometers, the nearest first.
 ///
-/// Moved by d, a plane shows the part's own section d higher. On a slope that is off by
-/// d times its cotangent, which is d / t of the step that a layer of thickness t makes
-/// there anyway. A flat face between both heights would show as other contours, which
-/// `has_same_contours` refuses. Gaps higher than 20 um are not passed: the fallback
-/// stands in for those.
+/// Moved by d, a plane shows the part's own section d higher. On a slope that is off by d times its
+/// cotangent, which is d / t of the step that a layer of thickness t makes there anyway. A flat
+/// face between both heights would show as other contours, which `has_same_contours` refuses. Gaps
+/// higher than 20 um are not bridged so: the fallback replaces these layers.
 const NUDGES_UM: [f64; 8] = [1.0, -1.0, 2.5, -2.5, 5.0, -5.0, 10.0, -10.0];
 /// The greatest distance of two boxes of the same part, as a share of its size.
 const SAME_BOX: f64 = 1e-3;
@@ -39,13 +38,13 @@ struct Fallback {
     /// The word that stacks record for it.
     word: String,
     slices: Slices,
-    /// The layers cut beside their planes, and those taken from here.
+    /// The layers cut next to their planes, and the layers taken from the fallback.
     nudged: Vec<u32>,
     borrowed: Vec<u32>,
 }
 
 impl Bridged {
-    /// `fallback` is an STL of the same part, in millimetres.
+    /// `fallback` is an STL of the same part, in millimeters.
     pub(crate) fn new(
         slices: Slices,
         fallback: Option<&Path>,
@@ -170,9 +169,8 @@ fn is_whole(layer: &Layer) -> bool {
     layer.info.closed == Some(true) && layer.info.stray_rows.is_empty()
 }
 
-/// Returns whether rows have as many transitions in both, except where contours
-/// turn. A face that is missing whole leaves no gap in a section: its contour is not
-/// there.
+/// Returns whether rows have as many transitions in both, except where contours turn. A missing
+/// face leaves no gap in a section: its whole contour is missing.
 fn has_same_contours(a: &Layer, b: &Layer) -> bool {
     let [a, b] = [a, b].map(|layer| transitions(&layer.image));
     let rows: Vec<bool> = a.iter().zip(&b).map(|(a, b)| a != b).collect();
@@ -180,7 +178,7 @@ fn has_same_contours(a: &Layer, b: &Layer) -> bool {
         && rows.chunk_by(|a, b| a == b).all(|run| !run[0] || run.len() < TURNING_ROWS)
 }
 
-/// Returns how often each row turns from black to some level, or back.
+/// Returns the number of turns of each row from black to some level, or back.
 fn transitions(image: &Image) -> Vec<usize> {
     match image {
         Image::Mask(mask) => (0..mask.height()).map(|row| mask.row(row).len()).collect(),

@@ -1,4 +1,4 @@
-//! What the stages of a part find on the way.
+//! Findings of the stages of a part.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use crate::edit::unused_text;
 use crate::fix_report::FixReport;
 use crate::slice::Counts;
 
-/// What stages found in a range of layers, or in several.
+/// Findings of stages in a range of layers, or in several.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RangeFindings {
     /// Layers that were made.
@@ -20,11 +20,11 @@ pub struct RangeFindings {
     pub stray_layers: usize,
     /// Bands of rows that were corrected.
     pub bands_corrected: usize,
-    /// Bands that the last `fix` left.
+    /// Bands that the last `fix` left as they were.
     pub bands_left: usize,
     /// Pixels that were changed.
     pub pixels_corrected: u64,
-    /// Where the first band is that was left.
+    /// The place of the first band left.
     pub first_left: Option<String>,
     /// Whether the sliced layers had no white pixel.
     pub is_blank: bool,
@@ -43,7 +43,7 @@ impl RangeFindings {
         Self { layers, stray_layers, stray_rows, is_blank, ..Self::default() }
     }
 
-    /// Adds what a `fix` found.
+    /// Adds the findings of a `fix`.
     pub(crate) fn add_fixed(&mut self, report: &FixReport) {
         self.bands_corrected += report.corrected();
         self.pixels_corrected += report.pixels();
@@ -51,7 +51,7 @@ impl RangeFindings {
         self.first_left = report.first_left().map(ToOwned::to_owned);
     }
 
-    /// Says of which range remarks are.
+    /// Names the range of remarks.
     pub(crate) fn of(mut self, range: &Range<u32>) -> Self {
         for line in &mut self.of_range {
             *line = format!("layers {} to {}: {line}", range.start, range.end - 1);
@@ -59,7 +59,7 @@ impl RangeFindings {
         self
     }
 
-    /// Joins what was found in two ranges of a part, the lower first.
+    /// Joins the findings in two ranges of a part, the lower first.
     pub fn joined(mut self, mut other: Self) -> Self {
         self.layers += other.layers;
         self.stray_rows += other.stray_rows;
@@ -76,7 +76,7 @@ impl RangeFindings {
         self
     }
 
-    /// Returns what is to be said, once all ranges are joined.
+    /// Returns the messages, once all ranges are joined.
     pub fn notes(&self) -> Vec<String> {
         let blank = self.is_blank.then(|| "slice: no layer has a white pixel".to_owned());
         let unused =

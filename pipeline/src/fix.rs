@@ -11,7 +11,7 @@ use crate::fix_report::FixReport;
 use crate::solid::is_default;
 use crate::words::{optional, text, words_of};
 
-/// Changes when other bytes come from the same settings and layers.
+/// Changes when the same settings and layers give other bytes.
 pub const CODE: u32 = 4;
 
 /// How rows are corrected.
@@ -21,7 +21,7 @@ pub struct FixSettings {
     /// Source of the missing crossings.
     #[serde(with = "text")]
     pub method: FixMethod,
-    /// Bands of more rows are left as they are; none leaves no band for its width.
+    /// Bands of more rows are left as they are; `None` leaves no band for its width.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub max_width: Option<u32>,
     /// Bands whose correction is less certain are left as they are, from 0 to 1.
@@ -60,7 +60,7 @@ pub struct Fixing {
 }
 
 impl Fixing {
-    /// Begins with nothing found.
+    /// Begins without findings.
     pub fn new(settings: &FixSettings) -> Self {
         let options = settings.options();
         Self { options, report: RefCell::new(FixReport::new(options)) }
@@ -84,7 +84,7 @@ impl Fixing {
         })
     }
 
-    /// Returns what was found so far.
+    /// Returns the findings so far.
     pub fn report(&self) -> Ref<'_, FixReport> {
         self.report.borrow()
     }

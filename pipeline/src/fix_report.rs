@@ -60,7 +60,7 @@ pub struct ReportedBand {
 }
 
 impl FixReport {
-    /// Begins with nothing found.
+    /// Begins without findings.
     pub fn new(options: FixOptions) -> Self {
         Self {
             options,
@@ -88,27 +88,27 @@ impl FixReport {
         }
     }
 
-    /// Returns how many bands were left as they are.
+    /// Returns the number of bands left as they are.
     pub fn left(&self) -> usize {
         self.bands.len() - self.corrected
     }
 
-    /// Returns how many bands were corrected.
+    /// Returns the number of corrected bands.
     pub fn corrected(&self) -> usize {
         self.corrected
     }
 
-    /// Returns how many pixels were changed.
+    /// Returns the number of changed pixels.
     pub fn pixels(&self) -> u64 {
         self.pixels
     }
 
-    /// Returns where the first band is that was left, if any was.
+    /// Returns the place of the first band left, if any was.
     pub fn first_left(&self) -> Option<&str> {
         self.first_left.as_deref()
     }
 
-    /// Returns a line that sums up what was corrected, if anything was.
+    /// Returns a line that sums up corrections, if there were any.
     pub fn text_of_corrected(&self) -> Option<String> {
         let layers = match self.corrected_layers {
             1 => "1 layer".to_owned(),
@@ -123,7 +123,7 @@ impl FixReport {
         })
     }
 
-    /// Returns a line that sums up what was left, if anything was.
+    /// Returns a line that sums up bands left, if there were any.
     pub fn text_of_left(&self) -> Option<String> {
         let first = self.first_left.as_ref()?;
         let (bands, were) = bands_were(self.left());

@@ -1,4 +1,4 @@
-//! Adaptive layer heights: their limits, their bound, and the search that they ask for.
+//! Adaptive layer heights: their limits, their bound, and their search.
 
 use std::fmt;
 use std::str::FromStr;
@@ -22,19 +22,19 @@ use crate::words::optional;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct HeightSettings {
-    /// Thinnest layer that the machine builds; none is 25 um.
+    /// Thinnest layer that the machine builds; `None` is 25 um.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub min: Option<Length>,
-    /// Thickest layer; none is 100 um.
+    /// Thickest layer; `None` is 100 um.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub max: Option<Length>,
-    /// Step of layer thickness, of which all are multiples; none is 1 um.
+    /// Step of layer thickness, of which all are multiples; `None` is 1 um.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub step: Option<Length>,
-    /// Measure of a layer's error; none is volume, or cusps where `cusp` is given.
+    /// Measure of a layer's error; `None` is volume, or cusps if `cusp` is given.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub criterion: Option<Measure>,
-    /// Largest error of a layer, as a share; none is 0.02.
+    /// Largest error of a layer, as a share; `None` is 0.02.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub deviation: Option<f64>,
     /// Largest height of cusps.
@@ -46,10 +46,10 @@ pub struct HeightSettings {
     /// Longest time of all layers, in place of a bound.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub time_budget: Option<Seconds>,
-    /// Time of a layer beside its exposure.
+    /// Time of a layer besides its exposure.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub layer_overhead: Option<Seconds>,
-    /// Distance between measured rows; none is four pixels.
+    /// Distance between measured rows; `None` is four pixels.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub row_pitch: Option<Length>,
     /// Ends layers at flat faces where the limits allow.
@@ -71,8 +71,8 @@ pub fn bound(found: &FoundHeights) -> String {
     format!("{} {}", found.measure, measured(found.measure, found.bound))
 }
 
-/// Returns sentences on rows that could not be measured, and on exposures that the material was not
-/// measured at.
+/// Returns sentences on rows that could not be measured, and on exposures at which the material was
+/// not measured.
 pub fn doubts(found: &FoundHeights, exposure: Option<&Exposure>) -> Vec<String> {
     let of_rows = found.doubt().map(|doubt| match doubt {
         HeightsDoubt::OpenRows { rows, layers } => format!(
@@ -116,7 +116,7 @@ impl HeightSettings {
             .map_err(|error| Error::new(ErrorKind::Settings, error))
     }
 
-    /// Checks, before the work, what the parser cannot.
+    /// Checks, before the work, the rules that the parser cannot check.
     pub fn check(&self, exposure: Option<&Exposure>) -> Result<(), Error> {
         self.thicknesses()?;
         self.measure()?;
@@ -141,7 +141,7 @@ impl HeightSettings {
     /// Searches for the heights.
     ///
     /// # Errors
-    /// Returns an error if settings contradict each other, or no heights keep them.
+    /// Returns an error if settings contradict each other, or no heights satisfy them.
     pub fn find(
         &self,
         part: &LayeredPart,
@@ -187,7 +187,7 @@ impl HeightSettings {
         let exposure = exposure.ok_or_else(|| {
             Error::settings("--time-budget needs exposures: give --material or --exposure-table")
         })?;
-        // What holds for the limits holds between them.
+        // If both limits have a time, all thicknesses between them do.
         exposure.time(self.min())?;
         exposure.time(self.max())?;
         let overhead = self.overhead();

@@ -34,7 +34,7 @@ pub fn in_words(bytes: u64) -> String {
     }
 }
 
-/// Returns the machine's memory, where the system tells.
+/// Returns the machine's memory, where the system reports it.
 fn machine() -> Option<u64> {
     bytes_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")
 }

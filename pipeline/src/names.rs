@@ -1,7 +1,7 @@
 //! Names of parts in stacks that are stored by content.
 //!
-//! A stack records the name of its part's file. Stored under a name that the part's content gives,
-//! a result is the same whatever the file is called; it gets today's name on its way out.
+//! A stack records the name of its part's file. Stored under a name made from the part's content, a
+//! result is the same under any file name; it gets today's name when it is copied out.
 
 use std::path::Path;
 
@@ -64,7 +64,7 @@ impl Names {
         match value {
             Value::String(text) => {
                 for (stored, file) in &self.0 {
-                    // Commands have the whole name, all else what is before the last dot.
+                    // Commands have the whole name, everything else the text before the last dot.
                     let [short, file_short] = [stored, file].map(|name| stem(Path::new(name)));
                     if text.contains(&short) {
                         let file = recorded(file, None);

@@ -1,4 +1,4 @@
-//! Says how much of the bodies of one file overlaps.
+//! Reports the overlap of the bodies of one file.
 
 use lamp_slicer::brep::Prepared;
 use lamp_slicer::{BodyOverlap, Part};
@@ -7,8 +7,8 @@ use lamp_stack::one_line;
 use crate::part_file::PartFile;
 use crate::size::short;
 
-/// Returns a line on what bodies share in the layers that were made, if they share
-/// anything; the largest overlap comes first. `cancels` if what lies in two of them is outside.
+/// Returns a line on the space that bodies share in the layers made so far, if they share any; the
+/// largest overlap comes first. `cancels` if space in two of them is outside.
 pub(crate) fn overlap_text(
     overlaps: &[BodyOverlap],
     part: &Part,

@@ -15,16 +15,16 @@ use crate::documents::{input_name, is_stream};
 pub struct PartFile {
     /// The file; `-` is standard input.
     pub path: PathBuf,
-    /// Where it stands, unless as its coordinates say.
+    /// Where it stands, if not at its own coordinates.
     pub placement: Option<PartPlacement>,
 }
 
 impl PartFile {
-    /// Reads `FILE` or `FILE@X,Y,Z,DEGREES`: what follows the last `@` is a placement, unless a file
-    /// has the whole name.
+    /// Reads `FILE` or `FILE@X,Y,Z,DEGREES`: the text after the last `@` is a placement, unless a
+    /// file has the whole name.
     ///
     /// # Errors
-    /// Returns a sentence if there is such a file, and its placement is none.
+    /// Returns a sentence if there is such a file, and the rest is no placement.
     pub fn parse(text: OsString) -> Result<Self, String> {
         let split = text.to_str().and_then(|text| text.rsplit_once('@'));
         let named = |name: &str| is_stream(Path::new(name)) || Path::new(name).exists();
@@ -56,7 +56,7 @@ impl PartFile {
         Self { path: self.file().into(), placement: self.placement }
     }
 
-    /// Returns the words that a stack records of it.
+    /// Returns the words by which a stack records it.
     pub fn recorded(&self) -> String {
         self.named().to_string()
     }
@@ -69,15 +69,15 @@ impl PartFile {
 }
 
 impl fmt::Display for PartFile {
-    /// Writes what [`PartFile::parse`] reads.
+    /// Writes text that [`PartFile::parse`] reads.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&recorded(&self.path.to_string_lossy(), self.placement))
     }
 }
 
-/// Returns what a stack records of a file of a part, so that [`PartFile::parse`] reads it.
+/// Returns a stack's record of a file of a part, so that [`PartFile::parse`] reads it.
 pub fn recorded(file: &str, placement: Option<PartPlacement>) -> String {
-    // Of a name with an `@` what follows would be taken for the placement.
+    // In a name with an `@`, the rest would be read as the placement.
     let placement = placement.or_else(|| file.contains('@').then(PartPlacement::default));
     let file = if file == "-" { file.into() } else { file_word(file) };
     placement.map_or_else(|| file.clone().into_owned(), |placement| format!("{file}@{placement}"))
@@ -103,7 +103,7 @@ impl PartPlacement {
 }
 
 impl fmt::Display for PartPlacement {
-    /// Formats in millimetres: `50,0,0,90`.
+    /// Formats in millimeters: `50,0,0,90`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.by.map(Length::mm);
         write!(f, "{x},{y},{z},{}", self.degrees)
@@ -113,7 +113,7 @@ impl fmt::Display for PartPlacement {
 impl FromStr for PartPlacement {
     type Err = String;
 
-    /// Parses `x,y`, `x,y,z` or `x,y,z,degrees`; lengths without a unit are in millimetres.
+    /// Parses `x,y`, `x,y,z` or `x,y,z,degrees`; lengths without a unit are in millimeters.
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
             || format!("`{text}` is no placement: write @X,Y,Z,DEGREES, as @50mm,0,0,90 or @2in,0");

@@ -28,8 +28,8 @@ impl PixelLocation {
     }
 }
 
-/// Formats a range of millimetres: `12.1-12.8`.
+/// Formats a range of millimeters: `12.1-12.8`.
 pub(crate) fn millimetres([low, high]: [f64; 2]) -> String {
-    // Beside a minus a dash would read as another.
+    // Next to a minus, a dash would look like another minus.
     if low < 0.0 { format!("{low:.1} to {high:.1}") } else { format!("{low:.1}-{high:.1}") }
 }

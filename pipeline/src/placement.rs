@@ -24,7 +24,7 @@ pub struct PlacementSettings {
     #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
     pub rotate: Vec<Rotation>,
 
-    /// The move at the end, in millimetres.
+    /// The move at the end, in millimeters.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub translate: Option<Numbers<3>>,
 }
@@ -111,7 +111,7 @@ impl FromStr for Rotation {
 /// Reads factors: one for all axes, or `X,Y,Z`.
 ///
 /// # Errors
-/// Returns a sentence if the text is none, or leaves nothing of a part.
+/// Returns a sentence if the text is no scale, or would leave nothing of a part.
 pub fn parse_scale(text: &str) -> Result<Numbers<3>, String> {
     let one = text.parse().map(|Numbers([factor])| Numbers([factor; 3]));
     let factors = one.or_else(|_| text.parse()).map_err(|_| {
@@ -128,10 +128,10 @@ pub fn parse_scale(text: &str) -> Result<Numbers<3>, String> {
     }
 }
 
-/// Reads a move in millimetres: `X,Y,Z`.
+/// Reads a move in millimeters: `X,Y,Z`.
 ///
 /// # Errors
-/// Returns a sentence if the text is none.
+/// Returns a sentence if the text is no move.
 pub fn parse_translation(text: &str) -> Result<Numbers<3>, String> {
     let wrong =
         || format!("`{text}` is not a translation: write X,Y,Z in millimetres, as -5,0,12.7");

@@ -1,6 +1,6 @@
 //! Ranges of numbers, for people.
 
-/// Formats numbers in order, those that follow each other as ranges: `3, 7-9`.
+/// Formats numbers in order, consecutive numbers as ranges: `3, 7-9`.
 pub fn ranges(rows: &[u32]) -> String {
     let text = |run: &[u32]| match run {
         [first, .., last] => format!("{first}-{last}"),

@@ -9,7 +9,7 @@ use crate::slice_settings::{SliceSettings, SlicingRecord};
 use crate::solid::{Reading, name_of_all};
 use crate::watcher::Watcher;
 
-/// What a stack records of how its part was sliced.
+/// A stack's record of how its part was sliced.
 pub struct RecordedSlicing<'a> {
     /// The settings.
     pub settings: SliceSettings,

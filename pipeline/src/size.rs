@@ -1,12 +1,11 @@
-//! Doubts about a part that can be sliced, but hardly as it was meant.
+//! Doubts about a part that can be sliced, but hardly as intended.
 
 use lamp_slicer::Units;
 use lamp_stack::{Dpi, Length};
 
-/// Images below this width or height, in pixels, show no shape; nor do stacks of fewer
-/// layers.
+/// Images below this width or height, in pixels, show no shape; nor do stacks of fewer layers.
 const FEW: f64 = 3.0;
-/// Sizes of parts, in millimetres: the largest build area known is 23 inches wide.
+/// Sizes of parts, in millimeters: the largest build area known is 23 inches wide.
 const USUAL_MM: std::ops::Range<f64> = 10.0..600.0;
 /// Smaller than any casting.
 const SMALL_MM: f64 = 0.5;
@@ -16,7 +15,7 @@ const LARGE_MM: f64 = 1000.0;
 /// The size of a part in its place.
 pub struct PartSize {
     mm: [f64; 3],
-    /// The unit that was taken for its file's, unless the file states it.
+    /// The unit assumed for its file, unless the file states it.
     units: Option<Units>,
 }
 
@@ -26,8 +25,8 @@ impl PartSize {
         Self { mm: std::array::from_fn(|k| high[k] - low[k]), units }
     }
 
-    /// Returns a doubt about the size, if there is one. Thickness is that of layers, if
-    /// all have the same.
+    /// Returns a doubt about the size, if there is one. `thickness` is the thickness of all layers,
+    /// if they share one.
     pub fn doubt(&self, dpi: Dpi, thickness: Option<Length>) -> Option<String> {
         let [x, y, z] = self.mm;
         let size = || format!("the part is {} x {} x {} mm", short(x), short(y), short(z));
@@ -49,7 +48,7 @@ impl PartSize {
         }
     }
 
-    /// Returns what to do about the size.
+    /// Returns advice about the size.
     fn advice(&self) -> String {
         match (self.units, self.likely_unit()) {
             (None, _) => "check the unit that its file states, and --scale".to_owned(),
@@ -60,7 +59,7 @@ impl PartSize {
 
     /// Returns the unit that would make an unusual size usual, if there is one.
     fn likely_unit(&self) -> Option<Units> {
-        // Nearly all files are in millimetres or inches.
+        // Nearly all files are in millimeters or inches.
         const LIKELY: [Units; 5] = [
             Units::Millimetres,
             Units::Inches,

@@ -30,7 +30,7 @@ use crate::step::length;
 use crate::watcher::{Importance, Remark, Watcher};
 use crate::words::option;
 
-/// Changes when other bytes come from the same settings and part.
+/// Changes when the same settings and part give other bytes.
 pub const CODE: u32 = 7;
 
 /// A part, how it is sliced, and on what machine it is to be built.
@@ -42,9 +42,9 @@ pub struct SliceStage {
     pub settings: SliceSettings,
     /// A machine whose limits hold: a built-in one's name, or a file.
     pub machine: Option<PathBuf>,
-    /// The layers to be made; all if `None`.
+    /// The layers to make; all if `None`.
     pub layers: Option<Range<u32>>,
-    /// The bytes that the table of crossings may take; none is a quarter of what there is.
+    /// The bytes that the table of crossings may take; `None` is a quarter of the free memory.
     pub memory: Option<u64>,
     /// An STL of the same STEP part, which stands in for layers with gaps.
     pub fallback: Option<PathBuf>,
@@ -85,16 +85,16 @@ pub struct Slicing<'a> {
     is_blank: Cell<bool>,
 }
 
-/// What slicing writes on pages beside their images.
+/// Text that slicing writes on pages besides their images.
 pub struct PageWords {
     record: SlicingRecord,
-    /// The part's name, where it is not its file's.
+    /// The part's name, if it is not its file's.
     part_name: Option<String>,
     exposure: Option<Exposure>,
 }
 
 impl PageWords {
-    /// Writes a page's exposure, and on the first page what the stack records.
+    /// Writes a page's exposure, and the stack's record on the first page.
     pub fn write(&self, layer: &mut Layer) {
         // All thicknesses were tried before the work.
         let time = |exposure: &Exposure| {
@@ -114,7 +114,7 @@ impl PageWords {
 }
 
 impl SliceSettings {
-    /// Returns the layers of a part, and what is to be written on their pages; `parts` are its files.
+    /// Returns the layers of a part, and the text for their pages; `parts` are its files.
     ///
     /// # Errors
     /// Returns an error if settings contradict each other or the part, or if there is too little
@@ -179,7 +179,7 @@ impl SliceSettings {
         })
     }
 
-    /// Finds adaptive layer heights, if they are asked for, with notes on them.
+    /// Finds adaptive layer heights, if requested, with notes on them.
     fn layer_heights(
         &self,
         model: &Part,
@@ -217,8 +217,8 @@ impl SliceStage {
         self.settings.files_mut().chain(&mut self.fallback).chain(machine)
     }
 
-    /// Returns the settings as one text, the same for all that mean the same. Files have only the
-    /// names that stacks record.
+    /// Returns the settings as one text, equal for all settings of the same meaning. Files have
+    /// only the names that stacks record.
     pub fn canonical(&self) -> String {
         let mut words = format!("slice{}", self.settings.canonical());
         if let Some(fallback) = &self.fallback {
@@ -233,8 +233,8 @@ impl SliceStage {
         words
     }
 
-    /// Opens the part, and prepares to slice it. Stacks record `name` as the name of its file, if it
-    /// is given.
+    /// Opens the part, and prepares to slice it. Stacks record `name`, if given, as its file's
+    /// name.
     ///
     /// # Errors
     /// Returns an error if settings contradict each other, or the part cannot be sliced.
@@ -304,7 +304,7 @@ impl Slicing<'_> {
         self.bridged.borrow().slices.layer_count() as u32
     }
 
-    /// Returns the layers. Those of `counted` are counted, and shown to `see`.
+    /// Returns the layers. Counts the layers of `counted`, and shows them to `see`.
     pub fn layers(
         &self,
         counted: Range<u32>,
@@ -334,7 +334,7 @@ impl Slicing<'_> {
         at_part(error.into(), &settings.solid.files(parts).0)
     }
 
-    /// Returns what was counted so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> Counts {
         self.counts.get()
     }
@@ -344,7 +344,7 @@ impl Slicing<'_> {
         self.is_blank.get()
     }
 
-    /// Returns what is said of bodies that overlap in the layers so far.
+    /// Returns a message about bodies that overlap in the layers so far.
     pub fn overlap(&self) -> Option<String> {
         let overlaps = self.bridged.borrow().slices.body_overlaps();
         let SliceStage { settings, parts, .. } = self.stage;
@@ -361,7 +361,7 @@ impl Slicing<'_> {
         doubts.iter().flat_map(|doubt| fill_doubt(doubt, &files[doubt.file].name())).collect()
     }
 
-    /// Returns a doubt about each file that is there to cut, and cut nothing so far.
+    /// Returns a doubt about each cutting file that has cut nothing so far.
     pub fn idle_cutters(&self) -> Vec<String> {
         let SliceStage { settings, parts, .. } = self.stage;
         let files = settings.solid.files(parts).0;
@@ -383,20 +383,20 @@ impl Slicing<'_> {
         look(&self.bridged.borrow().slices).map_err(|error| self.at_part(error))
     }
 
-    /// Returns what else is to be said of the layers so far.
+    /// Returns other messages about the layers so far.
     pub fn remarks(&self) -> Vec<String> {
         let bridged = self.bridged.borrow().text();
         let doubts = self.fill_doubts().into_iter().chain(self.idle_cutters());
         bridged.into_iter().chain(self.overlap()).chain(doubts).collect()
     }
 
-    /// Returns the number of all layers of the part, also of those that are not wanted.
+    /// Returns the number of all layers of the part, including layers that are not wanted.
     pub fn part_layers(&self) -> u32 {
         self.bridged.borrow().slices.layer_heights().thicknesses_um().count() as u32
     }
 
-    /// Returns lines about the work, once it is done. Stray rows are listed in the file `report`, or
-    /// could be.
+    /// Returns lines about the work, once it is done. Stray rows are listed in the file `report`,
+    /// or could be.
     pub fn summary(&self, report: Option<&Path>) -> Vec<Remark> {
         let bridged = self.bridged.borrow();
         let polished = bridged.slices.polished().filter(|it| it.moved + it.kept > 0);
@@ -451,7 +451,7 @@ pub(crate) fn stem(file: &Path) -> String {
     file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Checks that a part lies within a machine's area and height.
+/// Checks that a part fits within a machine's area and height.
 fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
     let [low, high] = slices.box_mm();
     let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
@@ -461,7 +461,7 @@ fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
     machine.check_height(height, "the part")
 }
 
-/// What polishing did, in a line.
+/// Returns a line about the result of polishing.
 fn polish_text(polished: Polished) -> String {
     let Polished { moved, kept, mended, mean_mm, most_mm } = polished;
     let mean = length(mean_mm);

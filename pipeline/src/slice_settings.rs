@@ -1,4 +1,4 @@
-//! The settings of slicing, and what a stack records of them.
+//! The settings of slicing, and their record in a stack.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub struct SliceSettings {
     /// Height in each layer at which the part is cut.
     #[serde(with = "text")]
     pub plane: PlaneRule,
-    /// How far a vertex may be from a layer's plane and still count as lying on it.
+    /// The largest distance of a vertex from a layer's plane at which it still counts as on it.
     #[serde(with = "text", skip_serializing_if = "is_usual_tolerance")]
     pub plane_tolerance: Length,
     /// The solid.
@@ -51,7 +51,7 @@ pub struct SliceSettings {
     pub frame: Frame,
 }
 
-/// How thick layers are.
+/// The thickness of layers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Thickness {
@@ -78,7 +78,8 @@ pub enum GrayRule {
     /// Black and white.
     #[default]
     None,
-    /// Each pixel is as bright as cures down to where the part ends below it, by its layer alone.
+    /// Each pixel has the level that cures down to where the part ends below it, by its layer
+    /// alone.
     ByDepth,
     /// The same, where doses of layers add up: light of the layers above does not cure through
     /// undersides.
@@ -101,7 +102,7 @@ struct GrayFlags {
 pub enum Frame {
     /// A given place, which holds the part.
     At {
-        /// The top left corner (x, y) in part coordinates, in millimetres.
+        /// The top left corner (x, y) in part coordinates, in millimeters.
         #[serde(with = "text")]
         origin: Numbers<2>,
         /// Its size.
@@ -153,7 +154,7 @@ impl Default for SliceSettings {
 }
 
 impl SliceSettings {
-    /// Returns the options of the library, as far as no material and no search decides them.
+    /// Returns the options of the library that neither a material nor a search decides.
     pub fn for_slicing(&self) -> SliceOptions {
         let usual = SliceOptions::default();
         SliceOptions {
@@ -180,8 +181,8 @@ impl SliceSettings {
         }
     }
 
-    /// Returns the key of the first setting that is not as it is by default, where `machine` may
-    /// give defaults.
+    /// Returns the key of the first setting that differs from its default; `machine` may give
+    /// defaults.
     pub fn stated(&self, machine: Option<&Machine>) -> Option<String> {
         let Defaults { dpi, thickness, margin } =
             machine.map(|machine| machine.defaults.clone()).unwrap_or_default();
@@ -205,14 +206,14 @@ impl SliceSettings {
         self
     }
 
-    /// Returns the command as people type it, for files that stand where they do.
+    /// Returns the command as people type it, for files that stay where they are.
     pub fn command(&self, files: &[String]) -> String {
         let files: String = files.iter().map(|file| format!(" {}", quoted(file))).collect();
         format!("slice{files}{}", words_of(self))
     }
 
-    /// Returns the settings as one text, the same for all that mean the same. Of files, which have
-    /// digests, only names stand there that a stack records.
+    /// Returns the settings as one text, equal for all settings of the same meaning. Files, which
+    /// have digests, appear only by the names that a stack records.
     pub fn canonical(&self) -> String {
         let mut settings = self.clone();
         settings.exposure.make_canonical();
@@ -220,11 +221,11 @@ impl SliceSettings {
         words_of(&settings)
     }
 
-    /// Checks that a machine builds in this resolution, these thicknesses and this size, as far as
-    /// it is given.
+    /// Checks that a machine builds in this resolution, these thicknesses and this size, where
+    /// given.
     ///
     /// # Errors
-    /// Returns the limit that is exceeded.
+    /// Returns the exceeded limit.
     pub fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
         machine.check_dpi(self.dpi, "the stack")?;
         if let Frame::At { size, .. } = self.frame {
@@ -239,7 +240,7 @@ impl SliceSettings {
         }
     }
 
-    /// Returns how far up in each layer the part is cut: 0 at the bottom, 1 at the top.
+    /// Returns the height in each layer at which the part is cut: 0 at the bottom, 1 at the top.
     pub fn cut(&self) -> f64 {
         match self.plane {
             PlaneRule::Bottom => 0.0,
@@ -292,7 +293,7 @@ impl SliceSettings {
     }
 }
 
-/// What a stack records of how its part was sliced.
+/// A stack's record of how its part was sliced.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct SlicingRecord {
@@ -314,8 +315,8 @@ impl SlicingRecord {
     /// The key of the record in a stack's metadata.
     const KEY: &str = "slice";
 
-    /// Reads the record of a stack. There is none if it was not sliced by LAMP, or by a version
-    /// with settings that this one does not know.
+    /// Reads the record of a stack. Returns `None` if the stack was not sliced by LAMP, or by a
+    /// version with settings that this one does not know.
     pub fn of(stack: &StackInfo) -> Option<Self> {
         let value = stack.other.get(Self::KEY)?;
         let record: Self = serde_json::from_value(value.clone()).ok()?;

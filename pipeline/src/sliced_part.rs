@@ -1,4 +1,4 @@
-//! A part where a stack may stand, too: it is sliced on the way.
+//! A part in place of a stack: it is sliced on the way.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -24,10 +24,10 @@ pub struct SlicedPart {
     pub settings: SliceSettings,
 }
 
-/// Refuses options of slicing where there is nothing to slice. `machine` gives defaults.
+/// Refuses options of slicing if there is nothing to slice. `machine` gives defaults.
 ///
 /// # Errors
-/// If an option is not as it is by default, and all inputs are stacks.
+/// If an option differs from its default, and all inputs are stacks.
 pub fn check_slicing(
     slicing: &SliceSettings,
     inputs: &[PathBuf],
@@ -49,12 +49,12 @@ pub fn check_slicing(
 pub struct LayersOfPart<I> {
     /// The layers.
     pub layers: I,
-    /// How many there are.
+    /// The number of layers.
     pub count: u64,
 }
 
 impl SlicedPart {
-    /// Opens a part; returns none for a stack, which begins otherwise.
+    /// Opens a part; returns `None` for a stack, which begins otherwise.
     ///
     /// # Errors
     /// Returns an error if the part cannot be opened.

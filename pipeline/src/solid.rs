@@ -18,14 +18,14 @@ use crate::step::{StepSettings, notes};
 use crate::watcher::{Remark, Watcher};
 use crate::words::{parts, text};
 
-/// What decides the solid that a part's files enclose.
+/// Settings that decide the solid that a part's files enclose.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct SolidSettings {
     /// Unit of coordinates in STL and OBJ files; STEP and 3MF files state their own.
     #[serde(with = "text")]
     pub units: Units,
-    /// Rule for what is inside.
+    /// Rule for the inside of the part.
     #[serde(with = "text")]
     pub fill: Fill,
     /// How the bodies of a STEP file, or the items of a 3MF, join under even-odd fill.
@@ -40,7 +40,7 @@ pub struct SolidSettings {
     /// Scale, turns and moves.
     #[serde(flatten)]
     pub placement: PlacementSettings,
-    /// Takes the part as large as it seems.
+    /// Trusts the part's apparent size.
     #[serde(skip_serializing_if = "is_default")]
     pub trust_extent: bool,
     /// How STEP files are read.
@@ -48,7 +48,7 @@ pub struct SolidSettings {
     pub step: StepSettings,
 }
 
-/// Returns whether a setting is as it is by default, so that records need not name it.
+/// Returns whether a setting has its default value, so that records need not name it.
 pub(crate) fn is_default<T: Default + PartialEq>(setting: &T) -> bool {
     *setting == T::default()
 }
@@ -87,7 +87,7 @@ impl SolidSettings {
         self.subtract.iter_mut().chain(&mut self.intersect).map(|part| &mut part.path)
     }
 
-    /// Puts the names that stacks record in the place of the paths of files.
+    /// Replaces the paths of files by the names that stacks record.
     pub(crate) fn name(&mut self) {
         for file in self.subtract.iter_mut().chain(&mut self.intersect) {
             *file = file.named();

@@ -1,4 +1,4 @@
-//! How STEP files are read, and notes about what was read.
+//! How STEP files are read, and notes on the reading.
 
 use std::io::{self, Read};
 use std::mem::discriminant;
@@ -19,10 +19,10 @@ use crate::words::optional;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct StepSettings {
-    /// How far facets may lie from surfaces; none is a quarter of a pixel.
+    /// The largest distance of facets from surfaces; `None` is a quarter of a pixel.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Length>,
-    /// What reads the file.
+    /// The program that reads the file.
     #[serde(flatten)]
     pub reader: ReaderSettings,
 }
@@ -34,7 +34,7 @@ pub struct ReaderSettings {
     /// The kernel.
     #[serde(skip_serializing_if = "Kernel::is_usual")]
     pub kernel: Kernel,
-    /// How long it may take. It decides no image.
+    /// Its time limit. It decides no image.
     #[serde(skip)]
     pub timeout: Duration,
 }
@@ -53,7 +53,7 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// Returns whether images are those of the default kernel.
+    /// Returns whether images are the images of the default kernel.
     fn is_usual(&self) -> bool {
         *self != Self::Occt
     }
@@ -61,7 +61,7 @@ impl Kernel {
     /// Returns the library's kernel.
     ///
     /// # Errors
-    /// Returns an error if OpenCASCADE is asked for, and this build is without it.
+    /// Returns an error if OpenCASCADE is requested, and this build is without it.
     pub fn of_library(self) -> Result<KernelName, Error> {
         match self {
             Self::Lamp => Ok(KernelName::Lamp),
@@ -82,7 +82,7 @@ impl Default for ReaderSettings {
 }
 
 impl StepSettings {
-    /// Returns how far facets may lie from surfaces, for images of a resolution.
+    /// Returns the largest distance of facets from surfaces, for images of a resolution.
     pub fn tolerance(&self, dpi: Dpi) -> Length {
         self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0))
     }
@@ -92,7 +92,7 @@ impl ReaderSettings {
     /// Returns the options of the library, for facets within a tolerance of surfaces.
     ///
     /// # Errors
-    /// Returns an error if OpenCASCADE is asked for, and this build is without it.
+    /// Returns an error if OpenCASCADE is requested, and this build is without it.
     pub fn for_opening(&self, tolerance: Length) -> Result<OpenOptions, Error> {
         let kernel = self.kernel.of_library()?;
         Ok(OpenOptions { kernel, tolerance, timeout: self.timeout, ..OpenOptions::default() })

@@ -1,4 +1,4 @@
-//! How much work a part is, by its facets, before it is sliced.
+//! The estimated work for a part, by its facets, before it is sliced.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, Stage};
 
-/// Layers that are estimated together. Ranges begin at multiples of it, where packed stacks have key
-/// layers.
+/// Layers that are estimated together. Ranges begin at multiples of it, where packed stacks have
+/// key layers.
 const BLOCK: u32 = lamp_stack::KEY_LAYERS;
 
-/// What a part will take. It is small, to be kept by the digest of the part and the options.
+/// The estimated cost of a part. It is small, to be kept by the digest of the part and the options.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Survey {
     /// The number of layers.
@@ -27,7 +27,7 @@ pub struct Survey {
     bytes: u64,
 }
 
-/// What a stage costs: nanoseconds of one processor for a row and for a crossing.
+/// The cost of a stage: nanoseconds of one processor for a row and for a crossing.
 #[derive(Clone, Copy)]
 struct Weight {
     row_ns: f64,
@@ -35,18 +35,18 @@ struct Weight {
 }
 
 /// Slicing, with packing. Fitted, as all weights here, to runs of the samples blade (0.1 and 0.75
-/// million facets), torus, tower, stairs and sphere at 600 and 1500 dpi and 100 um, on one thread of a
-/// machine with two: within a third of slicing, `fix` and `edit` that took more than 50 ms.
+/// million facets), torus, tower, stairs and sphere at 600 and 1500 dpi and 100 um, on one thread
+/// of a machine with two: within a third of slicing, `fix` and `edit` that took more than 50 ms.
 const SLICE: Weight = Weight { row_ns: 31.0, crossing_ns: 26.0 };
 const FIX: Weight = Weight { row_ns: 4.5, crossing_ns: 0.0 };
 const COMPENSATE: Weight = Weight { row_ns: 0.0, crossing_ns: 118.0 };
-/// Masks pass, and of gray layers the dots save as much packing as they take.
+/// Masks pass, and dots of gray layers save as much packing as they take.
 const DITHER: Weight = Weight { row_ns: 0.0, crossing_ns: 0.0 };
 const EDIT: Weight = Weight { row_ns: 11.0, crossing_ns: 1.0 };
 /// Gray pixels along edges are runs, too: 2.3 times the work at 300 dpi, 4.6 times at 1500.
 const GRAY: f64 = 4.5;
 /// Bytes of memory of a process with its table of crossings, and of a crossing or a row of layers
-/// on their way: above what one and two threads took.
+/// in progress: above the use of one and two threads.
 const PROCESS_BYTES: f64 = 64e6;
 const CROSSING_BYTES: f64 = 1000.0;
 /// Bytes of the packed stack for a crossing: blades at 300 to 2400 dpi have 0.085 to 0.123.
@@ -71,8 +71,8 @@ impl Weight {
 }
 
 impl Survey {
-    /// Estimates the work of a chain on slices that are ready to begin. `begun` is when the part
-    /// began to be opened.
+    /// Estimates the work of a chain on slices that are ready to begin. `begun` is the time when
+    /// opening the part began.
     pub(crate) fn of(slices: &Slices, chain: &Chain, begun: Instant) -> Self {
         let crossings = slices.crossings_per_layer();
         let rows = f64::from(slices.grid().height);

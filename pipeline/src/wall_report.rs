@@ -10,7 +10,7 @@ use lamp_stack::to_nm;
 
 use crate::pixel_location::{PixelLocation, millimetres};
 
-/// Walls beyond these are only counted.
+/// Further walls are only counted.
 const MAX_LISTED: usize = 10_000;
 
 /// The walls and losses of a run of `compensate`.
@@ -21,16 +21,16 @@ pub struct WallReport {
     walls: usize,
     /// Walls that would have been lost, but were kept.
     kept: usize,
-    /// Pieces that were lost, those that broke apart, and in how many layers.
+    /// Pieces that were lost, pieces that broke apart, and the number of layers with either.
     lost: usize,
     broken: usize,
     layers_with_losses: usize,
     /// Where the first of these was.
     first_loss: Option<String>,
     listed: Vec<NarrowedWall>,
-    /// The narrowest, where it was and how wide in micrometres.
+    /// The narrowest wall: its place, and its width in micrometers.
     narrowest: Option<(f64, String)>,
-    /// The first layer that its image cut off, and how many.
+    /// The first layer cut off by its image, and the number of such layers.
     cut_off: Option<(String, usize)>,
 }
 

@@ -1,11 +1,11 @@
-//! Whoever watches a stage at work: a terminal, or a list of lines.
+//! Watchers of a stage at work: a terminal, or a list of lines.
 
 use std::sync::Mutex;
 
 /// How much a line matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Importance {
-    /// Read by those who ask for details.
+    /// For people who ask for details.
     Detail,
     /// Worth knowing.
     Note,
@@ -39,8 +39,8 @@ pub trait Watcher {
     /// Takes a line.
     fn remark(&self, remark: Remark);
 
-    /// Takes how far a search for layer heights has come, in micrometres, of a part that reaches
-    /// over `part_um`.
+    /// Takes the height that a search for layer heights has reached, in micrometers, in a part that
+    /// is `part_um` high.
     fn height_reached(&self, part_um: [f64; 2], um: f64) {
         let _ = (part_um, um);
     }

@@ -1,6 +1,6 @@
 //! Settings as words of a command, for people, and as texts, for records.
 //!
-//! Each value stands as people write it, so that the words are a command that can be run. Nothing
+//! Each value appears as people write it, so that the words are a command that can be run. Nothing
 //! reads the words again: records hold the settings themselves.
 
 use std::fmt::Display;
@@ -29,7 +29,7 @@ pub fn words_of(settings: &impl Serialize) -> String {
     }
 }
 
-/// Returns the key of the first setting that is not the same in both.
+/// Returns the key of the first setting that differs between both.
 pub fn differing<T: Serialize>(a: &T, b: &T) -> Option<String> {
     let [a, b] = [a, b].map(|it| serde_json::to_value(it).expect("settings are texts and flags"));
     let (a, b) = (a.as_object()?, b.as_object()?);
@@ -39,7 +39,7 @@ pub fn differing<T: Serialize>(a: &T, b: &T) -> Option<String> {
 
 /// Returns an option with its value as words of a shell.
 pub fn option(key: &str, value: &str) -> String {
-    // Else it would be taken for an option.
+    // Otherwise it would be read as an option.
     let between = if value.starts_with("--") { '=' } else { ' ' };
     format!(" --{key}{between}{}", quoted(value))
 }
@@ -64,7 +64,7 @@ pub mod parts {
     /// Reads them.
     ///
     /// # Errors
-    /// Returns an error if a text is none.
+    /// Returns an error if a text does not parse.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PartFile>, D::Error> {
         let texts = Vec::<String>::deserialize(from)?;
         let parsed = texts.into_iter().map(|text| PartFile::parse(text.into()));
@@ -87,7 +87,7 @@ pub mod text {
     /// Reads them.
     ///
     /// # Errors
-    /// Returns an error if a text is none.
+    /// Returns an error if the text does not parse.
     pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
         from: D,
     ) -> Result<T, D::Error> {
@@ -116,7 +116,7 @@ pub mod optional {
     /// Reads them.
     ///
     /// # Errors
-    /// Returns an error if a text is none.
+    /// Returns an error if the text does not parse.
     pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
         from: D,
     ) -> Result<Option<T>, D::Error> {
@@ -143,7 +143,7 @@ pub mod list {
     /// Reads them.
     ///
     /// # Errors
-    /// Returns an error if a text is none.
+    /// Returns an error if a text does not parse.
     pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
         from: D,
     ) -> Result<Vec<T>, D::Error> {
@@ -151,7 +151,7 @@ pub mod list {
     }
 }
 
-/// A path as text, for serde. Names that are no Unicode text are written as far as they are.
+/// A path as text, for serde. Names that are not Unicode get replacement characters.
 pub mod path {
     use std::path::{Path, PathBuf};
 
