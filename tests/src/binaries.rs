@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Names the folder of programs that are built already, from the workspace's folder.
+/// The folder of programs that are built already, as seen from the workspace's folder.
 const PROGRAMS: &str = "LAMP_PROGRAMS";
 
-/// Returns the path of a binary of `lamp-cli`: in the folder `LAMP_PROGRAMS` if that is set, or else
-/// built from the current sources, once a process.
+/// Returns the path of a binary of `lamp-cli`: in the folder `LAMP_PROGRAMS` if that is set, or
+/// else built from the current sources, once a process.
 ///
 /// # Panics
 /// Panics with the compiler's message if the build fails.
@@ -49,8 +49,8 @@ fn folder_above(path: &Path) -> PathBuf {
 /// Builds the binaries with the profile of this test. Cargo does so itself only for
 /// tests of the package that contains them.
 ///
-/// Chooses this package too, so that shared crates keep the features of its tests and are not built
-/// again: its `Cargo.toml` has those that other packages ask for.
+/// Also chooses this package, so that shared crates keep the features of its tests and are not
+/// built again: its `Cargo.toml` has the features that other packages ask for.
 fn build() {
     let folder = profile_dir();
     let profile = match folder.file_name().and_then(|name| name.to_str()) {

@@ -40,7 +40,7 @@ pub fn with_soft_edges(mask: &Mask) -> GrayMask {
 /// Returns the pixels of a gray image that have at least a level.
 ///
 /// # Panics
-/// Never panics: its columns are those of the gray image.
+/// Never panics: its columns are the columns of the gray image.
 pub fn at_least(gray: &GrayMask, level: u8) -> Mask {
     let mut mask = MaskBuilder::new(gray.width());
     for row in gray.rows() {

@@ -44,8 +44,8 @@ pub fn tilted_ball() -> Mesh {
     })
 }
 
-/// Returns a folder of other programs' models or images (`stl` or `tiff`) in
-/// `../shared/data` beside the workspace, if it exists.
+/// Returns a folder of other programs' models or images (`stl` or `tiff`) in `../shared/data` next
+/// to the workspace, if it exists.
 pub fn shared_data(kind: &str) -> Option<PathBuf> {
     let folder = workspace_root().parent()?.join("shared/data").join(kind);
     folder.is_dir().then_some(folder)

@@ -172,8 +172,8 @@ impl Scratch {
         Ran { line: line.to_owned(), statuses, stdout, stderr }
     }
 
-    /// Starts a pipeline, the last stage of which writes to `file` if there is one, and all of
-    /// which say their messages into `said`.
+    /// Starts a pipeline. Its last stage writes to `file` if there is one, and all stages write
+    /// their messages to `said`.
     pub fn start(&self, stages: &str, file: Option<&str>, said: &File) -> Vec<Child> {
         let stages: Vec<&str> = stages.split('|').collect();
         let mut children: Vec<Child> = Vec::new();
@@ -270,7 +270,7 @@ pub fn read_stack(bytes: Vec<u8>) -> Vec<Layer> {
     pages.layers().collect::<Result<_, _>>().expect("a whole stack")
 }
 
-/// Returns whether a row of the image ends white, which none of a whole part does.
+/// Returns whether a row of the image ends white; rows of a whole part never do.
 pub fn ends_white(mask: &Mask) -> bool {
     mask.rows().any(|row| row.len() % 2 == 1)
 }

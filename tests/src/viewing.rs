@@ -36,8 +36,8 @@ pub struct Answer {
 }
 
 impl Viewing {
-    /// Returns the most memory that the viewer has taken, in bytes; none where the system does not
-    /// tell.
+    /// Returns the most memory that the viewer has taken, in bytes; `None` where the system does
+    /// not report it.
     pub fn peak_memory(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.server.id())).ok()?;
         let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -58,8 +58,8 @@ impl Viewing {
         viewing
     }
 
-    /// Starts `lamp view` with some variables of its environment, and leaves its address, which is
-    /// good for once, to others. There is no cookie then.
+    /// Starts `lamp view` with some environment variables, and leaves its address, which works
+    /// once, to others. There is no cookie then.
     ///
     /// # Panics
     /// Panics if it does not print its address.
@@ -81,8 +81,8 @@ impl Viewing {
         viewing
     }
 
-    /// Starts `lamp view --open` with a browser that only notes its arguments, and waits for those,
-    /// each in a line. The address that was printed is left to others.
+    /// Starts `lamp view --open` with a browser that only records its arguments, and waits for
+    /// these, each in a line. The printed address is left to others.
     ///
     /// # Panics
     /// Panics if no browser is started.
@@ -154,7 +154,7 @@ impl Viewing {
     /// Sends a request and returns its answer.
     ///
     /// # Panics
-    /// Panics if there is none.
+    /// Panics if there is no answer.
     #[track_caller]
     pub fn ask(&self, request: &str) -> Answer {
         self.send(request.as_bytes()).unwrap_or_else(|| panic!("no answer to {request}"))
@@ -179,10 +179,10 @@ impl Viewing {
         stream
     }
 
-    /// Returns what it said on standard error.
+    /// Returns its text on standard error.
     ///
     /// # Panics
-    /// Panics if that is no text.
+    /// Panics if it is not text.
     pub fn said(&self) -> String {
         let mut said = String::new();
         let mut file = self.said.try_clone().expect("a file has many handles");
@@ -205,8 +205,8 @@ fn port_and_token(address: &str) -> Option<(u16, &str)> {
 }
 
 impl Answer {
-    /// Reads an answer to its end, as its length tells or the connection closes. Returns none if
-    /// the connection closed before the headers were through.
+    /// Reads an answer to its end: its stated length, or the end of the connection. Returns `None`
+    /// if the connection closed before the headers were complete.
     pub fn read(stream: &mut impl Read) -> Option<Self> {
         let mut reader = BufReader::new(stream);
         let mut head = Vec::new();
@@ -227,7 +227,7 @@ impl Answer {
         let mut answer =
             Self { status, headers: lines.filter_map(header).collect(), body: Vec::new() };
         let length = answer.header("content-length").and_then(|length| length.parse().ok());
-        // A connection that breaks off leaves what came.
+        // A broken connection leaves the bytes received so far.
         let _: io::Result<usize> = match length {
             Some(length) => reader.take(length).read_to_end(&mut answer.body),
             None => reader.read_to_end(&mut answer.body),

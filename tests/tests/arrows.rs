@@ -5,8 +5,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// All crates of the workspace, from the ground floor up. A crate may use those of lower floors,
-/// and none of its own.
+/// All crates of the workspace, from the ground floor up. A crate may use crates of lower floors,
+/// and no crate of its own floor.
 const FLOORS: &[&[&str]] = &[
     &["lamp-stack", "lamp-brep"],
     &["lamp-brep-occt", "lamp-fixtures"],
@@ -17,7 +17,7 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-pipeline"],
     &["lamp"],
     &["lamp-cli"],
-    // What tries the rooms. Nothing is built on it.
+    // Crates that test the others. Nothing is built on them.
     &["lamp-truck-fixtures", "lamp-tests", "lamp-benches"],
 ];
 
@@ -40,7 +40,7 @@ fn packages() -> Vec<Value> {
     metadata["packages"].as_array().expect("metadata lists packages").clone()
 }
 
-/// Returns the crates of the workspace that a package needs, but for its own tests.
+/// Returns the crates of the workspace that a package needs, except for its own tests.
 fn needs(package: &Value) -> impl Iterator<Item = &str> {
     let all = package["dependencies"].as_array().into_iter().flatten();
     // Crates of the workspace have paths; the kinds are null, `build` and `dev`.

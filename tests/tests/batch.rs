@@ -14,7 +14,7 @@ fn night(scratch: &Scratch) -> Ran {
     scratch.run("lamp batch night.toml --jobs 2 --verbose")
 }
 
-/// The tasks that a run has done, as it tells them.
+/// The tasks that a run has done, as it lists them.
 fn done(ran: &Ran) -> Vec<&str> {
     ran.stderr
         .lines()
@@ -45,7 +45,7 @@ fn write_over(path: &Path, bytes: &[u8]) {
     fs::write(path, bytes).unwrap();
 }
 
-/// What a report tells first, as text.
+/// The first lines of a report, as text.
 fn first_of_report(scratch: &Scratch, folder: &str) -> String {
     let html = String::from_utf8(scratch.bytes(&format!("{folder}/report.html"))).unwrap();
     let start = html.find("Look at this first").expect("it tells what to look at");
@@ -115,7 +115,7 @@ fn a_night_of_twenty_parts_names_the_bad_ones_first() {
         );
     }
     assert!(!scratch.path("out/builds/three.tif").exists());
-    // What is done is not done again.
+    // Finished tasks are not done again.
     let again = night(&scratch);
     assert_eq!((again.statuses.clone(), done(&again)), (vec![Some(1)], vec![]), "{again:?}");
     // With a stray band that is left instead of the bad ones, all is done and a person is needed.
@@ -181,7 +181,8 @@ fn only_what_depends_on_a_change_is_done_again() {
     let ran = night(&scratch);
     assert!(ran.statuses == [Some(0)] && !done(&ran).is_empty(), "{ran:?}");
     assert!(done(&ran).iter().all(|task| !task.starts_with("a ")), "{ran:?}");
-    // Back again: all is there still, and the build has the same bytes but for the file's new name.
+    // Back again: everything is still there, and the build has the same bytes except the file's new
+    // name.
     scratch.write("night.toml", named.as_bytes());
     assert_eq!(done(&night(&scratch)), [""; 0]);
     fs::rename(scratch.path("c.stl"), scratch.path("b.stl")).unwrap();
@@ -196,7 +197,7 @@ fn damaged_results_are_found_and_made_again() {
     assert_eq!(night(&scratch).statuses, [Some(0)]);
     let build = scratch.bytes("night/builds/both.lamp");
     scratch.run("lamp batch verify night.toml").succeeds_quietly();
-    // Half a manifest is none.
+    // Half a manifest does not count.
     let manifests = stored(&scratch, "json");
     for manifest in &manifests {
         let text = fs::read(manifest).unwrap();

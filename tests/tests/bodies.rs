@@ -24,7 +24,7 @@ fn slice(scratch: &Scratch, words: &str) -> Vec<Layer> {
     scratch.layers("out.tif")
 }
 
-/// Returns the area of each layer, in square millimetres.
+/// Returns the area of each layer, in square millimeters.
 fn areas_mm2(layers: &[Layer]) -> Vec<f64> {
     layers.iter().map(|layer| mask(layer).white_pixels() as f64 / 100.0).collect()
 }

@@ -238,7 +238,7 @@ fn the_line_of_an_ageing_lamp_comes_back_from_its_films() {
     scratch.run("lamp calibrate lamp one.csv").is_refused_with(&["1 light is too few"]);
 }
 
-/// Squares that did not grow tell where growth begins, and commands know where it was measured.
+/// Squares that did not grow show where growth begins, and commands know where it was measured.
 #[test]
 fn doses_outside_the_measured_ones_are_told() {
     let scratch = Scratch::new();

@@ -91,7 +91,7 @@ fn an_overwritten_file_is_refused_even_if_its_size_and_time_are_restored() {
     });
 }
 
-/// What leaves the content alone leaves the images alone.
+/// Changes that leave the content alone leave the images alone.
 #[test]
 fn a_file_that_gets_other_names_and_rights_is_sliced() {
     let change = |part: &Path| {

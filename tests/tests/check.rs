@@ -1,4 +1,4 @@
-//! Checks what `lamp check` tells of stacks and parts.
+//! Checks the reports of `lamp check` on stacks and parts.
 
 use lamp_fixtures::{
     Mesh, Sample, build, closed_void, cup, mug, needle, ring, serpentine, slanted_wall,
@@ -80,7 +80,7 @@ fn pictures_show_the_worst_findings() {
     reader.next_frame(&mut pixels).unwrap();
     let (pixels, _) = pixels.as_chunks::<3>();
     let red = pixels.iter().filter(|pixel| **pixel == [230, 30, 30]).count();
-    // The ring has 156 mm2, at 10 pixels a millimetre and 2 x 2 pixels for one.
+    // The ring has 156 mm2, at 10 pixels a millimeter and 2 x 2 pixels for one.
     assert!((red as f64 / (156.0 * 400.0) - 1.0).abs() < 0.02, "{red}");
     let ran = scratch.run("lamp check ring.tif --evidence of_stack");
     ran.is_refused_with(&["of_stack"]);
@@ -203,7 +203,7 @@ fn a_chamber_behind_a_narrow_hole_drains_through_it_only_if_that_may_be_narrow()
 
 #[test]
 fn minima_that_pixels_miss_and_islands_that_the_mesh_lacks_are_told() {
-    // No centre of a pixel of 5 mm lies in the needle, which is 4 mm wide.
+    // No center of a pixel of 5 mm lies in the needle, which is 4 mm wide.
     let scratch = with("needle.stl", &needle(2000));
     let frame = "--dpi 5.08 --origin -50,50 --size 100x100mm";
     let line = format!("lamp check needle.stl {frame} --only islands --speck 1 --report n.json");

@@ -1,4 +1,4 @@
-//! Checks what `lamp compare` tells of stacks, against their pixels.
+//! Checks the reports of `lamp compare` on stacks, against their pixels.
 
 use lamp_fixtures::Sample;
 use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo, StackInfo};

@@ -241,7 +241,7 @@ critical-dose = { value = "80 mJ/cm2", source = "page 2" }
 sensitivity = { value = "0.5 um/(mJ/cm2)", source = "page 2" }
 "#;
 
-/// The growth of each edge of a feature of a size in micrometres at 500 mJ/cm2, in this resin.
+/// The growth of each edge of a feature of a size in micrometers at 500 mJ/cm2, in this resin.
 fn steep_growth(size_um: f64) -> f64 {
     let share = ((size_um - 423.3) / (7620.0 - 423.3)).clamp(0.0, 1.0);
     (0.02 + 0.48 * share) * (400.0 + 20.0 * share)

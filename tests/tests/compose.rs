@@ -1,4 +1,4 @@
-//! Checks that `lamp compose` makes the pages that `tile` writes, of a recipe in the place of a build.
+//! Checks that `lamp compose` makes the pages that `tile` writes, from a recipe instead of a build.
 
 use std::fs;
 
@@ -155,7 +155,7 @@ fn no_recipe_is_written_of_a_build_that_is_refused() {
     scratch
         .run("tile pages/ --recipe r.json")
         .is_wrong_usage(&["pages/ is a folder", "lamp convert"]);
-    // Stray rows are told of as when the build is made.
+    // Stray rows are reported as when the build is made.
     scratch.run("lamp sample tower --facets 5k --defect drop -q -o broken.stl").succeeds_quietly();
     scratch.run("slice broken.stl --dpi 100 --thickness 1mm -q -o broken.tif").succeeds();
     let strict = scratch.run("tile broken.tif --area 60x60mm --strict --recipe r.json");

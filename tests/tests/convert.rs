@@ -93,7 +93,7 @@ fn a_folder_of_pngs_holds_the_pixels_and_the_lines() {
     for layer in &layers {
         let png = read(scratch.bytes(&format!("pngs/layer_{:05}.png", layer.info.index)));
         assert_shows(&png, layer);
-        // 100 dpi are 3937.008 pixels a metre.
+        // 100 dpi are 3937.008 pixels a meter.
         assert_eq!(png.per_metre, Some(3937));
         assert_eq!(before_check(&png.line), serde_json::to_string(&layer.info).unwrap());
     }

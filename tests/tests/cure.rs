@@ -9,7 +9,7 @@ use lamp_tests::Scratch;
 /// The distance of the referee's lines: whole ones to a pixel of 1500 dpi.
 const LINE_DPI: f64 = 30_000.0;
 
-/// What a line of the referee is exposed to: tops of layers in micrometres, and levels 0 to 1.
+/// Exposures of a line of the referee: tops of layers in micrometers, and levels 0 to 1.
 type Exposures = Vec<[f64; 2]>;
 
 /// The dose at a height as a share of the critical one, written out from 002 eq. 40: each exposure
@@ -24,7 +24,7 @@ fn share(exposures: &[[f64; 2]], white_mj: f64, z_um: f64) -> f64 {
     near.map(of).sum()
 }
 
-/// Layers of one thickness: the first one's number, the number after the last one's, micrometres.
+/// Layers of one thickness: the first one's number, the number after the last one's, micrometers.
 #[derive(Clone, Copy)]
 struct Layers {
     first: usize,
@@ -108,7 +108,7 @@ fn wedge() -> Mesh {
     prism(1.0 / 12f64.to_radians().tan())
 }
 
-/// A prism along y, 2 mm high, whose left face overhangs by so many millimetres in each upwards.
+/// A prism along y, 2 mm high, whose left face overhangs by so many millimeters in each upwards.
 fn prism(overhang: f64) -> Mesh {
     let corner = |k: usize| {
         let [right, back, top] = [k & 1, k >> 1 & 1, k >> 2 & 1].map(|bit| bit as f64);
@@ -129,7 +129,7 @@ fn told(said: &str, panel: &str) -> ([f64; 4], u32) {
     (numbers.try_into().unwrap(), row.parse().unwrap())
 }
 
-/// Returns the height of y of a row's centre, and the right edge of the images.
+/// Returns the height of y of a row's center, and the right edge of the images.
 fn place(layer: &Layer, row: u32) -> [f64; 2] {
     let ([x, y], pitch) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap().pitch().mm());
     [y - (f64::from(row) + 0.5) * pitch, x + f64::from(layer.image.width()) * pitch]
@@ -139,7 +139,7 @@ fn place(layer: &Layer, row: u32) -> [f64; 2] {
 fn agree(found: [f64; 4], exact: [f64; 4], name: &str) {
     println!("{name}: {found:?} mm2 told, {exact:?} by lines");
     for (k, (found, exact)) in found.iter().zip(exact).enumerate() {
-        // What is missing is a sliver: held to a tenth of a per cent of the overshoot.
+        // The missing part is a sliver: held to a tenth of a per cent of the overshoot.
         let scale = if k == 3 { found.max(exact) + 0.1 } else { exact };
         assert!((found - exact).abs() < 1e-3 * scale, "{name}, column {k}: {found} {exact}");
     }
@@ -219,7 +219,7 @@ fn areas_of_gray_are_those_of_its_levels() {
     }
 }
 
-/// An upright wall cuts pixels, and those whose centres it holds are wholly cured at best.
+/// An upright wall cuts pixels, and those whose centers it holds are wholly cured at best.
 #[test]
 fn pixels_leave_what_walls_cut_off() {
     let scratch = Scratch::new();

@@ -12,7 +12,7 @@ fn with_cube() -> Scratch {
     scratch
 }
 
-/// Returns whether a layer is white at a point of the part, in millimetres.
+/// Returns whether a layer is white at a point of the part, in millimeters.
 fn white_at(layer: &Layer, [x, y]: [f64; 2]) -> bool {
     let [x0, y1] = layer.info.origin_mm.unwrap();
     mask(layer).is_white(((x - x0) * 10.0) as u32, ((y1 - y) * 10.0) as u32)
@@ -518,7 +518,7 @@ fn a_build_keeps_what_is_not_in_its_copies() {
     assert!(masks(&before)[5..].iter().zip(&masks(&after)[5..]).all(|(a, b)| a != b));
     scratch.write("only.toml", rib.replace("copies", "op = \"intersect\"\ncopies").as_bytes());
     scratch.run("lamp edit build.tif only.toml -o x.tif").is_refused_with(&["intersect", "tile"]);
-    // Nothing is lost beside the image.
+    // Nothing is lost outside the image.
     scratch
         .run("lamp edit cube.tif --union torus.tif -o x.tif")
         .is_refused_with(&["beside its image", "pad"]);

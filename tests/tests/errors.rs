@@ -1,4 +1,4 @@
-//! Checks errors: one sentence, a status that tells usage from input, no file under its final name.
+//! Checks errors: one sentence, a status for usage or input, no file under its final name.
 
 use std::fs;
 use std::io::Cursor;
@@ -167,7 +167,7 @@ fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
         let words = [&[place.as_str()], words].concat();
         is_bad_input(&scratch, &format!("slice {name} -o x.tif"), &words);
         is_bad_input(&scratch, &format!("slice {name} -o x/"), &words);
-        // The next stage is told, too.
+        // The next stage gets the error, too.
         let ran = scratch.run(&format!("slice {name}")).is_refused_with(&words);
         let told = Pages::from_stream(Cursor::new(ran.stdout)).unwrap().next().unwrap();
         let told = told.unwrap_err().to_string();
@@ -259,7 +259,7 @@ fn a_stack_that_does_not_fit_the_options_is_refused() {
     }
 }
 
-/// A name that would colour a terminal and forge a second line.
+/// A name that would color a terminal and forge a second line.
 #[test]
 fn names_of_files_cannot_steer_the_terminal() {
     let scratch = with_all_sorts();

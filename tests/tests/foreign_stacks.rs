@@ -1,5 +1,5 @@
-//! Checks that every kind of TIFF and picture that libtiff, Pillow and the image crate write is read
-//! with the same pixels.
+//! Checks that every kind of TIFF and picture that libtiff, Pillow and the image crate write is
+//! read with the same pixels.
 
 use std::fs;
 
@@ -22,7 +22,7 @@ impl Dice {
     }
 }
 
-/// Widths near those of bytes, words, tiles and the longest code.
+/// Widths near the widths of bytes, words, tiles and the longest code.
 const WIDTHS: [u32; 16] = [1, 7, 8, 9, 31, 32, 33, 63, 64, 65, 239, 240, 241, 2559, 2560, 2561];
 
 /// Returns rows that differ as much as possible, then rows like those above them.

@@ -137,7 +137,7 @@ fn a_material_alone_says_how_long_white_layers_are_exposed() {
     scratch.run(&format!("slice tower.stl {COARSE} -o plain.tif")).succeeds_quietly();
     let line = format!("slice tower.stl {COARSE} --material mine.toml --overcure 1.5 -o timed.tif");
     scratch.run("lamp material show lamp-suspension > mine.toml").succeeds();
-    // Doses beyond those that 002 measured are told.
+    // Doses beyond the range that 002 measured are reported.
     let said = scratch.run(&line).succeeds().stderr;
     let words = "layers get 2233 mJ/cm2, but lamp-suspension was measured at 320 to 1920 mJ/cm2";
     assert!(said.contains(words) && said.lines().count() == 1, "{said}");
@@ -230,7 +230,7 @@ fn areas(text: &[u8]) -> Vec<[f64; 2]> {
     .collect()
 }
 
-/// Returns the width of a colour picture and its pixels row by row.
+/// Returns the width of a color picture and its pixels row by row.
 fn rgb_pixels(png: &[u8]) -> (usize, Vec<[u8; 3]>) {
     let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
@@ -282,7 +282,7 @@ fn print_through_stays_in_the_part() {
     let [white, gray] = areas(&ran.stdout)[..] else { panic!("two panels") };
     assert!(white[0] > 1.0 && gray[0] < 0.1 * white[0], "{white:?} {gray:?}");
     assert!(gray[1] < white[1] + 0.1 * white[0], "{white:?} {gray:?}");
-    // Outlines are those of white, but for pixels whose centres are on the underside.
+    // Outlines are the outlines of white, except pixels whose centers are on the underside.
     let (white, summed) = (scratch.layers("white.tif"), scratch.layers("summed.tif"));
     let lit = |image: &Image| -> u64 {
         let runs = (0..image.height()).flat_map(|row| image.runs(row));
@@ -346,7 +346,7 @@ fn a_section_needs_its_own_part() {
     assert!(!scratch.path("t.png").exists());
 }
 
-/// The colours of what is cured, and of what is not.
+/// The colors of what is cured, and of what is not.
 const CURED: [u8; 3] = [200, 204, 208];
 const EMPTY: [u8; 3] = [24, 26, 30];
 

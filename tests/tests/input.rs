@@ -1,4 +1,4 @@
-//! What `slice` reads, how parts are placed, and what it says of parts that are hardly meant so.
+//! Inputs of `slice`: formats, placements, and warnings of parts that are hardly meant so.
 
 use std::fs;
 use std::io::Write;
@@ -45,7 +45,7 @@ fn every_format_gives_the_same_layers_and_pipes_do() {
     }
 }
 
-/// What the shell makes of `slice <(zcat part.stl.gz)`: a name that stands for a pipe.
+/// The shell turns `slice <(zcat part.stl.gz)` into a name that stands for a pipe.
 #[cfg(unix)]
 #[test]
 fn a_pipe_with_a_name_is_read_to_its_end() {
@@ -96,7 +96,7 @@ fn a_folder_is_named_as_one() {
     scratch.run("slice folder/ -o x.tif").is_refused_with(&["is a folder", "name the part's file"]);
 }
 
-/// Parts in metres and micrometres: warned of, refused with --strict, and right with their unit.
+/// Parts in meters and micrometers: warned of, refused with --strict, and right with their unit.
 #[test]
 fn a_wrong_unit_is_told() {
     let scratch = Scratch::new();

@@ -1,4 +1,4 @@
-//! The programs of the stages, which start the `lamp` beside them.
+//! The programs of the stages, which start the `lamp` next to them.
 
 use std::fs;
 use std::path::Path;

@@ -61,7 +61,7 @@ fn a_job_keeps_every_print() {
     scratch
         .run("lamp learn job/ --measured a.csv -o next.csv")
         .is_refused_with(&["with other options: print-001.csv is there already"]);
-    // The same table is not that of the next print.
+    // The same table does not fit the next print.
     scratch
         .run("lamp learn job/ --measured a.csv --print 1 -o next.csv")
         .is_refused_with(&["given twice: measure print 1"]);

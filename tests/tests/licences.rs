@@ -23,7 +23,7 @@ fn crates() -> Option<BTreeSet<String>> {
     }
     let text = String::from_utf8(tree.stdout).expect("names are text");
     let mut crates = BTreeSet::new();
-    // What stands in the tree twice is marked so; crates of the workspace have their path.
+    // Crates that the tree has twice are marked so; crates of the workspace have their path.
     for line in text.lines().map(|line| line.trim_end_matches(" (*)")) {
         let Some((package, licence)) = line.split_once('|') else { continue };
         if let Some((name, version)) = package.split_once(" v")

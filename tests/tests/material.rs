@@ -83,7 +83,7 @@ fn check_says_in_a_sentence_what_a_file_allows() {
         ("pegda-mw700", "depths of 180um or more"),
         ("sl-5510", "add [intensity]"),
         ("pegda-sudan", "working-curve, spread 50um; at 7.394 mW/cm2"),
-        // A wide field is brighter than the pixel that its intensity is told for.
+        // A wide field is brighter than the pixel for which its intensity is stated.
         ("zsg-amber", "gamma 2.404; at 3185.57 mW/cm2, full white cures 100um in 62.9 ms"),
         ("tmpta", "in order and gives kinetics, but tmpta has no cure model: add [working-curve]"),
     ] {

@@ -135,7 +135,7 @@ fn each_defect_is_repaired_and_reported() {
 fn a_mesh_without_faults_keeps_its_bytes() {
     let scratch = Scratch::new();
     scratch.part("tower.stl", Sample::Tower, 5_000);
-    // What a rewritten file would lose: a header and attributes.
+    // Parts that a rewritten file would lose: a header and attributes.
     let mut binary = scratch.bytes("tower.stl");
     (binary[3], binary[84 + 48]) = (b'!', 17);
     let facet = |corners: &str| {

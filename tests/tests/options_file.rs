@@ -58,7 +58,7 @@ fn the_command_line_wins() {
             "--dpi 100 --thickness 4mm --plane top --units mm --fill \
           solid --rotate z:5 --margin 3",
         ),
-        // What contradicts it is left out, too.
+        // Options that contradict it are left out, too.
         ("--adaptive --max 4mm", "--dpi 100 --adaptive --max 4mm --plane top"),
         ("--origin -20,60 --size 40x120mm --rotate x:0", "--origin -20,60 --size 40x120mm"),
     ] {

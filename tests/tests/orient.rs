@@ -53,7 +53,7 @@ fn images_have_the_islands_that_the_mesh_tells() {
     }
 }
 
-/// A pose's height and footprint are those of the stack that its rotation gives.
+/// A pose's height and footprint equal the stack's that its rotation gives.
 #[test]
 fn slicing_with_the_rotation_gives_the_pose() {
     let scratch = with("mug.stl", &mug(1_000));

@@ -141,7 +141,7 @@ fn libtiff_finds_no_difference() {
         }
         scratch.run("lamp pack theirs.tif -q -o theirs.lamp").succeeds_quietly();
         scratch.run("lamp convert theirs.lamp -q -o back.tif").succeeds_quietly();
-        // Decoded and written by libtiff alone, both are the same file but for their tags.
+        // Decoded and written by libtiff alone, both are the same file except for their tags.
         for (file, plain) in [("theirs.tif", "theirs_plain.tif"), ("back.tif", "back_plain.tif")] {
             ask(&scratch, "tiffcp", &["-c", "none", "-r", "400", file, plain]);
         }

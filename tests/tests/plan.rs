@@ -83,8 +83,8 @@ fn levels(layer: &Layer) -> Vec<Vec<u8>> {
     (0..layer.image.height()).map(row).collect()
 }
 
-/// Calls `check` with each pixel of a plan of the staircase: how far it lies within the part, by
-/// squares, or without (below zero), and its level.
+/// Calls `check` with each pixel of a plan of the staircase: its depth within the part, in squares,
+/// below zero outside, and its level.
 fn each_pixel(scratch: &Scratch, mut check: impl FnMut(i32, u8)) {
     let part = cavity_staircase(1);
     let planned = scratch.layers("planned.tif");
@@ -213,7 +213,7 @@ fn pages_without_a_time_get_the_one_given() {
     let silent = STAIRS.replace("stairs.tif", "silent.tif");
     scratch.run(&format!("{silent} --exposure 0.3s -o given.tif")).succeeds();
     assert!(scratch.bytes("stated.tif") == scratch.bytes("given.tif"));
-    // What pages state wins.
+    // The exposure on pages wins.
     scratch.run(&format!("{STAIRS} --exposure 9s -o kept.tif")).succeeds();
     assert!(scratch.bytes("stated.tif") == scratch.bytes("kept.tif"));
     scratch.run(&format!("{silent} -o none.tif")).is_refused_with(&[

@@ -131,7 +131,7 @@ fn bitmaps_that_no_display_shows_are_refused() {
     }
 }
 
-/// The facets of a box in millimetres, counter-clockwise seen from outside.
+/// The facets of a box in millimeters, counter-clockwise seen from outside.
 fn block(at: [f32; 3], size: [f32; 3]) -> impl Iterator<Item = Facet> {
     const SIDES: [[usize; 4]; 6] =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];

@@ -1,5 +1,5 @@
-//! Compares sections with those that POV-Ray renders, where it is installed: an independent
-//! program that tells inside from outside by the facets a ray from the pixel's centre meets
+//! Compares sections with sections that POV-Ray renders, where it is installed: an independent
+//! program that decides inside or outside by the facets that a ray from the pixel's center meets
 //! (002 section 2.3.1).
 
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ const SLACK_MM: f64 = 20e-6;
 const DIRECTIONS: [&str; 2] = ["<0.31, 0.83, 0.46>", "<-0.67, 0.22, 0.71>"];
 
 /// Slices a part at some height, renders the same section and returns the pixels that differ,
-/// as the distances in mm of their centres from the outline; `None` without POV-Ray.
+/// as the distances in mm of their centers from the outline; `None` without POV-Ray.
 fn differences_mm(part: Sample, facets: usize, dpi: u32, height_um: u32) -> Option<Vec<f64>> {
     if Command::new("povray").arg("--version").output().is_err() {
         note("povray is not installed: skipped");
@@ -56,7 +56,7 @@ fn differences_mm(part: Sample, facets: usize, dpi: u32, height_um: u32) -> Opti
     Some(distances_mm)
 }
 
-/// Returns a scene in which a ray straight down through each pixel's centre shows the plane,
+/// Returns a scene in which a ray straight down through each pixel's center shows the plane,
 /// white, where that is inside the part, and else the part or nothing, black.
 fn scene(mesh: &Mesh, layer: &Layer, pitch_mm: f64, plane_mm: f64, direction: &str) -> String {
     let corners = mesh.facets.as_flattened();
@@ -128,7 +128,7 @@ fn distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
     (point[0] - a[0] - part * along[0]).hypot(point[1] - a[1] - part * along[1])
 }
 
-/// Sections differ only in pixels whose centre is on the outline, and in few of these.
+/// Sections differ only in pixels whose center is on the outline, and in few of these.
 fn agrees(part: Sample, facets: usize, dpi: u32, height_um: u32) {
     let Some(distances_mm) = differences_mm(part, facets, dpi, height_um) else { return };
     let beside = distances_mm.iter().all(|&distance| distance < SLACK_MM);

@@ -6,8 +6,8 @@ use lamp_tests::Scratch;
 
 const COARSE: &str = "--dpi 100 --thickness 1mm -q";
 
-/// A part of 76 layers with gaps in its mesh, so that `fix` has work to do. It looks at the layers
-/// beside, so ranges are joined before it.
+/// A part of 76 layers with gaps in its mesh, so that `fix` has work to do. It looks at neighboring
+/// layers, so ranges are joined before it.
 fn with_broken_tower() -> Scratch {
     let scratch = Scratch::new();
     scratch.run("lamp sample tower --facets 5k --defect drop --count 20 -o t.stl -q").succeeds();

@@ -1,4 +1,4 @@
-//! What stacks, recipes and jobs record: commands that can be typed again, files that are found by
+//! Records of stacks, recipes and jobs: commands that can be typed again, files that are found by
 //! their digests, and numbers that nobody changes in silence.
 
 use std::fs;

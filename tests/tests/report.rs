@@ -1,4 +1,4 @@
-//! Compares the pages of `lamp report` with what `lamp info` and `lamp check` tell.
+//! Compares the pages of `lamp report` with the output of `lamp info` and `lamp check`.
 
 use lamp_fixtures::mug;
 use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo, StackInfo};
@@ -236,7 +236,7 @@ fn odd_stacks_have_pages_too() {
         (&stack["by_layer"]["gray_px"], &stack["by_layer"]["perimeter_px"]),
         (&json!([1]), &json!([4]))
     );
-    // Layers of two sizes cannot be checked, and are told all the same.
+    // Layers of two sizes cannot be checked, but are reported all the same.
     scratch.stack(
         "sizes.tif",
         [of(0, gray().into()), of(1, Mask::black(40, 3).into()), of(2, gray().into())],

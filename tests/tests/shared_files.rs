@@ -1,4 +1,4 @@
-//! Reads other programs' models and images in `../shared/data` beside the workspace, if present.
+//! Reads other programs' models and images in `../shared/data` next to the workspace, if present.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek};

@@ -5,7 +5,7 @@ use lamp_stack::Image;
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
-/// Cores that hang in a mould's cavity: 10 x 6 mm at 8 mm, and 4 x 6 mm at 12 mm.
+/// Cores that hang in a mold's cavity: 10 x 6 mm at 8 mm, and 4 x 6 mm at 12 mm.
 fn with_cores() -> Scratch {
     let scratch = Scratch::new();
     scratch.part("core.stl", Sample::Core, 2_000);
@@ -74,7 +74,7 @@ fn supports_hold_islands_and_their_plan_draws_the_same() {
     assert_eq!((&report["islands"], &report["left"]), (&2.into(), &0.into()));
     assert!(report["note"].as_str().unwrap().contains("features of the casting"));
     let [one, other] = &lengths(&report)[..] else { panic!("two islands") };
-    // The floor is 6 mm below the one, a wall 4 mm beside the other.
+    // The floor is 6 mm below the one, a wall 4 mm from the other.
     assert_eq!(one, &[6.0]);
     assert!((other[0] / 32f64.sqrt() - 1.0).abs() < 0.01, "{other:?}");
     let support = &report["plans"][0]["places"][0]["supports"][0];
@@ -97,7 +97,7 @@ fn supports_hold_islands_and_their_plan_draws_the_same() {
         scratch.layers(layers).iter().map(|layer| mask(layer).white_pixels() as i64).sum()
     };
     let added = white("held.tif") - white("core.tif");
-    // What reaches into cores and walls is white before: 0.5 mm of 11.7 mm.
+    // The part of struts in cores and walls is white before: 0.5 mm of 11.7 mm.
     let share = added as f64 / white("struts.tif") as f64;
     assert!(share > 0.9 && share < 1.0, "{share}");
 }

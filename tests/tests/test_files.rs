@@ -8,7 +8,7 @@ use std::process::Command;
 use lamp_tests::workspace_root;
 use serde_json::Value;
 
-/// The test programs beside the one of their package. Its `Cargo.toml` has the reasons.
+/// The test programs besides their package's own. Its `Cargo.toml` has the reasons.
 const ALONE: [&str; 4] = ["check_memory", "false_headers", "occt_files", "real_files"];
 
 /// A package's folder of tests, and the names and first files of its test programs.
@@ -39,7 +39,7 @@ fn packages() -> Vec<Package> {
     list(&metadata["packages"]).into_iter().map(package).collect()
 }
 
-/// Adds a file of Rust and those that its lines `mod x;` name; `folder` has its modules.
+/// Adds a file of Rust and the files that its lines `mod x;` name; `folder` has its modules.
 fn add_with_modules(file: PathBuf, folder: &Path, found: &mut BTreeSet<PathBuf>) {
     let text = fs::read_to_string(&file).expect("a file of a test program");
     found.insert(file);

@@ -1,5 +1,5 @@
 //! Projects of slicers, slices and odd packages in 3MF, sliced by the real program. The numbers of
-//! pixels are those of rectangles.
+//! pixels are the numbers of rectangles.
 
 use lamp_fixtures::{Mesh, three_mf, three_mf_model, zip_package};
 use lamp_tests::{Scratch, masks};

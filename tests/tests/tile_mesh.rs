@@ -28,7 +28,7 @@ fn nearer_than(mask: &Mask, gap: f64) -> Vec<Vec<bool>> {
         let first = row.saturating_sub(reach);
         let lines = near[first..(row + reach + 1).min(height)].iter_mut();
         for (line, near) in (first..).zip(lines) {
-            // The distance between centres is one pixel more.
+            // The distance between centers is one pixel more.
             let away = |across: usize| (across as f64).hypot(line.abs_diff(row) as f64);
             let across = (0..=reach).rev().find(|&across| away(across) < gap + 1.0);
             let Some(across) = across else { continue };

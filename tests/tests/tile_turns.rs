@@ -67,8 +67,8 @@ fn copies(build: &[Layer], stacks: &[Vec<Layer>], layer: usize) -> Vec<Copy> {
     parts.iter().zip(stacks).flat_map(of_part).collect()
 }
 
-/// Checks a build pixel by pixel: that it is its copies, each white pixel of one, and none as near to
-/// one of another as the gap. Returns their number.
+/// Checks a build pixel by pixel: it is its copies, each white pixel belongs to one, and is farther
+/// than the gap from other copies' pixels. Returns the number of copies.
 fn check(scratch: &Scratch, stacks: &[String], gap_px: i64) -> usize {
     let build = scratch.layers("build.tif");
     let stacks: Vec<Vec<Layer>> = stacks.iter().map(|stack| scratch.layers(stack)).collect();
@@ -115,7 +115,7 @@ fn check(scratch: &Scratch, stacks: &[String], gap_px: i64) -> usize {
 #[test]
 fn the_script_of_a_plan_makes_the_build_that_was_planned() {
     let scratch = with_plate(Plate::Aerofoil);
-    // The plate is 62 mm long: only aslant does it fit.
+    // The plate is 62 mm long: it fits only at an angle.
     let area = "--area 60x60mm";
     let script = plan(&scratch, &format!("{area} --turns 45deg"));
     let stacks = run(&scratch, &script);

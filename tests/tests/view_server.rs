@@ -57,7 +57,7 @@ fn a_token_opens_once_and_becomes_a_cookie() {
     let token = viewing.token();
     assert_eq!(token.len(), 32);
     let first = format!("/?token={token}");
-    // What is loaded ahead, or without looking at it, does not use the token up.
+    // Requests that load ahead, or without anybody looking, do not use the token up.
     for purpose in ["Sec-Purpose: prefetch;prerender", "Purpose: prefetch", "X-Moz: prefetch"] {
         let answer = viewing.ask(&viewing.request(&first, &format!("{purpose}\r\n")));
         assert!(answer.header("set-cookie").is_none());
@@ -303,7 +303,7 @@ fn what_there_is_not_is_refused() {
     ] {
         refused(viewing.get(target), &scratch, &[400, 404]);
     }
-    // Browsers ask for an icon by this name, and report an error where there is none.
+    // Browsers ask for an icon by this name, and report an error if there is none.
     let icon = checked(viewing.get("/favicon.ico"), &scratch);
     assert_eq!(icon.status, 200, "{}", icon.text());
     // A radius without bounds is cut down; it does not take for ever.
@@ -427,7 +427,7 @@ fn a_connection_goes_on_after_an_error() {
     ] {
         let mut stream = viewing.connect();
         stream.write_all(garbage).unwrap();
-        // What waits for more of a request hangs up once we do.
+        // A server that waits for more of a request hangs up once we do.
         stream.shutdown(std::net::Shutdown::Write).unwrap();
         if let Some(answer) = Answer::read(&mut stream) {
             assert!((400..500).contains(&answer.status), "{answer:?}");
@@ -607,7 +607,7 @@ fn random_requests_never_fail_the_server() {
         let Some(answer) = Answer::read(&mut stream) else { continue };
         let text = || String::from_utf8_lossy(&request).into_owned();
         assert!((200..500).contains(&answer.status), "{}: {}", answer.status, text());
-        // What is no HTTP at all is refused before it reaches us, without a body.
+        // Input that is not HTTP is refused before it reaches us, without a body.
         if !answer.body.is_empty() {
             checked(answer.clone(), &scratch);
         }

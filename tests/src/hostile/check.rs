@@ -6,11 +6,11 @@ use lamp_supports::{CheckError, CheckOptions, End, Findings};
 use super::{MAX_ROWS, decoded, file_of, one_line};
 
 /// Checks bytes as a stack, and as the pixels of a small one: columns, rows and the side of a
-/// speck, then eight pixels a byte. What is found fits the images, and images that are
-/// mirrored or turned hold the same.
+/// speck, then eight pixels a byte. The findings fit the images, and mirrored or turned images have
+/// the same findings.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn check(bytes: &[u8]) {
     let file = file_of(bytes);
     if let Ok(layers) = decoded(Pages::open(file.path()))
@@ -117,7 +117,7 @@ fn white_pixels(layer: &Layer) -> u64 {
     rows.map(row).sum()
 }
 
-/// What does not depend on where rows and columns begin.
+/// Returns the findings that do not depend on where rows and columns begin.
 fn counts(found: &Findings) -> String {
     // Which of two islands born in one layer is the elder, and so which is a speck, depends.
     let islands = found.islands.count() + found.specks.count();

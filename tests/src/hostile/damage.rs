@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use lamp_fixtures::SplitMix;
 
-/// Values at the ends of what fields hold.
+/// Values at the limits of fields.
 const EXTREMES: [u32; 8] = [0, 1, 0x7F, 0xFF, 0xFFFF, 1 << 26, 1 << 31, u32::MAX];
-/// What a number in a text may become.
+/// Replacements of a number in a text.
 const NUMBERS: [&str; 10] =
     ["0", "-1", "1e308", "-1e-308", "nan", "inf", "4294967296", "1e6", "0.1", "#"];
 
@@ -36,7 +36,7 @@ pub fn damage(bytes: &mut Vec<u8>, numbers: &mut SplitMix) {
     }
 }
 
-/// Returns where the next number of a text stands, from some place on; else the end.
+/// Returns the position of the next number of a text, from some position on; otherwise the end.
 fn number_from(bytes: &[u8], at: usize) -> Range<usize> {
     let is_of_number = |byte: &u8| byte.is_ascii_digit() || b".-+".contains(byte);
     let next = |from: usize, wanted: bool| {

@@ -10,12 +10,12 @@ use super::one_line;
 /// The most facets of a mesh.
 const MOST_FACETS: usize = 80;
 
-/// Joins, checks and repairs the facets that bytes stand for: how far to weld and to close, then
-/// nine coordinates a facet, of few values, so that corners meet. Neighbours are mutual; a mesh
-/// without faults stays as it is, and so does one that was repaired.
+/// Joins, checks and repairs the facets that bytes stand for: the distances to weld and to close,
+/// then nine coordinates a facet, of few values, so that corners meet. Neighbors are mutual; a mesh
+/// without faults stays as it is, and so does a repaired mesh.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn facets(bytes: &[u8]) {
     let [weld, close, coordinates @ ..] = bytes else { return };
     let mesh: Vec<Facet> = coordinates.chunks_exact(9).take(MOST_FACETS).map(facet).collect();

@@ -1,8 +1,7 @@
-//! What no input may do to the readers: one function each, for arbitrary
-//! bytes. The fuzz targets in `fuzz/` and ordinary tests run the same ones.
+//! Checks of the readers against any input: one function each, for arbitrary bytes. The fuzz
+//! targets in `fuzz/` and ordinary tests run the same ones.
 //!
-//! Each panics where a reader panics or an answer contradicts another; what
-//! is refused must be refused in one line.
+//! Each panics if a reader panics or an answer contradicts another; a refusal must be one line.
 
 mod check;
 mod damage;
@@ -39,7 +38,7 @@ const MAX_CODES: u64 = 1 << 20;
 /// Reads bytes as STL, as `part` says.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn stl(bytes: &[u8]) {
     part(bytes);
 }
@@ -47,7 +46,7 @@ pub fn stl(bytes: &[u8]) {
 /// Reads bytes as OBJ, and as what gzip packed, as `part` says.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn obj(bytes: &[u8]) {
     part(bytes);
 }
@@ -55,7 +54,7 @@ pub fn obj(bytes: &[u8]) {
 /// Reads bytes as a 3MF package, and as the model of one, as `part` says.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn three_mf(bytes: &[u8]) {
     part(bytes);
     // Hardly any damaged package is unpacked.
@@ -83,7 +82,7 @@ fn part(bytes: &[u8]) {
     }
 }
 
-/// Checks and repairs a mesh. A repair of what was repaired changes nothing.
+/// Checks and repairs a mesh. Repairing a repaired mesh changes nothing.
 fn mesh(part: &Part) {
     let facets = match part.facets() {
         Ok(facets) if facets.len() <= MAX_MESH => facets,
@@ -122,9 +121,9 @@ fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError
 /// surfaces: every contour closes and every row balances.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn step(bytes: &[u8]) {
-    // Parts of files that make sense are some centimetres large.
+    // Parts of files that make sense are some centimeters large.
     let options = OpenOptions { tolerance: Length::from_mm(0.5), ..OpenOptions::default() };
     let model = match Part::from_step("part", bytes, &options) {
         Ok(model) => model,
@@ -158,11 +157,11 @@ fn check_section(layer: &Layer) {
     assert_eq!(ends_white.collect::<Vec<_>>(), layer.info.stray_rows);
 }
 
-/// Reads bytes as a stack, as a stream and as a file. Both see the same, and
-/// what decodes is the same again when it was encoded.
+/// Reads bytes as a stack, as a stream and as a file. Both give the same, and a decoded stack is
+/// the same after it was encoded and decoded again.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn tiff(bytes: &[u8]) {
     let file = file_of(bytes);
     let from_file = decoded(Pages::open(file.path()));
@@ -182,7 +181,7 @@ pub fn tiff(bytes: &[u8]) {
 /// to the first.
 ///
 /// # Panics
-/// Where the reader panics, or pages depend on the order.
+/// If the reader panics, or pages depend on the order.
 pub fn packed(bytes: &[u8]) {
     let bytes = mended(bytes);
     tiff(&bytes);
@@ -195,8 +194,8 @@ pub fn packed(bytes: &[u8]) {
     }
 }
 
-/// Makes the checks of a packed stack's parts right, so that damage gets past them. The format is
-/// in `docs/pack.md`.
+/// Corrects the checks of a packed stack's parts, so that damage gets past them. The format is in
+/// `docs/pack.md`.
 fn mended(bytes: &[u8]) -> Vec<u8> {
     const SIGNATURE: [u8; 8] = [0x93, b'L', b'A', b'M', b'P', b'\r', b'\n', 1];
     let mut bytes = bytes.to_vec();
@@ -253,12 +252,11 @@ fn check_stack(layers: &[Layer]) {
     }
 }
 
-/// Takes bytes as a width, a height and a T.6 strip, and as the runs of an
-/// image. What decodes is canonical, as high as it should be and decodes again
-/// from its own codes, by the `fax` crate too.
+/// Takes bytes as a width, a height and a T.6 strip, and as the runs of an image. A decoded image
+/// is canonical, has the right height and decodes again from its own codes, by the `fax` crate too.
 ///
 /// # Panics
-/// Where that is not so.
+/// If that does not hold.
 pub fn g4(bytes: &[u8]) {
     let Some((size, rest)) = bytes.split_first_chunk::<8>() else { return };
     let [width, height] = [&size[..4], &size[4..]]
@@ -322,7 +320,7 @@ fn check_canonical(mask: &Mask) {
     assert_eq!(again.finish(), *mask);
 }
 
-/// What a command says of the error: one line, and not a long one.
+/// Returns a command's message about the error: one line, and not a long one.
 fn one_line(error: &dyn Error) -> String {
     let mut line = error.to_string();
     let mut cause = error.source();

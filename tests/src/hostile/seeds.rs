@@ -23,14 +23,14 @@ pub struct Seed {
     pub target: &'static str,
     /// Its file's name.
     pub name: &'static str,
-    /// What it holds.
+    /// The contents.
     pub bytes: Vec<u8>,
 }
 
 /// Makes all seeds.
 ///
 /// # Panics
-/// Where a fixture cannot be built.
+/// If a fixture cannot be built.
 pub fn seeds() -> Vec<Seed> {
     let of = |target| move |(name, bytes)| Seed { target, name, bytes };
     stl()
@@ -259,13 +259,13 @@ fn packed_stacks() -> Named {
     ]
 }
 
-/// What only other programs write.
+/// Stacks that only other programs write.
 fn foreign() -> Named {
     let of = |compression, more: &[(u16, u32)], strip: &[u8]| {
         let fields = [(256, 20), (257, 8), (259, compression), (262, 0)];
         classic_tiff(&[&fields[..], more].concat(), strip)
     };
-    // T.4: an end of line, and a run of 20 pixels; then what stands behind each.
+    // T.4: an end of line, and a run of 20 pixels; then the text after each.
     let (end, run) = ("000000000001", "0001000");
     let one = format!("{end}{run}").repeat(8);
     let two = format!("{end}1{run}{end}01").repeat(4);
@@ -383,7 +383,7 @@ fn blocks() -> Named {
     ]
 }
 
-/// Meshes: how far to weld and to close, then nine coordinates a facet, in quarters.
+/// Meshes: the distances to weld and to close, then nine coordinates a facet, in quarters.
 fn meshes() -> Named {
     let tetrahedron = |x: u8| {
         let [o, a, b, c] = [[x, 0, 0], [x + 8, 0, 0], [x, 8, 0], [x, 0, 8]];

@@ -49,7 +49,7 @@ fn a_flipped_bit_in_what_is_used_is_noticed_and_made_again() {
         );
         wanted.check(&night.outcome(&ended), &format!("a damaged {kind:?}"));
     }
-    // What nothing uses but its delivery.
+    // Results that only their delivery uses.
     for (name, kind) in [("parts/ball.lamp", Kind::Join), ("builds/all.lamp", Kind::Tile)] {
         for key in of_kind(&store, kind) {
             change(&store.result(key), |bytes| flip(bytes));

@@ -7,8 +7,8 @@ use lamp_tests::{bin, note};
 
 use super::night::{Ended, Night, Outcome, Running};
 
-/// Does a night on a disk that is too small for it, makes room, and does it again. The disk is in a mount
-/// namespace of its own, and goes with it.
+/// Does a night on a disk that is too small for it, makes room, and does it again. The disk is in
+/// its own mount namespace, and disappears with it.
 const ON_SMALL_DISK: &str = r#"
 mount -t tmpfs -o "size=$2" none full || exit 99
 "$1" batch plan full.toml >&2
@@ -54,7 +54,7 @@ fn check(night: &Night, wanted: &Outcome, ended: &Ended) {
     let last =
         "batch: the store's disk is full: make room, and run the same command again to go on\n";
     assert_eq!(after, last, "{ended:?}");
-    // What was done is not done again.
+    // Finished tasks are not done again.
     let done = |text: &str| text.lines().filter(|line| line.ends_with(" is done")).count();
     assert!(second.starts_with("1\n") && !second.contains("No space left"), "{ended:?}");
     assert_eq!(done(first) + done(second), 11, "{ended:?}");

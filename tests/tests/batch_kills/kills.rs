@@ -99,7 +99,7 @@ impl Trial<'_> {
             }
         }
         let ended = running.wait();
-        // What was hit alive says so.
+        // Tasks that were hit alive report it.
         self.hits.tasks += ended.killed_tasks();
         if ended.signal == Some(9) {
             *(if is_group { &mut self.hits.both } else { &mut self.hits.nights }) += 1;

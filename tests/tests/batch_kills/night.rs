@@ -40,7 +40,7 @@ pub(crate) struct Night {
     pub(crate) scratch: Scratch,
 }
 
-/// What a night gives: its files, and the facts of its summary and of its report.
+/// The outcome of a night: its files, and the facts of its summary and of its report.
 #[derive(PartialEq)]
 pub(crate) struct Outcome {
     pub(crate) files: BTreeMap<PathBuf, Vec<u8>>,
@@ -113,7 +113,7 @@ impl Night {
         self.outcome(&ended)
     }
 
-    /// Returns what came of a night that told its summary.
+    /// Returns the outcome of a night that printed its summary.
     pub(crate) fn outcome(&self, ended: &Ended) -> Outcome {
         let files = self.files();
         let report = self.scratch.bytes("night/report.html");
@@ -228,7 +228,7 @@ impl Running {
 }
 
 impl Ended {
-    /// Returns how many tasks were told to have been killed.
+    /// Returns the number of tasks reported as killed.
     pub(crate) fn killed_tasks(&self) -> usize {
         self.stderr.lines().filter(|line| line.contains("was ended by signal 9")).count()
     }

@@ -1,4 +1,4 @@
-//! Processes as the kernel tells of them.
+//! Processes as the kernel reports them.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// More than any night here takes, and a hang.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Returns the tasks of a store that are at work, all or those with a key.
+/// Returns the tasks of a store that are at work, all or only tasks with a key.
 pub(crate) fn tasks(store: &Path, key: Option<&str>) -> Vec<u32> {
     let words: Vec<String> =
         [store.to_str(), key].into_iter().flatten().map(str::to_owned).collect();

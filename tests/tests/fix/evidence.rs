@@ -109,8 +109,7 @@ fn each_band_has_its_picture_before_after_and_what_differs() {
     }
 }
 
-/// A stray run may cross a wide image; so much of it is shown as tells how it
-/// was mended.
+/// A stray run may cross a wide image; the picture shows enough of it to see how it was mended.
 #[test]
 fn of_a_wide_image_a_part_is_shown() {
     let (scratch, _) = broken_ball(1, 1, "--dpi 2400 --thickness 1mm --layers 0..12");

@@ -31,7 +31,7 @@ fn a_range_of_layers_is_corrected_as_in_the_whole() {
     let (scratch, _) = broken_ball(12, 2, COARSE);
     scratch.run("fix stray.tif -o fixed.tif").succeeds();
     let whole = scratch.layers("fixed.tif");
-    // What is said of the whole stack stands on another page.
+    // The record of the whole stack is on another page.
     let pages = |layers: &[Layer]| -> Vec<Layer> {
         let mut layers = layers.to_vec();
         layers.iter_mut().for_each(|layer| layer.info.stack = None);
@@ -40,7 +40,7 @@ fn a_range_of_layers_is_corrected_as_in_the_whole() {
     for range in [0..60, 0..50, 13..31, 40..41] {
         let (start, end) = (range.start, range.end);
         scratch.run(&format!("fix stray.tif --layers {start}..{end} -o part.tif")).succeeds();
-        // The first and the last layers of a range lack some of the layers beside them.
+        // The first and the last layers of a range lack some of their neighbors.
         let inner = |layers: &[Layer]| {
             let known = if start == 0 { 0 } else { 32 }..layers.len().saturating_sub(32);
             pages(layers.get(known).unwrap_or_default())
@@ -83,7 +83,7 @@ fn what_is_sure_enough_is_up_to_the_user() {
     assert!(none < some && some < all, "{none} {some} {all}");
 }
 
-/// A notch that no good row shows, though the layers beside do.
+/// A notch that no good row shows, though the neighboring layers do.
 #[test]
 fn neighbours_show_what_a_wide_band_hides() {
     let notched = |is_missed: bool| {

@@ -76,7 +76,7 @@ fn range(text: &str) -> [f64; 2] {
     [low, high].map(|number| number.parse().expect("a number"))
 }
 
-/// Each left band has its message, whose place is that of the missing facet.
+/// Each left band has its message, with the place of the missing facet.
 #[test]
 fn a_band_that_is_left_names_the_place_of_the_missing_facet() {
     /// The place is rounded to 0.1 mm; a curve is a little off the facet, and

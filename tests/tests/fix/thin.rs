@@ -5,7 +5,7 @@ use lamp_tests::{Scratch, stripped};
 
 use super::pixels_off;
 
-/// A box from one corner to the other, leaning along y by `lean` per millimetre
+/// A box from one corner to the other, leaning along y by `lean` per millimeter
 /// of height.
 fn plate(low: [f64; 3], high: [f64; 3], lean: f64) -> Vec<Facet> {
     let corner = |k: usize| {
@@ -23,8 +23,8 @@ fn plate(low: [f64; 3], high: [f64; 3], lean: f64) -> Vec<Facet> {
     sides.into_iter().flat_map(facets).collect()
 }
 
-/// Plates above each other in y, with slits of `slit_mm` between
-/// them and webs across the slits, and a body beside them.
+/// Plates above each other in y, with slits of `slit_mm` between them and webs across the slits,
+/// and a body next to them.
 fn plates(slit_mm: f64, lean: f64) -> Mesh {
     let mut facets = Vec::new();
     for k in 0..8 {
@@ -53,7 +53,7 @@ fn slits_stay_beside_a_broken_body() {
             let [whole, stray, fixed] =
                 ["whole.tif", "stray.tif", "fixed.tif"].map(|name| scratch.layers(name));
             let (before, after) = (pixels_off(&stray, &whole), pixels_off(&fixed, &whole));
-            // What is left is in bands that were left: wide ones that hide whole slits.
+            // The remaining errors are in bands that were left: wide ones that hide whole slits.
             assert!(before > 1000 && after * 3 < before, "{slit_mm} {lean}: {after} of {before}");
         }
     }

@@ -26,13 +26,13 @@ proptest! {
         let mut unsure = layers;
         unsure.iter_mut().for_each(|layer| layer.info.closed = None);
         scratch.stack("unsure.tif", unsure);
-        // A blade has slots that show in few rows of one layer alone, as a row that
-        // missed two crossings does: only its page tells them apart.
+        // A blade has slots that show in few rows of one layer alone, as a row that missed two
+        // crossings does: only its page distinguishes them.
         let names = if part == Sample::Blade { &["clean"][..] } else { &["clean", "unsure", "bare"] };
         for name in names {
             let ran = scratch.run(&format!("fix {name}.tif -o fixed.tif"));
             prop_assert!(ran.statuses == [Some(0)], "{}: {:?}", name, ran);
-            // Where nothing is known, a row may look stray and is told of.
+            // Where nothing is known, a row may look stray and is reported.
             prop_assert!(*name != "clean" || ran.stderr.is_empty(), "{:?}", ran);
             prop_assert!(scratch.bytes(&format!("{name}.tif")) == scratch.bytes("fixed.tif"), "{}: {:?}", name, ran);
         }

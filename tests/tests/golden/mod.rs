@@ -88,7 +88,7 @@ fn broken() -> Images {
     scratch.run(line).succeeds();
     scratch.run("slice broken.stl --dpi 150 --thickness 500um -o stray.tif").succeeds();
     scratch.run("fix stray.tif -o fixed.tif").succeeds();
-    // A layer of the cone, where a true row is known from its neighbours.
+    // A layer of the cone, where a true row is known from its neighbors.
     let wanted = &[51];
     let stray = named("broken", &scratch.layers("stray.tif"), wanted);
     let fixed = named("broken_fixed", &scratch.layers("fixed.tif"), wanted);

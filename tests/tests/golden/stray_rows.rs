@@ -97,7 +97,7 @@ fn paired() -> (String, Mask) {
     pair("fix_paired", &corrected(&scratch, 1, &["paired"], ""))
 }
 
-/// A run across the hole that neither the rows nor the layers beside it have.
+/// A run across the hole that neither the rows nor the neighboring layers have.
 fn sliver() -> (String, Mask) {
     let scratch = Scratch::new();
     let mut layers = waist();

@@ -1,5 +1,6 @@
-//! Fails the first, second, third and further call of one kind in every command that writes, until the
-//! command succeeds, as SQLite's tests do: no failure is passed over, and none leaves half an output.
+//! Fails the first, second, third and further call of one kind in every command that writes, until
+//! the command succeeds, as SQLite's tests do: each failure is noticed, and none leaves half an
+//! output.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -48,8 +49,8 @@ const WRITERS: &[&str] = &[
     "lamp learn job --measured a.csv --law single -o out.csv",
 ];
 
-/// Commands that write nothing by themselves, or only by way of those above; nights keep a store and are
-/// attacked by kills (`batch_kills`), calibration writes as `sample` does.
+/// Commands that write nothing by themselves, or only through those above; nights keep a store and
+/// are attacked by kills (`batch_kills`), calibration writes as `sample` does.
 const OTHERS: &[&str] = &[
     "demo",
     "info",
@@ -67,7 +68,7 @@ const OTHERS: &[&str] = &[
     "help",
 ];
 
-/// What fails, and whether the command must fail with it.
+/// Calls that fail, and whether the command must fail with them.
 const CALLS: [(&str, Must); 8] = [
     ("open", Must::FailOrNot),
     ("write", Must::Fail),

@@ -55,7 +55,7 @@ fn a_full_disk_is_one_sentence_and_an_empty_folder() {
         "lamp sample blade --facets 24k -q -o blade.stl",
     ] {
         let ended = on_small_disk(line);
-        // What the disk still holds would stand on further lines.
+        // Files left on the disk would be on further lines.
         assert!(ended.is_refusal(&["No space left"]), "{line}: {ended:?}");
     }
 }

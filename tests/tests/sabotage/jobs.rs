@@ -16,7 +16,7 @@ pub(crate) struct Job {
 }
 
 /// Commands that write each kind of output. All take a good part of a second where nothing is
-/// optimised.
+/// optimized.
 pub(crate) const JOBS: [Job; 8] = [
     Job { line: "slice ball.stl --dpi 500 -q -o out.tif", outputs: &["out.tif"] },
     Job { line: "slice ball.stl --dpi 500 -q --force -o out/", outputs: &["out"] },
@@ -37,17 +37,17 @@ pub(crate) const JOBS: [Job; 8] = [
     },
 ];
 
-/// What a name holds: its bytes, or those of each file in the folder.
+/// The content of a name: its bytes, or the bytes of each file in the folder.
 type Content = BTreeMap<String, Vec<u8>>;
 
 /// A folder for jobs.
 pub(crate) struct Workplace {
     pub(crate) scratch: Scratch,
-    /// What it holds without outputs.
+    /// Its content without outputs.
     names: Vec<String>,
 }
 
-/// What a job should write, and how long it took.
+/// The expected output of a job, and its duration.
 pub(crate) struct Wanted {
     contents: Vec<Content>,
     pub(crate) time: Duration,

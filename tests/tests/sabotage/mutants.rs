@@ -17,14 +17,14 @@ struct Kind {
     name: &'static str,
     /// The end of its files' names.
     ending: &'static str,
-    /// What reads `mutant`, a file of that kind.
+    /// The command that reads `mutant`, a file of that kind.
     line: &'static str,
     /// Whole inputs of the kind.
     seeds: fn(&Scratch) -> Vec<Vec<u8>>,
 }
 
-/// Of parts some layers are cut: a part that says that it is a kilometre high has millions, and takes
-/// its time for them, which is no hang.
+/// Only some layers of a part are cut: a part that claims to be a kilometer high has millions, and
+/// takes its time for them, which is no hang.
 const KINDS: [Kind; 12] = [
     Kind {
         name: "STL",
@@ -171,16 +171,16 @@ fn said(scratch: &Scratch, line: &str) -> Vec<u8> {
 const LONGEST: Duration = Duration::from_secs(10);
 /// No input may take more memory: this many KiB of address space, which is more than what is used.
 const MOST_MEMORY: &str = "-v 1048576";
-/// What a command says that needs more.
+/// Messages of a command that needs more memory.
 const TAKES_MORE: [&str; 2] = ["out of memory", "of memory, and there are"];
 
-/// What became of the inputs of a kind.
+/// Outcomes of the inputs of a kind.
 #[derive(Default)]
 struct Tally {
     accepted: u64,
     refused: u64,
     slowest: Duration,
-    /// What must not be: the inputs' numbers, and how they ended.
+    /// Failures: the inputs' numbers, and how they ended.
     panics: Vec<String>,
     hangs: Vec<String>,
     peaks: Vec<String>,

@@ -21,7 +21,7 @@ const STACKS: [(&str, &str); 4] = [
     ("builds", "tile blade.tif --area 90x90mm --base-layers 2 -q -o stack.tif"),
 ];
 
-/// What became of damaged stacks.
+/// Outcomes of damaged stacks.
 #[derive(Default)]
 struct Outcomes {
     refused: u64,

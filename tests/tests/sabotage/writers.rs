@@ -21,7 +21,7 @@ fn what_dead_writers_left_goes_and_all_else_stays() {
     scratch.write(".a.tif.lamp-aaaaaa.part", b"dead");
     fs::create_dir(scratch.path(".b.lamp-bbbbbb.part")).unwrap();
     scratch.write(".b.lamp-bbbbbb.part/layer_00000.tif", b"dead");
-    // An editor's, a user's, and those of a version without locks.
+    // Files of an editor, of a user, and of a version without locks.
     let others = [".a.part", ".lamp-aaaaaa.part", "lamp.part"];
     others.iter().for_each(|name| scratch.write(name, b"mine"));
     scratch.run("fix stray.tif -q -o out.tif").succeeds();

@@ -16,7 +16,7 @@ pub(crate) enum Form {
     Pipe,
 }
 
-/// What is wrong with a set of pages.
+/// A fault of a set of pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     FirstMissing,

@@ -1,5 +1,5 @@
-//! Every command that reads a stack, every form of a stack, and every way in which a set of pages can
-//! be short or wrong: none gives another result in silence.
+//! Every command that reads a stack, every form of a stack, and every way in which a set of pages
+//! can be short or wrong: none gives another result in silence.
 //!
 //! `matrix.txt` has a line for each command and form, and a letter for each fault:
 //!
@@ -53,8 +53,9 @@ const READERS: &[&str] = &[
     "lamp mesh-out S -o out.stl",
 ];
 
-/// Commands that read none, or by way of a command above, or serve one (`view` states what it cannot
-/// read, see `view_server`; `compose` and `batch` compare digests of what they read).
+/// Commands that read no stack, or read it through a command above, or serve one (`view` states
+/// what it cannot read, see `view_server`; `compose` and `batch` compare digests of what they
+/// read).
 const OTHERS: &[&str] = &[
     "slice",
     "sample",
@@ -76,7 +77,7 @@ const OTHERS: &[&str] = &[
     "help",
 ];
 
-/// A folder with a good stack, and what commands need beside it.
+/// A folder with a good stack, and the other files that commands need.
 fn scratch() -> Scratch {
     let scratch = Scratch::new();
     scratch.mesh("ball.stl", &tilted_ball());
@@ -234,7 +235,7 @@ fn folders_of_stacks_hide_none() {
         fs::remove_file(scratch.path(name)).unwrap();
     }
     scratch.run("lamp verify night").succeeds();
-    // Pages, and a packed stack beside them.
+    // Pages, and a packed stack next to them.
     scratch.run("lamp convert good.tif -q -o night/pages/").succeeds();
     scratch.run("lamp verify night").succeeds();
     scratch.write("night/pages/a.lamp", &bytes);

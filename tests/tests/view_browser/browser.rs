@@ -88,7 +88,7 @@ impl Browser {
     /// Waits until a condition of the page holds.
     #[track_caller]
     pub(crate) fn wait_for(&self, condition: &str) {
-        // What has come is drawn in the next frame.
+        // Received data is drawn in the next frame.
         let script = format!(
             "const done = arguments[0]; const end = Date.now() + {PATIENCE_MS};
              const look = () => {{
@@ -170,8 +170,8 @@ impl Browser {
         self.runtime.block_on(self.client().screenshot()).unwrap()
     }
 
-    /// Returns the colours of pixels of the image, `[column, row]` each, as the canvas has them in
-    /// their middle; those beside the screen are missing.
+    /// Returns the colors of pixels of the image, `[column, row]` each, as the canvas has them in
+    /// their middle; pixels off the screen are missing.
     #[track_caller]
     pub(crate) fn colours(&self, pixels: &[[u32; 2]]) -> Vec<Option<[u8; 3]>> {
         let script = format!(

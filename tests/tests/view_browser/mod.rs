@@ -26,15 +26,15 @@ fn demo() -> Scratch {
     scratch
 }
 
-/// Whether an overlay colours a pixel.
+/// Whether an overlay colors a pixel.
 type Rule<'a> = &'a dyn Fn([u32; 2]) -> bool;
 
 fn white(layer: &Layer, [column, row]: [u32; 2]) -> bool {
     mask(layer).is_white(column, row)
 }
 
-/// The pixels that the canvas must show as coloured are those of which `wanted` is true, on what
-/// is black and white below.
+/// The pixels that the canvas must show as colored are the pixels for which `wanted` is true, over
+/// black and white.
 #[track_caller]
 fn is_laid_over(browser: &Browser, layer: &Layer, wanted: impl Fn([u32; 2]) -> bool) -> usize {
     let [width, height] = [layer.image.width(), layer.image.height()];
@@ -201,7 +201,7 @@ fn bands(json: &Value) -> Vec<std::ops::Range<u32>> {
     bands.map(|band| number(&band["row"])..number(&band["row"]) + number(&band["rows"])).collect()
 }
 
-/// An island of 5 x 4 pixels, alone in its layer beside a block.
+/// An island of 5 x 4 pixels, alone in its layer next to a block.
 #[test]
 fn an_island_is_coloured_and_all_is_reached_by_keys() {
     let scratch = Scratch::new();
