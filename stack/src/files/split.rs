@@ -60,7 +60,7 @@ impl SplitPoints {
 }
 
 /// Writes layers as a folder of complete stacks named like `layers_00500-00999.tif`.
-/// [`join`](crate::files::join) restores the single stack. The folder gets its name when it is
+/// [`join`](fn@crate::join) restores the single stack. The folder gets its name when it is
 /// complete.
 ///
 /// # Errors

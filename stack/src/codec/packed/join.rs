@@ -18,14 +18,14 @@ use crate::layer::check::{Chain, OpenLine};
 use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::Limits;
 
-/// Joins packed stacks as [`join`](crate::files::join) does, and writes them as a packed stack: images
+/// Joins packed stacks as [`join`](fn@crate::join) does, and writes them as a packed stack: images
 /// are copied as they are coded, texts and their checks are made anew. Images are not decoded.
 ///
 /// Of ranges that start at multiples of [`KEY_LAYERS`](super::KEY_LAYERS), packed with the same
 /// level, the result has the bytes of the whole packed at once.
 ///
 /// # Errors
-/// Returns an error in the same cases as [`join`](crate::files::join) and its iterator, if a stack is not
+/// Returns an error in the same cases as [`join`](fn@crate::join) and its iterator, if a stack is not
 /// packed, or if writing fails. No file then appears under the final name.
 pub fn join_packed(
     stacks: &[PathBuf],
