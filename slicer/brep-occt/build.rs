@@ -1,4 +1,4 @@
-//! Builds the C++ side of the feature `occt`; without it, nothing.
+//! Builds the C++ side of the feature `occt`; does nothing without the feature.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -15,7 +15,7 @@ mod occt {
     const HEADER: &str = "STEPControl_Reader.hxx";
     const SOURCES: [&str; 2] = ["read.cpp", "mesh.cpp"];
     const HEADERS: [&str; 2] = ["model.hpp", "shim.hpp"];
-    /// The libraries, each before those that it needs.
+    /// The libraries. Each precedes the libraries that it needs.
     const LIBRARIES: [&str; 12] = [
         "TKSTEP",
         "TKSTEPBase",
@@ -42,7 +42,7 @@ mod occt {
         cc::Build::new()
             .cpp(true)
             .std("c++17")
-            // Its headers are not ours to warn about.
+            // The crate does not own these headers, so it shows no warnings about them.
             .flag("-isystem")
             .flag(&headers)
             .opt_level(2)

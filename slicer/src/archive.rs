@@ -1,4 +1,4 @@
-//! Names what a ZIP archive holds that is no 3MF package.
+//! Describes the contents of a ZIP archive that is not a 3MF package.
 
 use std::io::BufReader;
 
@@ -9,7 +9,7 @@ use crate::error::SliceError;
 use crate::part_file::PartFile;
 use crate::three_mf::ThreeMfError;
 
-/// Names in archives of programs, in small letters, and the programs' formats.
+/// Names in archives of programs, in lowercase, and the programs' formats.
 const NAMES: &[(&str, FileFormat)] = &[
     (".amf", FileFormat::Model("a packed AMF file")),
     (".brp", FileFormat::Model("a FreeCAD document")),
@@ -23,7 +23,8 @@ const NAMES: &[(&str, FileFormat)] = &[
 /// Ends of the names of parts.
 const PARTS: [&str; 5] = [".stl", ".step", ".stp", ".obj", ".3mf"];
 
-/// Returns why a package cannot be read as 3MF: of one without a model, what it is instead.
+/// Returns the reason why a package cannot be read as 3MF. For a package without a model, the
+/// reason names its actual format.
 pub(crate) fn not_three_mf(file: &PartFile, error: ThreeMfError) -> SliceError {
     let ThreeMfError::NoModel(_) = error else { return Box::new(error).into() };
     let Ok(archive) = ZipArchive::new(BufReader::new(file.reader())) else {
@@ -36,7 +37,7 @@ pub(crate) fn not_three_mf(file: &PartFile, error: ThreeMfError) -> SliceError {
     if let Some((_, format)) = NAMES.iter().find(|(end, _)| find(end).is_some()) {
         return SliceError::OtherFormat(*format);
     }
-    // A package of 3MF that lacks its model, or another one.
+    // A 3MF package that lacks its model, or a different fault.
     if find(".model").or(find("_rels/.rels")).is_some() {
         return Box::new(error).into();
     }

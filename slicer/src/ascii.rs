@@ -1,4 +1,4 @@
-//! Reads ASCII STL as words: any number of solids, in any case, however their lines break.
+//! Reads ASCII STL as words: any number of solids, in any case, with any line breaks.
 
 use std::io::{self, Read};
 
@@ -8,7 +8,7 @@ use crate::number::{NumberFault, Numbers};
 use crate::read_note::ReadNote;
 use crate::words::Words;
 
-/// The facets of a text, and notes on what is left out.
+/// The facets of a text, and notes on skipped parts.
 pub(crate) type Facets = (Vec<Facet>, Vec<ReadNote>);
 
 /// Reads the facets of all solids of an ASCII file, which `open` opens.
@@ -17,7 +17,7 @@ pub(crate) type Facets = (Vec<Facet>, Vec<ReadNote>);
 /// Returns an error if it ends within a facet, has other words in one, or cannot be read.
 pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<Facets, SliceError> {
     match AsciiReader::new(open(), Numbers::default())?.read() {
-        // Only all numbers together say how commas are meant.
+        // Only all numbers together show the meaning of commas.
         Err(SliceError::Ascii { fault: AsciiFault::Comma, .. }) => {
             AsciiReader::new(open(), Numbers::with_commas())?.read()
         }
@@ -37,7 +37,7 @@ enum Keyword {
     Loop,
     EndLoop,
     Vertex,
-    /// It begins `end loop` and others that are two words.
+    /// It begins `end loop` and other keywords of two words.
     End,
 }
 
@@ -125,7 +125,7 @@ impl<R: Read> AsciiReader<R> {
         SliceError::Ascii { facet: self.facets.len(), fault }
     }
 
-    /// Returns the fault of a word that stands where another should.
+    /// Returns the fault of a word found where another should be.
     fn unexpected(&self, expected: &'static str) -> SliceError {
         let found = self.words.word();
         self.failed(if found.is_empty() {
@@ -150,7 +150,7 @@ impl<R: Read> AsciiReader<R> {
         self.name()
     }
 
-    /// Passes over the name of a solid: the rest of the line, or all before a facet on it.
+    /// Skips the name of a solid: the rest of the line, or everything before a facet on it.
     fn name(&mut self) -> Result<(), SliceError> {
         while self.words.advance()? {
             if self.words.begins_line() {
@@ -173,10 +173,10 @@ impl<R: Read> AsciiReader<R> {
         Ok(())
     }
 
-    /// Reads a facet behind its first word.
+    /// Reads a facet after its first word.
     fn facet(&mut self) -> Result<(), SliceError> {
         if self.next_keyword()? == Some(Keyword::Normal) {
-            // A normal means nothing, and may be no number.
+            // A normal has no meaning, and may not be a number.
             for _ in 0..3 {
                 if self.next_keyword()?.is_some() {
                     break;
@@ -241,8 +241,8 @@ impl<R: Read> AsciiReader<R> {
         Ok(corner)
     }
 
-    /// Passes over a property behind its first word: the rest of the line, or all before a word of
-    /// STL's on it.
+    /// Skips a property after its first word: the rest of the line, or everything before an STL
+    /// keyword on it.
     fn property(&mut self) -> Result<(), SliceError> {
         ReadNote::count_statement(&mut self.notes, self.words.word());
         while self.words.advance()? {
@@ -254,7 +254,7 @@ impl<R: Read> AsciiReader<R> {
         Ok(())
     }
 
-    /// Passes over a statement between facets that STL does not have.
+    /// Skips a statement between facets that STL does not define.
     fn other_statement(&mut self) -> Result<(), SliceError> {
         if self.words.begins_padding() {
             let bytes = self.words.padding()?.ok_or_else(|| self.failed(AsciiFault::Zeros));
@@ -288,7 +288,7 @@ impl<R: Read> AsciiReader<R> {
                 self.words.hold();
                 break;
             }
-            // Facets are not passed over.
+            // Facets are not skipped.
             if !matches!(keyword, None | Some(Keyword::Solid | Keyword::EndSolid | Keyword::End)) {
                 return Err(self.unexpected("a line of another kind"));
             }

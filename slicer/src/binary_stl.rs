@@ -1,4 +1,5 @@
-//! The layout of binary STL files: a header, the count of facets, and a record for each.
+//! Defines the layout of binary STL files: a header, the count of facets, and a record for each
+//! facet.
 
 use crate::facet::Facet;
 
@@ -8,13 +9,13 @@ pub(crate) const HEADER_BYTES: u64 = 84;
 /// A facet of a binary STL: normal, three corners, attributes.
 pub(crate) const FACET_BYTES: usize = 50;
 
-/// Returns the number of facets that a binary file says to have.
+/// Returns the number of facets that a binary file declares.
 pub(crate) fn declared_count(start: &[u8]) -> Option<u32> {
     start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()))
 }
 
-/// Returns the number of facets of a binary file that starts with these bytes, if its size is that
-/// of one.
+/// Returns the number of facets of a binary file that starts with these bytes, if its size fits
+/// that number.
 pub(crate) fn binary_facets(size: u64, start: &[u8]) -> Option<usize> {
     let count = declared_count(start)?;
     let is_size = HEADER_BYTES + FACET_BYTES as u64 * u64::from(count) == size;

@@ -1,39 +1,40 @@
-//! Decides what is inside a part, from the windings of its bodies.
+//! Decides what is inside a part, from the winding numbers of its bodies.
 //!
-//! A body holds a point where its surface winds around it. The solids of an object unite, less its
-//! negative volumes; objects and files unite; files that cut are taken away, or all else is.
+//! A body holds a point where its surface winds around the point. The solids of an object unite,
+//! minus its negative volumes; objects and files unite. Files that cut are subtracted, or only
+//! their inside is kept.
 
 use std::collections::{BTreeMap, HashMap};
 
 use crate::fill::Fill;
 use crate::placement::Placement;
 
-/// How the bodies of one file join under [`Fill::EvenOdd`]: those of a STEP file, or the items of a
-/// 3MF.
+/// How the bodies of one file join under [`Fill::EvenOdd`]: the bodies of a STEP file, or the items
+/// of a 3MF.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Bodies {
-    /// What lies in one of them is inside.
+    /// A point in any body is inside.
     #[default]
     Unite,
-    /// What lies in two of them cancels out, as it does between files.
+    /// Overlaps of two bodies cancel out, as overlaps of files do.
     Xor,
 }
 
 lamp_stack::named!(Bodies { Unite = "unite", Xor = "xor" });
 
-/// How a file joins the others of a part.
+/// How a file joins the other files of a part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Join {
-    /// It unites with them.
+    /// It unites with the other files.
     #[default]
     Unite,
     /// It is cut out of the files that unite.
     Subtract,
-    /// Only what it holds is kept.
+    /// Only its inside is kept.
     Intersect,
 }
 
-/// The way in which a body makes its object.
+/// The role of a body in its object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Role {
     /// It is inside.
@@ -54,7 +55,7 @@ pub(crate) struct BodyRule {
 }
 
 impl BodyRule {
-    /// Returns true if it only takes away.
+    /// Returns true if it only removes material.
     pub(crate) fn is_cutter(&self) -> bool {
         self.role == Role::Negative || self.join != Join::Unite
     }
@@ -85,18 +86,19 @@ impl Turn {
     }
 }
 
-/// The rule that tells inside from outside of a whole part.
+/// The rule that decides what is inside a whole part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FillRule {
     fill: Fill,
     bodies: Bodies,
-    /// One for each body of a part that has several.
+    /// One rule for each body of a part that has several bodies.
     rules: Vec<BodyRule>,
     /// Whether a point is inside where any body holds it.
     is_union: bool,
-    /// The number of files to which the others are cut.
+    /// The number of files that intersect the others.
     intersections: usize,
-    /// Whether the part's placement mirrors it, so that facets that face outwards wind the other way.
+    /// Whether the part's placement mirrors it, so that facets that face outward wind in the
+    /// opposite direction.
     is_mirrored: bool,
 }
 
@@ -108,7 +110,7 @@ impl From<Fill> for FillRule {
 }
 
 impl FillRule {
-    /// Creates the rule for the bodies of a part, those of a file one after another.
+    /// Creates the rule for the bodies of a part, file by file.
     pub(crate) fn new(fill: Fill, bodies: Bodies, rules: Vec<BodyRule>) -> Self {
         if let [rule] = &rules[..]
             && !rule.is_cutter()
@@ -126,7 +128,7 @@ impl FillRule {
         Self { is_mirrored: placement.is_mirror(), ..self }
     }
 
-    /// Returns the winding number of a point within a body that faces outwards.
+    /// Returns the winding number of a point within a body that faces outward.
     #[inline]
     pub(crate) fn outward(&self) -> i32 {
         if self.is_mirrored { -1 } else { 1 }
@@ -137,22 +139,22 @@ impl FillRule {
         self.fill
     }
 
-    /// Returns true if crossings must be known by their bodies.
+    /// Returns true if crossings must record their bodies.
     pub(crate) fn has_bodies(&self) -> bool {
         !self.rules.is_empty()
     }
 
-    /// Returns the number by which a body's crossings are known: 0 if there is one.
+    /// Returns the number that crossings record for a body: 0 if there is only one body.
     pub fn name_of(&self, body: u32) -> u32 {
         if self.has_bodies() { body } else { 0 }
     }
 
-    /// Returns true if a body only takes away.
+    /// Returns true if a body only removes material.
     pub(crate) fn is_cutter(&self, body: u32) -> bool {
         self.rules[body as usize].is_cutter()
     }
 
-    /// Returns true if two bodies are of one file, and neither is cut out.
+    /// Returns true if two bodies belong to one file, and neither is cut out.
     pub(crate) fn may_share(&self, a: u32, b: u32) -> bool {
         let [a, b] = [a, b].map(|body| &self.rules[body as usize]);
         a.file == b.file && !a.is_cutter() && !b.is_cutter()
@@ -161,7 +163,7 @@ impl FillRule {
     /// Returns a number that differs between bodies, since their contours close by themselves.
     #[inline]
     pub(crate) fn salt(&self, body: u32) -> u64 {
-        // Odd, so that no two bodies share one; its bits are those of the golden ratio.
+        // Odd, so that no two bodies share a number; its bits are the bits of the golden ratio.
         const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
         (u64::from(self.name_of(body)) + u64::from(self.has_bodies())).wrapping_mul(GOLDEN)
     }
@@ -184,7 +186,7 @@ impl FillRule {
         if of(Join::Subtract).next().is_some() {
             return false;
         }
-        // The first of each unit: a file, or a body by itself.
+        // The first body of each unit: a file, or a body by itself.
         let is_alike = |(a, rule): (u32, &BodyRule), (b, other): (u32, &BodyRule)| {
             rule.file == other.file && (a == b || self.bodies == Bodies::Unite)
         };
@@ -217,11 +219,11 @@ impl FillRule {
 #[derive(Clone, Debug)]
 pub struct Position<'a> {
     rule: &'a FillRule,
-    /// About the only body.
+    /// The winding number about the only body.
     winding: i32,
-    /// The windings about bodies of a part that has several, where these are not zero.
+    /// The nonzero winding numbers of the bodies, for a part with several bodies.
     windings: Vec<(u32, i32)>,
-    /// The bodies whose windings do not add up in this row, so that every crossing toggles.
+    /// The bodies whose steps do not add up in this row, so that every crossing toggles.
     unsigned: Vec<u32>,
 }
 
@@ -231,8 +233,8 @@ impl<'a> Position<'a> {
         Self { rule, winding: 0, windings: Vec::new(), unsigned: Vec::new() }
     }
 
-    /// Moves outside, to the start of a row with these steps. A body whose steps do not add up, since
-    /// facets are missing or turned over, is filled by even-odd in this row.
+    /// Moves outside, to the start of a row with these steps. A body whose steps do not add up,
+    /// since facets are missing or turned over, is filled by even-odd in this row.
     pub fn start_row(&mut self, turns: impl Iterator<Item = Turn>) {
         self.winding = 0;
         self.windings.clear();
@@ -249,7 +251,7 @@ impl<'a> Position<'a> {
         self.windings.clear();
     }
 
-    /// Moves to where another point of the row is.
+    /// Moves to the position of another point of the row.
     pub(crate) fn move_to(&mut self, other: &Self) {
         self.winding = other.winding;
         self.windings.clone_from(&other.windings);
@@ -322,19 +324,19 @@ impl<'a> Position<'a> {
         self.rule.is_cutter(body)
     }
 
-    /// Returns the bodies whose windings are not zero.
+    /// Returns the bodies whose winding numbers are not zero.
     pub(crate) fn windings(&self) -> &[(u32, i32)] {
         &self.windings
     }
 
-    /// Returns the bodies that this row fills by even-odd, since their steps do not add up.
+    /// Returns the bodies that this row fills by even-odd, because their steps do not add up.
     pub(crate) fn unsigned(&self) -> &[u32] {
         &self.unsigned
     }
 }
 
-/// The numbers of pixels that bodies of a file share in a layer, by rising pairs. A body and
-/// itself share all that it has.
+/// The numbers of pixels that pairs of bodies of a file share in a layer, sorted by pair. A body
+/// shares all its pixels with itself.
 pub(crate) type SharedCounts = Vec<([u32; 2], u64)>;
 
 /// Counts the pixels of a layer that bodies of a file share.
@@ -349,8 +351,9 @@ impl<'a> SharedPixels<'a> {
         Self { rule, held: Vec::new(), counts: HashMap::new() }
     }
 
-    /// Adds pixels at a position. Bodies share them if both wind around them the same way, and
-    /// voids leave more than one winding. A body that cuts shares all that it takes away or keeps.
+    /// Adds pixels at a position. Bodies share the pixels if both wind around them the same way,
+    /// and voids leave more than one winding. A body that cuts shares all pixels that it removes or
+    /// keeps.
     pub(crate) fn add(&mut self, position: &Position<'_>, pixels: u32) {
         self.held.clear();
         self.held.extend(position.all_that_hold());
@@ -382,13 +385,13 @@ impl<'a> SharedPixels<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct SharedVolumes(BTreeMap<[u32; 2], SharedVolume>);
 
-/// The volume that two bodies share, or that of a body.
+/// The volume that two bodies share, or the volume of a body.
 #[derive(Clone, Copy, Debug, Default)]
 struct SharedVolume {
     mm3: f64,
-    /// The last layer that has some of it, plus one.
+    /// The last layer that has part of it, plus one.
     next_layer: usize,
-    /// Whether two layers in a row have some of it.
+    /// Whether two consecutive layers have part of it.
     lasts: bool,
 }
 
@@ -423,7 +426,7 @@ impl SharedVolumes {
         overlaps
     }
 
-    /// Returns the files that are there to cut, and share no pixel with the part.
+    /// Returns the files that are meant to cut, but share no pixel with the part.
     pub(crate) fn idle_cutters(&self, rule: &FillRule) -> Vec<usize> {
         let cuts = |file: usize| {
             self.0.keys().any(|&[a, b]| {
@@ -441,27 +444,27 @@ impl SharedVolumes {
 /// The volume that two bodies of a file share, in the layers made so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyOverlap {
-    /// The file, from 0, among those joined.
+    /// The index of the file among the joined files, from 0.
     pub file: usize,
-    /// The bodies, from 0, among those of the file.
+    /// The indices of the bodies in the file, from 0.
     pub bodies: [usize; 2],
     /// The pixels inside both, times the thickness of their layers.
     pub volume_mm3: f64,
 }
 
-/// Pixels and rows of a layer that the windings about a body make doubtful.
+/// Pixels and rows of a layer where a body's winding numbers are doubtful.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Doubts {
-    /// Rows that are filled by even-odd, since their steps do not add up.
+    /// Rows that are filled by even-odd, because their steps do not add up.
     pub(crate) unsigned_rows: u64,
     /// Pixels that the surface winds around more than once.
     pub(crate) repeated_px: u64,
-    /// Pixels around which the surface winds as one that faces inwards does.
+    /// Pixels around which the surface winds like a surface that faces inward.
     pub(crate) inward_px: u64,
 }
 
 impl Doubts {
-    /// Adds pixels with this winding number, which is above zero in a body that faces outwards.
+    /// Adds pixels with this winding number, which is above zero in a body that faces outward.
     #[inline]
     pub(crate) fn add(&mut self, winding: i32, pixels: u32) {
         if winding.abs() > 1 {
@@ -472,7 +475,7 @@ impl Doubts {
         }
     }
 
-    /// Adds others.
+    /// Adds the doubts of another count.
     pub(crate) fn join(&mut self, other: Self) {
         self.unsigned_rows += other.unsigned_rows;
         self.repeated_px += other.repeated_px;
@@ -487,21 +490,21 @@ pub(crate) struct LayerDoubts {
     pub(crate) white_px: u64,
 }
 
-/// A file whose surface is filled though its facets leave doubts, in the layers made so far whose
-/// contours close.
+/// A file whose facets leave doubts about what is inside, in the layers made so far whose contours
+/// close. Its surface is filled nevertheless.
 ///
-/// A void is a shell whose facets face inwards. A shell within another that faces outwards, too, may
-/// be a body in a body, or a void that was written the wrong way round.
+/// A void is a shell whose facets face inward. A shell inside another shell that also faces outward
+/// may be a body in a body, or a void that was written inside out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FillDoubt {
-    /// The file, from 0, among those joined.
+    /// The index of the file among the joined files, from 0.
     pub file: usize,
-    /// The rows in which the signs of facets do not add up, since some are turned over: every
-    /// crossing toggles there, as under [`Fill::EvenOdd`].
+    /// The rows in which the signs of facets do not add up, because some facets are turned over:
+    /// every crossing toggles there, as under [`Fill::EvenOdd`].
     pub unsigned_rows: u64,
     /// The volume that shells enclose more than once, in cubic millimeters.
     pub repeated_mm3: f64,
-    /// The volume of shells that face inwards though nothing is around them, in cubic millimeters.
+    /// The volume of shells that face inward though nothing is around them, in cubic millimeters.
     pub inward_mm3: f64,
 }
 
@@ -524,7 +527,7 @@ impl DoubtSum {
         }
     }
 
-    /// Returns the doubts of each file that has some. Shells that only touch leave none.
+    /// Returns the doubts of each file that has any. Shells that only touch cause no doubts.
     pub(crate) fn of_files(&self, file_of: impl Fn(u32) -> usize) -> Vec<FillDoubt> {
         let least_mm3 = LEAST_SHARE * self.white_mm3;
         let some = |mm3: f64| if mm3 > least_mm3 { mm3 } else { 0.0 };

@@ -1,10 +1,9 @@
-//! Sorts facets by slab into a temporary file, if their file is in no order of height.
+//! Sorts facets by slab into a temporary file, if their file is not ordered by height.
 //!
-//! A slab reads the blocks of the file that it meets. If each block's facets are
-//! spread over the whole part, that is the whole file for every slab. Then one pass
-//! writes each facet into a bucket of each of its slabs, in a temporary file, and
-//! every slab reads its own. A slab has several buckets, by the lowest layer met, so
-//! that neighbouring facets add to the same lists.
+//! A slab reads the blocks of the file that it meets. If each block's facets are spread over the
+//! whole part, every slab reads the whole file. Then one pass writes each facet into a bucket of
+//! each of its slabs, in a temporary file, and every slab reads its own buckets. A slab has several
+//! buckets, by the lowest layer met, so that neighboring facets add to the same lists.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -25,7 +24,7 @@ const RECORD_BYTES: usize = 36;
 /// All slabs together have at least this many buckets.
 const BUCKETS: usize = 128;
 
-/// Facets of a bucket that are of one piece: their bytes in the file.
+/// Facets of a bucket that belong to one piece: their bytes in the file.
 #[derive(Clone, Debug)]
 struct Chunk {
     bytes: Range<u64>,
@@ -42,7 +41,7 @@ pub(crate) struct Buckets {
 }
 
 impl Buckets {
-    /// Sorts the facets of a part into consecutive `slabs`, which look `reach_um` below
+    /// Sorts the facets of a part into consecutive `slabs`, which include facets `reach_um` below
     /// their planes. Gathers facets in about `memory` bytes.
     ///
     /// # Errors
@@ -56,7 +55,7 @@ impl Buckets {
     ) -> io::Result<Self> {
         let order = BucketOrder::new(planes, reach_um, slabs);
         let count = order.per_slab * slabs.len();
-        // As many workers as have room for their chunks.
+        // As many workers as there is memory for their chunks.
         let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
         let chunk_bytes = (memory / (workers * count)).clamp(1 << 12, 1 << 18);
         let file = tempfile::tempfile()?;
@@ -217,7 +216,7 @@ mod tests {
     use crate::planes::{PLANE_TOLERANCE, PlaneRule};
     use crate::survey::Survey;
 
-    /// Facets all over 10 mm, of which a few stand through all of it.
+    /// Facets all over 10 mm, a few of which span the full height.
     fn scattered() -> PlacedPart {
         let facet = |k: usize| {
             let low = (k * 7919 % 10_000) as f32 / 1000.0;

@@ -1,10 +1,9 @@
-//! Tells whether a layer's contours close, without linking them.
+//! Checks whether a layer's contours close, without linking them.
 //!
-//! A contour is a chain of segments. It closes if an even number of segments ends at
-//! each of its points.
-//! Equal points have equal bits, as `cut.rs` shows; and no coordinate in pixels is -0,
-//! since 1/2 was subtracted from it. So a sum over hashes of the points, in any order,
-//! is zero if all contours close, and otherwise some other of 2^64 values.
+//! A contour is a chain of segments. It closes if an even number of segments ends at each of its
+//! points. Equal points have equal bits, as `cut.rs` shows; and no coordinate in pixels is -0,
+//! since 1/2 was subtracted from it. So a sum over hashes of the points, in any order, is zero if
+//! all contours close, and otherwise another of 2^64 values.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -13,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub(crate) struct EndSum(u64);
 
 impl EndSum {
-    /// Adds the ends of a segment. Ends with another salt are other points.
+    /// Adds the ends of a segment. Ends with different salts are different points.
     #[inline]
     pub(crate) fn add(&mut self, ends: [[f64; 2]; 2], salt: u64) {
         let [a, b] = ends.map(|end| hash(end, salt));
@@ -37,18 +36,18 @@ impl EndSum {
 pub(crate) struct RowSums(Vec<AtomicU64>);
 
 impl RowSums {
-    /// Starts without ends in rows 0 to `last`.
+    /// Starts with no ends in rows 0 to `last`.
     pub(crate) fn new(last: u32) -> Self {
         Self((0..=last).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Adds an end of a segment. Ends with another salt are other points.
+    /// Adds an end of a segment. Ends with different salts are different points.
     #[inline]
     pub(crate) fn add(&self, row: u32, point: [f64; 2], salt: u64) {
         self.0[row as usize].fetch_xor(hash(point, salt), Relaxed);
     }
 
-    /// Returns the rows where contours break off, rising.
+    /// Returns the rows where contours break off, in ascending order.
     pub(crate) fn open_rows(&self) -> Vec<u32> {
         let rows = (0..).zip(&self.0).filter(|(_, sum)| sum.load(Relaxed) != 0);
         rows.map(|(row, _)| row).collect()
@@ -137,7 +136,7 @@ mod tests {
         assert_eq!(sums.open_rows(), [8]);
     }
 
-    /// Neighbouring whole numbers differ in one bit, and their points lie on a
+    /// Neighboring whole numbers differ in one bit, and their points lie on a
     /// grid whose rectangles must not cancel.
     #[test]
     fn points_of_a_grid_have_hashes_without_pattern() {

@@ -1,4 +1,4 @@
-//! Crossings of rows with contours, and segments that stand for many of them.
+//! Defines crossings of rows with contours, and segments that represent many crossings.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::bodies::Turn;
 use crate::grid::PixelGrid;
 use crate::scan::ceil_clamped;
 
-/// A crossing of a row in 64 bits: the row, the first column whose centre is past the
+/// A crossing of a row in 64 bits: the row, the first column whose center is past the
 /// crossing, and in the lowest bit the direction of the contour. Sorted, crossings
 /// are in the order of rows and columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,8 +18,8 @@ impl Crossing {
         Self(u64::from(row) << 32 | u64::from(column) << 1 | u64::from(rising))
     }
 
-    /// Creates the crossing of a row at a column in pixels. The last column is black:
-    /// rounding takes no crossing past it.
+    /// Creates the crossing of a row at a column in pixels. The last column is black: rounding
+    /// moves no crossing past it.
     #[inline]
     pub(crate) fn at(grid: &PixelGrid, row: u32, column: f64, rising: bool) -> Self {
         Self::new(row, ceil_clamped(column, grid.width - 1), rising)
@@ -86,7 +86,7 @@ impl RowCrossing {
     }
 }
 
-/// A crossing in its row and the body that it is of, to sort by.
+/// A crossing in its row and its body, to sort by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct BodyCrossing {
     place: RowCrossing,
@@ -100,7 +100,7 @@ impl BodyCrossing {
     }
 }
 
-/// What a row's images are made of.
+/// The elements from which a row's images are made.
 pub(crate) trait InRow: Copy + Default + Ord {
     /// Returns the first column past it.
     fn column(self) -> u32;
@@ -145,7 +145,7 @@ pub(crate) struct RowSegment {
 }
 
 impl RowSegment {
-    /// Creates a segment from its upper end on, which crosses `rows`.
+    /// Creates a segment that starts at its upper end and crosses `rows`.
     #[inline]
     pub(crate) fn new(
         upper: [f64; 2],
@@ -170,7 +170,8 @@ impl RowSegment {
         self.upper[0] + self.columns_per_row * (f64::from(row) - self.upper[1])
     }
 
-    /// Returns which of so many equal strips of an image, from the left, holds its middle.
+    /// Returns the index of the strip of an image that contains its middle, for `bins` equal strips
+    /// from the left.
     #[inline]
     pub(crate) fn bin(&self, grid: &PixelGrid, bins: usize) -> usize {
         let middle = self.upper[0] + self.columns_per_row * (0.5 * self.rows().len() as f64);

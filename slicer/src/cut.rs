@@ -7,12 +7,11 @@
 //! past a row or not, a chain crosses every row an even number of times. Only the
 //! column of a crossing depends on one facet alone.
 //!
-//! This needs no more than equal results for equal corners (0 equals -0), and an
-//! even number of facets on each edge. An edge that is cut has its ends on both
-//! sides of the plane. So it rises, however little, and its ends have an order,
-//! even if the third corner is as high as one of them. A facet without area that
-//! is cut has two such edges, too. An overflow would move a point to a row's end,
-//! but the same way for both facets.
+//! This needs no more than equal results for equal corners (0 equals -0), and an even number of
+//! facets on each edge. An edge that is cut has its ends on both sides of the plane. So it rises,
+//! however little, and its ends have an order, even if the third corner is as high as one of them.
+//! A degenerate facet (without area) that is cut also has two such edges. An overflow would move a
+//! point to a row's end, but the same way for both facets.
 
 use std::ops::Range;
 
@@ -23,7 +22,7 @@ use crate::gray::{DepthSpan, Sheet};
 use crate::layer_share::LayerShare;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
 
-/// A facet's section with a plane. If the facet faces outwards, the part is on the
+/// A facet's section with a plane. If the facet faces outward, the part is on the
 /// left of the way from start to end, seen from above.
 pub(crate) struct Segment {
     pub(crate) ends: [SegmentEnd; 2],
@@ -42,8 +41,8 @@ pub(crate) struct SegmentEnd {
 
 impl Cutter<'_> {
     /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and returns
-    /// the number of crossings that take as much memory. Segments that cross many rows are kept
-    /// as such, and crossings of small images are short, if `needs_no_body`.
+    /// the number of crossings that need the same memory. If `needs_no_body`, segments that cross
+    /// many rows are kept as segments, and crossings of small images are short.
     #[inline]
     pub(crate) fn cut(
         &self,
@@ -78,7 +77,7 @@ impl Cutter<'_> {
     }
 
     /// Adds the depths at which the rows of `layers` meet a body's facet below their sections,
-    /// within `reach_um`. Returns the number of crossings that take as much memory.
+    /// within `reach_um`. Returns the number of crossings that need the same memory.
     pub(crate) fn look_down(
         &self,
         facet: &PlacedFacet,
@@ -111,7 +110,7 @@ impl Cutter<'_> {
         mut each: impl FnMut(usize, Segment),
     ) {
         let (low, high) = facet_heights(facet);
-        // Most facets of a part in no order lie in another slab.
+        // Most facets of an unordered part are in another slab.
         if low >= self.planes.side_um(layers.end - 1) || high < self.planes.side_um(layers.start) {
             return;
         }
@@ -172,7 +171,7 @@ impl Cutter<'_> {
         segment.rows().for_each(|row| each(row, segment.column(row), segment.is_rising()));
     }
 
-    /// Returns the first row whose centre is at or below a point in pixels.
+    /// Returns the first row whose center is at or below a point in pixels.
     #[inline]
     pub(crate) fn first_row(&self, point: [f64; 2]) -> u32 {
         ceil_clamped(point[1], self.grid.height)

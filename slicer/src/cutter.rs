@@ -1,4 +1,4 @@
-//! The rows, planes and fill rule by which a part is cut.
+//! Holds the rows, planes and fill rule by which a part is cut.
 
 use crate::bodies::FillRule;
 use crate::grid::PixelGrid;

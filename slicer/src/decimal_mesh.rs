@@ -1,15 +1,16 @@
-//! Meshes of text formats, whose decimals are finer than the 32 bits of facets.
+//! Holds meshes of text formats, whose decimals are finer than the 32 bits of facets.
 
 use std::sync::Arc;
 
 use crate::facet::Facet;
 use crate::piece::{Facets, Piece};
 
-/// A mesh lies far from the origin along an axis if its coordinates there are this many times as
-/// large as it is. Vertices of nearer ones are off by `size / 2^18` at most, 0.4 um of 100 mm.
+/// A mesh is far from the origin along an axis if the ratio of its greatest coordinate there to its
+/// size is at least this. Vertices of nearer meshes are off by at most `size / 2^18`, 0.4 um of 100
+/// mm.
 const FAR: f64 = 64.0;
 
-/// A mesh as text has it: vertices in decimals, and facets of their numbers.
+/// A mesh as in the text: vertices in decimals, and facets of vertex numbers.
 #[derive(Debug, Default)]
 pub(crate) struct DecimalMesh {
     vertices: Vec<[f64; 3]>,
@@ -26,12 +27,12 @@ impl DecimalMesh {
         self.vertices.len()
     }
 
-    /// Adds a facet of vertices that were added.
+    /// Adds a facet of vertices that were added before.
     pub(crate) fn add_facet(&mut self, corners: [u32; 3]) {
         self.facets.push(corners);
     }
 
-    /// Returns a piece of the facets in 32 bits. A mesh far from the origin is measured from its
+    /// Returns a piece with the facets in 32 bits. A mesh far from the origin is measured from its
     /// own corner, since rounding to 32 bits errs in proportion to the distance.
     pub(crate) fn into_piece(self) -> Piece {
         let offset = self.offset();
@@ -43,10 +44,11 @@ impl DecimalMesh {
         Piece { offset, ..Piece::new(Facets::Memory(Arc::new(facets))) }
     }
 
-    /// Returns the least coordinates of the mesh along axes where it is far away, else zero.
+    /// Returns the least coordinates of the mesh along axes where it is far away, and zero along
+    /// the others.
     fn offset(&self) -> [f64; 3] {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        // Vertices that no facet has may lie anywhere.
+        // Vertices that no facet uses may be anywhere.
         for vertex in self.facets.iter().flatten().map(|&number| self.vertices[number as usize]) {
             low = std::array::from_fn(|axis| low[axis].min(vertex[axis]));
             high = std::array::from_fn(|axis| high[axis].max(vertex[axis]));

@@ -1,4 +1,4 @@
-//! Why a part cannot be sliced.
+//! Defines the errors of slicing a part.
 
 use std::io;
 use std::time::Duration;
@@ -9,27 +9,27 @@ use thiserror::Error;
 
 use crate::three_mf::ThreeMfError;
 
-/// Why a part cannot be sliced.
+/// The reason why a part cannot be sliced.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SliceError {
-    /// The file holds nothing.
+    /// The file is empty.
     #[error("the file is empty")]
     EmptyFile,
-    /// A folder.
+    /// The path is a folder.
     #[error("this is a folder, not a file")]
     Folder,
-    /// A file that another program wrote to, or replaced, while it was read.
+    /// Another program wrote to the file, or replaced it, while it was read.
     #[error(
         "the file was changed while it was read, so that images would mix its versions: {change}"
     )]
     Changed {
-        /// The file, from 0, among those joined.
+        /// The index of the file among the joined files, from 0.
         file: usize,
-        /// How it changed.
+        /// The kind of change.
         change: FileChange,
     },
-    /// Neither binary nor ASCII STL.
+    /// The file is neither binary nor ASCII STL.
     #[error(
         "this is not an STL file: it has {size} bytes, and neither a binary header nor `solid` and `facet`"
     )]
@@ -37,10 +37,10 @@ pub enum SliceError {
         /// The file's size in bytes.
         size: u64,
     },
-    /// A file of another format.
+    /// The file has another format.
     #[error("this is {0}, not an STL, STEP, 3MF or OBJ file")]
     OtherFormat(FileFormat),
-    /// A ZIP archive that is no 3MF package.
+    /// The file is a ZIP archive but not a 3MF package.
     #[error(
         "this is a ZIP archive of {files} file{} ({}{}), not a 3MF package",
         if *files == 1 { "" } else { "s" },
@@ -50,34 +50,34 @@ pub enum SliceError {
     OtherArchive {
         /// The number of files in it.
         files: usize,
-        /// The name of a file in it, of a part if there is one.
+        /// The name of a file in it; the name of a part if it contains one.
         name: String,
     },
-    /// A file that is read, where only STEP files are.
+    /// The format is supported, but only STEP files are allowed here.
     #[error("this is {0}, not a STEP file")]
     NotStep(FileFormat),
-    /// A packed file that is damaged.
+    /// A packed file is damaged.
     #[error("it cannot be unpacked")]
     Packed(#[source] io::Error),
-    /// A packed file that holds far more than any mesh its size.
+    /// A packed file contains far more than any mesh of its size.
     #[error("it unpacks to more than {most} bytes, which is far more than a packed mesh does")]
     Inflated {
-        /// The most that is unpacked.
+        /// The greatest amount that is unpacked.
         most: u64,
     },
-    /// A binary STL whose header does not agree with its size.
+    /// The header of a binary STL does not agree with its size.
     #[error(
         "the header declares {declared} facets, which take {} bytes, but the file has {size}: {}",
         84 + 50 * u64::from(*.declared),
         where_count_is_wrong(*.declared, *.size)
     )]
     Count {
-        /// How many facets the header declares.
+        /// The number of facets that the header declares.
         declared: u32,
         /// The file's size in bytes.
         size: u64,
     },
-    /// An ASCII STL that breaks off or has a line of another kind.
+    /// An ASCII STL breaks off or has an invalid line.
     #[error("facet {facet} of the ASCII file: {fault}")]
     Ascii {
         /// The facet, from 0, in the whole file.
@@ -85,7 +85,7 @@ pub enum SliceError {
         /// The fault there.
         fault: AsciiFault,
     },
-    /// A line of an OBJ file that cannot be read.
+    /// A line of an OBJ file cannot be read.
     #[error("line {line} of the OBJ file {fault}")]
     Obj {
         /// The line, from 1.
@@ -93,35 +93,35 @@ pub enum SliceError {
         /// The fault there.
         fault: ObjFault,
     },
-    /// A 3MF file that cannot be read.
+    /// A 3MF file cannot be read.
     #[error(transparent)]
     ThreeMf(#[from] Box<ThreeMfError>),
-    /// A coordinate that is no number.
+    /// A coordinate is not a number.
     #[error("facet {facet} has a coordinate that is not a finite number")]
     NotFinite {
-        /// The file, from 0, among those joined.
+        /// The index of the file among the joined files, from 0.
         file: usize,
         /// The facet in the file, from 0.
         facet: usize,
     },
-    /// A corner far outside the rest of the part.
+    /// A corner is far outside the rest of the part.
     #[error(
         "facet {facet} has a corner at {}, far outside the rest: only {reaching} of {facets} facets reach there",
         corner.map(|c| c.to_string()).join(", ")
     )]
     WildVertex {
-        /// The file, from 0, among those joined.
+        /// The index of the file among the joined files, from 0.
         file: usize,
-        /// The first facet out there, in the file, from 0.
+        /// The first facet out there: its index in the file, from 0.
         facet: usize,
         /// Its corner, in the file's coordinates and units.
         corner: [f32; 3],
-        /// How many facets reach so far.
+        /// The number of facets that reach so far.
         reaching: usize,
-        /// How many facets the part has.
+        /// The number of facets of the part.
         facets: usize,
     },
-    /// More rows than any machine exposes, which take hours even if they are black.
+    /// There are more rows than any machine exposes; they would take hours even if black.
     #[error("{layers} layers of {rows} rows are more than any machine exposes")]
     TooManyRows {
         /// The number of layers.
@@ -129,17 +129,17 @@ pub enum SliceError {
         /// The rows of each.
         rows: u32,
     },
-    /// Contours that cross the rows of a layer more often than those of any part.
+    /// Contours cross the rows of a layer more often than the contours of any real part.
     #[error(
         "about {crossings:.0} crossings of rows and contours in layer {layer} are more than any part has"
     )]
     TooManyCrossings {
         /// The first such layer.
         layer: usize,
-        /// How many crossings are expected there.
+        /// The expected number of crossings there.
         crossings: f64,
     },
-    /// A part more than 1000 km away, where coordinates are no longer exact.
+    /// The part is more than 1000 km away, where coordinates are no longer exact.
     #[error(
         "the part reaches {:.3e} mm from the origin, where coordinates are no longer exact",
         distance.mm()
@@ -151,27 +151,27 @@ pub enum SliceError {
     /// There is nothing to slice.
     #[error("the file holds no facets: there is nothing to slice")]
     NoFacets,
-    /// More facets than a corner table has numbers for.
+    /// There are more facets than a corner table has numbers.
     #[error("{facets} facets are more than a corner table holds, which are 1431655764")]
     TooManyFacets {
-        /// How many facets the part has.
+        /// The number of facets of the part.
         facets: usize,
     },
-    /// A part with volumes that are cut out of others, where its surface is asked for.
+    /// The surface of a part with subtracted volumes was requested.
     #[error(
         "volumes are cut out of it (negative volumes of a project, --subtract or --intersect), which \
          layers have and the mesh does not: cut them in CAD and export one mesh"
     )]
     Cut,
-    /// A mesh of facets that a repair drops.
+    /// A repair would drop all facets of a mesh.
     #[error(
         "a repair would drop all of its last {facets} facets: none has an area, or they cancel each other out"
     )]
     NothingLeft {
-        /// How many facets there were in the end.
+        /// The number of facets before the last step.
         facets: usize,
     },
-    /// An image would have too many pixels on a side.
+    /// An image would have too many pixels along a side.
     #[error(
         "an image would be {width} x {height} pixels, more than {} on a side",
         crate::grid::MAX_SIDE
@@ -182,14 +182,14 @@ pub enum SliceError {
         /// Height in pixels.
         height: f64,
     },
-    /// The part does not fit the place given for the images.
+    /// The part does not fit the space given for the images.
     #[error(
         "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images \
          or leaves no black column on their right",
         part_mm[0][0], part_mm[1][0], part_mm[0][1], part_mm[1][1]
     )]
     OutsideFrame {
-        /// The least and greatest x and y of the part, in millimetres.
+        /// The least and greatest x and y of the part, in millimeters.
         part_mm: [[f64; 2]; 2],
     },
     /// The part would have too many layers.
@@ -197,18 +197,18 @@ pub enum SliceError {
     TooManyLayers {
         /// The part's height.
         height: Length,
-        /// The thickness asked for.
+        /// The requested thickness.
         thickness: Length,
-        /// How many layers that makes.
+        /// The resulting number of layers.
         layers: f64,
     },
-    /// Heights that make no layers, or too many.
+    /// The heights give no layers, or too many.
     #[error("these heights make {layers} layers, not between one and four million")]
     LayerCount {
-        /// How many layers they make.
+        /// The resulting number of layers.
         layers: usize,
     },
-    /// A layer's top not above its bottom.
+    /// A layer's top is not above its bottom.
     #[error("layer {layer} would lie between {bottom} and {top}: heights of layers must rise")]
     NoThickness {
         /// The layer, from 0.
@@ -218,17 +218,17 @@ pub enum SliceError {
         /// Its top.
         top: Length,
     },
-    /// The layers asked for do not exist.
+    /// The requested layers do not exist.
     #[error("{} asked for, but the part has layers 0 to {}", asked(*start, *end), count.saturating_sub(1))]
     NoSuchLayers {
-        /// The first layer asked for.
+        /// The first requested layer.
         start: u32,
-        /// The layer after the last asked for.
+        /// The layer after the last requested layer.
         end: u32,
-        /// How many layers there are.
+        /// The number of layers.
         count: u32,
     },
-    /// Gray layers whose sections are not at their tops.
+    /// The sections of gray layers are not at their tops.
     #[error(
         "gray layers are as deep as the part below their tops, so their sections must be there"
     )]
@@ -249,10 +249,10 @@ pub enum SliceError {
         fault: BodyFault,
         /// The first finding about a face, which may be the reason.
         finding: Option<Finding>,
-        /// How many more faults there are.
+        /// The number of further faults.
         more: usize,
     },
-    /// Another kernel reads a STEP file otherwise.
+    /// Another kernel reads a STEP file differently.
     #[error(
         "the kernels disagree about {body}: {difference}{}",
         if *more > 0 { format!(", and {more} differences more") } else { String::new() }
@@ -262,7 +262,7 @@ pub enum SliceError {
         body: String,
         /// Its first difference.
         difference: Difference,
-        /// How many more differences there are.
+        /// The number of further differences.
         more: usize,
     },
     /// Reading a STEP file took too long.
@@ -270,7 +270,7 @@ pub enum SliceError {
     Timeout {
         /// The time allowed.
         timeout: Duration,
-        /// How far facets were allowed to lie from surfaces.
+        /// The greatest accepted distance of facets from surfaces.
         tolerance: Length,
     },
     /// Reading the file failed.
@@ -287,7 +287,7 @@ fn where_count_is_wrong(declared: u32, size: u64) -> String {
     }
 }
 
-/// How a file changed while it was read.
+/// The kind of change of a file while it was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FileChange {
@@ -302,22 +302,22 @@ pub enum FileChange {
     /// It was written to.
     #[error("it was written to")]
     Content,
-    /// Its name stands for another file now.
+    /// Its name refers to another file now.
     #[error("another file has its name now")]
     Replaced,
 }
 
-/// A fault of a line of an OBJ file.
+/// A fault in a line of an OBJ file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ObjFault {
-    /// A vertex without three numbers, or a face with something else than numbers.
+    /// A vertex without three numbers, or a face with something other than numbers.
     #[error("is no vertex of three numbers, and no face of numbers of vertices")]
     Number,
-    /// A corner at a vertex that does not stand before it.
+    /// A corner at a vertex that is not defined before it.
     #[error("names a vertex that does not stand before it: there is no vertex {0}")]
     NoVertex(i64),
-    /// A face that is no face of a part.
+    /// A face with too many corners for a real part.
     #[error("is a face with more corners than 500000")]
     ManyCorners,
     /// Bytes of zero before further words.
@@ -355,7 +355,7 @@ pub enum AsciiFault {
 }
 
 impl AsciiFault {
-    /// Returns the start of a word, which may be long and anything, for messages.
+    /// Returns the start of a word for messages. The word may be long and contain any bytes.
     pub(crate) fn start_of(word: &[u8]) -> String {
         const MAX_CHARACTERS: usize = 40;
         let text = String::from_utf8_lossy(word);
@@ -363,7 +363,7 @@ impl AsciiFault {
     }
 }
 
-/// Says which layers were asked for.
+/// Returns a description of the requested layers.
 fn asked(start: u32, end: u32) -> String {
     match end {
         _ if end <= start => format!("layers {start}..{end} were"),

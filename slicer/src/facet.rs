@@ -1,20 +1,20 @@
 //! Facets of parts, and the unit of their coordinates.
 
-/// A triangle of a part's surface: three corners (x, y, z) in file units, as
-/// STL holds them, counter-clockwise seen from outside.
+/// A triangle of a part's surface: three corners (x, y, z) in file units, as in STL,
+/// counterclockwise seen from outside.
 pub type Facet = [[f32; 3]; 3];
 
 /// The unit of a file's coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Units {
-    /// Millimetres.
+    /// Millimeters.
     #[default]
     Millimetres,
-    /// Centimetres.
+    /// Centimeters.
     Centimetres,
-    /// Metres.
+    /// Meters.
     Metres,
-    /// Micrometres.
+    /// Micrometers.
     Micrometres,
     /// Inches.
     Inches,
@@ -32,12 +32,12 @@ lamp_stack::named!(Units {
 });
 
 impl Units {
-    /// Returns the millimetres in one unit.
+    /// Returns the millimeters in one unit.
     pub fn mm(self) -> f64 {
         self.um() / 1000.0
     }
 
-    /// Returns the micrometres in one unit: whole, so that multiplying a 32-bit
+    /// Returns the micrometers in one unit: whole, so that multiplying a 32-bit
     /// coordinate by it is exact.
     pub(crate) fn um(self) -> f64 {
         match self {
@@ -51,7 +51,7 @@ impl Units {
     }
 }
 
-/// A facet in its place: x and y in millimetres, z in micrometres.
+/// A placed facet: x and y in millimeters, z in micrometers.
 pub type PlacedFacet = [[f64; 3]; 3];
 
 /// Returns the lowest and the highest z of a facet.
@@ -61,8 +61,7 @@ pub fn facet_heights(facet: &PlacedFacet) -> (f64, f64) {
     (lesser(lesser(a, b), c), greater(greater(a, b), c))
 }
 
-/// Returns the lesser of two numbers. `f64::min` looks for those that are none, and takes several
-/// times as long.
+/// Returns the lesser of two numbers. `f64::min` checks for NaN and takes several times as long.
 #[inline]
 pub(crate) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
@@ -74,7 +73,7 @@ pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// Rounds corners to 32 bits, as STL has them.
+/// Rounds corners to 32 bits, as in STL.
 pub(crate) fn rounded(corners: [[f64; 3]; 3]) -> Facet {
     corners.map(|corner| corner.map(|c| c as f32))
 }

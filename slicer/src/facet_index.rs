@@ -13,8 +13,8 @@ use crate::placed_part::PlacedPart;
 use crate::placement::Placement;
 use crate::survey::Survey;
 
-/// A part in its place, whose facets between two heights are found without looking at
-/// the others. It takes about 49 bytes a facet.
+/// A placed part, whose facets between two heights are found without examining the other facets. It
+/// takes about 49 bytes per facet.
 ///
 /// ```
 /// use lamp_slicer::{FacetIndex, Part, Placement, Units};
@@ -30,16 +30,16 @@ use crate::survey::Survey;
 pub struct FacetIndex {
     model: PlacedPart,
     bins: HeightBins,
-    /// By the bin in which they begin, with their pieces.
+    /// The facets, grouped by the bin in which they begin, with their pieces.
     facets: Grouped<(Facet, u32)>,
-    /// By bin, the facets of lower bins that reach into it, as positions in `facets`.
+    /// For each bin, the facets of lower bins that reach into it, as positions in `facets`.
     from_below: Grouped<u32>,
     min: [f64; 3],
     max: [f64; 3],
     overlap: Option<[usize; 2]>,
 }
 
-/// Even ranges of height.
+/// Equal ranges of height.
 #[derive(Clone, Copy, Debug)]
 struct HeightBins {
     start_um: f64,
@@ -61,7 +61,7 @@ impl HeightBins {
         Self { start_um, height_um, count: count as usize }
     }
 
-    /// Returns the bin of a height: the first or the last for those outside.
+    /// Returns the bin of a height; heights outside get the first or the last bin.
     #[inline]
     fn of(&self, z_um: f64) -> usize {
         (((z_um - self.start_um) / self.height_um) as usize).min(self.count - 1)
@@ -106,7 +106,7 @@ impl FacetIndex {
             let (piece, _) = model.model.place_of(block);
             model.model.for_each_in_block(block, |facet| {
                 let met = bins.of_facet(&model.transform_of(piece).placed(facet));
-                // There is room for all, unless the file changed.
+                // There is room for all facets, unless the file changed.
                 let Some(place) = facets.put(met.start, (*facet, piece as u32)) else { return };
                 for bin in met.start + 1..met.end {
                     from_below.put(bin, place);
@@ -119,7 +119,7 @@ impl FacetIndex {
         Ok(Self { model, bins, facets, from_below, min: survey.min, max: survey.max, overlap })
     }
 
-    /// Returns the rule that tells inside from outside, given that for crossings.
+    /// Returns the rule for the whole part, given the rule for crossings.
     pub fn fill_rule(&self, fill: Fill) -> FillRule {
         self.model.model.fill_rule(fill)
     }
@@ -129,18 +129,18 @@ impl FacetIndex {
         self.overlap
     }
 
-    /// Returns the least x and y in millimetres, and z in micrometres.
+    /// Returns the least x and y in millimeters, and z in micrometers.
     pub fn min(&self) -> [f64; 3] {
         self.min
     }
 
-    /// Returns the greatest x and y in millimetres, and z in micrometres.
+    /// Returns the greatest x and y in millimeters, and z in micrometers.
     pub fn max(&self) -> [f64; 3] {
         self.max
     }
 
-    /// Returns the facets that reach above one height and do not begin above the other, and
-    /// their bodies, in an arbitrary but fixed order. Heights are in micrometres.
+    /// Returns the facets that reach above `low_um` and do not begin above `high_um`, and their
+    /// bodies, in an arbitrary but fixed order. Heights are in micrometers.
     pub fn between(&self, low_um: f64, high_um: f64) -> Vec<(PlacedFacet, u32)> {
         let (first, last) = (self.bins.of(low_um), self.bins.of(high_um));
         let facets = self.facets.items();
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn facets_are_found_by_height() {
         let mut facets = tower(3_000).facets;
-        // One that stands through all bins.
+        // A facet that spans all bins.
         facets.push([[0.0, 0.0, -5.0], [1.0, 0.0, 80.0], [0.0, 1.0, 80.0]]);
         for placement in [Placement::default(), Placement::default().rotated(Axis::X, 90.0)] {
             let model = Part::from_facets("tower", facets.clone());

@@ -1,5 +1,5 @@
-//! Looks at the facets of a binary STL while its bytes pass for their digest, so that a survey of
-//! the part need not read the file once more.
+//! Examines the facets of a binary STL while its bytes pass for their digest, so that a survey of
+//! the part need not read the file again.
 
 use std::io;
 use std::sync::Mutex;
@@ -7,10 +7,10 @@ use std::sync::Mutex;
 use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
 use crate::facet::{Facet, greater, lesser};
 
-/// The facets of a block, in which they are read: 200 kB of a binary file.
+/// The number of facets read as a block: 200 kB of a binary file.
 pub(crate) const BLOCK_FACETS: usize = 4096;
 
-/// What a survey asks of a block of facets, in file units.
+/// The data of a block of facets for a survey, in file units.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FileBlock {
     pub(crate) min: [f32; 3],
@@ -58,21 +58,21 @@ impl FileBlock {
     }
 }
 
-/// Looks at the facets of a file as its bytes pass, in any order.
+/// Examines the facets of a file as its bytes pass, in any order.
 pub(crate) struct FileLooks {
     count: usize,
-    /// Facets in a row that are of one block, and the number of the first.
+    /// Consecutive facets of one block, and the number of the first one.
     looks: Mutex<Vec<(usize, FileBlock)>>,
 }
 
 impl FileLooks {
-    /// Starts to look at a file of `count` facets.
+    /// Starts to examine a file of `count` facets.
     pub(crate) fn new(count: usize) -> Self {
         Self { count, looks: Mutex::default() }
     }
 
-    /// Looks at the facets that begin in these bytes of the file, from `start` on. `read_at` reads
-    /// others, for the facet that does not end in them.
+    /// Examines the facets that begin in these bytes of the file, from `start` on. `read_at` reads
+    /// other bytes, for the facet that does not end in these.
     pub(crate) fn look(
         &self,
         bytes: &[u8],
@@ -90,7 +90,7 @@ impl FileLooks {
             let whole = ended.clamp(first, next);
             let [from, to] = [first, whole].map(|facet| (byte_of(facet) - start) as usize);
             let mut block = FileBlock::EMPTY;
-            // No facet lies wholly in them if the first is cut off.
+            // If the first facet is cut off, no facet is entirely in the bytes.
             let records = if whole > first { &bytes[from..to] } else { &[] };
             records.as_chunks().0.iter().for_each(|record| block.add(&parse(record)));
             if whole < next {

@@ -1,4 +1,4 @@
-//! The rule that tells inside from outside of a body.
+//! Defines the rule that decides what is inside a body.
 
 /// The rule that decides what is inside a body.
 ///
@@ -11,12 +11,12 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fill {
     /// Pixels that contours wind around are white. The facets' orientation gives the sign, so
-    /// shells that overlap unite, and those that face inwards are voids. A row whose signs do
-    /// not add up is filled by even-odd.
+    /// overlapping shells unite, and shells that face inward are voids. A row whose signs do not
+    /// add up is filled by even-odd.
     #[default]
     Solid,
-    /// Every crossing toggles the color, as in 002 section 2.3.4. Shells and files that overlap
-    /// cut each other.
+    /// Every crossing toggles the color, as in 002 section 2.3.4. Overlapping shells and files cut
+    /// each other.
     EvenOdd,
 }
 

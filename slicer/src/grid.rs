@@ -1,12 +1,11 @@
-//! The grid of a layer's pixels in part coordinates.
+//! Defines the grid of a layer's pixels in part coordinates.
 
 use lamp_stack::Dpi;
 
 use crate::error::SliceError;
 
-/// The greatest width and height of a layer in pixels. It is less than that of
-/// any image, because all rows of a slab take memory, also those without
-/// crossings.
+/// The greatest width and height of a layer in pixels. It is below the limit for other images,
+/// because all rows of a slab take memory, including rows without crossings.
 pub(crate) const MAX_SIDE: u32 = lamp_stack::MAX_SIDE / 4;
 
 /// The pixels of a layer in part coordinates.
@@ -21,7 +20,7 @@ pub(crate) const MAX_SIDE: u32 = lamp_stack::MAX_SIDE / 4;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelGrid {
-    /// The top left corner (x0, y1) in part coordinates, in millimetres.
+    /// The top left corner (x0, y1) in part coordinates, in millimeters.
     pub origin_mm: [f64; 2],
     /// The resolution.
     pub dpi: Dpi,
@@ -34,8 +33,8 @@ pub struct PixelGrid {
 impl PixelGrid {
     /// Creates the grid around a box (x, y), with `margin` pixels on every side. On the
     /// right its width is rounded up to a multiple of 32, and at least one column stays
-    /// black, since a row that ends white is a stray row. The origin is moved outwards
-    /// to a whole nanometre, so that six decimals state it exactly.
+    /// black, since a row that ends white is a stray row. The origin is moved outward
+    /// to a whole nanometer, so that six decimals state it exactly.
     ///
     /// ```
     /// use lamp_slicer::PixelGrid;
@@ -68,7 +67,7 @@ impl PixelGrid {
         Self::at([x0, y1], width, height, dpi)
     }
 
-    /// Creates the grid with its top left corner at `origin_mm`.
+    /// Creates the grid whose top left corner is at `origin_mm`.
     ///
     /// # Errors
     /// Returns an error if a side is not between 1 and 2^24 pixels.
@@ -80,9 +79,9 @@ impl PixelGrid {
         Ok(Self { origin_mm, dpi, width: width as u32, height: height as u32 })
     }
 
-    /// Returns true if a box lies inside the grid and leaves its last column black.
+    /// Returns true if a box is inside the grid and leaves the grid's last column black.
     pub(crate) fn holds(&self, min_mm: [f64; 2], max_mm: [f64; 2]) -> bool {
-        // In pixels, the grid's edges lie half a pixel outside its centres.
+        // In pixels, the grid's edges lie half a pixel outside its centers.
         let [left, bottom] = self.to_pixels(min_mm[0], min_mm[1]);
         let [right, top] = self.to_pixels(max_mm[0], max_mm[1]);
         left >= -0.5
@@ -91,12 +90,10 @@ impl PixelGrid {
             && bottom <= f64::from(self.height) - 0.5
     }
 
-    /// Returns a point in pixels: its column is at most c exactly if it lies left of or
-    /// on the centre of column c, and its row at most r exactly if it lies above or on
-    /// the centre of row r.
+    /// Returns a point in pixels: its column is at most c exactly if it is left of or on the center
+    /// of column c, and its row is at most r exactly if it is above or on the center of row r.
     ///
-    /// A point on a centre gives whole numbers, since the one division is by a whole
-    /// number.
+    /// A point on a center gives whole numbers, because the only division is by a whole number.
     #[inline]
     pub fn to_pixels(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
         let scale = pixels_per_127_mm(self.dpi);
@@ -106,7 +103,7 @@ impl PixelGrid {
         ]
     }
 
-    /// Returns a point in millimetres, given in pixels: the inverse of
+    /// Returns a point in millimeters, given in pixels: the inverse of
     /// [`to_pixels`](Self::to_pixels).
     pub fn to_mm(&self, column: f64, row: f64) -> [f64; 2] {
         let scale = pixels_per_127_mm(self.dpi);
@@ -139,7 +136,7 @@ mod tests {
 
     #[test]
     fn centres_are_whole_numbers() {
-        // 203.2 dpi is a pitch of 1/8 mm, which floating point holds.
+        // 203.2 dpi is a pitch of 1/8 mm, which floating point represents exactly.
         let grid = PixelGrid::at([-3.0, 5.0], 64.0, 64.0, Dpi::new(203.2).unwrap()).unwrap();
         for c in 0..64u32 {
             let centre = (f64::from(c) + 0.5) * 0.125;

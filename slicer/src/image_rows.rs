@@ -8,11 +8,11 @@ use crate::bodies::{Doubts, LayerDoubts, Position, SharedPixels};
 use crate::crossing::{BodyCrossing, InRow, RowCrossing};
 use crate::grid::PixelGrid;
 
-/// What the rows of a layer become, from the top.
+/// The maker of a layer's rows, from the top.
 pub(crate) trait RowMaker {
     type Made;
 
-    /// Returns a list to which the row's transitions are to be added.
+    /// Returns a list to which the row's transitions are added.
     fn transitions(&mut self) -> &mut Vec<u32>;
 
     /// Ends a row, given its sorted crossings.
@@ -21,7 +21,7 @@ pub(crate) trait RowMaker {
     fn finish(self) -> Self::Made;
 }
 
-/// Rows of a mask.
+/// The rows of a mask.
 pub(crate) struct MaskRows {
     width: u32,
     row_offsets: Vec<u32>,
@@ -55,8 +55,8 @@ impl RowMaker for MaskRows {
     }
 }
 
-/// Makes rows of what `fill` makes of their crossings, once they are sorted. Returns them, and the
-/// numbers of those for which `fill` returns false since they do not balance.
+/// Makes rows with `fill` from their sorted crossings. Returns the rows, and the numbers of the
+/// rows for which `fill` returns false because they do not balance.
 pub(crate) fn make_rows<M: RowMaker, C: InRow>(
     mut maker: M,
     height: u32,
@@ -78,7 +78,7 @@ pub(crate) fn make_rows<M: RowMaker, C: InRow>(
     (maker.finish(), stray_rows)
 }
 
-/// Sorts what a row has: two or four, as most rows have, without a branch.
+/// Sorts a row's items: two or four items, the usual numbers, without a branch.
 #[inline]
 fn sort<T: Copy + Ord>(items: &mut [T]) {
     match items {
@@ -94,7 +94,7 @@ fn sort<T: Copy + Ord>(items: &mut [T]) {
     }
 }
 
-/// Puts the lesser of two first.
+/// Puts the lesser of two items first.
 #[inline]
 fn in_order<T: Copy + Ord>(a: &mut T, b: &mut T) {
     (*a, *b) = ((*a).min(*b), (*a).max(*b));
@@ -117,12 +117,12 @@ pub(crate) fn sort_by<T: Copy>(items: &mut [T], order: impl Fn(&T, &T) -> Orderi
     }
 }
 
-/// Adds a row's transitions, one at every crossing, where two at one column cancel.
-/// Returns true if the number of crossings is even.
+/// Adds a row's transitions, one at every crossing; two at the same column cancel. Returns true if
+/// the number of crossings is even.
 #[inline]
 pub(crate) fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bool {
     let start = transitions.len();
-    // Nearly all rows.
+    // True for nearly all rows.
     if places.is_sorted_by(|a, b| a.column() < b.column()) {
         transitions.extend(places.iter().map(|place| place.column()));
         return places.len().is_multiple_of(2);
@@ -137,8 +137,8 @@ pub(crate) fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bo
     places.len().is_multiple_of(2)
 }
 
-/// Adds a row's transitions, wherever the winding number leaves or reaches zero, or at every crossing
-/// if it is not zero at the end. Returns true if the number of crossings is even.
+/// Adds a row's transitions, wherever the winding number leaves or reaches zero; or at every
+/// crossing, if the number is not zero at the end. Returns true if the number of crossings is even.
 #[inline]
 pub(crate) fn solid(
     places: &[RowCrossing],
@@ -146,7 +146,8 @@ pub(crate) fn solid(
     outward: i32,
     doubts: &mut LayerDoubts,
 ) -> bool {
-    // Nearly all rows: a clean shell is entered and left in turn. One pass, without a branch.
+    // True for nearly all rows: a clean shell is entered and left alternately. One pass, without a
+    // branch.
     let start = transitions.len();
     let (mut is_clean, mut least, mut winding) = (true, 0, outward);
     transitions.extend(places.iter().map(|place| {
@@ -167,7 +168,7 @@ pub(crate) fn solid(
     is_even
 }
 
-/// The same for any row. Adds to the doubts about it.
+/// Does the same for any row. Adds to the doubts about it.
 fn wound(
     places: &[RowCrossing],
     transitions: &mut Vec<u32>,

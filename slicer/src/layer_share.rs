@@ -1,4 +1,4 @@
-//! The share of a layer's crossings that one worker finds.
+//! Holds the share of a layer's crossings that one worker finds.
 
 use std::iter;
 
@@ -10,11 +10,13 @@ use crate::gray::DepthSpan;
 #[derive(Debug, Default)]
 pub(crate) struct LayerShare {
     crossings: Vec<Crossing>,
-    /// Crossings of small images, where they need not be known by body.
+    /// Crossings of small images, where crossings need not record their bodies.
     pub(crate) short: Vec<ShortCrossing>,
-    /// Segments whose crossings would take more memory, where crossings need not be known by body.
+    /// Segments whose crossings would take more memory, where crossings need not record their
+    /// bodies.
     pub(crate) segments: Vec<RowSegment>,
-    /// From which crossing on they are of which body; those before are of body 0.
+    /// The index of the first crossing of each body, and the body; earlier crossings belong to body
+    /// 0.
     bodies: Vec<(u32, u32)>,
     /// Crossings of B-rep facets near which no point of the surface was found, and their
     /// bodies.
@@ -36,7 +38,7 @@ impl LayerShare {
         self.ends = EndSum::default();
     }
 
-    /// Returns the crossings, to which those of a body are to be added.
+    /// Returns the list of crossings, ready to add the crossings of a body.
     #[inline]
     pub(crate) fn of_body(&mut self, body: u32) -> &mut Vec<Crossing> {
         if self.bodies.last().map_or(0, |&(_, last)| last) != body {
@@ -45,7 +47,7 @@ impl LayerShare {
         &mut self.crossings
     }
 
-    /// Returns all crossings but short ones and those of segments.
+    /// Returns all crossings except short ones and the crossings of segments.
     pub(crate) fn crossings(&self) -> &[Crossing] {
         &self.crossings
     }

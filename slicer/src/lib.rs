@@ -5,12 +5,12 @@
 //! planes of layers and the rows of images go into a table of (layer, row), and sorting
 //! a row's crossings gives its runs (002 section 2.3.4, algorithm 9).
 //!
-//! - [`Placement`] scales, turns and moves the part; [`PixelGrid`] lays its pixels.
-//! - [`LayerHeights`] are layers of any thickness, [`Shading`] gray levels.
+//! - [`Placement`] scales, turns and moves the part; [`PixelGrid`] places its pixels.
+//! - [`LayerHeights`] defines layers of any thickness, [`Shading`] gray levels.
 //! - [`Slices::trace`] finds the faulty edges behind stray rows.
 //! - [`section`](fn@section) cuts one section without rounding to pixels, and
 //!   [`FacetIndex`] finds facets by height.
-//! - [`topology`] tells which facets are neighbours and shells.
+//! - [`topology`] finds neighboring facets and shells.
 //!
 //! ```
 //! use lamp_slicer::{Part, SliceOptions, Slices};

@@ -1,21 +1,21 @@
-//! Reads the numbers of texts, as programs of all languages write them.
+//! Reads the numbers of texts, as programs in all languages write them.
 
 use std::str::FromStr;
 
-/// How a text writes its numbers.
+/// The number format of a text.
 #[derive(Debug, Default)]
 pub(crate) struct Numbers {
-    /// Whether commas stand for decimal points, as programs write them where that is the custom.
+    /// Whether commas are decimal points, as in some locales.
     pub(crate) has_commas: bool,
-    /// Whether no comma can stand between thousands.
+    /// Whether no comma can separate thousands.
     is_decimal: bool,
 }
 
-/// Why a word is no number.
+/// The reason why a word is not a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NumberFault {
     NoNumber,
-    /// It is one if commas stand for points.
+    /// It is a number if commas are decimal points.
     Comma,
 }
 
@@ -37,8 +37,8 @@ impl Numbers {
         }
     }
 
-    /// Returns the number of a word with the exponent of Fortran (`1.0D+02`), a comma behind it or
-    /// one for its point.
+    /// Returns the number of a word with an exponent of Fortran (`1.0D+02`), a comma after it, or a
+    /// comma as its decimal point.
     fn parse_odd<F: FromStr>(&mut self, text: &str) -> Result<F, NumberFault> {
         let plain = text.strip_suffix([',', ';']).unwrap_or(text).replace(['d', 'D'], "e");
         let is_plain = !(self.has_commas && plain.contains('.'));
@@ -57,7 +57,7 @@ impl Numbers {
         if self.has_commas { Ok(number) } else { Err(NumberFault::Comma) }
     }
 
-    /// Returns true if the commas that were read may stand between thousands.
+    /// Returns true if the commas so far may separate thousands.
     pub(crate) fn is_ambiguous(&self) -> bool {
         self.has_commas && !self.is_decimal
     }

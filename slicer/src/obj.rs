@@ -1,4 +1,4 @@
-//! Reads OBJ: the vertices and faces of Wavefront's text format.
+//! Reads OBJ, Wavefront's text format: its vertices and faces.
 
 use std::io::{self, Read};
 
@@ -9,11 +9,11 @@ use crate::piece::Piece;
 use crate::read_note::ReadNote;
 use crate::words::Words;
 
-/// More corners than any face has.
+/// A limit above the number of corners of any real face.
 const MAX_CORNERS: usize = 1 << 19;
 
-/// First words of lines that say nothing about the shape: normals, texture, names, groups,
-/// materials and how to draw.
+/// First words of lines without information about the shape: normals, texture, names, groups,
+/// materials and display settings.
 const PASSED_OVER: [&[u8]; 30] = [
     b"vn",
     b"vt",
@@ -47,14 +47,13 @@ const PASSED_OVER: [&[u8]; 30] = [
     b"map_ka",
 ];
 
-/// Reads the faces of all objects of a file, which `open` opens, as fans of facets. A face that is
-/// not convex has facets that overlap, but the same sections by either rule of filling.
+/// Reads the faces of all objects of a file, which `open` opens, as fans of facets. The facets of a
+/// non-convex face overlap, but have the same sections under either fill rule.
 ///
-/// # Errors
-/// Returns an error if a vertex or a face cannot be read, or the file.
+/// Returns an error if a vertex, a face or the file cannot be read.
 pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<(Piece, Vec<ReadNote>), SliceError> {
     match ObjReader::new(open(), Numbers::default())?.read() {
-        // Only all numbers together say how commas are meant.
+        // Only all numbers together show the meaning of commas.
         Err(SliceError::Obj { fault: ObjFault::Comma, .. }) => {
             ObjReader::new(open(), Numbers::with_commas())?.read()
         }
@@ -99,7 +98,7 @@ impl<R: Read> ObjReader<R> {
         Ok((self.mesh.mesh.into_piece(), self.notes))
     }
 
-    /// Moves to the next word of the line at hand, which a `\` at its end continues. Returns false
+    /// Moves to the next word of the current line, which a `\` at its end continues. Returns false
     /// at its end.
     #[inline]
     fn advance(&mut self) -> io::Result<bool> {
@@ -156,7 +155,7 @@ impl<R: Read> ObjReader<R> {
         Ok(Ok(()))
     }
 
-    /// Passes over a line of another kind.
+    /// Skips a line of another kind.
     fn other_line(&mut self) -> io::Result<Result<(), ObjFault>> {
         if self.words.begins_padding() {
             let Some(bytes) = self.words.padding()? else { return Ok(Err(ObjFault::Zeros)) };
@@ -183,7 +182,7 @@ impl<R: Read> ObjReader<R> {
 #[derive(Default)]
 struct ObjMesh {
     mesh: DecimalMesh,
-    /// The corners of the face at hand.
+    /// The corners of the current face.
     face: Vec<u32>,
 }
 
@@ -197,14 +196,15 @@ impl ObjMesh {
         Ok(())
     }
 
-    /// Adds the face at hand. Returns false if it has fewer than three corners.
+    /// Adds the current face. Returns false if it has fewer than three corners.
     fn add_face(&mut self) -> bool {
         let [first, others @ ..] = &self.face[..] else { return false };
         others.windows(2).for_each(|pair| self.mesh.add_facet([*first, pair[0], pair[1]]));
         others.len() > 1
     }
 
-    /// Returns the index of a vertex by its number, from 1; or from -1, the last one, backwards.
+    /// Returns the index of a vertex by its number: from 1 forward, or from -1, the last vertex,
+    /// backward.
     fn vertex(&self, number: i64) -> Option<u32> {
         let count = self.mesh.vertex_count();
         let index = if number < 0 {
@@ -216,8 +216,8 @@ impl ObjMesh {
     }
 }
 
-/// Returns the number before the first `/`. Most are digits alone, for which text need not be
-/// checked.
+/// Returns the number before the first `/`. Most numbers contain only digits, whose encoding need
+/// not be checked.
 #[inline]
 fn vertex_number(corner: &[u8]) -> Option<i64> {
     let digits = corner.iter().take_while(|byte| byte.is_ascii_digit());

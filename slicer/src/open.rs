@@ -1,4 +1,4 @@
-//! Opens parts from files and streams, in the format that their content says.
+//! Opens parts from files and streams, and detects the format from the content.
 
 use std::io::Read;
 use std::path::Path;
@@ -58,12 +58,10 @@ pub struct OpenOptions {
     pub tolerance: Length,
     /// The time limit.
     pub timeout: Duration,
-    /// Whether bodies may have gaps, because something else stands in for the layers
-    /// that have them.
+    /// Whether bodies may have gaps, because something else replaces the layers that have gaps.
     pub allow_gaps: bool,
-    /// Whether files of any format are taken as large as they are, also if single
-    /// vertices lie far outside the rest, or images have more rows than any machine
-    /// exposes.
+    /// Whether files of any format are accepted at any size, even if single vertices are far
+    /// outside the rest, or images have more rows than any machine exposes.
     pub trust_extent: bool,
 }
 
@@ -81,15 +79,15 @@ impl Default for OpenOptions {
 }
 
 impl Part {
-    /// Opens an STL, STEP, 3MF or OBJ file, or one of these packed by gzip. Which one it
-    /// is follows from its content. A pipe is read to its end.
+    /// Opens an STL, STEP, 3MF or OBJ file, or one of these compressed with gzip. The content
+    /// determines the format. A pipe is read to its end.
     ///
-    /// A binary STL must not change while the part is in use; [`check_unchanged`] tells.
+    /// A binary STL must not change while the part is in use; [`check_unchanged`] checks this.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is none of these, contradicts itself
-    /// or holds no facets; if bodies of a STEP file have faults; or if the file changed
-    /// while it was read.
+    /// Returns an error if the file cannot be read, has another format, contradicts itself or
+    /// contains no facets; if bodies of a STEP file have faults; or if the file changed while it
+    /// was read.
     ///
     /// [`check_unchanged`]: Self::check_unchanged
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, SliceError> {
@@ -102,15 +100,15 @@ impl Part {
             return Self::from_stream("pipe", file, options);
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        // The ending that says how the file is packed is no part of the name.
+        // The extension of a compressed file is not part of the name.
         let name = name.strip_suffix(".stl").unwrap_or(&name);
         Self::from_file(name, PartFile::new(file, path)?, options)
     }
 
-    /// Reads a part from a stream, such as standard input, by way of a temporary file.
+    /// Reads a part from a stream, such as standard input, through a temporary file.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// Returns an error as [`open`](Self::open) does.
     pub fn from_stream(
         name: &str,
         stream: impl Read,
@@ -123,7 +121,7 @@ impl Part {
         let digest = file.digest().to_owned();
         let file = Arc::new(file);
         let contents = match contents(&file, options) {
-            // Of a binary STL, nothing was read yet.
+            // For a binary STL, nothing has been read yet.
             Ok(contents) if contents.pieces.iter().any(Piece::is_in_file) => contents,
             outcome => match file.change()? {
                 Some(change) => return Err(SliceError::Changed { file: 0, change }),
@@ -152,7 +150,7 @@ impl Part {
     }
 }
 
-/// Reads what a file holds.
+/// Reads the contents of a file.
 fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, SliceError> {
     let start = file.start(FORMAT_BYTES as u64)?;
     if start.is_empty() {
@@ -205,10 +203,10 @@ fn unpacked(
     }
 }
 
-/// Returns the bytes of a STEP file, which gzip may have packed.
+/// Returns the bytes of a STEP file, which may be compressed with gzip.
 ///
 /// # Errors
-/// Returns an error if they begin as another format does, or cannot be unpacked.
+/// Returns an error if they begin like another format, or cannot be unpacked.
 pub fn step_bytes(bytes: Vec<u8>) -> Result<Arc<[u8]>, SliceError> {
     let bytes = if is_gzip(&bytes) { unpack_bytes(&bytes)? } else { bytes };
     let start = &bytes[..bytes.len().min(FORMAT_BYTES)];
@@ -219,19 +217,19 @@ pub fn step_bytes(bytes: Vec<u8>) -> Result<Arc<[u8]>, SliceError> {
     }
 }
 
-/// Files nest entities as deep as they like.
+/// Files may nest entities to any depth.
 const STACK_BYTES: usize = 64 << 20;
 
-/// Reads the bytes of a STEP file for a report. Faults of bodies are in it.
+/// Reads the bytes of a STEP file for a report, which includes faults of bodies.
 ///
 /// # Errors
 /// Returns an error if they cannot be read in time.
 pub fn read_step(bytes: Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, SliceError> {
     let OpenOptions { kernel, tolerance, timeout, .. } = *options;
     let (sender, receiver) = channel();
-    // A thread of its own, which is left behind if it hangs.
+    // The work runs in its own thread, which is abandoned if it hangs.
     thread::Builder::new().stack_size(STACK_BYTES).spawn(move || {
-        // Nobody listens any more once time is up.
+        // Nobody is listening any more after the timeout.
         let _ = sender.send(prepare(&bytes, kernel.read(), tolerance.mm()));
     })?;
     match receiver.recv_timeout(timeout) {
@@ -254,8 +252,7 @@ fn read_good(bytes: &Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, Slice
     Ok(prepared)
 }
 
-/// Reads the bytes of a STEP file with OpenCASCADE, too, and compares what both kernels
-/// read.
+/// Reads the bytes of a STEP file with OpenCASCADE too, and compares the readings of both kernels.
 ///
 /// # Errors
 /// Returns an error if OpenCASCADE cannot read them in time.

@@ -1,4 +1,4 @@
-//! Parts as sources of facets, in files or in memory.
+//! Provides parts as sources of facets, in files or in memory.
 
 use std::io;
 use std::ops::Range;
@@ -15,13 +15,12 @@ use crate::piece::{Facets, Piece};
 use crate::placement::Placement;
 use crate::read_note::ReadNote;
 
-/// A part: its name and its facets, from one file or several of one body or many. A binary STL
-/// stays in its file, of which only a few blocks are read at a time. Clones
-/// share the facets.
+/// A part: its name and its facets, from one or several files with one or many bodies. A binary STL
+/// stays in its file; only a few of its blocks are read at a time. Clones share the facets.
 #[derive(Clone, Debug)]
 pub struct Part {
     name: String,
-    /// The bodies. No block has facets of two pieces.
+    /// The bodies. A block never has facets of two pieces.
     pieces: Vec<Piece>,
     /// The number of blocks up to the end of each piece.
     block_ends: Vec<usize>,
@@ -32,7 +31,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// Creates a part of some pieces of a file with this digest.
+    /// Creates a part from some pieces of a file with this digest.
     pub(crate) fn new(name: &str, pieces: Vec<Piece>, digest: String) -> Self {
         let mut blocks = 0;
         let end = |piece: &Piece| {
@@ -45,12 +44,12 @@ impl Part {
         Self { name, pieces, block_ends, digest, bodies, notes, trusts_extent: false }
     }
 
-    /// Adds what was skipped in the file, and whether the part is as large as it seems.
+    /// Adds notes on skipped contents of the file, and whether its extent is trusted.
     pub(crate) fn with(self, notes: Vec<ReadNote>, trusts_extent: bool) -> Self {
         Self { notes, trusts_extent, ..self }
     }
 
-    /// Creates a part of facets in memory.
+    /// Creates a part from facets in memory.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let numbers = facets.iter().flatten().flatten();
         let bytes: Vec<u8> = numbers.flat_map(|number| number.to_le_bytes()).collect();
@@ -58,20 +57,21 @@ impl Part {
         Self::new(name, vec![Piece::new(Facets::Memory(Arc::new(facets)))], digest)
     }
 
-    /// Returns what was read of each STEP file.
+    /// Returns the prepared model of each STEP file.
     pub fn prepared(&self) -> impl Iterator<Item = &Prepared> {
         let of_files = self.pieces.chunk_by(|a, b| a.file == b.file);
         of_files.filter_map(|pieces| pieces[0].surfaces().map(Arc::as_ref))
     }
 
-    /// Returns what was read of a file, from 0 among those joined, if it is a STEP file.
+    /// Returns the prepared model of a file, if it is a STEP file. `file` is its index among the
+    /// joined files, from 0.
     pub fn prepared_of(&self, file: usize) -> Option<&Prepared> {
         let piece = self.pieces.iter().find(|piece| piece.file == file)?;
         piece.surfaces().map(Arc::as_ref)
     }
 
-    /// Sets how its files join others; they unite by default. Parts that are cut out, or to which
-    /// others are cut, add nothing to the box and the layers of these.
+    /// Sets how its files join other files; they unite by default. Parts that are subtracted or
+    /// intersected add nothing to the box and the layers of the others.
     #[must_use]
     pub fn with_join(mut self, join: Join) -> Self {
         self.pieces.iter_mut().for_each(|piece| piece.join = join);
@@ -84,13 +84,13 @@ impl Part {
         Self { bodies, ..self }
     }
 
-    /// Returns the rule that tells inside from outside of all files together.
+    /// Returns the rule that decides what is inside all files together.
     pub(crate) fn fill_rule(&self, fill: Fill) -> FillRule {
         let rules = self.pieces.iter().map(Piece::rule).collect();
         FillRule::new(fill, self.bodies, rules)
     }
 
-    /// Returns the file of a body, and its number there, from 0.
+    /// Returns the file of a body, and the body's number there, from 0.
     pub(crate) fn body_in_file(&self, body: u32) -> (usize, usize) {
         let file = self.pieces[body as usize].file;
         let first = self.pieces.partition_point(|piece| piece.file < file);
@@ -101,9 +101,9 @@ impl Part {
         &self.pieces
     }
 
-    /// Joins parts into one, each where its own placement puts it. Its name joins theirs
-    /// with `+`, without those of parts that only cut; its digest is that of all, one after another. A single part stays
-    /// as it is.
+    /// Joins parts into one, each where its own placement puts it. Its name joins their names with
+    /// `+`, without the names of parts that only cut; its digest is the digest of all their digests
+    /// in order. A single part stays unchanged.
     pub fn joined(models: Vec<Self>) -> Self {
         let is_cutter = |model: &Self| model.pieces.iter().all(|piece| piece.rule().is_cutter());
         let names: Vec<&str> =
@@ -122,8 +122,8 @@ impl Part {
         Self::new(&name, pieces, digest).with(notes, trusts_extent).with_bodies(bodies)
     }
 
-    /// Places the part among others, after its file's units were taken into account.
-    /// What slicing scales, turns and moves afterwards is all of them together.
+    /// Places the part among others, after its file's units were applied. Slicing scales, turns and
+    /// moves all parts together afterward.
     #[must_use]
     pub fn placed(mut self, placement: &Placement) -> Self {
         for piece in &mut self.pieces {
@@ -142,8 +142,8 @@ impl Part {
         self.pieces.iter().map(|piece| piece.facets.count()).sum()
     }
 
-    /// Returns the digest of the file, `blake3:` and 64 hexadecimal digits. Without a
-    /// file it is that of the coordinates, and with several that of their digests.
+    /// Returns the digest of the file, `blake3:` and 64 hexadecimal digits. Without a file, it is
+    /// the digest of the coordinates; with several files, the digest of their digests.
     pub fn digest(&self) -> &str {
         &self.digest
     }
@@ -153,21 +153,21 @@ impl Part {
         self.pieces.iter().all(|piece| piece.units.is_some())
     }
 
-    /// Returns what its files hold beside the solids that are sliced.
+    /// Returns notes on the contents of its files besides the solids that are sliced.
     pub fn notes(&self) -> &[ReadNote] {
         &self.notes
     }
 
-    /// Returns true if the part is to be taken as large as it seems.
+    /// Returns true if the part's extent is trusted.
     pub(crate) fn trusts_extent(&self) -> bool {
         self.trusts_extent
     }
 
-    /// Checks that no file was written to or replaced since it was opened. Whoever reads
-    /// a part does so after the last look at its facets.
+    /// Checks that no file was written to or replaced since it was opened. Readers of a part call
+    /// this after the last access to its facets.
     ///
     /// # Errors
-    /// Returns an error if one was, or cannot be read.
+    /// Returns an error if a file was changed or cannot be read.
     pub fn check_unchanged(&self) -> Result<(), SliceError> {
         for piece in &self.pieces {
             if let Facets::Binary { file, .. } = &piece.facets
@@ -189,7 +189,7 @@ impl Part {
         if self.is_cut() { Err(SliceError::Cut) } else { Ok(()) }
     }
 
-    /// Returns the reason for an error: a file that changed, if reading it failed.
+    /// Returns the reason for an error: if reading failed, the change of a file.
     pub(crate) fn reason(&self, error: SliceError) -> SliceError {
         self.check_unchanged().err().unwrap_or(error)
     }

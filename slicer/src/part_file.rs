@@ -1,9 +1,9 @@
-//! Reads files of parts in pieces, and tells whether they stayed as they were.
+//! Reads files of parts in pieces, and checks whether they stayed unchanged.
 //!
-//! A part's file is read several times: to survey it, and slab by slab. Each reading
-//! copies bytes; a file that another program cuts short is an error then, where a
-//! mapped one would end the process. That all readings saw one version of the file
-//! is checked once the last is done, by what the system notes of every change.
+//! A part's file is read several times: for a survey, and slab by slab. Each reading copies bytes.
+//! So if another program truncates the file, reading returns an error, where a memory-mapped file
+//! would end the process. After the last reading, the file's metadata shows whether all readings
+//! saw one version of the file.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -17,21 +17,21 @@ use crate::binary_stl::{HEADER_BYTES, binary_facets};
 use crate::error::FileChange;
 use crate::file_blocks::{FileBlock, FileLooks};
 
-/// The bytes that are read at once: few enough to stay in a processor's cache.
+/// The number of bytes read at once: few enough to stay in a processor's cache.
 const READ_BYTES: usize = 1 << 15;
 
-/// File systems note times in steps, of two seconds at most (FAT).
+/// File systems record times in steps of at most two seconds (FAT).
 const CLOCK_STEP: Duration = Duration::from_secs(2);
 
 /// An open file of a part, and its state when it was opened.
 #[derive(Debug)]
 pub(crate) struct PartFile {
     file: File,
-    /// Its path and state; none for a temporary file, which nobody else can open.
+    /// Its path and state; `None` for a temporary file, which nobody else can open.
     shared: Option<(PathBuf, FileState)>,
     size: u64,
     digest: String,
-    /// What was seen of its blocks if it is a binary STL.
+    /// The data collected from its blocks if it is a binary STL.
     seen: Vec<FileBlock>,
 }
 
@@ -47,17 +47,17 @@ impl PartFile {
         Self { file, shared, size, digest: String::new(), seen: Vec::new() }.seen()
     }
 
-    /// Keeps a stream in a temporary file that has no name.
+    /// Keeps a stream in an unnamed temporary file.
     ///
     /// # Errors
-    /// Returns an error if the stream fails, or the disk has no room for it.
+    /// Returns an error if the stream fails, or the disk is full.
     pub(crate) fn of_stream(mut stream: impl Read) -> io::Result<Self> {
         let mut file = tempfile::tempfile()?;
         let size = io::copy(&mut stream, &mut file)?;
         Self { file, shared: None, size, digest: String::new(), seen: Vec::new() }.seen()
     }
 
-    /// Reads all bytes once, for the digest and for what a survey asks.
+    /// Reads all bytes once, for the digest and for a survey's data.
     fn seen(mut self) -> io::Result<Self> {
         let Some(count) = binary_facets(self.size, &self.start(HEADER_BYTES)?) else {
             self.digest = self.digest_now()?;
@@ -72,8 +72,8 @@ impl PartFile {
         Ok(Self { digest, seen: looks.blocks(), ..self })
     }
 
-    /// Takes a temporary file with this one's content in another form. Its digest is
-    /// this one's.
+    /// Creates a part file from a temporary file with this one's content in another form. Its
+    /// digest is this one's.
     pub(crate) fn in_other_form(&self, file: File, size: u64) -> Self {
         Self { file, shared: None, size, digest: self.digest.clone(), seen: Vec::new() }
     }
@@ -95,8 +95,8 @@ impl PartFile {
         &self.digest
     }
 
-    /// Returns what was seen of the file's blocks when it was opened; nothing unless it is a binary
-    /// STL.
+    /// Returns the data collected from the file's blocks when it was opened; empty unless it is a
+    /// binary STL.
     pub(crate) fn seen_blocks(&self) -> &[FileBlock] {
         &self.seen
     }
@@ -115,12 +115,12 @@ impl PartFile {
         for_each_record(&self.file, range, each)
     }
 
-    /// Returns how the file changed since it was opened, if it did.
+    /// Returns the change of the file since it was opened, if there was one.
     ///
-    /// Its size, the time of the last write and what its name stands for tell, as far as
-    /// clocks do. Where only the time of the last change to its entry differs, or the
-    /// file was so new when it was opened that a write since may bear the same times,
-    /// its digest decides.
+    /// The file's size, the time of the last write and the identity of its name decide, as far as
+    /// clocks allow. The digest decides in two cases: only the time of the last change to the
+    /// file's entry differs, or the file was so new when it was opened that a later write may have
+    /// the same times.
     ///
     /// # Errors
     /// Returns an error if the file cannot be read.
@@ -130,7 +130,7 @@ impl PartFile {
         if now.size != before.size {
             return Ok(Some(FileChange::Size { before: before.size, now: now.size }));
         }
-        // A name that is gone leaves the file as it is.
+        // A removed name leaves the file unchanged.
         let named = path.metadata().ok().map(|metadata| FileState::of(&metadata).identity);
         if named.is_some_and(|identity| identity != before.identity) {
             return Ok(Some(FileChange::Replaced));
@@ -147,25 +147,25 @@ impl PartFile {
     }
 }
 
-/// What a system notes of a file.
+/// The metadata that a system keeps about a file.
 #[derive(Debug)]
 struct FileState {
     size: u64,
     /// The time of the last write.
     written: Option<SystemTime>,
-    /// The time of the last change of content, name, owner or times, which no program
-    /// can set; zero where there is none.
+    /// The time of the last change of content, name, owner or times, which no program can set; zero
+    /// on systems without it.
     changed: (i64, i64),
-    /// Device and number, which no two files share; zero where there are none.
+    /// Device and number, which no two files share; zero on systems without them.
     identity: (u64, u64),
-    /// Whether it changed so recently that the next write may bear the same times.
+    /// Whether it changed so recently that the next write may have the same times.
     is_fresh: bool,
 }
 
 impl FileState {
     fn of(metadata: &Metadata) -> Self {
         let written = metadata.modified().ok();
-        // A time to come is another machine's.
+        // A time in the future comes from another machine.
         let age = |time: SystemTime| time.elapsed().unwrap_or_default();
         let (changed, identity) = entry(metadata);
         let entry_time = u64::try_from(changed.0)
@@ -188,7 +188,7 @@ fn entry(_: &Metadata) -> ((i64, i64), (u64, u64)) {
     ((0, 0), (0, 0))
 }
 
-/// Reads a file from its start, whatever place others read at.
+/// Reads a file from its start, regardless of other readers' positions.
 #[derive(Debug)]
 pub(crate) struct FileReader<'a> {
     file: &'a File,

@@ -1,4 +1,4 @@
-//! Facets of a file that stand alike: those of an item or a body.
+//! Holds facets of a file with the same placement: the facets of an item or a body.
 
 use std::io;
 use std::ops::Range;
@@ -13,28 +13,29 @@ use crate::file_blocks::{BLOCK_FACETS, FileBlock};
 use crate::part_file::PartFile;
 use crate::placement::Placement;
 
-/// Facets of surfaces are fewer and cost more, and all threads should have some.
+/// Facets of surfaces are fewer and cost more, and every thread should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
 
-/// The facets of a file that stand alike: all, or those of one of its items or bodies.
+/// The facets of a file with the same placement: all facets, or the facets of one of its items or
+/// bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
     pub(crate) facets: Facets,
-    /// The file, from 0, among those joined.
+    /// The index of the file among the joined files, from 0.
     pub(crate) file: usize,
-    /// The number in the file of its first facet.
+    /// The number of its first facet in the file.
     pub(crate) first_facet: usize,
     /// The unit that the file states, if it does.
     pub(crate) units: Option<Units>,
-    /// The point, in units of the file, that its facets are relative to. It is the origin, except
-    /// where a mesh is so far away that 32 bits would move its corners.
+    /// The point to which its facets are relative, in units of the file. It is the origin, except
+    /// for a mesh so far away that 32 bits would move its corners.
     pub(crate) offset: [f64; 3],
-    /// How it stands among the other pieces.
+    /// Its placement among the other pieces.
     pub(crate) placement: Placement,
-    /// The number in the file of the object whose volume it adds to or takes from.
+    /// The number of its object in the file. It adds to the object's volume, or subtracts from it.
     pub(crate) object: usize,
     pub(crate) role: Role,
-    /// How its file joins the others.
+    /// How its file joins the other files.
     pub(crate) join: Join,
 }
 
@@ -54,13 +55,13 @@ impl Piece {
         }
     }
 
-    /// Returns how it counts.
+    /// Returns the rule by which it counts.
     pub(crate) fn rule(&self) -> BodyRule {
         let Self { file, object, role, join, .. } = *self;
         BodyRule { file, object, role, join }
     }
 
-    /// Returns true if the facets are read again from their file whenever they are needed.
+    /// Returns true if the facets are read from their file again at each use.
     pub(crate) fn is_in_file(&self) -> bool {
         matches!(self.facets, Facets::Binary { .. })
     }
@@ -78,8 +79,7 @@ impl Piece {
         bodies.map(|body| piece(before(body.faces.start)..before(body.faces.end))).collect()
     }
 
-    /// Returns the exact surfaces below the facets, if there are some. Bodies of one file
-    /// share them.
+    /// Returns the exact surfaces of the facets, if they have any. Bodies of one file share them.
     pub(crate) fn surfaces(&self) -> Option<&Arc<Prepared>> {
         match &self.facets {
             Facets::Surfaces { prepared, .. } => Some(prepared),
@@ -87,8 +87,8 @@ impl Piece {
         }
     }
 
-    /// Calls `each` with every facet of a range, counter-clockwise seen from outside
-    /// once it is in its place.
+    /// Calls `each` with every facet of a range, counterclockwise seen from outside once it is
+    /// placed.
     pub(crate) fn for_each(
         &self,
         range: Range<usize>,
@@ -110,7 +110,7 @@ pub(crate) enum Facets {
         count: usize,
     },
     Memory(Arc<Vec<Facet>>),
-    /// Those of a body.
+    /// The facets of a body.
     Surfaces {
         prepared: Arc<Prepared>,
         facets: Range<usize>,
@@ -137,7 +137,7 @@ impl Facets {
         }
     }
 
-    /// Returns what was seen of the block that begins with a facet when the file was opened.
+    /// Returns the data collected when the file was opened from the block that begins with a facet.
     pub(crate) fn seen_block(&self, first: usize) -> Option<&FileBlock> {
         match self {
             Self::Binary { file, .. } => file.seen_blocks().get(first / BLOCK_FACETS),

@@ -1,4 +1,4 @@
-//! A part where it stands on the machine: its facets, block by block, and its exact surfaces.
+//! Holds a placed part: its facets, block by block, and its exact surfaces.
 
 use std::io;
 
@@ -12,28 +12,28 @@ use crate::piece::Piece;
 use crate::placement::{Placement, affine};
 use crate::transform::{Transform, placed, scaled};
 
-/// A part in its place.
+/// A part placed on the machine.
 #[derive(Debug)]
 pub(crate) struct PlacedPart {
     pub(crate) model: Part,
-    /// Those of the pieces, each once.
+    /// The transforms of the pieces, each once.
     transforms: Vec<Transform>,
-    /// The exact surfaces of each file that has some.
+    /// The exact surfaces of each file that has any.
     surfaces: Vec<PlacedSurfaces>,
     pieces: Vec<PlacedPiece>,
 }
 
-/// A piece of a part in its place.
+/// A piece of a placed part.
 #[derive(Debug)]
 struct PlacedPiece {
-    /// Its number among the transforms.
+    /// The index of its transform.
     transform: usize,
-    /// The number of its file's surfaces, if it has some.
+    /// The index of its file's surfaces, if it has any.
     surfaces: Option<usize>,
 }
 
 impl PlacedPart {
-    /// Places a part. Files that state no unit are in `units`.
+    /// Places a part. Files that do not state a unit are in `units`.
     pub(crate) fn new(model: Part, placement: &Placement, units: Units) -> Self {
         let (mut transforms, mut surfaces) = (Vec::new(), Vec::new());
         let mut file_before = None;
@@ -43,7 +43,7 @@ impl PlacedPart {
                 Placement::default().translated(piece.offset.map(|offset| offset * units.mm()));
             let placement = from_corner.then(&piece.placement).then(placement);
             let transform = Transform::new(&placement, units);
-            // Pieces that stand alike follow each other.
+            // Pieces with the same placement follow each other.
             if transforms.last() != Some(&transform) {
                 transforms.push(transform);
             }
@@ -73,8 +73,8 @@ impl PlacedPart {
         &self.surfaces
     }
 
-    /// Returns the surfaces of a block's piece, if it has some, and the number there of
-    /// the block's first facet.
+    /// Returns the surfaces of a block's piece, if it has any, and the number there of the block's
+    /// first facet.
     pub(crate) fn surfaces_of_block(&self, block: usize) -> Option<(&PlacedSurfaces, u32)> {
         let (piece, facets) = self.model.place_of(block);
         let surfaces = &self.surfaces[self.pieces[piece].surfaces?];
@@ -82,8 +82,8 @@ impl PlacedPart {
         Some((surfaces, first as u32))
     }
 
-    /// Returns what was seen of a block when its file was opened, and the scales of its axes from
-    /// file units to the place; none unless that is all that places it.
+    /// Returns the data collected from a block when its file was opened, and the scales of its axes
+    /// from file units to the placed part. Returns `None` if the placement does more than scale.
     pub(crate) fn seen_block(&self, block: usize) -> Option<(&FileBlock, [f64; 3])> {
         let (piece, facets) = self.model.place_of(block);
         let Transform::Scale(scale) = self.transform_of(piece) else { return None };
@@ -96,7 +96,7 @@ impl PlacedPart {
         block: usize,
         mut each: impl FnMut(&PlacedFacet),
     ) -> io::Result<()> {
-        // Two loops, so that neither asks at every facet which one it is.
+        // Two separate loops avoid a test at every facet.
         let (piece, _) = self.model.place_of(block);
         match self.transform_of(piece) {
             Transform::Scale(scale) => self.model.for_each_in_block(block, |facet| {

@@ -1,7 +1,7 @@
 //! Places a part on the machine: scaled, mirrored, turned and moved.
 //!
-//! Each corner is placed by itself, in 64 bits. Corners that are equal in the file
-//! stay equal, so a closed mesh stays closed however it is turned.
+//! Each corner is placed separately, in 64 bits. Corners that are equal in the file stay equal, so
+//! a closed mesh stays closed however it is turned.
 
 use crate::facet::Units;
 
@@ -18,7 +18,7 @@ pub enum Axis {
 
 lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
 
-/// Steps that place a part before it is sliced; none by default. Each acts about the
+/// Steps that place a part before it is sliced; no steps by default. Each step acts about the
 /// origin, after the steps before.
 ///
 /// ```
@@ -29,7 +29,7 @@ lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Coefficients of x, y, z and 1 for the x, y and z in place.
+    /// Coefficients of x, y, z and 1 for the placed x, y and z.
     rows: [[f64; 4]; 3],
 }
 
@@ -40,8 +40,8 @@ impl Default for Placement {
 }
 
 impl Placement {
-    /// Scales x, y and z. A factor below zero mirrors, and so turns every facet over;
-    /// neither fill rule sees that.
+    /// Scales x, y and z. A negative factor mirrors, and so turns every facet over; neither fill
+    /// rule is affected.
     #[must_use]
     pub fn scaled(mut self, factors: [f64; 3]) -> Self {
         for (row, factor) in self.rows.iter_mut().zip(factors) {
@@ -50,7 +50,7 @@ impl Placement {
         self
     }
 
-    /// Turns counter-clockwise, as seen from the axis's tip. Quarter turns are exact.
+    /// Turns counterclockwise, as seen from the axis's tip. Quarter turns are exact.
     #[must_use]
     pub fn rotated(mut self, axis: Axis, degrees: f64) -> Self {
         let quarters = (degrees / 90.0).round();
@@ -78,7 +78,7 @@ impl Placement {
         self
     }
 
-    /// Returns both placements as one: this one, and then another.
+    /// Returns both placements as one: this one, then `next`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let rows = next.rows.map(|[x, y, z, shift]| {
@@ -91,13 +91,13 @@ impl Placement {
         Self { rows }
     }
 
-    /// Creates the placement that takes a point (x, y, z) to the sums of these
-    /// coefficients times x, y, z and 1 mm.
+    /// Creates the placement that maps a point (x, y, z) to the sums of these coefficients times x,
+    /// y, z and 1 mm.
     pub(crate) fn of_rows(rows: [[f64; 4]; 3]) -> Self {
         Self { rows }
     }
 
-    /// Returns the coefficients of x, y, z and 1 mm for each coordinate in place.
+    /// Returns the coefficients of x, y, z and 1 mm for each placed coordinate.
     pub(crate) fn rows(&self) -> [[f64; 4]; 3] {
         self.rows
     }
@@ -108,14 +108,14 @@ impl Placement {
         self.rows.map(|[x, y, z, shift]| [x * unit, y * unit, z * unit, shift])
     }
 
-    /// Returns true if it makes right hands left ones.
+    /// Returns true if it changes the handedness of the part.
     pub(crate) fn is_mirror(&self) -> bool {
         let [a, b, c] = self.rows;
         let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
         a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1) < 0.0
     }
 
-    /// Returns a point in its place, in millimetres.
+    /// Returns a placed point, in millimeters.
     pub fn at(&self, point_mm: [f64; 3]) -> [f64; 3] {
         self.rows.map(|row| affine(&row, point_mm))
     }

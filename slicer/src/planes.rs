@@ -1,4 +1,4 @@
-//! The planes at which a part is cut, one a layer.
+//! Defines the planes at which a part is cut, one per layer.
 
 use std::collections::HashMap;
 use std::iter;
@@ -9,14 +9,13 @@ use lamp_stack::{Grouped, Length};
 use crate::error::SliceError;
 use crate::scan::count_at_or_below;
 
-/// More layers than any machine builds.
+/// A limit above the number of layers that any machine builds.
 const MAX_LAYERS: f64 = 4e6;
 
-/// How far a vertex may be from a plane and still count as lying on it, unless options say
-/// otherwise: a micrometre.
+/// The default distance within which a vertex counts as lying on a plane: a micrometer.
 ///
 /// A height of 0.7 mm is 0.699999988 in 32 bits, and files of six significant digits round heights
-/// above 100 mm by half a micrometre, the part's bottom as well as the face.
+/// above 100 mm by half a micrometer, the part's bottom as well as the face.
 pub const PLANE_TOLERANCE: Length = Length::from_um(1.0);
 
 /// The plane of a layer at which its section is taken.
@@ -25,7 +24,7 @@ pub enum PlaneRule {
     /// The layer's top: the section is swept down (002 section 3.2.2).
     #[default]
     Top,
-    /// Half way up.
+    /// Halfway up.
     Middle,
     /// Just above the layer's bottom: a flat underside there belongs to the section.
     Bottom,
@@ -33,7 +32,7 @@ pub enum PlaneRule {
 
 lamp_stack::named!(PlaneRule { Top = "top", Middle = "middle", Bottom = "bottom" });
 
-/// Layers of any thickness: the heights between which each one lies.
+/// Layers of any thickness, by the heights between them.
 ///
 /// ```
 /// use lamp_slicer::LayerHeights;
@@ -49,12 +48,12 @@ pub struct LayerHeights {
 }
 
 impl LayerHeights {
-    /// Creates layers between rising boundaries in micrometres, the first layer's
+    /// Creates layers between rising boundaries in micrometers, the first layer's
     /// bottom first.
     ///
     /// # Errors
-    /// Returns an error if there is no layer, one has no thickness or is not finite, or
-    /// there are more than any machine builds.
+    /// Returns an error if there is no layer, a layer has no thickness or is not finite, or there
+    /// are more layers than any machine builds.
     pub fn new(boundaries_um: Vec<f64>) -> Result<Self, SliceError> {
         let layers = boundaries_um.len().saturating_sub(1);
         if layers == 0 || layers as f64 >= MAX_LAYERS {
@@ -68,27 +67,28 @@ impl LayerHeights {
         Ok(Self { boundaries_um })
     }
 
-    /// Returns the boundaries in micrometres, one more than layers.
+    /// Returns the boundaries in micrometers, one more than the number of layers.
     pub fn boundaries_um(&self) -> &[f64] {
         &self.boundaries_um
     }
 
-    /// Returns the layers' thicknesses in micrometres, to the nanometre, so that the
+    /// Returns the layers' thicknesses in micrometers, to the nanometer, so that the
     /// rounding of differences does not show.
     pub fn thicknesses_um(&self) -> impl Iterator<Item = f64> {
         self.boundaries_um.windows(2).map(|pair| to_nanometres(pair[1] - pair[0]))
     }
 }
 
-/// The planes at which a part is cut, one a layer, bottom first.
+/// The planes at which a part is cut, one per layer, bottom first.
 ///
-/// If all layers are of one thickness, the part's height is rounded to whole layers,
-/// at least one. A plane above the part, in the layer that holds the part's top, is
-/// moved down to that top, where flat tops still have their section.
+/// If all layers are of one thickness, the part's height is rounded to whole layers, at least one.
+/// A plane above the part, in the layer that contains the part's top, is moved down to that top,
+/// where flat tops still have their section.
 ///
-/// A vertex within the tolerance of a plane counts as lying on it: above a plane at its layer's
-/// top or middle, so that the section is the limit from below, and below one at its bottom, the
-/// limit from above. So each plane has a side height, at and above which vertices are above it.
+/// A vertex within the tolerance of a plane counts as lying on it: above a plane at its layer's top
+/// or middle, so that the section is the limit from below; below a plane at its layer's bottom, so
+/// that the section is the limit from above. So each plane has a side height; vertices at or above
+/// it are above the plane.
 #[derive(Clone, Debug)]
 pub(crate) struct Planes {
     /// The heights of sections.
@@ -100,9 +100,9 @@ pub(crate) struct Planes {
     boundaries_um: Vec<f64>,
     spacing: Spacing,
     rule: PlaneRule,
-    /// The planes of bodies that begin or end within a layer, where these differ.
+    /// The planes of bodies that begin or end within a layer, where they differ from the part's.
     own: Vec<Self>,
-    /// The number among them of each body's, plus one; 0 for the others.
+    /// The number of each body's planes among these, plus one; 0 for bodies without their own.
     own_of: Vec<u32>,
 }
 
@@ -120,7 +120,7 @@ impl Spacing {
 }
 
 impl Planes {
-    /// Creates the planes of a part between two heights (micrometres).
+    /// Creates the planes of a part between two heights (micrometers).
     ///
     /// # Errors
     /// Returns an error if there would be more layers than any machine builds.
@@ -132,7 +132,7 @@ impl Planes {
     ) -> Result<Self, SliceError> {
         let thickness_um = thickness.um();
         let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
-        // Negated, so that a thickness of NaN fails, too.
+        // Negated, so that a thickness of NaN also fails.
         if !(thickness_um > 0.0 && count < MAX_LAYERS) {
             let height = Length::from_um(top_um - bottom_um).to_whole_nm();
             return Err(SliceError::TooManyLayers { height, thickness, layers: count });
@@ -156,7 +156,7 @@ impl Planes {
         Ok(Self::common(z_um, sides_um, tolerance_um, boundaries_um, spacing, rule))
     }
 
-    /// Creates the planes of given layers, of a part between two heights (micrometres).
+    /// Creates the planes of given layers, of a part between two heights (micrometers).
     pub(crate) fn of(
         heights: &LayerHeights,
         [bottom_um, top_um]: [f64; 2],
@@ -201,8 +201,8 @@ impl Planes {
         Self { z_um, sides_um, tolerance_um, boundaries_um, spacing, rule, own, own_of }
     }
 
-    /// Gives each body, between two heights (micrometres), the layers that it has alone: the part's
-    /// top and bottom are not where its other bodies begin and end.
+    /// Gives each body, between two heights (micrometers), the layers that it would have alone: its
+    /// top and bottom may differ from the part's.
     pub(crate) fn with_bodies(mut self, bodies_um: &[[f64; 2]]) -> Self {
         let alone = self.clone();
         let mut numbers: HashMap<Vec<(usize, [u64; 2])>, u32> = HashMap::new();
@@ -225,11 +225,11 @@ impl Planes {
         self
     }
 
-    /// Returns the planes that are elsewhere for a body between two heights, with their sides.
+    /// Returns the planes that differ for a body between two heights, with their sides.
     ///
-    /// Alone, a body's height is rounded to whole layers, and its last section is at its own top. If
-    /// the planes that it meets are fewer, the layer beyond them is cut at its end; if it begins at
-    /// the bottom of a layer and meets one more, that one is left out.
+    /// Alone, a body's height is rounded to whole layers, and its last section is at its own top.
+    /// If it meets fewer planes, the layer beyond them is cut at its end. If it begins at the
+    /// bottom of a layer and meets one plane more, this plane is left out.
     fn moves_of(&self, [low_um, high_um]: [f64; 2]) -> Vec<(usize, [f64; 2])> {
         let ends = &self.boundaries_um;
         let holds = |layer: usize, z_um: f64| {
@@ -304,7 +304,8 @@ impl Planes {
         each
     }
 
-    /// Returns the heights between which bodies meet the planes of some layers, or lie on them.
+    /// Returns the heights between which bodies meet the planes of some layers, or lie on these
+    /// planes.
     pub(crate) fn heights_um(&self, layers: &Range<usize>) -> [f64; 2] {
         let all = || iter::once(self).chain(&self.own);
         let low_um = all().map(|planes| planes.sides_um[layers.start]).fold(f64::MAX, f64::min);
@@ -314,8 +315,8 @@ impl Planes {
         [low_um, high_um]
     }
 
-    /// Returns the planes with one of them moved: by no more than half of the way to its
-    /// neighbours, and not at all if that were out of the part between two heights.
+    /// Returns the planes with one of them moved: at most halfway to its neighbors, and not at all
+    /// if it would leave the part between two heights.
     pub(crate) fn moved(&self, layer: usize, by_um: f64, part_um: [f64; 2]) -> Self {
         let mut planes = self.clone();
         let here = self.z_um[layer];
@@ -348,42 +349,41 @@ impl Planes {
         self.z_um.len()
     }
 
-    /// Returns the height of a plane, in micrometres.
+    /// Returns the height of a plane, in micrometers.
     #[inline]
     pub(crate) fn z_um(&self, layer: usize) -> f64 {
         self.z_um[layer]
     }
 
-    /// Returns the height at and above which vertices are above a plane, in micrometres.
+    /// Returns the height at and above which vertices are above a plane, in micrometers.
     #[inline]
     pub(crate) fn side_um(&self, layer: usize) -> f64 {
         self.sides_um[layer]
     }
 
-    /// Returns how far a vertex may be from a plane and count as lying on it, in micrometres.
+    /// Returns the distance within which a vertex counts as lying on a plane, in micrometers.
     #[inline]
     pub(crate) fn tolerance_um(&self) -> f64 {
         self.tolerance_um
     }
 
-    /// Returns the height of a layer's bottom, in micrometres, to the nanometre.
+    /// Returns the height of a layer's bottom, in micrometers, to the nanometer.
     pub(crate) fn layer_bottom_um(&self, layer: usize) -> f64 {
         to_nanometres(self.boundaries_um[layer])
     }
 
-    /// Returns the height of a layer's top, where its exposure begins, in micrometres.
+    /// Returns the height of a layer's top, where its exposure begins, in micrometers.
     #[inline]
     pub(crate) fn top_um(&self, layer: usize) -> f64 {
         self.boundaries_um[layer + 1]
     }
 
-    /// Returns the height of the first layer's bottom, in micrometres.
+    /// Returns the height of the first layer's bottom, in micrometers.
     pub(crate) fn bottom_um(&self) -> f64 {
         self.boundaries_um[0]
     }
 
-    /// Returns the thickness of a layer, in micrometres; that of given layers to the
-    /// nanometre.
+    /// Returns the thickness of a layer, in micrometers; to the nanometer for given layers.
     pub(crate) fn thickness_um(&self, layer: usize) -> f64 {
         match self.spacing {
             Spacing::Even { thickness_um, .. } => thickness_um,
@@ -391,20 +391,19 @@ impl Planes {
         }
     }
 
-    /// Returns the height of some layers together, in micrometres.
+    /// Returns the height of some layers together, in micrometers.
     pub(crate) fn depth_um(&self, layers: &Range<usize>) -> f64 {
         self.boundaries_um[layers.end] - self.boundaries_um[layers.start]
     }
 
-    /// Returns the layers whose planes have one vertex below and one above them, of two at these
-    /// heights.
+    /// Returns the layers whose planes are between two vertices at these heights.
     #[inline]
     pub(crate) fn between(&self, low_um: f64, high_um: f64) -> Range<usize> {
         self.at_or_below(low_um)..self.at_or_below(high_um)
     }
 
-    /// Returns the layers whose sections are at or above `low_um`, and up to `high_um`, and perhaps
-    /// one more at each end.
+    /// Returns the layers whose sections are from `low_um` up to `high_um`, and perhaps one more at
+    /// each end.
     #[inline]
     pub(crate) fn near(&self, low_um: f64, high_um: f64) -> Range<usize> {
         self.between(low_um - self.tolerance_um, high_um)
@@ -423,8 +422,9 @@ impl Planes {
     }
 }
 
-/// Returns the heights that divide vertices above planes from those below, at most a tolerance
-/// away. No vertex is on two planes, nor are a part's bottom and top on one.
+/// Returns the heights that divide vertices above planes from vertices below, at most a tolerance
+/// away from the planes. No vertex is on two planes, and no plane touches both a part's bottom and
+/// top.
 fn sides(
     z_um: &[f64],
     boundaries_um: &[f64],
@@ -447,7 +447,7 @@ fn to_nanometres(um: f64) -> f64 {
     Length::from_um(um).to_whole_nm().um()
 }
 
-/// Finds planes that are not evenly apart, by as many even bins.
+/// Finds planes with uneven distances, by the same number of even bins.
 #[derive(Clone, Debug)]
 struct PlaneBins {
     start_um: f64,
@@ -461,23 +461,23 @@ impl PlaneBins {
     fn new(planes_um: &[f64]) -> Self {
         let [start_um, end_um] = [planes_um[0], planes_um[planes_um.len() - 1]];
         let count = planes_um.len();
-        // All in one bin where they lie at one height.
+        // All planes are in one bin if they have the same height.
         let per_um = if end_um > start_um { count as f64 / (end_um - start_um) } else { 0.0 };
         let empty = Self { start_um, per_um, last: count - 1, planes_um: Grouped::default() };
         let planes_um = Grouped::new(count, || planes_um.iter().map(|&z| (empty.bin(z), z)));
         Self { planes_um, ..empty }
     }
 
-    /// Returns the bin of a height: the first or the last for those outside.
+    /// Returns the bin of a height; heights outside get the first or the last bin.
     #[inline]
     fn bin(&self, z_um: f64) -> usize {
         (((z_um - self.start_um) * self.per_um) as usize).min(self.last)
     }
 
-    /// Returns how many planes lie at or below a height.
+    /// Returns the number of planes at or below a height.
     ///
-    /// Bins rise with heights, however these are rounded: planes in lower bins
-    /// are lower, those in higher ones higher.
+    /// Bins rise with heights, regardless of rounding: planes in lower bins are lower, and planes
+    /// in higher bins are higher.
     // Not inlined, so that the even planes' search stays small enough to be.
     #[inline(never)]
     fn at_or_below(&self, z_um: f64) -> usize {
@@ -515,7 +515,7 @@ mod tests {
     fn other_heights_round_to_whole_layers() {
         assert_eq!(planes(349.9, PlaneRule::Top), [100.0, 200.0, 300.0]);
         assert_eq!(planes(350.0, PlaneRule::Top), [100.0, 200.0, 300.0, 350.0]);
-        // 32-bit coordinates miss decimal heights by a little.
+        // 32-bit coordinates differ slightly from decimal heights.
         assert_eq!(planes(299.99999, PlaneRule::Top), [100.0, 200.0, 299.99999]);
         assert_eq!(planes(300.00001, PlaneRule::Top), [100.0, 200.0, 300.0]);
         assert_eq!(planes(1.0, PlaneRule::Top), [1.0]);
@@ -590,7 +590,7 @@ mod tests {
     proptest! {
         #![proptest_config(Config { failure_persistence: None, ..Config::default() })]
 
-        /// Thicknesses that differ by up to a million times.
+        /// Thicknesses that differ by a factor of up to a million.
         #[test]
         fn uneven_planes_are_found_exactly(
             start in -1e6..1e6f64,

@@ -1,15 +1,15 @@
-//! Notes on what a part's file holds and slicing does not use.
+//! Defines notes on the contents of a part's file that slicing does not use.
 
 use std::fmt;
 
-/// Something that a part's file holds and slicing does not use, or that was read in another way
-/// than its format says. As text it is one sentence.
+/// Contents of a part's file that slicing does not use, or that were read differently from the
+/// format's definition. As text it is one sentence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReadNote {
-    /// Objects of a 3MF file that are no solids: supports, surfaces and others.
+    /// Objects of a 3MF file that are not solids: supports, surfaces and others.
     NoSolids {
-        /// How often items and components place them.
+        /// The number of times that items and components place them.
         items: usize,
     },
     /// Items of a 3MF file that are not to be printed.
@@ -17,41 +17,41 @@ pub enum ReadNote {
         /// The number of items.
         items: usize,
     },
-    /// Volumes of a slicer's project that are no solids.
+    /// Volumes of a slicer's project that are not solids.
     Volumes {
         /// Their kind, such as `modifier`.
         kind: String,
-        /// How many there are.
+        /// The number of volumes.
         volumes: usize,
     },
-    /// Negative volumes of a slicer's project without solids that they could be cut out of.
+    /// Negative volumes of a slicer's project without solids to subtract them from.
     LoneNegatives {
-        /// How many there are.
+        /// The number of volumes.
         volumes: usize,
     },
-    /// Slices of a 3MF file beside a mesh of the same volume.
+    /// Slices of a 3MF file in addition to a mesh of the same volume.
     Slices {
         /// The number of objects.
         objects: usize,
     },
-    /// Meshes of a 3MF file beside slices that stand for something else.
+    /// Meshes of a 3MF file in addition to slices that represent something else.
     StandIns {
         /// The number of objects.
         objects: usize,
     },
-    /// Elements of objects that are of an extension of 3MF that is not known.
+    /// Elements of objects that belong to an unknown extension of 3MF.
     Extension {
         /// The extension's name.
         name: String,
     },
-    /// Something of a slicer's project for printers of resin.
+    /// Data of a slicer's project for resin printers.
     ProjectData {
         /// Its name.
         what: &'static str,
     },
     /// Several plates of a slicer's project, which are built at once.
     Plates {
-        /// How many there are.
+        /// The number of plates.
         plates: usize,
     },
     /// Bytes after the last facet.
@@ -59,8 +59,8 @@ pub enum ReadNote {
         /// The number of bytes.
         bytes: u64,
     },
-    /// A binary STL with more facets than its header counts, as programs write it that do not know
-    /// the number when they begin.
+    /// A binary STL with more facets than its header declares. Programs write such files if they do
+    /// not know the number when they begin.
     WrongCount {
         /// The number of facets in the header.
         declared: u32,
@@ -71,7 +71,7 @@ pub enum ReadNote {
     NoEnd,
     /// Numbers with commas for decimal points.
     DecimalCommas,
-    /// Statements of a text that are neither facets nor around them.
+    /// Statements of a text other than facets and their enclosing statements.
     Statements {
         /// The word that they begin with; empty for several other words.
         word: String,
@@ -85,9 +85,9 @@ pub enum ReadNote {
     },
 }
 
-/// The number of words whose statements are counted each by itself.
+/// The number of words whose statements are counted separately.
 const MAX_WORDS: usize = 8;
-/// The characters of a word that a note quotes.
+/// The greatest number of characters of a word that a note quotes.
 const MAX_CHARACTERS: usize = 40;
 
 impl ReadNote {

@@ -1,10 +1,10 @@
 //! Finds where planes and rows meet the edges of facets.
 //!
-//! The slicer meets facets with planes, then the segments there with rows; gray
-//! layers and adaptive heights meet facets with rows straight away. All do so
-//! the same way. A facet's corners are sorted along an axis. Each line across this
-//! axis (planes across z, rows across y) meets the long edge, from the first corner
-//! to the last, and one of the two short edges, before or behind the middle corner.
+//! The slicer meets facets with planes, then the segments there with rows; gray layers and adaptive
+//! heights meet facets with rows directly. All work the same way. A facet's corners are sorted
+//! along an axis. Each line across this axis (planes across z, rows across y) meets the long edge,
+//! from the first corner to the last, and one of the two short edges, before or after the middle
+//! corner.
 //!
 //! Both facets on an edge find its point on a line by the same arithmetic on the
 //! same two ends, sorted alike. The points of a closed mesh on a line are
@@ -20,8 +20,8 @@ pub const Z: usize = 2;
 /// Returns the least whole number that is not below `value`, between 0 and `max`.
 #[inline]
 pub fn ceil_clamped(value: f64, max: u32) -> u32 {
-    // Whole numbers from here to twice as many are all the numbers that there are: adding it rounds
-    // to the nearest. Casts and `f64::ceil` take several times as long.
+    // From here to twice this number, all floating-point numbers are whole: adding it rounds to the
+    // nearest. Casts and `f64::ceil` take several times as long.
     const WHOLE: f64 = (1u64 << 52) as f64;
     let max = f64::from(max);
     let value = if value > 0.0 { value } else { 0.0 };
@@ -31,8 +31,8 @@ pub fn ceil_clamped(value: f64, max: u32) -> u32 {
     (moved.to_bits() as u32).wrapping_add(u32::from(nearest < value))
 }
 
-/// Returns how many of some rising numbers are at or below `value`. Numbers that
-/// are nearly even are found fast: by a guess, and a walk from there.
+/// Returns the number of ascending values at or below `value`. Nearly even values are found fast,
+/// by a guess and a walk from there.
 #[inline]
 pub fn count_at_or_below(rising: &[f64], value: f64, guess: f64) -> usize {
     let mut count = ((guess as i32).max(0) as usize).min(rising.len());
@@ -50,17 +50,18 @@ pub fn count_at_or_below(rising: &[f64], value: f64, guess: f64) -> usize {
 pub struct SortedFacet<const ALONG: usize> {
     /// The corners, from the least to the greatest.
     pub corners: [[f64; 3]; 3],
-    /// Which corner of the facet each one is.
+    /// For each of these, the corner's index in the facet.
     pub order: [u8; 3],
     /// Whether sorting turned the facet over.
     pub is_flipped: bool,
 }
 
 impl<const ALONG: usize> SortedFacet<ALONG> {
-    /// Sorts a facet's corners; equal ones stay in their order.
+    /// Sorts a facet's corners; equal corners stay in their order.
     #[inline]
     pub fn new(corners: [[f64; 3]; 3]) -> Self {
-        // By a table: facets come in any order, so a processor could not predict branches.
+        // A table is used because facets come in any order, so a processor could not predict
+        // branches.
         const ORDERS: [([u8; 3], bool); 8] = {
             let impossible = ([0, 1, 2], false);
             let mut orders = [impossible; 8];
@@ -77,9 +78,9 @@ impl<const ALONG: usize> SortedFacet<ALONG> {
         Self { corners: order.map(|corner| corners[usize::from(corner)]), order, is_flipped }
     }
 
-    /// Calls `each` with each of some lines across the facet, the points of the long and
-    /// the short edge there, and which short edge that is, 0 or 1. `second` is the first
-    /// line past the middle corner; `at` returns a line's coordinate.
+    /// Calls `each` with each line across the facet, the points of the long and the short edge
+    /// there, and the number of the short edge, 0 or 1. `second` is the first line past the middle
+    /// corner; `at` returns a line's coordinate.
     #[inline]
     pub fn for_each_line(
         &self,
@@ -131,19 +132,19 @@ impl<const ALONG: usize> FacetEdge<ALONG> {
     #[inline]
     pub(crate) fn at(&self, value: f64) -> [f64; 2] {
         let [a, b] = Self::ACROSS;
-        // No rounding where a plane meets the corner itself. Rows never do: those
-        // of an edge end before the first that its lower end is past.
+        // No rounding where a plane meets the corner itself. Rows never do: the rows of an edge end
+        // before the first row that its lower end is past.
         if ALONG == Z && value >= self.to[Z] {
             return [self.to[a], self.to[b]];
         }
-        // A plane may be lower than the lower end where that counts as lying on it.
+        // A plane that counts as touching the lower end may be below it.
         let passed = value - self.from[ALONG];
         let passed = if ALONG == Z { passed.max(0.0) } else { passed };
         [self.from[a] + self.slopes[0] * passed, self.from[b] + self.slopes[1] * passed]
     }
 }
 
-/// A facet that rows cross: x in any unit, y in rows downwards, z in micrometres.
+/// A facet that rows cross: x in any unit, y in rows downward, z in micrometers.
 #[derive(Clone, Copy, Debug)]
 pub struct RowFacet {
     sorted: SortedFacet<Y>,
@@ -171,8 +172,8 @@ impl RowFacet {
         self.sorted.is_flipped
     }
 
-    /// Returns the rows that cross what lies between two heights (micrometres), and
-    /// perhaps one more on each side, where rounding could decide.
+    /// Returns the rows that cross its part between two heights (micrometers), and perhaps one more
+    /// on each side, where rounding could decide.
     pub fn rows_between(&self, [low_um, high_um]: [f64; 2]) -> Range<u32> {
         let (mut first, mut last) = (f64::MAX, f64::MIN);
         let mut reach = |row: f64| (first, last) = (first.min(row), last.max(row));
@@ -191,8 +192,8 @@ impl RowFacet {
         ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
     }
 
-    /// Calls `each` with each of some rows that cross it, and the points (x, z) of its
-    /// long and its short edge there.
+    /// Calls `each` with each of the given rows that cross it, and the points (x, z) of its long
+    /// and its short edge there.
     #[inline]
     pub fn for_each_row(&self, rows: Range<u32>, mut each: impl FnMut(u32, [[f64; 2]; 2])) {
         let rows = rows.start as usize..rows.end as usize;

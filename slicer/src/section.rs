@@ -22,23 +22,23 @@ pub struct SectionOptions {
     pub units: Units,
     /// Scaling, turns and moves of the part.
     pub placement: Placement,
-    /// The rule that tells inside from outside.
+    /// The rule that decides what is inside.
     pub fill: Fill,
     /// The height of the plane.
     pub z: Length,
-    /// The distance of rows, as a resolution.
+    /// The distance between rows, as a resolution.
     pub dpi: Dpi,
-    /// The upper edge of the first row, in millimetres.
+    /// The upper edge of the first row, in millimeters.
     pub top_mm: f64,
     /// The number of rows.
     pub rows: u32,
 }
 
-/// The stretches of a line that are inside a part: from and to, in millimetres, rising.
+/// The stretches of a line inside a part: from and to, in millimeters, in ascending order.
 pub type Inside = Vec<[f64; 2]>;
 
-/// Returns where the rows through a part's section are inside it. In a row that does
-/// not balance, a crossing without a partner is left out.
+/// Returns the stretches of rows inside a part's section. In a row that does not balance, a
+/// crossing without a partner is left out.
 ///
 /// # Errors
 /// Returns an error if the part is empty, not finite or 1000 km away, or there are too
@@ -67,7 +67,7 @@ fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError
     Ok(rows)
 }
 
-/// A part in its place, about to be cut by one plane.
+/// A placed part, about to be cut by one plane.
 pub(crate) struct CutPart {
     model: PlacedPart,
     survey: Survey,
@@ -87,7 +87,7 @@ impl CutPart {
     }
 
     /// Calls `each` with every segment on the plane: its ends in pixels, whether it is reversed,
-    /// its body, and a list to add to. Returns all lists in one.
+    /// its body, and a list to add to. Returns all lists joined.
     pub(crate) fn gather<T: Clone + Send>(
         &self,
         each: impl Fn(&Cutter<'_>, [[f64; 2]; 2], bool, u32, &mut Vec<T>) + Sync,
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Rounded to columns, they are the layer's transitions.
+    /// Rounded to columns, the stretches are the layer's transitions.
     #[test]
     fn rows_are_those_of_the_layer() {
         let model = || Part::from_facets("tower", tower(5_000).facets);

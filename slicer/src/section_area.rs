@@ -7,8 +7,9 @@ use crate::error::SliceError;
 use crate::part::Part;
 use crate::section::{CutPart, SectionOptions};
 
-/// The ends of segments are rounded to such parts of a row, 0.26 nm at 1500 dpi: all segments that
-/// meet in a point round it alike, so contours stay closed, and walls along rows have no width.
+/// The ends of segments are rounded to this fraction of a row, 0.26 nm at 1500 dpi: all segments
+/// that meet in a point round it the same way, so contours stay closed, and walls along rows have
+/// no width.
 const PARTS: i64 = 1 << 16;
 
 /// A piece of a section between two lines along rows, straight on both sides.
@@ -16,18 +17,18 @@ const PARTS: i64 = 1 << 16;
 pub struct Trapezoid {
     /// The lines, in rows from the upper edge of its row: within 0 to 1.
     pub rows: [f64; 2],
-    /// Where it begins on each of them, in millimetres.
+    /// Its start on each line, in millimeters.
     pub from_mm: [f64; 2],
-    /// Where it ends on each of them, in millimetres.
+    /// Its end on each line, in millimeters.
     pub to_mm: [f64; 2],
 }
 
 /// Returns the section that each row covers, from its upper to its lower edge, as trapezoids that
-/// do not overlap, from the top. As they are those of the facets, areas are exact to rounding. A
-/// segment without a partner is left out.
+/// do not overlap, from the top. Areas are exact for the facets, to rounding. A segment without a
+/// partner is left out.
 ///
 /// # Errors
-/// As [`section`](fn@crate::section).
+/// Returns an error as [`section`](fn@crate::section) does.
 pub fn section_area(
     model: Part,
     options: &SectionOptions,
@@ -38,7 +39,7 @@ pub fn section_area(
     Ok(rows)
 }
 
-/// A segment of the section, downwards.
+/// A segment of the section, downward.
 #[derive(Clone, Copy)]
 struct Side {
     /// Its ends, in parts of rows.
@@ -60,7 +61,7 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
     let cut = CutPart::new(model, options)?;
     let mut sides = cut.gather(|cutter, ends, is_reversed, body, sides| {
         let end = |[column, row]: [f64; 2]| {
-            // Rows count from their centres there.
+            // Rows are counted from their centers there.
             let parts = ((row + 0.5) * PARTS as f64).round() as i64;
             (parts, cutter.grid.to_mm(column, 0.0)[0])
         };
@@ -102,8 +103,8 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
     Ok((0..options.rows).map(row).collect())
 }
 
-/// Adds the trapezoids between two lines that all `sides` cross. Where sides cross each other, it
-/// halves the lines' distance until that is one part of a row.
+/// Adds the trapezoids between two lines that all `sides` cross. Where sides cross each other,
+/// halves the distance between the lines down to one fraction of a row.
 fn cut_between(
     sides: &[&Side],
     lines: Range<i64>,
@@ -181,7 +182,7 @@ mod tests {
         {
             let part = || Part::from_facets("part", mesh.facets.clone());
             let pieces = section_area(part(), &options(z_mm, Fill::EvenOdd)).unwrap();
-            // 37 lines a row.
+            // 37 lines per row.
             let fine = SectionOptions {
                 dpi: Dpi::new(25.4 * 37.0).unwrap(),
                 rows: 28 * 37,
@@ -222,7 +223,7 @@ mod tests {
         let one = area(Mesh { facets: shifted(0.0).collect() }, 4.0, Fill::Solid);
         let both = || Mesh { facets: shifted(0.0).chain(shifted(3.0)).collect() };
         let [even_odd, united] = [Fill::EvenOdd, Fill::Solid].map(|fill| area(both(), 4.0, fill));
-        // Common to both discs of r^2 = 24, whose centres are d apart.
+        // The common area of both discs of r^2 = 24, whose centers are d apart.
         let (r, d) = (24.0_f64.sqrt(), 3.0 * 1.09_f64.sqrt());
         let common = 2.0 * 24.0 * (d / 2.0 / r).acos() - d / 2.0 * (4.0 * 24.0 - d * d).sqrt();
         assert!((one - 24.0 * std::f64::consts::PI).abs() < 0.2, "{one}");

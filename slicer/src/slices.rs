@@ -34,30 +34,29 @@ pub struct SliceOptions {
     pub dpi: Dpi,
     /// Thickness of the layers, unless `heights` is given.
     pub thickness: Length,
-    /// The layers' heights, if they are not all of one thickness. Parts of the model
-    /// outside them are left out.
+    /// The layers' heights, if the thickness varies. Parts of the model outside them are left out.
     pub heights: Option<LayerHeights>,
     /// The plane of a layer at which its section is taken.
     pub plane: PlaneRule,
-    /// How far a vertex may be from a plane and still count as lying on it.
+    /// The distance within which a vertex counts as lying on a plane.
     pub plane_tolerance: Length,
     /// The unit of the file's coordinates.
     pub units: Units,
     /// Scaling, turns and moves of the part.
     pub placement: Placement,
-    /// The rule that tells inside from outside.
+    /// The rule that decides what is inside.
     pub fill: Fill,
     /// The gray of layers where the part is less deep. The plane must then be
     /// [`PlaneRule::Top`].
     pub shading: Shading,
     /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
-    /// The layers to be made; all if `None`.
+    /// The layers to make; all if `None`.
     pub layers: Option<Range<u32>>,
     /// The pixels of the images.
     pub grid: GridRule,
-    /// The bytes that the table of crossings may take, about. It holds at least one
-    /// layer.
+    /// The approximate memory for the table of crossings, in bytes. The table has room for at least
+    /// one layer.
     pub memory: u64,
 }
 
@@ -69,10 +68,9 @@ pub enum GridRule {
         /// Black pixels on every side.
         margin: u32,
     },
-    /// A given place, which must hold the whole part and leave the last
-    /// column black.
+    /// A given place, which must contain the whole part and leave the last column black.
     At {
-        /// The top left corner (x, y) in part coordinates, in millimetres.
+        /// The top left corner (x, y) in part coordinates, in millimeters.
         origin_mm: [f64; 2],
         /// Width and height in pixels.
         pixels: [u32; 2],
@@ -96,7 +94,7 @@ impl GridRule {
 }
 
 impl Default for SliceOptions {
-    /// 1500 dpi and 100 um, as in 002; the default of everything else.
+    /// 1500 dpi and 100 um, as in 002; the default of each other option.
     fn default() -> Self {
         Self {
             dpi: Dpi::new(1500.0).expect("1500 is a resolution"),
@@ -123,21 +121,20 @@ const MAX_ROWS: u64 = 1 << 30;
 /// Twice the layers of 10 um in a cube of 23 inches: even black layers take time.
 const MAX_LAYERS: usize = 1 << 17;
 
-/// A layer of 23 x 23 inches at 2400 dpi has them if contours cross each of its rows 600
+/// The number of crossings of a layer of 23 x 23 inches at 2400 dpi whose rows are each crossed 600
 /// times. They take a quarter of a gigabyte.
 const MAX_CROSSINGS: f64 = (1 << 25) as f64;
 
-/// Layers whose levels are chosen together: several times those whose light reaches one, which must be
-/// looked at again.
+/// The number of layers whose levels are chosen together: several times the number of layers whose
+/// light reaches one layer, which must be examined again.
 const CHOSEN_AT_ONCE: usize = 64;
 
 /// The layers of a part, bottom first.
 ///
-/// One look at all facets finds the part's box. Then z is processed in slabs of as
-/// many layers as the memory holds, each of which reads only those blocks of the
-/// file that it meets. A file without any order in z is first sorted into a
-/// temporary one. All threads of the current rayon pool work, and layers do not
-/// depend on them.
+/// One pass over all facets finds the part's box. Then z is processed in slabs of as many layers as
+/// fit into memory; each slab reads only the blocks of the file that it meets. A file without any
+/// order in z is first sorted into a temporary file. All threads of the current rayon pool work;
+/// the layers do not depend on their number.
 #[derive(Debug)]
 pub struct Slices {
     model: PlacedPart,
@@ -147,28 +144,28 @@ pub struct Slices {
     rule: FillRule,
     shading: PlacedShading,
     wanted: Range<usize>,
-    /// The layers that are cut: those wanted, those above them whose light counts, and those below
-    /// with their undersides.
+    /// The layers that are cut: the requested layers, the layers above them whose light counts, and
+    /// the layers below that contain their undersides.
     cut: Range<usize>,
     max_crossings: usize,
-    /// The crossings of the largest layer, by an estimate.
+    /// The estimated number of crossings of the largest layer.
     largest: f64,
-    /// Slabs of layers that fit the memory, by an estimate.
+    /// Slabs of layers that fit into memory, by an estimate.
     slabs: Vec<Range<usize>>,
     buckets: Option<Buckets>,
     table: Table,
-    /// What polishing did to the crossings of slabs before.
+    /// The result of polishing the crossings of earlier slabs.
     polished: Polished,
     open_rows: OpenRows,
     shared: SharedVolumes,
     doubts: DoubtSum,
-    /// The layers of the table that are still to be made into images.
+    /// The layers of the table that have no images yet.
     pending: Range<usize>,
-    /// The layers whose levels are not chosen yet.
+    /// The layers whose levels have not been chosen yet.
     waiting: VecDeque<Layer>,
     columns: Columns,
     ready: VecDeque<Layer>,
-    /// Whether the files were compared with what they were, after all layers.
+    /// Whether the files were checked for changes after all layers.
     is_checked: bool,
 }
 
@@ -219,7 +216,7 @@ impl Slices {
         if !is_usual && !model.model.trusts_extent() {
             return Err(SliceError::TooManyRows { layers: wanted.len(), rows: grid.height });
         }
-        // A list that grows holds up to twice what it needs.
+        // A growing list takes up to twice the memory that it needs.
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = shading.reach_um().unwrap_or(0.0);
         let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
@@ -238,8 +235,8 @@ impl Slices {
         let slabs = slabs(&cut, &expected, max_crossings);
         let heights: Vec<_> =
             slabs.iter().map(|slab| heights_of(slab, &planes, reach_um)).collect();
-        // If no temporary file can be written, slabs read all blocks that they meet.
-        // B-rep facets are in memory; and buckets would lose their numbers.
+        // If no temporary file can be written, slabs read all blocks that they meet. B-rep facets
+        // are in memory, and would lose their numbers in buckets.
         let wants_sorting = model.surfaces().is_empty() && survey.wants_sorting(&heights);
         let buckets = wants_sorting
             .then(|| Buckets::sort(&model, &planes, reach_um, &slabs, options.memory as usize).ok())
@@ -280,23 +277,22 @@ impl Slices {
         self.wanted.len()
     }
 
-    /// Returns the bytes that the table takes at least, which is for the largest layer alone, by
-    /// an estimate.
+    /// Returns the least memory for the table, in bytes: the estimated memory for the largest layer
+    /// alone.
     pub fn least_memory(&self) -> u64 {
         let rows = f64::from(self.grid.height);
         ((2.0 * self.largest + rows) * size_of::<Crossing>() as f64) as u64
     }
 
-    /// Returns what polishing did to the crossings of B-rep parts so far, if there are
-    /// any.
+    /// Returns the result of polishing the crossings of B-rep parts so far, if there are any.
     pub fn polished(&self) -> Option<Polished> {
         let is_exact = !self.model.surfaces().is_empty();
         is_exact.then(|| self.polished.joined(self.table.polished()))
     }
 
-    /// Cuts a layer once more, with its plane moved up, but not past its neighbours' or
-    /// out of the part. So 002 section 2.2.3 avoids sections that fail. Where doses add up, its
-    /// levels are those under white layers, if there are layers above.
+    /// Cuts a layer again, with its plane moved up, but not past its neighbors' planes or out of
+    /// the part. This follows 002 section 2.2.3, which avoids sections that fail. Where doses add
+    /// up, its levels are the levels under white layers, if there are layers above.
     ///
     /// # Errors
     /// Returns an error if there is no such layer, or the file cannot be read.
@@ -325,8 +321,8 @@ impl Slices {
         Ok(layer)
     }
 
-    /// Returns the number of crossings of each layer of the part, by an estimate: the work follows
-    /// it.
+    /// Returns the estimated number of crossings of each layer of the part. The work is
+    /// proportional to it.
     pub fn crossings_per_layer(&self) -> Vec<f64> {
         self.survey.crossings_per_layer(&self.planes, self.grid.dpi.pitch().mm())
     }
@@ -346,8 +342,7 @@ impl Slices {
         self.shading.unplaced()
     }
 
-    /// Returns the least and the greatest corner of the part in its place, in
-    /// millimetres.
+    /// Returns the least and the greatest corner of the placed part, in millimeters.
     pub fn box_mm(&self) -> [[f64; 3]; 2] {
         [self.survey.min, self.survey.max].map(|[x, y, z_um]| [x, y, z_um / 1000.0])
     }
@@ -357,9 +352,9 @@ impl Slices {
         self.survey.overlap(&self.model)
     }
 
-    /// Returns what bodies of the same file share in the layers made so far, the largest
-    /// volumes first. Bodies that only touch share nothing: what less than 0.01 % of
-    /// the smaller body, or no two layers in a row, have in common does not count.
+    /// Returns the shared volumes of bodies of the same file in the layers made so far, the largest
+    /// first. Bodies that only touch share nothing: a shared volume does not count if it is less
+    /// than 0.01 % of the smaller body, or if no two consecutive layers have part of it.
     pub fn body_overlaps(&self) -> Vec<BodyOverlap> {
         let of_pair = |(bodies, volume_mm3): ([u32; 2], f64)| {
             let [(file, a), (_, b)] = bodies.map(|body| self.model.model.body_in_file(body));
@@ -368,20 +363,20 @@ impl Slices {
         self.shared.overlaps(&self.rule).into_iter().map(of_pair).collect()
     }
 
-    /// Returns the files that are subtracted or intersected, and touch nothing of the part in the
+    /// Returns the files that are subtracted or intersected, but touch nothing of the part in the
     /// layers made so far.
     pub fn idle_cutters(&self) -> Vec<usize> {
         self.shared.idle_cutters(&self.rule)
     }
 
-    /// Returns the files whose surfaces left doubts in the layers made so far. Under
-    /// [`Fill::EvenOdd`] the list is empty.
+    /// Returns the files with fill doubts in the layers made so far. Under [`Fill::EvenOdd`] the
+    /// list is empty.
     pub fn fill_doubts(&self) -> Vec<FillDoubt> {
         self.doubts.of_files(|body| self.model.model.body_in_file(body).0)
     }
 
-    /// Fills the table with the next slab, as the iterator does when it needs to.
-    /// Benchmarks time the table and the images separately with it.
+    /// Fills the table with the next slab, as the iterator does on demand. Benchmarks use it to
+    /// time the table and the images separately.
     #[doc(hidden)]
     pub fn fill_slab(&mut self) -> Result<(), SliceError> {
         let start = self.pending.end;
@@ -407,16 +402,16 @@ impl Slices {
                 self.pending = start..end;
                 return Ok(());
             }
-            // The estimate was too low here: take fewer layers.
+            // The estimate was too low here, so the slab gets fewer layers.
             end = start + (end - start) / 2;
         }
     }
 
-    /// Finds the faulty edges of the mesh behind bands of stray rows, by a second look
-    /// at the facets there. [`StrayBand::of`] returns the bands of a page.
+    /// Finds the faulty edges of the mesh behind bands of stray rows, by a second pass over the
+    /// facets there. [`StrayBand::of`] returns the bands of a page.
     ///
-    /// Findings depend on neither threads nor memory. At least one layer's are held at
-    /// a time, and more as far as the memory allows.
+    /// Findings depend on neither threads nor memory. The findings of at least one layer are held
+    /// at a time, and more as memory allows.
     ///
     /// # Errors
     /// Returns an error if the part has no such layer, or the file cannot be read.
@@ -468,8 +463,8 @@ impl Slices {
         self.choose_levels(new_depths);
     }
 
-    /// Adds the depths of a batch, and chooses the levels of the waiting layers above which all
-    /// layers that count are known.
+    /// Adds the depths of a batch. Chooses the levels of the waiting layers for which all layers
+    /// above that count are known.
     fn choose_levels(&mut self, depths: Vec<DepthRows>) {
         let Some(light) = self.shading.print_through() else { return };
         self.columns.extend(light, depths);
@@ -514,13 +509,13 @@ impl Slices {
         Made { layer, depths, shared, doubts }
     }
 
-    /// Returns the number of layers to make into images at once: enough for all threads,
-    /// but no more memory than the table takes.
+    /// Returns the number of layers to make into images at once: enough for all threads, but
+    /// without using more memory than the table.
     fn batch_len(&self) -> usize {
         let row_offsets = size_of::<u32>() * self.grid.height as usize;
         let table = size_of::<Crossing>() * self.max_crossings;
         let max = (table / row_offsets).clamp(1, 16 * rayon::current_num_threads());
-        // Gray pixels may all differ.
+        // In the worst case, all gray pixels differ.
         let mut room = table / size_of::<LevelChange>();
         let fits = |layer: &usize| {
             let pixels = self.table.pixels_over_facets(*layer);
@@ -573,7 +568,7 @@ impl Iterator for Slices {
     }
 }
 
-/// A layer, its depths if its levels are still to be chosen, and what else is known of it.
+/// A layer, its depths if its levels are not chosen yet, and the other findings about it.
 struct Made {
     layer: Layer,
     depths: Option<DepthRows>,
@@ -581,7 +576,7 @@ struct Made {
     doubts: LayerDoubts,
 }
 
-/// Chooses the levels of layers from a first one on.
+/// Chooses the levels of layers from a given first layer on.
 fn choose(light: &PrintThrough, columns: &Columns, first: usize, layers: &mut [Layer]) {
     let chosen = columns.choose(light, first..first + layers.len());
     for (layer, chosen) in layers.iter_mut().zip(chosen) {
@@ -606,7 +601,7 @@ fn fill(
     if !table.fill(facets, cutter, reach_um, layers, max_crossings)? {
         return Ok(None);
     }
-    // A row takes as much memory as a crossing.
+    // A row takes as much memory as one crossing.
     let open = table.open_layers();
     let at_once = (max_crossings / cutter.grid.height as usize).max(1);
     let mut rows = OpenRows::new();
@@ -623,8 +618,7 @@ struct MetBlocks<'a> {
 }
 
 impl<'a> MetBlocks<'a> {
-    /// Finds the blocks that some layers meet between `reach_um` below their planes and
-    /// these.
+    /// Finds the blocks that some layers meet from `reach_um` below their planes up to the planes.
     fn of(
         model: &'a PlacedPart,
         survey: &Survey,
@@ -655,16 +649,16 @@ impl FacetSource for MetBlocks<'_> {
     }
 }
 
-/// Returns the heights between which some layers look at facets: from `reach_um` below
-/// their first plane to their last.
+/// Returns the heights between which some layers examine facets: from `reach_um` below their first
+/// plane to their last plane.
 fn heights_of(layers: &Range<usize>, planes: &Planes, reach_um: f64) -> (f64, f64) {
     let [low_um, high_um] = planes.heights_um(layers);
     (low_um - reach_um, high_um)
 }
 
-/// Estimates the memory, in crossings, that facets below sections take for each crossing
-/// in these. `reach` is the depth of exposure in thicknesses of layers: a facet crosses
-/// as many rows between two planes as on one.
+/// Estimates the memory, in crossings, of facets below sections per crossing in the sections.
+/// `reach` is the depth of exposure in layer thicknesses: a facet crosses as many rows between two
+/// planes as on one plane.
 fn spans_per_crossing(reach: f64) -> f64 {
     (1.0 + reach) * (size_of::<DepthSpan>() / size_of::<Crossing>()) as f64
 }

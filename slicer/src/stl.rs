@@ -1,4 +1,4 @@
-//! Reads STL files, and writes parts as binary ones.
+//! Reads STL files, and writes parts as binary STL files.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -14,26 +14,26 @@ use crate::part_file::PartFile;
 use crate::piece::Facets;
 use crate::read_note::ReadNote;
 
-/// The facets at a file's start that say whether it is a binary STL.
+/// The number of facets at a file's start that decide whether it is a binary STL.
 const FIRST_FACETS: u64 = 64;
 /// No part reaches so far in any unit.
 const MAX_COORDINATE: f32 = 1e8;
-/// From here on a count stands for an unknown number: programs that write facets as they make them
-/// begin with the greatest one.
+/// Counts from here on represent an unknown number: programs that write facets as they make them
+/// begin with the greatest count.
 const UNKNOWN_COUNT: u32 = i32::MAX as u32;
 
 /// Opens a binary STL that starts with these bytes, and returns notes about it.
 ///
 /// Where the size contradicts the count, the bytes decide:
 ///
-/// - Facets behind the counted ones belong to the part if they close its surface. Bytes that are
-///   no facets are left out.
-/// - A program that does not know the count when it begins writes zero or the greatest number. All
-///   bytes are facets then.
-/// - Any other file with fewer facets than are counted was cut off.
+/// - Facets after the counted ones belong to the part if they close its surface. Bytes that are not
+///   facets are left out.
+/// - A program that does not know the count when it begins writes zero or the greatest number. Then
+///   all bytes are facets.
+/// - Any other file with fewer facets than its count was cut off.
 ///
 /// # Errors
-/// Returns an error if the file is no STL, contradicts itself, was cut off or cannot be read.
+/// Returns an error if the file is not an STL, contradicts itself, was cut off or cannot be read.
 pub(crate) fn open(
     file: &Arc<PartFile>,
     start: &[u8],
@@ -52,7 +52,8 @@ pub(crate) fn open(
     }
     let count = if declared == 0 || declared >= UNKNOWN_COUNT {
         let all = tally(file, 0..held)?;
-        // With neither a count nor a whole last facet, nothing says that the file is whole.
+        // With neither a count nor a complete last facet, there is no evidence that the file is
+        // complete.
         let is_whole = declared == 0 || byte_of(held) == size;
         if held > 0 && all.facets == all.records && is_whole { held } else { 0 }
     } else if u64::from(declared) > held {
@@ -85,14 +86,15 @@ fn byte_of(facet: u64) -> u64 {
     HEADER_BYTES + facet * FACET_BYTES as u64
 }
 
-/// Counts of the records of a file that could be facets.
+/// Counts of the file's records that could be facets.
 #[derive(Default)]
 struct Tally {
     records: u64,
     plausible: u64,
     facets: u64,
-    /// A sum over their edges. It is zero if each edge runs as often one way as the other, as the
-    /// edges of a closed surface do. Other surfaces have a sum of zero with a chance of 2^-64.
+    /// A sum over their edges. It is zero if each edge is used equally often in both directions,
+    /// like the edges of a closed surface. For other surfaces it is zero with a probability of
+    /// 2^-64.
     edges: u64,
 }
 
@@ -112,7 +114,7 @@ fn tally(file: &PartFile, records: Range<u64>) -> io::Result<Tally> {
 }
 
 fn point_hash(point: [f32; 3]) -> u64 {
-    // Both zeros are one place.
+    // 0 and -0 are the same place.
     point.iter().fold(0, |hash, &c| mixed(hash ^ u64::from((c + 0.0).to_bits())))
 }
 
@@ -124,13 +126,13 @@ fn mixed(bits: u64) -> u64 {
     bits ^ (bits >> 31)
 }
 
-/// Returns true if a record has numbers that coordinates can be.
+/// Returns true if the numbers of a record can be coordinates.
 fn is_plausible(record: &[u8; FACET_BYTES]) -> bool {
     parse(record).iter().flatten().all(|number| number.abs() <= MAX_COORDINATE)
 }
 
-/// Returns true if a record is a facet: plausible, with corners that differ and a normal of length
-/// one or none.
+/// Returns true if a record is a facet: plausible, with different corners and a normal of length
+/// one or zero.
 fn is_facet(record: &[u8; FACET_BYTES]) -> bool {
     let [a, b, c] = parse(record);
     let normal = [0, 4, 8]
@@ -140,8 +142,8 @@ fn is_facet(record: &[u8; FACET_BYTES]) -> bool {
 }
 
 impl Part {
-    /// Writes the facets as binary STL, in the file's units: those of exact surfaces
-    /// in millimetres.
+    /// Writes the facets as binary STL, in the file's units; facets of exact surfaces in
+    /// millimeters.
     ///
     /// # Errors
     /// Returns an error if the part cannot be read, or `out` fails.
@@ -171,7 +173,7 @@ fn triangle(facet: &Facet) -> Triangle {
     let across = |i: usize, j: usize| e[i] * f[j] - e[j] * f[i];
     let normal = [across(1, 2), across(2, 0), across(0, 1)];
     let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-    // A facet without area has none.
+    // A degenerate facet has no normal.
     let per = if length > 0.0 { 1.0 / length } else { 0.0 };
     Triangle {
         normal: Normal::new(normal.map(|n| (n * per) as f32)),

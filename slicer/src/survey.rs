@@ -1,5 +1,4 @@
-//! Looks at every facet once, for the part's box and the heights of its blocks of
-//! facets.
+//! Examines every facet once, for the part's box and the heights of its blocks of facets.
 
 use std::io;
 use std::ops::Range;
@@ -16,13 +15,13 @@ use crate::placed_part::PlacedPart;
 use crate::planes::Planes;
 use crate::wild;
 
-/// Coordinates are exact to a nanometre as far as this.
+/// Coordinates up to this distance are exact to a nanometer.
 const MAX_DISTANCE_MM: f64 = 1e9;
 
-/// Boxes that overlap by no more only touch: a micrometre, far more than rounding.
+/// Boxes that overlap by at most this only touch: a micrometer, far more than rounding.
 const TOUCHING: [f64; 3] = [0.001, 0.001, 1.0];
 
-/// A part's box and blocks: x and y in millimetres, z in micrometres.
+/// A part's box and blocks: x and y in millimeters, z in micrometers.
 #[derive(Debug)]
 pub(crate) struct Survey {
     pub(crate) min: [f64; 3],
@@ -35,8 +34,8 @@ pub(crate) struct Survey {
 struct BlockSurvey {
     min: [f64; 3],
     max: [f64; 3],
-    /// Half the areas of the facets' boxes in y and z, summed. The number of crossings
-    /// is in proportion to it.
+    /// Half the areas of the facets' boxes in y and z, summed. The number of crossings is
+    /// proportional to it.
     yz_area: f64,
     facets: usize,
     /// The sum of the facets' heights.
@@ -69,8 +68,8 @@ impl BlockSurvey {
         Ok(if finite { Ok(whole) } else { Err(not_finite(model, block)?) })
     }
 
-    /// Places what was seen of a block of a file. Products rise with their factors, so corners of
-    /// the box are those of the placed facets.
+    /// Places the data of a block of a file. Products rise with their factors, so the corners of
+    /// the box are corners of the placed facets.
     fn scaled(seen: &FileBlock, scale: [f64; 3]) -> Self {
         let ends =
             |axis: usize| [seen.min[axis], seen.max[axis]].map(|end| f64::from(end) * scale[axis]);
@@ -119,11 +118,10 @@ fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
 }
 
 impl Survey {
-    /// Looks at every facet once, on all threads.
+    /// Examines every facet once, on all threads.
     ///
     /// # Errors
-    /// Returns an error if there is no facet, or one has a coordinate that is not
-    /// finite.
+    /// Returns an error if there is no facet, or a coordinate is not finite.
     pub(crate) fn of(model: &PlacedPart) -> Result<Self, SliceError> {
         let blocks: Vec<_> = (0..model.model.block_count())
             .into_par_iter()
@@ -145,7 +143,7 @@ impl Survey {
         for [low, high] in solids.filter_map(PlacedSurfaces::box_mm) {
             for (axis, unit) in [1.0, 1.0, 1000.0].into_iter().enumerate() {
                 let (low, high) = (low[axis] * unit, high[axis] * unit);
-                // Not for rounding's sake: a flat end stays where its facets are.
+                // Not extended for rounding: a flat end stays where its facets are.
                 let rounding = f64::from(f32::EPSILON) * low.abs().max(high.abs());
                 if low < min[axis] - rounding {
                     min[axis] = low;
@@ -158,11 +156,11 @@ impl Survey {
         Ok(Self { min, max, blocks: good })
     }
 
-    /// Checks that the part is near enough for coordinates to be exact to a nanometre,
-    /// and that no vertex lies far outside the rest, unless the part is to be trusted.
+    /// Checks that coordinates are small enough to be exact to a nanometer, and that no vertex is
+    /// far outside the rest, unless the part's extent is trusted.
     ///
     /// # Errors
-    /// Returns an error if that is not so.
+    /// Returns an error if a check fails.
     pub(crate) fn check_extent(&self, part: &PlacedPart) -> Result<(), SliceError> {
         if !part.model.trusts_extent() {
             wild::check(part, self)?;
@@ -209,8 +207,8 @@ impl Survey {
         if mm > MAX_DISTANCE_MM { Err(SliceError::TooFar { distance }) } else { Ok(()) }
     }
 
-    /// Returns the blocks that planes between two heights (micrometres) may meet: above
-    /// the first, and up to the second.
+    /// Returns the blocks that planes between two heights (micrometers) may meet: above the first
+    /// height, and up to the second.
     pub(crate) fn blocks_between(&self, low_um: f64, high_um: f64) -> Vec<usize> {
         (0..self.blocks.len())
             .filter(|&block| {
@@ -226,8 +224,8 @@ impl Survey {
         planes.of_body(body).between(min[2], max[2])
     }
 
-    /// Returns the heights (micrometres) between which each body of a part lies. Bodies that are cut
-    /// out have the planes of the part.
+    /// Returns the lowest and highest heights (micrometers) of each body of a part. Bodies that are
+    /// cut out have the planes of the part.
     pub(crate) fn heights_of_bodies(&self, part: &PlacedPart) -> Vec<[f64; 2]> {
         let of_part = [self.min[2], self.max[2]];
         let start = |piece: &Piece| match piece.rule().is_cutter() {
@@ -246,9 +244,9 @@ impl Survey {
         heights_um
     }
 
-    /// Returns true if the blocks are spread over the part so widely that sorting the
-    /// facets by slab costs less than reading, for each of `slabs` (given by their
-    /// heights), all blocks that it meets.
+    /// Returns true if the blocks are spread so widely over the part that sorting the facets by
+    /// slab costs less than reading, for each of `slabs` (given by their heights), all blocks that
+    /// the slab meets.
     pub(crate) fn wants_sorting(&self, slabs: &[(f64, f64)]) -> bool {
         let height_um = (self.max[2] - self.min[2]) / slabs.len() as f64;
         let (mut facets, mut visits, mut met) = (0.0, 0.0, 0.0);
@@ -258,7 +256,7 @@ impl Survey {
             visits += count as f64 * slabs.count() as f64;
             met += count as f64 + heights_um / height_um;
         }
-        // Writing a facet and reading it back costs about as much as four looks.
+        // Writing a facet and reading it back costs about as much as four examinations.
         visits - met > 4.0 * facets
     }
 
@@ -306,7 +304,7 @@ mod tests {
     use crate::placement::{Axis, Placement};
     use crate::stl::write_stl;
 
-    /// Facets of blocks, and pieces of the file that are hashed at once, begin and end astride.
+    /// Facets of blocks, and pieces of the file that are hashed at once, have different boundaries.
     #[test]
     fn what_opening_a_file_saw_is_what_its_facets_say() {
         let folder = tempfile::tempdir().unwrap();

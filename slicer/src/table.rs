@@ -1,7 +1,7 @@
-//! The intersection table: gathers crossings by layer, and makes rows of them.
+//! The intersection table: gathers crossings by layer, and makes rows from them.
 //!
-//! Source: 002 section 2.3.4, algorithm 9 and figure 26. There the table holds the
-//! whole part, here one slab of layers at a time, so that memory is bounded.
+//! Source: 002 section 2.3.4, algorithm 9 and figure 26. There the table holds the whole part; here
+//! it holds one slab of layers at a time, so that memory is bounded.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -30,13 +30,13 @@ pub(crate) trait FacetSource: Sync {
     /// Calls `each` with every facet of a piece.
     fn for_each_in(&self, piece: usize, each: impl FnMut(&PlacedFacet)) -> io::Result<()>;
 
-    /// The exact surfaces below a piece's facets, if it has some, and its first
-    /// facet's number among theirs.
+    /// Returns the exact surfaces of a piece's facets, if it has any, and the number of its first
+    /// facet among the surfaces' facets.
     fn surfaces(&self, _piece: usize) -> Option<(&PlacedSurfaces, u32)> {
         None
     }
 
-    /// The body that a piece's facets are of.
+    /// Returns the body of a piece's facets.
     fn body(&self, piece: usize) -> u32;
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Table {
     layers: Range<usize>,
     /// Each worker's share of each layer. Lists keep their memory from slab to slab.
     shares: Vec<Vec<LayerShare>>,
-    /// What polishing did to the crossings of these layers.
+    /// The result of polishing the crossings of these layers.
     tally: Tally,
 }
 
@@ -56,7 +56,7 @@ pub(crate) enum CutImage {
     Depths(DepthRows),
 }
 
-/// A layer made of its crossings.
+/// A layer made from its crossings.
 pub(crate) struct CutLayer {
     pub(crate) image: CutImage,
     /// The rows whose crossings do not balance.
@@ -68,7 +68,7 @@ pub(crate) struct CutLayer {
     pub(crate) doubts: LayerDoubts,
 }
 
-/// A limit to the crossings that all workers make together.
+/// A limit on the number of crossings that all workers make together.
 struct CrossingLimit {
     used: AtomicUsize,
     max: usize,
@@ -77,8 +77,7 @@ struct CrossingLimit {
 }
 
 impl CrossingLimit {
-    /// Counts crossings that were made, a few thousand at a time, so that workers seldom
-    /// contend for the counter.
+    /// Counts crossings, a few thousand at a time, so that workers seldom contend for the counter.
     #[inline]
     fn claim(&self, unclaimed: &mut usize) {
         if *unclaimed > 4096 {
@@ -93,8 +92,8 @@ impl CrossingLimit {
 }
 
 impl Table {
-    /// Fills the table with the crossings of `layers`. Returns false once there are more
-    /// than `max` in a slab that could be smaller.
+    /// Fills the table with the crossings of `layers`. Returns false once there are more than `max`
+    /// in a slab that could be smaller.
     pub(crate) fn fill(
         &mut self,
         facets: &impl FacetSource,
@@ -149,7 +148,7 @@ impl Table {
         Ok(!budget.is_spent())
     }
 
-    /// Returns what polishing did to the crossings of its layers so far.
+    /// Returns the result of polishing the crossings of its layers so far.
     pub(crate) fn polished(&self) -> Polished {
         self.tally.total()
     }
@@ -168,14 +167,14 @@ impl Table {
         self.shares.iter().map(move |shares| &shares[layer - self.layers.start])
     }
 
-    /// Returns an upper limit to the pixels of a layer that lie over facets.
+    /// Returns an upper limit on the number of a layer's pixels over facets.
     pub(crate) fn pixels_over_facets(&self, layer: usize) -> usize {
         let spans = self.shares(layer).flat_map(|share| &share.spans);
         spans.map(|span| (span.end - span.start) as usize).sum()
     }
 
-    /// Returns the spans below a layer's section by row, sorted by their starts: those of facets,
-    /// and those of surfaces that facets miss.
+    /// Returns the spans below a layer's section by row, sorted by their starts: the spans of
+    /// facets, and the spans of surfaces that facets miss.
     fn spans(
         &self,
         layer: usize,
@@ -192,7 +191,7 @@ impl Table {
         let rows = cutter.grid.height as usize;
         let mut spans = Grouped::new(rows, spans);
         for row in 0..rows {
-            // By all they have, so that the order of threads shows nowhere.
+            // Sorted by all fields, so that the order of threads has no effect.
             sort_by(spans.group_mut(row), |a, b| {
                 let by_columns = (a.start, a.end).cmp(&(b.start, b.end));
                 by_columns.then_with(|| a.partial_cmp(b).expect("spans are numbers"))
@@ -252,7 +251,7 @@ impl Table {
         }
     }
 
-    /// Returns a layer's crossings by row: those of facets, and others.
+    /// Returns a layer's crossings by row: crossings of facets, and other crossings.
     fn by_row(
         &self,
         layer: usize,
@@ -292,7 +291,7 @@ impl Table {
         rows.finish()
     }
 
-    /// Returns what a layer's rows become, and what else is known of it.
+    /// Returns a layer's rows, and the other findings about it.
     fn rows<M: RowMaker>(
         &self,
         layer: usize,
@@ -326,14 +325,14 @@ impl Table {
         };
         let closed = self.is_closed(layer);
         if !closed {
-            // Where facets are missing, the signs of the others say nothing.
+            // Where facets are missing, the signs of the other facets mean nothing.
             doubts = LayerDoubts::default();
         }
         (made, CutFindings { stray_rows, closed, shared: shared.counts(), doubts })
     }
 }
 
-/// What is known of a layer beside its pixels.
+/// The findings about a layer other than its pixels.
 struct CutFindings {
     stray_rows: Vec<u32>,
     closed: bool,
@@ -358,12 +357,12 @@ fn shader<'a, R: ShadedRows>(
     Shader::new(rows, cutter.rule, cutter.planes, layer, spans, cutter.grid.width)
 }
 
-/// The rows where contours break off, by layer: the first row below each such point, up
-/// to the one below the image.
+/// The rows where contours break off, by layer: the first row below each such point, up to the row
+/// below the image.
 pub(crate) type OpenRows = BTreeMap<usize, Vec<u32>>;
 
-/// Finds the rows where the contours of some layers, in order, break off, by a
-/// second look at the facets.
+/// Finds the rows where the contours of some layers, in order, break off, by a second pass over the
+/// facets.
 pub(crate) fn open_rows(
     facets: &impl FacetSource,
     cutter: Cutter<'_>,

@@ -1,11 +1,10 @@
 //! Traces stray rows to the faulty edges of the mesh.
 //!
-//! From one row to the next, a layer's balance changes only where a contour has an
-//! open end: a point where an odd number of segments ends (see `cut.rs`). A band of
-//! stray rows therefore lies between open ends, and the mesh is faulty at the edges on
-//! which these lie. A second look at the facets near the bands finds them, by the
-//! arithmetic that cut the layers. No plane meets a level edge; but a hole's other
-//! edges lead to it.
+//! From one row to the next, a layer's balance changes only where a contour has an open end: a
+//! point where an odd number of segments ends (see `cut.rs`). A band of stray rows therefore lies
+//! between open ends, and the mesh is faulty at the edges on which these ends lie. A second pass
+//! over the facets near the bands finds them, by the arithmetic that cut the layers. No plane meets
+//! a level edge; but a hole's other edges lead to it.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -22,7 +21,7 @@ use crate::piece::Piece;
 use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 
-/// Neighbouring rows of a layer that do not balance.
+/// Neighboring rows of a layer that do not balance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StrayBand {
     /// The layer's index.
@@ -62,14 +61,14 @@ pub struct TracedBand {
 /// A point where contours break off.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenEnd {
-    /// x and y in part coordinates (the placed part's), in millimetres.
+    /// x and y in the placed part's coordinates, in millimeters.
     pub at_mm: [f64; 2],
-    /// The edges on which it lies, as positions in [`Trace::edges`]: several where edges
-    /// meet, otherwise one.
+    /// The edges on which it lies, as positions in [`Trace::edges`]: several where edges meet,
+    /// otherwise one edge.
     pub edges: Vec<usize>,
 }
 
-/// An edge that does not join two facets as in a closed mesh: an odd number of facets has it.
+/// An edge that does not join two facets as in a closed mesh: it has an odd number of facets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultyEdge {
     /// Its ends, in the file's coordinates and units.
@@ -81,9 +80,9 @@ pub struct FaultyEdge {
 /// A facet at an edge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeFacet {
-    /// The file, from 0, among those joined.
+    /// The index of the file among the joined files, from 0.
     pub file: usize,
-    /// The facet in the file, from 0.
+    /// The index of the facet in the file, from 0.
     pub facet: usize,
     /// The facet's corners, in the file's coordinates and units.
     pub corners: Facet,
@@ -91,36 +90,36 @@ pub struct EdgeFacet {
     pub forwards: bool,
 }
 
-/// A segment's end near a band. Sorted, those at one point are together.
+/// A segment's end near a band. In sorted order, ends at the same point are together.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Sighting {
     layer: u32,
     row: u32,
     point: [u64; 2],
-    /// Differs between bodies whose contours close by themselves.
+    /// Differs between bodies whose contours close separately.
     salt: u64,
     piece: u32,
     facet: u32,
     edge: [u8; 2],
 }
 
-/// The bits of an edge's corners, the lesser first, which identify it in its file.
+/// The bits of an edge's corners, the lesser first, which identify the edge in its file.
 type EdgeName = [[u32; 3]; 2];
 
-/// The positions of edges that were found, by file, salt of the body, and name.
+/// The positions of the edges found, by file, salt of the body, and name.
 type KnownEdges = BTreeMap<(usize, u64, EdgeName), usize>;
 
-/// Looks at a mesh a second time.
+/// Examines a mesh a second time.
 pub(crate) struct Tracer<'a> {
     pub(crate) model: &'a PlacedPart,
     pub(crate) survey: &'a Survey,
     pub(crate) cutter: Cutter<'a>,
-    /// The bytes that one look may take, about.
+    /// The approximate memory limit of one pass, in bytes.
     pub(crate) memory: usize,
 }
 
 impl Tracer<'_> {
-    /// Traces bands that are in order of layers and rows.
+    /// Traces bands, given in order of layers and rows.
     pub(crate) fn trace(&self, bands: &[StrayBand]) -> io::Result<Trace> {
         let layers: Vec<_> = bands.chunk_by(|a, b| a.layer == b.layer).collect();
         let mut trace = Trace::default();
@@ -138,8 +137,8 @@ impl Tracer<'_> {
         Ok(trace)
     }
 
-    /// Returns the ends of segments near the bands, sorted, or `None` if they take too
-    /// much memory and fewer layers would take less.
+    /// Returns the ends of segments near the bands, sorted, or `None` if they take too much memory
+    /// and fewer layers would take less.
     fn sightings(&self, layers: &[&[StrayBand]]) -> io::Result<Option<Vec<Sighting>>> {
         let index = |bands: &[StrayBand]| bands[0].layer as usize;
         let span = index(layers[0])..index(layers[layers.len() - 1]) + 1;
@@ -245,7 +244,7 @@ impl Tracer<'_> {
             let Piece { file, first_facet, .. } = self.model.model.pieces()[piece];
             let facet = first_facet + facet;
             let [from, to] = sighting.edge.map(usize::from);
-            // Numbers along the facet: 0 1, 1 2, 2 0.
+            // Numbered along the facet: 0 1, 1 2, 2 0.
             let [from, to] = if (from + 1) % 3 == to { [from, to] } else { [to, from] };
             let [a, b] = [from, to].map(|k| corners[k].map(|v| v + 0.0));
             let forwards = a.map(f32::to_bits) <= b.map(f32::to_bits);

@@ -1,12 +1,12 @@
-//! The affine map that takes a part's facets from its file to its place.
+//! Defines the affine map of a part's facets from its file to its place on the machine.
 
 use crate::facet::{Facet, PlacedFacet, Units};
 use crate::placement::{Placement, affine};
 
-/// The transform from file units to the place.
+/// The transform from file units to the placed part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Transform {
-    /// Scales the axes. Most parts stay where they are, and need no more.
+    /// Scales the axes. Most parts need only this.
     Scale([f64; 3]),
     Affine([[f64; 4]; 3]),
 }
@@ -14,7 +14,7 @@ pub(crate) enum Transform {
 impl Transform {
     pub(crate) fn new(placement: &Placement, units: Units) -> Self {
         let mut rows = placement.rows();
-        // Straight to micrometres: z in file units times them is exact.
+        // Converts directly to micrometers: z in file units multiplied by these is exact.
         for (row, (unit, per_mm)) in
             rows.iter_mut().zip([(units.mm(), 1.0), (units.mm(), 1.0), (units.um(), 1000.0)])
         {

@@ -1,4 +1,4 @@
-//! Unpacks files that gzip packed.
+//! Unpacks files compressed with gzip.
 
 use std::io::{self, BufReader, Read};
 
@@ -7,27 +7,26 @@ use flate2::bufread::MultiGzDecoder;
 use crate::error::SliceError;
 use crate::part_file::PartFile;
 
-/// Meshes shrink by up to 20 when they are packed; bytes that shrink more than this hold
-/// something else, and would fill the disk.
+/// Meshes shrink by a factor of up to 20 when compressed; bytes that shrink more than this limit
+/// are not a mesh, and would fill the disk.
 const MOST_SHRINKAGE: u64 = 100;
-/// This much is unpacked in any case.
+/// The number of bytes that are unpacked in any case.
 const ALWAYS_BYTES: u64 = 64 << 20;
 
-/// Returns true if a file that starts with these bytes was packed by gzip.
+/// Returns true if a file that starts with these bytes was compressed with gzip.
 pub(crate) fn is_gzip(start: &[u8]) -> bool {
     start.starts_with(b"\x1F\x8B")
 }
 
-/// Returns the most bytes that are unpacked from this many.
+/// Returns the greatest number of bytes unpacked from `packed` bytes.
 pub(crate) fn most_unpacked(packed: u64) -> u64 {
     ALWAYS_BYTES.saturating_add(packed.saturating_mul(MOST_SHRINKAGE))
 }
 
-/// Unpacks a file into a temporary one.
+/// Unpacks a file into a temporary file.
 ///
 /// # Errors
-/// Returns an error if it is damaged, holds more than a mesh explains, or the disk has
-/// no room for it.
+/// Returns an error if it is damaged, contains more than a mesh would, or the disk is full.
 pub(crate) fn unpack(file: &PartFile) -> Result<PartFile, SliceError> {
     let most = most_unpacked(file.size());
     let mut bytes = MultiGzDecoder::new(BufReader::new(file.reader())).take(most + 1);

@@ -1,9 +1,9 @@
-//! Reads text in UTF-8 and UTF-16 as UTF-8 without a mark.
+//! Reads text in UTF-8 and UTF-16 as UTF-8 without a byte order mark.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
-/// Returns a text as UTF-8, without the byte order mark that may stand before it. Text in UTF-16
-/// is known by that mark, or by the zero beside its first character.
+/// Returns a text as UTF-8, without a leading byte order mark. Text in UTF-16 is recognized by this
+/// mark, or by the zero next to its first character.
 ///
 /// # Errors
 /// Returns an error if the text cannot be read.
@@ -27,13 +27,13 @@ pub(crate) fn as_utf8<'a>(mut text: impl BufRead + 'a) -> io::Result<Box<dyn Buf
     })
 }
 
-/// UTF-16 that is read as UTF-8. Halves of characters become U+FFFD.
+/// UTF-16 text read as UTF-8. Halves of characters become U+FFFD.
 struct Utf16<R> {
     text: R,
     is_big: bool,
-    /// The first half of a character whose second one follows.
+    /// The first half of a character whose second half follows.
     high: Option<u16>,
-    /// The text that was decoded and not read yet.
+    /// The decoded text that has not been read yet.
     utf8: Cursor<Vec<u8>>,
 }
 
@@ -63,7 +63,7 @@ impl<R: Read> Read for Utf16<R> {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
         if self.utf8.position() == self.utf8.get_ref().len() as u64 {
             self.decode()?;
-            // A last half may be all there is.
+            // The text may end with the first half of a character.
             if self.utf8.get_ref().is_empty() && self.high.is_some() {
                 self.decode()?;
             }
@@ -83,7 +83,7 @@ mod tests {
         text
     }
 
-    /// Characters of one to four bytes, the last kind astride the pieces that are decoded.
+    /// Characters of one to four bytes, some of which cross the boundaries of decoded pieces.
     #[test]
     fn text_is_the_same_in_every_encoding() {
         let text = "a<é\u{20AC}".to_owned() + &"\u{1F600}".repeat(5_000);

@@ -1,18 +1,18 @@
 //! Finds vertices far outside the rest of a part.
 //!
-//! One damaged number in a file can make a part a thousand times as large, and images
-//! of nothing for hours. A vertex is taken for damaged if all of this holds:
+//! One damaged number in a file can make a part a thousand times as large, and make images of
+//! nothing for hours. A vertex counts as damaged if all of these conditions hold:
 //!
-//! - Seen from the middle of the part, it is 32 times as far away as where the rest ends,
-//!   or 8 times if the part is larger than any machine.
-//! - At most one facet in eight reaches out there. Slender parts of few facets have many
-//!   facets along their length; a cone's tip is a corner of half of its facets.
-//! - At most one facet lies out there with all of its corners. Another body has four or
-//!   more, and even the end of a square bar two. So several parts in one file, however
-//!   far apart, and large plates with fine details stay.
+//! - Seen from the middle of the part, it is 32 times as far away as the end of the rest, or 8
+//!   times if the part is larger than any machine.
+//! - At most one facet in eight reaches out there. Slender parts with few facets have many facets
+//!   along their length; a cone's tip is a corner of half of its facets.
+//! - At most one facet is out there with all of its corners. Another body has four or more, and
+//!   even the end of a square bar has two. So several parts in one file, however far apart, and
+//!   large plates with fine details stay.
 //!
-//! What is left is a spike of one facet's width at most, on a body of a thirtieth of its
-//! length: nothing that is built of layers.
+//! The damage is then a spike at most one facet wide, on a body of a thirtieth of its length:
+//! nothing that is built from layers.
 
 use std::io;
 
@@ -23,7 +23,7 @@ use crate::facet::{Facet, PlacedFacet};
 use crate::placed_part::PlacedPart;
 use crate::survey::Survey;
 
-/// How far outside the rest a vertex is damaged, and that in a part larger than any
+/// The factor for a damaged vertex outside the rest, and the factor for a part larger than any
 /// machine.
 const FAR: f64 = 32.0;
 const FAR_IF_LARGE: f64 = 8.0;
@@ -31,17 +31,17 @@ const FAR_IF_LARGE: f64 = 8.0;
 const LARGE_MM: f64 = 1000.0;
 /// The share of facets that damage may reach.
 const REACHED: usize = 8;
-/// Facets that are looked at to find the middle.
+/// The number of facets examined to find the middle.
 const SAMPLES: usize = 1024;
 /// Distances are counted by the upper bits of 32-bit numbers: four steps from one power
 /// of two to the next.
 const STEP_BITS: u32 = 21;
 const STEPS: usize = 1 << (32 - STEP_BITS);
 
-/// Checks that no vertex lies far outside the rest.
+/// Checks that no vertex is far outside the rest.
 ///
 /// # Errors
-/// Returns an error that names the first one, or if the part cannot be read.
+/// Returns an error that names the first such vertex, or an error if the part cannot be read.
 pub(crate) fn check(part: &PlacedPart, survey: &Survey) -> Result<(), SliceError> {
     let samples = samples(part)?;
     let middle =
@@ -51,7 +51,7 @@ pub(crate) fn check(part: &PlacedPart, survey: &Survey) -> Result<(), SliceError
     let reach = distance(low, middle).max(distance(high, middle));
     let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
     let far = if size > LARGE_MM { FAR_IF_LARGE } else { FAR };
-    // Nearly all parts end here: their middle half is not so much smaller than they are.
+    // Nearly all parts end here: they are not that much larger than their middle half.
     if reach < far * middle_half_mm {
         return Ok(());
     }
@@ -67,7 +67,7 @@ pub(crate) fn check(part: &PlacedPart, survey: &Survey) -> Result<(), SliceError
     }
 }
 
-/// A point, in millimetres.
+/// A point, in millimeters.
 type Point = [f64; 3];
 
 fn in_mm([x, y, z_um]: Point) -> Point {
@@ -87,7 +87,7 @@ fn distances(facet: &PlacedFacet, middle: Point) -> [f64; 2] {
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
-/// Returns the corners of facets all over the files.
+/// Returns the corners of facets spread over the files.
 fn samples(part: &PlacedPart) -> io::Result<Vec<Point>> {
     let step = part.model.facet_count().div_ceil(SAMPLES).max(1);
     let mut samples = Vec::new();
@@ -120,8 +120,8 @@ fn distance_of(step: usize) -> f64 {
     f64::from(f32::from_bits((step as u32) << STEP_BITS))
 }
 
-/// The numbers of facets beyond each step: of those that reach there, and of those that
-/// lie there with all corners.
+/// The numbers of facets beyond each step: facets that reach there, and facets with all corners
+/// there.
 struct Counts {
     reaching: Vec<usize>,
     outside: Vec<usize>,

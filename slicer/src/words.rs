@@ -1,22 +1,22 @@
-//! Reads text word by word, in memory that no text can exceed.
+//! Reads text word by word, with bounded memory for any text.
 
 use std::io::{self, Read};
 use std::ops::Range;
 
 use lamp_stack::PlainText;
 
-/// The bytes that are read at once.
+/// The number of bytes read at once.
 const READ_BYTES: usize = 1 << 16;
-/// More bytes than any number or keyword has. Longer words come in pieces.
+/// A limit above the length of any number or keyword. Longer words come in pieces.
 const MAX_WORD_BYTES: usize = 1 << 12;
 
-/// The words of a text, one at a time. Lines end in line feeds, carriage returns (as old
-/// Macintosh files have them) or both.
+/// The words of a text, one at a time. Lines end in line feeds, carriage returns (as in old
+/// Macintosh files) or both.
 #[derive(Debug)]
 pub(crate) struct Words<R> {
     text: PlainText<R>,
     buffer: Vec<u8>,
-    /// The bytes of the buffer that are read and no part of a word yet.
+    /// The bytes of the buffer that were read but are not part of a word yet.
     unread: Range<usize>,
     word: Range<usize>,
     line: u64,
@@ -27,7 +27,7 @@ pub(crate) struct Words<R> {
 }
 
 impl<R: Read> Words<R> {
-    /// Reads the words of a text, in any code that [`PlainText`] knows.
+    /// Reads the words of a text, in any encoding that [`PlainText`] supports.
     pub(crate) fn new(text: R) -> io::Result<Self> {
         Ok(Self {
             text: PlainText::new(text)?,
@@ -42,7 +42,7 @@ impl<R: Read> Words<R> {
         })
     }
 
-    /// Moves to the next word. Returns false if there is none, and the word is empty then.
+    /// Moves to the next word. Returns false, with an empty word, at the end of the text.
     pub(crate) fn advance(&mut self) -> io::Result<bool> {
         if std::mem::take(&mut self.is_held) {
             return Ok(!self.word.is_empty());
@@ -70,7 +70,7 @@ impl<R: Read> Words<R> {
         Ok(length > 0)
     }
 
-    /// Leaves the word to be the next one again.
+    /// Keeps the word, so that it comes next again.
     pub(crate) fn hold(&mut self) {
         self.is_held = true;
     }
@@ -85,7 +85,7 @@ impl<R: Read> Words<R> {
         self.begins_line
     }
 
-    /// Returns true if nothing stands behind the word, not even the end of its line.
+    /// Returns true if nothing follows the word, not even the end of its line.
     pub(crate) fn ends_text(&self) -> bool {
         self.is_over && self.unread.is_empty()
     }
@@ -95,7 +95,7 @@ impl<R: Read> Words<R> {
         self.line
     }
 
-    /// Moves behind the last word of the line.
+    /// Moves past the last word of the line.
     pub(crate) fn skip_line(&mut self) -> io::Result<()> {
         while self.advance()? {
             if self.begins_line {
@@ -106,13 +106,13 @@ impl<R: Read> Words<R> {
         Ok(())
     }
 
-    /// Returns true if the word begins with a zero or a Ctrl-Z, with which some programs fill up
-    /// files.
+    /// Returns true if the word begins with a zero or a Ctrl-Z. Some programs pad files with these
+    /// bytes.
     pub(crate) fn begins_padding(&self) -> bool {
         matches!(self.word(), [0 | 0x1A, ..])
     }
 
-    /// Moves behind all such bytes and returns their number, or none if words follow.
+    /// Moves past all such bytes and returns their number, or `None` if words follow.
     pub(crate) fn padding(&mut self) -> io::Result<Option<u64>> {
         let mut bytes = 0;
         while self.word().iter().all(|byte| matches!(byte, 0 | 0x1A)) {
@@ -145,8 +145,8 @@ impl<R: Read> Words<R> {
         }
     }
 
-    /// Reads further bytes behind the unread ones, which move to the buffer's start. Returns false
-    /// if there are none.
+    /// Reads further bytes after the unread ones, which move to the buffer's start. Returns false
+    /// if the file has no more bytes.
     fn fill(&mut self) -> io::Result<bool> {
         self.buffer.copy_within(self.unread.clone(), 0);
         self.unread = 0..self.unread.len();
@@ -169,7 +169,7 @@ impl<R: Read> Words<R> {
 mod tests {
     use super::*;
 
-    /// Gives at most so many bytes at a time.
+    /// Returns at most a given number of bytes at a time.
     struct Slow<'a>(&'a [u8], usize);
 
     impl Read for Slow<'_> {

@@ -103,7 +103,7 @@ pub(super) struct Chain {
     pub(super) edge: u32,
     /// The vertices at the edge's ends, or `u32::MAX`.
     pub(super) ends: [u32; 2],
-    /// The position of its first node among those of all chains.
+    /// The position of its first node in the nodes of all chains.
     pub(super) first: u32,
     pub(super) count: u32,
 }
@@ -126,7 +126,7 @@ unsafe fn values<T, O>(_owner: &O, list: raw::List) -> &[T] {
     if list.count == 0 {
         return &[];
     }
-    // SAFETY: the caller's promise. A vector's values are aligned and contiguous.
+    // SAFETY: the caller guarantees it. A vector's values are aligned and contiguous.
     unsafe { std::slice::from_raw_parts(list.data.cast(), list.count) }
 }
 
@@ -148,8 +148,8 @@ pub(super) struct Model {
 
 // SAFETY: nothing in it is bound to a thread; OpenCASCADE counts references atomically.
 unsafe impl Send for Model {}
-// SAFETY: all calls only read it, except meshing, which locks it and changes nothing that
-// the others read. Surfaces are evaluated without a cache.
+// SAFETY: all calls only read it, except meshing, which locks it and changes nothing that other
+// calls read. Surfaces are evaluated without a cache.
 unsafe impl Sync for Model {}
 
 impl Model {

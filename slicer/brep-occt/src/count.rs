@@ -5,7 +5,7 @@ use lamp_brep::{BrepError, Jet, Kernel};
 
 /// The number of samples of a face along u and along v.
 const STEPS: usize = 16;
-/// The greatest accepted size of a face: a kilometre.
+/// The greatest accepted size of a face: a kilometer.
 const MAX_MM: f64 = 1e6;
 
 /// Returns the estimated number of facets, from how much faces bend within their ranges.

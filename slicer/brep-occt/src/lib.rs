@@ -43,7 +43,7 @@ impl OcctModel {
     }
 
     /// Reads a file's bytes and repairs its bodies: edges and vertices may move, and gaps
-    /// are closed, by up to a tolerance in millimetres.
+    /// are closed, by up to a tolerance in millimeters.
     ///
     /// # Errors
     /// Returns an error as [`Self::read`] does, or if the tolerance is not a positive
@@ -111,7 +111,7 @@ fn info(face: &calls::Face) -> FaceInfo {
     FaceInfo {
         kind: KINDS.get(face.kind as usize).copied().unwrap_or("other"),
         entity: face.entity,
-        // OpenCASCADE has told the sides.
+        // OpenCASCADE has determined the sides.
         is_closed: false,
         control_box_mm: (face.has_box != 0).then_some(face.box_mm),
     }

@@ -10,7 +10,7 @@ use crate::calls::Node;
 use lamp_brep::vector::{Vec3, cross, dot, length, sub, unit};
 use lamp_brep::{Jet, Kernel};
 
-/// Each round halves an edge once: after the last, edges are a thousandth as long.
+/// Each round halves an edge once: after the last round, edges are a thousandth as long.
 const MAX_ROUNDS: usize = 10;
 /// The greatest number of added facets: a multiple of the face's own, plus a constant.
 const MORE: [usize; 2] = [8, 20_000];
@@ -29,7 +29,7 @@ pub(super) struct Patch {
 
 impl Patch {
     /// Halves edges between facets until the surface is within the chord. Returns the
-    /// remaining distance in millimetres.
+    /// remaining distance in millimeters.
     pub(super) fn refine(&mut self, kernel: &dyn Kernel, chord_mm: f64) -> f64 {
         let most = self.triangles.len() * (1 + MORE[0]) + MORE[1];
         for _ in 0..MAX_ROUNDS {

@@ -1,4 +1,4 @@
-//! What OpenCASCADE does that the other kernel does not, and that both agree.
+//! Checks what OpenCASCADE does differently from the other kernel, and that both agree.
 
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ fn both_kernels_say_the_same_of_bodies_and_faces() {
         let other = OcctModel::read(text.as_bytes()).unwrap();
         assert_eq!((own.unit(), own.bodies()), (other.unit(), other.bodies()));
         for face in 0..own.bodies().last().unwrap().faces.end {
-            // OpenCASCADE has told the sides of faces on closed surfaces.
+            // OpenCASCADE has determined the sides of faces on closed surfaces.
             let own = FaceInfo { is_closed: false, ..own.face(face) };
             assert_eq!(own, other.face(face));
         }
@@ -47,15 +47,15 @@ fn surfaces_are_evaluated_on_many_threads_at_once() {
     let radius = |p: [f64; 3]| ((p[0].hypot(p[1]) - 20.0).powi(2) + (p[2] - 8.0).powi(2)).sqrt();
     assert!(expected.iter().all(|jet| (radius(jet.point) - 8.0).abs() < 1e-12));
     std::thread::scope(|scope| {
-        // While facets are made of the same model.
+        // While facets are made from the same model.
         scope.spawn(|| model.tessellate(0.01).unwrap());
         let threads: Vec<_> = (0..4).map(|_| scope.spawn(evaluated)).collect();
         threads.into_iter().for_each(|thread| assert_eq!(thread.join().unwrap(), expected));
     });
 }
 
-/// A corner of a box of 60, 20 and 10 mm. Each face has points of its own, a gap
-/// further along z than those of the face before.
+/// A corner of a box of 60, 20 and 10 mm. Each face has its own points, a gap farther along z than
+/// the points of the previous face.
 fn loose_corner(gap_mm: f64) -> String {
     let text = step(StepSample::Sphere, StepUnit::Millimetre);
     let (text, end) = text.split_at(text.find("ENDSEC;\nEND-").unwrap());

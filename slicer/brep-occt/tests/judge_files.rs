@@ -1,4 +1,4 @@
-//! A program that reads files of other programs, each in a process of its own.
+//! A program that reads files of other programs, each in a separate process.
 
 mod kernels;
 #[path = "../../brep/tests/real_files/mod.rs"]

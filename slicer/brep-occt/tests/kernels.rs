@@ -1,4 +1,4 @@
-//! The kernels that tests ask beside LAMP's own.
+//! The kernels that tests use besides LAMP's own.
 
 use lamp_brep::ReadFn;
 

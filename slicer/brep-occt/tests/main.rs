@@ -1,4 +1,4 @@
-//! Tests of the kernel on OpenCASCADE: alone, and in the tests of the crates that take any kernel.
+//! Tests of the OpenCASCADE kernel: alone, and in the tests of the crates that accept any kernel.
 
 mod alone;
 #[path = "../../brep/tests/closed_forms.rs"]

@@ -1,4 +1,4 @@
-//! Defines what the validation of a body finds.
+//! Defines the findings of a body's validation.
 
 /// The reason why a body cannot be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,7 +15,7 @@ pub enum BodyFault {
     Open {
         /// The number of these edges.
         edges: usize,
-        /// The start of the first one, in millimetres.
+        /// The start of the first one, in millimeters.
         at_mm: [f64; 3],
         /// The entity of that edge's face.
         entity: u64,
@@ -25,18 +25,18 @@ pub enum BodyFault {
     Outside {
         /// The entity of the face.
         entity: u64,
-        /// The distance, in millimetres.
+        /// The distance, in millimeters.
         off_mm: f64,
     },
-    /// The volume of the facets differs from that of the surfaces.
+    /// The volume of the facets differs from the volume of the surfaces.
     #[error(
         "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
          a shorter chord may bring them together"
     )]
     Volumes {
-        /// The volume of the facets, in cubic millimetres.
+        /// The volume of the facets, in cubic millimeters.
         facets_mm3: f64,
-        /// The volume of the surfaces, in cubic millimetres.
+        /// The volume of the surfaces, in cubic millimeters.
         surfaces_mm3: f64,
     },
     /// Its faces enclose something twice, or turn inside out: the side of a face is wrong, or the
@@ -49,7 +49,7 @@ pub enum BodyFault {
     Crossed {
         /// The entity of a face there.
         entity: u64,
-        /// A place on that face, in millimetres.
+        /// A place on that face, in millimeters.
         at_mm: [f64; 3],
     },
     /// As [`Crossed`](Self::Crossed), of a body with a face on a torus whose radii are equal.
@@ -61,7 +61,7 @@ pub enum BodyFault {
         /// The entity of the face.
         entity: u64,
     },
-    /// A face on a closed surface contradicts its neighbours.
+    /// A face on a closed surface contradicts its neighbors.
     #[error(
         "the side of #{entity} cannot be told: its loop runs against its neighbours, \
          and its surface is closed"
@@ -70,25 +70,25 @@ pub enum BodyFault {
         /// The entity of the face.
         entity: u64,
     },
-    /// An edge or facets lie too far off a surface.
+    /// An edge or facets are too far off a surface.
     #[error(
         "{what} of #{entity} lie {off_mm:.3} mm off its surface, more than a thousandth of the body"
     )]
     Off {
         /// The entity of the face.
         entity: u64,
-        /// What lies off: `edges` or `facets`.
+        /// The parts off the surface: `edges` or `facets`.
         what: &'static str,
-        /// The distance, in millimetres.
+        /// The distance, in millimeters.
         off_mm: f64,
     },
     /// Its faces lie on each other.
     #[error("its faces lie on each other and enclose nothing")]
     Flat,
-    /// Its faces point inwards.
+    /// Its faces point inward.
     #[error("it is inside out: its volume is {volume_mm3:.6} mm³")]
     InsideOut {
-        /// The volume of the facets, in cubic millimetres.
+        /// The volume of the facets, in cubic millimeters.
         volume_mm3: f64,
     },
 }
@@ -100,13 +100,13 @@ pub struct BodyReport {
     pub name: String,
     /// The number of facets.
     pub facets: usize,
-    /// The volume of the facets, in cubic millimetres.
+    /// The volume of the facets, in cubic millimeters.
     pub volume_mm3: f64,
-    /// The volume of the surfaces, in cubic millimetres.
+    /// The volume of the surfaces, in cubic millimeters.
     pub exact_volume_mm3: f64,
-    /// The area of the facets, in square millimetres.
+    /// The area of the facets, in square millimeters.
     pub area_mm2: f64,
-    /// The least and the greatest corner, in millimetres.
+    /// The least and the greatest corner, in millimeters.
     pub box_mm: [[f64; 3]; 2],
     /// The reasons not to slice it; empty for a good body.
     pub faults: Vec<BodyFault>,

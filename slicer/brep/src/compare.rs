@@ -1,4 +1,4 @@
-//! Compares what two kernels read of one file, body by body.
+//! Compares two kernels' readings of one file, body by body.
 //!
 //! A kernel that takes the wrong side of a loop may still make closed facets. Another
 //! kernel, which shares no code with it, hardly makes the same mistake.
@@ -16,14 +16,14 @@ const SECTIONS: [f64; 5] = [0.113, 0.307, 0.499, 0.714, 0.907];
 /// The greatest relative difference of a section's two areas.
 const SECTIONS_APART: f64 = 2e-3;
 
-/// What two kernels read of one file.
+/// Two kernels' readings of one file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The names of the kernels.
     pub kernels: [&'static str; 2],
-    /// The bodies that both read.
+    /// The bodies that both kernels read.
     pub pairs: Vec<BodyPair>,
-    /// The bodies that only the first reads, and only the second.
+    /// The bodies that only the first kernel reads, and the bodies that only the second reads.
     pub only: [Vec<NamedBody>; 2],
 }
 
@@ -39,7 +39,7 @@ pub struct NamedBody {
 /// A body as two kernels read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyPair {
-    /// What it is in both readings.
+    /// The body in both readings.
     pub bodies: [NamedBody; 2],
     /// The first reason of each kernel not to slice it.
     pub faults: [Option<BodyFault>; 2],
@@ -47,10 +47,10 @@ pub struct BodyPair {
     pub measures: Vec<Measured>,
 }
 
-/// A measure of a body by both kernels, in millimetres or their squares or cubes.
+/// A measure of a body by both kernels, in millimeters or their squares or cubes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// What is measured.
+    /// The measure.
     pub what: Measure,
     /// The values.
     pub values: [f64; 2],
@@ -70,7 +70,7 @@ pub enum Measure {
     Volume,
     /// The area of a level section of the facets.
     Section {
-        /// Its height, in millimetres.
+        /// Its height, in millimeters.
         z_mm: f64,
     },
 }
@@ -142,9 +142,9 @@ impl NamedBody {
 impl Comparison {
     /// Compares two readings of a file. `kernels` are their names, for people.
     ///
-    /// Bodies are paired by their boxes. Boxes may differ by both chords, volumes by the
-    /// chord times the area, and sections by the chord times the perimeter or by what a
-    /// move of the plane by two chords changes.
+    /// Bodies are paired by their boxes. Boxes may differ by both chords, volumes by the chord
+    /// times the area, and sections by the chord times the perimeter or by the change from moving
+    /// the plane by two chords.
     pub fn of(readings: [&Prepared; 2], kernels: [&'static str; 2]) -> Self {
         let (paired, only) = pair_up(readings.map(|reading| &reading.reports[..]));
         let pair = |bodies: [usize; 2]| {
@@ -283,7 +283,7 @@ fn measures(bodies: &[ReadBody<'_>; 2]) -> Vec<Measured> {
     measures.extend(SECTIONS.map(|share| {
         let z_mm = low + share * (high - low);
         let [ours, theirs] = bodies.each_ref().map(|body| body.section(z_mm));
-        // Where faces are nearly level, sections change much between neighbouring planes.
+        // Where faces are nearly level, sections change much between neighboring planes.
         let steps = bodies.each_ref().map(|body| {
             let [below, above] = [-2.0, 2.0].map(|by| body.section(z_mm + by * chord_mm)[0]);
             (above - below).abs()

@@ -20,7 +20,7 @@ pub enum BrepError {
     /// The chord is not a positive length.
     #[error("a chord of {chord_mm} mm is not a positive length")]
     Chord {
-        /// In millimetres.
+        /// In millimeters.
         chord_mm: f64,
     },
     /// A face has no size, or is too large to be built.
@@ -32,7 +32,7 @@ pub enum BrepError {
     /// The healing tolerance is not a positive length.
     #[error("a tolerance of {heal_mm} mm is not a positive length")]
     Heal {
-        /// In millimetres.
+        /// In millimeters.
         heal_mm: f64,
     },
     /// The surfaces bend too much for facets within the chord.

@@ -3,7 +3,7 @@
 use crate::error::BrepError;
 use crate::notice::Notice;
 
-/// A point of a surface, in millimetres, and its first derivatives. Kernels in other
+/// A point of a surface, in millimeters, and its first derivatives. Kernels in other
 /// languages write it as nine numbers in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
@@ -16,11 +16,11 @@ pub struct Jet {
     pub dv: [f64; 3],
 }
 
-/// A model read by a kernel: placed bodies, in millimetres.
+/// A model read by a kernel: placed bodies, in millimeters.
 ///
 /// Faces are numbered across all bodies. Each has a surface with the same number.
 pub trait Kernel: Send + Sync {
-    /// Returns the bodies in the file's order. A body that is placed twice appears twice.
+    /// Returns the bodies in the file's order. A body placed twice appears twice.
     fn bodies(&self) -> &[Body];
 
     /// Returns a face by its number.
@@ -32,23 +32,24 @@ pub trait Kernel: Send + Sync {
     /// Returns the name of the file's length unit, for reports.
     fn unit(&self) -> &str;
 
-    /// Returns the uncertainty of lengths that the file states, in millimetres.
+    /// Returns the uncertainty of lengths that the file states, in millimeters.
     fn uncertainty_mm(&self) -> Option<f64> {
         None
     }
 
-    /// Returns what the file holds beside the bodies, or not as it stands.
+    /// Returns the contents of the file besides the bodies, and parts that are not read as they
+    /// stand.
     fn notices(&self) -> &[Notice] {
         &[]
     }
 
-    /// Returns the number of edges that bound one face alone, so that no facets can close
-    /// there; 0 if the kernel does not know.
+    /// Returns the number of edges that bound only one face, so that facets cannot close there; 0
+    /// if the kernel does not know.
     fn free_edges(&self) -> usize {
         0
     }
 
-    /// Returns the longest side of the box of the vertices, in millimetres; 0 if the kernel
+    /// Returns the longest side of the box of the vertices, in millimeters; 0 if the kernel
     /// does not know.
     fn longest_mm(&self) -> f64 {
         0.0
@@ -79,7 +80,7 @@ pub trait Kernel: Send + Sync {
 /// A body and its faces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Body {
-    /// The name from the file, or that of its product; may be empty.
+    /// The name from the file, or the name of its product; may be empty.
     pub name: String,
     /// The indices of its faces.
     pub faces: std::ops::Range<u32>,
@@ -92,18 +93,18 @@ pub struct FaceInfo {
     pub kind: &'static str,
     /// The entity's number in the file, such as 12 for `#12`; 0 if unknown.
     pub entity: u64,
-    /// Whether its surface is closed both ways, so that the direction of its loops alone
-    /// tells which side of them is the face.
+    /// Whether its surface is closed both ways, so that only the direction of its loops shows which
+    /// side of them is the face.
     pub is_closed: bool,
     /// The least and the greatest corner of the surface's control points, in
-    /// millimetres, if it has any. They enclose the surface.
+    /// millimeters, if it has any. They enclose the surface.
     pub control_box_mm: Option<[[f64; 3]; 2]>,
 }
 
 /// A triangle of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
-    /// The indices of its corners, counter-clockwise seen from outside.
+    /// The indices of its corners, counterclockwise seen from outside.
     pub corners: [u32; 3],
     /// The corners' parameters on the face's surface. A point on a seam or at a pole
     /// has several.
@@ -123,7 +124,7 @@ impl Facet {
 /// The facets of all bodies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tessellation {
-    /// All points, in millimetres. Neighbouring faces share the points of their edge.
+    /// All points, in millimeters. Neighboring faces share the points of their edge.
     pub points: Vec<[f64; 3]>,
     /// The facets, by body and face.
     pub facets: Vec<Facet>,
@@ -132,7 +133,7 @@ pub struct Tessellation {
     pub tips: Vec<Facet>,
     /// The faults found in faces.
     pub findings: Vec<Finding>,
-    /// The greatest distance of facets from their surfaces, in millimetres.
+    /// The greatest distance of facets from their surfaces, in millimeters.
     pub chord_mm: f64,
 }
 
@@ -186,40 +187,39 @@ pub enum Fault {
     /// A loop's edges do not follow each other.
     #[error("the edges of a loop do not follow each other")]
     Broken,
-    /// An edge lies off the surface.
+    /// An edge is off the surface.
     #[error("an edge lies {off_mm:.6} mm off its surface")]
     Off {
-        /// The distance, in millimetres.
+        /// The distance, in millimeters.
         off_mm: f64,
     },
-    /// An edge lay off the surface, and was moved to where its surfaces meet.
+    /// An edge was off the surface, and was moved to the intersection of its surfaces.
     #[error("an edge lay {off_mm:.6} mm off its surface; it was moved onto its surfaces")]
     Rebuilt {
-        /// The distance, in millimetres.
+        /// The distance, in millimeters.
         off_mm: f64,
     },
-    /// Its loops go clockwise although they should not. The face was turned over to fit
-    /// the loops.
+    /// Its loops go clockwise although they should not. The face was turned over to fit the loops.
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
-    /// A loop ran along an edge in the same direction as its neighbour's.
+    /// A loop ran along an edge in the same direction as a neighbor's loop.
     #[error("a loop ran against its neighbours; it was reversed")]
     Contrary,
-    /// Some of its edges were joined with those of its neighbours.
+    /// Some of its edges were joined with edges of its neighbors.
     #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
     Joined {
         /// The number of joints: ends of edges, or whole edges.
         joints: usize,
-        /// The greatest gap, in millimetres.
+        /// The greatest gap, in millimeters.
         off_mm: f64,
     },
-    /// It points inwards where its neighbours point outwards.
+    /// It points inward where its neighbors point outward.
     #[error("it is inside out beside its neighbours; it was turned over")]
     Inverted,
     /// The shell that begins with it points the wrong way: out of a void, or into the body.
     #[error("its shell points the wrong way; it was turned over")]
     Shell,
-    /// All faces of its body point inwards.
+    /// All faces of its body point inward.
     #[error("its body is inside out; all of it was turned over")]
     InsideOut,
     /// It is too large, or bends too much, for the chord.
@@ -231,13 +231,13 @@ pub enum Fault {
     /// It bends too much for its facets to follow.
     #[error("facets lie {off_mm:.4} mm off its surface")]
     Coarse {
-        /// The distance, in millimetres.
+        /// The distance, in millimeters.
         off_mm: f64,
     },
 }
 
 impl Fault {
-    /// Returns the distance of a fault, in millimetres, or 0 for faults without one.
+    /// Returns the distance of a fault, in millimeters, or 0 for faults without one.
     pub fn off_mm(&self) -> f64 {
         match self {
             Self::Off { off_mm }

@@ -1,8 +1,8 @@
-//! Finds loops that run against their neighbours, and reverses them.
+//! Finds loops that run against their neighbors, and reverses them.
 //!
-//! In a closed shell two loops follow each edge, in opposite directions. On a sphere the
-//! direction of a loop alone tells which side of it is the face, so it must be right before
-//! facets are made.
+//! In a closed shell, two loops follow each edge, in opposite directions. On a sphere, only the
+//! direction of a loop shows which side of it is the face, so it must be right before facets are
+//! made.
 
 use std::collections::HashMap;
 
@@ -10,12 +10,12 @@ use crate::kernel::{Fault, Finding};
 use crate::model::{BrepModel, Loop};
 use crate::orient::{neighbours, pieces};
 
-/// A loop, by its face and its place in it.
+/// A loop, by its face and its index in the face.
 type LoopPlace = (usize, usize);
 
-/// Reverses loops on closed surfaces that follow edges in the same direction as their
-/// neighbours, and returns a finding for each face changed. Of loops that run against each
-/// other, the fewer are wrong; where both are as many, all stay.
+/// Reverses loops on closed surfaces that follow edges in the same direction as their neighbors.
+/// Returns a finding for each changed face. Of loops that run against each other, the smaller
+/// number is wrong; if the numbers are equal, all stay.
 pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<Finding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
@@ -23,7 +23,7 @@ pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<Finding> {
         let places = loops(model, faces);
         let pieces = pieces(&neighbours(uses(model, &places).values(), places.len()));
         let contrary = pieces.iter().flat_map(|piece| minority(piece)).map(|at| places[at]);
-        // Elsewhere a loop bounds one region alone, and the face is turned over instead.
+        // Elsewhere a loop bounds a single region, so the face is turned over instead.
         let is_closed = |&(face, _): &LoopPlace| model.faces[face].surface.is_closed();
         let mut contrary: Vec<LoopPlace> = contrary.filter(is_closed).collect();
         contrary.sort_unstable();
@@ -49,13 +49,12 @@ fn loops(model: &BrepModel, faces: std::ops::Range<usize>) -> Vec<LoopPlace> {
     faces.flat_map(of_face).collect()
 }
 
-/// Returns for each edge the loops that follow it, by their index in a list, and which way they
-/// do.
+/// Returns the loops that follow each edge, by their index in a list, and their directions.
 fn uses(model: &BrepModel, places: &[LoopPlace]) -> HashMap<usize, Vec<(usize, bool)>> {
     let mut uses: HashMap<usize, Vec<(usize, bool)>> = HashMap::new();
     for (at, &(face, number)) in places.iter().enumerate() {
         let face = &model.faces[face];
-        // Loops are counter-clockwise seen from where the face's own normal points.
+        // Loops are counterclockwise seen from where the face's own normal points.
         let is_outwards = face.along_normal == face.outwards;
         if let Loop::Edges(edges) = &face.loops[number] {
             for &(edge, is_along) in edges {
@@ -66,7 +65,7 @@ fn uses(model: &BrepModel, places: &[LoopPlace]) -> HashMap<usize, Vec<(usize, b
     uses
 }
 
-/// Returns the loops of the side with fewer of them, if there is one.
+/// Returns the loops of the side with fewer loops, if there is one.
 fn minority(piece: &[(usize, bool)]) -> Vec<usize> {
     let on = |side: bool| piece.iter().filter(move |(_, other)| *other == side);
     let [one, other] = [false, true].map(|side| on(side).count());

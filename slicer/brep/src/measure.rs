@@ -26,5 +26,6 @@ pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// How far edges and facets may lie off their surface, as a part of the body's longest side.
+/// The greatest accepted distance of edges and facets from their surface, as a part of the body's
+/// longest side.
 pub(crate) const MOST_OFF: f64 = 1e-3;

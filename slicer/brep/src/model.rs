@@ -1,4 +1,4 @@
-//! Holds a model in memory: placed bodies, faces, edges and vertices, in millimetres.
+//! Holds a model in memory: placed bodies, faces, edges and vertices, in millimeters.
 
 use crate::geometry::{Curve, Surface, edge_range};
 use crate::kernel::Body;
@@ -12,17 +12,17 @@ pub(crate) struct BrepModel {
     pub(crate) faces: Vec<Face>,
     pub(crate) edges: Vec<BrepEdge>,
     pub(crate) vertices: Vec<Vec3>,
-    /// What the file holds besides.
+    /// Notices about the other contents of the file.
     pub(crate) notices: Vec<Notice>,
     /// The name of the file's length unit.
     pub(crate) unit: String,
-    /// The uncertainty of lengths that the file states, in millimetres.
+    /// The uncertainty of lengths that the file states, in millimeters.
     pub(crate) uncertainty_mm: Option<f64>,
 }
 
 impl BrepModel {
-    /// Returns the edges that bound one face alone, in ascending order, but for those that
-    /// are a single point.
+    /// Returns the edges that bound only one face, in ascending order, except edges that are a
+    /// single point.
     pub(crate) fn free_edges(&self) -> Vec<usize> {
         let mut uses = vec![0u32; self.edges.len()];
         for around in self.faces.iter().flat_map(|face| &face.loops) {
@@ -60,7 +60,7 @@ impl BrepModel {
     }
 }
 
-/// The length below which an edge is a single point, in millimetres.
+/// The length below which an edge is a single point, in millimeters.
 const POINT_MM: f64 = 1e-6;
 
 /// A piece of a surface.
@@ -69,12 +69,12 @@ pub(crate) struct Face {
     /// The entity's number in the file.
     pub(crate) entity: u64,
     pub(crate) surface: Surface,
-    /// Whether its loops go counter-clockwise seen against the surface's normal.
+    /// Whether its loops go counterclockwise seen against the surface's normal.
     pub(crate) along_normal: bool,
     /// Whether the surface's normal points out of the body.
     pub(crate) outwards: bool,
     pub(crate) loops: Vec<Loop>,
-    /// The index of the loop that is marked as the outer one, if one alone is.
+    /// The index of the loop marked as the outer one, if exactly one is.
     pub(crate) outer: Option<usize>,
 }
 
@@ -83,7 +83,7 @@ pub(crate) struct Face {
 pub(crate) enum Loop {
     /// A single point, such as the tip of a cone.
     Vertex(usize),
-    /// Edges by number, each with whether the loop follows it from its start.
+    /// Edges by number, each with a flag: whether the loop follows it from its start.
     Edges(Vec<(usize, bool)>),
 }
 

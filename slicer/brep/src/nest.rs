@@ -1,4 +1,4 @@
-//! Tells which shells of a body are voids, and whether its faces enclose it.
+//! Finds which shells of a body are voids, and whether its faces enclose it.
 
 use std::collections::HashMap;
 
@@ -7,13 +7,13 @@ use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
 use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
 use crate::volume::facet_volume;
 
-/// How far faces may reach into each other, as a multiple of the chord, and of the distance of
-/// edges from their surfaces.
+/// The greatest accepted overlap of faces, as a multiple of the chord, and of the distance of edges
+/// from their surfaces.
 const LOOSE: f64 = 8.0;
 const LOOSE_EDGES: f64 = 2.0;
 
-/// Turns over shells whose faces point into the body: an outermost one must point outwards, one
-/// inside it into its void, and so on. Returns whether any was turned over.
+/// Turns over shells whose faces point into the body: an outermost shell must point outward, a
+/// shell inside it into its void, and so on. Returns whether any shell was turned over.
 pub(crate) fn turn_shells(
     kernel: &dyn Kernel,
     mesh: &mut Tessellation,
@@ -41,7 +41,7 @@ pub(crate) fn turn_shells(
     is_turned
 }
 
-/// Returns for each shell whether it points the wrong way.
+/// Returns, for each shell, whether it points the wrong way.
 fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize) -> Vec<bool> {
     let mut volumes = vec![0.0; count];
     let mut widest = vec![(0.0, 0); count];
@@ -123,8 +123,7 @@ fn turn(
     mesh.findings.extend(faces.into_iter().map(finding));
 }
 
-/// Returns a fault if a ray through one of the faces does not enter and leave the body in
-/// turns.
+/// Returns a fault if a ray through one of the faces does not enter and leave the body alternately.
 pub(crate) fn crossed(
     kernel: &dyn Kernel,
     mesh: &Tessellation,
@@ -137,7 +136,7 @@ pub(crate) fn crossed(
         let hits = hits(mesh, facets, &rays);
         let mut again = Vec::new();
         for (facet, hits) in left.into_iter().zip(hits) {
-            // A ray that meets an edge misses a facet or meets one twice.
+            // A ray that meets an edge misses a facet or meets a facet twice.
             if hits.iter().map(wound).sum::<i32>() != 0 {
                 again.push(facet);
             } else if let Some(hit) = wrong(&hits, loose_mm) {
@@ -151,14 +150,14 @@ pub(crate) fn crossed(
     None
 }
 
-/// Returns how far edges or facets of a body lie off their surfaces, if further than they may.
+/// Returns the distance of edges or facets of a body from their surfaces, if it exceeds the limit.
 fn off_mm(mesh: &Tessellation, facets: &[Facet]) -> f64 {
     let (Some(first), Some(last)) = (facets.first(), facets.last()) else { return 0.0 };
     let of_body = mesh.findings.iter().filter(|it| (first.face..=last.face).contains(&it.face));
     of_body.map(|finding| finding.fault.off_mm()).fold(0.0, f64::max)
 }
 
-/// Returns for each face the facet that the rays see best, and others spread over it.
+/// Returns, for each face, the facet that the rays see best, and other facets spread over it.
 fn samples(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
     let mut samples = Vec::new();
     let mut start = 0;
@@ -174,18 +173,18 @@ fn samples(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
     samples
 }
 
-/// The number of facets of a face that rays go through.
+/// The number of facets per face through which rays go.
 const SAMPLES: usize = 8;
-/// The least area of a facet as rays see it, as a part of the greatest one's.
+/// The least area of a facet as rays see it, as a part of the greatest such area.
 const LEAST_SEEN: f64 = 0.05;
 
-/// Returns how often a ray is deeper in the body after a hit.
+/// Returns the change after a hit in the number of times that a ray is inside the body.
 fn wound(hit: &Hit) -> i32 {
     if hit.cosine < 0.0 { 1 } else { -1 }
 }
 
-/// Returns the hit after which a ray is in the body twice, or less than not at all, for
-/// more than a length.
+/// Returns the first hit after which, for more than a given length, a ray is inside the body twice
+/// or a negative number of times.
 fn wrong(hits: &[Hit], loose_mm: f64) -> Option<Hit> {
     let mut inside = 0;
     hits.windows(2).find_map(|pair| {

@@ -1,6 +1,6 @@
-//! Defines what a file holds beside the solids that are sliced.
+//! Describes the contents of a file besides the solids that are sliced.
 
-/// Something that a file holds and that is not sliced, or not as it stands there.
+/// Contents of a file that are not sliced, or not as they stand.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("#{entity}, {matter}, is {}{}", matter.fate(), first_of(*count))]
 pub struct Notice {
@@ -8,7 +8,7 @@ pub struct Notice {
     pub entity: u64,
     /// The number of such entities.
     pub count: usize,
-    /// What they are.
+    /// The kind of the entities.
     pub matter: Matter,
 }
 
@@ -16,7 +16,7 @@ fn first_of(count: usize) -> String {
     if count > 1 { format!(" (the first of {count})") } else { String::new() }
 }
 
-/// What a [`Notice`] is about.
+/// The subject of a [`Notice`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Matter {
@@ -29,10 +29,10 @@ pub enum Matter {
     /// A curve or a point.
     #[error("a curve that bounds no face")]
     Wire,
-    /// Facets, also such as repeat a solid.
+    /// Facets, including facets that repeat a solid.
     #[error("facets without exact surfaces")]
     Facets,
-    /// A solid that no product holds, or of a part that no assembly places.
+    /// A solid that no product contains, or a solid of a part that no assembly places.
     #[error("a solid that no product or assembly places")]
     Unplaced,
     /// A solid used twice in one place.
@@ -47,7 +47,7 @@ pub enum Matter {
 }
 
 impl Matter {
-    /// Says what becomes of it.
+    /// Says what happens to it.
     fn fate(&self) -> &'static str {
         match self {
             Self::Sewn => "sliced if such surfaces close",

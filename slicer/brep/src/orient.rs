@@ -1,4 +1,4 @@
-//! Finds faces that are inside out relative to their neighbours, and turns them over.
+//! Finds faces that are inside out relative to their neighbors, and turns them over.
 
 use std::collections::HashMap;
 
@@ -12,23 +12,23 @@ use crate::volume::facet_volume;
 /// area is less than this part of the other's.
 const CLEARLY_SMALLER: f64 = 0.8;
 
-/// What [`turn_over`] did.
+/// The result of [`turn_over`].
 #[derive(Debug, Default)]
 pub(crate) struct Turned {
     /// Whether any face was turned over.
     pub(crate) is_changed: bool,
-    /// The faces that contradict their neighbours and cannot be turned over: their number and
-    /// that of their body.
+    /// The faces that contradict their neighbors and cannot be turned over: the number of the face
+    /// and the number of its body.
     pub(crate) undecided: Vec<(u32, usize)>,
 }
 
-/// Turns over faces that follow a shared edge in the same direction as a neighbour, and
+/// Turns over faces that follow a shared edge in the same direction as a neighbor, and
 /// bodies that are inside out.
 ///
-/// Of contradicting groups, the one with less area is turned. If their areas are
-/// similar, the sign of the body's volume decides. Changes are added to the findings. A face
-/// on a surface that is closed both ways stays: if its loop runs the wrong way, it is not
-/// inside out, but on the wrong side of the loop.
+/// Of contradicting groups, the one with less area is turned. If their areas are similar, the sign
+/// of the body's volume decides. Changes are added to the findings. A face on a surface closed both
+/// ways stays: if its loop runs the wrong way, it is not inside out, but on the wrong side of the
+/// loop.
 pub(crate) fn turn_over(
     kernel: &dyn Kernel,
     mesh: &mut Tessellation,
@@ -70,7 +70,7 @@ fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[boo
     }
 }
 
-/// Returns for each face of a body whether it is inside out.
+/// Returns, for each face of a body, whether it is inside out.
 fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let facets = mesh.of_faces(&body.faces);
     let count = body.faces.len();
@@ -103,7 +103,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     turned
 }
 
-/// Returns for each edge of facets the faces that follow it, and which way they do.
+/// Returns, for each edge of facets, the faces that follow it, and their directions.
 fn uses(
     facets: &[Facet],
     index: impl Fn(&Facet) -> usize,
@@ -117,9 +117,9 @@ fn uses(
     uses
 }
 
-/// Returns the neighbours of each of `count` faces or loops, and whether they contradict it by
-/// following a shared edge in the same direction. `uses` tells for each edge who follows it,
-/// and which way.
+/// Returns the neighbors of each of `count` faces or loops, and whether they contradict it by
+/// following a shared edge in the same direction. `uses` lists, for each edge, the faces or loops
+/// that follow it, and their directions.
 pub(crate) fn neighbours<'a>(
     uses: impl Iterator<Item = &'a Vec<(usize, bool)>>,
     count: usize,
@@ -140,8 +140,8 @@ pub(crate) fn neighbours<'a>(
     list
 }
 
-/// Returns the connected groups of faces or loops, each with its side: those on different sides
-/// contradict each other. One without neighbours is a group of its own.
+/// Returns the connected groups of faces or loops, each member with its side: members on different
+/// sides contradict each other. A member without neighbors is a group of its own.
 pub(crate) fn pieces(neighbours: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
     let mut pieces = Vec::new();
     let mut seen = vec![false; neighbours.len()];
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn pieces_have_sides() {
-        // Four faces in a ring, the third of which contradicts its neighbours, and a
+        // Four faces in a ring, the third of which contradicts its neighbors, and a
         // single face.
         let neighbours = vec![
             vec![(1, false), (3, false)],

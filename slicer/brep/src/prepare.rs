@@ -1,5 +1,4 @@
-//! Prepares a STEP file for slicing: reads, tessellates and validates it, and retries with
-//! healing.
+//! Prepares a STEP file for slicing: reads, tessellates and validates it, and retries with healing.
 
 use std::any::Any;
 use std::fmt;
@@ -14,7 +13,7 @@ use crate::orient::turn_over;
 use crate::validate::check;
 use crate::vector::sub;
 
-/// Reads a file's bytes and joins edges within a distance in millimetres; 0 leaves the
+/// Reads a file's bytes and joins edges within a distance in millimeters; 0 leaves the
 /// model unchanged.
 pub type ReadFn = fn(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError>;
 
@@ -36,9 +35,9 @@ pub struct Prepared {
     pub reports: Vec<BodyReport>,
     /// The rejected attempts, in order.
     pub tries: Vec<Attempt>,
-    /// The distance within which edges were joined, in millimetres; 0 without healing.
+    /// The distance within which edges were joined, in millimeters; 0 without healing.
     pub heal_mm: f64,
-    /// The greatest distance of facets from their surfaces, in millimetres.
+    /// The greatest distance of facets from their surfaces, in millimeters.
     pub chord_mm: f64,
 }
 
@@ -53,31 +52,31 @@ pub struct Attempt {
     pub why: String,
 }
 
-/// The uncertainty assumed for files that state none, in millimetres.
+/// The uncertainty assumed for files that state none, in millimeters.
 const USUAL_MM: f64 = 1e-3;
 /// Healing tolerances, as multiples of the file's own.
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
 /// Healing tolerances, as multiples of the chord.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
-/// The upper limit of healing, in millimetres, and as a part of the model's longest side,
+/// The upper limit of healing, in millimeters, and as a part of the model's longest side,
 /// unless the chord is longer.
 const MOST_MM: f64 = 0.1;
 const MOST_PART: f64 = 1e-3;
-/// The chord for bodies that stay open, as a multiple of the requested one: they are sliced
-/// only if gaps are accepted.
+/// The chord for bodies that stay open, as a multiple of the requested chord: they are sliced only
+/// if gaps are accepted.
 const OPEN_CHORD: f64 = 4.0;
 /// The least of such chords, as a part of the model's longest side.
 const OPEN_PART: f64 = 1e-4;
 
 /// Reads a file's bytes, tessellates its bodies and checks them.
 ///
-/// A file with faults is healed with its own tolerance, then with a tighter and with
-/// looser ones, at most 0.1 mm or a thousandth of the model, or the chord if that is more.
-/// Models with edges that bound one face alone get no facets. Faces and shells that are
-/// inside out are turned over and reported as findings. Returns the first attempt without
-/// faults. If there is none, returns the one with the fewest; it must not be sliced. If
-/// all have edges of one face alone, that with the fewest such edges gets facets with a
-/// chord 4 times as long. Panics of the kernel are caught. There is no time limit.
+/// A file with faults is healed with its own tolerance, then with a tighter and with looser ones,
+/// at most 0.1 mm or a thousandth of the model, or the chord if that is more. Models with edges
+/// that bound only one face get no facets. Faces and shells that are inside out are turned over and
+/// reported as findings. Returns the first attempt without faults. If every attempt has faults,
+/// returns the attempt with the fewest; it must not be sliced. If all have edges of only one face,
+/// the attempt with the fewest such edges gets facets with a chord 4 times as long. Panics of the
+/// kernel are caught. There is no time limit.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or no attempt gives facets.
@@ -109,12 +108,12 @@ struct Search<'a> {
     chord_mm: f64,
     /// All attempts, in order.
     tries: Vec<Attempt>,
-    /// The best attempt and its index, or the first one's error if none gave facets.
+    /// The best attempt and its index, or the first attempt's error if no attempt gave facets.
     best: Result<(usize, Prepared), BrepError>,
-    /// Of the models without facets because edges bound one face alone, that with the fewest
+    /// Of the models without facets because edges bound only one face, the model with the fewest
     /// such edges: its index among the attempts, the number of edges, and the model.
     open: Option<(usize, usize, Arc<dyn Kernel>)>,
-    /// The longest side of the box of the model's vertices, in millimetres.
+    /// The longest side of the box of the model's vertices, in millimeters.
     longest_mm: f64,
 }
 
@@ -135,7 +134,7 @@ impl<'a> Search<'a> {
         self.best = first.map(|made| (0, made));
     }
 
-    /// Takes the size of the facets if the kernel does not know that of the model.
+    /// Uses the size of the facets if the kernel does not know the size of the model.
     fn measure(&mut self) {
         if let (0.0, Ok((_, best))) = (self.longest_mm, &self.best) {
             let boxes = best.reports.iter().map(|report| report.box_mm);
@@ -144,8 +143,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns whether edges bound one face alone, so that facets would be in vain, and
-    /// keeps the model with the fewest.
+    /// Returns whether edges bound only one face, so that facets would be useless, and keeps the
+    /// model with the fewest such edges.
     fn is_open(&mut self, kernel: &Arc<dyn Kernel>, heal_mm: f64) -> bool {
         let edges = kernel.free_edges();
         if edges == 0 {
@@ -159,7 +158,7 @@ impl<'a> Search<'a> {
         true
     }
 
-    /// Makes facets of the model with the fewest free edges, if no other has any, to tell
+    /// If no other model has facets, makes facets of the model with the fewest free edges, to show
     /// where it is open.
     fn settle_open(&mut self) {
         if self.best.is_err()
@@ -195,7 +194,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Tessellates a model, and keeps it if it has fewer faults than the best one.
+    /// Tessellates a model, and keeps it if it has fewer faults than the best attempt.
     fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64) {
         let made = facets(kernel, heal_mm, self.chord_mm);
         self.tries.push(Attempt::of(&made, heal_mm, self.chord_mm));

@@ -1,7 +1,7 @@
-//! Sends rays through the facets of a body, which tell what its faces enclose.
+//! Sends rays through the facets of a body to find what its faces enclose.
 //!
-//! Tessellation decides which side of a loop is the face; nothing here shares that choice.
-//! A ray from outside must enter the body, leave it, enter it again, and so on.
+//! Tessellation decides which side of a loop is the face; this module does not share that choice. A
+//! ray from outside must enter the body, leave it, enter it again, and so on.
 
 use crate::kernel::{Facet, Tessellation};
 use crate::vector::{Vec3, cross, dot, sub, unit};
@@ -17,7 +17,7 @@ pub(crate) struct RayPoint {
     pub(crate) shares: [f64; 3],
 }
 
-/// The shares at which to send rays, one after the other until one meets no edge.
+/// The shares at which to send rays, in order, until a ray meets no edge.
 pub(crate) const SHARES: [[f64; 3]; 4] = [
     [0.334_1, 0.332_7, 0.333_2],
     [0.521_3, 0.237_9, 0.240_8],
@@ -25,10 +25,10 @@ pub(crate) const SHARES: [[f64; 3]; 4] = [
     [0.243_7, 0.151_9, 0.604_4],
 ];
 
-/// Where a ray meets a facet.
+/// The place where a ray meets a facet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
-    /// The way along the ray, in millimetres.
+    /// The distance along the ray, in millimeters.
     pub(crate) depth_mm: f64,
     /// The index of the facet.
     pub(crate) facet: usize,
@@ -49,7 +49,7 @@ pub(crate) fn seen_mm2(mesh: &Tessellation, facet: &Facet) -> f64 {
     dot(cross(sub(b, a), sub(c, a)), axes()[2])
 }
 
-/// Returns where each ray meets facets, in order.
+/// Returns the places where each ray meets facets, in order.
 pub(crate) fn hits(mesh: &Tessellation, facets: &[Facet], rays: &[RayPoint]) -> Vec<Vec<Hit>> {
     let axes = axes();
     let seen = |facet: &Facet| mesh.corners(facet).map(|p| axes.map(|axis| dot(axis, p)));

@@ -13,13 +13,13 @@ use crate::volume::{facet_volume, surface_volume};
 /// The greatest relative difference of a body's two volumes.
 pub(crate) const VOLUMES_APART: f64 = 1e-3;
 
-/// The least volume of a body of some area, as a part of what such a cube would have: less is
-/// the error of its numbers.
+/// The least volume of a body, as a part of the volume of a cube with the same area: a smaller
+/// volume is within rounding errors.
 const LEAST_VOLUME: f64 = 1e-9;
 
-/// Checks every body: facets follow each edge as often in one direction as in the other; no
-/// face leaves the box of its control points; and the volumes of facets and surfaces
-/// agree within 0.1 %, or within what the chord allows.
+/// Checks every body: facets follow each edge as often in one direction as in the other; no face
+/// leaves the box of its control points; and the volumes of facets and surfaces agree within 0.1 %,
+/// or within the error that the chord allows.
 pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     let report = |body: &crate::kernel::Body| {
         let facets = mesh.of_faces(&body.faces);
@@ -61,7 +61,7 @@ fn faults(
     let faces = facets[0].face..=facets[facets.len() - 1].face;
     let horn = faces.map(|face| kernel.face(face)).find(|face| face.kind == HORN_TORUS);
     let mut faults: Vec<BodyFault> = open(kernel, mesh, facets).into_iter().collect();
-    // Loops without a known side give facets anywhere.
+    // Loops with an unknown side give facets anywhere.
     faults.extend(off(kernel, mesh, facets, report).map(|off| match (&horn, &off) {
         (Some(face), BodyFault::Off { entity, what: FACETS, .. }) if face.entity == *entity => {
             BodyFault::Horn { entity: *entity }
@@ -108,11 +108,11 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
     })
 }
 
-/// Returns a fault if an edge or facets lie off their surface by more than numbers of another
-/// part would explain: nothing else tells that the edge is another surface's.
+/// Returns a fault if an edge or facets are off their surface by more than the numbers of another
+/// part would explain: no other check shows that the edge belongs to another surface.
 ///
-/// Facets may lie some chords off. For edges the chord does not count: what the file is off, it is
-/// off at any tolerance.
+/// Facets may be some chords off. For edges, the chord does not count: an error in the file stays
+/// the same at any tolerance.
 fn off(
     kernel: &dyn Kernel,
     mesh: &Tessellation,
@@ -121,7 +121,7 @@ fn off(
 ) -> Option<BodyFault> {
     let sides = sub(report.box_mm[1], report.box_mm[0]);
     let longest_mm = sides.into_iter().fold(0.0, f64::max);
-    // What a file says of its own accuracy counts, but no file may say everything.
+    // The accuracy that a file states counts, but only up to a limit.
     let stated_mm = kernel.uncertainty_mm().unwrap_or(0.0).min(LOCAL_OFF * longest_mm);
     let most_mm = f64::max(MOST_OFF * longest_mm, stated_mm);
     let faces = facets.first()?.face..=facets.last()?.face;
@@ -151,11 +151,12 @@ fn off(
     worst.map(|&(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
 }
 
-/// The things other than edges that are off.
+/// The parts that are off, if not edges.
 const FACETS: &str = "facets";
 
-/// The same, for edges of a face whose neighbours hold their edges, or where the surfaces meet
-/// near the edge, and that is small: its area times the distance is below a share of the volume.
+/// The greatest accepted distance of edges, as a part of the body's longest side, for a small face
+/// whose neighbors are on their edges, or where the surfaces meet near the edge. A face is small if
+/// its area times the distance is below a share of the volume.
 const LOCAL_OFF: f64 = 4e-3;
 const LOCAL_VOLUME: f64 = 1e-4;
 
@@ -176,7 +177,7 @@ fn neighbours(facets: &[Facet], face: u32) -> Vec<u32> {
     near
 }
 
-/// Returns how far edges of a face lie off its surface, if further than facets may.
+/// Returns the distance of a face's edges from its surface, if it exceeds the limit for facets.
 fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {
     let findings = mesh.findings.iter().filter(|finding| finding.face == face);
     let off = findings.filter_map(|finding| match finding.fault {
@@ -194,7 +195,7 @@ fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option
         let [low, high] = bounds(mesh, facets);
         let over = (0..3).map(|k| (least[k] - low[k]).max(high[k] - most[k]));
         let off_mm = over.fold(0.0, f64::max);
-        // Points of edges may lie off the surface by as much as facets.
+        // Points of edges may be as far off the surface as facets.
         let is_off = off_mm > mesh.chord_mm.max(off_edges_mm(mesh, facets[0].face));
         is_off.then_some(BodyFault::Outside { entity: info.entity, off_mm })
     };

@@ -1,6 +1,6 @@
 //! Computes with points, directions and placed axes.
 
-/// A point in millimetres, or a direction.
+/// A point in millimeters, or a direction.
 pub type Vec3 = [f64; 3];
 
 /// Returns `a + b`.

@@ -6,7 +6,7 @@ use crate::kernel::{Body, Facet, Jet, Kernel, Tessellation};
 use crate::measure::sides;
 use crate::vector::{Vec3, add, cross, dot, length, middle, scale, sub, unit};
 
-/// Returns the volume that facets enclose, in cubic millimetres. `about` is a point near them.
+/// Returns the volume that facets enclose, in cubic millimeters. `about` is a point near them.
 pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[Facet], about: Vec3) -> f64 {
     let six = |facet: &Facet| {
         let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, about));
@@ -15,7 +15,7 @@ pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[Facet], about: Vec3) -
     facets.iter().map(six).sum::<f64>() / 6.0
 }
 
-/// Returns the volume that the surfaces of a body enclose, in cubic millimetres.
+/// Returns the volume that the surfaces of a body enclose, in cubic millimeters.
 ///
 /// Each facet is bent into a patch of second degree: the middles of its sides move onto the
 /// surface, and onto both surfaces where two faces meet. The patches close as the facets do,
@@ -52,7 +52,7 @@ fn middles(kernel: &dyn Kernel, facets: &[Facet]) -> Vec<[Jet; 3]> {
     middles
 }
 
-/// Moves the middles of sides between two faces to where the faces' surfaces meet.
+/// Moves the middles of sides between two faces to the intersection of the faces' surfaces.
 fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
     let mut waiting: HashMap<[u32; 2], (usize, usize)> = HashMap::new();
     for (number, facet) in facets.iter().enumerate() {
@@ -72,12 +72,13 @@ fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
     }
 }
 
-/// Returns the point halfway between the ends of a side where the planes that touch two
-/// surfaces meet; between their points where the surfaces touch each other.
+/// Returns the point halfway between the ends of a side where the tangent planes of two surfaces
+/// meet, or a point between the surfaces' points where the surfaces touch each other.
 ///
-/// An edge is within the chord of its side, so the meeting is some chords away, and as far as the
-/// surfaces lie off the side. Surfaces that nearly touch, with an edge off one of them, meet far
-/// beside it: that place would add a fin as long as it is away to both, in each side of the edge.
+/// An edge is within the chord of its side, so the meeting point is at most some chords away, plus
+/// the distance of the surfaces from the side. Surfaces that nearly touch, with an edge off one of
+/// them, meet far away: that place would add a fin as long as this distance to both, in each side
+/// of the edge.
 fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2], chord_mm: f64) -> Vec3 {
     let [p, q] = jets.map(|jet| jet.point);
     let between = middle(p, q);
@@ -99,7 +100,8 @@ fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2], chord_mm: f64) -> Vec3 {
 /// The least sine of the angle between surfaces that meet.
 const LEAST_SINE: f64 = 0.05;
 
-/// How far from a side its surfaces may meet, in chords, and as a multiple of how far they are off it.
+/// The greatest distance between a side and the meeting point of its surfaces, in chords, and as a
+/// multiple of their distance from the side.
 const MOST_CHORDS: f64 = 4.0;
 const MOST_OFF: f64 = 2.0;
 
@@ -150,7 +152,7 @@ mod tests {
     use super::*;
     use crate::vector::distance;
 
-    /// A plane through a point that leans by an angle about the x axis.
+    /// A plane through a point, tilted by an angle about the x axis.
     fn leaning(point: Vec3, degrees: f64) -> Jet {
         let (s, c) = degrees.to_radians().sin_cos();
         Jet { point, du: [1.0, 0.0, 0.0], dv: [0.0, c, s] }
@@ -161,17 +163,19 @@ mod tests {
         let side = [[0.0; 3], [1.0, 0.0, 0.0]];
         let at = |jets: [Jet; 2]| meeting(side, jets, 0.001);
         let near = |a: Vec3, b: Vec3| distance(a, b) < 1e-12;
-        // The edge bulges by a chord in the plane that both share there: found, also at 4 degrees.
+        // The edge bulges by a chord in the plane that both surfaces share there: found, also at 4
+        // degrees.
         for degrees in [4.0f64, 30.0, 90.0] {
             let edge = [0.5, 0.001, 0.0];
             let on = [0.2, 0.001 + degrees.to_radians().cos(), degrees.to_radians().sin()];
             let place = at([leaning([0.7, 0.4, 0.0], 0.0), leaning(on, degrees)]);
             assert!(near(place, edge), "{degrees}: {place:?}");
         }
-        // An edge 0.05 mm off one of two surfaces that meet in a right angle: they are right.
+        // An edge 0.05 mm off one of two surfaces that meet at a right angle: the surfaces are
+        // right.
         let right = at([leaning([0.5, 0.0, 0.0], 0.0), leaning([0.5, 0.05, 0.0], 90.0)]);
         assert!(near(right, [0.5, 0.05, 0.0]), "{right:?}");
-        // The same at 4 degrees: they meet 0.7 mm beside the edge, which no longer says anything.
+        // The same at 4 degrees: they meet 0.7 mm from the edge, too far to be meaningful.
         let flat = at([leaning([0.5, 0.0, 0.0], 0.0), leaning([0.5, 0.0, 0.05], 4.0)]);
         assert!(near(flat, [0.5, 0.0, 0.025]), "{flat:?}");
     }

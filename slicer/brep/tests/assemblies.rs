@@ -1,9 +1,9 @@
-//! Checks that exactly the solids that products place are read, each where it stands.
+//! Checks that exactly the solids that products place are read, each in its place.
 
 use lamp_brep::{BodyReport, BrepError, Kernel, Matter, Notice, StepError, StepModel, check};
 use lamp_fixtures::{StepSample, StepUnit, step};
 
-/// A product of its own, `#123`, with the shape `#120`.
+/// A separate product, `#123`, with the shape `#120`.
 const PRODUCT: &str = "#121=PRODUCT('more','','',());\
     #122=PRODUCT_DEFINITION_FORMATION('','',#121);#123=PRODUCT_DEFINITION('','',#122,$);\
     #124=PRODUCT_DEFINITION_SHAPE('','',#123);#125=SHAPE_DEFINITION_REPRESENTATION(#124,#120);";
@@ -48,7 +48,7 @@ fn reports(text: &str, chord_mm: f64) -> Vec<BodyReport> {
     reports
 }
 
-/// Returns the middles of the bodies' boxes in x and z, rounded to millimetres, in order.
+/// Returns the middles of the bodies' boxes in x and z, rounded to millimeters, in order.
 fn middles(text: &str) -> Vec<[i32; 2]> {
     let middle = |report: &BodyReport| {
         let [low, high] = report.box_mm;
@@ -59,10 +59,10 @@ fn middles(text: &str) -> Vec<[i32; 2]> {
     middles
 }
 
-/// Where the spheres of the assembly stand.
+/// The positions of the assembly's spheres.
 const PAIR: [[i32; 2]; 2] = [[0, 15], [65, 15]];
 
-/// Returns what a file's notices are about.
+/// Returns the matters of a file's notices.
 fn matters(text: &str) -> Vec<Matter> {
     read(text).notices().iter().map(|notice| notice.matter.clone()).collect()
 }
@@ -74,7 +74,7 @@ fn a_shape_of_an_aspect_is_that_of_its_product() {
                   #132=SHAPE_DEFINITION_REPRESENTATION(#131,#120);";
     let again = with(&pair(), &(more(14) + aspect));
     assert_eq!(middles(&again), PAIR);
-    // The sphere that no shape names.
+    // The sphere that no shape refers to.
     assert_eq!(matters(&again), [Matter::Unplaced]);
     let other = with(&pair(), &(more(109) + aspect));
     assert_eq!(middles(&other), [[0, 15], [50, 15], [65, 15], [200, 0]]);
@@ -85,7 +85,7 @@ fn a_shape_of_an_aspect_is_that_of_its_product() {
 fn all_shapes_of_a_product_are_placed_with_it() {
     let second = with(&pair(), &(more(109) + "#125=SHAPE_DEFINITION_REPRESENTATION(#22,#120);"));
     assert_eq!(middles(&second), [[0, 15], [50, 15], [65, 15], [200, 0]]);
-    // One that a transformation relates to the first stands where that says.
+    // A sphere related to the first by a transformation is placed by it.
     let moved = with(
         &second,
         "#130=ITEM_DEFINED_TRANSFORMATION('','',#33,#29);\
@@ -110,7 +110,7 @@ fn what_nothing_places_is_told_and_not_sliced() {
     // A shape of no product.
     let of_none = with(&pair(), &more(109));
     assert_eq!((middles(&of_none), matters(&of_none)), (PAIR.to_vec(), vec![Matter::Unplaced]));
-    // A part that an assembly uses without saying where.
+    // A part that an assembly uses without a position.
     let usage = "#126=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#36,#123,$);";
     let unplaced = with(&pair(), &(more(109) + PRODUCT + usage));
     assert_eq!((middles(&unplaced), matters(&unplaced)), (PAIR.to_vec(), vec![Matter::Unplaced]));
@@ -127,7 +127,7 @@ fn without_products_shapes_stand_where_they_are() {
     assert_eq!(middles(&without(&pair(), &structure)), PAIR);
     let no_assembly: Vec<usize> = (16..24).chain(30..49).collect();
     assert_eq!(middles(&without(&pair(), &no_assembly)), [[0, 15]]);
-    // Products whose shapes hold nothing place nothing.
+    // Products with empty shapes place nothing.
     assert_eq!(middles(&without(&pair(), &[23, 39, 40, 43, 44, 45, 48])), [[0, 15]]);
 }
 
@@ -152,7 +152,7 @@ fn mapped(targets: [&str; 2]) -> String {
 #[test]
 fn mapped_items_place_shapes() {
     assert_eq!(middles(&mapped(["#26", "#29"])), PAIR);
-    // With or without uses of the product, and beside relations that place the same.
+    // With or without uses of the product, and in addition to relationships that place the same.
     let usage = "#41=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#36,#21,$);";
     assert_eq!(middles(&with(&mapped(["#26", "#29"]), usage)), PAIR);
     let both = with(&pair(), "#60=REPRESENTATION_MAP(#33,#15);#61=MAPPED_ITEM('',#60,#29);");
@@ -208,7 +208,7 @@ fn a_file_without_bodies_says_what_it_holds() {
     assert!(matches!(said(""), BrepError::Step(StepError::Empty)));
 }
 
-/// Returns where an operator puts a part: the reports of the part as it is, and moved.
+/// Returns the reports of a part as it is, and moved by an operator.
 fn operated(part: StepSample, operator: &str, scale: f64) -> [BodyReport; 2] {
     let text = step(part, StepUnit::Inch);
     let shape = text.lines().find(|line| line.contains("=ADVANCED_BREP_SHAPE")).unwrap();
@@ -243,7 +243,7 @@ fn operators_mirror_and_scale() {
                 let off = moved / (plain * f64::powi(scale, 3)) - 1.0;
                 assert!(off.abs() < 1e-3, "{part:?} {operator}: {off}");
             }
-            // The operator's origin is that of the map: it scales about there.
+            // The operator's origin is the map's origin: it scales about it.
             for k in 0..3 {
                 let (at, sign) = ([25.4, 50.8, 76.2][k], if k == 1 { mirror } else { 1.0 });
                 let ends = [0, 1].map(|end| at + sign * scale * (plain.box_mm[end][k] - at));

@@ -1,5 +1,5 @@
 //! Reads parts of other programs with one bad fillet, and a torus whose tube touches itself. The
-//! tests run where the folder `shared/data` stands beside the project.
+//! tests run if the folder `shared/data` is next to the project.
 
 use std::path::PathBuf;
 
@@ -43,8 +43,8 @@ fn a_tube_that_touches_itself_is_the_reason_given() {
 
 #[test]
 fn edges_through_the_ends_of_spline_surfaces_are_followed_at_any_tolerance() {
-    // Four edges off their surfaces meet in the pole of each half of a ball. The volume is that of
-    // OpenCASCADE's facets: see docs/brep.md.
+    // Four edges off their surfaces meet in the pole of each half of a ball. The volume is the
+    // volume of OpenCASCADE's facets: see docs/brep.md.
     for chord_mm in [0.02, 0.004, 0.001] {
         let Some(part) = read_of("step", "axom_boxed_sphere.step", chord_mm) else { return };
         assert!(part.is_good(), "{chord_mm}: {:?}", part.reports);

@@ -48,7 +48,7 @@ fn bodies(part: StepSample, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
     by_kernel.into_iter().next().unwrap_or_default()
 }
 
-/// Returns the greatest relative error of the volume of surfaces: that of patches of second
+/// Returns the greatest relative error of the volume of surfaces: the error of patches of second
 /// degree is of the fourth order in the facets' size, so of the second in the chord.
 fn patched(chord_mm: f64) -> f64 {
     1e-2 * chord_mm * chord_mm
@@ -99,7 +99,7 @@ fn parts_of_a_torus_that_meets_itself_are_told_apart() {
             let off = report.volume_mm3 / volume_mm3 - 1.0;
             assert!(off < 0.0 && off > -chord_mm, "{part:?} {chord_mm}: {off}");
             let off = report.exact_volume_mm3 / volume_mm3 - 1.0;
-            // The lemon is small for its bends.
+            // The lemon is small compared with its curvature.
             assert!(off.abs() < 10.0 * patched(chord_mm), "{part:?} {chord_mm}: exact {off}");
         }
     }
@@ -150,7 +150,7 @@ fn a_lofted_blade_has_its_sections() {
         let report = &check(&model, &mesh)[0];
         assert!(report.faults.is_empty() && mesh.findings.is_empty(), "{report:?}");
         let off = (report.volume_mm3 / blade_volume_mm3() - 1.0).abs();
-        // Facets lie within the chord; the blade is about 4 mm thick.
+        // Facets are within the chord; the blade is about 4 mm thick.
         assert!(off < chord_mm / 4.0 && off < before / 3.0, "{chord_mm}: {off}");
         before = off;
         for part in 1..20 {
@@ -195,7 +195,7 @@ fn a_tower_of_all_kinds_of_surfaces_is_closed() {
 fn an_assembly_has_its_parts_in_their_places() {
     let reports = bodies(StepSample::Pair, StepUnit::Inch, 0.01);
     assert_eq!(reports.len(), 2);
-    // The second body stands at x = 50 mm, at the height of the first one's centre.
+    // The second body is at x = 50 mm, at the height of the first one's center.
     let expected = [[-15.0, -15.0, 0.0], [50.0, -15.0, 0.0]];
     for (report, least) in reports.iter().zip(expected) {
         for k in 0..3 {

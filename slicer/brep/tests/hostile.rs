@@ -86,7 +86,7 @@ fn broken_files_are_refused_or_read_in_time() {
     assert!(refused > 0 && passed > 0);
 }
 
-/// The time limit for refusing a file of a few megabytes.
+/// The time limit for rejecting a file of a few megabytes.
 const SOON: Duration = Duration::from_secs(20);
 /// The number of nested shapes in a deep file.
 const DEEP: usize = 100_000;

@@ -1,5 +1,5 @@
-//! The kernels that tests ask beside LAMP's own: none. The tests of lamp-brep-occt are the same files
-//! with OpenCASCADE here.
+//! The kernels that tests use besides LAMP's own: none. The tests of lamp-brep-occt are the same
+//! files, with OpenCASCADE here.
 
 use lamp_brep::ReadFn;
 

@@ -1,4 +1,4 @@
-//! Tests of the kernel as other crates use it: one program, linked once.
+//! Tests the kernel as other crates use it: one program, linked once.
 
 mod assemblies;
 mod bad_fillets;

@@ -8,8 +8,8 @@ use lamp_fixtures::{StepSample, StepUnit, step};
 /// The volume of a frustum of radii 15 and 7.5 mm, 30 mm high.
 const FRUSTUM_MM3: f64 = PI * 30.0 / 3.0 * (225.0 + 112.5 + 56.25);
 
-/// Replaces every entity of a type in a part's file. The replacement is made from its number and
-/// attributes, with unused numbers from `next` on.
+/// Replaces every entity of a type in a part's file. The replacement is made from the entity's
+/// number and attributes, with unused numbers from `next` on.
 fn reworded(
     part: StepSample,
     unit: StepUnit,
@@ -71,7 +71,7 @@ fn trimmed_circles_may_go_backwards() {
 
 #[test]
 fn circles_may_be_chains_of_arcs() {
-    // Half a turn forwards, the other half backwards.
+    // Half a turn forward, the other half backward.
     let text = reworded(StepSample::Frustum, StepUnit::Metre, "CIRCLE", |id, attributes, k| {
         let arc = |k: usize, from: &str, to: &str, sense: &str| {
             format!(
@@ -135,7 +135,7 @@ fn surfaces_may_be_trimmed_or_bounded_or_offset() {
                 "{id}=OFFSET_SURFACE('',#{k},2.7,.F.);\n#{k}=CYLINDRICAL_SURFACE({attributes});"
             )
         },
-        // Outwards from an extruded circle, and inwards.
+        // Outward from an extruded circle, and inward.
         |id, attributes, k| extruded(id, &attributes.replace("12.7", "10.0"), k, 2.7),
         |id, attributes, k| extruded(id, &attributes.replace("12.7", "15.0"), k, -2.3),
     ];
@@ -245,7 +245,7 @@ fn lines_and_circles_may_be_offsets_of_others() {
     let text = reworded(StepSample::Frustum, StepUnit::Inch, "CIRCLE", |id, attributes, k| {
         let (rest, radius) = attributes.rsplit_once(',').unwrap();
         let radius: f64 = radius.parse().unwrap();
-        // Outwards, against the product of z and the tangent.
+        // Outward, against the product of z and the tangent.
         format!(
             "{id}=OFFSET_CURVE_3D('',#{k},-0.1,.F.,#{});\n#{k}=CIRCLE({rest},{:?});\n\
              #{}=DIRECTION('',(0.,0.,1.));",
@@ -328,7 +328,7 @@ fn bodies_without_names_have_those_of_their_products() {
     let nameless = pair.replace("MANIFOLD_SOLID_BREP('part'", "MANIFOLD_SOLID_BREP(''");
     assert_eq!(names(&nameless), ["nut", "nut"]);
     assert_eq!(names(&nameless.replace("'nut'", "''")), ["7", "7"]);
-    // A shape without a product has that of the shape that contains it.
+    // A shape without a product has the product of the shape that contains it.
     let of_shape = |line: &&str| line.contains("=SHAPE_DEFINITION_REPRESENTATION(");
     let first = nameless.lines().find(of_shape).unwrap();
     assert_eq!(names(&nameless.replace(first, "")), ["pair", "pair"]);

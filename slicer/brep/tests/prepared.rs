@@ -1,9 +1,9 @@
-//! Checks which broken files are healed, and the reason and place given for those refused.
+//! Checks which broken files are healed, and the reason and place given for rejected files.
 
 use lamp_brep::{BodyFault, Fault, Prepared, prepare, read_step};
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 
-/// The block's volume, in cubic millimetres.
+/// The block's volume, in cubic millimeters.
 const BLOCK_MM3: f64 = 6000.0;
 
 fn prepared(text: &str, chord_mm: f64) -> Prepared {
@@ -58,10 +58,10 @@ fn a_gap_wider_than_the_limit_stays_open() {
     };
     // Four sides of each of six faces.
     assert_eq!(edges, 24);
-    // Within a thousandth of the block nothing can be joined.
+    // Within a thousandth of the block, nothing can be joined.
     assert!(prepared.tries.is_empty() && prepared.heal_mm == 0.0);
     assert!(prepared.mesh.findings.is_empty());
-    // It is open whatever its facets.
+    // It is open, whatever its facets.
     assert_eq!(prepared.chord_mm, 0.08);
     // A chord as long as the gap heals it, but the file is as far off as before.
     let prepared = broken(StepDefect::Apart { gap_nm: 100_000 }, 0.2);

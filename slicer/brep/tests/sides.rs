@@ -1,5 +1,5 @@
-//! Checks that faces lie on the right side of their loops, whatever loops there are, and that
-//! bodies that enclose something twice are refused.
+//! Checks that faces are on the right side of their loops, whatever loops there are, and that
+//! bodies that enclose something twice are rejected.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -7,7 +7,7 @@ use std::fmt::Write;
 use lamp_brep::{BodyFault, Fault, Kernel, StepModel, Tessellation, check, prepare, read_step};
 use lamp_fixtures::{StepSample, StepUnit, step};
 
-/// A surface about the z axis, in millimetres.
+/// A surface about the z axis, in millimeters.
 #[derive(Clone, Copy)]
 enum Round {
     Cylinder { radius: f64 },
@@ -126,7 +126,7 @@ impl Text {
         self.add(&format!("FACE_BOUND('',#{around},.{sense}.)"))
     }
 
-    /// Adds a loop around a patch, counter-clockwise from outside, or clockwise.
+    /// Adds a loop around a patch, counterclockwise from outside, or clockwise.
     fn patch(&mut self, round: Round, u: [f64; 2], v: [f64; 2], is_hole: bool) -> usize {
         let corners = [[u[0], v[0]], [u[1], v[0]], [u[1], v[1]], [u[0], v[1]]];
         let [a, b, c, d] = corners.map(|uv| self.vertex(round, uv));
@@ -149,7 +149,7 @@ impl Text {
         self.add(&format!("ADVANCED_FACE('',({}),#{surface},.T.)", list.join(",")))
     }
 
-    /// Adds a box as polygons, counter-clockwise from outside.
+    /// Adds a box as polygons, counterclockwise from outside.
     fn box_shell(&mut self, low: f64, high: f64) -> usize {
         let at = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high } else { low });
         let corners: Vec<usize> = (0..8).map(|k| self.point(at(k))).collect();
@@ -180,7 +180,7 @@ impl Text {
         self.add(&format!("{kind}('',({}))", list.join(",")))
     }
 
-    /// Returns the whole file, in millimetres, with one item.
+    /// Returns the whole file, in millimeters, with one item.
     fn file(mut self, item: usize) -> String {
         let unit = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))");
         let context = self.add(&format!(
@@ -196,7 +196,7 @@ impl Text {
     }
 }
 
-/// Makes the facets of a face alone, and checks their area.
+/// Makes the facets of a single face, and checks their area.
 fn has_area(round: Round, bounds: impl Fn(&mut Text) -> Vec<usize>, area_mm2: f64) {
     let mut text = Text::default();
     let bounds = bounds(&mut text);
@@ -223,7 +223,7 @@ fn a_pipe_with_windows_is_cut_between_them() {
         bounds
     };
     has_area(pipe, bounds, pipe.area([0.0, TAU], [0.0, 20.0]) - windows);
-    // Two rows of windows, so that no straight line along the axis meets none.
+    // Two rows of windows, so that every straight line along the axis meets one.
     let tall = |k: i32| (window(f64::from(k) / 2.0), [[2.0, 8.0], [12.0, 18.0]][k as usize % 2]);
     let rows = (0..12).map(|k| pipe.area(tall(k).0, tall(k).1)).sum::<f64>();
     let bounds = |text: &mut Text| {

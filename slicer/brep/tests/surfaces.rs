@@ -58,7 +58,7 @@ fn open_shells_of_a_shape_are_sewn_to_one_body() {
         let [notice] = prepared.kernel.notices() else { panic!() };
         assert_eq!((&notice.matter, notice.count), (&Matter::Sewn, 6));
     }
-    // A closed shell is a body of its own.
+    // A closed shell is a separate body.
     let text = in_open_shells(&step(StepSample::Block, StepUnit::Millimetre));
     let closed = text.replace("OPEN_SHELL", "CLOSED_SHELL");
     assert_eq!(StepModel::read(closed.as_bytes()).unwrap().bodies().len(), 6);
@@ -135,7 +135,7 @@ fn by_parameters(text: &str, curve: impl Fn(usize, f64) -> String) -> String {
     let line = text.lines().find(|line| line.contains("=CONICAL_SURFACE(")).unwrap();
     let cone = line.split('=').next().unwrap();
     let count = Cell::new(0);
-    // The cone's axis points down, so its parameters go round the other way.
+    // The cone's axis points down, so its parameters go around the other way.
     let text = replaced(text, "EDGE_CURVE", |id, attributes| {
         format!("{id}=EDGE_CURVE({});", attributes.replace(".T.", ".F."))
     });
@@ -215,7 +215,7 @@ fn edges_may_be_given_by_parameters_alone() {
     }
 }
 
-/// Writes a file in millimetres and degrees with a set of surfaces as its only shape.
+/// Writes a file in millimeters and degrees with a set of surfaces as its only shape.
 fn set_of(surfaces: &[&str], entities: &str) -> String {
     format!(
         "ISO-10303-21;DATA;\n#1=(LENGTH_UNIT()SI_UNIT(.MILLI.,.METRE.));\n\

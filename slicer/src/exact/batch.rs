@@ -13,7 +13,7 @@ use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
 use crate::layer_share::LayerShare;
 
-/// The number of crossings polished at once: enough to amortise each call; 0.5 MB.
+/// The number of crossings polished at once: enough to amortize each call; 0.5 MB.
 const BATCH: usize = 4096;
 
 /// Crossings with a body's curved facets, before they go into the table.
@@ -24,7 +24,7 @@ pub(super) struct Batch<'a> {
     cutter: Cutter<'a>,
     layers: Range<usize>,
     points: Vec<FacetPoint>,
-    /// Each point's layer and row, and its x on the facet in millimetres.
+    /// Each point's layer and row, and its x on the facet in millimeters.
     cells: Vec<(usize, u32, f64)>,
 }
 

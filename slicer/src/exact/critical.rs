@@ -1,4 +1,4 @@
-//! The places where the contours of sections may turn back or meet.
+//! Defines the places where the contours of sections may turn back or meet.
 
 /// The places where the contours of any section may have extrema or meet.
 #[derive(Debug)]
@@ -19,13 +19,13 @@ pub(super) struct CandidateFacet {
     pub(super) may_be_level: bool,
 }
 
-/// Extrema closer than this are the same, in millimetres.
+/// Extrema closer than this, in millimeters, are the same.
 pub(super) const SAME_MM: f64 = 1e-6;
 
 /// A point where a surface is level and bends both ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Saddle {
-    /// The point, in millimetres.
+    /// The point, in millimeters.
     pub(super) at_mm: [f64; 3],
     pub(super) facet: u32,
     pub(super) uv: [f64; 2],

@@ -18,7 +18,7 @@ pub(super) struct CurvedEdge {
     pub(super) facets: [u32; 2],
     /// The curve's points at the chord's ends.
     pub(super) ends: [EdgePoint; 2],
-    /// The chord's ends as the facets have them: x and y in millimetres, z in micrometres.
+    /// The chord's ends as the facets have them: x and y in millimeters, z in micrometers.
     pub(super) chord: [[f64; 3]; 2],
     /// The curve's extremum along each axis, if there is one between the ends.
     pub(super) turns: [Option<EdgePoint>; 3],

@@ -11,10 +11,11 @@ use crate::facet::PlacedFacet;
 use crate::gray::{DepthSpan, Sheet};
 use crate::layer_share::LayerShare;
 
-/// The number of pixels evaluated at once: enough to amortise each call; 0.3 MB.
+/// The number of pixels evaluated at once: enough to amortize each call; 0.3 MB.
 const BATCH: usize = 4096;
 
-/// Pixels over a body's curved facets. Their exact heights go into the table as spans of one column.
+/// Pixels over a body's curved facets. Their exact heights go into the table as spans of one
+/// column.
 pub(super) struct Depths<'a> {
     surfaces: &'a PlacedSurfaces,
     body: u32,
@@ -37,8 +38,8 @@ impl<'a> Depths<'a> {
         Self { surfaces, body, cutter, layers, reach_um, points: Vec::new(), pixels: Vec::new() }
     }
 
-    /// Adds the pixels where rows pass a facet below the sections, down to the exposure
-    /// depth. Returns the number of crossings that would take as much memory.
+    /// Adds the pixels where rows pass a facet below the sections, down to the exposure depth.
+    /// Returns the number of crossings that would need the same memory.
     pub(super) fn look_down(
         &mut self,
         number: u32,

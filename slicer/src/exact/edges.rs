@@ -11,21 +11,22 @@ use super::curved_edge::{CurvedEdge, CurvedEdges, EdgePoint};
 use super::placed::PlacedSurfaces;
 use crate::facet::PlacedFacet;
 
-/// Curves nearer to their chords than this are straight, in millimetres.
+/// Curves nearer to their chords than this are straight, in millimeters.
 const STRAIGHT_MM: f64 = 1e-7;
-/// Surfaces that meet at a smaller sine are tangent: along their edge both are as far from the
-/// facets, and their intersection is not defined.
+/// Surfaces that meet at a smaller sine are tangent: both are at the same distance from the facets
+/// along their edge, and their intersection is not defined.
 const TANGENT: f64 = 1e-3;
-/// A chord that turns further from its curve follows it too loosely; a cosine.
+/// The least cosine between a chord and its curve: below it, the chord follows the curve too
+/// loosely.
 const LOOSE: f64 = 0.5;
 /// The greatest distance of a curve from its chord, in tolerances of the tessellation.
 const NEAR: f64 = 2.0;
 const MAX_STEPS: usize = 12;
 /// The greatest number of steps of a search between two points.
 const MAX_HALVES: usize = 60;
-/// The distance between points of both surfaces that are the same, in millimetres.
+/// The distance below which points of both surfaces are the same, in millimeters.
 const SAME_MM: f64 = 1e-10;
-/// The distance accepted after the last step, in millimetres: rounding may allow no better.
+/// The distance accepted after the last step, in millimeters: rounding may allow no better.
 const SAME_AT_LAST_MM: f64 = 1e-7;
 /// The facets examined at once.
 const BATCH: usize = 1024;
@@ -98,7 +99,7 @@ fn of_facet<'a>(
     })
 }
 
-/// Returns which points belong to several faces.
+/// Returns, for each point, whether it belongs to several faces.
 fn shared_points(surfaces: &PlacedSurfaces) -> Vec<bool> {
     let mesh = surfaces.mesh();
     let mut first_face = vec![None; mesh.points.len()];
@@ -111,8 +112,8 @@ fn shared_points(surfaces: &PlacedSurfaces) -> Vec<bool> {
     is_shared
 }
 
-/// Returns the facet of another face on the other side of a facet's side, if it is the only
-/// one there.
+/// Returns the facet of another face on the other side of a facet's side, if it is the only one
+/// there.
 fn other_side(surfaces: &PlacedSurfaces, number: u32, [p, q]: [u32; 2]) -> Option<u32> {
     let has_side = |other: &u32| {
         let corners = surfaces.facet(*other).corners;
@@ -153,7 +154,7 @@ impl CurvedEdge {
             Some(EdgePoint { at_mm: at[k], uv: uv[k], share: k as f64, slope })
         };
         let ends = [end(0)?, end(1)?];
-        // A parabola is a quarter as high as its ends are steep.
+        // The height of a parabola is a quarter of the slope at its ends.
         let is_curved = |end: &EdgePoint| length(sub(end.slope, way)) > 4.0 * STRAIGHT_MM;
         if !ends.iter().any(is_curved) {
             return None;
@@ -173,7 +174,7 @@ impl CurvedEdge {
         self.facets.map(|facet| surfaces.facet(facet).face)
     }
 
-    /// Returns the distance of a point from the chord, if the point is beside it.
+    /// Returns the distance of a point from the chord, if its projection is on the chord.
     fn away_mm(&self, surfaces: &PlacedSurfaces, at_mm: Vec3) -> Option<f64> {
         let (way, off) = (self.way(), sub(at_mm, self.ends[0].at_mm));
         let share = dot(off, way) / dot(way, way);
@@ -182,8 +183,8 @@ impl CurvedEdge {
         ((0.0..=1.0).contains(&share) && is_near).then_some(away_mm)
     }
 
-    /// Returns whether a point of the surface on one side lies on the face there, and not
-    /// beyond the curve.
+    /// Returns whether a point of the surface on one side is on the face there, and not beyond the
+    /// curve.
     fn holds(&self, surfaces: &PlacedSurfaces, side: usize, at_mm: Vec3) -> Option<bool> {
         let way = self.way();
         let share = dot(sub(at_mm, self.ends[0].at_mm), way) / dot(way, way);
@@ -191,7 +192,7 @@ impl CurvedEdge {
         Some(self.is_inwards(surfaces, side, &beside, sub(at_mm, beside.at_mm)))
     }
 
-    /// Returns whether a way from a point of the curve leads onto the face on one side.
+    /// Returns whether a direction from a point of the curve leads onto the face on one side.
     pub(super) fn is_inwards(
         &self,
         surfaces: &PlacedSurfaces,
@@ -240,7 +241,8 @@ impl CurvedEdge {
         })
     }
 
-    /// Returns where a cubic through two points passes a level along an axis, about.
+    /// Returns the approximate share at which a cubic through two points passes a level along an
+    /// axis.
     pub(super) fn share_at(&self, axis: usize, level_mm: f64, [a, b]: &[EdgePoint; 2]) -> f64 {
         let width = b.share - a.share;
         let (low, high) = (a.at_mm[axis] - level_mm, b.at_mm[axis] - level_mm);
@@ -287,7 +289,7 @@ impl CurvedEdge {
         found
     }
 
-    /// Finds the curve's point beside a point of the chord.
+    /// Finds the curve's point opposite a point of the chord.
     fn meet_across(&self, surfaces: &PlacedSurfaces, share: f64) -> Option<EdgePoint> {
         let way = self.way();
         let normal = unit(way)?;
@@ -365,8 +367,8 @@ fn both_jets(surfaces: &PlacedSurfaces, faces: [u32; 2], uv: [[f64; 2]; 2]) -> [
     jets
 }
 
-/// Returns the direction of the curve where two surfaces meet, as long as makes it pass along
-/// the chord's whole way; `None` where they are tangent.
+/// Returns the direction of the curve where two surfaces meet, with a length that covers the whole
+/// chord; `None` where they are tangent.
 fn slope(jets: &[Jet; 2], way: Vec3) -> Option<Vec3> {
     let [na, nb] = jets.map(|jet| unit(cross(jet.du, jet.dv)));
     let across = cross(na?, nb?);
@@ -377,7 +379,8 @@ fn slope(jets: &[Jet; 2], way: Vec3) -> Option<Vec3> {
     (sine > TANGENT && !is_loose && slope.iter().all(|c| c.is_finite())).then_some(slope)
 }
 
-/// Returns the change of parameters that moves a point of a surface the most of a way.
+/// Returns the change of parameters that moves a point of a surface as far as possible along a
+/// vector.
 fn parameters(jet: &Jet, way: Vec3) -> [f64; 2] {
     let (uu, uv, vv) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
     let (u, v) = (dot(jet.du, way), dot(jet.dv, way));

@@ -5,8 +5,8 @@ use lamp_brep::vector::Vec3;
 
 use super::placed::PlacedSurfaces;
 
-/// The greatest number of facets searched per direction: all facets around a level ring are
-/// as high.
+/// The greatest number of facets searched per direction: all facets around a level ring have the
+/// same height.
 const MAX_FACETS: usize = 64;
 const MAX_STEPS: usize = 30;
 /// The step for differences, as a part of a facet.
@@ -36,7 +36,7 @@ pub(super) struct LevelPoint {
 }
 
 impl PlacedSurfaces {
-    /// Returns the least and the greatest corner of the surfaces' box, in millimetres, or
+    /// Returns the least and the greatest corner of the surfaces' box, in millimeters, or
     /// `None` if there are no facets.
     ///
     /// It equals the facets' box where surfaces end at a corner. Round surfaces and edges bulge
@@ -50,7 +50,7 @@ impl PlacedSurfaces {
         Some([end(-1.0), end(1.0)])
     }
 
-    /// Returns the greatest extent of the surfaces in a direction, in millimetres.
+    /// Returns the greatest extent of the surfaces in a direction, in millimeters.
     fn end_mm(&self, direction: AxisDirection) -> f64 {
         let top = |facet: u32| {
             let corners = self.corners(facet).map(|corner| direction.along(corner));

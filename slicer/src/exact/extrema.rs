@@ -1,9 +1,9 @@
 //! Finds the extrema of a section's contours, where they turn back along the rows, on
 //! the exact surfaces.
 //!
-//! Facets cut corners. Near an extremum some rows pass between the corner of the facets and
-//! that of the surface, so facets cross them twice too often or not at all. Either way the
-//! row stays balanced.
+//! Facets cut corners. Near an extremum, some rows pass between the corner of the facets and the
+//! corner of the surface, so facets cross them twice too often or not at all. Either way, the row
+//! stays balanced.
 
 use std::ops::Range;
 
@@ -19,9 +19,9 @@ use super::placed::PlacedSurfaces;
 /// A point where a contour has a tangent along the rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremum {
-    /// The point, in millimetres.
+    /// The point, in millimeters.
     pub at_mm: [f64; 3],
-    /// The greatest distance of facets from the contour along y here, in millimetres.
+    /// The greatest distance of facets from the contour along y here, in millimeters.
     pub reach_mm: f64,
     facet: u32,
     uv: [f64; 2],
@@ -65,8 +65,8 @@ impl CriticalPoints {
 }
 
 impl PlacedSurfaces {
-    /// Examines all facets, which the first layer would do otherwise: its thread would wait for
-    /// others, and might meanwhile take up a layer that waits for the same.
+    /// Examines all facets. Otherwise the first layer would do this: its thread would wait for
+    /// other threads, and might meanwhile start a layer that waits for the same result.
     pub(crate) fn examine(&self) {
         self.critical_points();
         self.curved_edges();
@@ -86,7 +86,7 @@ impl PlacedSurfaces {
         for candidate in self.critical_points().candidates.iter().filter(is_met) {
             for seed in seeds(self, candidate, z_mm) {
                 let found = Extremum::find(self, candidate.facet, seed, z_mm);
-                // Facets as thin as those at a pole seldom lie below their own.
+                // Facets as thin as facets at a pole seldom lie below their own extremum.
                 extrema.extend(
                     found.filter(|it| self.facet_below(candidate.facet, it.at_mm).is_some()),
                 );
@@ -166,7 +166,7 @@ impl Extremum {
         })
     }
 
-    /// Returns the greatest distance of facets from the contour along x, in millimetres.
+    /// Returns the greatest distance of facets from the contour along x, in millimeters.
     pub(super) fn width_mm(&self) -> f64 {
         (2.0 * self.reach_mm / self.bend_per_mm.abs()).sqrt()
     }
@@ -226,8 +226,8 @@ fn candidates(surfaces: &PlacedSurfaces, facets: Range<u32>) -> Vec<CandidateFac
     found
 }
 
-/// Returns whether values at a facet's corners may pass zero within it. The surface may
-/// turn half as much again as between its corners.
+/// Returns whether values at a facet's corners may pass zero within it. The surface may turn 1.5
+/// times as much as between its corners.
 fn passes_zero(values: [f64; 3]) -> bool {
     let (low, high) = range(values);
     let more = 0.5 * (high - low) + LEVEL;

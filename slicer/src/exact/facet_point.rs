@@ -1,4 +1,4 @@
-//! Points of facets that are moved onto surfaces, and pairs of them.
+//! Defines points of facets that are moved onto surfaces, and pairs of these points.
 
 /// A point of a facet to be moved along an axis, x or z, to the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -7,7 +7,7 @@ pub struct FacetPoint {
     pub facet: u32,
     /// The point's parameters on the facet's surface.
     pub uv: [f64; 2],
-    /// The point, in millimetres.
+    /// The point, in millimeters.
     pub at_mm: [f64; 3],
     /// Whether the axis enters the part here, according to the facet.
     pub enters: bool,
@@ -27,7 +27,7 @@ impl FacetPoint {
 pub enum RowContact {
     /// Two crossings of the contour, the left one first.
     Pair([FacetPoint; 2]),
-    /// A crossing on one side at least; on the other the contour may turn again.
+    /// At least one crossing on one side; on the other side, the contour may turn again.
     OneSide(FacetPoint),
     /// No crossing.
     Nothing,

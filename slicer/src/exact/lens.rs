@@ -1,10 +1,9 @@
-//! Finds the grid points between a facet's chord and the curved edge that it stands for.
+//! Finds the grid points between a facet's chord and the curved edge that it approximates.
 //!
-//! On the way across an edge a contour changes from one face to the other. Facets change where
-//! they meet the chord, surfaces where they meet the curve. Rows between have a crossing with
-//! the wrong face; if the contour turns back at the edge, they have a pair too many or too
-//! few. Either way the one face gains a crossing and the other gains its reverse, where a
-//! reverse takes away a crossing that is there.
+//! At an edge, a contour changes from one face to the other. Facets change where they meet the
+//! chord, surfaces where they meet the curve. Rows between have a crossing with the wrong face; if
+//! the contour turns back at the edge, they have a pair too many or too few. Either way, one face
+//! gains a crossing and the other gains its reverse; a reverse removes an existing crossing.
 
 use std::ops::Range;
 
@@ -38,14 +37,14 @@ pub(super) struct LensSide {
     pub(super) lost: Option<FacetPoint>,
 }
 
-/// A plane of a section, or that of a row.
+/// The plane of a section, or the plane of a row.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a, const ALONG: usize> {
     grid: &'a PixelGrid,
-    /// In micrometres, or in rows.
+    /// The level, in micrometers or in rows.
     level: f64,
     level_mm: f64,
-    /// The level that divides points before the line from those past it.
+    /// The level that divides points before the line from points past it.
     side: f64,
 }
 
@@ -57,7 +56,7 @@ const ROUGH: f64 = 0.1;
 /// The greatest distance of a crossing from its tangent at the edge, in tolerances.
 const NEAR: f64 = 4.0;
 
-/// Where the search for a crossing starts: on the curve and, as parts of the way to the
+/// The starts of the search for a crossing: on the curve and, as parts of the distance to the
 /// facet's middle, on both sides, for contours that turn at the curve.
 const SEEDS: [f64; 5] = [0.0, 0.5, -0.5, 0.1, -0.1];
 
@@ -70,7 +69,7 @@ impl<'a> Line<'a, Z> {
 }
 
 impl<'a> Line<'a, Y> {
-    /// Returns the plane across y through a row's centres.
+    /// Returns the plane across y through a row's centers.
     pub(super) fn at_row(grid: &'a PixelGrid, row: u32) -> Self {
         let row = f64::from(row);
         Self { grid, level: row, level_mm: grid.to_mm(0.0, row)[1], side: row }
@@ -99,7 +98,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         self.between(surfaces, edge, start, on_chord).unwrap_or_default()
     }
 
-    /// Returns the grid points between the places where chord and curve pass, if these are
+    /// Returns the grid points between the places where chord and curve pass, if these places are
     /// found.
     fn between(
         &self,
@@ -160,7 +159,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         }
     }
 
-    /// Finds where a line of the grid crosses the surface on one side of an edge.
+    /// Finds the place where a line of the grid crosses the surface on one side of an edge.
     fn change(
         &self,
         surfaces: &PlacedSurfaces,
@@ -177,7 +176,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         for by in SEEDS {
             let uv = [0, 1].map(|k| seed.uv[side][k] + by * (middle[k] - seed.uv[side][k]));
             let Some(found) = self.crossing(surfaces, facet, uv, seed, cell) else { continue };
-            // A face gains crossings on its own side of the curve, and loses those beyond.
+            // A face gains crossings on its own side of the curve, and loses crossings beyond it.
             let is_gained = found.enters == (winding > 0);
             let way = sub(found.at_mm, seed.at_mm);
             if is_gained == edge.is_inwards(surfaces, side, seed, way) {
@@ -216,7 +215,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         (is_near && is_across).then_some(point)
     }
 
-    /// Returns whether no grid point may lie between the chord and the curve.
+    /// Returns whether there can be no grid point between the chord and the curve.
     fn is_far(&self, edge: &CurvedEdge, on_chord: f64) -> bool {
         let share = edge.share_at(ALONG, self.level_mm, &edge.ends);
         let about = [0, 1, 2].map(|axis| edge.about(axis, share));
@@ -226,20 +225,20 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         self.cell(low) == self.cell(high)
     }
 
-    /// Returns where the chord passes, as facets do.
+    /// Returns the place where the chord passes, computed as for facets.
     fn on_chord(&self, [a, b]: [[f64; 3]; 2]) -> f64 {
         let (low, high) = if b[ALONG] < a[ALONG] { (b, a) } else { (a, b) };
         let at = FacetEdge::<ALONG>::new(low, high).at(self.level);
         at[if ALONG == Z { 1 } else { 0 }]
     }
 
-    /// Returns whether a point in pixels and micrometres comes before the line, as facets
-    /// see it.
+    /// Returns whether a point in pixels and micrometers is before the line, computed as for
+    /// facets.
     fn is_before(&self, at: [f64; 3]) -> bool {
         if ALONG == Z { at[Z] < self.side } else { at[Y] <= self.side }
     }
 
-    /// Returns the first cell whose centre a place in pixels is not past.
+    /// Returns the first cell whose center is at or past a place in pixels.
     fn cell(&self, at: f64) -> u32 {
         let count = if ALONG == Z { self.grid.height } else { self.grid.width };
         ceil_clamped(at, count)

@@ -11,12 +11,12 @@ use super::solve::{Wanted, solve};
 const NEAR: f64 = 2.0;
 /// The greatest number of facets that a walk visits.
 const MAX_FACETS: usize = 256;
-/// The greatest number of faces that a contour is followed through: one and its neighbours.
+/// The greatest number of faces through which a contour is followed: a face and its neighbors.
 const MAX_FACES: usize = 3;
 
 impl PlacedSurfaces {
-    /// Returns the facet below a point of a surface, walking from another facet. Returns
-    /// `None` if the walk ends further away than surfaces are from their facets.
+    /// Returns the facet below a point of a surface, walking from another facet. Returns `None` if
+    /// the walk ends farther away than the distance of surfaces from their facets.
     pub(super) fn facet_below(&self, facet: u32, point: Vec3) -> Option<u32> {
         let away = |facet: u32| (self.distance_to(facet, point), facet);
         let mut nearest = away(facet);
@@ -34,7 +34,7 @@ impl PlacedSurfaces {
         (nearest.0 < NEAR * self.tolerance_mm()).then_some(nearest.1)
     }
 
-    /// Returns whether a point is as near to a facet as the surface is.
+    /// Returns whether a point is within the surface's distance of a facet.
     pub(super) fn is_below(&self, facet: u32, point: Vec3) -> bool {
         self.distance_to(facet, point) < NEAR * self.tolerance_mm()
     }
@@ -66,7 +66,7 @@ impl PlacedSurfaces {
         }
     }
 
-    /// Returns a facet for which a rule holds: this one, or one of those around it.
+    /// Returns a facet for which a rule holds: this one, or a neighboring one.
     fn facet_around(&self, facet: u32, is_wanted: impl Fn(u32) -> bool) -> Option<u32> {
         let corners = self.facet(facet).corners.into_iter();
         let around = corners.flat_map(|corner| self.facets_by_point().group(corner as usize));

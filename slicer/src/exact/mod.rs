@@ -1,9 +1,9 @@
 //! Finds crossings on the exact surfaces of B-rep parts.
 //!
-//! Facets decide which rows are crossed, which keeps every row balanced; surfaces decide
-//! where. A worker gathers crossings on facets and [`polish`]es them in batches before they
-//! go into the table. Near extrema of contours, facets miss pairs of crossings or have too
-//! many: those rows are settled layer by layer.
+//! Facets decide which rows are crossed; this keeps every row balanced. Surfaces decide where. A
+//! worker gathers crossings on facets and [`polish`]es them in batches before they go into the
+//! table. Near extrema of contours, facets miss pairs of crossings or have surplus pairs: those
+//! rows are settled layer by layer.
 //!
 //! Source: 002 section 2.2, which slices the CAD model itself for accuracy.
 
@@ -67,7 +67,7 @@ impl<'a> ExactCut<'a> {
         Self { next: first, crossings: Batch::new(surfaces, body, tally, cutter, layers), depths }
     }
 
-    /// Adds the next facet. Returns the number of crossings that would take as much memory.
+    /// Adds the next facet. Returns the number of crossings that would need the same memory.
     pub(crate) fn cut(&mut self, facet: &PlacedFacet, shares: &mut [LayerShare]) -> usize {
         let number = self.next;
         self.next += 1;

@@ -18,7 +18,7 @@ use crate::transform::Transform;
 pub struct PlacedSurfaces {
     kernel: Arc<dyn Kernel>,
     mesh: Arc<Tessellation>,
-    /// The affine map from model to machine coordinates, both in millimetres: one row per
+    /// The affine map from model to machine coordinates, both in millimeters: one row per
     /// axis.
     rows: [[f64; 4]; 3],
     tolerance_mm: f64,
@@ -40,7 +40,7 @@ impl fmt::Debug for PlacedSurfaces {
 
 impl PlacedSurfaces {
     /// Places a model with the affine map `rows` from model to machine coordinates, in
-    /// millimetres.
+    /// millimeters.
     pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
         let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
@@ -60,7 +60,7 @@ impl PlacedSurfaces {
         }
     }
 
-    /// Numbers the bodies from another number than 0 on.
+    /// Numbers the bodies from a given number on, instead of 0.
     pub(crate) fn numbered_from(self, first_body: u32) -> Self {
         Self { first_body, ..self }
     }
@@ -77,7 +77,7 @@ impl PlacedSurfaces {
         self.first_body + before as u32
     }
 
-    /// Returns the greatest distance of facets from their surfaces, in millimetres.
+    /// Returns the greatest distance of facets from their surfaces, in millimeters.
     pub fn tolerance_mm(&self) -> f64 {
         self.tolerance_mm
     }
@@ -96,7 +96,7 @@ impl PlacedSurfaces {
         &self.mesh.facets[number as usize]
     }
 
-    /// Returns a facet's corners in place.
+    /// Returns the corners of a placed facet.
     pub(crate) fn corners(&self, number: u32) -> [Vec3; 3] {
         self.mesh.corners(self.facet(number)).map(|corner| self.at(corner))
     }
@@ -142,8 +142,8 @@ impl PlacedSurfaces {
         [0, 1].map(|k| p[k].max(q[k]).max(r[k]) - p[k].min(q[k]).min(r[k]))
     }
 
-    /// Evaluates a facet's surface at parameters, and slightly further along u and along v,
-    /// for second derivatives by differences.
+    /// Evaluates a facet's surface at parameters, and slightly farther along u and along v, for
+    /// second derivatives by differences.
     pub(super) fn jets(&self, facet: u32, [u, v]: [f64; 2], by: [f64; 2]) -> [Jet; 3] {
         let mut jets = [Jet::default(); 3];
         let at = [[u, v], [u + by[0], v], [u, v + by[1]]];

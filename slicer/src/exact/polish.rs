@@ -14,8 +14,8 @@ const LEVEL: f64 = 1e-6;
 /// The greatest distance of a point outside its facet, in facets.
 const MAX_BEYOND: f64 = 1.0;
 
-/// Moves points along an axis, 0 for x or 2 for z, to where the surfaces have the
-/// other two coordinates, by Newton's method from the facets' parameters.
+/// Moves points along an axis, 0 for x or 2 for z, to where the surfaces have the other two
+/// coordinates, by Newton's method from the facets' parameters.
 ///
 /// A point stays on its facet, and is not exact, if the method diverges, if the solution
 /// belongs to another facet or to the other side of the part, or if it moves across the
@@ -62,7 +62,7 @@ fn is_same_point(
     // At a pole the surface has no normal.
     let outwards = surfaces.normal(point.facet, jet).map_or(0.0, |normal| normal[axis]);
     let is_other_side = outwards.abs() > LEVEL && (outwards < 0.0) != point.enters;
-    // At a pole facets are so narrow that a point may move past several.
+    // At a pole, facets are so narrow that a point may move past several of them.
     let is_on_face = || {
         let below = surfaces.facet_below(point.facet, jet.point);
         below.is_some_and(|below| surfaces.facet(below).face == surfaces.facet(point.facet).face)
@@ -73,7 +73,7 @@ fn is_same_point(
     !is_other_side && !is_too_far && (is_near_facet() || is_on_face())
 }
 
-/// Returns whether parameters lie on a facet or near it.
+/// Returns whether parameters are on a facet or near it.
 fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
     let double = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -1,9 +1,9 @@
 //! Finds where vertical lines meet surfaces but no facets, or facets but no surfaces: at the
 //! outline of a part seen from above.
 //!
-//! Gray levels come from the depths at which lines through pixels meet facets. Smooth outlines
-//! are where the contour of a row's plane turns back along x: extrema of sections, with the
-//! axes turned. Sharp ones are curved edges, whose chords leave pixels out or have too many.
+//! Gray levels come from the depths at which lines through pixels meet facets. Smooth outlines are
+//! where the contour of a row's plane turns back along x: extrema of sections, with the axes
+//! turned. Sharp outlines are curved edges, whose chords miss pixels or have surplus pixels.
 
 use std::collections::HashMap;
 
@@ -19,17 +19,17 @@ use super::rims::{RimCrossing, Rims, SAME_UM};
 use crate::cutter::Cutter;
 use crate::gray::{DepthSpan, Sheet};
 
-/// The distance of two crossings with surfaces that are the same, in millimetres.
+/// The distance below which two crossings with surfaces are the same, in millimeters.
 const SAME_MM: f64 = 1e-6;
 
 impl PlacedSurfaces {
-    /// Examines all rows of gray images, for the same reason.
+    /// Examines all rows of gray images, for the same reason as `examine`.
     pub(crate) fn examine_rims(&self, cutter: Cutter<'_>) {
         self.rims(cutter);
     }
 
-    /// Returns how vertical lines through an image's pixels meet surfaces other than facets.
-    /// The first call examines every row; all must be for the same image.
+    /// Returns the differences between how vertical lines through an image's pixels meet surfaces
+    /// and facets. The first call examines every row; all calls must be for the same image.
     pub(crate) fn rims(&self, cutter: Cutter<'_>) -> &Rims {
         self.rims.get_or_init(|| Rims::find(self, cutter))
     }
@@ -53,7 +53,7 @@ impl Rims {
     }
 }
 
-/// Surfaces in place, and with their z axis along rows and their x axis across.
+/// Placed surfaces, and the same surfaces with their z axis along rows and their x axis across.
 struct RimSearch<'a> {
     surfaces: &'a PlacedSurfaces,
     turned: &'a PlacedSurfaces,
@@ -100,8 +100,8 @@ impl RimSearch<'_> {
         }
     }
 
-    /// Returns those of a pair of crossings with surfaces that facets do not have, or `None`
-    /// if facets have an odd number.
+    /// Returns the crossings of a pair with surfaces that facets do not have, or `None` if facets
+    /// have an odd number.
     fn missing(&self, pixel: [u32; 2], pair: &[FacetPoint; 2]) -> Option<Vec<RimCrossing>> {
         let met = self.met(pixel, &pair.map(|point| point.facet));
         let is_met = |z_mm: f64| {
@@ -142,7 +142,7 @@ impl RimSearch<'_> {
                     }
                 }
             }
-            // A vertical surface has no crossing: what one edge gives another takes.
+            // A vertical surface has no crossing: the gain at one edge cancels the loss at another.
             unknown.retain(|_, sum| *sum != 0);
             if unknown.is_empty() {
                 break;
@@ -169,15 +169,15 @@ impl RimSearch<'_> {
         }
     }
 
-    /// Returns whether a facet of a face near another lies over or under a pixel.
+    /// Returns whether a facet of a face near a given facet is above or below a pixel.
     fn is_covered(&self, pixel: [u32; 2], facet: u32) -> bool {
         let face = self.surfaces.facet(facet).face;
         let met = self.met(pixel, &[facet]);
         met.iter().any(|point| self.surfaces.facet(point.facet).face == face)
     }
 
-    /// Returns where the line through a pixel meets facets at most two away from others, moved
-    /// onto the surfaces.
+    /// Returns the places where the line through a pixel meets facets at most two facets away from
+    /// given facets, moved onto the surfaces.
     fn met(&self, pixel: [u32; 2], facets: &[u32]) -> Vec<FacetPoint> {
         let (surfaces, grid) = (self.surfaces, self.cutter.grid);
         let by_point = surfaces.facets_by_point();

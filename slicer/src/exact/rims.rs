@@ -1,29 +1,29 @@
-//! Where vertical lines meet surfaces but no facets, or facets but no surfaces.
+//! Describes where vertical lines meet surfaces but no facets, or facets but no surfaces.
 
 use std::collections::HashMap;
 
 use crate::gray::DepthSpan;
 use crate::planes::Planes;
 
-/// The difference of lines through pixels with facets and with surfaces.
+/// The differences between crossings of lines through pixels with facets and with surfaces.
 #[derive(Debug)]
 pub(crate) struct Rims {
-    /// By height.
+    /// The crossings, by height.
     pub(super) crossings: Vec<RimCrossing>,
-    /// The heights, in millimetres, between which the crossings of lines through pixels are
-    /// those of surfaces, and none kept on facets counts.
+    /// The heights, in millimeters, between which only surfaces decide the crossings of lines
+    /// through pixels; crossings kept on facets do not count there.
     pub(super) settled_mm: HashMap<[u32; 2], [f64; 2]>,
 }
 
-/// A crossing of a line with a surface, or the reverse of one with a facet.
+/// A crossing of a line with a surface, or the reverse of a crossing with a facet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RimCrossing {
     pub(super) z_um: f64,
     pub(super) span: DepthSpan,
 }
 
-/// The distance within which a reverse takes away a facet's crossing: more than the rounding
-/// of corners.
+/// The distance within which a reverse removes a facet's crossing: more than the rounding of
+/// corners.
 pub(super) const SAME_UM: f64 = 0.02;
 
 impl Rims {

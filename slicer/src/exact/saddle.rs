@@ -1,8 +1,8 @@
 //! Finds saddles of surfaces, where a section's contours meet.
 //!
-//! At the height of a saddle four contours meet in a cross. Slightly above and below they
-//! separate in pairs, one way above and the other way below. Within the tolerance of that
-//! height, facets may pair them the wrong way.
+//! At the height of a saddle, four contours meet in a cross. Slightly above and below they separate
+//! in pairs, one way above and the other way below. Within the tolerance of that height, facets may
+//! pair them the wrong way.
 
 use lamp_brep::vector::distance;
 
@@ -26,7 +26,7 @@ impl Saddle {
         let (x, y) = ([ux, vx], [uy, vy]);
         let form = [bend(x, x), bend(x, y), bend(y, y)];
         let [a, b, c] = form;
-        // Excludes ridges, along which only rounding bends.
+        // Excludes ridges, along which the surface bends only by rounding.
         let is_saddle = a * c - b * b < -1e-6 * (a * a + b * b + c * c);
         let is_above = surfaces.normal(facet, &level.jet)?[2] > 0.0;
         let saddle = Self { at_mm: level.jet.point, facet, uv: level.uv, is_above, form, uv_by };
@@ -46,7 +46,7 @@ impl Saddle {
     }
 
     /// Returns the extents along y and x in which facets may pair a section's contours the
-    /// wrong way, in millimetres, or `None` if the section is too far away.
+    /// wrong way, in millimeters, or `None` if the section is too far away.
     pub(super) fn reach_mm(&self, surfaces: &PlacedSurfaces, z_mm: f64) -> Option<[f64; 2]> {
         let ([a, b, c], off) = (self.form, 2.0 * surfaces.tolerance_mm());
         let rise = (z_mm - self.at_mm[2]).abs();

@@ -1,9 +1,9 @@
-//! Repairs rows near extrema and saddles, where facets miss crossings or have too many.
+//! Repairs rows near extrema and saddles, where facets miss crossings or have surplus crossings.
 //!
 //! There are three repairs. Each adds or removes crossings whose windings sum to zero, so a
-//! balanced row stays balanced. Added crossings lie on the surface. Removed ones were found
-//! twice or were kept on their facet; they are at most as far from the contour as the
-//! facets, so a wrong guess leaves the row no worse than with facets alone.
+//! balanced row stays balanced. Added crossings are on the surface. Removed crossings were found
+//! twice or were kept on their facet; they are at most as far from the contour as the facets, so a
+//! wrong guess leaves the row no worse than with facets alone.
 
 use std::collections::HashMap;
 use std::ops::{Range, RangeInclusive};
@@ -25,7 +25,7 @@ struct UnsettledRow {
     found: Vec<Crossing>,
     /// The row's crossings, as repaired.
     lists: RowLists,
-    /// Changes next to curved edges that are still to be made.
+    /// Pending changes next to curved edges.
     switches: Vec<Switch>,
 }
 
@@ -35,9 +35,8 @@ type UnsettledRows = HashMap<(u32, u32), UnsettledRow>;
 /// Returns the crossings to add to a layer's crossings on surfaces.
 ///
 /// These are the crossings `kept` on facets, except pairs near extrema and saddles that the
-/// surfaces do not have; the surfaces' pairs there that facets miss; and the reverses of
-/// surplus crossings on surfaces. All come and go with their bodies: each is settled by
-/// itself.
+/// surfaces do not have; the surfaces' pairs there that facets miss; and the reverses of surplus
+/// crossings on surfaces. Each body is settled by itself.
 pub(crate) fn settle(
     surfaces: &[PlacedSurfaces],
     tally: &Tally,
@@ -99,14 +98,14 @@ pub(crate) fn settle(
         row.switch(tally);
         row.add_sides(tally);
     }
-    // A map has no order, but the table sorts.
+    // A map is unordered, but the table sorts.
     let changes = |((body, _), row): ((u32, u32), UnsettledRow)| {
         row.changes().map(move |crossing| (body, crossing))
     };
     rows.into_iter().flat_map(changes).collect()
 }
 
-/// The greatest length of a fold along its row, in millimetres.
+/// The greatest length of a fold along its row, in millimeters.
 ///
 /// A fold is as long as the two or three facets that make it. Facets are long only where
 /// the surface is straight, which has no folds. The limit bounds the damage where two
@@ -114,17 +113,17 @@ pub(crate) fn settle(
 const MAX_FOLD_MM: f64 = 3.0;
 
 impl UnsettledRow {
-    /// Removes folds: facets nearly along a row may cross it forwards, back and forwards
+    /// Removes folds: facets nearly along a row may cross it forward, back and forward
     /// again, where the surface crosses it once.
     ///
-    /// Polishing moves both forward crossings to the same point of the surface, and finds
-    /// none for the one back, since the surface faces the other way. So a fold is a kept
-    /// crossing beside two equal ones of the other winding. Removing it and one of the two
-    /// leaves the surface's crossing. Otherwise even-odd filling would cancel the two and
-    /// leave the kept one, which is off by the fold.
+    /// Polishing moves both forward crossings to the same point of the surface, and finds no point
+    /// for the crossing back, because the surface faces the other way. So a fold is a kept crossing
+    /// next to two equal crossings of the other winding. Removing it and one of the two leaves the
+    /// surface's crossing. Otherwise even-odd filling would cancel the two and leave the kept one,
+    /// which is off by the fold.
     ///
-    /// Two contours of a body that touch within a column, beside a kept crossing of a third
-    /// contour, look the same. Then the third moves by at most the fold.
+    /// Two contours of a body that touch within a column, next to a kept crossing of a third
+    /// contour, look the same. Then the third contour moves by at most the fold.
     fn unfold(&mut self, tally: &Tally, max_columns: u32) {
         let kept = std::mem::take(&mut self.lists.kept);
         for crossing in kept {
@@ -145,7 +144,7 @@ impl UnsettledRow {
         }
     }
 
-    /// Changes the faces of crossings next to curved edges, where both are known.
+    /// Changes the faces of crossings next to curved edges, where both faces are known.
     fn switch(&mut self, tally: &Tally) {
         if self.switches.is_empty() {
             return;
@@ -155,12 +154,12 @@ impl UnsettledRow {
         tally.mend(2 * made, before - self.lists.kept.len());
     }
 
-    /// Adds the outer sides of two extrema between which the contour turns back, so that
-    /// neither has a pair of its own.
+    /// Adds the outer sides of two extrema between which the contour turns back, so that neither
+    /// extremum has a pair of its own.
     ///
-    /// Both are crossings of the row with the surface that no facet has, and they balance,
-    /// so the part is between them. With another number of sides, or a kept crossing that
-    /// may stand for one of them, the pairing is ambiguous and the row stays without them.
+    /// Both are crossings of the row with the surface that no facet has, and they balance, so the
+    /// part is between them. With another number of sides, or a kept crossing that may represent a
+    /// side, the pairing is ambiguous and no sides are added.
     fn add_sides(&mut self, tally: &Tally) {
         let mut sides: Vec<Crossing> = Vec::new();
         for side in std::mem::take(&mut self.lists.sides) {
@@ -174,7 +173,7 @@ impl UnsettledRow {
         }
     }
 
-    /// Returns the crossings to add to those found. A surplus one is cancelled by its
+    /// Returns the crossings to add to the found crossings. A surplus crossing is canceled by its
     /// reverse in the same column.
     fn changes(mut self) -> impl Iterator<Item = Crossing> {
         let mut cancelled = Vec::new();
@@ -188,12 +187,12 @@ impl UnsettledRow {
     }
 }
 
-/// An extremum or a saddle, and the pixels around it where facets may cross too many or too
-/// few rows.
+/// An extremum or a saddle, and the pixels around it where facets may cross too many or too few
+/// rows.
 struct Near {
     point: CriticalPoint,
     body: u32,
-    /// The columns where facets may have crossings in place of the contour's.
+    /// The columns where facets may have crossings instead of the contour's.
     columns: RangeInclusive<i64>,
     rows: Range<u32>,
 }
@@ -287,8 +286,8 @@ impl Near {
         }
     }
 
-    /// Moves the crossing kept on a facet near the point to the surface's only one there, or
-    /// notes that one if there is no such crossing.
+    /// Moves the crossing kept on a facet near the point to the surface's only crossing there. If
+    /// there is no kept crossing, notes the surface's crossing.
     fn set_side(&self, tally: &Tally, side: Crossing, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[side]);
         let is_there = row.lists.exact.iter().any(|other| is_same(side, *other));
@@ -325,8 +324,8 @@ fn winding(crossings: &[Crossing]) -> i32 {
     crossings.iter().map(|crossing| crossing.in_row().winding()).sum()
 }
 
-/// Returns whether two crossings are the same one found twice: rounding may put it in
-/// either of two columns.
+/// Returns whether two crossings are the same crossing found twice: rounding may put it in either
+/// of two columns.
 pub(super) fn is_same(a: Crossing, b: Crossing) -> bool {
     let [a, b] = [a.in_row(), b.in_row()];
     a.winding() == b.winding() && a.column().abs_diff(b.column()) <= 1

@@ -6,9 +6,9 @@ use super::placed::PlacedSurfaces;
 
 /// The greatest number of steps; two or three are usual.
 const MAX_STEPS: usize = 12;
-/// The greatest distance of a found point from the known coordinates, in millimetres.
+/// The greatest distance of a found point from the known coordinates, in millimeters.
 const NEAR_MM: f64 = 1e-10;
-/// The distance accepted after the last step, in millimetres: rounding may allow no better.
+/// The distance accepted after the last step, in millimeters: rounding may allow no better.
 const NEAR_AT_LAST_MM: f64 = 1e-7;
 
 /// A point to find on a surface.
@@ -16,14 +16,14 @@ const NEAR_AT_LAST_MM: f64 = 1e-7;
 pub(super) struct Wanted {
     /// The parameters to start from.
     pub(super) uv: [f64; 2],
-    /// The known coordinates, in millimetres.
+    /// The known coordinates, in millimeters.
     pub(super) known_mm: [f64; 2],
 }
 
 /// Finds points on a face's surface with known coordinates along `axes`. Returns their
 /// parameters and jets, or `None` where Newton's method diverges.
 ///
-/// All points take each step together, since kernels evaluate many at once more cheaply.
+/// All points take each step together, because kernels evaluate many points at once at lower cost.
 pub(super) fn solve(
     surfaces: &PlacedSurfaces,
     face: u32,

@@ -6,7 +6,7 @@ use super::placed::PlacedSurfaces;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;
 
-/// A crossing that one face gains and another's reverse, next to a curved edge.
+/// Next to a curved edge, a crossing that one face gains, and its reverse that another face gains.
 pub(super) struct Switch {
     sides: [SwitchSide; 2],
 }
@@ -47,7 +47,7 @@ impl Switch {
     }
 }
 
-/// Returns the columns of a facet and as many on both sides.
+/// Returns the columns of a facet, and the same number of columns on both sides.
 fn columns_around(surfaces: &PlacedSurfaces, facet: u32, cutter: Cutter<'_>) -> [f64; 2] {
     let columns = surfaces.corners(facet).map(|[x, y, _]| cutter.grid.to_pixels(x, y)[0]);
     let low = columns.into_iter().fold(f64::MAX, f64::min);
@@ -59,17 +59,17 @@ fn columns_around(surfaces: &PlacedSurfaces, facet: u32, cutter: Cutter<'_>) -> 
 /// A row's crossings.
 #[derive(Clone, Default)]
 pub(super) struct RowLists {
-    /// Those on surfaces.
+    /// The crossings on surfaces.
     pub(super) exact: Vec<Crossing>,
-    /// Those kept on facets.
+    /// The crossings kept on facets.
     pub(super) kept: Vec<Crossing>,
-    /// Those located on only one side of an extremum or a saddle.
+    /// The crossings located on only one side of an extremum or a saddle.
     pub(super) sides: Vec<Crossing>,
 }
 
 impl RowLists {
-    /// Makes a row's switches that are known on both sides, and leaves the others. Returns how
-    /// many were made.
+    /// Makes a row's switches that are known on both sides, and leaves the others. Returns the
+    /// number of switches made.
     pub(super) fn switch(&mut self, switches: &mut Vec<Switch>) -> usize {
         let mut left = Vec::new();
         loop {
@@ -79,14 +79,14 @@ impl RowLists {
                 *self = lists;
                 return std::mem::replace(switches, left).len();
             }
-            // Both sides stay as they are, or neither.
+            // Both sides stay unchanged, or neither does.
             let is_unknown =
                 |switch: &mut Switch| switch.sides.iter().any(|it| unknown.contains(&it.face));
             left.extend(switches.extract_if(.., is_unknown));
         }
     }
 
-    /// Makes all switches. Returns the faces of those crossings that were not found.
+    /// Makes all switches. Returns the faces of the crossings that were not found.
     fn take(&mut self, switches: &[Switch]) -> Vec<u32> {
         let sides = || switches.iter().flat_map(|switch| &switch.sides);
         let is_new = |crossing: &Crossing| !self.exact.contains(crossing);
@@ -99,7 +99,8 @@ impl RowLists {
             if self.remove(side, &mut gains) || self.add_side(side.winding) {
                 continue;
             }
-            // A surface along the row has no crossing: what one edge gives another takes.
+            // A surface along the row has no crossing: the gain at one edge cancels the loss at
+            // another.
             let reverse = (side.face, -side.winding);
             match missing.iter().position(|other| *other == reverse) {
                 Some(at) => drop(missing.swap_remove(at)),
@@ -110,8 +111,8 @@ impl RowLists {
         missing.into_iter().map(|(face, _)| face).collect()
     }
 
-    /// Removes the crossing that a side takes away: the one on its surface, which may be gained
-    /// at another edge, or the nearest one kept on its facets. Returns whether there was one.
+    /// Removes the crossing that a side loses: the crossing on its surface, which may be gained at
+    /// another edge, or the nearest crossing kept on its facets. Returns whether there was one.
     fn remove(&mut self, side: &SwitchSide, gains: &mut Vec<(u32, Crossing)>) -> bool {
         if let Some(lost) = side.lost {
             if let Some(at) = self.exact.iter().position(|it| *it == lost) {
@@ -132,8 +133,8 @@ impl RowLists {
         nearest.map(|at| self.kept.swap_remove(at)).is_some()
     }
 
-    /// Adds the other side of an extremum of which the facets have no crossing at all: the
-    /// pair less the crossing beyond the edge.
+    /// Adds the other side of an extremum for which the facets have no crossing: the pair minus the
+    /// crossing beyond the edge.
     fn add_side(&mut self, winding: i32) -> bool {
         let at = self.sides.iter().position(|side| winds(*side, winding));
         self.exact.extend(at.map(|at| self.sides.swap_remove(at)));

@@ -11,9 +11,9 @@ pub struct Polished {
     pub kept: u64,
     /// Crossings added or removed near extrema and saddles.
     pub mended: u64,
-    /// The mean move along the rows, in millimetres.
+    /// The mean move along the rows, in millimeters.
     pub mean_mm: f64,
-    /// The greatest move, in millimetres.
+    /// The greatest move, in millimeters.
     pub most_mm: f64,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Tally {
 const PM_PER_MM: f64 = 1e9;
 
 impl Tally {
-    /// Counts crossings by their moves along x, in millimetres; `None` is a kept one.
+    /// Counts crossings by their moves along x, in millimeters; `None` is a kept crossing.
     pub(super) fn add(&self, moves_mm: impl Iterator<Item = Option<f64>>) {
         let (mut moved, mut kept, mut sum, mut most) = (0, 0, 0, 0);
         for by_mm in moves_mm {
@@ -62,7 +62,7 @@ impl Tally {
         self.most_pm.fetch_max(most, Relaxed);
     }
 
-    /// Counts crossings that were added or removed, and those no longer kept.
+    /// Counts added and removed crossings, and crossings that are no longer kept.
     pub(crate) fn mend(&self, mended: usize, kept: usize) {
         self.mended.fetch_add(mended as u64, Relaxed);
         self.kept.fetch_sub(kept as u64, Relaxed);

@@ -1,23 +1,23 @@
-//! What lies above the columns of rows, as far as light comes from.
+//! Finds the layers above the columns of rows, as far up as light comes from.
 //!
-//! Layers are taken from the top down. Most columns of a layer that are looked at were so in the one
-//! above, too, and what was seen there holds here: only the others are looked up, layer by layer.
+//! Layers are processed from the top down. Most columns that a layer asks for were also asked for
+//! by the layer above, whose results hold here: only the others are looked up, layer by layer.
 
 use super::columns::Columns;
 
-/// Columns, and what is above them: first layers that are part all the way down to the next, then
-/// layers that are not part, and then any.
+/// Columns, and the layers above them: first, layers that are part all the way down to the next
+/// layer; then layers that are not part; then any.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Above {
     pub(super) start: u32,
     pub(super) end: u32,
     /// The first layer that is not part all the way down.
     pub(super) white_to: u32,
-    /// The first layer from there on that is part again.
+    /// The first layer from there up that is part again.
     pub(super) black_to: u32,
 }
 
-/// Stands for a layer that was not come across.
+/// Represents a layer that was not found.
 const NONE: u32 = u32::MAX;
 
 impl Above {
@@ -26,14 +26,14 @@ impl Above {
         self.end == next.start && layers(self) == layers(next)
     }
 
-    /// Returns what the layer below sees, given whether the part ends within this one.
+    /// Returns the view from the layer below, given whether the part ends within this layer.
     fn seen_below(self, layer: u32, ends_within: bool) -> Self {
         // Such a layer is part, but not all the way down.
         if ends_within { Self { white_to: layer, black_to: layer, ..self } } else { self }
     }
 }
 
-/// Columns above which the layers are known up to the next.
+/// Columns above which the layers are known up to `next`.
 #[derive(Clone, Copy)]
 struct LookUp {
     next: u32,
@@ -41,7 +41,8 @@ struct LookUp {
 }
 
 impl LookUp {
-    /// Goes on past the next layer, given whether that is part, and goes on into the one below.
+    /// Passes the next layer, given whether it is part, and whether the part continues into the
+    /// layer below.
     #[inline]
     fn pass(&mut self, is_part: bool, is_through: bool) {
         let Self { next, above } = self;
@@ -59,20 +60,20 @@ impl LookUp {
     }
 }
 
-/// What was seen above columns in the rows of a band.
+/// The layers found above columns in the rows of a band.
 pub(super) struct AboveRows<'a> {
     columns: &'a Columns,
     band: usize,
     layer: u32,
     /// The first layer above that does not count.
     end: u32,
-    /// What the last layer saw in each row, as the one below sees it.
+    /// The results of the last layer for each row, as seen from the layer below it.
     known: Vec<Vec<Above>>,
-    /// How much of that was read in this row.
+    /// The number of these results read in this row.
     read: usize,
-    /// What this row sees, as the layer below sees it.
+    /// The results of this row, as seen from the layer below.
     next: Vec<Above>,
-    /// Columns that are still to be looked up, the first ones last.
+    /// Columns still to be looked up, the first ones last.
     unseen: Vec<LookUp>,
 }
 
@@ -82,7 +83,7 @@ impl<'a> AboveRows<'a> {
         Self { columns, band: 0, layer: 0, end: 0, known, read: 0, next, unseen }
     }
 
-    /// Starts a band of so many rows, of which nothing is known.
+    /// Starts a band of so many rows, with nothing known.
     pub(super) fn start(&mut self, band: usize, rows: usize) {
         (self.band, self.end) = (band, 0);
         self.known.resize_with(rows, Vec::new);
@@ -92,14 +93,14 @@ impl<'a> AboveRows<'a> {
     pub(super) fn start_layer(&mut self, layer: usize, end: usize) {
         let end = end as u32;
         if end > self.end {
-            // The last one did not look so far up.
+            // The last layer did not look this far up.
             self.known.iter_mut().for_each(Vec::clear);
         }
         (self.layer, self.end) = (layer as u32, end);
     }
 
-    /// Tells what is above columns of a row, whose undersides lie in a layer. Columns come from the
-    /// left; [`end_row`](Self::end_row) ends them.
+    /// Finds the layers above columns of a row whose undersides are in a layer. Columns come from
+    /// the left; [`end_row`](Self::end_row) ends them.
     pub(super) fn look(
         &mut self,
         in_band: u32,
@@ -140,7 +141,7 @@ impl<'a> AboveRows<'a> {
         self.read = 0;
     }
 
-    /// Looks up columns of which nothing is known.
+    /// Looks up columns with nothing known.
     fn look_up(&mut self, in_band: u32, (start, end): (u32, u32), seen: &mut Vec<Above>) {
         let above = Above { start, end, white_to: NONE, black_to: NONE };
         self.unseen.push(LookUp { next: self.layer + 1, above });

@@ -11,19 +11,19 @@ use super::print_through::{LevelsByDepth, PrintThrough};
 use super::row_lists::RowLists;
 use super::solid::{Intervals, SolidRow};
 
-/// A surface this far above the underside, as a share of the critical dose, is short of it.
+/// A surface this far above the underside, as a share of the critical dose, falls short of it.
 const SHORT: f64 = 1e-3;
 
-/// What all pixels of a layer have in common.
+/// The data that all pixels of a layer have in common.
 pub(super) struct Around<'a> {
     light: &'a PrintThrough,
     layer: usize,
     /// The first layer above that does not count.
     end: usize,
-    /// The levels under so many white layers, as far as they were asked for.
+    /// The levels under each number of white layers, as far as requested.
     by_depth: Vec<OnceLock<Arc<LevelsByDepth>>>,
-    /// The level under white layers alone if the underside lies in the layer itself, in the one below
-    /// it, and so on.
+    /// The level under white layers alone if the underside is in the layer itself, in the layer
+    /// below it, and so on.
     under_white: Vec<Option<u8>>,
 }
 
@@ -37,7 +37,7 @@ impl<'a> Around<'a> {
         Self { under_white, ..around }
     }
 
-    /// Returns the levels under so many white layers.
+    /// Returns the levels under this number of white layers.
     fn levels_under(&self, white: usize) -> &LevelsByDepth {
         self.by_depth[white].get_or_init(|| {
             let goes_on = self.end < self.light.len() && white + 1 == self.end - self.layer;
@@ -45,11 +45,11 @@ impl<'a> Around<'a> {
         })
     }
 
-    /// Returns the level of all undersides in a layer, if they have one.
+    /// Returns the level of all undersides in a layer, if they share one.
     fn level_of_all(&self, table: &LevelsByDepth, below: usize) -> Option<u8> {
         let tops_um = self.light.distance_um(self.layer, below);
         if tops_um + self.light.step_um(below) < table.first_um {
-            // However deep it is within its layer.
+            // At any depth within its layer.
             Some(1)
         } else if tops_um >= table.white_um && below != self.layer {
             Some(255)
@@ -67,18 +67,18 @@ pub(super) struct BandChooser<'a> {
     column: ColumnLight,
     rows: ChangeRows,
     short_px: u64,
-    /// How far each layer below has been read in the row, from the layer itself down.
+    /// The number of changes of each layer below read in the row, from the layer itself down.
     read: Vec<usize>,
     /// The columns of each row that are part in all layers above.
     solid: Vec<SolidRow>,
-    /// Those of the row that is made.
+    /// The columns of the current row.
     white_above: Intervals,
     spare: Intervals,
     above: AboveRows<'a>,
     seen: Vec<Above>,
 }
 
-/// The rows of a layer in a band, and their pixels that are short of the underside.
+/// The rows of a layer in a band, and their number of pixels that fall short of the underside.
 pub(super) type ChosenRows = (RowLists<LevelChange>, u64);
 
 impl<'a> BandChooser<'a> {
@@ -212,7 +212,8 @@ impl<'a> BandChooser<'a> {
         self.columns.below(layer, self.band, in_band)
     }
 
-    /// Adds the levels of columns under so many white layers, whose undersides lie in one layer.
+    /// Adds the levels of columns under this number of white layers, whose undersides are in one
+    /// layer.
     fn by_depth(
         &mut self,
         around: &Around<'_>,
@@ -254,7 +255,7 @@ impl<'a> BandChooser<'a> {
         }
     }
 
-    /// Goes down a column to the layer, from as far up as it counts.
+    /// Goes down a column to the layer, from the highest layer that counts.
     fn column_level(&mut self, around: &Around<'_>, in_band: u32, column: u32) -> u8 {
         self.column.darken();
         let mut level = 0;
@@ -286,7 +287,7 @@ impl<'a> BandChooser<'a> {
     }
 }
 
-/// Rows of changes, the last of which is made from the left.
+/// Rows of changes, the last of which is built from the left.
 #[derive(Default)]
 struct ChangeRows {
     lists: RowLists<LevelChange>,
@@ -309,7 +310,7 @@ impl ChangeRows {
         self.end = end;
     }
 
-    /// Ends the row of an image of some width, beyond which a row that ends white does not go on.
+    /// Ends the row of an image of a given width. A row that ends white stops there.
     fn end_row(&mut self, width: u32) {
         if self.level > 0 && self.end < width {
             self.lists.items_mut().push(LevelChange { column: self.end, level: 0 });

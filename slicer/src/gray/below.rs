@@ -1,4 +1,4 @@
-//! What lies below the pixels of a layer: the underside of the part, or nothing but part as far as
+//! Finds what is below the pixels of a layer: the underside of the part, or only part as far as
 //! light reaches.
 
 use super::print_through::PrintThrough;
@@ -7,25 +7,27 @@ use super::rows::DepthRows;
 /// Rounding of depths, which must not open gaps between layers.
 const TIE_UM: f64 = 0.01;
 
-/// The columns of a row, from `start` to `end`, whose undersides lie in one layer.
+/// The columns of a row, from `start` to `end`, whose undersides are in one layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Below {
     pub(crate) start: u32,
     pub(crate) end: u32,
-    /// The layer that knows the depth of the underside, [`DEEP`] if light does not reach it.
+    /// The layer that has the depth of the underside, or [`DEEP`] if light does not reach it.
     pub(crate) layer: u32,
 }
 
-/// Stands for the layer of an underside that light does not reach.
+/// Represents the layer of an underside that light does not reach.
 pub(crate) const DEEP: u32 = u32::MAX;
 
-/// Returns whether the part goes on into the layer below. The first layer has none, but may stand.
+/// Returns whether the part continues into the layer below. The first layer has none below it, but
+/// may stand on the platform.
 #[inline]
 fn is_through(depth_um: f64, step_um: f64) -> bool {
     depth_um.is_infinite() || depth_um > step_um - TIE_UM
 }
 
-/// Adds the undersides below a row of a layer, from those of the layer below if it is known.
+/// Adds the undersides below a row of a layer, from the undersides of the layer below if it is
+/// known.
 pub(crate) fn push_below(
     light: &PrintThrough,
     layer: usize,
@@ -48,7 +50,7 @@ pub(crate) fn push_below(
             continue;
         }
         let in_reach = |below: u32| if below >= first_in_reach { below } else { DEEP };
-        // Black right below is an underside at the plane between.
+        // Black right below is an underside at the plane between the layers.
         let between = in_reach(layer as u32 - 1);
         let mut column = start;
         while column < end {
@@ -67,7 +69,7 @@ pub(crate) fn push_below(
     }
 }
 
-/// Adds columns to a row that starts at `first`, joined with those that they touch.
+/// Adds columns to a row that starts at `first`, joined with columns that they touch.
 fn push_joined(list: &mut Vec<Below>, first: usize, below: Below) {
     match list[first..].last_mut() {
         Some(last) if last.end == below.start && last.layer == below.layer => last.end = below.end,

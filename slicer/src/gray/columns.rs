@@ -1,19 +1,20 @@
 //! Chooses gray levels down columns of pixels, for doses that add up.
 //!
 //! Let `b` be the underside below a pixel of a layer. The light of the layers above leaves a share
-//! of the critical dose at `b`; the layer gets the level that makes up what lacks, at most white,
-//! and at least the least level above black, so that outlines stay. From the top down, this takes
-//! the least light away from white layers that leaves the underside where it is: light from low
-//! layers weighs most there, so those are darkened first, and one layer of a column is in between.
-//! All of the part above `b` has more than its dose at `b`, or is cured by its own white layer, so
-//! it cures.
+//! of the critical dose at `b`; the layer gets the level that supplies the rest, at most white, and
+//! at least the least level above black, so that outlines stay. From the top down, this removes the
+//! least light from white layers that leaves the underside in place: light from low layers weighs
+//! most there, so these are darkened first, and one layer of a column is in between. Every point of
+//! the part above `b` has more than its dose at `b`, or is cured by its own white layer, so it
+//! cures.
 //!
 //! Where the layers above are white up to the part's top, or as far up as light comes from, the
-//! level follows from the depth alone. Depths are told within a layer; further down, they are those
-//! of the layers below. What is below a row's pixels is carried up from layer to layer
-//! ([`below`](super::below)), and where all layers above are part is carried down
-//! ([`solid`](super::solid)). Only elsewhere, near faces that look up, the layers above are looked at,
-//! which are for most pixels those that the layer above saw ([`above`](super::above)).
+//! level follows from the depth alone. Depths are known within a layer; further down, the layers
+//! below have them. The undersides below a row's pixels are carried up from layer to layer
+//! ([`below`](super::below)), and the columns where all layers above are part are carried down
+//! ([`solid`](super::solid)). Only elsewhere, near faces that look up, the layers above are
+//! examined; for most pixels, they are the layers that the layer above saw
+//! ([`above`](super::above)).
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -37,13 +38,13 @@ pub(crate) struct ChosenLayer {
     pub(crate) short_px: u64,
 }
 
-/// The depths of some layers in a row, and which layers have the undersides below their pixels.
+/// The depths of consecutive layers, and the layers that contain the undersides below their pixels.
 #[derive(Debug)]
 pub(crate) struct Columns {
     /// The number of the first layer.
     first: usize,
     depths: VecDeque<DepthRows>,
-    /// Those of each layer, by bands of rows.
+    /// The undersides of each layer, by bands of rows.
     below: Vec<VecDeque<RowLists<Below>>>,
 }
 
@@ -87,7 +88,7 @@ impl Columns {
         self.first = layer;
     }
 
-    /// Chooses the levels of some layers, given all below and above that count.
+    /// Chooses the levels of some layers, given all layers below and above that count.
     pub(crate) fn choose(&self, light: &PrintThrough, layers: Range<usize>) -> Vec<ChosenLayer> {
         let around = |layer| Around::new(light, layer, light.end_above(layer).min(self.end()));
         let around: Vec<Around<'_>> = layers.clone().map(around).collect();
@@ -109,7 +110,7 @@ impl Columns {
         &self.depths[layer - self.first]
     }
 
-    /// Returns what lies below a row of a band.
+    /// Returns the undersides below a row of a band.
     pub(super) fn below(&self, layer: usize, band: usize, in_band: u32) -> &[Below] {
         self.below[band][layer - self.first].row(in_band)
     }

@@ -1,12 +1,12 @@
-//! The depths at which a layer's rows meet facets below its section.
+//! Holds the depths at which a layer's rows meet facets below its section.
 
 use std::ops::Range;
 
 use super::stretch::Looks;
 use crate::planes::Planes;
 
-/// The columns of a row, from `start` to `end`, over a facet below a section. Depths
-/// along them lie on a straight line.
+/// The columns of a row, from `start` to `end`, over a facet below a section. Depths along them are
+/// on a straight line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub(crate) struct DepthSpan {
     pub(crate) row: u32,
@@ -15,8 +15,8 @@ pub(crate) struct DepthSpan {
     /// Below the layer's top, at the first column.
     pub(super) depth_um: f32,
     pub(super) um_per_column: f32,
-    /// The distance by which rounding may put it on the other side of the plane. Below
-    /// zero if going down enters the part.
+    /// The distance by which rounding may put it on the other side of the plane. Negative if the
+    /// way down enters the part.
     pub(super) signed_tie_um: f32,
     pub(super) body: u32,
 }
@@ -64,8 +64,8 @@ impl DepthSpan {
         Self { depth_um: depth_um as f32, ..self }
     }
 
-    /// Returns the depths at which a layer looks at it: from just above the section to
-    /// the end of the exposure.
+    /// Returns the depths at which a layer examines it: from just above the section to the end of
+    /// the exposure.
     pub(crate) fn depths(&self, planes: &Planes, layer: usize, reach_um: f64) -> Range<f64> {
         Looks { planes, reach_um, tie_um: self.tie_um() }.depths(layer)
     }

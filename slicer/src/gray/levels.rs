@@ -1,4 +1,4 @@
-//! The gray levels of each layer.
+//! Holds the gray levels of each layer.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::planes::LayerHeights;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerLevels<L = DepthLevels> {
     distinct: Vec<L>,
-    /// The position in `distinct` of each layer's levels; layers beyond have the first.
+    /// The position of each layer's levels in `distinct`; further layers have the first levels.
     of_layer: Vec<u32>,
 }
 
@@ -23,8 +23,8 @@ impl<L> From<L> for LayerLevels<L> {
 }
 
 impl<L> LayerLevels<L> {
-    /// Creates the levels of layers whose exposures differ. `of_thickness` returns those
-    /// of a thickness; it is called once for each, to the nanometre.
+    /// Creates the levels of layers whose exposures differ. `of_thickness` returns the levels for a
+    /// thickness; it is called once for each thickness, to the nanometer.
     ///
     /// # Errors
     /// Returns the first error of `of_thickness`.
@@ -35,7 +35,7 @@ impl<L> LayerLevels<L> {
         let mut distinct = Vec::new();
         let mut known = BTreeMap::new();
         let of_layer = heights.thicknesses_um().map(|um| -> Result<u32, E> {
-            // Thicknesses are above zero, and so in the order of their bits.
+            // Thicknesses are above zero, so their bits have the same order.
             if let Some(&index) = known.get(&um.to_bits()) {
                 return Ok(index);
             }

@@ -2,14 +2,14 @@
 //!
 //! A layer is exposed with its section at its top. Where the part's underside slopes
 //! away within the layer, full exposure cures too deep. The vertical line through a
-//! pixel's centre leaves the part at the first facet below the section
+//! pixel's center leaves the part at the first facet below the section
 //! ([`sheet`](self::sheet)). The depth there has a gray level
-//! ([`DepthLevels`](lamp_stack::DepthLevels)), and neighbouring pixels of one level
+//! ([`DepthLevels`](lamp_stack::DepthLevels)), and neighboring pixels of one level
 //! make a run ([`shade`](self::shade)).
 //!
-//! Vertical lines meet facets as rows do in a section: whether a line is left or right
-//! of an edge follows from the edge's ends alone. So a line through a closed sheet of
-//! facets meets exactly one of them.
+//! Vertical lines meet facets as rows do in a section: whether a line is left or right of an edge
+//! follows from the edge's ends alone. So a line through a closed sheet of facets meets exactly one
+//! facet.
 //!
 //! Where doses add up ([`print_through`](self::print_through)), rows keep the depths instead, and
 //! levels are chosen down columns ([`columns`](self::columns)).

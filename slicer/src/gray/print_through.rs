@@ -1,4 +1,4 @@
-//! The light of whole columns, for gray levels whose doses add up.
+//! Computes the light of whole columns, for gray levels whose doses add up.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -8,14 +8,14 @@ use lamp_stack::{FadingLevels, LevelSteps};
 use crate::gray::LayerLevels;
 use crate::planes::Planes;
 
-/// Light from further up than this many penetration depths counts for nothing: less than a
-/// 4000th of it is left, which moves no surface by more than a micrometre.
+/// Light from more than this many penetration depths above does not count: less than a 4000th of it
+/// is left, which moves no surface by more than a micrometer.
 const LOOK_UP_DEPTHS: f64 = 8.3;
 
-/// Layers look a little below their bottoms, so that rounding hides no underside there.
+/// Layers look slightly below their bottoms, so that rounding hides no underside there.
 const BEYOND_UM: f64 = 0.1;
 
-/// What all layers of a part leave below them.
+/// The light that all layers of a part leave below them.
 #[derive(Debug)]
 pub(crate) struct PrintThrough {
     levels: LayerLevels<FadingLevels>,
@@ -24,9 +24,9 @@ pub(crate) struct PrintThrough {
     white: Vec<f64>,
     reach_um: f64,
     within_um: f64,
-    /// The most layers above a layer that count.
+    /// The greatest number of layers above a layer that count.
     most_above: u32,
-    /// For each layer the first whose top its light reaches.
+    /// For each layer, the first layer whose top its light reaches.
     first_in_reach: Vec<u32>,
     known: Mutex<HashMap<Surroundings, Arc<LevelsByDepth>>>,
 }
@@ -44,7 +44,7 @@ impl PrintThrough {
             white[layer] = own.share(255) + above.map_or(0.0, faded);
             above = Some((tops_um[layer], white[layer]));
             let reach = own.depth_um(255) * white[layer].ln();
-            // Where even white falls short, the underside within the layer must still be seen.
+            // Where even white falls short, the underside within the layer must still be found.
             reach_um = reach_um.max(reach).max(planes.thickness_um(layer));
             most_um = most_um.max(planes.thickness_um(layer));
         }
@@ -60,18 +60,18 @@ impl PrintThrough {
         light
     }
 
-    /// Returns what each level of each layer leaves below.
+    /// Returns the light that each level of each layer leaves below.
     pub(crate) fn levels(&self) -> &LayerLevels<FadingLevels> {
         &self.levels
     }
 
-    /// Returns the most layers above a layer that count.
+    /// Returns the greatest number of layers above a layer that count.
     pub(crate) fn most_above(&self) -> u32 {
         self.most_above
     }
 
-    /// Returns the depth that layers look at: their own thickness. Further down, the layers below
-    /// know the depths.
+    /// Returns the depth that layers examine: their own thickness. Further down, the layers below
+    /// have the depths.
     pub(crate) fn within_um(&self) -> f64 {
         self.within_um
     }
@@ -91,18 +91,18 @@ impl PrintThrough {
         self.tops_um.len()
     }
 
-    /// Returns the distance of a layer's top from that of the layer below, if there is one.
+    /// Returns the distance between a layer's top and the top of the layer below, if there is one.
     pub(crate) fn step_um(&self, layer: usize) -> f64 {
         layer.checked_sub(1).map_or(f64::INFINITY, |below| self.distance_um(layer, below))
     }
 
-    /// Returns the distance of a layer's top from that of one below.
+    /// Returns the distance between a layer's top and the top of a layer below.
     pub(crate) fn distance_um(&self, layer: usize, below: usize) -> f64 {
         self.tops_um[layer] - self.tops_um[below]
     }
 
-    /// Returns what the layers below leave at a depth under a layer's top if all of them, down to
-    /// there, have the least level. No pixel of the part is black, so that outlines stay.
+    /// Returns the light that the layers below leave at a depth under a layer's top if all of them,
+    /// down to there, have the least level. No pixel of the part is black, so that outlines stay.
     pub(crate) fn least_below(&self, layer: usize, depth_um: f64) -> f64 {
         let here_um = self.tops_um[layer] - depth_um;
         let below = (0..layer).rev().take_while(|&below| self.tops_um[below] > here_um);
@@ -120,8 +120,8 @@ impl PrintThrough {
         self.first_in_reach[layer]
     }
 
-    /// Returns the levels by depth of a layer under so many white ones, or under white as far up as
-    /// it counts.
+    /// Returns the levels by depth of a layer under this number of white layers, or under white as
+    /// far up as it counts.
     pub(crate) fn levels_by_depth(
         &self,
         layer: usize,
@@ -149,14 +149,15 @@ impl PrintThrough {
     }
 }
 
-/// What decides the levels by depth of a layer, rounded: layers in equal ones share them, whichever
-/// is first.
+/// The data that determines a layer's levels by depth, rounded: layers with equal surroundings
+/// share the levels, whichever layer is first.
 #[derive(Debug, PartialEq, Eq, Hash)]
 struct Surroundings {
     levels: usize,
     /// The critical doses from above, in millionths.
     above: i64,
-    /// How far the tops of the layers below are down, in nanometres, and which levels they have.
+    /// The distances down to the tops of the layers below, in nanometers, and the numbers of their
+    /// levels.
     below: Vec<(i64, usize)>,
 }
 
@@ -186,7 +187,7 @@ impl Surroundings {
         let (mut from_um, mut step_um, mut rising_um) = (0.0, 1.0, 0.0_f64);
         let steps_um = (0..255).map(|step| {
             let is_above = |depth_um: f64| own.is_above(step, depth_um, left(depth_um));
-            // Steps follow each other closely: look near the one before.
+            // Steps follow each other closely, so the search starts near the previous one.
             let (mut low, mut high) = (from_um, from_um + 2.0 * step_um);
             while high < reach_um && !is_above(high) {
                 (low, high) = (high, high + 2.0 * (high - from_um));
@@ -213,7 +214,7 @@ impl Surroundings {
 pub(crate) struct LevelsByDepth {
     /// The depth up to which the least level is enough.
     pub(crate) first_um: f64,
-    /// The depth from which on it takes white.
+    /// The depth from which on white is needed.
     pub(crate) white_um: f64,
     steps: LevelSteps,
     /// The depth that even white does not cure.
@@ -221,7 +222,7 @@ pub(crate) struct LevelsByDepth {
 }
 
 impl LevelsByDepth {
-    /// Returns the level of a pixel below which the part is so deep.
+    /// Returns the level of a pixel with this depth of part below it.
     #[inline]
     pub(crate) fn level(&self, depth_um: f64) -> u8 {
         self.steps.level(depth_um).max(1)

@@ -1,9 +1,9 @@
-//! Lists of what each row has, in one array.
+//! Lists of the items of each row, in one array.
 
-/// What each of some rows has, from the left.
+/// The items of each row, from the left.
 #[derive(Debug)]
 pub(crate) struct RowLists<T> {
-    /// Where each row's items start, and where those of the last end.
+    /// The start of each row's items, and the end of the last row's.
     starts: Vec<u32>,
     items: Vec<T>,
 }
@@ -33,14 +33,14 @@ impl<T: Copy> RowLists<T> {
 }
 
 impl<T> RowLists<T> {
-    /// Starts lists that will have about so many items.
+    /// Starts lists with room for about this many items.
     pub(crate) fn with_room(rows: usize, items: usize) -> Self {
         let mut starts = Vec::with_capacity(rows + 1);
         starts.push(0);
         Self { starts, items: Vec::with_capacity(items) }
     }
 
-    /// Starts lists that will have about as many items as others.
+    /// Starts lists with room for about as many items as another has.
     pub(crate) fn like(other: &Self) -> Self {
         Self::with_room(other.starts.len(), other.items.len() + other.items.len() / 8)
     }
@@ -57,7 +57,7 @@ impl<T> RowLists<T> {
         &self.items[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
 
-    /// Returns the items of all rows. What is added to them belongs to the row that
+    /// Returns the items of all rows. Items added to them belong to the row that
     /// [`end_row`](Self::end_row) ends.
     #[inline]
     pub(crate) fn items_mut(&mut self) -> &mut Vec<T> {
@@ -70,7 +70,7 @@ impl<T> RowLists<T> {
         self.starts.push(self.items.len() as u32);
     }
 
-    /// Returns where each row's items start, and where those of the last end; and the items.
+    /// Returns the start of each row's items and the end of the last row's; and the items.
     pub(crate) fn into_arrays(self) -> (Vec<u32>, Vec<T>) {
         (self.starts, self.items)
     }

@@ -1,4 +1,4 @@
-//! What a shaded row is made of: gray levels, or the depths of the part.
+//! Defines the pixels of a shaded row: gray levels, or the depths of the part.
 
 use std::iter;
 
@@ -8,26 +8,26 @@ use super::row_lists::RowLists;
 
 /// Rows that get the depth of the part below each pixel.
 pub(crate) trait ShadedRows {
-    /// What a pixel becomes.
+    /// The value of a pixel.
     type Pixel: Copy + PartialEq;
-    /// A column from which on pixels are another.
+    /// A column from which on pixels have another value.
     type Change;
 
     /// A pixel outside the part.
     const OUTSIDE: Self::Pixel;
-    /// A pixel below which the part is deeper than it matters.
+    /// A pixel below which the part is deeper than any depth that matters.
     const DEEP: Self::Pixel;
 
-    /// Returns a pixel below which the part is so deep, in micrometres.
+    /// Returns the pixel for a depth of part below it, in micrometers.
     fn of_depth(&self, depth_um: f64) -> Self::Pixel;
 
     fn change(column: u32, pixel: Self::Pixel) -> Self::Change;
 
-    /// Returns the rows, to which changes from the left are to be added.
+    /// Returns the rows; changes are added to them from the left.
     fn rows_mut(&mut self) -> &mut RowLists<Self::Change>;
 }
 
-/// Gray levels that cure each depth by themselves.
+/// Gray levels, each of which alone cures its depth.
 pub(crate) struct LevelRows<'a> {
     levels: &'a DepthLevels,
     width: u32,
@@ -78,7 +78,7 @@ pub(crate) fn finished(width: u32, rows: RowLists<LevelChange>) -> Image {
     Image::Mask(Mask::new(width, row_offsets, transitions).expect(rises))
 }
 
-/// The depth of the part below each pixel of a layer, in micrometres from the layer's top: zero
+/// The depth of the part below each pixel of a layer, in micrometers from the layer's top: zero
 /// outside, infinite where it is deeper than light reaches.
 #[derive(Debug)]
 pub(crate) struct DepthRows {
@@ -100,8 +100,8 @@ impl DepthRows {
         self.changes.len()
     }
 
-    /// Returns the pieces of equal depth of a row that are part, as the first column, the one after
-    /// the last, and the depth.
+    /// Returns the pieces of equal depth in a row that are part, as the first column, the column
+    /// after the last, and the depth.
     #[inline]
     pub(crate) fn parts(&self, row: u32) -> impl Iterator<Item = (u32, u32, f64)> {
         let changes = self.changes.row(row);
@@ -112,10 +112,9 @@ impl DepthRows {
         })
     }
 
-    /// Returns the pieces of equal depth of some columns of a row, as [`parts`](Self::parts) does, and
-    /// those outside.
-    /// `read` is the number of changes at or before columns that were asked for before; these must
-    /// come from the left.
+    /// Returns the pieces of equal depth of some columns of a row, as [`parts`](Self::parts) does,
+    /// including pieces outside. `read` is the number of changes at or before the columns requested
+    /// so far; these must come from the left.
     #[inline]
     pub(crate) fn pieces_from(
         &self,

@@ -18,12 +18,12 @@ pub(crate) struct Shader<'a, R: ShadedRows> {
     spans: &'a Grouped<DepthSpan>,
     /// The spans over a column, in the order of their starts.
     open: Vec<&'a DepthSpan>,
-    /// What a pixel's line is in on its way down.
+    /// The position of a pixel's line in the part on its way down.
     below: Position<'a>,
     met: Vec<(f64, &'a DepthSpan)>,
     /// The columns at which the row enters and leaves the part.
     transitions: Vec<u32>,
-    /// The pixel that the row ends with.
+    /// The last pixel of the row.
     last: R::Pixel,
     width: u32,
 }
@@ -113,8 +113,8 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
     }
 
-    /// Adds columns that lie over one facet at most, as far as these go, and returns the first that
-    /// does not; or opens the spans of several.
+    /// Adds columns over at most one facet, as far as these go, and returns the first column that
+    /// is not one of them; or opens the spans of several facets.
     fn shade_alone(
         &mut self,
         column: u32,
@@ -166,7 +166,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         }
     }
 
-    /// Adds columns over one facet that lies below the section.
+    /// Adds columns over one facet below the section.
     fn shade_over(&mut self, span: &DepthSpan, start: u32, end: u32, position: &Position<'a>) {
         self.below.move_to(position);
         self.below.step(span.body(), -span.winding());
@@ -195,14 +195,14 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
             let is_near = depth <= plane_um + first.tie_um().max(self.planes.tolerance_um());
             for (k, (_, span)) in group.iter().enumerate() {
                 let is_alike = |(_, other): &&(f64, &DepthSpan)| span.body() == other.body();
-                // All spans of a body at once, at the first of them.
+                // All spans of a body at once, at the first one.
                 if group[..k].iter().any(|other| is_alike(&other)) {
                     continue;
                 }
                 let alike = group[k..].iter().filter(is_alike);
                 let lost = alike.map(|(_, span)| span.winding()).sum::<i32>();
-                // The section accounts for facets that count as lying on the plane and lead
-                // into what it is in, or out of what it is not in.
+                // The section accounts for facets that count as lying on the plane and lead into a
+                // body that it is in, or out of a body that it is not in.
                 let there = section.winding_about(span.body());
                 let inwards = if there == 0 { -1 } else { there.signum() };
                 if !is_near || lost * inwards > 0 {

@@ -1,4 +1,4 @@
-//! The gray of layers where the part is less deep than they are.
+//! Defines the gray of layers where the part below is thinner than the layers.
 
 use lamp_stack::FadingLevels;
 
@@ -6,18 +6,18 @@ use super::levels::LayerLevels;
 use super::print_through::PrintThrough;
 use crate::planes::Planes;
 
-/// The gray of layers where the part is less deep than light reaches. Gray layers are swept down
-/// from their sections, which must be at their tops ([`PlaneRule::Top`](crate::PlaneRule::Top)).
+/// The gray of layers where the part is less deep than the light reaches. Gray layers are swept
+/// down from their sections, which must be at their tops
+/// ([`PlaneRule::Top`](crate::PlaneRule::Top)).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Shading {
-    /// None: pixels are white or black.
+    /// No gray: pixels are white or black.
     #[default]
     White,
-    /// Each layer by itself: the level that cures the depth of the part below its top.
+    /// Each layer alone: the level that cures the depth of the part below its top.
     ByDepth(LayerLevels),
-    /// Layers whose doses add up, by what each level leaves in the resin below: down each column of
-    /// pixels, the least light is taken away from white layers that leaves the undersides where
-    /// they are.
+    /// Layers whose doses add up, by the light that each level leaves in the resin below: down each
+    /// column of pixels, white layers lose the least light that leaves the undersides in place.
     PrintThrough(LayerLevels<FadingLevels>),
 }
 
@@ -40,7 +40,7 @@ impl PlacedShading {
         }
     }
 
-    /// Returns the shading that it was made of.
+    /// Returns the shading from which it was made.
     pub(crate) fn unplaced(&self) -> Shading {
         match self {
             Self::White => Shading::White,
@@ -49,7 +49,7 @@ impl PlacedShading {
         }
     }
 
-    /// Returns how far below their sections layers look at facets, if they do.
+    /// Returns the distance below their sections down to which layers examine facets, if they do.
     pub(crate) fn reach_um(&self) -> Option<f64> {
         match self {
             Self::White => None,

@@ -1,4 +1,4 @@
-//! Facets as vertical lines through pixels meet them, and the depths there.
+//! Finds where vertical lines through pixels meet facets, and the depths there.
 
 use std::ops::Range;
 
@@ -8,14 +8,14 @@ use crate::cutter::Cutter;
 use crate::facet::{PlacedFacet, facet_heights};
 use crate::scan::RowFacet;
 
-/// Facets closer than this to each other, or to a layer's plane, count as touching: far
-/// more than rounding, far less than anything cures.
+/// Facets closer than this to each other, or to a layer's plane, count as touching: far more than
+/// rounding, far less than any cure depth.
 const TOUCHING_UM: f64 = 1e-3;
 
-/// The same sideways: a pixel's centre may be this far off.
+/// The same distance sideways: a pixel's center may be this far off.
 const ASIDE_PIXELS: f64 = 1e-6;
 
-/// A facet seen from above: x and y in pixels, z in micrometres.
+/// A facet seen from above: x and y in pixels, z in micrometers.
 pub(crate) struct Sheet {
     facet: RowFacet,
     low_um: f64,
@@ -28,7 +28,7 @@ pub(crate) struct Sheet {
 }
 
 impl Sheet {
-    /// Looks at a body's facet from above. Returns `None` if no vertical line meets it.
+    /// Projects a body's facet from above. Returns `None` if no vertical line meets it.
     pub(crate) fn new(cutter: &Cutter<'_>, facet: &PlacedFacet, body: u32) -> Option<Self> {
         let corners = facet.map(|[x, y, z_um]| {
             let [column, row] = cutter.grid.to_pixels(x, y);
@@ -49,14 +49,14 @@ impl Sheet {
             high_um,
             steepness: 1.0 + um_per_pixel / cutter.grid.dpi.pitch().um(),
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
-            // Rows count downwards: facets that face down turn clockwise in y.
+            // Rows count downward: facets that face down turn clockwise in y.
             winding: if area > 0.0 { 1 } else { -1 },
             body,
         })
     }
 
-    /// Calls `each` with the spans of `layers`, whose planes are above its lowest corner:
-    /// from just above the section to the end of the exposure.
+    /// Calls `each` with the spans of `layers` whose planes are above its lowest corner: from just
+    /// above the section to the end of the exposure.
     pub(crate) fn for_each_span(
         &self,
         cutter: &Cutter<'_>,
@@ -94,8 +94,7 @@ impl Sheet {
         }
     }
 
-    /// Calls `each` with every pixel that meets it between two heights, and the height
-    /// there.
+    /// Calls `each` with every pixel that meets it between two heights, and the height there.
     pub(crate) fn for_each_pixel(
         &self,
         cutter: &Cutter<'_>,
@@ -138,9 +137,9 @@ impl Sheet {
         RowStretch::new(ends, [self.low_um, self.high_um], width)
     }
 
-    /// Returns how much higher or lower a surface at a distance from it may be.
+    /// Returns the height by which a surface at a distance from it may be higher or lower.
     pub(crate) fn slack_um(&self, near_um: f64) -> f64 {
-        // Not more than the facet itself, twice: steeper ones are met by few lines.
+        // At most twice the facet's own height: few lines meet steeper facets.
         let most = near_um + 2.0 * (self.high_um - self.low_um);
         (near_um * self.steepness).min(most)
     }

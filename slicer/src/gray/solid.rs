@@ -1,5 +1,5 @@
-//! The columns of a row that are part in all layers above whose light counts: those below which
-//! nearly all undersides lie.
+//! Finds the columns of a row that are part in all layers above whose light counts. Nearly all
+//! undersides are below such columns.
 
 use super::below::Below;
 
@@ -8,25 +8,25 @@ pub(super) type Intervals = Vec<(u32, u32)>;
 
 /// The columns of a row that are part in as many layers as count, or a few more, from a layer down.
 ///
-/// What is part in all layers of a window that slides down follows from blocks of half its length:
-/// from two whole blocks and the layers of a third.
+/// A window of layers slides down. The columns that are part in all its layers follow from blocks
+/// of half its length: from two whole blocks and the layers of a third.
 #[derive(Default)]
 pub(crate) struct SolidRow {
     width: u32,
-    /// Part in all layers of the last two whole blocks, of the last one, and of the one that has
-    /// begun.
+    /// The columns that are part in all layers of the last two whole blocks, of the last one, and
+    /// of the current block.
     last_two: Intervals,
     last: Intervals,
     begun: Intervals,
-    /// The layers that the block still lacks.
+    /// The number of layers that the current block lacks.
     left: u32,
-    /// The layers of each block but the first.
+    /// The number of layers of each block except the first.
     block: u32,
 }
 
 impl SolidRow {
-    /// Starts with the layer below one of which nothing is known, or with the part's last if it
-    /// `is_top`: no light comes from above that.
+    /// Starts with the layer below an unknown layer, or with the part's last layer if it `is_top`:
+    /// no light comes from above that layer.
     pub(crate) fn start(&mut self, width: u32, most_above: u32, is_top: bool) {
         self.width = width;
         self.block = most_above.div_ceil(2).max(1);
@@ -39,13 +39,13 @@ impl SolidRow {
         }
     }
 
-    /// Adds the columns that are part in all layers above that count, but for some that are so only
-    /// in few more.
+    /// Adds the columns that are part in all layers above that count, except some that are part in
+    /// only a few more layers.
     pub(crate) fn push_columns(&self, to: &mut Intervals) {
         push_common(&self.last_two, self.begun.iter().copied(), to);
     }
 
-    /// Goes down through a layer, given what lies below its row. `spare` is a list to work with.
+    /// Goes down through a layer, given the undersides below its row. `spare` is a scratch list.
     pub(crate) fn go_down(&mut self, layer: usize, below: &[Below], spare: &mut Intervals) {
         let is_through = |piece: &&Below| piece.layer != layer as u32;
         let part = below.iter().filter(is_through).map(|piece| (piece.start, piece.end));
@@ -64,7 +64,7 @@ impl SolidRow {
     }
 }
 
-/// Adds the columns that lie in a part, too, whose pieces come from the left.
+/// Adds the columns that are also in a part, whose pieces come from the left.
 fn push_common(columns: &[(u32, u32)], part: impl Iterator<Item = (u32, u32)>, to: &mut Intervals) {
     let mut rest = columns;
     for (start, end) in part {
@@ -96,7 +96,8 @@ mod tests {
 
     const WIDTH: u32 = 40;
 
-    /// The part of a row in some layers, from the top down, as pieces with the layer of the underside.
+    /// Generates the part of a row in some layers, from the top down, as pieces with the layer of
+    /// the underside.
     fn layers() -> impl Strategy<Value = Vec<Vec<Below>>> {
         let piece = (0u32..6, 1u32..30, prop::bool::weighted(0.2));
         let row = prop::collection::vec(piece, 0..4);
@@ -135,7 +136,7 @@ mod tests {
                 row.push_columns(&mut solid);
                 prop_assert!(solid.is_sorted_by(|a, b| a.1 < b.0));
                 let is_solid = |column: u32| solid.iter().any(|&(from, to)| (from..to).contains(&column));
-                // Those that count, and all that can be looked at.
+                // The layers that count, and all layers that can be looked at.
                 let most_seen = 3 * most_above.div_ceil(2).max(1);
                 let [counts, all] = [most_above, most_seen].map(|most| {
                     let first = (done + 1).saturating_sub(most as usize);

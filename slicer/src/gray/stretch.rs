@@ -1,16 +1,15 @@
-//! The columns of a row that meet a facet, and the layers that look at each of them.
+//! Finds the columns of a row that meet a facet, and the layers that look at each column.
 
 use std::ops::Range;
 
 use crate::planes::Planes;
 use crate::scan::ceil_clamped;
 
-/// Facets this near to the part's lowest point stand on the platform. A flat underside
-/// that was turned into its place is not level to the last digit.
+/// Facets this near the part's lowest point stand on the platform. A flat underside that was turned
+/// into its place is not exactly level.
 const STANDING_UM: f64 = 1.0;
 
-/// The columns of a row that meet a facet, with heights along the line from edge to
-/// edge.
+/// The columns of a row that meet a facet, with heights along the line from edge to edge.
 pub(super) struct RowStretch {
     columns: Range<u32>,
     ends: [f64; 2],
@@ -19,8 +18,8 @@ pub(super) struct RowStretch {
 }
 
 impl RowStretch {
-    /// Creates the stretch between two points (x, z) of a facet's edges, if a pixel's centre lies
-    /// between them. Heights are those of the facet, whatever rounding makes of its edges.
+    /// Creates the stretch between two points (x, z) of a facet's edges, if a pixel's center is
+    /// between them. Heights are the facet's, regardless of rounding at its edges.
     #[inline]
     pub(super) fn new(
         ends: [[f64; 2]; 2],
@@ -43,7 +42,7 @@ impl RowStretch {
         self.columns.clone()
     }
 
-    /// Returns how much it rises from column to column.
+    /// Returns its rise from column to column.
     #[inline]
     pub(super) fn um_per_column(&self) -> f64 {
         self.um_per_column
@@ -64,8 +63,8 @@ impl RowStretch {
         z.clamp(low, high)
     }
 
-    /// Calls `each` with the layers of a range that look at it, the columns that each one looks at,
-    /// and the depth of the first of these.
+    /// Calls `each` with the layers of a range that look at it, the columns that each layer looks
+    /// at, and the depth of the first of these columns.
     #[inline]
     pub(super) fn for_each_look(
         &self,
@@ -92,7 +91,7 @@ impl RowStretch {
         }
     }
 
-    /// The same where layers are many and columns few: a sweep from the lowest column to the highest.
+    /// The same for many layers and few columns: a sweep from the lowest column to the highest.
     #[inline]
     fn for_each_look_of_few(
         &self,
@@ -104,7 +103,7 @@ impl RowStretch {
         let count = end - start;
         let rises = self.um_per_column > 0.0;
         let height = |k: u32| self.height(if rises { start + k } else { end - 1 - k });
-        // Columns from `low` on are not too deep, those before `high` not above the section.
+        // Columns from `low` on are not too deep; columns before `high` are not above the section.
         let (mut low, mut high, mut layer) = (0, 0, layers.start);
         while layer < layers.end {
             let (top_um, depths) = (looks.planes.top_um(layer), looks.depths(layer));
@@ -130,7 +129,7 @@ impl RowStretch {
         }
     }
 
-    /// Returns the columns that a layer looks at, and the first one's depth.
+    /// Returns the columns that a layer looks at, and the depth of the first one.
     #[inline]
     fn within(&self, looks: &Looks<'_>, layer: usize) -> Option<(Range<u32>, f64)> {
         let Range { mut start, mut end } = self.columns;
@@ -153,7 +152,7 @@ impl RowStretch {
     }
 }
 
-/// How layers look at a facet.
+/// Holds the data by which layers look at a facet.
 pub(super) struct Looks<'a> {
     pub(super) planes: &'a Planes,
     pub(super) reach_um: f64,

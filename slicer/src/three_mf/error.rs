@@ -1,32 +1,32 @@
-//! Why a 3MF file cannot be read.
+//! Defines the errors of reading a 3MF file.
 
 use thiserror::Error;
 use zip::result::ZipError;
 
-/// Objects that are visited in all.
+/// The greatest total number of visited objects.
 pub(super) const MAX_VISITS: usize = 1 << 14;
 
-/// Why a 3MF file cannot be read.
+/// The reason why a 3MF file cannot be read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ThreeMfError {
-    /// The package is damaged, or packed in another way than 3MF allows.
+    /// The package is damaged, or packed in a way that 3MF does not allow.
     #[error("its ZIP package cannot be read")]
     Package(#[from] ZipError),
-    /// A ZIP package of another kind.
+    /// The file is a ZIP package of another kind.
     #[error("it is a ZIP package without a 3D model: it has no {0}")]
     NoModel(String),
-    /// A model that is no XML, or breaks off.
+    /// A model is not XML, or breaks off.
     #[error("byte {at} of its {model}: {fault}")]
     Model {
         /// The name of the model in the package.
         model: String,
-        /// The byte near which the fault is.
+        /// The approximate byte of the fault.
         at: u64,
         /// The fault there.
         fault: ModelFault,
     },
-    /// An item or a component of an object that is not there.
+    /// An item or a component refers to a missing object.
     #[error("it builds object {id} of its {model}, which is not there")]
     NoObject {
         /// The name of the model in the package.
@@ -34,17 +34,17 @@ pub enum ThreeMfError {
         /// The object's number.
         id: u32,
     },
-    /// An object whose shape is made in a way that is not read.
+    /// The shape of an object is defined in an unsupported way.
     #[error("object {id} of its {model} is made by {feature}, which is not read")]
     Unread {
         /// The name of the model in the package.
         model: String,
         /// The object's number.
         id: u32,
-        /// The way in which it is made.
+        /// The unsupported feature.
         feature: &'static str,
     },
-    /// Slices that cannot be read.
+    /// Slices cannot be read.
     #[error("object {id} of its {model} has {fault}")]
     Slices {
         /// The name of the model in the package.
@@ -54,27 +54,27 @@ pub enum ThreeMfError {
         /// The fault of its slices.
         fault: &'static str,
     },
-    /// A model that cannot be read without its key.
+    /// A model cannot be read without its key.
     #[error("its {0} is encrypted, and encrypted models are not read")]
     Encrypted(String),
-    /// An object that holds itself, or very many objects.
+    /// An object contains itself, or there are very many objects.
     #[error("its objects hold themselves, or more than {MAX_VISITS} objects in all")]
     Endless,
-    /// No item that is built.
+    /// No item is built.
     #[error("it holds nothing to build: {}", why_nothing(*.items))]
     NothingToBuild {
         /// The number of items.
         items: usize,
     },
-    /// Items that stand for far more facets than a package of its size explains.
+    /// Items represent far more facets than the package's size explains.
     #[error("its items stand for more than {0} facets, far more than a package of its size does")]
     Copies(u64),
-    /// A package that holds far more than any mesh its size.
+    /// A package contains far more than any mesh of its size.
     #[error("its model unpacks to more than {0} bytes, which is far more than a packed mesh does")]
     Inflated(u64),
 }
 
-/// Returns why none of so many items is built.
+/// Returns the reason why none of `items` items is built.
 fn why_nothing(items: usize) -> String {
     let items = match items {
         0 => return "it has no items".to_owned(),
@@ -88,10 +88,10 @@ fn why_nothing(items: usize) -> String {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ModelFault {
-    /// The text is no XML.
+    /// The text is not XML.
     #[error("{}", start_of(.0))]
     Xml(#[source] quick_xml::Error),
-    /// An attribute that is missing or cannot be read.
+    /// An attribute is missing or cannot be read.
     #[error("<{element}> has no {attribute} that can be read")]
     Attribute {
         /// The element's name.
@@ -99,23 +99,23 @@ pub enum ModelFault {
         /// The attribute's name.
         attribute: &'static str,
     },
-    /// A triangle at a vertex that does not stand before it, or a segment of a slice.
+    /// A triangle or a segment of a slice refers to a vertex that is not defined before it.
     #[error("a {of} names vertex {vertex} of {count}")]
     NoVertex {
         /// The element.
         of: &'static str,
         /// The vertex, from 0.
         vertex: u32,
-        /// How many there are.
+        /// The number of vertices.
         count: usize,
     },
-    /// Volumes of a project that a mesh does not have.
+    /// Volumes of a project refer to triangles that a mesh does not have.
     #[error("the project's volumes of object {object} overlap, or are not in its mesh")]
     Volumes {
         /// The object's number.
         object: u32,
     },
-    /// An extension that must be understood, and is not.
+    /// A required extension is not supported.
     #[error("it needs the extension {0}, which is not read")]
     Extension(String),
     /// The text ends before the model does.

@@ -1,9 +1,9 @@
-//! Reads 3MF: packed XML with meshes, and the items that are built of them.
+//! Reads 3MF: packed XML with meshes, and the items built from them.
 //!
-//! An item stands where its transform puts it. Its object is a mesh, or is put together
-//! of other objects, each with a transform of its own. Every mesh that is reached becomes
-//! a piece; pieces of one mesh share its facets. Projects of slicers have meshes that are cut out
-//! of others, and some that are no solids.
+//! An item is placed by its transform. Its object is a mesh, or consists of other objects, each
+//! with its own transform. Every mesh that is reached becomes a piece; pieces of one mesh share its
+//! facets. Projects of slicers have meshes that are cut out of others, and meshes that are not
+//! solids.
 
 mod error;
 mod model;
@@ -30,14 +30,14 @@ use slices::Prisms;
 pub use error::{ModelFault, ThreeMfError};
 pub(crate) use package::looks_packaged;
 
-/// Objects within objects, so that a few lines of text may stand for more meshes than
-/// there are atoms.
+/// The greatest nesting of objects. Without a limit, a few lines of text could represent more
+/// meshes than there are atoms.
 const MAX_DEPTH: usize = 32;
-/// A mesh whose volume differs by a larger share from its slices' is a stand-in, often their
+/// A mesh whose volume differs from its slices' volume by a larger share is a stand-in, often their
 /// bounding box. Slices are coarse: each has the height of a layer.
 const SAME_VOLUME: f64 = 0.05;
 
-/// What a file holds.
+/// The contents of a file.
 pub(crate) struct Contents {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) notes: Vec<ReadNote>,
@@ -83,7 +83,7 @@ pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
     Ok(Contents { pieces: found.pieces, notes })
 }
 
-/// The pieces of the items that were read so far.
+/// The pieces of the items read so far.
 #[derive(Default)]
 struct Found {
     pieces: Vec<Piece>,
@@ -106,7 +106,7 @@ impl Found {
     }
 }
 
-/// Counts of the content that is not built.
+/// The counts of contents that are not built.
 #[derive(Default)]
 struct LeftOut {
     no_solids: usize,
@@ -114,7 +114,7 @@ struct LeftOut {
     lone_negatives: usize,
     /// The volumes by their kind.
     volumes: BTreeMap<String, usize>,
-    /// Objects whose slices are left out, and objects whose mesh is.
+    /// Objects whose slices are left out, and objects whose mesh is left out.
     slices: BTreeSet<(String, u32)>,
     stand_ins: BTreeSet<(String, u32)>,
     extensions: BTreeSet<String>,
@@ -137,28 +137,28 @@ impl LeftOut {
     }
 }
 
-/// Where an object stands and what it is there.
+/// The place of an object, and its role there.
 #[derive(Default)]
 struct Place {
     placement: Placement,
     depth: usize,
-    /// The number of the placed object that it is a part of, and whether its project lists it.
+    /// The number of the placed object that contains it, and whether its project lists it.
     object: usize,
     is_in_project: bool,
     kind: VolumeKind,
 }
 
-/// The models of a package, each read when it is first asked for.
+/// The models of a package, each read on first use.
 struct Models<'a> {
     package: Package<'a>,
-    /// The name of the one that the package is about.
+    /// The name of the package's main model.
     root: String,
     encrypted: Vec<String>,
     project: Project,
     models: BTreeMap<String, Model>,
-    /// The solids of objects that have slices; none where the mesh is read.
+    /// The solids of objects that have slices; `None` where the mesh is read.
     sliced: BTreeMap<(String, u32), Option<Piece>>,
-    /// How many facets they have so far.
+    /// The number of their facets so far.
     facets: usize,
 }
 
@@ -180,7 +180,7 @@ impl Models<'_> {
         Ok(&self.models[path])
     }
 
-    /// Returns the name of a model that another one names.
+    /// Returns the name of a model that another model refers to.
     fn path_of(&self, target: &str, from: &str) -> Result<String, ThreeMfError> {
         let found = self.package.find(target, from);
         found.map(str::to_owned).ok_or_else(|| ThreeMfError::NoModel(without_root(target)))
@@ -191,7 +191,7 @@ impl Models<'_> {
         object.ok_or_else(|| ThreeMfError::NoObject { model: path.to_owned(), id })
     }
 
-    /// Adds the pieces of an object as it stands in others.
+    /// Adds the pieces of an object as placed in other objects.
     fn expand(
         &mut self,
         from: &str,
@@ -259,7 +259,7 @@ impl Models<'_> {
         Ok(())
     }
 
-    /// Adds a piece of a kind that stands at a place.
+    /// Adds a piece of a given kind at a place.
     fn add(
         &self,
         piece: &Piece,
@@ -284,7 +284,7 @@ impl Models<'_> {
         Ok(())
     }
 
-    /// Returns the slices of an object, if they stand for it and its mesh does not.
+    /// Returns the slices of an object, if they represent it and its mesh does not.
     fn sliced(
         &mut self,
         path: &str,
@@ -318,7 +318,7 @@ impl Models<'_> {
         Ok(piece)
     }
 
-    /// Returns the slices of a stack and of the stacks that it names, or the fault of these.
+    /// Returns the slices of a stack and of the stacks that it refers to, or their fault.
     fn prisms(
         &mut self,
         path: &str,
@@ -343,8 +343,8 @@ impl Models<'_> {
         Ok(if prisms.volume > 0.0 { Ok(prisms) } else { Err("slices without area") })
     }
 
-    /// Returns true if an object has about this volume, in units of its file, or is made of others,
-    /// whose volume is not known.
+    /// Returns true if an object has about this volume, in units of its file, or consists of other
+    /// objects, whose volume is not known.
     fn has_volume(&mut self, path: &str, id: u32, volume: f64) -> Result<bool, ThreeMfError> {
         let Shape::Mesh(volumes) = &self.object(path, id)?.shape else { return Ok(true) };
         let facets = volumes.iter().flat_map(|(_, piece)| match &piece.facets {

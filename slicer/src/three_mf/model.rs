@@ -21,15 +21,15 @@ use crate::placement::Placement;
 /// The effect of an extension of 3MF on the objects that use it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Effect {
-    /// It leaves meshes as they are, or adds objects that are read.
+    /// It leaves meshes unchanged, or adds objects that the reader supports.
     None,
-    /// It has slices, which are read.
+    /// It has slices, which the reader supports.
     Slices,
-    /// Its elements in an object make another shape of it.
+    /// Its elements in an object change the object's shape.
     Shape(&'static str),
 }
 
-/// Words of the namespaces of extensions, whose years differ, and the effects of these.
+/// Words in the namespaces of extensions, whose years differ, and the effects of the extensions.
 const EXTENSIONS: [(&str, Effect); 12] = [
     ("/3dmanufacturing/production/alternatives/", Effect::None),
     ("/3dmanufacturing/production/", Effect::None),
@@ -45,7 +45,7 @@ const EXTENSIONS: [(&str, Effect); 12] = [
     ("/3dmanufacturing/securecontent/", Effect::None),
 ];
 
-/// Returns what the extension of a namespace does, if it is known.
+/// Returns the effect of a namespace's extension, if it is known.
 fn effect_of(namespace: &str) -> Option<Effect> {
     EXTENSIONS.iter().find(|(words, _)| namespace.contains(words)).map(|(_, effect)| *effect)
 }
@@ -55,25 +55,25 @@ pub(super) struct Model {
     pub(super) units: Units,
     pub(super) objects: BTreeMap<u32, Object>,
     pub(super) slice_stacks: BTreeMap<u32, SliceStack>,
-    /// What is built.
+    /// The items to build.
     pub(super) items: Arc<Vec<Reference>>,
-    /// The number of facets of the package up to its end.
+    /// The number of facets of the package up to the end of this model.
     pub(super) facets_end: usize,
 }
 
 pub(super) struct Object {
-    /// Whether it is part of what is built, not a support, a surface or anything else.
+    /// Whether it is material to build, rather than a support, a surface or anything else.
     pub(super) is_solid: bool,
-    /// Its kind by the settings of its project.
+    /// Its kind according to the settings of its project.
     pub(super) kind: VolumeKind,
     pub(super) shape: Shape,
-    /// The stack of its slices, if it has some.
+    /// The stack of its slices, if it has any.
     pub(super) slices: Option<u32>,
-    /// Whether its shape stands for a finer one that is elsewhere.
+    /// Whether its shape represents a finer one elsewhere.
     pub(super) is_stand_in: bool,
-    /// An extension that gives it another shape and is not read.
+    /// An unsupported extension that changes its shape.
     pub(super) unread: Option<&'static str>,
-    /// Names of extensions that are not known and have elements in it.
+    /// Names of unknown extensions that have elements in it.
     pub(super) unknown: BTreeSet<String>,
 }
 
@@ -83,10 +83,10 @@ pub(super) enum Shape {
     Components(Arc<Vec<Reference>>),
 }
 
-/// An object as an item or another object holds it.
+/// A reference to an object, from an item or another object.
 #[derive(Clone, Debug)]
 pub(super) struct Reference {
-    /// The file that it is in, if that is another one.
+    /// The file of the object, if it is another file.
     pub(super) model: Option<String>,
     pub(super) object: u32,
     pub(super) placement: Placement,
@@ -121,7 +121,7 @@ impl Model {
     }
 }
 
-/// A model as far as it was read.
+/// The part of a model read so far.
 struct ModelReader<'a> {
     project: &'a Project,
     units: Units,
@@ -131,13 +131,13 @@ struct ModelReader<'a> {
     first_facet: usize,
     /// The namespace of 3MF's own elements.
     own: Option<String>,
-    /// The object at hand and its number.
+    /// The current object and its number.
     object: Option<(u32, Object)>,
     mesh: DecimalMesh,
     /// Volumes that the model lists itself.
     volumes: Vec<Volume>,
     components: Vec<Reference>,
-    /// The key of the setting at hand.
+    /// The key of the current setting.
     setting: Option<String>,
 }
 
@@ -227,13 +227,13 @@ impl<'a> ModelReader<'a> {
         match (effect, tag.local_name().as_ref()) {
             (Some(Effect::Shape(what)), _) => object.unread = Some(what),
             (Some(_), _) => {}
-            // Slic3r lists the volumes of a mesh behind its triangles.
+            // Slic3r lists the volumes of a mesh after its triangles.
             (None, "volume") if attribute(tag, "ts")?.is_some() => {
                 let mut volume = Volume::of_triangles(tag, ["ts", "te"])?;
                 volume.set("modifier", &attribute(tag, "modifier")?.unwrap_or_default());
                 self.volumes.push(volume);
             }
-            // Cura has settings of objects.
+            // Cura has settings for objects.
             (None, "setting") => self.setting = attribute(tag, "key")?,
             (None, "settings" | "volumes" | "metadata") => {}
             (None, _) => {
@@ -315,8 +315,8 @@ impl<'a> ModelReader<'a> {
     }
 }
 
-/// Splits a mesh into volumes; triangles of none are a solid. Returns none if it has no such
-/// volumes.
+/// Splits a mesh into volumes; triangles without a volume are a solid. Returns `None` if it has no
+/// such volumes.
 fn volumes_of(mesh: &Piece, volumes: &[Volume]) -> Option<Vec<(VolumeKind, Piece)>> {
     let count = mesh.facets.count();
     let mut ranges: Vec<_> = volumes
@@ -355,7 +355,7 @@ fn volumes_of(mesh: &Piece, volumes: &[Volume]) -> Option<Vec<(VolumeKind, Piece
     Some(pieces)
 }
 
-/// Reads twelve numbers: where x, y and z go, and a shift.
+/// Reads twelve numbers: the images of x, y and z, and a shift.
 fn transform(text: &str, units: Units) -> Option<Placement> {
     let numbers = text.split_whitespace().map(|number| number.parse().ok());
     let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;

@@ -1,4 +1,4 @@
-//! Finds the files of a ZIP package, however programs write their names.
+//! Finds the files of a ZIP package, regardless of how programs write their names.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -22,9 +22,9 @@ const USUAL_MODEL: &str = "3D/3dmodel.model";
 /// A ZIP package.
 pub(super) struct Package<'a> {
     archive: ZipArchive<BufReader<FileReader<'a>>>,
-    /// The numbers and names of its files by the plain forms of these.
+    /// The numbers and names of its files, by the plain forms of the names.
     files: HashMap<String, (usize, String)>,
-    /// The most bytes that are unpacked in all, and those so far.
+    /// The total number of bytes that may be unpacked, and the number so far.
     pub(super) most: u64,
     unpacked: u64,
 }
@@ -40,7 +40,7 @@ impl<'a> Package<'a> {
         Ok(Self { archive, files, most: most_unpacked(file.size()), unpacked: 0 })
     }
 
-    /// Returns the name of the file that a target means in a file of the package.
+    /// Returns the name of the file that a target in a file of the package refers to.
     pub(super) fn find(&self, target: &str, from: &str) -> Option<&str> {
         let folder = from.rsplit_once(['/', '\\']).map_or("", |(folder, _)| folder);
         let beside = || self.files.get(&plain(&format!("{folder}/{target}")));
@@ -77,7 +77,7 @@ impl<'a> Package<'a> {
         Ok(outcome)
     }
 
-    /// Returns the name of the model that the package is about, and the names of encrypted files.
+    /// Returns the name of the package's main model, and the names of encrypted files.
     pub(super) fn model_path(&mut self) -> Result<(String, Vec<String>), ThreeMfError> {
         let (mut model, mut keystore) = (None, None);
         if let Some(path) = self.find(RELATIONSHIPS, "").map(str::to_owned) {
@@ -107,7 +107,8 @@ impl<'a> Package<'a> {
         Ok((model, encrypted.map(str::to_owned).collect()))
     }
 
-    /// Calls `each` with the name of every element of a file, and what returns its attributes.
+    /// Calls `each` with the name of every element of a file, and a function that returns its
+    /// attributes.
     fn for_each_tag(
         &mut self,
         path: &str,
@@ -126,13 +127,13 @@ impl<'a> Package<'a> {
     }
 }
 
-/// Returns a name without the slash that stands for the package.
+/// Returns a name without the slash that represents the package.
 pub(super) fn without_root(name: &str) -> String {
     name.trim_start_matches(['/', '\\']).to_owned()
 }
 
-/// Returns the form of a name in which it is compared: names are equal whatever the case of their
-/// letters (OPC, 6.3.5), some programs write backslashes, and targets may be percent-encoded.
+/// Returns the form in which a name is compared: names are equal regardless of case (OPC, 6.3.5),
+/// some programs write backslashes, and targets may be percent-encoded.
 fn plain(name: &str) -> String {
     let mut bytes = Vec::with_capacity(name.len());
     let mut rest = name.as_bytes();
@@ -161,12 +162,12 @@ fn plain(name: &str) -> String {
     steps.join("/")
 }
 
-/// Returns true if a file is a ZIP package, whatever stands before it.
+/// Returns true if a file is a ZIP package, even if other bytes precede it.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read.
 pub(crate) fn looks_packaged(file: &PartFile, start: &[u8]) -> io::Result<bool> {
-    /// The record at a package's end, and the comment behind it.
+    /// The size of the record at a package's end; a comment may follow it.
     const END_BYTES: usize = 22;
     const LONGEST_COMMENT: u64 = 1 << 16;
     if start.starts_with(b"PK\x03\x04") {
@@ -184,7 +185,7 @@ pub(crate) fn looks_packaged(file: &PartFile, start: &[u8]) -> io::Result<bool> 
     let Some(end) = (0..(tail.len() + 1).saturating_sub(END_BYTES)).rfind(is_end) else {
         return Ok(false);
     };
-    // Its directory stands before it, or the end of a long one.
+    // It is preceded by the directory, or by the end of a long one.
     let size = u64::from(u32::from_le_bytes(tail[end + 12..][..4].try_into().expect("four bytes")));
     let Some(directory) = (tail_start + end as u64).checked_sub(size) else {
         return Ok(tail[..end].ends_with(b"PK\x06\x07"));

@@ -1,8 +1,8 @@
-//! Reads which volumes of an object are solids, as projects of slicers have it.
+//! Reads which volumes of an object are solids, according to projects of slicers.
 //!
-//! PrusaSlicer, SuperSlicer and old versions of Bambu Studio keep the volumes of an object as ranges
-//! of the triangles of one mesh, Bambu Studio and OrcaSlicer as components; Slic3r has ranges in
-//! the model, Cura settings of objects.
+//! PrusaSlicer, SuperSlicer and old versions of Bambu Studio store the volumes of an object as
+//! ranges of the triangles of one mesh; Bambu Studio and OrcaSlicer as components; Slic3r as ranges
+//! in the model; Cura as settings of objects.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -17,19 +17,19 @@ use super::xml::{BoundedText, Located, Xml, attribute, for_each_piece, number};
 /// PrusaSlicer, `model_settings.config` of Bambu Studio.
 pub(super) const PROJECT_FILES: [&str; 2] = ["_model.config", "/model_settings.config"];
 
-/// Files of projects that are for printers of resin, and what they have.
+/// Files of projects for resin printers, and their contents.
 pub(super) const UNREAD_FILES: [(&str, &str); 2] = [
     ("Metadata/Slic3r_PE_sla_support_points.txt", "support points"),
     ("Metadata/Slic3r_PE_sla_drain_holes.txt", "drain holes"),
 ];
 
-/// How a volume makes its object.
+/// The role of a volume in its object.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) enum VolumeKind {
     #[default]
     Solid,
     Negative,
-    /// Settings for where it lies, or something else of this name.
+    /// Settings for the region that it covers, or something else of this name.
     LeftOut(String),
 }
 
@@ -53,7 +53,7 @@ impl VolumeKind {
         Self::LeftOut(kind.chars().filter(|c| !c.is_control()).take(MAX_CHARACTERS).collect())
     }
 
-    /// Returns the kind that a setting of Cura gives an object.
+    /// Returns the kind that a Cura setting gives an object.
     pub(super) fn of_cura(key: &str, value: &str) -> Self {
         if !value.trim().eq_ignore_ascii_case("true") {
             return Self::Solid;
@@ -66,7 +66,7 @@ impl VolumeKind {
         }
     }
 
-    /// Returns the kind of a part of something of this kind.
+    /// Returns the kind of a part of an object of this kind.
     pub(super) fn of_part(&self, part: &Self) -> Self {
         if *self == Self::Solid { part.clone() } else { self.clone() }
     }
@@ -75,7 +75,7 @@ impl VolumeKind {
 /// A volume of an object.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Volume {
-    /// The object of the component that it is.
+    /// The object of the component that this volume is.
     component: Option<u32>,
     /// Its triangles in the object's mesh.
     pub(super) triangles: Option<Range<usize>>,
@@ -92,11 +92,11 @@ impl Volume {
         Ok(Self { triangles: Some(first..last.saturating_add(1)), ..Self::default() })
     }
 
-    /// Takes a setting of its project.
+    /// Applies a setting of its project.
     pub(super) fn set(&mut self, key: &str, value: &str) {
         match key {
             "volume_type" => self.kind = VolumeKind::of_name(value),
-            // Of versions that had no other kinds.
+            // From versions that had no other kinds.
             "modifier" if matches!(value, "1" | "true") && self.kind == VolumeKind::Solid => {
                 self.kind = VolumeKind::left_out("modifier");
             }
@@ -105,7 +105,7 @@ impl Volume {
     }
 }
 
-/// The volumes of objects that a project has.
+/// The volumes of a project's objects.
 #[derive(Debug, Default)]
 pub(super) struct Project {
     objects: BTreeMap<u32, Vec<Volume>>,
@@ -113,7 +113,7 @@ pub(super) struct Project {
 }
 
 impl Project {
-    /// Adds the objects of a file of the project that no other file had.
+    /// Adds the objects of a project's file that no earlier file had.
     pub(super) fn read(&mut self, text: &mut BoundedText<impl BufRead>) -> Result<(), Located> {
         let known: Vec<u32> = self.objects.keys().copied().collect();
         let mut object = None;
@@ -160,13 +160,13 @@ impl Project {
         })
     }
 
-    /// Returns the volumes of an object of the package's first model, if it lists some.
+    /// Returns the volumes of an object of the package's first model, if the project lists any.
     pub(super) fn volumes(&self, object: u32) -> Option<&[Volume]> {
         self.objects.get(&object).map(Vec::as_slice)
     }
 
-    /// Returns the kind of an object's component that is another object, after `before` others that
-    /// are the same one.
+    /// Returns the kind of an object's component that is another object, after `before` components
+    /// that are the same object.
     pub(super) fn kind_of_component(
         &self,
         object: u32,

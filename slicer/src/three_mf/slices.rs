@@ -1,4 +1,4 @@
-//! Reads the slices of the slice extension: polygons that stand for an object from one height to
+//! Reads the slices of the slice extension: polygons that represent an object from one height to
 //! the next.
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use crate::decimal_mesh::DecimalMesh;
 pub(super) struct SliceStack {
     bottom: f64,
     slices: Vec<Slice>,
-    /// Stacks in other files of the package that follow.
+    /// The stacks in other files of the package that follow.
     pub(super) references: Vec<(String, u32)>,
 }
 
@@ -22,7 +22,7 @@ pub(super) struct SliceStack {
 struct Slice {
     top: f64,
     vertices: Vec<[f64; 2]>,
-    /// Numbers of vertices, each polygon's first one again at its end.
+    /// The vertex numbers of each polygon; the first is repeated at the end.
     polygons: Vec<Vec<u32>>,
 }
 
@@ -89,7 +89,7 @@ impl Slice {
         }
     }
 
-    /// Adds the area between a line and the y axis, and so on around each polygon.
+    /// Adds the area between each side of the polygons and the y axis.
     fn area(&self) -> f64 {
         let sides = self.polygons.iter().flat_map(|polygon| polygon.windows(2));
         let twice = sides.map(|side| {
@@ -100,7 +100,7 @@ impl Slice {
     }
 }
 
-/// Slices as a solid: a prism for each polygon.
+/// Slices converted to a solid: a prism for each polygon.
 #[derive(Debug, Default)]
 pub(super) struct Prisms {
     pub(super) mesh: DecimalMesh,
@@ -110,7 +110,7 @@ pub(super) struct Prisms {
 }
 
 impl Prisms {
-    /// Adds the slices of a stack. Returns the reason if that cannot be.
+    /// Adds the slices of a stack. Returns the reason if this is not possible.
     pub(super) fn add(&mut self, stack: &SliceStack, most_facets: u64) -> Result<(), &'static str> {
         let mut bottom = stack.bottom;
         for slice in &stack.slices {
@@ -136,7 +136,7 @@ impl Prisms {
     }
 
     /// Adds a polygon between two heights. Its ends are fans of facets, which may overlap and still
-    /// have an odd number above each point within.
+    /// have an odd number above each inner point.
     fn add_prism(&mut self, slice: &Slice, polygon: &[u32], heights: [f64; 2]) {
         if polygon.len() < 3 {
             return;

@@ -1,4 +1,4 @@
-//! Packages as programs write them: the pieces and the notes that are read of each.
+//! Tests packages as programs write them: the pieces and notes read from each.
 
 use std::io::{Cursor, Write};
 
@@ -45,7 +45,7 @@ fn object(id: u32, meshes: &[Mesh]) -> String {
     Mesh { facets }.three_mf_object(id)
 }
 
-/// An object of others.
+/// An object that consists of others.
 fn components(id: u32, components: &str) -> String {
     format!("<object id=\"{id}\"><components>{components}</components></object>\n")
 }
@@ -176,7 +176,7 @@ fn volumes_that_a_mesh_does_not_have_are_refused() {
     }
 }
 
-/// A project of Bambu Studio or OrcaSlicer: parts are components, often in a model of their own.
+/// A project of Bambu Studio or OrcaSlicer: parts are components, often in a separate model.
 fn bambu(parts: &[&str], is_apart: bool) -> Vec<u8> {
     let meshes: String = (1..).zip(parts).map(|(id, _)| object(id, &[slab()])).collect();
     let path = if is_apart { "p:path=\"/3D/Objects/object_1.model\"" } else { "" };
@@ -279,7 +279,7 @@ fn negative_volumes_without_a_solid_are_left_out() {
     assert!(modifier.contains("its only item is"), "{modifier}");
 }
 
-/// The part's box holds its solids and no more.
+/// The part's box contains its solids and no more.
 #[test]
 fn negative_volumes_do_not_make_a_part_larger() {
     let config = prusa(1, &[&of_type("ModelPart"), &of_type("NegativeVolume")]);
@@ -334,7 +334,7 @@ fn supports_stay_out_as_components_too() {
     }
 }
 
-/// A model with a namespace, and what is in its object.
+/// A model with a namespace, and the given content of its object.
 fn extended(namespace: &str, attributes: &str, within: &str, is_required: bool) -> String {
     let object = object(1, &[slab()])
         .replace("<object ", &format!("<object {attributes} "))
@@ -388,7 +388,7 @@ fn extensions_that_make_other_shapes_are_refused_by_name() {
                 text.contains(words) && text.contains("object 1 of its 3D/3dmodel.model"),
                 "{text}"
             );
-            // The default namespace may change within the object, too.
+            // The default namespace may also change within the object.
             if !within.is_empty() {
                 let local =
                     within.replace("e:", "").replacen(' ', &format!(" xmlns=\"{namespace}\" "), 1);
@@ -399,7 +399,7 @@ fn extensions_that_make_other_shapes_are_refused_by_name() {
                 let text = said(&three_mf(&extended(&namespace, "", &local, is_required), &[]));
                 assert!(text.contains(words), "{text}");
             }
-            // An object that is not built does no harm.
+            // An object that is not built is harmless.
             let other = xml.replace("</resources>", &(object(2, &[post()]) + "</resources>"));
             let other = other.replace(ITEM, "<item objectid=\"2\"/>\n");
             assert_eq!(open(&three_mf(&other, &[])).facet_count(), 12);
@@ -458,7 +458,7 @@ fn with_slices(stacks: &str, attributes: &str, is_required: bool) -> String {
         .replace("<resources>", &format!("<resources>{stacks}"))
 }
 
-/// The white pixels of each layer of 0.1 mm, at 0.1 mm a pixel.
+/// The white pixels of each layer of 0.1 mm, at 0.1 mm per pixel.
 fn white(part: Part) -> Vec<u64> {
     let options = SliceOptions {
         dpi: Dpi::new(254.0).unwrap(),
@@ -489,11 +489,11 @@ fn slices_stand_for_a_mesh_that_is_another_shape() {
     }
 }
 
-/// A mesh of the volume of its slices is finer than they are.
+/// A mesh with the same volume as its slices is finer than the slices.
 #[test]
 fn slices_of_a_mesh_are_left_out() {
     let stack = slices(5, 0.0, &[1.0, 2.0], 10.0).replace("startv=\"4\"", "startv=\"5\"");
-    // 29 mm2 in place of the 30 of the slab, once the hole is as small as a facet.
+    // 29 mm2 instead of the 30 of the slab, once the hole is as small as a facet.
     let stack = stack.replace(
         "v2=\"5\"/><e:segment v2=\"6\"/><e:segment v2=\"7\"/><e:segment v2=\"4\"",
         "v2=\"6\"/><e:segment v2=\"5\"",
@@ -510,7 +510,7 @@ fn slices_of_a_mesh_are_left_out() {
     assert_eq!((part.facet_count(), white(part)), (12, vec![3_000; 20]));
 }
 
-/// As the samples of the 3MF Consortium have them.
+/// As in the samples of the 3MF Consortium.
 #[test]
 fn slices_may_be_in_other_models() {
     let stack = "<e:slicestack id=\"5\"><e:sliceref slicestackid=\"1\" slicepath=\"/2D/a.model\"/>\
@@ -723,7 +723,7 @@ fn meshes_far_away_keep_their_shape() {
     assert_eq!(white(part), white(open(&three_mf(&model(&slab, ITEM), &[]))));
 }
 
-/// The numbers of pixels are those of rectangles: two slabs of 30 mm2 share half.
+/// The numbers of pixels are exact for rectangles: two slabs of 30 mm2 share half.
 #[test]
 fn volumes_unite_and_modifiers_have_no_pixels() {
     let second = block([3.0, 0.0, 0.0], [9.0, 5.0, 2.0]);
@@ -739,7 +739,7 @@ fn volumes_unite_and_modifiers_have_no_pixels() {
     }
 }
 
-/// A ball 500 m away has the pixels that it has at the origin.
+/// A ball 500 m away has the same pixels as at the origin.
 #[test]
 fn a_ball_far_away_keeps_its_edges() {
     let near = lamp_fixtures::sphere(3.0, 5_000).obj();

@@ -12,11 +12,11 @@ use super::error::ModelFault;
 /// The longest tag, comment or text in XML.
 const MAX_XML_BYTES: usize = 4 << 20;
 
-/// A fault and the byte near it.
+/// A fault and its approximate byte.
 pub(super) type Located = (u64, ModelFault);
 
-/// A piece of XML. Elements come with their namespace; where nothing declares it, that is the
-/// prefix of their names.
+/// A piece of XML. Elements come with their namespace; without a declaration, the prefix of their
+/// names replaces it.
 pub(super) enum Xml<'a> {
     Start(&'a str, &'a BytesStart<'a>),
     Text(&'a str),
@@ -31,8 +31,8 @@ pub(super) fn for_each_piece(
 ) -> Result<(), Located> {
     let mut reader = Reader::from_reader(text);
     let mut resolver = NamespaceResolver::default();
-    // How many elements were open at each one that declares namespaces. Vertices and triangles do
-    // not, and looking into all of their attributes takes a quarter of the time.
+    // The number of open elements at each element that declares namespaces. Vertices and triangles
+    // do not, and examining all of their attributes takes a quarter of the time.
     let mut scopes = Vec::new();
     let declares = |tag: &BytesStart<'_>| tag.contains("xmlns");
     let mut buffer = Vec::new();
@@ -89,12 +89,12 @@ fn name_of<'a>(namespace: &'a ResolveResult<'_>) -> &'a str {
     }
 }
 
-/// Returns an attribute that has no prefix.
+/// Returns an attribute without a prefix.
 pub(super) fn attribute(tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ModelFault> {
     find_attribute(tag, |key| key.as_ref() == name)
 }
 
-/// Returns an attribute of an extension, whatever its prefix.
+/// Returns an attribute of an extension, with any prefix.
 pub(super) fn prefixed_attribute(
     tag: &BytesStart<'_>,
     name: &str,
@@ -148,11 +148,10 @@ pub(super) fn missing(tag: &BytesStart<'_>, attribute: &'static str) -> ModelFau
     ModelFault::Attribute { element, attribute }
 }
 
-/// Text of which no tag, comment or text between tags is read into memory beyond a
-/// limit.
+/// A text reader that limits the memory for each tag, comment or text between tags.
 pub(super) struct BoundedText<R> {
     text: R,
-    /// The bytes that were read in all, and since the last event.
+    /// The number of bytes read in all, and since the last event.
     pub(super) read: u64,
     of_event: usize,
 }

@@ -1,14 +1,14 @@
-//! Finds which of many facets around one edge are neighbours.
+//! Finds which of many facets around one edge are neighbors.
 
 use lamp_brep::vector::{Vec3, cross, dot, length, sub};
 
 use crate::topology::corner_table::{next, previous};
 
-/// Facets at angles that differ by less, in radians, are not in any order.
+/// Facets whose angles differ by less, in radians, have no order.
 const SAME_ANGLE: f64 = 1e-7;
 
-/// Pairs the facets around an edge, given by the corners opposite to it: any two with solid
-/// between them. There are no pairs unless the facets face each other in turns, as they do where
+/// Pairs the facets around an edge, given by the corners opposite to it: any two facets with solid
+/// between them. There are no pairs unless the facets face each other alternately, as they do where
 /// solids touch in an edge.
 pub(crate) fn neighbours(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> Vec<[u32; 2]> {
     let Some(around) = sorted(corners, points, vertices) else { return Vec::new() };
@@ -16,7 +16,7 @@ pub(crate) fn neighbours(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> 
     if !(0..around.len()).all(alternate) {
         return Vec::new();
     }
-    // By rising angle, solid follows a facet that runs backward along the edge.
+    // By ascending angle, solid follows a facet that runs backward along the edge.
     let start = usize::from(around[0].is_forward);
     let pair = |k: usize| [around[k].corner, around[(k + 1) % around.len()].corner];
     (start..around.len()).step_by(2).map(pair).collect()
@@ -25,13 +25,13 @@ pub(crate) fn neighbours(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> 
 /// A facet at an edge.
 struct Leaf {
     corner: u32,
-    /// Whether it runs through the edge from the lower vertex to the upper one.
+    /// Whether it runs along the edge from the lower vertex to the upper one.
     is_forward: bool,
-    /// Around the edge, counter-clockwise seen against its direction.
+    /// The angle around the edge, counterclockwise seen against its direction.
     angle: f64,
 }
 
-/// Returns the facets by rising angle, if all angles differ.
+/// Returns the facets by ascending angle, if all angles differ.
 fn sorted(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> Option<Vec<Leaf>> {
     let vertex = |corner: u32| vertices[corner as usize];
     let point = |vertex: u32| points[vertex as usize];

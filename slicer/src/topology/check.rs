@@ -1,4 +1,4 @@
-//! What is wrong with a mesh, and what its shells enclose.
+//! Checks a mesh for faults, and measures its shells.
 
 use crate::topology::faults::{is_finite, is_flat};
 use crate::topology::lumps::{lumps, voids};
@@ -6,24 +6,25 @@ use crate::topology::nest::containers;
 use crate::topology::shell_report::reports;
 use crate::topology::{CornerTable, Doubled, Lump, RimLoop, ShellReport, Shells};
 
-/// What a check of a mesh finds.
+/// The findings of a mesh check.
 #[derive(Clone, Debug)]
 pub struct MeshCheck {
     /// The shells.
     pub shells: Vec<ShellReport>,
-    /// The lumps that closed shells make, in the order of their outer shells.
+    /// The lumps that closed shells form, in the order of their outer shells.
     pub lumps: Vec<Lump>,
     /// The loops around holes.
     pub loops: Vec<RimLoop>,
-    /// Facets that face the other way than most of their neighbours.
+    /// Facets that face the other way than most of their neighbors.
     pub turned: Vec<u32>,
-    /// Facets that repeat another.
+    /// Facets that repeat another facet.
     pub doubled: Vec<Doubled>,
-    /// Facets without area.
+    /// Degenerate facets, which have no area.
     pub flat: Vec<u32>,
     /// Facets with a coordinate that is not finite.
     pub not_finite: Vec<u32>,
-    /// The number of edges of three facets and more; [`CornerTable::crowded`] lists them.
+    /// The number of crowded edges (non-manifold edges), which have three or more facets;
+    /// [`CornerTable::crowded`] lists them.
     pub crowded: usize,
 }
 
@@ -61,8 +62,8 @@ impl MeshCheck {
         shells.filter(|(_, shell)| shell.is_inside_out()).map(|(number, _)| number)
     }
 
-    /// Returns true if nothing was found: all shells are closed and face outwards, every edge has
-    /// two facets, and every facet an area.
+    /// Returns true if there are no findings: all shells are closed and face outward, every edge
+    /// has two facets, and every facet has an area.
     pub fn is_clean(&self) -> bool {
         let is_good = |shell: &ShellReport| shell.mass.is_some() && !shell.is_inside_out();
         self.shells.iter().all(is_good)
@@ -139,8 +140,8 @@ mod tests {
     #[test]
     fn voids_belong_to_the_lumps_around_them() {
         let cube = |low: f32, high: f32| block([low; 3], [high; 3]);
-        // A shell in a void in a shell, with another void beside it, and a solid apart. The
-        // second void faces the wrong way.
+        // A shell in a void in a shell, another void next to it, and a separate solid. The second
+        // void faces the wrong way.
         let facets = [
             turned(&cube(2.0, 8.0)),
             cube(0.0, 20.0),
@@ -164,7 +165,7 @@ mod tests {
 
     #[test]
     fn shells_that_touch_are_nested_all_the_same() {
-        // From wall to wall, so that up to two of three axes tell nothing.
+        // From wall to wall, so that up to two of three axes decide nothing.
         let outer = block([0.0; 3], [4.0; 3]);
         for [low, high] in [[[1.0; 3], [4.0, 3.0, 3.0]], [[0.0, 0.0, 1.0], [4.0, 4.0, 3.0]]] {
             let inner = block(low, high);
@@ -224,12 +225,12 @@ mod tests {
         assert!(found.shells[0].mass.is_none() && found.lumps.is_empty());
         let (found, chosen) = spoiled(Defect::Flip);
         assert_eq!(found.turned, [chosen]);
-        // Its volume is that of the mesh without the defect.
+        // Its volume is the volume of the mesh without the defect.
         let mass = found.shells[0].mass.as_ref().unwrap();
         assert!(is_near(mass.volume_mm3, good.volume_mm3(), 1e-9));
         let (found, chosen) = spoiled(Defect::Duplicate);
         assert_eq!((found.crowded, found.doubled.len(), found.doubled[0].of), (3, 1, chosen));
-        // Of one sphere: 1 facet more, and no edge more.
+        // Counts for one sphere: 1 facet more, and no edge more.
         assert_eq!(found.shells[0].euler(), 3);
         let (found, _) = spoiled(Defect::Nudge { by_mm: 0.1 });
         assert_eq!((found.loops.len(), found.loops[0].corners.len()), (1, 4));

@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use crate::topology::edges::Edges;
 
-/// Stands in arrays for no corner, no edge.
+/// Represents no corner or no edge in arrays.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Returns the corner after another of its facet, counter-clockwise seen from outside.
+/// Returns the next corner of a corner's facet, counterclockwise seen from outside.
 #[inline]
 pub const fn next(corner: u32) -> u32 {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
-/// Returns the corner before another of its facet.
+/// Returns the previous corner of a corner's facet.
 #[inline]
 pub const fn previous(corner: u32) -> u32 {
     if corner.is_multiple_of(3) { corner + 2 } else { corner - 1 }
@@ -25,20 +25,20 @@ pub const fn facet_of(corner: u32) -> u32 {
     corner / 3
 }
 
-/// A mesh as its corners: what vertex each is at, which corner lies opposite, and which edge
-/// between (002 section 2.3.2.1, figure 19).
+/// A mesh as its corners: the vertex of each corner, its opposite corner, and the edge between them
+/// (002 section 2.3.2.1, figure 19).
 ///
-/// The edge opposite to a corner joins the other two corners of its facet; so each corner stands
-/// for an edge, too, as a facet has it.
+/// The edge opposite to a corner joins the other two corners of its facet; so each corner also
+/// represents an edge of its facet.
 ///
-/// - Two facets alone on an edge are neighbours, whichever way they face.
-/// - Three and more are neighbours in twos if they face each other in turns around the edge: two
-///   that have solid between them. Otherwise none of them has a neighbour there. Such edges are
-///   [crowded](Self::crowded) either way.
+/// - Two facets alone on an edge are neighbors, whichever way they face.
+/// - Three or more facets are neighbors in pairs if they face each other alternately around the
+///   edge. The two facets of a pair have solid between them. Otherwise none of the facets has a
+///   neighbor there. Either way, such edges are [crowded](Self::crowded) (non-manifold).
 /// - Facets with two corners at one vertex, or with a coordinate that is not finite, are
-///   [idle](Self::is_idle): no edge counts them.
+///   [idle](Self::is_idle): they do not count at edges.
 ///
-/// It takes 36 bytes a facet and 24 a vertex.
+/// It takes 36 bytes per facet and 24 bytes per vertex.
 #[derive(Clone, Debug)]
 pub struct CornerTable {
     points: Vec<[f64; 3]>,
@@ -48,18 +48,18 @@ pub struct CornerTable {
 }
 
 impl CornerTable {
-    /// Creates the table of facets of one body: `vertices` are those of all corners, as indices of
-    /// points in millimetres.
+    /// Creates the table of facets of one body: `vertices` are the vertices of all corners, as
+    /// indices of points in millimeters.
     ///
     /// # Panics
-    /// Panics if a vertex is not among the points, the corners are not three for each facet, or
-    /// there are 2^32 - 1.
+    /// Panics if a vertex is not among the points, the number of corners is not three per facet, or
+    /// there are 2^32 - 1 corners.
     pub fn new(points: Vec<[f64; 3]>, vertices: Vec<u32>) -> Self {
         let facets = u32::try_from(vertices.len() / 3).unwrap_or(NONE);
         Self::of_bodies(points, vertices, vec![facets])
     }
 
-    /// Creates the table of several bodies, each given by its end among the facets.
+    /// Creates the table of several bodies, each given by the end of its facets.
     pub(crate) fn of_bodies(
         points: Vec<[f64; 3]>,
         vertices: Vec<u32>,
@@ -91,17 +91,17 @@ impl CornerTable {
         self.vertices.len() as u32
     }
 
-    /// Returns the number of edges, each once, however many facets meet there.
+    /// Returns the number of edges. Each edge counts once, regardless of its number of facets.
     pub fn edge_count(&self) -> usize {
         self.edges.count as usize
     }
 
-    /// Returns the points of the vertices, in millimetres.
+    /// Returns the points of the vertices, in millimeters.
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
     }
 
-    /// Returns the facets of each body of the part's files. Vertices of two bodies are never one.
+    /// Returns the facets of each body of the part's files. Two bodies never share a vertex.
     pub fn bodies(&self) -> impl Iterator<Item = Range<u32>> {
         let starts = std::iter::once(0).chain(self.body_ends.iter().copied());
         starts.zip(&self.body_ends).map(|(start, &end)| start..end)
@@ -113,13 +113,13 @@ impl CornerTable {
         self.vertices[corner as usize]
     }
 
-    /// Returns where a corner is, in millimetres.
+    /// Returns the place of a corner, in millimeters.
     #[inline]
     pub fn point(&self, corner: u32) -> [f64; 3] {
         self.points[self.vertex(corner) as usize]
     }
 
-    /// Returns the three points of a facet, in millimetres.
+    /// Returns the three points of a facet, in millimeters.
     #[inline]
     pub fn facet(&self, facet: u32) -> [[f64; 3]; 3] {
         [3 * facet, 3 * facet + 1, 3 * facet + 2].map(|corner| self.point(corner))
@@ -131,41 +131,41 @@ impl CornerTable {
         [3 * facet, 3 * facet + 1, 3 * facet + 2].map(|corner| self.vertex(corner))
     }
 
-    /// Returns the corner on the other side of the edge opposite to a corner: O of 002. There is
-    /// none at the rim of an open mesh.
+    /// Returns the corner on the other side of the edge opposite to a corner: O of 002. Returns
+    /// `None` at the boundary of an open mesh.
     #[inline]
     pub fn opposite(&self, corner: u32) -> Option<u32> {
         Some(self.edges.opposites[corner as usize]).filter(|&opposite| opposite != NONE)
     }
 
-    /// Returns the corner opposite to the previous corner: that of the facet on the left.
+    /// Returns the corner opposite to the previous corner: the corner of the facet on the left.
     #[inline]
     pub fn left(&self, corner: u32) -> Option<u32> {
         self.opposite(previous(corner))
     }
 
-    /// Returns the corner opposite to the next corner: that of the facet on the right.
+    /// Returns the corner opposite to the next corner: the corner of the facet on the right.
     #[inline]
     pub fn right(&self, corner: u32) -> Option<u32> {
         self.opposite(next(corner))
     }
 
-    /// Returns the edge opposite to a corner, below [`edge_count`](Self::edge_count): E of 002. An
-    /// idle facet has none.
+    /// Returns the edge opposite to a corner, below [`edge_count`](Self::edge_count): E of 002.
+    /// Returns `None` for an idle facet.
     #[inline]
     pub fn edge(&self, corner: u32) -> Option<u32> {
         Some(self.edges.numbers[corner as usize]).filter(|&edge| edge != NONE)
     }
 
-    /// Returns the vertices that the edge opposite to a corner joins, as its facet runs through
-    /// them.
+    /// Returns the vertices that the edge opposite to a corner joins, in the order in which the
+    /// corner's facet runs through them.
     #[inline]
     pub fn edge_ends(&self, corner: u32) -> [u32; 2] {
         [self.vertex(next(corner)), self.vertex(previous(corner))]
     }
 
-    /// Returns true if a facet and its neighbour opposite to a corner run through their edge the
-    /// same way, so that one of them is turned over.
+    /// Returns true if a facet and its neighbor opposite to a corner run along their edge in the
+    /// same direction, so that one of them is turned over.
     #[inline]
     pub fn disagrees(&self, corner: u32) -> bool {
         self.opposite(corner).is_some_and(|other| self.edge_ends(corner) == self.edge_ends(other))
@@ -177,7 +177,7 @@ impl CornerTable {
         self.edges.numbers[3 * facet as usize] == NONE
     }
 
-    /// Returns true if only one facet has the edge opposite to a corner.
+    /// Returns true if the edge opposite to a corner is a boundary edge, with only one facet.
     #[inline]
     pub fn is_rim(&self, corner: u32) -> bool {
         self.edges.opposites[corner as usize] == NONE
@@ -185,12 +185,13 @@ impl CornerTable {
             && !self.edges.is_crowded(corner)
     }
 
-    /// Returns the edges of three facets and more: the corners opposite to each, one a facet.
+    /// Returns the crowded edges, with three or more facets: for each, the corners opposite to it,
+    /// one per facet.
     pub fn crowded(&self) -> impl ExactSizeIterator<Item = &[u32]> {
         self.edges.crowded.iter().map(|corners| &corners[..])
     }
 
-    /// Returns the bytes that the arrays take.
+    /// Returns the size of the arrays in bytes.
     pub fn bytes(&self) -> usize {
         24 * self.points.len() + 4 * (self.vertices.len() * 3 + self.body_ends.len())
     }
@@ -250,7 +251,7 @@ mod tests {
             assert_eq!(table.vertex(corner), vertex);
             assert_eq!(table.opposite(corner).unwrap_or(99), opposite, "corner {corner}");
             assert_eq!(table.is_rim(corner), opposite == 99);
-            // Its opposite corner 2 has 7, and so has it.
+            // Its opposite corner 2 has 7, so it has 7, too.
             if corner == 25 {
                 assert_eq!(edge, 5);
                 edge = 7;

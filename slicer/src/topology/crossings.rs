@@ -11,22 +11,22 @@ use crate::topology::rims::box_of;
 /// Facets that pass through each other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Crossings {
-    /// The first pairs, each in rising order, and sorted.
+    /// The first pairs, each in ascending order, and sorted.
     pub pairs: Vec<[u32; 2]>,
-    /// The number of all pairs that were found.
+    /// The total number of pairs found.
     pub count: usize,
-    /// Whether so many boxes of facets overlap that not all pairs were looked at.
+    /// Whether too many boxes of facets overlap to examine all pairs.
     pub is_partial: bool,
 }
 
-/// Pairs of overlapping boxes that are looked at, for each facet and on top of that. A facet of a
-/// usual mesh meets some twenty boxes.
+/// The greatest number of examined pairs of overlapping boxes: per facet, and in addition
+/// regardless of facets. A facet of a usual mesh meets some twenty boxes.
 const PAIRS_PER_FACET: usize = 1000;
 const PAIRS_BESIDE: usize = 10_000_000;
 
 impl Crossings {
-    /// Finds all pairs of facets of a body of which one has an edge that passes through the other,
-    /// and keeps the first `most`.
+    /// Finds all pairs of a body's facets where an edge of one facet passes through the other, and
+    /// keeps the first `most` pairs.
     ///
     /// An edge passes through a facet if its ends are on both sides of the facet's plane, and the
     /// point between is inside the facet or on its border; signs are exact. Facets with a common
@@ -35,7 +35,7 @@ impl Crossings {
         Self::of_pairs(table, most, |_, _| true)
     }
 
-    /// As [`new`](Self::new), of those pairs that count.
+    /// Does the same as [`new`](Self::new), for the pairs that `counts` accepts.
     pub(crate) fn of_pairs(
         table: &CornerTable,
         most: usize,
@@ -83,15 +83,15 @@ fn cross(table: &CornerTable, a: u32, b: u32) -> bool {
     common < 2 && (pierces(table, of_a, of_b) || pierces(table, of_b, of_a))
 }
 
-/// Returns true if an edge of the first facet, without a vertex of the second, passes through the
-/// second.
+/// Returns true if an edge of the first facet, without a vertex of the second facet, passes through
+/// the second facet.
 fn pierces(table: &CornerTable, edges: [u32; 3], facet: [u32; 3]) -> bool {
     let point = |vertex: u32| {
         let [x, y, z] = table.points()[vertex as usize];
         Coord3D { x, y, z }
     };
     let [a, b, c] = facet.map(point);
-    // The sides of the plane on which the ends are.
+    // The sides of the plane for the ends.
     let sides = edges.map(|vertex| match facet.contains(&vertex) {
         true => 0.0,
         false => orient3d(a, b, c, point(vertex)),
@@ -108,9 +108,9 @@ fn pierces(table: &CornerTable, edges: [u32; 3], facet: [u32; 3]) -> bool {
     })
 }
 
-/// Returns where one of two facets that cross enters the other, and how deep: how far the nearest of
-/// the edge's ends and of the facet's sides is from there. That far, at least, coordinates must move
-/// until the facets are apart.
+/// Returns the place where one of two crossing facets enters the other, and the depth: the least
+/// distance from there to the edge's ends and to the facet's sides. Coordinates must move at least
+/// this far to separate the facets.
 pub(crate) fn deepest(table: &CornerTable, a: u32, b: u32) -> (Vec3, f64) {
     let entries = [[a, b], [b, a]].into_iter().flat_map(|[of_edges, facet]| {
         let corners = table.facet(facet);
@@ -122,7 +122,7 @@ pub(crate) fn deepest(table: &CornerTable, a: u32, b: u32) -> (Vec3, f64) {
     entries.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((table.point(3 * a), 0.0))
 }
 
-/// Returns where an edge enters a facet with a normal, and how deep, if it does.
+/// Returns the place where an edge enters a facet with a normal, and the depth, if it does.
 fn entry([p, q]: [Vec3; 2], corners: [Vec3; 3], normal: Vec3) -> Option<(Vec3, f64)> {
     let [above, below] = [p, q].map(|end| dot(sub(end, corners[0]), normal));
     if above * below >= 0.0 {

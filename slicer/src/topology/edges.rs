@@ -5,26 +5,26 @@ use lamp_stack::Grouped;
 use crate::topology::around_edge::neighbours;
 use crate::topology::corner_table::{NONE, next, previous};
 
-/// The edges of a mesh, as its corners see them.
+/// The edges of a mesh, as seen from its corners.
 #[derive(Clone, Debug)]
 pub(crate) struct Edges {
-    /// By corner, the corner across the opposite edge.
+    /// For each corner, the corner across the opposite edge.
     pub(crate) opposites: Vec<u32>,
-    /// By corner, the opposite edge.
+    /// For each corner, the opposite edge.
     pub(crate) numbers: Vec<u32>,
     /// The number of edges.
     pub(crate) count: u32,
-    /// The corners opposite to each edge of three facets and more.
+    /// The corners opposite to each crowded edge, which has three or more facets.
     pub(crate) crowded: Vec<Box<[u32]>>,
-    /// The corners opposite to such edges, sorted.
+    /// The corners opposite to crowded edges, sorted.
     crowded_corners: Vec<u32>,
 }
 
 impl Edges {
     /// Finds the edges of facets, given by the vertices of their corners.
     ///
-    /// Corners are put into bins by the lower vertex of their opposite edge, as algorithm 2 of 002
-    /// does, and those of a bin sorted by the upper one.
+    /// Corners are put into bins by the lower vertex of their opposite edge, as in algorithm 2 of
+    /// 002, and the corners of a bin are sorted by the upper vertex.
     pub(crate) fn of(points: &[[f64; 3]], vertices: &[u32]) -> Self {
         let is_finite = |point: &[f64; 3]| point.iter().all(|c| c.is_finite());
         let all_are_finite = points.iter().all(is_finite);
@@ -96,7 +96,7 @@ impl Edges {
         self.opposites[b as usize] = a;
     }
 
-    /// Returns true if the edge opposite to a corner is one of three facets and more.
+    /// Returns true if the edge opposite to a corner has three or more facets.
     pub(crate) fn is_crowded(&self, corner: u32) -> bool {
         self.crowded_corners.binary_search(&corner).is_ok()
     }

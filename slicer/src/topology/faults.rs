@@ -1,11 +1,11 @@
-//! Facets that repeat, have no area or are not finite.
+//! Finds facets that repeat another facet, have no area or are not finite.
 
 use lamp_brep::vector::{Vec3, cross, dot, sub};
 
 use crate::topology::CornerTable;
 use crate::topology::corner_table::facet_of;
 
-/// A facet that joins the same three vertices as one before it.
+/// A facet that joins the same three vertices as an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Doubled {
     /// The facet.
@@ -17,7 +17,7 @@ pub struct Doubled {
 }
 
 impl Doubled {
-    /// Finds all facets that repeat another, in rising order.
+    /// Finds all facets that repeat another facet, in ascending order.
     pub fn all(table: &CornerTable) -> Vec<Self> {
         let mut found = Vec::new();
         let mut add = |a: u32, b: u32| {
@@ -25,8 +25,8 @@ impl Doubled {
             let is_same_way = is_same_way(table, of, facet);
             found.push(Self { facet, of, is_same_way });
         };
-        // Facets that repeat each other share all three edges; each of these is either theirs
-        // alone, or crowded.
+        // Facets that repeat each other share all three edges; each of these edges has no other
+        // facets, or is crowded.
         for facet in 0..table.facet_count() as u32 {
             if let Some(across) = table.opposite(3 * facet)
                 && table.vertex(across) == table.vertex(3 * facet)
@@ -49,7 +49,7 @@ impl Doubled {
     }
 }
 
-/// Returns true if two facets of the same vertices run through them the same way.
+/// Returns true if two facets with the same vertices run through them the same way.
 fn is_same_way(table: &CornerTable, a: u32, b: u32) -> bool {
     let [first, then, _] = table.facet_vertices(a);
     let other = table.facet_vertices(b);
@@ -57,17 +57,17 @@ fn is_same_way(table: &CornerTable, a: u32, b: u32) -> bool {
     at.is_some_and(|at| other[(at + 1) % 3] == then)
 }
 
-/// Returns true if a facet has no area: two corners in one vertex, or all on a line, as exactly as
-/// 64 bits tell.
+/// Returns true if a facet is degenerate (has no area): two corners share a vertex, or all corners
+/// are on a line within the accuracy of 64 bits.
 pub(crate) fn is_flat(table: &CornerTable, facet: u32) -> bool {
     is_flat_between(table.facet(facet))
 }
 
-/// As [`is_flat`], of three points.
+/// Does the same as [`is_flat`] for three points.
 pub(crate) fn is_flat_between([a, b, c]: [Vec3; 3]) -> bool {
     let (to_b, to_c) = (sub(b, a), sub(c, a));
     let across = cross(to_b, to_c);
-    // Squares, for roots cost time.
+    // Squares are compared, because roots cost time.
     dot(across, across) <= (4.0 * f64::EPSILON).powi(2) * dot(to_b, to_b) * dot(to_c, to_c)
 }
 

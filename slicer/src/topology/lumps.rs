@@ -1,20 +1,20 @@
-//! Lumps: outer shells with their voids.
+//! Combines outer shells with their voids into lumps.
 
 use crate::topology::{Mass, ShellReport};
 
-/// A piece of material: what an outer shell encloses, without its voids.
+/// A piece of material: the inside of an outer shell, without its voids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lump {
     /// Its outer shell.
     pub outer: u32,
-    /// The shells of its voids, in rising order.
+    /// The shells of its voids, in ascending order.
     pub voids: Vec<u32>,
-    /// Its mass: positive, whichever way its shells face; none if the voids leave nothing.
+    /// Its mass: positive, whichever way its shells face; `None` if the voids leave nothing.
     pub mass: Option<Mass>,
 }
 
-/// Returns for each shell whether it is a void: within an odd number of others. Shells that cross
-/// may be around each other; such a ring counts as outside.
+/// Returns, for each shell, whether it is a void: within an odd number of other shells. Shells that
+/// cross may be around each other; such a ring counts as outside.
 pub(crate) fn voids(around: &[Option<u32>]) -> Vec<bool> {
     let mut known: Vec<Option<bool>> = vec![None; around.len()];
     let mut way = Vec::new();
@@ -24,7 +24,7 @@ pub(crate) fn voids(around: &[Option<u32>]) -> Vec<bool> {
             if let Some(is_void) = known[at] {
                 break is_void;
             }
-            // Whoever comes back here, on a ring, finds it.
+            // A walk that returns here, on a ring, finds this value.
             known[at] = Some(true);
             way.push(at);
             match around[at] {
@@ -40,7 +40,7 @@ pub(crate) fn voids(around: &[Option<u32>]) -> Vec<bool> {
     known.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// Returns the lumps that shells make.
+/// Returns the lumps that shells form.
 pub(crate) fn lumps(shells: &[ShellReport]) -> Vec<Lump> {
     let closed = || (0..).zip(shells).filter(|(_, shell)| shell.mass.is_some());
     let outer = closed().filter(|(_, shell)| !shell.is_void);

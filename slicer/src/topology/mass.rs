@@ -1,28 +1,28 @@
-//! Volume, centre of mass and inertia of what a closed mesh encloses.
+//! Computes the volume, center of mass and inertia of a closed mesh.
 
 use lamp_brep::vector::{Vec3, along, cross, dot, scale, sub};
 
-/// The volume that a closed shell encloses, and how it is spread, at density 1.
+/// The volume that a closed shell encloses, and its distribution, at density 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mass {
-    /// The volume in mm³: positive if the facets face outwards.
+    /// The volume in mm³: positive if the facets face outward.
     pub volume_mm3: f64,
-    /// The centre of mass.
+    /// The center of mass.
     pub centre_mm: [f64; 3],
-    /// The tensor of inertia about the centre of mass, in mm⁵. Times a density in kg/mm³ it is in
-    /// kg mm².
+    /// The tensor of inertia about the center of mass, in mm⁵. Multiplied by a density in kg/mm³,
+    /// it is in kg mm².
     pub inertia_mm5: [[f64; 3]; 3],
 }
 
-/// Sums over facets, about a point near them: each facet stands for the tetrahedron between it and
-/// that point.
+/// Sums over facets, about a point near them: each facet represents the tetrahedron between it and
+/// this point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
     about: Vec3,
     /// Six times the volume, and its first and second moments times 24 and 120.
     zeroth: f64,
     first: Vec3,
-    /// Those of xx, yy, zz, xy, yz and zx.
+    /// The second moments of xx, yy, zz, xy, yz and zx.
     second: [f64; 6],
 }
 
@@ -47,7 +47,7 @@ impl Moments {
     /// Returns the mass, if its numbers are finite.
     pub(crate) fn mass(&self) -> Option<Mass> {
         let volume = self.zeroth / 6.0;
-        // Without a volume, there is no centre but where the facets are.
+        // Without a volume, the only center is the place of the facets.
         let per = if self.zeroth == 0.0 { 0.0 } else { 1.0 / (4.0 * self.zeroth) };
         let centre = scale(self.first, per);
         let about_centre = |k: usize| {
@@ -64,7 +64,7 @@ impl Moments {
 }
 
 impl Mass {
-    /// Returns the mass at another density: -1 for what is missing.
+    /// Returns the mass at another density; -1 for missing material.
     pub(crate) fn times(self, density: f64) -> Self {
         Self {
             volume_mm3: density * self.volume_mm3,
@@ -73,7 +73,7 @@ impl Mass {
         }
     }
 
-    /// Returns the mass of several shells together, such as a solid and its voids; none if their
+    /// Returns the mass of several shells together, such as a solid and its voids; `None` if their
     /// volumes cancel.
     pub fn together(masses: impl IntoIterator<Item = Self> + Clone) -> Option<Self> {
         let volume_mm3: f64 = masses.clone().into_iter().map(|mass| mass.volume_mm3).sum();
@@ -129,7 +129,7 @@ mod tests {
         let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0f32]];
         let mass = mass_of(&[[o, y, x], [o, x, z], [o, z, y], [x, y, z]], [0.3; 3]);
         assert!((mass.volume_mm3 - 1.0).abs() < 1e-12);
-        // About a corner, the product of a and b is V a b / 20; about the centre less V a b / 16.
+        // About a corner, the product of a and b is V a b / 20; about the center less V a b / 16.
         for (i, j, product) in [(0, 1, 2.0), (1, 2, 6.0), (0, 2, 3.0)] {
             let expected = -product * (1.0 / 20.0 - 1.0 / 16.0);
             assert!((mass.inertia_mm5[i][j] - expected).abs() < 1e-12);

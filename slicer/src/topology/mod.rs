@@ -1,8 +1,8 @@
-//! What a mesh hangs together by: vertices, edges, neighbours, shells.
+//! Describes the connections of a mesh: vertices, edges, neighbors, shells.
 //!
-//! A [`CornerTable`] finds all that a soup of facets leaves out: which corners are one vertex, and
-//! which facets meet at an edge (002 section 2.3.2.1). A corner is a number: facet t has the
-//! corners 3t, 3t + 1 and 3t + 2, and everything is read from flat arrays by it.
+//! A [`CornerTable`] finds the structure that a list of unconnected facets lacks: the corners that
+//! are one vertex, and the facets that meet at an edge (002 section 2.3.2.1). A corner is a number:
+//! facet t has the corners 3t, 3t + 1 and 3t + 2, and this number indexes flat arrays.
 //!
 //! ```
 //! use lamp_slicer::topology::{CornerTable, MeshCheck, Shells, facet_of, next, previous};

@@ -1,11 +1,12 @@
-//! Tells which closed shells lie within which others, by rays.
+//! Finds which closed shells are inside which other shells, by rays.
 //!
-//! A ray along an axis goes through the facet of a shell that the axis sees best. Behind the last
-//! facet of this shell that it meets, the first one of another shell decides. If the ray leaves that shell there, the first one lies within
-//! it; if it enters it, both lie side by side, and within the same one. Where rays meet facets
-//! follows from the same arithmetic and ties as in slicing, so none slips through an edge. A ray that
-//! starts where its shell touches another goes the other way. All three axes must agree: shells that
-//! pass through each other are around nothing.
+//! A ray along an axis goes through the facet of a shell with the largest area along this axis.
+//! After the last facet of this shell that it meets, the first facet of another shell decides. If
+//! the ray leaves the other shell there, the first shell is inside it; if the ray enters it, both
+//! are side by side, and inside the same shell. The points where rays meet facets follow from the
+//! same arithmetic and ties as in slicing, so no ray slips through an edge. A ray that starts where
+//! its shell touches another shell goes the other way. All three axes must agree: shells that pass
+//! through each other are not around anything.
 
 use lamp_stack::sets::{root, unite};
 use rstar::primitives::GeomWithData;
@@ -13,14 +14,14 @@ use rstar::{AABB, RTree};
 
 use crate::topology::{CornerTable, ShellReport, Shells};
 
-/// A ray that starts nearer to a facet, as a share of the part's size, may start on it.
+/// A ray that starts closer to a facet, as a share of the part's size, may start on it.
 const TOUCHING: f64 = 1e-9;
 
-/// Where on its facet a ray starts, by the shares of the corners: not quite in the middle, where
+/// The start of a ray on its facet, by the shares of the corners: not quite in the middle, where
 /// other meshes of the same shape have edges.
 const SHARES: [f64; 3] = [0.334_1, 0.332_7, 0.333_2];
 
-/// Where a ray meets a facet.
+/// A place where a ray meets a facet.
 #[derive(Clone, Copy, Debug)]
 struct Hit {
     depth_mm: f64,
@@ -34,7 +35,7 @@ struct Hit {
 struct Ray {
     shell: u32,
     start: [f64; 3],
-    /// Twice the area of the facet as the axis sees it.
+    /// Twice the area of the facet as seen along the axis.
     seen: f64,
     hit: Option<Hit>,
     /// Whether it starts on another shell.
@@ -52,9 +53,9 @@ impl Ray {
     }
 }
 
-/// Returns for each shell the closed one right around it. Only closed shells of the same body are
-/// looked at. Shells that pass through each other are not within each other, as far as rays along
-/// three axes and the boxes of shells tell.
+/// Returns, for each shell, the closed shell directly around it. Only closed shells of the same
+/// body are examined. Shells that pass through each other are not inside each other, as far as rays
+/// along three axes and the boxes of shells show.
 pub(crate) fn containers(
     table: &CornerTable,
     shells: &Shells,
@@ -79,11 +80,11 @@ pub(crate) fn containers(
     found
 }
 
-/// What a ray tells of a shell: what is right around it, if anything; nothing if the shell touches
-/// another at both ends of the ray.
+/// The result of a ray from a shell: the shell directly around it, or `Some(None)` if there is
+/// none; `None` if the shell touches another at both ends of the ray.
 type Told = Option<Option<u32>>;
 
-/// Returns what all rays of a shell agree on.
+/// Returns the result on which all rays of a shell agree.
 fn agreed(told: [Told; 3]) -> Option<u32> {
     let mut known = told.into_iter().flatten();
     let first = known.next()?;
@@ -95,7 +96,7 @@ fn is_inside(shell: u32, outer: u32, reports: &[ShellReport]) -> bool {
     (0..3).all(|axis| outer[0][axis] <= inner[0][axis] && inner[1][axis] <= outer[1][axis])
 }
 
-/// Returns what rays along an axis tell of some closed shells of a body.
+/// Returns the results of rays along an axis for some closed shells of a body.
 fn along_axis(
     table: &CornerTable,
     shells: &Shells,
@@ -123,7 +124,7 @@ fn along_axis(
             break;
         }
     }
-    // What is around a shell is around its siblings.
+    // A shell that is around a shell is also around its siblings.
     let mut of_family = vec![None; closed.len()];
     for (shell, told) in (0..).zip(&around) {
         let first = root(&mut siblings, shell) as usize;
@@ -172,7 +173,7 @@ impl<'a> Rays<'a> {
         this
     }
 
-    /// Returns a point as rays see it, with the first axis along them.
+    /// Returns a point in the coordinates of rays, with the first axis along them.
     fn seen(&self, point: [f64; 3]) -> [f64; 3] {
         let axis = self.axis;
         [self.sign * point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3]]
@@ -245,7 +246,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Returns true if a facet of a shell faces away from what the shell encloses.
+    /// Returns true if a facet of a shell faces away from the shell's inside.
     fn faces_outward(&self, facet: u32, shell: u32) -> bool {
         let encloses =
             self.reports[shell as usize].mass.as_ref().is_some_and(|mass| mass.volume_mm3 > 0.0);
@@ -253,9 +254,9 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// Returns where a line along the first axis meets a facet, and whether the facet faces along the
-/// axis there. As in slicing, a corner is above a plane, or past a row, if its coordinate is at
-/// least that of the line.
+/// Returns the place where a line along the first axis meets a facet, and whether the facet faces
+/// along the axis there. As in slicing, a corner is above a plane, or past a row, if its coordinate
+/// is at least the line's coordinate.
 fn met(corners: &[[f64; 3]; 3], [_, y, z]: [f64; 3]) -> Option<(f64, bool)> {
     let mut ends = [[0.0; 2]; 2];
     let mut found = [false; 2];

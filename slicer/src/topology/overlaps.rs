@@ -13,26 +13,26 @@ use crate::piece::{Facets, Piece};
 use crate::slices::{SliceOptions, Slices};
 use crate::topology::{CornerTable, MeshCheck, Shells};
 
-/// Two shells that enclose some volume together, more than once.
+/// Two shells that both enclose a common volume.
 ///
-/// A void in its body does not count: its facets face inwards, so that they take away.
+/// A void in its body does not count: its facets face inward, so it removes volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShellOverlap {
     /// The shells, as positions in [`MeshCheck::shells`].
     pub shells: [u32; 2],
-    /// The box that they share: the least and the greatest corner.
+    /// The box that they share: its least and its greatest corner.
     pub box_mm: [[f64; 3]; 2],
     /// The volume that they share, from some hundred sections of some hundred rows.
     pub volume_mm3: f64,
 }
 
-/// The rows along the longer side of what is looked at, and its layers.
+/// The number of rows along the longer side of the examined box, and the number of its layers.
 const ROWS: f64 = 800.0;
 const LAYERS: f64 = 200.0;
 
 impl ShellOverlap {
-    /// Finds all shells of a mesh that overlap, the largest volume first. Only closed shells are
-    /// looked at. Shells that touch, or share less than 0.01 % of the smaller one, do not overlap.
+    /// Finds all overlapping shells of a mesh, the largest volume first. Only closed shells are
+    /// examined. Shells that touch, or share less than 0.01 % of the smaller shell, do not overlap.
     ///
     /// # Errors
     /// Returns an error if sections cannot be cut.
@@ -86,8 +86,8 @@ fn shared([a, b]: [[f64; 3]; 2], [c, d]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
     [[0, 1, 2].map(|k| a[k].max(c[k])), [0, 1, 2].map(|k| b[k].min(d[k]))]
 }
 
-/// Returns the closed shells whose boxes overlap those of others, and those around these: a shell
-/// in a void of another overlaps nothing.
+/// Returns the closed shells whose boxes overlap the boxes of other shells, and the shells around
+/// these: a shell in a void of another overlaps nothing.
 fn candidates(check: &MeshCheck) -> BTreeSet<u32> {
     let is_closed = |shell: &u32| check.shells[*shell as usize].mass.is_some();
     let box_mm = |shell: u32| check.shells[shell as usize].box_mm;

@@ -1,4 +1,4 @@
-//! Reads a part into a corner table, and gives equal corners one vertex.
+//! Reads a part into a corner table, and merges equal corners into one vertex.
 
 use std::hash::BuildHasher;
 
@@ -13,15 +13,15 @@ use crate::topology::CornerTable;
 use crate::topology::corner_table::NONE;
 
 impl CornerTable {
-    /// Reads a part in its place. Corners are one vertex if their coordinates have the same bits
-    /// (0 and -0 are the same) and they are of one body. Vertices are numbered as they come.
+    /// Reads a placed part. Corners are one vertex if their coordinates have the same bits (0 and
+    /// -0 are the same) and they belong to one body. Vertices are numbered in order of appearance.
     ///
-    /// Facets are numbered through all bodies, so that with one file of one body they have the
-    /// numbers that errors give them.
+    /// Facets are numbered through all bodies, so that for one file with one body they have the
+    /// same numbers as in error messages.
     ///
     /// # Errors
-    /// Returns an error if there are no facets, or more than 1431655764, if some are of negative
-    /// volumes, or if they cannot be read.
+    /// Returns an error if there are no facets, or more than 1431655764, if some facets belong to
+    /// negative volumes, or if they cannot be read.
     pub fn of_part(part: &Part, placement: &Placement, units: Units) -> Result<Self, SliceError> {
         check_count(part.facet_count())?;
         part.refuse_cut()?;
@@ -31,7 +31,7 @@ impl CornerTable {
         Ok(table)
     }
 
-    /// Creates the table of facets of one body, with points in their unit.
+    /// Creates the table of facets of one body, with points in the facets' unit.
     ///
     /// # Errors
     /// Returns an error if there are no facets, or too many.
@@ -71,11 +71,11 @@ impl CornerTable {
 }
 
 impl Part {
-    /// Returns all facets, as one body: in file units, or in millimetres where the file states its
-    /// unit. Those of several items or files stand as these are placed.
+    /// Returns all facets, as one body: in file units, or in millimeters where the file states its
+    /// unit. Facets of several items or files are placed as these are.
     ///
     /// # Errors
-    /// Returns an error if some are of negative volumes, or if they cannot be read.
+    /// Returns an error if some facets belong to negative volumes, or if they cannot be read.
     pub fn facets(&self) -> Result<Vec<Facet>, SliceError> {
         self.refuse_cut()?;
         let placed = PlacedPart::new(self.clone(), &Placement::default(), Units::Millimetres);
@@ -99,15 +99,15 @@ fn check_count(facets: usize) -> Result<(), SliceError> {
     }
 }
 
-/// Gives equal points one number.
+/// Assigns one number to equal points.
 struct Welder {
     points: Vec<[f64; 3]>,
-    /// The numbers of those of this body. Its order never shows.
+    /// The numbers of this body's points. Its order has no effect.
     known: HashTable<u32>,
-    /// Those from here on are of this body.
+    /// The first point of this body.
     first: u32,
-    /// By some bits of their hashes, the last points asked for: in most files facets follow their
-    /// neighbours.
+    /// The last requested points, by some bits of their hashes: in most files facets follow their
+    /// neighbors.
     recent: Box<[u32; RECENT]>,
     hasher: DefaultHashBuilder,
 }
@@ -116,7 +116,7 @@ struct Welder {
 const RECENT: usize = 1 << 13;
 
 impl Welder {
-    /// Expects a number of facets, of all bodies.
+    /// Prepares for a number of facets of all bodies.
     fn new(facets: usize) -> Self {
         Self {
             points: Vec::with_capacity(usual_vertices(facets)),
@@ -127,14 +127,14 @@ impl Welder {
         }
     }
 
-    /// Starts a body of so many facets. All points to come are other vertices than those before.
+    /// Starts a body of so many facets. Later points are different vertices from all points before.
     fn start_body(&mut self, facets: usize) {
         self.known = HashTable::with_capacity(usual_vertices(facets));
         self.first = self.points.len() as u32;
     }
 
     fn vertex(&mut self, point: [f64; 3]) -> u32 {
-        // Makes 0 of -0.
+        // Changes -0 to 0.
         let point = point.map(|c| c + 0.0);
         let Self { points, known, first, recent, hasher } = self;
         let bits = |[x, y, z]: &[f64; 3]| (x.to_bits(), y.to_bits(), z.to_bits());
@@ -155,7 +155,7 @@ impl Welder {
     }
 }
 
-/// A closed mesh has half as many vertices as facets, and some.
+/// A closed mesh has slightly more than half as many vertices as facets.
 fn usual_vertices(facets: usize) -> usize {
     facets / 2 + 2
 }

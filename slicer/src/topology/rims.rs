@@ -1,4 +1,4 @@
-//! Follows the rims of open meshes around holes.
+//! Follows the boundary edges of open meshes around holes.
 
 use std::collections::HashMap;
 
@@ -7,15 +7,15 @@ use lamp_brep::vector::{Vec3, distance};
 use crate::topology::CornerTable;
 use crate::topology::corner_table::{next, previous};
 
-/// Rims that follow one another around a hole.
+/// Rims (boundary edges) that follow one another around a hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RimLoop {
     /// The corners opposite to its rims, in order.
     pub corners: Vec<u32>,
-    /// Its vertices, in order: rim k is between vertices k and k + 1, the last one between the
-    /// last vertex and the first if the loop is closed.
+    /// Its vertices, in order: rim k is between vertices k and k + 1. If the loop is closed, the
+    /// last rim is between the last vertex and the first.
     pub vertices: Vec<u32>,
-    /// Whether it returns to where it began. Otherwise it ends at crowded edges.
+    /// Whether it returns to its start. Otherwise it ends at crowded edges.
     pub is_closed: bool,
     /// Its length.
     pub length_mm: f64,
@@ -24,8 +24,8 @@ pub struct RimLoop {
 }
 
 impl RimLoop {
-    /// Follows all rims of a mesh, from the lowest corner on. Each is of one loop. A closed loop
-    /// comes to no vertex twice.
+    /// Follows all rims of a mesh, from the lowest corner on. Each rim belongs to one loop. A
+    /// closed loop visits no vertex twice.
     pub fn all(table: &CornerTable) -> Vec<Self> {
         let rims: Vec<u32> = (0..table.corner_count()).filter(|&c| table.is_rim(c)).collect();
         let mut is_done = vec![false; rims.len()];
@@ -41,7 +41,7 @@ impl RimLoop {
             let from = table.vertex(next(rims[first]));
             let (mut ahead, is_closed) = follow(table, rims[first], from, &mut take);
             if !is_closed {
-                // It began in the middle: what lies before it comes first.
+                // It began in the middle, so the rims before it come first.
                 let other = table.vertex(previous(rims[first]));
                 let before = across_vertex(table, rims[first], from);
                 let (mut behind, _) = match before {
@@ -79,13 +79,13 @@ impl RimLoop {
     }
 
     /// Returns the width of the hole: the diagonal of the loop's box, which is at least the
-    /// greatest distance between two of its points and at most 1.74 times that.
+    /// greatest distance between two of its points and at most 1.74 times this distance.
     pub fn width_mm(&self) -> f64 {
         distance(self.box_mm[0], self.box_mm[1])
     }
 }
 
-/// Splits a closed way where it comes to a vertex again, as around holes that touch in one.
+/// Splits a closed path where it visits a vertex again, as around holes that touch in a vertex.
 fn without_repeats(way: Vec<(u32, u32)>) -> Vec<Vec<(u32, u32)>> {
     let (mut loops, mut left) = (Vec::new(), Vec::new());
     let mut places = HashMap::new();
@@ -116,8 +116,8 @@ pub(crate) fn widen([low, high]: &mut [Vec3; 2], point: Vec3) {
     *high = std::array::from_fn(|axis| high[axis].max(point[axis]));
 }
 
-/// Follows rims from one that begins at a vertex, as long as they are new. Returns each with the
-/// vertex that it begins at, and whether the way came back to its start.
+/// Follows rims from a rim that begins at a vertex, until a rim is not new. Returns each rim with
+/// the vertex at which it begins, and whether the path returned to its start.
 fn follow(
     table: &CornerTable,
     first: u32,
@@ -142,14 +142,14 @@ fn other_end(table: &CornerTable, corner: u32, end: u32) -> u32 {
     if a == end { b } else { a }
 }
 
-/// Returns the other rim at one end of a rim: goes around that vertex from facet to facet. There is
-/// none if the way ends at a crowded edge.
+/// Returns the other rim at one end of a rim: goes around that vertex from facet to facet. Returns
+/// `None` if this ends at a crowded edge.
 fn across_vertex(table: &CornerTable, rim: u32, vertex: u32) -> Option<u32> {
     let mut entered = rim;
     loop {
         let at =
             if table.vertex(next(entered)) == vertex { next(entered) } else { previous(entered) };
-        // Of the two edges at the vertex, the one that was not entered by.
+        // Of the two edges at the vertex, takes the one not entered by.
         let left = if next(at) == entered { previous(at) } else { next(at) };
         match table.opposite(left) {
             Some(across) => entered = across,
@@ -158,7 +158,7 @@ fn across_vertex(table: &CornerTable, rim: u32, vertex: u32) -> Option<u32> {
     }
 }
 
-/// Reverses a way along rims.
+/// Reverses a path along rims.
 fn reversed(table: &CornerTable, mut way: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
     way.reverse();
     way.iter_mut().for_each(|(corner, at)| *at = other_end(table, *corner, *at));
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn a_fin_on_a_block_has_an_open_way_of_rims() {
         let mut facets = block([0.0; 3], [1.0; 3]);
-        // A fin along the diagonal of the upper side, whose edge has three facets then.
+        // A fin along the diagonal of the upper side, which then has an edge of three facets.
         let [a, b] = [[0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
         facets.extend([[a, b, [1.0, 1.0, 2.0f32]], [a, [1.0, 1.0, 2.0], [0.0, 0.0, 2.0]]]);
         let table = table_of(&facets);

@@ -8,10 +8,10 @@ use crate::topology::mass::Moments;
 use crate::topology::rims::{box_of, widen};
 use crate::topology::{CornerTable, Mass, Shells};
 
-/// A shell, and what it encloses.
+/// A shell and its measures.
 #[derive(Clone, Debug)]
 pub struct ShellReport {
-    /// Its body, from 0, among those of [`CornerTable::bodies`].
+    /// The index of its body in [`CornerTable::bodies`], from 0.
     pub body: u32,
     /// Its first facet.
     pub first_facet: u32,
@@ -19,41 +19,42 @@ pub struct ShellReport {
     pub facets: u32,
     /// The number of vertices at its corners.
     pub vertices: u32,
-    /// The number of its edges. One that several pairs of neighbours share counts once for each.
+    /// The number of its edges. An edge that several pairs of neighbors share counts once for each
+    /// pair.
     pub edges: u32,
-    /// The number of sides of facets that have no neighbour.
+    /// The number of sides of facets without a neighbor.
     pub open_sides: u32,
-    /// Whether it has one side only, so that nothing is inside or outside.
+    /// Whether it has only one side, so that nothing is inside or outside.
     pub is_one_sided: bool,
     /// Its area.
     pub area_mm2: f64,
     /// The least and the greatest corner of its box.
     pub box_mm: [[f64; 3]; 2],
-    /// What it encloses, with facets that are turned over counted as their neighbours face. None if
-    /// it is open, one-sided or too large for 64 bits.
+    /// The mass that it encloses. Facets that are turned over count as if they faced like their
+    /// neighbors. `None` if it is open, one-sided or too large for 64 bits.
     pub mass: Option<Box<Mass>>,
-    /// The closed shell right around it, if it is closed, too.
+    /// The closed shell directly around it, if it is also closed.
     pub within: Option<u32>,
     /// Whether it is a void: within an odd number of shells.
     pub is_void: bool,
 }
 
 impl ShellReport {
-    /// Returns the Euler number, vertices less edges plus facets: 2 less twice the number of
+    /// Returns the Euler number, vertices minus edges plus facets: 2 minus twice the number of
     /// handles, if the shell is closed.
     pub fn euler(&self) -> i64 {
         i64::from(self.vertices) - i64::from(self.edges) + i64::from(self.facets)
     }
 
     /// Returns true if most of its facets face into the material: the volume of an outer shell is
-    /// below zero, or that of a void above.
+    /// negative, or the volume of a void positive.
     pub fn is_inside_out(&self) -> bool {
         let volume = self.mass.as_ref().map_or(0.0, |mass| mass.volume_mm3);
         if self.is_void { volume > 0.0 } else { volume < 0.0 }
     }
 }
 
-/// Looks at the facets of each shell. Which one is within which is not known yet.
+/// Examines the facets of each shell. Their nesting is not known yet.
 pub(crate) fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> {
     let facets = || (0..table.facet_count() as u32).map(|facet| (shells.of(facet), facet));
     let in_shells = facets().filter(|(shell, _)| (*shell as usize) < shells.count());
@@ -61,7 +62,7 @@ pub(crate) fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> 
     let mut last_shell_at = vec![u32::MAX; table.points().len()];
     let mut body_ends = table.bodies().map(|facets| facets.end).enumerate().peekable();
     let groups = match shells.count() {
-        // No need to sort.
+        // A single number needs no sorting.
         1 => None,
         count => Some(Grouped::new(count, || {
             in_shells.clone().map(|(shell, facet)| (shell as usize, facet))
@@ -82,7 +83,7 @@ pub(crate) fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> 
     (0..shells.count()).map(report).collect()
 }
 
-/// Returns the number of crowded edges without neighbours in each shell; nothing if there are none.
+/// Returns the number of crowded edges without neighbors in each shell; empty if there are none.
 fn crowded_by_shell(table: &CornerTable, shells: &Shells) -> Vec<u32> {
     let mut counts = Vec::new();
     for corners in table.crowded().filter(|corners| table.opposite(corners[0]).is_none()) {

@@ -1,14 +1,14 @@
-//! Shells: facets that hang together by edges.
+//! Finds shells: facets connected by edges.
 
 use lamp_stack::sets::{root, unite};
 
 use crate::topology::CornerTable;
 use crate::topology::corner_table::{NONE, facet_of};
 
-/// The shells of a mesh: facets that are joined by edges, and which of them are turned over.
+/// The shells of a mesh: facets connected by edges, and which of them are turned over.
 ///
-/// 002 algorithm 4 visits the neighbours of a facet by calling itself, once for each facet in a
-/// row, which no stack has room for; here they wait in a list.
+/// 002 algorithm 4 visits the neighbors of a facet by recursion, once per facet in a row, which
+/// would overflow any stack; here they wait in a list.
 #[derive(Clone, Debug)]
 pub struct Shells {
     of_facet: Vec<u32>,
@@ -17,22 +17,22 @@ pub struct Shells {
     one_sided: Vec<u32>,
 }
 
-/// Facets that hang together by [`CornerTable::opposite`].
+/// Facets connected by [`CornerTable::opposite`].
 struct Sheets {
     of_facet: Vec<u32>,
-    /// Whether a facet faces the other way than the first of its sheet.
+    /// Whether a facet faces the other way than the first facet of its sheet.
     is_turned: Vec<bool>,
     all: Vec<Sheet>,
 }
 
 struct Sheet {
-    /// Whether most of its facets face the other way than the first.
+    /// Whether most of its facets face the other way than the first one.
     is_turned: bool,
     is_one_sided: bool,
 }
 
 impl Shells {
-    /// Finds the shells. They are numbered by their first facets. Idle facets are of none.
+    /// Finds the shells. They are numbered by their first facets. Idle facets belong to no shell.
     pub fn new(table: &CornerTable) -> Self {
         let sheets = Sheets::of(table);
         let turned = sheets.turned();
@@ -62,26 +62,26 @@ impl Shells {
         self.count as usize
     }
 
-    /// Returns the shell of a facet, below [`count`](Self::count), or `u32::MAX` for an idle one.
+    /// Returns the shell of a facet, below [`count`](Self::count), or `u32::MAX` for an idle facet.
     #[inline]
     pub fn of(&self, facet: u32) -> u32 {
         self.of_facet[facet as usize]
     }
 
-    /// Returns the facets that face the other way than most of those they hang together with, in
-    /// rising order. Whether these face outwards is another question.
+    /// Returns the facets that face the other way than most facets connected to them, in ascending
+    /// order. This does not decide whether these face outward.
     pub fn turned(&self) -> &[u32] {
         &self.turned
     }
 
-    /// Returns true if a facet is one of those [turned](Self::turned).
+    /// Returns true if a facet is among the [turned](Self::turned) ones.
     #[inline]
     pub fn is_turned(&self, facet: u32) -> bool {
         self.turned.binary_search(&facet).is_ok()
     }
 
-    /// Returns the shells that have one side only, as a Moebius strip: whichever of their facets
-    /// are turned over, some neighbours disagree.
+    /// Returns the shells with only one side, such as a Moebius strip: whichever of their facets
+    /// are turned over, some neighbors disagree.
     pub fn one_sided(&self) -> &[u32] {
         &self.one_sided
     }
@@ -139,7 +139,8 @@ impl Sheets {
     }
 }
 
-/// Numbers sets by their first members. Returns the numbers by member, and that of sets.
+/// Numbers sets by their first members. Returns the set number of each member, and the number of
+/// sets.
 fn numbered(parents: &mut [u32]) -> (Vec<u32>, u32) {
     let mut count = 0;
     let mut numbers = vec![NONE; parents.len()];
@@ -163,7 +164,7 @@ mod tests {
     use crate::facet::Facet;
     use crate::topology::testing::{block, table_of, turned};
 
-    /// A strip of facets in a zigzag, each with a neighbour before and after.
+    /// A strip of facets in a zigzag, each with a neighbor before and after.
     fn strip(facets: usize) -> Vec<Facet> {
         let point = |k: usize| [k as f32, (k % 2) as f32, 0.0];
         let facet = |k: usize| match k % 2 {

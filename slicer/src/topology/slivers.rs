@@ -1,4 +1,4 @@
-//! Mends facets without area whose three corners are apart.
+//! Repairs degenerate facets whose three corners are different vertices.
 
 use std::collections::VecDeque;
 
@@ -8,18 +8,19 @@ use crate::topology::CornerTable;
 use crate::topology::corner_table::{NONE, facet_of, next, previous};
 use crate::topology::faults::is_flat_between;
 
-/// Flips for each facet. A side with n vertices along it takes some n flips, whatever their order.
+/// The number of flips per facet. A side with n vertices along it takes about n flips, in any
+/// order.
 const FLIPS_PER_FACET: usize = 8;
 
-/// Facets around a vertex that are looked at before a flip.
+/// The greatest number of facets around a vertex that are examined before a flip.
 const MAX_AROUND: usize = 10_000;
 
-/// Returns the facets, by number and with their vertices, that differ once facets without area are
-/// gone.
+/// Returns the facets, by number and with their vertices, that change when facets without area are
+/// removed.
 ///
 /// Such a facet has a corner on its longest side. That side is flipped: the facet across it becomes
-/// two, which meet in the corner. No point of the surface moves. A facet stays where its longest
-/// side has no neighbor, or where the flip would repeat an edge of the mesh.
+/// two facets, which meet in the corner. No point of the surface moves. A facet stays where its
+/// longest side has no neighbor, or where the flip would repeat an edge of the mesh.
 pub(crate) fn without_slivers(table: &CornerTable) -> Vec<(u32, [u32; 3])> {
     let mut waiting: VecDeque<u32> =
         (0..table.facet_count() as u32).filter(|&facet| table.is_sliver(facet)).collect();
@@ -80,7 +81,7 @@ impl Flips<'_> {
         corners.max_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(3 * facet)
     }
 
-    /// Returns the corner of a facet without area whose opposite side can be flipped.
+    /// Returns the corner of a degenerate facet whose opposite side can be flipped.
     fn to_flip(&self, facet: u32) -> Option<u32> {
         if !self.is_flat(facet) {
             return None;
@@ -90,8 +91,8 @@ impl Flips<'_> {
         let vertex = |corner: u32| self.vertices[corner as usize];
         let runs_on = vertex(next(across)) == vertex(previous(corner))
             && vertex(previous(across)) == vertex(next(corner));
-        // Of two on one line, that goes first whose longest side leads off the line: each flip then
-        // shortens sides, so they come to an end.
+        // Of two on one line, the facet goes first whose longest side leads off the line: each flip
+        // then shortens sides, so the flips end.
         let other = facet_of(across);
         let is_next = !self.is_flat(other) || self.between(other) == across;
         let is_apart = vertex(across) != vertex(corner);
@@ -99,7 +100,7 @@ impl Flips<'_> {
         is_free.then_some(corner)
     }
 
-    /// Returns true if an edge leads from a corner's vertex to another one.
+    /// Returns true if an edge leads from a corner's vertex to another vertex.
     fn is_edge(&self, corner: u32, to: u32) -> bool {
         let ways: [fn(u32) -> u32; 2] = [next, previous];
         ways.into_iter().any(|way| {
@@ -119,7 +120,7 @@ impl Flips<'_> {
         })
     }
 
-    /// Flips the side opposite to a corner, so that it leads from the corner to the one across,
+    /// Flips the side opposite to a corner, so that it leads from the corner to the corner across,
     /// which it returns.
     fn flip(&mut self, corner: u32) -> u32 {
         let across = self.opposites[corner as usize];
@@ -148,12 +149,12 @@ impl Flips<'_> {
 }
 
 impl CornerTable {
-    /// Returns true if a facet has no area, though its corners are three vertices.
+    /// Returns true if a facet has no area although its corners are three vertices.
     fn is_sliver(&self, facet: u32) -> bool {
         !self.is_idle(facet) && is_flat_between(self.facet(facet))
     }
 
-    /// Returns the table with some facets between other vertices.
+    /// Returns the table with some facets changed to other vertices.
     pub(crate) fn with_facets(self, changed: &[(u32, [u32; 3])]) -> Self {
         let (points, mut vertices, body_ends) = self.into_parts();
         for &(facet, of_facet) in changed {
@@ -174,14 +175,14 @@ mod tests {
     use crate::topology::testing::table_of;
 
     /// A prism over a triangle, with vertices along the upper side of its front. The front has
-    /// facets without area between them: the strip is cut as `cut` says.
+    /// degenerate facets between them: the strip is cut as `cut` specifies.
     fn prism(along: &[f32], mut cut: impl FnMut(usize) -> usize) -> Vec<Facet> {
         let [a, b, c] = [[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 6.0, 0.0f32]];
         let up = |[x, y, z]: [f32; 3]| [x, y, z + 4.0];
         let [d, e, f] = [a, b, c].map(up);
         let mut facets = vec![[a, c, b], [a, b, e], [a, e, d], [b, c, f], [b, f, e]];
         facets.extend([[c, a, d], [c, d, f]]);
-        // The lid meets the vertices, the front does not.
+        // The lid uses the vertices, the front does not.
         let line: Vec<[f32; 3]> =
             [d].into_iter().chain(along.iter().map(|&x| [x, 0.0, 4.0])).chain([e]).collect();
         facets.extend(line.windows(2).map(|side| [side[0], side[1], f]));

@@ -1,17 +1,17 @@
-//! Meshes for the tests of topology.
+//! Provides meshes for the tests of topology.
 
 use crate::facet::{Facet, Units};
 use crate::part::Part;
 use crate::placement::Placement;
 use crate::topology::CornerTable;
 
-/// Returns the table of facets in millimetres.
+/// Returns the table of facets in millimeters.
 pub(crate) fn table_of(facets: &[Facet]) -> CornerTable {
     let part = Part::from_facets("test", facets.to_vec());
     CornerTable::of_part(&part, &Placement::default(), Units::Millimetres).unwrap()
 }
 
-/// Returns the twelve facets of a block between two corners, facing outwards.
+/// Returns the twelve facets of a block between two corners, facing outward.
 pub(crate) fn block(low: [f32; 3], high: [f32; 3]) -> Vec<Facet> {
     let corner = |k: usize| [0, 1, 2].map(|axis| [low, high][k >> axis & 1][axis]);
     let sides =

@@ -1,4 +1,4 @@
-//! Joins vertices of open rims that lie within a tolerance of each other.
+//! Joins vertices of open rims (boundary edges) within a tolerance of each other.
 
 use std::collections::HashMap;
 
@@ -6,21 +6,22 @@ use lamp_brep::vector::{Vec3, distance};
 
 use crate::topology::CornerTable;
 
-/// Steps of 32-bit numbers at the greatest coordinate, within which rounding alone may part corners.
+/// The number of steps of 32-bit numbers at the greatest coordinate, within which rounding alone
+/// may separate corners.
 const STEPS: f64 = 4.0;
 
-/// The usual tolerance, at most, as a share of the diagonal of the box: 5 um for 100 mm. Writers of
-/// few digits keep five of them.
+/// The upper limit of the usual tolerance, as a share of the diagonal of the box: 5 um for 100 mm.
+/// Programs that write few digits write at least five.
 const OF_SIZE: f64 = 5e-5;
 
-/// The same, as a share of the shortest side at a rim.
+/// The upper limit, as a share of the shortest side at a rim.
 const OF_SIDES: f64 = 0.25;
 
 impl CornerTable {
-    /// Returns how far apart vertices at rims may lie that are meant to be one, in the unit of the
-    /// points: 1/20 000 of the diagonal of the box, but at most a quarter of the shortest side at a
-    /// rim, so that no facet collapses, and at least four steps of a 32-bit number at the greatest
-    /// coordinate. Sides as short as these steps do not count.
+    /// Returns the distance within which vertices at rims are meant to be one vertex, in the unit
+    /// of the points: 1/20 000 of the diagonal of the box, but at most a quarter of the shortest
+    /// side at a rim, so that no facet collapses, and at least four steps of a 32-bit number at the
+    /// greatest coordinate. Sides as short as these steps do not count.
     pub fn usual_weld(&self) -> f64 {
         let finite = self.points().iter().filter(|point| point.iter().all(|c| c.is_finite()));
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -40,10 +41,10 @@ impl CornerTable {
         if usual.is_finite() { usual } else { 0.0 }
     }
 
-    /// Joins vertices at rims with the nearest vertex at a rim, among those numbered before, that
-    /// lies within a tolerance in millimetres. Returns the table and the corners that moved.
+    /// Joins each vertex at a rim with the nearest earlier vertex at a rim within a tolerance in
+    /// millimeters. Returns the table and the corners that moved.
     ///
-    /// The seed looks at all vertices (002 figure 21); but where facets are closed, vertices close
+    /// The seed examines all vertices (002 figure 21). But where facets are closed, vertices close
     /// together are fine detail, which a tolerance would crush.
     #[must_use]
     pub fn welded(self, within_mm: f64) -> (Self, Vec<u32>) {
@@ -62,7 +63,7 @@ impl CornerTable {
         (Self::of_bodies(points, vertices, body_ends), moved)
     }
 
-    /// Returns the vertices that move, and the vertex to which each does.
+    /// Returns the vertices that move, and their target vertices.
     fn near_vertices(&self, within_mm: f64) -> HashMap<u32, u32> {
         let mut moved_to = HashMap::new();
         if !(within_mm > 0.0 && within_mm.is_finite()) {
@@ -86,8 +87,8 @@ impl CornerTable {
     }
 }
 
-/// Cubes as wide as the tolerance, and the vertices in each. These are farther apart than the
-/// tolerance, so a cube has few.
+/// Cubes as wide as the tolerance, and the vertices in each cube. The vertices are farther apart
+/// than the tolerance, so a cube has few.
 struct Cells {
     side: f64,
     vertices: HashMap<[u64; 3], Vec<u32>>,
@@ -99,12 +100,12 @@ impl Cells {
     }
 
     /// Returns the key of a cell some cells away. Far from the origin, where steps of floating
-    /// point are wider than cells, it is the same.
+    /// point are wider than cells, it is the same key.
     fn key_beside(&self, point: Vec3, steps: Vec3) -> [u64; 3] {
         [0, 1, 2].map(|axis| ((point[axis] / self.side).floor() + steps[axis] + 0.0).to_bits())
     }
 
-    /// Returns the nearest vertex within the tolerance, the first one of several.
+    /// Returns the nearest vertex within the tolerance; of several, the first.
     fn nearest(&self, point: Vec3, points: &[Vec3]) -> Option<u32> {
         let steps = (0..27).map(|k| [k % 3, k / 3 % 3, k / 9].map(|step| f64::from(step) - 1.0));
         let near = steps.filter_map(|steps| self.vertices.get(&self.key_beside(point, steps)));
@@ -146,7 +147,8 @@ mod tests {
     #[test]
     fn the_usual_tolerance_follows_the_part() {
         let good = sphere(10.0, 5_000);
-        // The same part in every size and place: gaps of 1/100 000 of it close, no detail does.
+        // The same part in every size and place: gaps of 1/100 000 of its size close, details do
+        // not.
         for (scale, shift) in [(1.0, 0.0), (1e-3, 0.0), (50.0, 0.0), (1.0, 90.0), (1.0, -1e4)] {
             let mut mesh = good.clone();
             let gap = if shift < -1e3 { 0.003 } else { 2e-4 };
@@ -160,7 +162,7 @@ mod tests {
             let steps = 4.0 * 2f64.powi(-23) * (f64::abs(shift) + 21.0);
             assert!(within <= f64::max(size / 19_900.0, steps), "{within}");
         }
-        // Steps of a comb, 1 um wide on a part of a meter, are no gaps.
+        // Steps of a comb, 1 um wide on a part of a meter, are not gaps.
         let tooth = |k: usize| [k as f32 * 1e-3, 0.0, 0.0f32];
         let far = [1000.0, 1000.0, 0.0f32];
         let comb: Vec<_> = (0..50).map(|k| [tooth(k), tooth(k + 1), far]).collect();

@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use crate::topology::CornerTable;
 
-/// The greatest number of facets that are looked at, of all places together.
+/// The greatest number of facets examined, for all places together.
 const MOST_FACETS: usize = 200_000_000;
 
-/// Returns the first of some facets beside which its solid is wound around twice, or turned
-/// inside out, and the place. `off_mm` is the distance to the side of a facet that is looked at,
-/// and `solid` gives the facets of the same solid.
+/// Returns the first of some facets next to which its solid is wound around twice, or turned inside
+/// out, and the place. `off_mm` is the distance between the examined place and the facet, and
+/// `solid` gives the facets of the same solid.
 ///
-/// Facets may lie exactly on each other's edges here: no place is on a facet's border.
+/// Facets may be exactly on each other's edges here: no place is on a facet's border.
 pub(crate) fn wound_twice(
     table: &CornerTable,
     facets: &[u32],

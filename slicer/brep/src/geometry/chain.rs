@@ -3,8 +3,8 @@
 use super::curve::Curve;
 use crate::vector::{Vec3, distance, scale};
 
-/// Pieces of curves, each starting where the one before ends. Piece k has the parameters k
-/// to k + 1.
+/// Pieces of curves; each starts where the previous piece ends. Piece k has the parameters k to k +
+/// 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Chain {
     links: Vec<Link>,
@@ -17,11 +17,11 @@ pub(crate) struct Link {
     pub(crate) range: [f64; 2],
 }
 
-/// The greatest gap between pieces, in millimetres: programs round points by less.
+/// The greatest gap between pieces, in millimeters: programs round points by less.
 const JOINED_MM: f64 = 1e-3;
 
-/// Turns pieces over that only so meet the one before, and returns them if they close:
-/// some programs confuse the senses of pieces.
+/// Turns over pieces that meet the previous piece only that way. Returns the pieces if they close.
+/// Some programs confuse the senses of pieces.
 pub(crate) fn closed(mut links: Vec<Link>) -> Option<Vec<Link>> {
     let end = |link: &Link, k: usize| link.curve.place(link.range[k]);
     let meet = |a: Vec3, b: Vec3| distance(a, b) <= JOINED_MM;
@@ -42,7 +42,7 @@ pub(crate) fn closed(mut links: Vec<Link>) -> Option<Vec<Link>> {
 }
 
 impl Chain {
-    /// Returns a chain, or `None` if a piece does not start where the one before ends.
+    /// Returns a chain, or `None` if a piece does not start where the previous piece ends.
     pub(crate) fn new(links: Vec<Link>) -> Option<Self> {
         let ends = |link: &Link| link.range.map(|t| link.curve.place(t));
         let meet = |pair: &[Link]| distance(ends(&pair[0])[1], ends(&pair[1])[0]) <= JOINED_MM;

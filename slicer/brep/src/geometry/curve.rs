@@ -7,7 +7,7 @@ use super::spline::SplineCurve;
 use super::surface_curve::SurfaceCurve;
 use crate::vector::{Axes, Vec3, along, distance, dot, scale, sub};
 
-/// A curve in space, in millimetres, with the parameter of ISO 10303-42.
+/// A curve in space, in millimeters, with the parameter of ISO 10303-42.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Curve {
     Line {

@@ -14,7 +14,7 @@ impl Surface {
         if !by_mm.is_finite() {
             return None;
         }
-        // In left-handed axes, du × dv points against z and inwards.
+        // In left-handed axes, du × dv points against z and inward.
         let turned = |axes: &Axes| if axes.is_mirrored() { -by_mm } else { by_mm };
         let outwards_mm = match &self {
             Self::Plane(axes)

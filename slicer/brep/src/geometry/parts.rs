@@ -1,17 +1,17 @@
-//! Chooses the part of a surface that crosses itself on which a face lies.
+//! Chooses the part of a self-intersecting surface on which a face lies.
 
 use super::surface::{SAME_MM, Surface, TorusPart};
 use crate::vector::{Vec3, distance};
 
-/// How much nearer the points of a face must be to the other part.
+/// How much nearer the points of a face must be to the other part, as a factor.
 const CLEARLY_NEARER: f64 = 0.5;
 
 impl Surface {
-    /// Returns the surface with the part on which points lie, of a cone and of a torus whose tube
-    /// crosses itself. Others stay, and so does the part if the points do not decide.
+    /// Returns a cone, or a torus whose tube intersects itself, with the part on which the points
+    /// lie. Other surfaces stay unchanged. The part stays if the points do not decide.
     ///
     /// ISO 10303-42 has both halves of a cone, and a `TOROIDAL_SURFACE` with a tube wider than its
-    /// ring has the part around the axis, too; programs use them.
+    /// ring also has the part around the axis; programs use them.
     pub(crate) fn part_at(self, points: impl FnOnce() -> Vec<Vec3>) -> Self {
         let Some(other) = self.other_part() else { return self };
         let points = points();
@@ -23,10 +23,10 @@ impl Surface {
         if off_mm > SAME_MM && off(&other) < CLEARLY_NEARER * off_mm { other } else { self }
     }
 
-    /// Returns the other part of a surface that crosses itself.
+    /// Returns the other part of a self-intersecting surface.
     fn other_part(&self) -> Option<Self> {
         match self {
-            // Behind the tip radii are negative: a point with the radius -r at u has r at u + π.
+            // Behind the tip, radii are negative: a point with the radius -r at u has r at u + π.
             // Both have the same derivatives, so the normal stays.
             Self::Cone { axes, radius, slope } if *slope != 0.0 => {
                 Some(Self::Cone { axes: *axes, radius: -radius, slope: -slope })

@@ -18,8 +18,8 @@ pub(super) struct PolynomialBasis {
     /// The coefficients of all functions that are not zero, by interval and power, highest
     /// power first.
     coefficients: Vec<f64>,
-    /// For each of the equal parts of the domain, the piece in which it begins; then the
-    /// last piece.
+    /// For each of the equal parts of the domain, the index of the piece in which the part begins;
+    /// then the index of the last piece.
     parts: Vec<u32>,
     parts_per_unit: f64,
 }
@@ -117,14 +117,13 @@ impl PolynomialBasis {
     /// Returns the piece of a parameter; outside the domain, the first or the last.
     #[inline(always)]
     fn find(&self, t: f64) -> usize {
-        // Knots and parameters are rounded to parts alike, so the piece is always the right
-        // one.
+        // Knots and parameters are rounded to parts alike, so the piece is always right.
         let part = self.part(t);
         let (low, high) = (self.parts[part] as usize, self.parts[part + 1] as usize);
         low + self.breaks[low + 1..=high].partition_point(|&knot| knot <= t)
     }
 
-    /// Returns a parameter within its piece. Outside the domain the first or last piece is
+    /// Returns a parameter within its piece. Outside the domain, the first or last piece is
     /// continued.
     #[inline(always)]
     pub(super) fn local(&self, t: f64) -> LocalParameter {

@@ -9,7 +9,7 @@ use crate::vector::{Vec3, distance, dot, length, sub};
 
 /// The number of starts from which the nearest point is searched.
 const MOST_SEEDS: usize = 6;
-/// How far seeds at a pole move towards the middle of the surface.
+/// The distance by which seeds at a pole move toward the middle of the surface.
 const OFF_POLE: f64 = 1e-3;
 
 impl Surface {
@@ -54,14 +54,13 @@ impl Surface {
 
     /// Returns the parameters of the point nearest to `p`, searching near `hint` first.
     ///
-    /// At a pole the undetermined parameter is arbitrary. Periodic parameters may lie in
-    /// any period.
+    /// At a pole the undetermined parameter is arbitrary. Periodic parameters may be in any period.
     pub(crate) fn project(&self, p: Vec3, hint: Option<[f64; 2]>) -> [f64; 2] {
         self.project_near(p, hint, SAME_MM)
     }
 
-    /// Returns the same for a point that may lie off the surface: what is found near
-    /// `hint` is taken if it is as near as `off_mm`.
+    /// Returns the same for a point that may be off the surface: accepts the point found near
+    /// `hint` if it is within `off_mm`.
     pub(crate) fn project_near(&self, p: Vec3, hint: Option<[f64; 2]>, off_mm: f64) -> [f64; 2] {
         let azimuth = |q: Vec3| q[1].atan2(q[0]);
         match self {
@@ -98,7 +97,7 @@ impl Surface {
 
     fn search(&self, p: Vec3, hint: Option<[f64; 2]>, off_mm: f64) -> [f64; 2] {
         let near = hint.map(|hint| self.nearer(p, hint));
-        // From a pole the search leaves along one line alone, which may lead away from the point.
+        // From a pole, the search leaves along a single line, which may lead away from the point.
         if let Some((apart, uv)) = near
             && apart < off_mm
             && (apart < SAME_MM || self.arbitrary(&self.at(uv)).is_none())
@@ -124,8 +123,8 @@ impl Surface {
         slopes.iter().position(|slope| *slope < SAME_MM)
     }
 
-    /// Returns the distance of a seed from `p`. Seeds at a pole move off it a little: there they
-    /// are all as near, and only some lead to the point.
+    /// Returns the distance of a seed from `p`. Seeds at a pole first move off it a little: at the
+    /// pole all are equally near, and only some lead to the point.
     fn seed(&self, p: Vec3, mut uv: [f64; 2]) -> (f64, [f64; 2]) {
         let jet = self.at(uv);
         let Some(axis) = self.arbitrary(&jet) else { return (distance(jet.point, p), uv) };
@@ -187,8 +186,8 @@ mod tests {
     use crate::geometry::spline::{Knots, weighted};
     use crate::geometry::spline_surface::SplineSurface;
 
-    /// Returns an eighth of a sphere of radius 5 mm as a rational surface with three sides: all of
-    /// v = 1 is its pole.
+    /// Returns an eighth of a sphere of radius 5 mm as a rational surface with three sides: the
+    /// line v = 1 is its pole.
     fn eighth() -> Surface {
         let knots = || Knots::new(2, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], 3).unwrap();
         let w = std::f64::consts::FRAC_1_SQRT_2;

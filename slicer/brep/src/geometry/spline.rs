@@ -88,8 +88,8 @@ impl Knots {
         }
     }
 
-    /// Returns the basis at `t`; outside the domain the first or last piece is continued
-    /// (*The NURBS Book*, algorithms A2.1 to A2.3).
+    /// Returns the basis at `t`; outside the domain, the first or last piece is continued (*The
+    /// NURBS Book*, algorithms A2.1 to A2.3).
     pub(super) fn basis(&self, t: f64) -> BasisValues<{ MAX_DEGREE + 1 }> {
         let (p, k, span) = (self.degree, &self.knots, self.span(t));
         let mut values = [0.0; MAX_DEGREE + 1];

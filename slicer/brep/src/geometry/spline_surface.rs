@@ -20,7 +20,7 @@ pub(crate) struct SplineSurface {
     pub(crate) periods: [Option<f64>; 2],
 }
 
-/// The greatest gap between the sides of a closed surface, in millimetres.
+/// The greatest gap between the sides of a closed surface, in millimeters.
 const CLOSED_MM: f64 = 1e-6;
 
 impl SplineSurface {
@@ -95,9 +95,9 @@ impl SplineSurface {
         [u, v]
     }
 
-    /// Returns points along the side of the domain where u (axis 0) or v (axis 1) is least
-    /// or greatest. Evaluated, since the control points are on the side only if its knots
-    /// are clamped.
+    /// Returns points along the side of the domain where u (axis 0) or v (axis 1) is least or
+    /// greatest. Evaluates the surface, because the control points are on the side only if its
+    /// knots are clamped.
     pub(crate) fn side(&self, axis: usize, last: bool) -> Vec<Vec3> {
         let (fixed, free) = if axis == 0 { (&self.u, &self.v) } else { (&self.v, &self.u) };
         let fixed = fixed.domain()[usize::from(last)];

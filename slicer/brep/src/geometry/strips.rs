@@ -47,8 +47,7 @@ impl Strips {
         }
     }
 
-    /// Evaluates with `M` and `N` one more than the degrees: loops of constant length are
-    /// fast.
+    /// Evaluates with `M` and `N`, each one more than a degree: loops of constant length are fast.
     fn along_v<const M: usize>(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match self.v.degree() {
             1 => self.each::<M, 2>(uv, jets),

@@ -9,7 +9,7 @@ use super::spline_surface::SplineSurface;
 use crate::kernel::Jet;
 use crate::vector::{Axes, Vec3, add, scale};
 
-/// A surface in millimetres, with the parameters of ISO 10303-42.
+/// A surface in millimeters, with the parameters of ISO 10303-42.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     Plane(Axes),
@@ -17,7 +17,7 @@ pub(crate) enum Surface {
         axes: Axes,
         radius: f64,
     },
-    /// Its radius at v = 0, and the radius's growth per unit of v.
+    /// A cone: its radius at v = 0, and the growth of the radius per unit of v.
     Cone {
         axes: Axes,
         radius: f64,
@@ -62,10 +62,10 @@ pub(crate) enum TorusPart {
 
 /// A torus whose tube touches itself in its center.
 pub(crate) const HORN_TORUS: &str = "horn torus";
-/// How far its radii may differ, as a share.
+/// The greatest relative difference of its radii.
 const HORN: f64 = 1e-9;
 
-/// Points closer than this are equal, in millimetres.
+/// Points closer than this are equal, in millimeters.
 pub(super) const SAME_MM: f64 = 1e-6;
 
 impl Surface {
@@ -214,7 +214,7 @@ impl Surface {
         }
     }
 
-    /// Returns whether the surface is closed both ways, and so bounds a body by itself.
+    /// Returns whether the surface is closed both ways, so that it bounds a body by itself.
     pub(crate) fn is_closed(&self) -> bool {
         let (periods, poles) = (self.periods(), self.poles());
         (0..2).all(|axis| {

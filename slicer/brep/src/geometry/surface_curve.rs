@@ -14,7 +14,7 @@ pub(crate) struct SurfaceCurve {
     scale: [f64; 2],
 }
 
-/// The least number of parts that a curve is searched in.
+/// The least number of parts in which a curve is searched.
 const PARTS: usize = 4;
 
 impl SurfaceCurve {

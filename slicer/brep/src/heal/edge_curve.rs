@@ -29,8 +29,8 @@ impl<'a> EdgeCurve<'a> {
         distance(self.curve.place(self.curve.project(p)), p)
     }
 
-    /// Returns a point's place along the edge, from 0 to 1, or `None` if it is further
-    /// away than the tolerance.
+    /// Returns a point's place along the edge, from 0 to 1, or `None` if it is farther away than
+    /// the tolerance.
     pub(super) fn part(&self, p: Vec3) -> Option<f64> {
         // A test of the box avoids most of the slow projections.
         let near = 2.0 * self.tolerance_mm;
@@ -49,7 +49,7 @@ impl<'a> EdgeCurve<'a> {
         (distance(at, p) <= self.tolerance_mm).then_some(part)
     }
 
-    /// Returns [`part`](Self::part) for a point further than the tolerance from both ends.
+    /// Returns [`part`](Self::part) for a point farther than the tolerance from both ends.
     pub(super) fn inner_part(&self, p: Vec3) -> Option<f64> {
         let is_end = |t: f64| distance(self.curve.place(t), p) <= self.tolerance_mm;
         self.part(p).filter(|_| !self.range.into_iter().any(is_end))

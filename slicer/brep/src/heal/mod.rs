@@ -1,9 +1,9 @@
 //! Joins edges that faces do not share, within a tolerance.
 //!
-//! Healing changes only what is open: edges used by one face, their ends, and gaps
-//! between the edges of a loop. It merges vertices within the tolerance, splits edges
-//! at vertices that lie on them, and merges edges that run within the tolerance of each
-//! other between the same vertices. Validation then decides whether the facets close.
+//! Healing changes only open parts: edges used by one face, their ends, and gaps between the edges
+//! of a loop. It merges vertices within the tolerance, splits edges at vertices on them, and merges
+//! edges that run within the tolerance of each other between the same vertices. Validation then
+//! decides whether the facets close.
 
 mod edge_curve;
 mod vertices;
@@ -42,13 +42,13 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
     findings
 }
 
-/// The healing of one body.
+/// The healing process of one body.
 struct Healing<'a> {
     faces: &'a mut [Face],
     edges: &'a mut Vec<BrepEdge>,
     vertices: &'a mut [Vec3],
     tolerance_mm: f64,
-    /// The gap closed at each edge that was joined or whose ends were, in millimetres.
+    /// The gap closed at each edge that was joined or whose ends were joined, in millimeters.
     widest_mm: HashMap<usize, f64>,
 }
 
@@ -98,7 +98,7 @@ impl Healing<'_> {
         edge_range(&edge.curve, start, end, edge.forward)
     }
 
-    /// Splits open edges at the ends of others that lie on them.
+    /// Splits open edges at the ends of other open edges on them.
     fn cut_edges(&mut self) {
         let mut ends: Vec<usize> = self.loose();
         ends.sort_by(|&a, &b| self.vertices[a][0].total_cmp(&self.vertices[b][0]));
@@ -134,8 +134,8 @@ impl Healing<'_> {
         }
     }
 
-    /// Returns the vertices that lie on an edge away from its ends, in order along it.
-    /// `ends` are sorted by x.
+    /// Returns the vertices on an edge away from its ends, in order along it. `ends` are sorted by
+    /// x.
     fn cuts(&self, edge: &BrepEdge, ends: &[usize]) -> Vec<usize> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let low = span.low[0] - 2.0 * self.tolerance_mm;
@@ -163,7 +163,7 @@ impl Healing<'_> {
             });
             match twin {
                 Some((k, other, is_along, apart)) => {
-                    // An edge joins two faces at most, so a pair takes no third edge.
+                    // An edge joins at most two faces, so a pair takes no third edge.
                     waiting.swap_remove(k);
                     becomes.insert(edge, (other, is_along));
                     let widest = self.widest_mm.remove(&edge).unwrap_or(0.0).max(apart);

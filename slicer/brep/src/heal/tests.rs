@@ -1,4 +1,4 @@
-//! Tests healing on models that are torn apart.
+//! Tests healing on models whose faces were separated.
 
 use std::path::Path;
 
@@ -9,14 +9,14 @@ use crate::step::StepModel;
 use crate::validate::check;
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};
 
-/// A way of tearing a model apart.
+/// A way of separating a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tear {
     /// Each face has its own edges, which meet within the face.
     Faces,
-    /// The edges within a face do not meet either.
+    /// The edges within a face do not meet, either.
     Edges,
-    /// Every other face has two edges for each edge of its neighbours.
+    /// Every other face has two edges for each edge of its neighbors.
     Halves,
 }
 

@@ -6,13 +6,13 @@ use super::Healing;
 use crate::model::Loop;
 use crate::vector::{Vec3, add, distance, scale};
 
-/// The greatest number of steps of a vertex to the place where its edges meet.
+/// The greatest number of steps that move a vertex to the place where its edges meet.
 const MAX_STEPS: usize = 50;
-/// The length of the last step, in millimetres.
+/// The length of the last step, in millimeters.
 const SETTLED_MM: f64 = 1e-9;
 
 impl Healing<'_> {
-    /// Merges vertices that lie within the tolerance of each other.
+    /// Merges vertices within the tolerance of each other.
     pub(super) fn join_vertices(&mut self) {
         let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
         // Each vertex becomes the first one within the tolerance.
@@ -80,8 +80,8 @@ impl Healing<'_> {
         }
     }
 
-    /// Removes edges from loops if their ends become one vertex and all of the edge
-    /// lies within twice the tolerance of its start.
+    /// Removes edges from loops if their ends become one vertex and the whole edge is within twice
+    /// the tolerance of its start.
     fn collapse(&mut self, becomes: &HashMap<usize, usize>) {
         let at = |vertex: &usize| *becomes.get(vertex).unwrap_or(vertex);
         let is_tiny = |&(edge, _): &(usize, bool)| {

@@ -14,7 +14,7 @@ use super::shapes::{Shapes, SubShape};
 const MAX_PARTS: usize = 100_000;
 const MAX_LEVELS: usize = 64;
 
-/// Places all bodies of a file: the solids, or without any, its surfaces.
+/// Places all bodies of a file: the solids, or, if there are no solids, its surfaces.
 pub(crate) fn placed(entities: &Entities) -> Result<Placed, StepError> {
     let products = Products::read(entities)?;
     let shapes = Shapes::read(entities, &products)?;
@@ -27,7 +27,7 @@ pub(crate) fn placed(entities: &Entities) -> Result<Placed, StepError> {
     };
     assembly.place_all(&roots(&products, &shapes))?;
     if assembly.found.is_empty() {
-        // Without products, or if they place nothing, shapes stand where they are.
+        // Without products, or if products place nothing, shapes stand where they are.
         let used = shapes.used_in(0..shapes.groups.len());
         let tops: Vec<usize> =
             (0..shapes.groups.len()).filter(|group| !used.contains(group)).collect();
@@ -36,8 +36,8 @@ pub(crate) fn placed(entities: &Entities) -> Result<Placed, StepError> {
     assembly.found.finish(entities)
 }
 
-/// Returns the groups of shapes of products that no assembly uses, and that no shape of
-/// another product contains.
+/// Returns the groups of shapes of products that no assembly uses and no shape of another product
+/// contains.
 fn roots(products: &Products, shapes: &Shapes) -> Vec<usize> {
     let all = products.shapes.iter().flat_map(|(_, shapes)| shapes);
     let used = shapes.used_in(all.filter_map(|id| shapes.group(*id)));
@@ -94,7 +94,7 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Returns the place of a part in its whole.
+    /// Returns the place of a part in the assembly that contains it.
     fn place_in(&self, whole: u64, part: &SubShape) -> Result<Place, StepError> {
         let place = |id: u64, item: Option<u64>| {
             let Some(item) = item else { return Ok(Place::WORLD) };

@@ -1,4 +1,4 @@
-//! Sorts what shapes hold: solids, surfaces to be sewn, and what is not sliced.
+//! Sorts the contents of shapes: solids, surfaces to be sewn, and contents that are not sliced.
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -15,15 +15,15 @@ use crate::notice::{Matter, Notice};
 /// A body with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedBody {
-    /// The solid, or the shells and faces that are to be sewn to one.
+    /// The solid, or the shells and faces to be sewn to a solid.
     pub(crate) items: Vec<u64>,
     pub(crate) units: Units,
     pub(crate) place: Place,
-    /// Its own name, or that of its product; may be empty.
+    /// Its own name, or the name of its product; may be empty.
     pub(crate) name: String,
 }
 
-/// The bodies of a file in their places, and what is not sliced.
+/// The bodies of a file in their places, and contents that are not sliced.
 pub(crate) struct Placed {
     pub(crate) bodies: Vec<PlacedBody>,
     pub(crate) notices: Vec<Notice>,
@@ -35,14 +35,14 @@ enum Kind {
     Solid,
     /// A solid, moved.
     Replica,
-    /// A solid of a kind that is not read.
+    /// A solid of a kind that the reader does not support.
     OtherSolid,
     /// Surfaces without a solid.
     Surfaces,
     Wires,
     /// Facets.
     Tessellated,
-    /// Placements, texts and the like.
+    /// Placements, texts and similar items.
     Other,
 }
 
@@ -51,7 +51,7 @@ impl Kind {
         let records = entities.records(item)?;
         let mut kinds = records.iter().map(|record| Self::of_name(&record.name));
         Ok(match kinds.find(|kind| *kind != Self::Other).unwrap_or(Self::Other) {
-            // One that repeats an exact solid, which it names, is not missed.
+            // A solid that names the exact solid that it repeats is not missed.
             Self::OtherSolid
                 if entities
                     .find(item, "TESSELLATED_SOLID")
@@ -104,15 +104,15 @@ impl Kind {
     }
 }
 
-/// What the shapes of a file hold, in their places.
+/// The contents of a file's shapes, in their places.
 #[derive(Default)]
 pub(super) struct Contents {
     pub(super) solids: Vec<PlacedBody>,
-    /// Closed shells, and what is open in each shape, to be sewn.
+    /// Closed shells, and the open surfaces of each shape, to be sewn.
     pub(super) surfaces: Vec<PlacedBody>,
-    /// One for each matter.
+    /// One notice for each matter.
     pub(super) notices: Vec<Notice>,
-    /// The visit in which each item was met in a place.
+    /// The visit in which each item was found in a place.
     seen: HashMap<(u64, [u64; 13]), usize>,
 }
 
@@ -147,7 +147,7 @@ impl Contents {
         self.solids.is_empty() && self.surfaces.is_empty()
     }
 
-    /// Returns the solids, or without any, the surfaces.
+    /// Returns the solids, or, if there are no solids, the surfaces.
     pub(super) fn finish(mut self, entities: &Entities) -> Result<Placed, StepError> {
         if self.is_empty() {
             return Err(self.nothing(entities));
@@ -179,7 +179,7 @@ impl Contents {
     /// Returns the error of a file without any body.
     fn nothing(mut self, entities: &Entities) -> StepError {
         self.note_missing(entities, &[]);
-        // Parts in other files say most.
+        // Parts in other files are the most useful information.
         if let Some(Notice { entity, matter, .. }) = self.notices.pop() {
             return StepError::Other { id: entity, matter };
         }
@@ -225,7 +225,7 @@ impl Contents {
         Ok(())
     }
 
-    /// Notes an item as of a matter.
+    /// Adds an item to the notice of a matter.
     pub(super) fn note(&mut self, matter: Matter, entity: u64) {
         let is_alike = |notice: &&mut Notice| discriminant(&notice.matter) == discriminant(&matter);
         match self.notices.iter_mut().find(is_alike) {
@@ -234,8 +234,8 @@ impl Contents {
         }
     }
 
-    /// Returns whether an item is met for the first time in its place. Several shapes of a
-    /// product may name it: one of them may carry properties.
+    /// Returns whether an item is found for the first time in its place. Several shapes of a
+    /// product may refer to it: one of them may carry properties.
     fn is_new(&mut self, item: u64, kind: Kind, within: &PlacedShape) -> bool {
         let Place { axes, scale } = within.place;
         let mut bits = [scale.to_bits(); 13];
@@ -307,7 +307,7 @@ fn bounded_surfaces(entities: &Entities, set: u64) -> impl Iterator<Item = u64> 
     })
 }
 
-/// Returns whether an entity is a surface that ends with its parameters.
+/// Returns whether an entity is a surface bounded by its parameters.
 pub(super) fn is_whole_surface(entities: &Entities, id: u64) -> bool {
     const KINDS: [&str; 5] = [
         "RECTANGULAR_TRIMMED_SURFACE",

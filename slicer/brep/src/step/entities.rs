@@ -44,8 +44,8 @@ pub(crate) struct Entities {
 /// The greatest number of points, edges and faces of all bodies. Few entities may be read
 /// many times.
 const MAX_SPENT: usize = 10_000_000;
-/// Types with subtypes that come together, from the most general one on. A complex
-/// instance of one of them is read as a simple one.
+/// Types whose subtypes occur together, from the most general type on. A complex instance of one of
+/// them is read as a simple instance.
 const COMBINED: [&str; 6] = [
     "REPRESENTATION_ITEM",
     "MANIFOLD_SOLID_BREP",
@@ -58,7 +58,7 @@ const COMBINED: [&str; 6] = [
 impl Entities {
     /// Reads a whole file.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, StepError> {
-        // Some editors put a mark of the order of bytes before a text.
+        // Some editors put a byte order mark before a text.
         let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
         let mut reader = EntityReader { tokens: Tokens::new(bytes) };
         match reader.next() {

@@ -1,4 +1,4 @@
-//! Why a STEP file cannot be read.
+//! Defines the error for a STEP file that cannot be read.
 
 use crate::notice::Matter;
 
@@ -30,7 +30,7 @@ pub enum StepError {
         /// The entity's number.
         id: u64,
     },
-    /// An entity has another type than required.
+    /// An entity's type is not the required type.
     #[error("#{id} is not {expected}")]
     Unexpected {
         /// The entity's number.
@@ -71,12 +71,12 @@ pub enum StepError {
     /// There is no solid and no face.
     #[error("it holds no solid and no face")]
     Empty,
-    /// There is only something else.
+    /// There are only other contents.
     #[error("it holds nothing that can be sliced: #{id} is {matter}")]
     Other {
         /// The first such entity's number.
         id: u64,
-        /// What it is.
+        /// The kind of these contents.
         matter: Matter,
     },
     /// There is only a mesh of finite elements.

@@ -1,4 +1,4 @@
-//! Reads faces of surfaces that carry their bounds themselves.
+//! Reads faces of surfaces that include their own bounds.
 
 use super::entities::Item;
 use super::error::StepError;
@@ -19,7 +19,7 @@ impl BodyReader<'_> {
         Ok(())
     }
 
-    /// Adds a face whose loops go counter-clockwise.
+    /// Adds a face whose loops go counterclockwise.
     fn add(&mut self, entity: u64, surface: Surface, loops: Vec<Loop>) {
         let outwards = !self.geometry.place.is_mirrored();
         let face = Face { entity, surface, along_normal: true, outwards, loops, outer: None };
@@ -49,7 +49,7 @@ impl BodyReader<'_> {
         Loop::Edges(edges.collect())
     }
 
-    /// Reads a surface that ends with its parameters: a B-spline, or a trimmed one.
+    /// Reads a surface bounded by its parameters: a B-spline, or a trimmed surface.
     pub(super) fn whole_surface(&mut self, id: u64) -> Result<(), StepError> {
         self.entities.spend(1)?;
         let surface = self.geometry.surface(id)?;
@@ -63,8 +63,8 @@ impl BodyReader<'_> {
         Ok(())
     }
 
-    /// Returns the loops around a rectangle of parameters. Sides where the surface closes
-    /// bound nothing, nor do poles.
+    /// Returns the loops around a rectangle of parameters. Sides where the surface closes bound
+    /// nothing; neither do poles.
     fn sides(&mut self, surface: &Surface, domain: [[f64; 2]; 2]) -> Vec<Loop> {
         let is_round = [0, 1].map(|axis| {
             let [low, high] = domain[axis];
@@ -72,7 +72,7 @@ impl BodyReader<'_> {
             period.is_some_and(|period| (high - low - period).abs() < 1e-9 * period)
         });
         let mut sides = Vec::new();
-        // Counter-clockwise: along u, along v, and back.
+        // Counterclockwise: along u, along v, and back.
         for [from, to] in [[[0, 0], [1, 0]], [[1, 0], [1, 1]], [[1, 1], [0, 1]], [[0, 1], [0, 0]]] {
             let [from, to] =
                 [from, to].map(|corner: [usize; 2]| [0, 1].map(|k| domain[k][corner[k]]));

@@ -2,8 +2,8 @@
 
 use crate::vector::{Axes, scale};
 
-/// Where a shape stands: its points are scaled, then placed by axes, which are left-handed
-/// if it is mirrored.
+/// The placement of a shape: its points are scaled, then placed by axes. The axes are left-handed
+/// if the shape is mirrored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     pub(crate) axes: Axes,
@@ -13,7 +13,7 @@ pub(crate) struct Place {
 impl Place {
     pub(crate) const WORLD: Self = Self { axes: Axes::WORLD, scale: 1.0 };
 
-    /// Returns where `inner` stands in the world if it stands so within this place.
+    /// Returns the placement in the world of an `inner` placement within this one.
     pub(crate) fn then(&self, inner: &Self) -> Self {
         let moved = Axes { origin: scale(inner.axes.origin, self.scale), ..inner.axes };
         Self { axes: self.axes.then(&moved), scale: self.scale * inner.scale }

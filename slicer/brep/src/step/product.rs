@@ -1,5 +1,5 @@
-//! Reads product structure: which shapes products have, and which products assemblies use
-//! (ISO 10303-41, -44).
+//! Reads the product structure: the shapes of products, and the products that assemblies use (ISO
+//! 10303-41, -44).
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,7 +15,7 @@ pub(super) struct Products<'a> {
     pub(super) names: HashMap<u64, &'a str>,
     /// The product definitions that assemblies use.
     used: HashSet<u64>,
-    /// The product definition whose use each relation of shapes places.
+    /// The product definition whose use each shape relationship places.
     placed: HashMap<u64, u64>,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Products<'a> {
         roots.flat_map(|(_, shapes)| shapes.iter().copied())
     }
 
-    /// Returns the first shape of each product whose use a relation of shapes places.
+    /// Returns the first shape of each product whose use a shape relationship places.
     pub(super) fn parts(&self) -> HashMap<u64, u64> {
         let shapes: HashMap<u64, u64> =
             self.shapes.iter().map(|(definition, shapes)| (*definition, shapes[0])).collect();
@@ -69,15 +69,15 @@ impl<'a> Products<'a> {
     }
 }
 
-/// Returns what a property defines: what its third attribute names.
+/// Returns the entity that a property defines: the one that its third attribute references.
 fn definitions(entities: &Entities, property: u64) -> Option<u64> {
     // One of the records of a complex entity has the attributes.
     let mut records = entities.records(property).ok()?.iter();
     records.find_map(|record| Item { id: property, record }.optional(2))
 }
 
-/// Returns the product definition that a property belongs to, also by way of a shape
-/// aspect, which is a portion of the product's shape.
+/// Returns the product definition that a property belongs to, directly or through a shape aspect,
+/// which is a portion of the product's shape.
 fn definition(entities: &Entities, property: u64) -> Option<u64> {
     const KINDS: [&str; 2] = ["PRODUCT_DEFINITION", "PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS"];
     let mut at = property;
@@ -92,7 +92,7 @@ fn definition(entities: &Entities, property: u64) -> Option<u64> {
 
 /// Returns the product definitions of an assembly and of the part that it uses.
 fn ends(entities: &Entities, usage: u64) -> Option<[u64; 2]> {
-    // A complex entity has the attributes of the relation in a record of their own.
+    // A complex entity has the attributes of the relationship in a separate record.
     let relation = entities.find(usage, "PRODUCT_DEFINITION_RELATIONSHIP");
     let item = relation.or_else(|| entities.find(usage, "NEXT_ASSEMBLY_USAGE_OCCURRENCE"))?;
     Some([item.optional(3)?, item.optional(4)?])
@@ -166,7 +166,7 @@ mod tests {
             assert_eq!(products.roots().collect::<Vec<_>>(), [32]);
             assert_eq!(products.parts(), HashMap::from([(41, 31)]));
         }
-        // A product that uses itself is no part of another.
+        // A product that uses itself is not a part of another product.
         let entities = entities("#8=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#5,#5,$);");
         assert_eq!(Products::read(&entities).unwrap().roots().count(), 2);
     }

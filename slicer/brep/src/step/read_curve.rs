@@ -96,8 +96,8 @@ impl GeometryReader<'_> {
         Ok(Curve::Spline(SplineCurve { knots, points }))
     }
 
-    /// Moves a line or a circle sideways, along the product of a direction and its own; returns
-    /// `None` if the result is neither (ISO 10303-42, `offset_curve_3d`).
+    /// Moves a line or a circle sideways, along the cross product of a direction and its own
+    /// direction. Returns `None` if the result is neither (ISO 10303-42, `offset_curve_3d`).
     fn offset(&self, basis: &Curve, item: Item) -> Result<Option<Curve>, StepError> {
         let by_mm = item.number(2)? * self.units.mm;
         let up = self.direction(item.reference(4)?)?;
@@ -110,7 +110,7 @@ impl GeometryReader<'_> {
                 Some(Curve::Line { point: along(point, sideways, by_mm), direction })
             }
             Curve::Ellipse { axes, radii: [a, b] } if a == b => {
-                // The product points inwards where the circle goes round the direction.
+                // The product points inward where the circle goes around the direction.
                 let rise = dot(up, axes.directions[2]);
                 let radius = a - by_mm * rise.signum();
                 let is_flat = rise.abs() > 1.0 - 1e-9;
@@ -133,7 +133,7 @@ impl GeometryReader<'_> {
     /// Reads the pieces of a chain of curves.
     pub(super) fn links(&self, item: Item, depth: usize) -> Result<Vec<Link>, StepError> {
         let link = |id: u64| {
-            // A piece takes as much as several points.
+            // A piece costs as much as several points.
             self.entities.spend(10)?;
             let segment = self.entities.get(id, "COMPOSITE_CURVE_SEGMENT")?;
             let mut link = self.bounded(segment.reference(2)?, depth + 1)?;
@@ -189,7 +189,7 @@ impl GeometryReader<'_> {
         Ok(Link { curve, range: [from, to] })
     }
 
-    /// Returns a curve's parameter for a parameter of the file.
+    /// Returns the curve's parameter that corresponds to a parameter of the file.
     pub(super) fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
         match curve {
             Curve::Line { .. } => {

@@ -7,7 +7,7 @@ use super::units::Units;
 use crate::geometry::{Curve, Link, Surface, SurfaceCurve};
 use crate::vector::{Axes, Vec3, distance};
 
-/// How many periods before and after its own a line on a closed surface may lie.
+/// The number of periods before and after its own in which a line on a closed surface may be.
 const PERIODS: i32 = 3;
 
 impl GeometryReader<'_> {
@@ -39,7 +39,7 @@ impl GeometryReader<'_> {
         Ok(Curve::OnSurface(Box::new(SurfaceCurve::new(surface, link, scale))))
     }
 
-    /// Returns a surface's parameters for those of the file, as factors of u and v.
+    /// Returns the factors of u and v that convert the file's parameters to the surface's.
     fn parameters(&self, id: u64, depth: usize) -> Result<[f64; 2], StepError> {
         let Units { mm, radians, .. } = *self.units;
         // Of surfaces, only B-splines are complex instances.
@@ -88,9 +88,9 @@ impl GeometryReader<'_> {
         Ok([range(0)?, range(1)?])
     }
 
-    /// Returns the parameter of a swept curve for one of the file.
+    /// Returns the parameter of a swept curve that corresponds to a parameter of the file.
     fn profile(&self, id: u64) -> Result<f64, StepError> {
-        // The parameters of these begin where they do.
+        // The parameters of these curves begin where the curves begin.
         if ["TRIMMED_CURVE", "COMPOSITE_CURVE"]
             .iter()
             .any(|it| self.entities.find(id, it).is_some())
@@ -127,7 +127,7 @@ fn bounded(line: &Curve, surface: &Surface, scale: [f64; 2], [first, last]: [Vec
         all.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
     };
     let start = least(&mut starts.into_iter());
-    // Around a closed surface, the curve ends where it next gets to its last point.
+    // Around a closed surface, the curve ends where it next reaches its last point.
     let ahead = ends.iter().map(|end| end - start).filter(|way| *way > 1e-9).min_by(f64::total_cmp);
     let end = ahead.map_or_else(|| least(&mut ends.iter().copied()), |way| start + way);
     [start, end]
@@ -151,7 +151,7 @@ mod tests {
             (line(TAU, along), [a, b], [FRAC_PI_2, PI]),
             (line(PI, [-1.0, 0.0, 0.0]), [b, a], [0.0, FRAC_PI_2]),
             (line(FRAC_PI_2 - TAU, [0.0, 1.0, 0.0]), [a, up], [0.0, 5.0]),
-            // Against its direction, only if there is no other way.
+            // Against its direction only if there is no other way.
             (line(FRAC_PI_2, [0.0, 1.0, 0.0]), [up, a], [5.0, 0.0]),
         ] {
             let found = bounded(&line, &surface, [1.0; 2], ends);

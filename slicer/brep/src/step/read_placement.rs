@@ -6,12 +6,12 @@ use super::place::Place;
 use super::units::Units;
 use crate::vector::{Axes, Vec3, dot, scale, unit};
 
-/// A reader of a representation's geometry, placed and in millimetres.
+/// A reader of a representation's geometry, placed and in millimeters.
 pub(crate) struct GeometryReader<'a> {
     pub(crate) entities: &'a Entities,
     pub(crate) units: &'a Units,
     pub(crate) place: Axes,
-    /// Whether points have two coordinates: the parameters of a surface.
+    /// Whether points have two coordinates, the parameters of a surface.
     pub(crate) is_flat: bool,
 }
 
@@ -24,7 +24,7 @@ impl<'a> GeometryReader<'a> {
         Self { entities, units, place: Axes::WORLD, is_flat: false }
     }
 
-    /// Reads where a placement or an operator puts things.
+    /// Reads the place that a placement or an operator defines.
     pub(super) fn place(&self, id: u64) -> Result<Place, StepError> {
         if let Some(operator) = self.entities.find(id, "CARTESIAN_TRANSFORMATION_OPERATOR_3D") {
             return self.operator(operator);
@@ -39,7 +39,7 @@ impl<'a> GeometryReader<'a> {
     /// (ISO 10303-42, `base_axis`).
     fn operator(&self, item: Item) -> Result<Place, StepError> {
         let bad = || StepError::Numbers { id: item.id, what: "transformation" };
-        // Names and descriptions come first; some programs write one, others three.
+        // Names and descriptions come first; some programs write one, other programs three.
         let first = item.record.values.len().checked_sub(5).ok_or_else(bad)?;
         let direction = |k: usize| self.optional_direction(item.optional(first + k));
         let z = direction(4)?.unwrap_or([0.0, 0.0, 1.0]);
@@ -54,7 +54,7 @@ impl<'a> GeometryReader<'a> {
         is_sound.then_some(Place { axes, scale }).ok_or_else(bad)
     }
 
-    /// Reads what an operator copies, with a reader of the copy.
+    /// Reads the original that an operator copies, with a reader of the copy.
     pub(super) fn copied<T>(
         &self,
         operator: u64,
@@ -99,7 +99,7 @@ impl<'a> GeometryReader<'a> {
         id.map(|id| self.direction(id)).transpose()
     }
 
-    /// Reads an `AXIS2_PLACEMENT_3D`, or one in a plane, with defaults for omitted axes.
+    /// Reads an `AXIS2_PLACEMENT_3D`, or a placement in a plane, with defaults for omitted axes.
     pub(crate) fn axes(&self, id: u64) -> Result<Axes, StepError> {
         if let (true, Some(item)) = (self.is_flat, self.entities.find(id, "AXIS2_PLACEMENT_2D")) {
             let (x, [_, _, z]) =
@@ -119,7 +119,7 @@ impl<'a> GeometryReader<'a> {
         axes.map(|axes| self.handed(axes)).ok_or(StepError::Numbers { id, what: "axes" })
     }
 
-    /// Returns axes that were made right-handed, mirrored if this reader's place is.
+    /// Returns axes made right-handed, or mirrored if this reader's place is.
     pub(super) fn handed(&self, mut axes: Axes) -> Axes {
         if self.place.is_mirrored() {
             axes.directions[1] = scale(axes.directions[1], -1.0);

@@ -144,7 +144,7 @@ impl<'a> SplineRecords<'a> {
             "UNIFORM_CURVE" | "UNIFORM_SURFACE" => {
                 (0..count + degree + 1).map(|k| k as f64 - degree as f64).collect()
             }
-            // Quasi-uniform knots, or those of one or several Bézier pieces.
+            // Quasi-uniform knots, or the knots of one or several Bézier pieces.
             kind => {
                 let pieces =
                     if kind.starts_with("BEZIER") { (count - 1) / degree } else { count - degree };

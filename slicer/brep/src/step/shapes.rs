@@ -1,4 +1,4 @@
-//! Reads shape representations, and how they are used in each other (ISO 10303-43).
+//! Reads shape representations, and their use in each other (ISO 10303-43).
 
 use std::collections::{HashMap, HashSet};
 
@@ -16,8 +16,8 @@ pub(super) struct Shape {
     group: usize,
 }
 
-/// A shape used in another. The placement `from` coincides with the placement `to` of the
-/// whole; one that is missing is the shape's own coordinate system.
+/// A shape used in another. The placement `from` coincides with the placement `to` of the whole. A
+/// missing placement is the shape's own coordinate system.
 pub(super) struct SubShape {
     pub(super) shape: u64,
     pub(super) from: Option<u64>,
@@ -30,8 +30,8 @@ pub(super) struct Shapes<'a> {
     map: HashMap<u64, Shape>,
     /// Their numbers, in the file's order.
     order: Vec<u64>,
-    /// Groups of shapes in the same coordinates, in the file's order: those related without
-    /// a transformation, and those of one product.
+    /// Groups of shapes in the same coordinates, in the file's order: shapes related without a
+    /// transformation, and shapes of one product.
     pub(super) groups: Vec<Vec<u64>>,
 }
 
@@ -55,7 +55,7 @@ impl<'a> Shapes<'a> {
         self.map.get(&id).map(|shape| shape.group)
     }
 
-    /// Returns the groups that are used in some of these, or in others used there.
+    /// Returns the groups used in some of these groups, directly or indirectly.
     pub(super) fn used_in(&self, groups: impl Iterator<Item = usize>) -> HashSet<usize> {
         let mut used = HashSet::new();
         let mut waiting: Vec<usize> = groups.collect();
@@ -73,7 +73,7 @@ impl<'a> Shapes<'a> {
             let is_shape = item.name().ends_with("SHAPE_REPRESENTATION")
                 || item.name() == "REPRESENTATION"
                     && self.entities.find(item.id, "SHAPE_REPRESENTATION").is_some();
-            // In a complex entity only one of the records has the attributes.
+            // In a complex entity, only one of the records has the attributes.
             let (true, Ok(items), Some(context)) = (is_shape, item.references(1), item.optional(2))
             else {
                 continue;
@@ -140,8 +140,8 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    /// Records shapes that are related by a transformation as parts. `parts` are the shapes
-    /// that relations place by the product structure.
+    /// Records shapes that are related by a transformation as parts. `parts` are the shapes that
+    /// relationships place by the product structure.
     fn read_parts(&mut self, parts: &HashMap<u64, u64>) -> Result<(), StepError> {
         for (id, [a, b], transformed) in self.relations().collect::<Vec<_>>() {
             let Some(transformed) = transformed else { continue };
@@ -162,7 +162,7 @@ impl<'a> Shapes<'a> {
         Ok(())
     }
 
-    /// Records shapes that others show as mapped items as parts.
+    /// Records shapes that other shapes include as mapped items, as parts.
     fn read_mapped(&mut self) -> Result<(), StepError> {
         for whole in self.order.clone() {
             for item in self.map[&whole].items.clone() {

@@ -127,7 +127,7 @@ impl<'a> BodyReader<'a> {
         }
     }
 
-    /// Returns the place of the bound that is marked as the outer one, if one alone is.
+    /// Returns the index of the bound marked as the outer one, if exactly one is.
     fn outer(&self, bounds: &[u64]) -> Option<usize> {
         let is_outer = |id: &u64| self.entities.find(*id, "FACE_OUTER_BOUND").is_some();
         let mut marked = (0..bounds.len()).filter(|&k| is_outer(&bounds[k]));
@@ -194,7 +194,7 @@ impl<'a> BodyReader<'a> {
         Ok(edge)
     }
 
-    /// Returns the edge of which an edge is a part, or itself.
+    /// Returns the edge that contains an edge as a part, or the edge itself.
     fn whole_edge(&self, item: Item<'a>) -> Result<Item<'a>, StepError> {
         let mut whole = item;
         for _ in 0..MAX_NESTED {

@@ -6,13 +6,13 @@ use super::error::StepError;
 /// The units of a representation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Units {
-    /// The millimetres per unit of length.
+    /// The millimeters per unit of length.
     pub(crate) mm: f64,
     /// The radians per unit of angle.
     pub(crate) radians: f64,
     /// The name of the unit of length.
     pub(crate) name: String,
-    /// The uncertainty of lengths, in millimetres, if stated.
+    /// The uncertainty of lengths, in millimeters, if stated.
     pub(crate) uncertainty_mm: Option<f64>,
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Units {
 const MAX_STEPS: usize = 8;
 
 impl Units {
-    /// Returns the units of shapes that are scaled.
+    /// Returns the units of scaled shapes.
     pub(crate) fn scaled(&self, by: f64) -> Self {
         let uncertainty_mm = self.uncertainty_mm.map(|mm| by * mm);
         Self { mm: by * self.mm, uncertainty_mm, ..self.clone() }
@@ -44,7 +44,7 @@ impl Units {
     }
 }
 
-/// Returns the greatest length uncertainty of a context, in millimetres.
+/// Returns the greatest length uncertainty of a context, in millimeters.
 fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     let assigned = entities.find(context, "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT")?;
     let mm = |measure: u64| {
@@ -57,7 +57,7 @@ fn uncertainty_mm(entities: &Entities, context: u64) -> Option<f64> {
     assigned.references(0).ok()?.into_iter().filter_map(mm).reduce(f64::max)
 }
 
-/// Returns the size of a unit in SI units (metres, radians).
+/// Returns the size of a unit in SI units (meters, radians).
 fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let bad = StepError::Numbers { id: unit, what: "unit" };
     if let Some(si) = entities.find(unit, "SI_UNIT") {
@@ -67,7 +67,7 @@ fn size(entities: &Entities, unit: u64, step: usize) -> Result<f64, StepError> {
     let converted = entities.get(unit, "CONVERSION_BASED_UNIT")?;
     let measure = converted.reference(1)?;
     let records = entities.records(measure)?;
-    // A complex measure has several records; only one has value and unit (ISO 10303-41).
+    // A complex measure has several records; only one has a value and a unit (ISO 10303-41).
     let with_unit = records.iter().find(|record| record.values.len() >= 2);
     let item = Item { id: measure, record: with_unit.ok_or(bad.clone())? };
     if step == MAX_STEPS {

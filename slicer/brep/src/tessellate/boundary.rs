@@ -10,11 +10,11 @@ use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
 use crate::model::Face;
 
-/// The number of nodes that stand for a pole.
+/// The number of nodes that represent a pole.
 const POLE_PARTS: usize = 16;
 
-/// Returns the polygons of a face, the outer one last. A point is on the face if an odd
-/// number of them contain it.
+/// Returns the polygons of a face, the outer one last. A point is on the face if an odd number of
+/// polygons contain it.
 pub(super) fn polygons(
     face: &Face,
     rings: &[PointRing],
@@ -31,7 +31,7 @@ pub(super) fn polygons(
             PointRing::Points(Some(ring)) => {
                 let unwrapped = unwrap(face, &poles, ring, points, chord_mm);
                 if unwrapped.nodes.is_empty() {
-                    // All of it lies at a pole.
+                    // The whole loop lies at a pole.
                     tips.extend(ring.first());
                 } else {
                     loops.push(Unwrapped { is_outer: face.outer == Some(number), ..unwrapped });
@@ -69,15 +69,15 @@ struct FaceOutline<'a, 'b> {
 }
 
 impl FaceOutline<'_, '_> {
-    /// Removes the outer loop from the loops that do not go around the surface. If
-    /// there is none, makes it from the surface's whole domain.
+    /// Removes the outer loop from the loops that do not go around the surface. If there is no
+    /// outer loop, makes it from the surface's whole domain.
     fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
         let areas: Vec<f64> = closed.iter().map(|hole| area(&hole.nodes)).collect();
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
         let sense = if self.face.along_normal { 1.0 } else { -1.0 };
         match largest {
-            // A hole cannot be the outer loop, whatever its sense; but a loop that encloses
-            // nothing bounds none of it.
+            // A hole cannot be the outer loop, whatever its sense; but a loop that encloses nothing
+            // bounds no hole.
             Some(k) if areas[k] * sense > 0.0 || closed[k].is_outer && self.is_wide(areas[k]) => {
                 Ok(closed.remove(k).nodes)
             }
@@ -86,13 +86,13 @@ impl FaceOutline<'_, '_> {
         }
     }
 
-    /// Returns whether twice an area is more than nothing beside the surface's domain.
+    /// Returns whether twice an area is more than nothing compared with the surface's domain.
     fn is_wide(&self, doubled: f64) -> bool {
         let sides = self.face.surface.domain().map(|side| side.map_or(1.0, |[a, b]| b - a));
         doubled.abs() > 1e-3 * sides[0] * sides[1]
     }
 
-    /// Returns the polygon of a closed surface with holes alone.
+    /// Returns the polygon of a closed surface that has only holes.
     fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
         if !self.face.surface.is_closed() {
             return Err(Fault::Unbounded);
@@ -180,8 +180,8 @@ impl FaceOutline<'_, '_> {
         let axis = axis(around)?;
         let across = 1 - axis;
         let middle = mean(around, across);
-        // The left of a loop along u is towards greater v; the left of one along v is
-        // towards smaller u.
+        // The left of a loop along u is toward greater v; the left of one along v is
+        // toward smaller u.
         let left = f64::from(around.turns[axis] * if axis == 0 { 1 } else { -1 });
         let is_on_left = |pole: &Pole| (pole.at - middle) * left > 0.0;
         let mut poles = self.poles.iter().copied().filter(|pole| pole.axis == across);
@@ -217,8 +217,7 @@ impl FaceOutline<'_, '_> {
         Ok(is_above == ((one.turns[axis] > 0) == (axis == 0)))
     }
 
-    /// Joins two loops around the surface, and takes those holes from the list that lie
-    /// on the way.
+    /// Joins two loops around the surface, and removes the holes between them from the list.
     fn joined(
         &mut self,
         rings: [Unwrapped; 2],
@@ -246,7 +245,7 @@ fn mean(around: &Unwrapped, axis: usize) -> f64 {
     around.nodes.iter().map(|node| node.uv[axis]).sum::<f64>() / around.nodes.len() as f64
 }
 
-/// Returns the least and the greatest value of a parameter of a loop.
+/// Returns the least and the greatest value of a loop's parameter.
 fn span(around: &Unwrapped, axis: usize) -> [f64; 2] {
     let ends = around.nodes.iter().map(|node| node.uv[axis]);
     ends.fold([f64::MAX, f64::MIN], |[a, b], t| [a.min(t), b.max(t)])
@@ -274,8 +273,8 @@ fn gap(spans: &[[f64; 2]], low: f64, period: f64) -> Option<f64> {
     (longest.0 > 1e-6 * period).then_some(longest.1)
 }
 
-/// Returns whether the outer polygon is counter-clockwise. One made from a whole domain
-/// takes its direction from the face.
+/// Returns whether the outer polygon is counterclockwise. A polygon made from a whole domain takes
+/// its direction from the face.
 pub(super) fn is_counter_clockwise(polygons: &[Vec<Node>]) -> bool {
     polygons.last().is_none_or(|outer| area(outer) > 0.0)
 }
@@ -307,7 +306,7 @@ fn moved_into(mut hole: Vec<Node>, outer: &[Node], surface: &Surface) -> Vec<Nod
         let is_in = |node: &&Node| is_within([node.uv[0] + by[0], node.uv[1] + by[1]], outer);
         hole.iter().filter(is_in).count()
     };
-    // Chooses the move that puts most nodes inside; if none does, the hole stays.
+    // Chooses the move that puts most nodes inside; if no move puts any inside, the hole stays.
     let best = all.map(|by| (within(&by), by)).max_by(|a, b| {
         let far = |by: [f64; 2]| by[0].abs() + by[1].abs();
         a.0.cmp(&b.0).then(far(b.1).total_cmp(&far(a.1)))

@@ -6,8 +6,8 @@ use super::points::Node;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
-/// The greatest ratio of a cell's length to its width. A cylinder is straight along its axis,
-/// and would otherwise get facets as long as it is.
+/// The greatest ratio of a cell's length to its width. A cylinder is straight along its axis, so
+/// its facets would otherwise be as long as the cylinder.
 const LONGEST: f64 = 1000.0;
 
 /// The map from parameters to the plane of the triangulation.
@@ -30,7 +30,7 @@ impl CellScale {
         }
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1e-12));
         let (lengths, bends) = measure(surface, low, size);
-        // Sag grows with the square of a cell's size, hence the root.
+        // Sag grows with the square of a cell's size, so the root is taken.
         let wanted = bends.map(|bend| (bend / chord_mm).sqrt().max(1.0));
         let cell = [0, 1].map(|k| lengths[k].max(1e-9) / wanted[k]);
         // A face without extent along one parameter has no bend there either.

@@ -1,10 +1,10 @@
 //! Triangulates faces whose loops cross themselves within the tolerance.
 //!
-//! Where edges lie off their surface, or two run within the tolerance of each other, loops
-//! cross in the surface's parameters. Cutting off ears needs no loops free of crossings:
-//! every side of a loop becomes a side of exactly one triangle, so that the face still
-//! closes with its neighbours. Triangles at a crossing lie upside down; their area tells
-//! whether the loops cross by more than the tolerance.
+//! Where edges are off their surface, or two edges run within the tolerance of each other, loops
+//! cross in the surface's parameters. Cutting ears off works for crossing loops too: every side of
+//! a loop becomes a side of exactly one triangle, so the face still closes with its neighbors.
+//! Triangles at a crossing are upside down; their area shows whether the loops cross by more than
+//! the tolerance.
 
 use std::collections::{HashMap, HashSet};
 
@@ -17,10 +17,10 @@ pub(super) struct Corner {
     pub(super) number: usize,
 }
 
-/// Returns triangles between an outer polygon, counter-clockwise, and holes, clockwise.
+/// Returns triangles between an outer polygon, counterclockwise, and holes, clockwise.
 pub(super) fn ears(outer: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<[usize; 3]> {
     let mut ring = outer;
-    // From right to left, so that a hole is joined to what lies on its right.
+    // From right to left, so that a hole is joined to the loop on its right.
     let right = |hole: &[Corner]| hole.iter().map(|corner| corner.at.x).fold(f64::MIN, f64::max);
     holes.sort_by(|a, b| right(b).total_cmp(&right(a)));
     for hole in holes {
@@ -29,7 +29,7 @@ pub(super) fn ears(outer: Vec<Corner>, mut holes: Vec<Vec<Corner>>) -> Vec<[usiz
     cut(ring)
 }
 
-/// Joins a hole to a ring by a line there and back, the shortest that crosses neither.
+/// Joins a hole to a ring by the shortest line there and back that crosses neither.
 fn join(ring: &mut Vec<Corner>, hole: &[Corner]) {
     let some = |list: &[Corner]| (0..list.len()).step_by(list.len().div_ceil(MOST_ENDS));
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
@@ -64,8 +64,8 @@ fn is_crossed([a, b]: [Point2<f64>; 2], ring: &[Corner]) -> bool {
     })
 }
 
-/// Cuts ears off until a triangle is left: corners that bulge out and whose triangle holds
-/// no other corner; where there is none, the flattest.
+/// Cuts ears off until a triangle is left: corners that bulge out and whose triangle contains no
+/// other corner; if there is no such corner, the flattest.
 fn cut(mut ring: Vec<Corner>) -> Vec<[usize; 3]> {
     let mut triangles = Vec::with_capacity(ring.len());
     let mut at = 0;
@@ -124,7 +124,7 @@ pub(super) fn doubled(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
 /// Triangles whose sides are halved where they are too long.
 pub(super) struct Refined {
     pub(super) triangles: Vec<[usize; 3]>,
-    /// Whether sides that are too long are left, because there would be too many triangles.
+    /// Whether sides that are too long remain, because there would be too many triangles.
     pub(super) is_coarse: bool,
 }
 
@@ -134,13 +134,13 @@ impl Refined {
     }
 }
 
-/// Halves the sides that two triangles share and that are too long, and both triangles with
-/// them, until none is, or until there are more than `most` triangles. In between, sides are
-/// turned to be Delaunay: ears reach across a strip much longer than wide, and
-/// halving alone would never make them follow it.
+/// Halves the sides that two triangles share and that are too long, and both triangles with them,
+/// until no such side is left, or until there are more than `most` triangles. In between, sides are
+/// turned to be Delaunay: ears reach across a strip much longer than wide, and halving alone would
+/// never make them follow the strip.
 ///
-/// `places` has the corners; `is_long` says of two corners and `halve` makes the one
-/// between.
+/// `places` holds the corners; `is_long` decides for two corners; `halve` makes the corner between
+/// them.
 pub(super) fn refine(
     mut triangles: Vec<[usize; 3]>,
     places: &mut Vec<Point2<f64>>,
@@ -187,7 +187,7 @@ const MOST_TURNS: usize = 30;
 
 /// Turns sides that two triangles share to the other diagonal of both, where that is Delaunay.
 ///
-/// Triangles that lie upside down stay, and so do the sides next to them. Each turn lowers the
+/// Triangles that are upside down stay, and so do the sides next to them. Each turn lowers the
 /// triangles lifted to a paraboloid, so that turning ends.
 fn turn_sides(triangles: &mut [[usize; 3]], places: &[Point2<f64>]) {
     let key = |a: usize, b: usize| [a.min(b), a.max(b)];
@@ -221,8 +221,8 @@ fn turn_sides(triangles: &mut [[usize; 3]], places: &[Point2<f64>]) {
     }
 }
 
-/// Returns the ends of a side as the first triangle follows it, and the corner opposite to it of
-/// each triangle; `None` if both follow it the same way.
+/// Returns the ends of a side as the first triangle follows it, and the opposite corner of each
+/// triangle; `None` if both follow it the same way.
 fn quad(
     one: [usize; 3],
     other: [usize; 3],
@@ -244,7 +244,7 @@ fn is_turned_better([a, b, c, d]: [Point2<f64>; 4]) -> bool {
     if areas.iter().any(|area| *area <= 0.0) {
         return false;
     }
-    // d lies within the circle through a, b and c if the angles at c and d exceed a half turn.
+    // d is in the circle through a, b and c if the angles at c and d exceed a half turn.
     let angle = |p: Point2<f64>| {
         let (u, v) = ((a.x - p.x, a.y - p.y), (b.x - p.x, b.y - p.y));
         ((u.0 * v.1 - u.1 * v.0).abs(), u.0 * v.0 + u.1 * v.1)
@@ -258,10 +258,10 @@ fn sides([a, b, c]: [usize; 3]) -> [[usize; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// Returns the parts of a triangle after its sides got middles.
+/// Returns the parts of a triangle whose sides were halved.
 fn halved(triangle: [usize; 3], middles: &HashMap<[usize; 2], usize>) -> Vec<[usize; 3]> {
     let middle = |[a, b]: [usize; 2]| middles.get(&[a.min(b), a.max(b)]).copied();
-    // Starts where the first side has a middle, if any, and the last has none, if any.
+    // Starts where the first side has a middle and the last has none, if there is such a corner.
     let [a, b, c] = triangle;
     let turns = [[a, b, c], [b, c, a], [c, a, b]];
     let turned = turns.into_iter().find(|&turn| {
@@ -327,7 +327,7 @@ mod tests {
 
     #[test]
     fn sides_follow_a_strip() {
-        // A strip of 1 by 100, whose ears span all of it.
+        // A strip of 1 by 100, with ears that span all of it.
         let low = (0..=100).map(|k| [f64::from(k), 0.0]);
         let high = (0..=100).rev().map(|k| [f64::from(k), 1.0]);
         let strip = ring(&low.chain(high).collect::<Vec<_>>(), 0);

@@ -33,7 +33,7 @@ const LEAST_CELLS: f64 = 1e-3;
 
 type Filled = (Vec<[Node; 3]>, Option<Fault>);
 
-/// Triangulates a face. Triangles are counter-clockwise in its parameters.
+/// Triangulates a face. Triangles are counterclockwise in its parameters.
 pub(super) fn fill(
     face: &Face,
     polygons: &[Vec<Node>],
@@ -62,8 +62,8 @@ pub(super) fn fill(
     Ok((work.triangles(points), coarse))
 }
 
-/// Triangulates a face whose polygons cross by less than its edges are off, or than the
-/// chord.
+/// Triangulates a face whose polygons cross by less than the distance of its edges from the
+/// surface, or than the chord.
 fn crossed(
     work: &FaceTriangulation,
     polygons: &[Vec<Node>],
@@ -80,7 +80,7 @@ fn crossed(
         rings.push(polygon.iter().enumerate().map(corner).collect::<Vec<_>>());
         nodes.extend(polygon);
     }
-    // Cutting ears takes time with the square of their number.
+    // The time for cutting ears grows with the square of their number.
     if nodes.len() > MOST_CROSSED {
         return Err(Fault::Crossing);
     }
@@ -136,7 +136,7 @@ fn ring_area(ring: &[Corner]) -> f64 {
     ring.windows(2).map(|pair| doubled(first, pair[0].at, pair[1].at)).sum()
 }
 
-/// Returns the area of the triangles that lie upside down.
+/// Returns the area of the triangles that are upside down.
 fn turned_mm2(
     triangles: &[[usize; 3]],
     nodes: &[Node],
@@ -216,7 +216,7 @@ impl FaceTriangulation<'_> {
     fn corner(&mut self, node: &Node) -> Result<FixedVertexHandle, Fault> {
         let handle = self.insert(self.scale.place(node.uv))?;
         if handle.index() < self.corners.len() {
-            // Merging two different points would leave a gap to the neighbouring face.
+            // Merging two different points would leave a gap to the neighboring face.
             let is_same = self.corners[handle.index()].point == Some(node.point);
             return if is_same { Ok(handle) } else { Err(Fault::Crossing) };
         }

@@ -1,9 +1,9 @@
 //! Joins the loops of a face on a closed surface into one polygon.
 //!
-//! A loop that goes around the surface has no inside of its own. Straight cuts through the
-//! face join it to the loop on the other side, by way of holes where they stand between.
-//! Walking along loops and cuts, always with the face on the same hand, gives a polygon
-//! that comes back to its start; both sides of a cut have the same points.
+//! A loop that goes around the surface has no inside of its own. Straight cuts through the face
+//! join it to the loop on the other side, through the holes between them. Walking along loops and
+//! cuts, always with the face on the same hand, gives a closed polygon; both sides of a cut have
+//! the same points.
 
 use super::points::{FacePoints, Node};
 use super::unwrap::{Unwrapped, between};
@@ -15,11 +15,11 @@ const ENDS: usize = 48;
 /// The greatest number of cuts that are tried between two loops.
 const TRIES: usize = 500;
 
-/// A straight line from a node to another, each given by its loop and its place in it.
+/// A straight line from one node to another, each given by its loop and its index in the loop.
 #[derive(Clone, Copy)]
 struct Line {
     ends: [(usize, usize); 2],
-    /// The periods to add to the second end to be beside the first.
+    /// The periods to add to the second end to bring it next to the first.
     shift: [f64; 2],
 }
 
@@ -42,14 +42,14 @@ pub(super) struct Joining<'a> {
 }
 
 impl<'a> Joining<'a> {
-    /// Takes two loops around the surface, then those that come back to their starts.
+    /// Takes two loops around the surface, then the loops that close.
     pub(super) fn new(surface: &'a Surface, is_left: bool, loops: Vec<Unwrapped>) -> Self {
         let is_joined = (0..loops.len()).map(|k| k == 0).collect();
         Self { surface, is_left, loops, cuts: Vec::new(), is_joined }
     }
 
-    /// Returns the polygon of the first two loops and of the holes on the way, and the
-    /// other holes.
+    /// Returns the polygon of the first two loops and of the holes between them, and the other
+    /// holes.
     pub(super) fn polygon(
         mut self,
         points: &mut FacePoints,
@@ -86,7 +86,7 @@ impl<'a> Joining<'a> {
         let long = self.lengths();
         let is_free = |end: &(usize, usize)| self.cut_at(*end).is_none();
         let mut tries = Vec::new();
-        // With one cut a node, the walk knows its way.
+        // With at most one cut per node, the walk is unambiguous.
         for i in spread(from.len()).filter(|&i| is_free(&(a, i))) {
             for k in spread(to.len()).filter(|&k| is_free(&(b, k))) {
                 for shift in self.shifts(from[i].uv, to[k].uv) {
@@ -117,8 +117,8 @@ impl<'a> Joining<'a> {
         most
     }
 
-    /// Returns the periods that bring `to` beside `from`: the nearest along an axis around
-    /// which loops go, and also the next ones along another.
+    /// Returns the periods that bring `to` next to `from`: the nearest along an axis around which
+    /// loops go, and also the next periods along another axis.
     fn shifts(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
         let axis = usize::from(self.loops[0].turns[0] == 0);
         let periods = self.surface.periods();
@@ -146,7 +146,7 @@ impl<'a> Joining<'a> {
         [minus(before, here), minus(after, here)]
     }
 
-    /// Returns how far a loop has moved when it comes to its first node again.
+    /// Returns the displacement of a loop on its return to its first node.
     fn turn(&self, number: usize) -> [f64; 2] {
         let (turns, periods) = (self.loops[number].turns, self.surface.periods());
         [0, 1].map(|k| f64::from(turns[k]) * periods[k].unwrap_or(0.0))
@@ -155,7 +155,7 @@ impl<'a> Joining<'a> {
     /// Returns whether a way from a node leads into the face.
     fn is_inwards(&self, number: usize, k: usize, way: [f64; 2]) -> bool {
         let [before, after] = self.sides(number, k);
-        // Seen from the way on, the face's hand sweeps to the way back.
+        // From the way onward, the face's side sweeps to the way back.
         let to = |w: [f64; 2]| self.sweep(after, w);
         let (way, back) = (to(way), to(before));
         way > 1e-9 && way < back - 1e-9
@@ -187,7 +187,7 @@ impl<'a> Joining<'a> {
             })
     }
 
-    /// Returns the copies of a side, moved by periods, whose boxes meet that of a line.
+    /// Returns the copies of a side, moved by periods, whose boxes meet the box of a line.
     fn copies(
         &self,
         line: [[f64; 2]; 2],
@@ -239,7 +239,7 @@ impl<'a> Joining<'a> {
                 shift = plus(shift, self.turn(at.0));
             }
         }
-        // A walk that has not seen all of the loops has cut the face in two.
+        // A walk that has not visited all loops has cut the face in two.
         if at == start { Ok(polygon) } else { Err(Fault::Unbounded) }
     }
 

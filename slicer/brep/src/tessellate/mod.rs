@@ -2,7 +2,7 @@
 //!
 //! Each edge becomes a chain of points once, which all its faces share. A face is
 //! triangulated between its loops, in the parameters of its surface; inner points lie on
-//! the surface. Facets of neighbouring faces therefore always meet in the same points.
+//! the surface. Facets of neighboring faces therefore always meet in the same points.
 
 mod boundary;
 mod cells;
@@ -29,7 +29,7 @@ use crate::vector::{Vec3, distance, sub};
 /// The clearance of an edge's inner points from its vertices, as a multiple of the
 /// distance between a vertex and the curve's end.
 const CLEAR: f64 = 4.0;
-/// The least clearance of an edge's inner points from its vertices, in millimetres: where a
+/// The least clearance of an edge's inner points from its vertices, in millimeters: where a
 /// surface ends in a point, loops must not pass that point twice.
 const CLEAR_MM: f64 = 2.0 * unwrap::AT_POLE_MM;
 /// The greatest number of facets, which take about 5 GB of memory.
@@ -46,7 +46,7 @@ struct Outline {
 }
 
 impl Outline {
-    /// Returns how far edges lie off the surface, if further than facets may.
+    /// Returns the distance of edges from the surface, if it exceeds the limit for facets.
     fn off_mm(&self) -> Option<f64> {
         self.faults.iter().find_map(|fault| match fault {
             Fault::Off { off_mm } => Some(*off_mm),
@@ -69,8 +69,8 @@ struct FacePatch {
 
 /// Tessellates all faces of a model.
 ///
-/// The edges of faces whose loops cross get more points if that lets them cross no more: chords
-/// of edges that run beside each other may cross where the edges do not.
+/// The edges of faces whose loops cross get more points if that makes the loops cross less: chords
+/// of neighboring edges may cross where the edges do not.
 pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, BrepError> {
     if !(chord_mm > 0.0 && chord_mm.is_finite()) {
         return Err(BrepError::Chord { chord_mm });
@@ -90,7 +90,7 @@ pub(crate) fn model(model: &BrepModel, chord_mm: f64) -> Result<Tessellation, Br
     }
 }
 
-/// The chord of edges of faces whose loops cross, as a part of the others'.
+/// The chord of edges of faces whose loops cross, as a part of the chord of other edges.
 const FINER: f64 = 1.0 / 16.0;
 
 /// Returns the faces whose loops cross.
@@ -166,8 +166,8 @@ fn chain(edge: &BrepEdge, model: &BrepModel, chord_mm: f64, points: &mut Vec<Vec
     let range = edge_range(&edge.curve, model.vertices[start], model.vertices[end], edge.forward);
     let line = edge.curve.polyline(range, chord_mm);
     let first = points.len() as u32;
-    // The vertices replace the curve's ends, so that all edges of a vertex meet. If a
-    // vertex lies off the curve, a point close to it would make the chain double back.
+    // The vertices replace the curve's ends, so that all edges of a vertex meet. If a vertex is off
+    // the curve, a point close to it would make the chain double back.
     let off = |vertex: usize, end: usize| {
         f64::max(CLEAR_MM, CLEAR * distance(model.vertices[vertex], line[end]))
     };
@@ -208,8 +208,8 @@ fn outlines(
     outlines
 }
 
-/// Returns for each face how far its edges may lie off its surface without a finding, whatever the
-/// chord: as far as validation does not look into it.
+/// Returns, for each face, the distance that its edges may have from its surface without a finding,
+/// whatever the chord: the distance up to which validation does not report it.
 fn sure_mm(model: &BrepModel) -> Vec<f64> {
     let mut sure = vec![f64::INFINITY; model.faces.len()];
     for body in &model.bodies {
@@ -224,7 +224,8 @@ fn sure_mm(model: &BrepModel) -> Vec<f64> {
             }
         }
         let longest = sub(high, low).into_iter().fold(0.0, f64::max);
-        // Bodies with a single vertex, or none, have no edges that say more than their surfaces.
+        // Bodies with at most one vertex have no edges that give more information than their
+        // surfaces.
         if longest > 0.0 {
             sure[faces].fill(MOST_OFF * longest);
         }
@@ -257,7 +258,7 @@ fn patch(number: u32, face: &Face, outline: Outline, shared: &[Vec3], chord_mm: 
     let filled = inner.and_then(|(polygons, scale)| {
         let (corners, coarse) = fill::fill(face, &polygons, scale, &mut points, chord_mm)?;
         if boundary::is_counter_clockwise(&polygons) != face.along_normal {
-            // Neighbours share the loops, not the sense flag, so the loops decide.
+            // Neighbors share the loops, not the sense flag, so the loops decide.
             outwards = !outwards;
             faults.push(Fault::Sense);
         }
@@ -307,7 +308,7 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
     rings.collect()
 }
 
-/// Returns a fault if the points of the edges lie further off the surface than they may.
+/// Returns a fault if the points of the edges are farther off the surface than allowed.
 fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, sure_mm: f64) -> Option<Fault> {
     let apart =
         |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));

@@ -1,4 +1,4 @@
-//! The points of a face, and its corners in the parameters of its surface.
+//! Holds the points of a face, and its corners in the parameters of its surface.
 
 use crate::vector::Vec3;
 
@@ -10,7 +10,7 @@ pub(super) struct Node {
     pub(super) point: u32,
 }
 
-/// The points of a face: those of its edges, which are shared, and its own.
+/// The points of a face: the shared points of its edges, and its own points.
 pub(super) struct FacePoints<'a> {
     pub(super) shared: &'a [Vec3],
     pub(super) own: Vec<Vec3>,

@@ -1,23 +1,23 @@
 //! Moves points of edges onto the surfaces of the faces that meet there.
 //!
-//! Programs write edges that lie off their surfaces, by far more than the accuracy they
-//! claim. The surfaces are what was modelled; edges follow from them.
+//! Programs write edges that are off their surfaces by far more than the accuracy they claim. The
+//! surfaces were modeled; edges follow from them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::{BrepModel, Loop};
 use crate::vector::{Vec3, add, cross, distance, dot, length, scale, sub, unit};
 
-/// The greatest distance that a point may move, in millimetres.
+/// The greatest distance that a point may move, in millimeters.
 const MOST_MM: f64 = 0.25;
 /// The greatest number of steps of a point.
 const MAX_STEPS: usize = 12;
-/// How much a step costs against coming nearer to a surface: surfaces that touch each other
-/// along an edge do not say where along them the edge is.
+/// The cost of a step relative to the gain from approaching a surface: surfaces that touch each
+/// other along an edge do not determine where along them the edge is.
 const SLIDING: f64 = 1e-6;
 
-/// Moves the points of the edges of some faces, and returns the numbers of all faces that
-/// have points that moved.
+/// Moves the points of the edges of some faces, and returns the numbers of all faces with moved
+/// points.
 pub(super) fn rebuild(
     model: &BrepModel,
     chains: &[Vec<u32>],
@@ -46,7 +46,7 @@ pub(super) fn rebuild(
         }
     }
     let mut moved = BTreeSet::new();
-    // Points of an edge follow each other, so each starts where the one before ended.
+    // Points of an edge follow each other, so each search starts where the previous one ended.
     let mut hints = BTreeMap::new();
     for (point, faces) in around {
         let start = points[point as usize];
@@ -58,8 +58,8 @@ pub(super) fn rebuild(
     moved
 }
 
-/// Returns the place near a point where the surfaces of all its faces meet, if the point is
-/// off and the place is nearer to them.
+/// Returns the place near a point where the surfaces of all its faces meet, if the point is off the
+/// surfaces and the place is nearer to them.
 fn settled(
     model: &BrepModel,
     faces: &BTreeSet<usize>,
@@ -70,7 +70,7 @@ fn settled(
     let mut place = start;
     let mut off_mm = Vec::new();
     for _ in 0..MAX_STEPS {
-        // The planes that touch the surfaces at their points nearest to the place.
+        // The planes that touch the surfaces at their points nearest the place.
         let mut sums = [[0.0; 3]; 3];
         let mut pull = [0.0; 3];
         let mut off: f64 = 0.0;

@@ -16,12 +16,12 @@ pub(super) struct Unwrapped {
     pub(super) is_outer: bool,
 }
 
-/// The distance within which a point counts as at a pole, in millimetres.
+/// The distance within which a point counts as at a pole, in millimeters.
 pub(super) const AT_POLE_MM: f64 = 1e-5;
-/// The number of corners that stand for a pole, per full turn around it.
+/// The number of corners that represent a pole, per full turn around it.
 const POLE_PARTS: f64 = 16.0;
 
-/// Finds a loop's parameters, each as near to the one before as periods allow.
+/// Finds a loop's parameters, each as near the previous one as periods allow.
 pub(super) fn unwrap(
     face: &Face,
     poles: &[Pole],
@@ -40,7 +40,7 @@ pub(super) fn unwrap(
     let order = ring[start..].iter().chain(&ring[..start]).copied();
     let mut nodes: Vec<Node> = Vec::with_capacity(ring.len() + 1);
     let mut waiting: Option<(&Pole, u32)> = None;
-    // Points that share the pole with the one before them.
+    // Points that share the pole with the previous point.
     let mut others = Vec::new();
     for point in order.chain([ring[start]]) {
         if let Some(pole) = pole_at(point) {
@@ -84,8 +84,8 @@ pub(super) fn near(t: f64, other: f64, period: Option<f64>) -> f64 {
     }
 }
 
-/// Adds the corners that stand for a pole between two nodes, and returns the parameters
-/// of the second node.
+/// Adds the corners that represent a pole between two nodes, and returns the parameters of the
+/// second node.
 ///
 /// A pole is a side of the domain. The face lies on the left of its loop, which decides
 /// the direction along that side.
@@ -100,7 +100,7 @@ fn around_pole(
     let free = 1 - pole.axis;
     if let Some(period) = face.surface.periods()[free] {
         let is_last = pole.at > before[pole.axis];
-        // Counter-clockwise is backwards along the sides of greatest v and of least u.
+        // Counterclockwise is backward along the sides of greatest v and of least u.
         let is_forward = (is_last == (pole.axis == 0)) == face.along_normal;
         let way = (after[free] - before[free]).rem_euclid(period);
         let tiny = 1e-6 * period;

@@ -1,8 +1,8 @@
-//! Checks that STEP files with one entity changed give the right part or are refused.
+//! Checks that STEP files with one changed entity give the right part or are rejected.
 //!
-//! `LAMP_MUTATIONS` gives the number of changes to the samples, and of those to files of other
-//! programs, where present. Each follows from its number. `LAMP_MUTANTS` names a folder for the
-//! files that give another part.
+//! `LAMP_MUTATIONS` is the number of changes to the samples, and of changes to files of other
+//! programs, where present. The number of a change determines it. `LAMP_MUTANTS` names a folder for
+//! the files that give another part.
 
 mod text;
 
@@ -41,7 +41,8 @@ const FILES: [&str; 10] = [
 ];
 
 /// A face on a torus whose loop the file does not mark as its outer one. Where its sense alone is
-/// turned over, the text is free of contradictions: it describes what the rest of the ring bounds.
+/// turned over, the text is free of contradictions: it describes the body bounded by the rest of
+/// the ring.
 const ON_CLOSED_SURFACE: (&str, u64) = ("Bend", 28);
 
 /// A good file.
@@ -79,7 +80,7 @@ fn volumes(prepared: &Prepared) -> Vec<f64> {
 /// Bodies: their number and their volume.
 type Bodies = (usize, f64);
 
-/// Returns the bodies that a changed text describes, as far as they are known.
+/// Returns the bodies that a changed text describes, if known.
 fn described(good: &Good, mutation: Mutation, text: &str) -> Vec<Bodies> {
     let volumes = &good.volumes_mm3;
     let (count, volume_mm3) = (volumes.len(), volumes.iter().sum::<f64>());
@@ -90,7 +91,7 @@ fn described(good: &Good, mutation: Mutation, text: &str) -> Vec<Bodies> {
     match mutation {
         Mutation::Unit => vec![(count, LONGER * volume_mm3)],
         Mutation::Copy => more().into_iter().collect(),
-        // What stands twice in one place is the same part.
+        // A part placed twice in one place is the same part.
         Mutation::Placement => [(count, volume_mm3)].into_iter().chain(more()).collect(),
         _ => vec![(count, volume_mm3)],
     }
@@ -106,7 +107,7 @@ fn bodies(prepared: &Prepared) -> Bodies {
     (volumes.len(), volumes.iter().sum())
 }
 
-/// What a changed file gives: the part that its text describes, another one, or none.
+/// The result of a changed file: the part that its text describes, another part, or none.
 enum Outcome {
     Right,
     Refused,
@@ -126,7 +127,7 @@ fn outcome(good: &Good, mutation: Mutation, text: &str, expected: &[Bodies]) -> 
     }
 }
 
-/// Changes a file in a way that it allows: not every one has edges or an assembly.
+/// Changes a file in a way that it allows: not every file has edges or an assembly.
 fn changed(good: &Good, random: &mut SplitMix) -> (Mutation, Text, u64) {
     loop {
         let mutation = Mutation::ALL[random.below(Mutation::ALL.len())];
@@ -139,7 +140,7 @@ fn changed(good: &Good, random: &mut SplitMix) -> (Mutation, Text, u64) {
     }
 }
 
-/// Changes files one by one and checks what they give.
+/// Changes files one by one and checks the results.
 fn check_all(files: &[Good]) {
     let rounds =
         std::env::var("LAMP_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(ROUNDS);
@@ -172,7 +173,8 @@ fn check_all(files: &[Good]) {
     }
     println!("right and refused: {counts:?}");
     assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
-    // What is only turned over can be told from its neighbours; the rest is no fault.
+    // A face that is only turned over can be detected from its neighbors; the other changes are not
+    // faults.
     for mutation in [Mutation::Face, Mutation::Unit, Mutation::Placement, Mutation::Copy] {
         let [right, refused] = counts.get(&format!("{mutation:?}")).copied().unwrap_or([1, 0]);
         assert!(right > 0 && refused == 0, "{mutation:?}: {right} right, {refused} refused");

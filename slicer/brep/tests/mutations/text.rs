@@ -117,7 +117,7 @@ impl Text {
         }
     }
 
-    /// Repeats a usage of a part in an assembly, further along x.
+    /// Repeats a usage of a part in an assembly, farther along x.
     fn place_again(&mut self, usage: u64, further: f64) -> Option<()> {
         let shape = self.user("PRODUCT_DEFINITION_SHAPE", usage)?;
         let occurrence = self.user("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", shape)?;
@@ -155,7 +155,7 @@ impl Text {
         &mut found.expect("an entity of this text").1
     }
 
-    /// Returns the first entity of a type that refers to another.
+    /// Returns the first entity of a type that refers to a given entity.
     fn user(&self, name: &str, of: u64) -> Option<u64> {
         let is_user =
             |body: &str| body.starts_with(name) && references(body).any(|number| number == of);
@@ -180,7 +180,7 @@ fn references(body: &str) -> impl Iterator<Item = u64> {
         .filter_map(|rest| rest.split(|letter: char| !letter.is_ascii_digit()).next()?.parse().ok())
 }
 
-/// Returns an entity that refers to another number instead of one.
+/// Returns an entity with a reference to a new number in place of the old one.
 fn renumbered(body: &str, old: u64, new: u64) -> String {
     let (first, rest) = body.split_once('#').unwrap_or((body, ""));
     let mut text = first.to_owned();

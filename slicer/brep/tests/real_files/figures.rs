@@ -1,13 +1,13 @@
-//! Reads what OpenCASCADE says of the files of a folder.
+//! Reads OpenCASCADE's figures of the files of a folder.
 
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-/// Files with a volume other than the reference's, each with the reason in `docs/brep.md`.
+/// Files with a volume that differs from the reference's, each with the reason in `docs/brep.md`.
 const VOLUMES: &[(&str, f64)] =
     &[("axom_boxed_sphere.step", 733.601), ("occt-import-_HEAD_BACK.stp", 23_630.7)];
-/// Files, numbers of their sections and areas other than the reference's, as above.
+/// Files, numbers of their sections, and areas that differ from the reference's, as above.
 const SECTIONS: &[(&str, usize, f64)] = &[
     ("nist_ctc_02_asme1_ap242.stp", 2, 103_560.4),
     ("gmsh_wing_fuselage.step", 2, 26_974.5),
@@ -18,12 +18,12 @@ const SECTIONS: &[(&str, usize, f64)] = &[
     ("occt-import-_HEAD_BACK.stp", 3, 186.925),
     ("occt-import-_HEAD_BACK.stp", 4, 186.925),
 ];
-/// Files, numbers of their boxes' sides (the least x, y and z, the greatest x, y and z) and places
-/// other than the reference's, as above.
+/// Files, numbers of their boxes' sides (the least x, y and z, the greatest x, y and z), and places
+/// that differ from the reference's, as above.
 const SIDES: &[(&str, usize, f64)] =
     &[("s1_tu_203_tailturbine.stp", 0, 1.483), ("occt-import-_HEAD_BACK.stp", 3, 250.0)];
 
-/// Files of faces alone that close when OpenCASCADE sews them, the volume of its facets and their
+/// Files with only faces that close when OpenCASCADE sews them, the volume of its facets and their
 /// box, as above.
 const SEWN: &[(&str, f64, [f64; 6])] =
     &[("gmsh_mesh_T106_V3.step", 2_059_078.5, [-170.109, -264.794, 0.0, 510.243, 96.899, 19.781])];
@@ -33,7 +33,7 @@ pub(crate) struct Figures {
     pub(crate) name: String,
     pub(crate) path: PathBuf,
     pub(crate) bodies: u64,
-    /// Whether the reference finds a solid in the file; a refusal is right where it does not.
+    /// Whether the reference finds a solid in the file; a rejection is right if it does not.
     pub(crate) has_solid: bool,
     /// The least and the greatest corner, if there is a body.
     pub(crate) box_mm: Option<[[f64; 3]; 2]>,
@@ -83,7 +83,7 @@ impl Figures {
     }
 }
 
-/// Returns the figures of a folder's files; none if it does not exist.
+/// Returns the figures of a folder's files; empty if the folder does not exist.
 pub(crate) fn of_folder(folder: &Path) -> Vec<Figures> {
     let mut beside = folder.as_os_str().to_owned();
     beside.push("_oracle.json");

@@ -1,9 +1,9 @@
-//! Judges STEP files of other programs, where present: each is right or refused with a reason,
-//! within limits of time and memory.
+//! Judges STEP files of other programs, where present: each must be right or rejected with a
+//! reason, within limits of time and memory.
 //!
-//! The folders `step` and `step2` beside the project are judged, or the one that
-//! `LAMP_STEP_FOLDER` names, each by the file `..._oracle.json` beside it. Arguments name
-//! kernels (`own`, `occt`) and parts of file names. Every file is read in a process of its own.
+//! The folders `step` and `step2` next to the project are judged, or the folder that
+//! `LAMP_STEP_FOLDER` names, each by the file `..._oracle.json` next to it. Arguments name kernels
+//! (`own`, `occt`) and parts of file names. Every file is read in a separate process.
 
 mod figures;
 mod one_file;
@@ -22,11 +22,11 @@ use verdict::Verdict;
 
 /// A process that takes longer than this is killed.
 const LIMIT: Duration = Duration::from_secs(120);
-/// How often a process is asked whether it has ended.
+/// The interval for checking whether a process has ended.
 const POLL: Duration = Duration::from_millis(5);
 
-/// A kernel, the name it is chosen by, and the share of files that it must read right; it may
-/// refuse the rest.
+/// A kernel, its name for selection, and the share of files that it must read right; it may reject
+/// the rest.
 struct Judged {
     name: &'static str,
     read: ReadFn,
@@ -39,7 +39,7 @@ fn all() -> Vec<Judged> {
     [own].into_iter().chain(OTHERS.iter().map(other)).collect()
 }
 
-/// Judges all files, or one of them in a process of its own, as the arguments ask.
+/// Judges all files, or one of them in a separate process, as the arguments specify.
 pub(crate) fn run() -> ExitCode {
     let all = all();
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -55,7 +55,7 @@ pub(crate) fn run() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let is_kernel = |word: &String| all.iter().any(|judged| judged.name == word);
-    // Those with a dash are libtest's, such as `--nocapture`.
+    // Words with a dash belong to libtest, such as `--nocapture`.
     let words = words.into_iter().filter(|word| !word.starts_with('-'));
     let (kernels, files): (Vec<_>, Vec<_>) = words.partition(is_kernel);
     let is_asked =
@@ -114,7 +114,7 @@ fn judge(kernel: &Judged, wanted: &[String]) -> bool {
     wrong.is_empty() && right.len() as f64 >= kernel.least_right * verdicts.len() as f64
 }
 
-/// Reads a file in a process of its own, which is killed if it hangs.
+/// Reads a file in a separate process, which is killed if it hangs.
 fn within_limit(kernel: &str, file: &Figures) -> Answer {
     let heights: Vec<String> = file.heights_mm.iter().map(ToString::to_string).collect();
     let mut child = Command::new(std::env::current_exe().expect("this program"))

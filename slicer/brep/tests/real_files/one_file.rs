@@ -1,4 +1,4 @@
-//! Reads one file, in a process of its own, and prints what it finds as lines of JSON.
+//! Reads one file, in a separate process, and prints its findings as lines of JSON.
 
 use std::path::Path;
 use std::time::Instant;
@@ -6,26 +6,27 @@ use std::time::Instant;
 use lamp_brep::{Facet, Prepared, ReadFn, Tessellation, prepare};
 use serde::{Deserialize, Serialize};
 
-/// The argument that asks for one file.
+/// The argument that requests one file.
 pub(crate) const TASK: &str = "one-file";
-/// Said of a file whose process gave no answer.
+/// The message for a file whose process gave no answer.
 pub(crate) const ENDED: &str = "the process was ended or ended itself";
 /// The default tolerance at 1500 dpi: a quarter of a pixel.
 const CHORD_MM: f64 = 25.4 / 1500.0 / 4.0;
 /// The chord for volumes and sections is the part's size divided by this, or the default.
 const CHORDS: f64 = 40_000.0;
 
-/// What is found in a file.
+/// The findings in a file.
 #[derive(Deserialize, Serialize)]
 pub(crate) struct Answer {
     /// The time and memory at the default tolerance.
     pub(crate) seconds: f64,
     pub(crate) peak_mb: Option<f64>,
-    /// The part in facets fine enough to compare, or why it is refused at the default tolerance.
+    /// The part in facets fine enough to compare, or the reason why it is rejected at the default
+    /// tolerance.
     pub(crate) read: Result<Part, String>,
 }
 
-/// What is compared of a part.
+/// The compared values of a part.
 #[derive(Deserialize, Serialize)]
 pub(crate) struct Part {
     pub(crate) bodies: u64,
@@ -35,7 +36,7 @@ pub(crate) struct Part {
     pub(crate) volumes_mm3: [f64; 2],
     /// The sum of the sections of each body.
     pub(crate) areas_mm2: Vec<f64>,
-    /// What was repaired.
+    /// A description of the repairs.
     pub(crate) said: String,
 }
 
@@ -48,8 +49,8 @@ impl Answer {
     }
 }
 
-/// Reads a file and prints an [`Answer`], and a better one if shorter chords than the default are
-/// needed to compare and time is left.
+/// Reads a file and prints an [`Answer`], and a better one if the comparison needs shorter chords
+/// than the default and time is left.
 pub(crate) fn answer(kernel: ReadFn, path: &Path, size_mm: &str, heights_mm: &str) {
     let bytes = std::fs::read(path).expect("the file");
     let heights: Vec<f64> = heights_mm.split(',').filter_map(|z| z.parse().ok()).collect();
@@ -61,14 +62,14 @@ pub(crate) fn answer(kernel: ReadFn, path: &Path, size_mm: &str, heights_mm: &st
     say(&first);
     let fine_mm = size_mm.parse::<f64>().expect("a size") / CHORDS;
     if fine_mm > 0.0 && fine_mm < CHORD_MM && first.read.is_ok() {
-        // What is good at the default tolerance stays so, however rough its edges are.
+        // A file that is good at the default tolerance stays good, however rough its edges are.
         if let Ok(part) = part(&bytes, kernel, fine_mm, &heights) {
             say(&Answer { read: Ok(part), ..first });
         }
     }
 }
 
-/// Returns the most memory that this process ever held, where Linux says it.
+/// Returns the peak memory of this process, where Linux reports it.
 fn peak_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -107,7 +108,7 @@ fn faults(prepared: &Prepared) -> String {
     faults.join("; ")
 }
 
-/// Returns how the part was repaired, and the first finding.
+/// Returns a description of the repairs, and the first finding.
 fn said(prepared: &Prepared) -> String {
     let mut said = Vec::new();
     if let Some(first) = prepared.tries.first() {
@@ -134,7 +135,7 @@ fn section_area(mesh: &Tessellation, facets: &[Facet], z: f64) -> f64 {
     let double = |facet: &Facet| {
         let corners = mesh.corners(facet);
         let is_above = corners.map(|corner| corner[2] >= z);
-        // The points where the contour crosses the facet's edges downwards and upwards.
+        // The points where the contour crosses the facet's edges downward and upward.
         let crossing = |from_above: bool| {
             let k = (0..3)
                 .find(|&k| is_above[k] == from_above && is_above[(k + 1) % 3] != from_above)?;

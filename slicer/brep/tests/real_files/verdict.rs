@@ -1,4 +1,4 @@
-//! Compares what was found in a file with its reference figures.
+//! Compares the findings in a file with its reference figures.
 
 use std::fmt;
 
@@ -9,18 +9,18 @@ use super::one_file::{Answer, ENDED, Part};
 const SAME: f64 = 1e-3;
 /// The tolerated relative error of section areas.
 const SAME_AREA: f64 = 2e-3;
-/// A section as narrow as this part of the size is not compared.
+/// A section narrower than this part of the size is not compared.
 const NARROW: f64 = 1e-9;
 /// The limits of every file, for reports.
 pub(crate) const LIMITS: &str = "10 s or 300 MB";
 const MOST_SECONDS: f64 = 10.0;
 const MOST_MB: f64 = 300.0;
 
-/// The judgement of a file. Prints as a row of a table.
+/// The verdict on a file. It prints as a row of a table.
 pub(crate) struct Verdict {
     pub(crate) name: String,
     answer: Answer,
-    /// `None` if the part was refused.
+    /// `None` if the part was rejected.
     errors: Option<Errors>,
     /// Whether the reference finds a solid.
     has_solid: bool,
@@ -66,7 +66,8 @@ impl Verdict {
         Self { name: figures.name.clone(), answer, errors, has_solid: figures.has_solid }
     }
 
-    /// Returns whether the part is the reference's, or is refused where that has no solid.
+    /// Returns whether the part matches the reference, or is rejected where the reference has no
+    /// solid.
     pub(crate) fn is_right(&self) -> bool {
         match (&self.errors, &self.answer.read) {
             (Some(errors), _) => errors.is_none(),
@@ -75,7 +76,7 @@ impl Verdict {
         }
     }
 
-    /// Returns whether another part than the reference's would be sliced.
+    /// Returns whether a part that differs from the reference would be sliced.
     pub(crate) fn is_wrong(&self) -> bool {
         self.errors.is_some() && !self.is_right()
     }

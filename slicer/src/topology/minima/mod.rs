@@ -1,4 +1,4 @@
-//! Finds where a mesh has its minima in a direction: where islands and pits begin.
+//! Finds the minima of a mesh in a direction, where islands and pits begin.
 
 mod region;
 mod sweep;
@@ -10,39 +10,39 @@ use crate::topology::{CornerTable, facet_of, next, previous};
 use region::{level_regions, section_area};
 use sweep::depths;
 
-/// What begins at a minimum.
+/// The feature that begins at a minimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MinimumKind {
-    /// Solid is above: built upwards, an island begins, or the part itself.
+    /// Solid is above: built upward, an island begins, or the part itself.
     Island,
-    /// Solid is below: it is the floor of a pit.
+    /// Solid is below: the minimum is the floor of a pit.
     Pit,
 }
 
-/// A point or a level region of a mesh with nothing lower beside it.
+/// A point or a level region of a mesh with no lower neighbor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Minimum {
-    /// Its height along the direction, in millimetres from the origin.
+    /// Its height along the direction, in millimeters from the origin.
     pub height_mm: f64,
     /// Its first vertex's point.
     pub point: [f64; 3],
-    /// Its vertices, all at one height and joined by edges, in rising order.
+    /// Its vertices, all at one height and joined by edges, in ascending order.
     pub region: Vec<u32>,
-    /// What begins there. Where the facets around do not tell, as in a mesh that is open or flat,
-    /// it is an island.
+    /// The feature that begins there. If the facets around do not decide, as in an open or flat
+    /// mesh, it is an island.
     pub kind: MinimumKind,
-    /// How far the surface rises from it until it meets that of a lower minimum, or else to its
-    /// top, in millimetres.
+    /// The rise of the surface from the minimum to its meeting with the surface of a lower minimum,
+    /// or else to its top, in millimeters.
     ///
-    /// Of two minima at one height the one with the first vertex counts as lower. Surfaces meet by
-    /// edges: bodies that only overlap, and shells within one another, do not.
+    /// Of two minima at the same height, the one with the first vertex counts as lower. Surfaces
+    /// meet by edges: bodies that only overlap, and shells within one another, do not meet.
     pub depth_mm: f64,
 }
 
 /// Finds the minima of a mesh along a unit vector that points up, the lowest first.
 ///
-/// Vertices that an edge joins at exactly equal heights are one region. Facets that are idle or
-/// turned over, rims and crowded edges change what is found near them, and nothing else.
+/// Vertices joined by an edge at exactly equal heights are one region. Facets that are idle or
+/// turned over, boundary edges and crowded edges change the findings near them, and nothing else.
 ///
 /// ```
 /// use lamp_slicer::topology::{CornerTable, MinimumKind, minima};
@@ -61,17 +61,17 @@ pub fn minima(table: &CornerTable, up: [f64; 3]) -> Vec<Minimum> {
     relief.minima(up, &relief.heights(up), f64::INFINITY)
 }
 
-/// A mesh whose minima are found in one direction after another.
+/// A mesh for finding minima in several directions.
 #[derive(Clone, Debug)]
 pub struct Relief<'a> {
     table: &'a CornerTable,
-    /// The corners at each vertex, without those of idle facets.
+    /// The corners at each vertex, without the corners of idle facets.
     corners: Grouped<u32>,
     has_idle: bool,
 }
 
 impl<'a> Relief<'a> {
-    /// Prepares a mesh. It takes 12 bytes a facet and 4 a vertex.
+    /// Prepares a mesh. It takes 12 bytes per facet and 4 bytes per vertex.
     pub fn new(table: &'a CornerTable) -> Self {
         let corners = || {
             let corners = 0..table.corner_count();
@@ -88,11 +88,11 @@ impl<'a> Relief<'a> {
     }
 
     /// Finds the minima as [`minima`](fn@minima) does, with the [`heights`](Self::heights) along
-    /// `up`. Depths are followed as far as `deepest_mm`, and greater ones cut off there: the work
-    /// is then little more than a look at each facet.
+    /// `up`. Depths are followed up to `deepest_mm`, and greater depths are cut off there: then the
+    /// work is little more than a look at each facet.
     ///
     /// # Panics
-    /// Panics if there are less heights than vertices.
+    /// Panics if there are fewer heights than vertices.
     pub fn minima(&self, up: [f64; 3], heights: &[f64], deepest_mm: f64) -> Vec<Minimum> {
         let field = Field { relief: self, heights };
         let regions = level_regions(&field);
@@ -127,7 +127,7 @@ impl Field<'_> {
         self.relief.corners.group(vertex as usize)
     }
 
-    /// Returns the vertices beside one, most of them twice.
+    /// Returns the neighbors of a vertex, most of them twice.
     fn beside(&self, vertex: u32) -> impl Iterator<Item = u32> {
         let table = self.relief.table;
         let ends = |&corner: &u32| [next(corner), previous(corner)].map(|c| table.vertex(c));

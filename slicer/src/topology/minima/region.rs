@@ -1,12 +1,12 @@
-//! Level regions that have nothing lower beside them, and what begins there.
+//! Finds level regions with no lower neighbors, and the features that begin there.
 
 use lamp_brep::vector::{Vec3, along, cross, dot, sub};
 
 use super::Field;
 use crate::topology::{next, previous};
 
-/// Finds the regions that are minima, by rising height, and at one height by first vertex. The
-/// vertices of each are in rising order.
+/// Finds the regions that are minima, by ascending height, and at equal heights by first vertex.
+/// The vertices of each region are in ascending order.
 pub(super) fn level_regions(field: &Field<'_>) -> Vec<Vec<u32>> {
     let has_lower = has_lower(field);
     let mut is_seen = vec![false; field.heights.len()];
@@ -27,7 +27,7 @@ pub(super) fn level_regions(field: &Field<'_>) -> Vec<Vec<u32>> {
     regions
 }
 
-/// Tells of each vertex whether an edge leads down from it.
+/// Returns, for each vertex, whether an edge leads down from it.
 fn has_lower(field: &Field<'_>) -> Vec<bool> {
     let table = field.relief.table;
     let mut has_lower = vec![false; field.heights.len()];
@@ -38,14 +38,14 @@ fn has_lower(field: &Field<'_>) -> Vec<bool> {
         let heights = vertices.map(|vertex| field.height(vertex));
         let lowest = heights[0].min(heights[1]).min(heights[2]);
         for (vertex, height) in vertices.into_iter().zip(heights) {
-            // Always written: which corner is the lowest, no processor can foresee.
+            // Always written, because no processor can predict which corner is the lowest.
             has_lower[vertex as usize] |= height > lowest;
         }
     }
     has_lower
 }
 
-/// Returns the vertices that level edges join to one.
+/// Returns the vertices connected to a vertex by level edges.
 fn level_with(vertex: u32, field: &Field<'_>, is_seen: &mut [bool]) -> Vec<u32> {
     let height = field.height(vertex);
     let mut region = vec![vertex];
@@ -66,8 +66,8 @@ fn level_with(vertex: u32, field: &Field<'_>, is_seen: &mut [bool]) -> Vec<u32> 
 /// Returns the area of the section just above a minimum, seen from above: positive around solid,
 /// negative around a pit. Sections have solid to their left.
 ///
-/// The plane lies halfway up to the next vertex beside the region, where the section is a closed
-/// polygon, so that no limit is to be taken.
+/// The plane is halfway up to the next vertex next to the region, where the section is a closed
+/// polygon, so that no limit is needed.
 pub(super) fn section_area(field: &Field<'_>, region: &[u32], up: Vec3) -> f64 {
     let table = field.relief.table;
     let height = field.height(region[0]);
@@ -85,7 +85,8 @@ pub(super) fn section_area(field: &Field<'_>, region: &[u32], up: Vec3) -> f64 {
     for &corner in region.iter().flat_map(|&vertex| field.corners(vertex)) {
         let (after, before) = (next(corner), previous(corner));
         let is_low = [after, before].map(|corner| rise(corner) == 0.0);
-        // A facet with two corners in the region is met at both, and counts at the first of them.
+        // A facet with two corners in the region is found at both corners, and counts at the first
+        // one.
         let segment = match is_low {
             [false, false] => [crossing(corner, before), crossing(corner, after)],
             [true, false] => [crossing(before, corner), crossing(before, after)],

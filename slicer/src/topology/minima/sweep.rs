@@ -1,4 +1,4 @@
-//! Raises a plane from all minima at once, and sees where their surfaces meet.
+//! Raises a plane from all minima at once, and finds where their surfaces meet.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -7,17 +7,17 @@ use lamp_stack::sets::root;
 
 use super::Field;
 
-/// No component has come to the vertex.
+/// No component has reached the vertex.
 const NONE: u32 = u32::MAX;
-/// The component of all that is followed no further: older than all others.
+/// The component of all minima that are followed no further: older than all others.
 const DEEP: u32 = 0;
 
-/// Returns how deep each minimum is, but not above `deepest_mm`. They come by rising height, and
-/// of two whose surfaces meet the elder, which comes first, goes on.
+/// Returns the depth of each minimum, at most `deepest_mm`. The minima come by ascending height.
+/// Where two surfaces meet, the older minimum, which comes first, continues.
 ///
 /// This is the merge tree of the heights on vertices and edges. Each vertex waits once in a queue
-/// by height; a component deeper than `deepest_mm` asks for no more vertices. Whoever then finds
-/// one below that nobody asked for has met a component whose minimum is lower than its own.
+/// by height; a component deeper than `deepest_mm` requests no more vertices. A component that then
+/// finds a vertex below it that no component requested has met a component with a lower minimum.
 pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) -> Vec<f64> {
     let mut sweep = Sweep::new(field, minima, deepest_mm);
     while let Some(Reverse((_, vertex))) = sweep.waiting.pop() {
@@ -25,7 +25,7 @@ pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) ->
     }
     let Sweep { births, tops, mut depths, .. } = sweep;
     for (depth, (birth, top)) in depths.iter_mut().zip(births.iter().zip(&tops)) {
-        // Never met a lower one.
+        // It never met a lower minimum.
         if depth.is_nan() {
             *depth = top - birth;
         }
@@ -36,14 +36,16 @@ pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) ->
 struct Sweep<'a> {
     field: &'a Field<'a>,
     deepest_mm: f64,
-    /// Vertices by height, as bits in the same order.
+    /// Vertices by height, encoded as bits in the same order.
     waiting: BinaryHeap<Reverse<(u64, u32)>>,
     is_known: Vec<bool>,
-    /// The component that first came to each vertex.
+    /// The component that first reached each vertex.
     of_vertex: Vec<u32>,
-    /// By component, one that it has become part of, or itself. Elder ones have lower numbers.
+    /// For each component, the component that it became part of, or itself. Older components have
+    /// lower numbers.
     parents: Vec<u32>,
-    /// By component, the heights of its minimum and of the last vertex, and the depth once known.
+    /// For each component, the heights of its minimum and of the last vertex, and the depth once
+    /// known.
     births: Vec<f64>,
     tops: Vec<f64>,
     depths: Vec<f64>,
@@ -82,7 +84,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Joins the components below a vertex, and asks for what is above.
+    /// Joins the components below a vertex, and requests the vertices above it.
     fn pass(&mut self, vertex: u32) {
         let field = self.field;
         let height = field.height(vertex);
@@ -112,7 +114,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Joins two components at a height, and returns the elder.
+    /// Joins two components at a height, and returns the older one.
     fn joined(&mut self, a: u32, b: u32, height: f64) -> u32 {
         let (a, b) = (root(&mut self.parents, a), root(&mut self.parents, b));
         let [elder, younger] = [a.min(b), a.max(b)];
@@ -128,7 +130,7 @@ impl<'a> Sweep<'a> {
     }
 }
 
-/// Returns bits that have the order of finite heights; both zeros are one height.
+/// Returns bits in the order of finite heights; both zeros are the same height.
 fn rank(height: f64) -> u64 {
     let bits = (height + 0.0).to_bits();
     if bits >> 63 == 0 { bits | 1 << 63 } else { !bits }

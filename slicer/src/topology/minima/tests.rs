@@ -69,13 +69,13 @@ fn the_blade_has_the_islands_of_its_images() {
     assert_eq!(layers(Axis::X, 180.0, 0.1), [[80, 312], [150, 262]]);
     assert_eq!(layers(Axis::X, 30.0, 0.1), [[1124, 1153]]);
     assert_eq!(layers(Axis::Y, 90.0, 0.1), [[300, 346], [436, 458]]);
-    // One of 43 um, whose neck is too narrow for pixels at first.
+    // An island of 43 um, whose neck is too narrow for pixels at first.
     assert_eq!(layers(Axis::Y, 90.0, 0.04), [[300, 346], [347, 347], [436, 458]]);
 }
 
 #[test]
 fn what_touches_in_a_point_meets_there() {
-    // The second block stands on a corner of the first, as far as vertices tell.
+    // The second block stands on a corner of the first, according to the vertices.
     let facets = [block([0.0; 3], [1.0; 3]), block([1.0; 3], [2.0; 3])].concat();
     assert_eq!(found(&Mesh { facets }), [(0.0, Island, 2.0)]);
 }
@@ -102,7 +102,7 @@ fn open_flat_and_broken_meshes_get_an_answer() {
     }
 }
 
-/// Finds how deep a minimum is by looking how high one must go to come to a lower one.
+/// Finds the depth of a minimum by searching for the height of the lowest path to a lower minimum.
 fn depth_by_search(field: &Field<'_>, all: &[Minimum], one: usize) -> f64 {
     let heights = field.heights;
     let mut levels: Vec<f64> =
@@ -149,7 +149,7 @@ proptest! {
         for (one, minimum) in all.iter().enumerate() {
             prop_assert_eq!(minimum.depth_mm, depth_by_search(&field, &all, one));
         }
-        // Depths that are cut off are the same up to there.
+        // Depths that are cut off are the same up to the limit.
         let deepest = f64::from(deepest);
         let shallow = relief.minima(UP, &heights, deepest);
         prop_assert_eq!(shallow.len(), all.len());

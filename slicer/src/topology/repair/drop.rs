@@ -1,4 +1,4 @@
-//! Finds facets that a mesh is better without.
+//! Finds facets to drop from a mesh.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::topology::repair::Deed;
 use crate::topology::rims::box_of;
 use crate::topology::{CornerTable, Doubled};
 
-/// Returns the facets to drop, in rising order, each with the reason.
+/// Returns the facets to drop, in ascending order, each with the reason.
 pub(super) fn dropped(table: &CornerTable, close: f64) -> Vec<(u32, Deed)> {
     let facets = || 0..table.facet_count() as u32;
     let idle = facets().filter(|&facet| table.is_idle(facet));
@@ -22,7 +22,7 @@ pub(super) fn dropped(table: &CornerTable, close: f64) -> Vec<(u32, Deed)> {
     let doubled = doubled(table).into_iter();
     doubled.for_each(|facet| _ = dropped.entry(facet).or_insert(Deed::DroppedDoubled));
     let is_alone = |facet: &u32| (3 * facet..3 * facet + 3).all(|corner| table.is_rim(corner));
-    // In a soup in which no facet has a neighbour, that says nothing.
+    // This decides nothing if no facet of the mesh has a neighbor.
     if (0..table.corner_count()).any(|corner| table.opposite(corner).is_some()) {
         for facet in facets().filter(is_alone) {
             let [low, high] = box_of(table.facet(facet));
@@ -36,13 +36,13 @@ pub(super) fn dropped(table: &CornerTable, close: f64) -> Vec<(u32, Deed)> {
     dropped
 }
 
-/// Returns facets that repeat others and go, so that no edge of an even number of facets is left
-/// with an odd one.
+/// Returns the repeated facets to drop, so that no edge with an even number of facets gets an odd
+/// number.
 ///
-/// Of an odd number of facets between three vertices one stays. Of an even number, one stays or
-/// none: as the edges ask for on which all other facets are known, and in groups that hang together
-/// by edges. Where none asks, one stays if more face one way than the other: of a surface that the
-/// file holds twice. Facets back to back bound nothing, and none stays.
+/// Of an odd number of facets between three vertices, one stays. Of an even number, one or none
+/// stays: as required by the edges on which all other facets are known, in groups connected by
+/// edges. Where no edge decides, one stays if more facets face one way than the other, as in a
+/// surface that the file contains twice. Facets back to back bound nothing, so none of them stays.
 fn doubled(table: &CornerTable) -> Vec<u32> {
     let groups = groups(table);
     let edges = GroupEdges::new(table, &groups);
@@ -54,7 +54,7 @@ fn doubled(table: &CornerTable) -> Vec<u32> {
         }
     }
     if edges.was_even && !edges.are_even(&keeps) {
-        // To drop facets in pairs leaves every edge as even as it was.
+        // Dropping facets in pairs leaves every edge as even as it was.
         for (keep, group) in keeps.iter_mut().zip(&groups) {
             *keep = Some(group.facets.len() % 2 == 1);
         }
@@ -69,9 +69,9 @@ fn doubled(table: &CornerTable) -> Vec<u32> {
 /// All facets between the same three vertices.
 struct Group {
     facets: Vec<u32>,
-    /// The first of those that face as most of them do.
+    /// The first of the facets that face the same way as most.
     kept: u32,
-    /// Whether as many face one way as the other.
+    /// Whether equal numbers of facets face each way.
     is_balanced: bool,
 }
 
@@ -94,9 +94,9 @@ fn groups(table: &CornerTable) -> Vec<Group> {
 
 /// The edges of groups of facets.
 struct GroupEdges {
-    /// By group, its edges.
+    /// For each group, its edges.
     of_group: Vec<[u32; 3]>,
-    /// By edge, its groups, and whether it has an odd number of facets besides theirs.
+    /// For each edge, its groups, and whether it has an odd number of other facets.
     groups_at: HashMap<u32, (Vec<usize>, bool)>,
     /// Whether every edge of the mesh has an even number of facets.
     was_even: bool,
@@ -108,7 +108,7 @@ impl GroupEdges {
             table.crowded().map(|corners| (table.edge(corners[0]), corners.len())).collect();
         let edges = |group: &Group| {
             let corner = 3 * group.facets[0];
-            // Facets between three vertices are on edges.
+            // Facets between three vertices have edges.
             [corner, corner + 1, corner + 2].map(|corner| table.edge(corner).unwrap_or(u32::MAX))
         };
         let of_group: Vec<[u32; 3]> = groups.iter().map(edges).collect();
@@ -127,7 +127,7 @@ impl GroupEdges {
         Self { of_group, groups_at, was_even }
     }
 
-    /// Returns true if all edges of groups have an even number of facets, of those that stay.
+    /// Returns true if all edges of groups have an even number of remaining facets.
     fn are_even(&self, keeps: &[Option<bool>]) -> bool {
         self.groups_at.values().all(|(at, is_odd)| {
             let kept = at.iter().filter(|&&group| keeps[group] == Some(true)).count();
@@ -135,10 +135,10 @@ impl GroupEdges {
         })
     }
 
-    /// Decides on a group, and on those that hang together with it by edges on which all others
-    /// are known.
+    /// Decides on a group, and on the groups connected to it by edges on which all other facets are
+    /// known.
     fn decide(&self, first: usize, groups: &[Group], keeps: &mut [Option<bool>]) {
-        // Whether each group stays if the first does.
+        // For each group, whether it stays if the first group does.
         let mut as_first = HashMap::from([(first, true)]);
         let (mut cluster, mut next) = (vec![first], 0);
         let (mut stay, mut go) = (0, 0);

@@ -1,4 +1,4 @@
-//! Closes holes by the facets of least area.
+//! Closes holes with the facets of least area.
 
 use std::collections::HashSet;
 
@@ -7,18 +7,18 @@ use lamp_brep::vector::{Vec3, cross, length, sub};
 use crate::topology::corner_table::facet_of;
 use crate::topology::{CornerTable, RimLoop};
 
-/// Loops of more rims stay open: the time grows by the third power of their number.
+/// Loops with more boundary edges stay open: the time grows with the third power of their number.
 const MAX_RIMS: usize = 100;
 
-/// An edge, by its vertices in rising order.
+/// An edge, by its vertices in ascending order.
 type Edge = [u32; 2];
 
 fn edge(a: u32, b: u32) -> Edge {
     [a.min(b), a.max(b)]
 }
 
-/// Returns the facets, by their vertices, that close all loops no wider than `close`. None makes an
-/// edge that the mesh has already.
+/// Returns the facets, by their vertices, that close all loops no wider than `close`. No facet
+/// makes an edge that the mesh already has.
 pub(super) fn closing(table: &CornerTable, loops: &[RimLoop], close: f64) -> Vec<[u32; 3]> {
     let is_narrow = |rims: &&RimLoop| {
         rims.is_closed
@@ -31,7 +31,7 @@ pub(super) fn closing(table: &CornerTable, loops: &[RimLoop], close: f64) -> Vec
     let mut edges = edges_between(table, &narrow);
     let mut added = Vec::new();
     for rims in narrow {
-        // Facets in the hole run against those around it.
+        // Facets in the hole run in the opposite direction to facets around it.
         let vertices: Vec<u32> = rims.vertices.iter().rev().copied().collect();
         let Some(facets) = least_area(table.points(), &vertices, &edges) else { continue };
         for [a, b, c] in facets {
@@ -50,7 +50,7 @@ fn runs_along(table: &CornerTable, rims: &RimLoop) -> bool {
         .all(|(&corner, &from)| table.edge_ends(corner)[0] == from)
 }
 
-/// Returns true if a loop is that of a facet without neighbours, whose other side is not missing.
+/// Returns true if a loop surrounds a facet without neighbors, whose other side is not missing.
 fn is_around_facet(rims: &RimLoop) -> bool {
     let first = facet_of(rims.corners[0]);
     rims.corners.len() == 3 && rims.corners.iter().all(|&corner| facet_of(corner) == first)
@@ -69,10 +69,9 @@ fn edges_between(table: &CornerTable, loops: &[&RimLoop]) -> HashSet<Edge> {
     between.map(|[a, b]| edge(a, b)).collect()
 }
 
-/// Returns the facets between the vertices of a loop whose areas sum to the least (G. Barequet and
-/// M. Sharir, "Filling gaps in the boundary of a polyhedron", CAGD 12, 1995), without facets that
-/// have no area where possible. None if every way makes a
-/// forbidden edge.
+/// Returns the facets between the vertices of a loop with the least sum of areas (G. Barequet and
+/// M. Sharir, "Filling gaps in the boundary of a polyhedron", CAGD 12, 1995), without degenerate
+/// facets where possible. Returns `None` if every solution makes a forbidden edge.
 fn least_area(
     points: &[Vec3],
     vertices: &[u32],
@@ -85,7 +84,7 @@ fn least_area(
             || (a == 0 && b == count - 1)
             || !forbidden.contains(&edge(vertices[a], vertices[b]))
     };
-    // By first and last vertex of a piece of the loop: its cost, and where to cut it.
+    // For the first and last vertex of each piece of the loop: its cost, and where to cut it.
     let mut best = vec![vec![(Cost::default(), 0); count]; count];
     for reach in 2..count {
         for first in 0..count - reach {
@@ -118,7 +117,7 @@ fn least_area(
     Some(facets)
 }
 
-/// The cost of facets: first how many have no area, then the sum of areas.
+/// The cost of facets: first the number of degenerate facets, then the sum of areas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 struct Cost {
     flat: u32,
@@ -126,7 +125,7 @@ struct Cost {
 }
 
 impl Cost {
-    /// That of no way.
+    /// The cost if there is no solution.
     const NONE: Self = Self { flat: u32::MAX, twice_area: f64::INFINITY };
 
     fn of(a: Vec3, b: Vec3, c: Vec3) -> Self {

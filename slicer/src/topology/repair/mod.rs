@@ -1,4 +1,4 @@
-//! Mends a mesh: welds, drops, turns over and adds facets, and lists each.
+//! Repairs a mesh: welds, drops, turns over and adds facets, and lists each.
 
 mod drop;
 mod fill;
@@ -9,32 +9,32 @@ use crate::topology::corner_table::facet_of;
 use crate::topology::slivers::without_slivers;
 use crate::topology::{CornerTable, MeshCheck, Shells};
 
-/// How far a repair may go, in the unit of the facets.
+/// The limits of a repair, in the unit of the facets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepairOptions {
-    /// Vertices at rims that are no farther apart become one.
+    /// Vertices at boundary edges become one vertex if they are no farther apart.
     pub weld: f64,
     /// Holes whose loops are no wider ([`RimLoop::width_mm`](crate::topology::RimLoop::width_mm))
     /// are closed.
     pub close: f64,
 }
 
-/// What a repair did to a facet.
+/// A repair action on a facet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Deed {
-    /// Moved corners to other vertices.
+    /// Corners moved to other vertices.
     Moved,
-    /// Turned it over.
+    /// The facet was turned over.
     Turned,
-    /// Dropped it: a coordinate was not finite.
+    /// The facet was dropped: a coordinate was not finite.
     DroppedNotFinite,
-    /// Dropped it: two of its corners were at one vertex.
+    /// The facet was dropped: two of its corners were at one vertex.
     DroppedCollapsed,
-    /// Dropped it: it repeated another facet, or was one of two back to back.
+    /// The facet was dropped: it repeated another facet, or was one of two back to back.
     DroppedDoubled,
-    /// Dropped it: it had no neighbour, and was no wider than holes that are closed.
+    /// The facet was dropped: it had no neighbor, and was no wider than holes that are closed.
     DroppedAlone,
-    /// Added it, to close a hole.
+    /// The facet was added, to close a hole.
     Added,
 }
 
@@ -53,36 +53,37 @@ lamp_stack::named!(Deed {
 pub struct Touched {
     /// The facet: its number before the repair, or after it if it was added.
     pub facet: usize,
-    /// What was done to it.
+    /// The repair action.
     pub deed: Deed,
 }
 
 /// A mesh after its repair.
 #[derive(Clone, Debug)]
 pub struct Repaired {
-    /// The facets: those left, in their order and to the bit as they were if not listed, and then
-    /// those added.
+    /// The facets: first the remaining facets, in their order and unchanged to the last bit if not
+    /// listed, then the added facets.
     pub facets: Vec<Facet>,
-    /// The facets that were touched, by rising numbers, those added last. A facet may be moved and
-    /// turned.
+    /// The facets that were touched, by ascending numbers, added facets last. A facet may be moved
+    /// and turned.
     pub touched: Vec<Touched>,
-    /// What is left.
+    /// The findings that remain.
     pub left: MeshCheck,
 }
 
-/// Rounds in which a repair must come to an end. Each mends what the one before left open.
+/// The number of rounds in which a repair must end. Each round repairs faults that the previous
+/// round left.
 const MAX_ROUNDS: usize = 32;
 
-/// Mends a mesh of one body. A mesh in which nothing can be mended stays as it is; so does one that
-/// was repaired with the same options.
+/// Repairs a mesh of one body. A mesh in which nothing can be repaired stays unchanged; so does a
+/// mesh that was repaired with the same options.
 ///
-/// Round by round it welds rims, drops facets, turns over those that face the other way than their
-/// neighbours, gives the corners of facets without area to their neighbours, closes holes, and turns
-/// over shells that face into the material. A mesh whose edges all have an even number of facets
-/// keeps them so.
+/// Each round welds boundary edges, drops facets, turns over facets that face the other way than
+/// their neighbors, gives the corners of degenerate facets to their neighbors, closes holes, and
+/// turns over shells that face into the material. A mesh whose edges all have an even number of
+/// facets keeps this property.
 ///
 /// # Errors
-/// Returns an error if there are no facets, too many, or none would be left.
+/// Returns an error if there are no facets, there are too many, or none would be left.
 pub fn repair(facets: Vec<Facet>, options: &RepairOptions) -> Result<Repaired, SliceError> {
     let mut work = Work::new(facets);
     for _ in 0..MAX_ROUNDS {
@@ -98,15 +99,15 @@ pub fn repair(facets: Vec<Facet>, options: &RepairOptions) -> Result<Repaired, S
 /// Facets under repair.
 struct Work {
     facets: Vec<Facet>,
-    /// Where each comes from.
+    /// The origin of each facet.
     origins: Vec<Origin>,
-    /// Those that are no longer there.
+    /// The facets that were dropped.
     dropped: Vec<Touched>,
 }
 
 #[derive(Clone, Copy)]
 struct Origin {
-    /// Its number before the repair; none if it was added.
+    /// Its number before the repair; `None` if it was added.
     facet: Option<u32>,
     is_moved: bool,
     is_turned: bool,
@@ -119,7 +120,7 @@ impl Work {
         Self { facets, origins, dropped: Vec::new() }
     }
 
-    /// Does what can be done first, and returns whether there may be more.
+    /// Performs the first possible repair step, and returns whether there may be more.
     fn round(&mut self, options: &RepairOptions) -> Result<bool, SliceError> {
         let (table, moved) = CornerTable::of_facets(&self.facets)?.welded(options.weld);
         for corner in moved {
@@ -162,13 +163,13 @@ impl Work {
         Ok(is_inside_out.contains(&true))
     }
 
-    /// Drops facets, given in rising order.
+    /// Drops facets, given in ascending order.
     fn drop(&mut self, dropped: &[(u32, Deed)]) -> Result<(), SliceError> {
         if dropped.len() == self.facets.len() {
             return Err(SliceError::NothingLeft { facets: self.facets.len() });
         }
         for &(facet, deed) in dropped {
-            // Facets that were added leave no trace.
+            // Added facets are dropped without a record.
             if let Some(facet) = self.origins[facet as usize].facet {
                 self.dropped.push(Touched { facet: facet as usize, deed });
             }
@@ -229,7 +230,7 @@ mod tests {
         repaired
     }
 
-    /// Also those that are not finite.
+    /// Includes coordinates that are not finite.
     fn bits(facets: &[Facet]) -> Vec<u32> {
         facets.as_flattened().as_flattened().iter().map(|c| c.to_bits()).collect()
     }
@@ -315,7 +316,7 @@ mod tests {
         assert!(matches!(repair(both_ways, &USUAL), Err(SliceError::NothingLeft { facets: 24 })));
     }
 
-    /// How many edges have an odd number of facets.
+    /// Returns the number of edges with an odd number of facets.
     fn odd_edges(facets: &[Facet]) -> usize {
         let mut counts = std::collections::HashMap::new();
         for &[a, b, c] in facets {
@@ -332,7 +333,7 @@ mod tests {
         Mesh { facets: facets.to_vec() }.volume_mm3()
     }
 
-    /// A square of facets that stands on the lid of a block of 10 mm, in `steps` steps each way.
+    /// A square of facets on the lid of a block of 10 mm, in `steps` steps each way.
     fn fin(steps: usize) -> Vec<Facet> {
         let at = |i: usize, j: usize| [i, i, j].map(|k| 10.0 * k as f32 / steps as f32);
         let up = |[x, y, z]: [f32; 3]| [x, y, z + 10.0];
@@ -356,7 +357,7 @@ mod tests {
                 let done = repaired(&facets, &USUAL);
                 assert_eq!((&done.facets, done.touched.len()), (&cube, 2 * fin.len()));
             }
-            // Held three times, it stays once: its rim was open.
+            // Present three times, it stays once: its boundary was open.
             let thrice = [cube.clone(), fin.clone(), fin.clone(), fin.clone()].concat();
             let done = repair(thrice, &RepairOptions { weld: 0.0, close: 0.0 }).unwrap();
             assert_eq!(done.facets.len(), cube.len() + fin.len());
@@ -406,7 +407,7 @@ mod tests {
 
     #[test]
     fn slivers_and_vertices_on_sides_are_mended() {
-        // A block whose lid knows a vertex in the middle of each side, its walls not.
+        // A block whose lid has a vertex in the middle of each side, unlike its walls.
         let lid = |with_slivers: bool| {
             let mut facets = block([0.0; 3], [10.0; 3]);
             facets.drain(2..4);

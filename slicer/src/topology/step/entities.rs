@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use lamp_brep::vector::Vec3;
 
-/// How many references stand on a line.
+/// The number of references per line.
 const PER_LINE: usize = 100;
 
 /// Writes entities, and counts them.
@@ -43,7 +43,7 @@ impl<'a> EntityWriter<'a> {
         Ok(self.last)
     }
 
-    /// Adds an entity with a list of others in it.
+    /// Adds an entity that contains a list of others.
     pub(super) fn with_list(&mut self, start: &str, list: &[u64], end: &str) -> io::Result<u64> {
         self.add(|out| {
             out.write_all(start.as_bytes())?;
@@ -54,7 +54,7 @@ impl<'a> EntityWriter<'a> {
 
     /// Adds a plane through a point.
     pub(super) fn plane(&mut self, point: u64, normal: Vec3) -> io::Result<u64> {
-        // Across a metre, a digit more is a hundredth of a nanometre.
+        // Across a meter, one digit more is a hundredth of a nanometer.
         let [x, y, z] = normal.map(|c| Real((c * 1e11).round() / 1e11));
         let normal = self.add(|out| write!(out, "DIRECTION('',({x},{y},{z}))"))?;
         let place = self.add(|out| write!(out, "AXIS2_PLACEMENT_3D('',#{point},#{normal},$)"))?;
@@ -66,11 +66,11 @@ impl<'a> EntityWriter<'a> {
         if voids.is_empty() {
             return self.add(|out| write!(out, "FACETED_BREP('',#{outer})"));
         }
-        // Not a faceted B-rep, too: of those OpenCASCADE 7.6 leaves the voids out.
+        // Not written as a faceted B-rep: OpenCASCADE 7.6 omits the voids of such solids.
         self.with_list(&format!("BREP_WITH_VOIDS('',#{outer},"), voids, ")")
     }
 
-    /// Adds the product that solids are the shape of.
+    /// Adds the product whose shape consists of the solids.
     pub(super) fn product(&mut self, name: &str, solids: &[u64]) -> io::Result<()> {
         let mut add = |entity: String| self.add(|out| out.write_all(entity.as_bytes()));
         let length = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))".to_owned())?;
@@ -108,8 +108,8 @@ fn write_list(list: &[u64], out: &mut dyn Write) -> io::Result<()> {
     out.write_all(b")")
 }
 
-/// A number as STEP writes it: with a point, without zeros behind it, and with a capital E. It has
-/// as many digits as it takes to tell it from others.
+/// A number as STEP writes it: with a point, without zeros after it, and with a capital E. It has
+/// just enough digits to identify it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Real(pub(super) f64);
 

@@ -1,17 +1,17 @@
-//! Joins facets in one plane to faces.
+//! Joins facets in one plane into faces.
 
 use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub};
 use lamp_stack::Grouped;
 
 use crate::topology::{CornerTable, facet_of};
 
-/// How far vertices may lie from a face's plane, as a share of the part's size.
+/// The greatest distance of vertices from a face's plane, as a share of the part's size.
 const FLAT: f64 = 1e-9;
 
 /// No face yet.
 const NONE: u32 = u32::MAX;
 
-/// Facets by the flat face that they are part of.
+/// Facets by the flat face that contains them.
 #[derive(Debug)]
 pub(super) struct FlatFaces {
     of_facet: Vec<u32>,
@@ -27,8 +27,8 @@ struct Plane {
 }
 
 impl FlatFaces {
-    /// Finds the faces. The largest facets decide on planes, for theirs are known best: each
-    /// takes in all that reaches it within its own plane.
+    /// Finds the faces. The largest facets determine the planes, because their planes are known
+    /// best: each takes all facets connected to it within its own plane.
     pub(super) fn new(table: &CornerTable) -> Self {
         let count = table.facet_count() as u32;
         let areas: Vec<f32> =
@@ -70,7 +70,7 @@ impl FlatFaces {
         Self { facets: Grouped::new(count as usize, by_face), count, of_facet }
     }
 
-    /// Makes each facet of faces that are bad, by their facets, a face of its own.
+    /// Makes each facet of bad faces a separate face. `is_bad` judges a face by its facets.
     pub(super) fn split_where(&mut self, is_bad: impl Fn(&Self, &[u32]) -> bool) {
         let mut count = self.count();
         let mut of_facet = self.of_facet.clone();
@@ -97,7 +97,7 @@ impl FlatFaces {
         self.facets.group(face as usize)
     }
 
-    /// Returns true if the edge opposite to a corner is one between two faces.
+    /// Returns true if the edge opposite to a corner is between two faces.
     pub(super) fn is_side(&self, table: &CornerTable, corner: u32) -> bool {
         let face = |corner: u32| self.of_facet[facet_of(corner) as usize];
         table.opposite(corner).is_none_or(|across| face(across) != face(corner))
@@ -111,7 +111,7 @@ impl Plane {
         Self { point: table.point(3 * facet), normal }
     }
 
-    /// Returns true if a facet lies in the plane, and faces the same way.
+    /// Returns true if a facet is in the plane, and faces the same way.
     fn holds(&self, table: &CornerTable, facet: u32, tolerance: f64) -> bool {
         let is_in = |point: Vec3| dot(sub(point, self.point), self.normal).abs() <= tolerance;
         table.facet(facet).into_iter().all(is_in)
@@ -119,7 +119,7 @@ impl Plane {
     }
 }
 
-/// Takes in all facets in a plane that those that wait lead to.
+/// Adds all facets in a plane that the waiting facets lead to.
 fn grow(
     table: &CornerTable,
     plane: &Plane,

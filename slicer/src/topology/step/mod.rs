@@ -21,14 +21,14 @@ use entities::{EntityWriter, text};
 use flat_faces::FlatFaces;
 use outline::{Dropped, outer_first, outlines};
 
-/// A reason that a mesh is no solid that a STEP file could hold.
+/// A reason why a mesh is not a solid that a STEP file could contain.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoSolid {
     /// It has holes.
     #[error("the mesh is not closed: {sides} sides of facets have no neighbour")]
     Open {
-        /// The sides of facets that have no neighbour.
+        /// The number of sides of facets without a neighbor.
         sides: u64,
     },
     /// It is closed, but its facets contradict each other.
@@ -38,15 +38,15 @@ pub enum NoSolid {
          inwards or have one side"
     )]
     Faulty {
-        /// The facets that face the other way than their neighbours.
+        /// The number of facets that face the other way than their neighbors.
         turned: usize,
-        /// Those that repeat others.
+        /// The number of facets that repeat others.
         doubled: usize,
-        /// Those without area, or with coordinates that are not finite.
+        /// The number of facets without area, or with coordinates that are not finite.
         flat: usize,
-        /// The edges of three facets and more.
+        /// The number of crowded edges, which have three or more facets.
         crowded: usize,
-        /// The shells that face into the material, or have one side only.
+        /// The number of shells that face into the material, or have only one side.
         shells: usize,
     },
     /// Its surface passes through itself.
@@ -57,13 +57,13 @@ pub enum NoSolid {
         facets[0], facets[1], at_mm[0], at_mm[1], at_mm[2]
     )]
     Crossed {
-        /// The pairs of facets that cross.
+        /// The number of pairs of facets that cross.
         pairs: usize,
-        /// The facets that cross deepest, of the first pairs.
+        /// The facets that cross deepest, among the first pairs.
         facets: [u32; 2],
-        /// Where they cross, in millimetres.
+        /// The place where they cross, in millimeters.
         at_mm: [f64; 3],
-        /// How deep, in millimetres.
+        /// The depth of the crossing, in millimeters.
         depth_mm: f64,
     },
     /// Its surface passes through itself along edges.
@@ -76,24 +76,25 @@ pub enum NoSolid {
     Wound {
         /// The facet.
         facet: u32,
-        /// The place, in millimetres.
+        /// The place, in millimeters.
         at_mm: [f64; 3],
     },
 }
 
 /// A mesh as solids with flat faces, to be written as a STEP file (ISO 10303-21, AP214).
 ///
-/// Facets in one plane are one face, with loops inside it where it has holes; vertices are in one
-/// plane if they lie within 1e-9 of the part's size of it. Vertices on a straight side of
-/// two faces, as exactly as 64 bits tell, are left out.
+/// Facets in one plane are one face, with inner loops where it has holes. Vertices count as in one
+/// plane if they are within 1e-9 of the part's size of it. Vertices on a straight side of two
+/// faces, to the accuracy of 64 bits, are left out.
 ///
-/// Coordinates of 32 bits become the shortest decimals that mean the same 32-bit numbers: those
-/// that the part was made with, as 1.3 for 1.2999999523162842. Faces are found with these decimals.
-/// Facets without area along a straight side give that side's vertices to their neighbours.
-/// Should decimals make facets cross that do not, coordinates stay as they are to the last bit.
+/// Coordinates of 32 bits become the shortest decimals with the same 32-bit numbers. These are the
+/// decimals with which the part was made, such as 1.3 for 1.2999999523162842. Faces are found with
+/// these decimals. Facets without area along a straight side give that side's vertices to their
+/// neighbors. If decimals would make facets cross that do not cross, coordinates stay unchanged to
+/// the last bit.
 ///
-/// Each lump of the mesh is a `FACETED_BREP`, and one with voids a `BREP_WITH_VOIDS`. Faces
-/// are bounded by `POLY_LOOP`s, which need neither edges nor curves, and so little text.
+/// Each lump of the mesh is a `FACETED_BREP`, or, if it has voids, a `BREP_WITH_VOIDS`. Faces are
+/// bounded by `POLY_LOOP`s, which need neither edges nor curves, and so little text.
 #[derive(Debug)]
 pub struct StepSolids {
     table: CornerTable,
@@ -105,11 +106,11 @@ pub struct StepSolids {
 }
 
 impl StepSolids {
-    /// Finds the solids and faces of a mesh. Besides the table, it takes as much as the table, and
-    /// some 40 bytes a facet.
+    /// Finds the solids and faces of a mesh. It takes twice the memory of the table, and some 40
+    /// bytes per facet.
     ///
     /// # Errors
-    /// Returns an error if the mesh is open, has any other fault of [`MeshCheck`] than facets
+    /// Returns an error if the mesh is open, has any other fault of [`MeshCheck`] except facets
     /// without area along a side, or passes through itself. Solids may pass through each other.
     pub fn new(table: CornerTable) -> Result<Self, NoSolid> {
         let unit_mm = unit_mm(table.points());
@@ -117,7 +118,7 @@ impl StepSolids {
         Self::of_exact(decimal).or_else(|_| Self::of_exact(table))
     }
 
-    /// As [`new`](Self::new), with all digits of the coordinates.
+    /// Does the same as [`new`](Self::new), with all digits of the coordinates.
     fn of_exact(table: CornerTable) -> Result<Self, NoSolid> {
         let changed = without_slivers(&table);
         let table = if changed.is_empty() { table } else { table.with_facets(&changed) };
@@ -144,7 +145,8 @@ impl StepSolids {
         self.faces.count() as usize
     }
 
-    /// Writes the file, in millimetres. `name` is the product's. The text goes out as it is made.
+    /// Writes the file, in millimeters. `name` is the product's name. The text is written as it is
+    /// made.
     ///
     /// # Errors
     /// Returns an error if `out` does.
@@ -160,7 +162,7 @@ impl StepSolids {
         file.end()
     }
 
-    /// Writes the vertices that faces have, and returns their entities.
+    /// Writes the vertices of faces, and returns their entities.
     fn write_points(&self, file: &mut EntityWriter<'_>) -> io::Result<Vec<u64>> {
         let mut points = vec![0; self.table.points().len()];
         for (vertex, point) in self.table.points().iter().enumerate() {
@@ -184,7 +186,7 @@ impl StepSolids {
         let mut voids = Vec::with_capacity(lump.voids.len());
         for &void in &lump.voids {
             let shell = self.write_shell(void, points, file)?;
-            // Its facets face into the void, away from the material, as the solid wants it.
+            // Its facets face into the void, away from the material, as the solid requires.
             voids.push(file.add(|out| write!(out, "ORIENTED_CLOSED_SHELL('',*,#{shell},.T.)"))?);
         }
         file.solid(outer, &voids)
@@ -244,11 +246,11 @@ fn check_solid(check: &MeshCheck) -> Result<(), NoSolid> {
     }
 }
 
-/// How deep facets may cross, as a share of the greatest coordinate: the rounding of 32 bits moves
-/// coordinates by up to 2^-24 of themselves.
+/// The greatest accepted depth of crossing facets, as a share of the greatest coordinate: the
+/// rounding of 32 bits moves coordinates by up to 2^-24 of themselves.
 const ROUNDED: f64 = 1e-6;
 
-/// How many pairs of facets that cross are looked at for the deepest one.
+/// The number of pairs of crossing facets that are examined for the deepest one.
 const PAIRS: usize = 1000;
 
 /// Refuses a mesh in which facets of one solid cross.
@@ -260,7 +262,7 @@ fn check_apart(table: &CornerTable, shells: &Shells, lumps: &[Lump]) -> Result<(
     }
     let greatest = table.points().iter().flatten().fold(0.0, |most, c| f64::max(most, c.abs()));
     let lump = |facet: u32| lump_of[shells.of(facet) as usize];
-    // The facets that cross by no more than rounding.
+    // The facets that cross only by rounding.
     let shallow = RefCell::new(Vec::new());
     let found = Crossings::of_pairs(table, PAIRS, |a, b| {
         let is_deep = deepest(table, a, b).1 > ROUNDED * greatest;
@@ -285,8 +287,8 @@ fn check_apart(table: &CornerTable, shells: &Shells, lumps: &[Lump]) -> Result<(
     }
 }
 
-/// How far beside facets the solid is looked for, as a share of the greatest coordinate: further
-/// than rounding lets facets cross.
+/// The distance next to facets at which the solid is looked for, as a share of the greatest
+/// coordinate: farther than rounding lets facets cross.
 const BESIDE: f64 = 10.0 * ROUNDED;
 
 /// Returns the unit normal of facets in one plane.

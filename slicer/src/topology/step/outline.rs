@@ -1,4 +1,4 @@
-//! The loops around a face, and the vertices that they need not have.
+//! Finds the loops around a face, and the vertices that the loops do not need.
 
 use lamp_brep::vector::{Vec3, cross, dot, sub};
 
@@ -7,7 +7,7 @@ use crate::topology::CornerTable;
 use crate::topology::faults::is_flat_between;
 
 /// Returns the loops of vertices around facets of one face, with the face to the left as seen from
-/// outside; none if a vertex is on them twice, so that they touch.
+/// outside; `None` if a vertex is on them twice, so that they touch.
 pub(super) fn outlines(
     table: &CornerTable,
     facets: &[u32],
@@ -40,7 +40,7 @@ pub(super) fn outlines(
     outlines.iter().all(|outline| outline.len() > 2).then_some(outlines)
 }
 
-/// Puts the loop around all others first.
+/// Puts the outer loop first.
 pub(super) fn outer_first(table: &CornerTable, normal: Vec3, outlines: &mut [Vec<u32>]) {
     if outlines.len() > 1 {
         let area = |outline: &Vec<u32>| {
@@ -59,10 +59,10 @@ fn ordered(number: f64) -> i64 {
     bits ^ ((bits >> 63) as u64 >> 1) as i64
 }
 
-/// Which vertices loops have, and which of these lie on a straight side of two faces.
+/// The vertices of loops, and which of them are on a straight side of two faces.
 #[derive(Debug)]
 pub(super) struct Dropped {
-    /// By vertex, how many faces meet there, up to three; none within a face.
+    /// For each vertex, the number of faces that meet there, up to three; zero within a face.
     faces_at: Vec<u8>,
     is_dropped: Vec<bool>,
 }
@@ -84,7 +84,7 @@ impl Dropped {
     }
 
     /// Drops the vertices of a loop where only two faces meet, in a straight line. The other face
-    /// drops them, too: it has the same sides in reverse.
+    /// drops them too: it has the same sides in reverse.
     fn drop_from(&mut self, table: &CornerTable, outline: &[u32]) {
         let count = outline.len();
         for k in 0..count {
@@ -98,12 +98,12 @@ impl Dropped {
         }
     }
 
-    /// Returns true if a vertex is on loops, and not dropped from them.
+    /// Returns true if a vertex is on loops and was not dropped from them.
     pub(super) fn is_used(&self, vertex: u32) -> bool {
         self.faces_at[vertex as usize] > 0 && !self.is_dropped[vertex as usize]
     }
 
-    /// Returns a loop without the vertices that are dropped.
+    /// Returns a loop without the dropped vertices.
     pub(super) fn without(&self, outline: &[u32]) -> Vec<u32> {
         outline.iter().copied().filter(|&vertex| self.is_used(vertex)).collect()
     }

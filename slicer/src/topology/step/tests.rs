@@ -19,7 +19,7 @@ const TABLE_3: [[f64; 2]; 7] = [
     [6162.0, 7668.0],
 ];
 
-/// Returns the slope and the intercept of the line that fits points best.
+/// Returns the slope and the intercept of the line that best fits points.
 fn fit(points: &[[f64; 2]]) -> [f64; 2] {
     let count = points.len() as f64;
     let mean = [0, 1].map(|k| points.iter().map(|point| point[k]).sum::<f64>() / count);
@@ -67,7 +67,7 @@ fn a_facet_takes_less_than_half_of_what_table_3_says() {
     let [per_facet, first] = fit(&TABLE_3);
     assert_eq!((per_facet * 1e3).round(), 1246.0);
     assert_eq!(((per_facet * 5.5e6 + first) / 1e4).round(), 685.0);
-    // None of the facets of a ball lie in one plane but at its poles.
+    // No facets of a ball are in one plane, except at its poles.
     let ball = parts::sphere(15.0, 6_162);
     let (text, faces) = step(&ball);
     assert!(faces as f64 > 0.9 * ball.facets.len() as f64);
@@ -78,7 +78,7 @@ fn a_facet_takes_less_than_half_of_what_table_3_says() {
 
 #[test]
 fn flat_sides_are_single_faces() {
-    // Sides and corners as the part has them, however many facets it has.
+    // The same sides and corners as the part, for any number of facets.
     let has = |part: fn(usize) -> Mesh, faces: usize, corners: usize| {
         for facets in [1, 3_000] {
             let mesh = part(facets);
@@ -142,7 +142,7 @@ fn a_face_that_touches_itself_stays_in_facets() {
     let mesh = dented();
     let (text, faces) = step(&mesh);
     let top = mesh.facets.iter().filter(|facet| facet.iter().all(|corner| corner[2] > 0.0)).count();
-    // Its dents are four flat sides each at least.
+    // Its dents have at least four flat sides each.
     assert!(faces > 5 + 8 && faces <= 5 + top, "{faces} {top}");
     assert_same_volume(&mesh, &text);
 }
@@ -179,7 +179,7 @@ fn coordinates(text: &str) -> [Vec<f64>; 3] {
     })
 }
 
-/// The volume of the one body of a file, by its surfaces.
+/// The volume of a file's only body, by its surfaces.
 fn exact_volume(text: &str) -> f64 {
     let read = lamp_brep::prepare(text.as_bytes(), lamp_brep::read_step, 0.01).unwrap();
     assert!(read.is_good() && read.reports.len() == 1, "{:?}", read.reports);
@@ -221,7 +221,7 @@ fn stair(x: &[f64], y: [f64; 2], z: &[f64]) -> Mesh {
 #[test]
 fn files_hold_the_decimals_that_were_meant() {
     let mut numbers = lamp_fixtures::SplitMix(23);
-    // Whole micrometres, up to a metre from the origin: 32 bits tell them apart up to 8 m.
+    // Whole micrometers, up to a meter from the origin: 32 bits distinguish them up to 8 m.
     for _ in 0..40 {
         let steps = 2 + numbers.below(6);
         let mut along = |most: usize| -> Vec<f64> {
@@ -248,14 +248,14 @@ fn files_hold_the_decimals_that_were_meant() {
 
 #[test]
 fn slanted_sides_stay_flat_and_slivers_join_their_neighbours() {
-    // A wedge whose slanted side has vertices that only decimals put on one line.
+    // A wedge whose slanted side has vertices that only decimals align.
     let [a, b, c] = [[0.0, 0.0, 0.1f32], [7.0, 0.0, 0.1], [0.0, 0.0, 2.2]];
     let back = |[x, _, z]: [f32; 3]| [x, 5.0, z];
     let on = [[2.0, 0.0, 1.6f32], [4.0, 0.0, 1.0], [6.0, 0.0, 0.4]];
     let line: Vec<_> = [c].into_iter().chain(on).chain([b]).collect();
     let [d, e, f] = [a, b, c].map(back);
     let mut facets = vec![[d, f, e], [a, e, b], [a, d, e], [a, f, d], [a, c, f], [a, b, c]];
-    // The slanted side meets the vertices, the front has slivers along its edge.
+    // The slanted side uses the vertices; the front has slivers along its edge.
     facets.extend(line.windows(2).map(|side| [side[0], side[1], e]));
     facets.push([c, e, f]);
     facets.extend((1..4).map(|k| [b, line[k], line[k - 1]]));
@@ -295,7 +295,7 @@ fn a_surface_through_itself_is_refused_and_solids_through_each_other_are_not() {
         let is_there = (x - 2.0).abs() < 0.5 && (y - 2.0).abs() < 0.5 && z.abs() < 1e-6;
         assert!(is_there && depth_mm > 0.001 && pairs > 0, "{x} {y} {z} {depth_mm}");
     }
-    // A cavity that leaves its block is no solid either.
+    // A cavity that leaves its block is not a solid, either.
     let cavity = turned(&block([1.0, 1.0, 1.0], [3.0, 3.0, 5.0]));
     assert!(StepSolids::new(table_of(&[cube, cavity].concat())).is_err());
 }
