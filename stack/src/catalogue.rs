@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{line_of, one_line};
 
-/// A TOML document of a kind of which some are built in, as materials and machines.
+/// A TOML document of a kind with built-in documents, such as materials and machines.
 ///
 /// ```
 /// use lamp_stack::{Builtin, CatalogueError, Catalogued};
@@ -41,7 +41,7 @@ pub trait Catalogued: DeserializeOwned {
     const KIND: &'static str;
     /// The built-in documents, in the order of their names.
     const BUILTINS: &'static [Builtin];
-    /// Why values make no document though each can be read.
+    /// Why values make no document although each can be read.
     type CheckError;
 
     /// Returns the document's name: small letters, digits and `-`.
@@ -135,7 +135,7 @@ pub enum CatalogueError<E> {
         line: usize,
         /// The key's path, as `working-curve.critical-dose`.
         key: String,
-        /// The parser's message, or that of the value's type.
+        /// The parser's message, or the message of the value's type.
         problem: String,
     },
     /// The name holds other characters than a name may.

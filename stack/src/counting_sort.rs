@@ -73,15 +73,15 @@ impl<T> Grouped<T> {
 /// come from somewhere that may fail; otherwise [`Grouped::new`] does it all.
 #[derive(Clone, Debug)]
 pub struct KeyCounts {
-    /// Those of key k at k + 2, so that summing and placing need no other list.
+    /// The counts of key k are at k + 2, so that summing and placing need no other list.
     counts: Vec<u32>,
-    /// What ranges of keys add to the count of each key, from that of the key before. Empty if
-    /// there are none.
+    /// For each key, the change by ranges of keys from the count of the key before. Empty if there
+    /// are no ranges.
     steps: Vec<i32>,
 }
 
 impl KeyCounts {
-    /// Starts with none of the keys below `keys`.
+    /// Starts with a count of zero for each key below `keys`.
     pub fn new(keys: usize) -> Self {
         Self { counts: vec![0; keys + 2], steps: Vec::new() }
     }
@@ -102,7 +102,7 @@ impl KeyCounts {
         self.steps[keys.end] -= 1;
     }
 
-    /// Makes room for what was counted.
+    /// Makes room for the counted items.
     pub fn into_groups<T: Copy + Default>(self) -> UnfinishedGroups<T> {
         let mut starts = self.counts;
         let mut of_ranges = 0;

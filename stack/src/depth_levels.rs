@@ -71,7 +71,7 @@ impl LevelSteps {
     /// Bins of depths, eight for each step.
     const BINS: usize = 2048;
 
-    /// Creates the steps: from the depth at `i` on, in micrometres, the level is above `i`.
+    /// Creates the steps: from the depth at `i` on, in micrometers, the level is above `i`.
     ///
     /// # Panics
     /// Panics if there are more than 255.

@@ -71,8 +71,8 @@ fn halves(subtrees: &[ChainingValue]) -> (&[ChainingValue], &[ChainingValue]) {
     subtrees.split_at(subtrees.len().next_power_of_two() / 2)
 }
 
-/// Returns the digest of several inputs, which is that of their digests in order; of a single
-/// input, its own. It is empty if one of them is.
+/// Returns the digest of several inputs: the digest of their digests in order; for a single input,
+/// its own. It is empty if one of them is empty.
 pub fn digest_of_digests<'a>(digests: impl IntoIterator<Item = &'a str>) -> String {
     let digests: Vec<&str> = digests.into_iter().collect();
     if let [alone] = digests[..] {
@@ -94,7 +94,7 @@ fn text(hash: Hash) -> String {
 
 impl StackInfo {
     /// Returns whether the stack was made of inputs with these digests: of all of them in this
-    /// order, or as a build of several parts, each of one of them.
+    /// order, or, in a build of several parts, each part of one of them.
     pub fn is_made_of(&self, digests: &[String]) -> bool {
         let whole = digest_of_digests(digests.iter().map(String::as_str));
         let mut parts = self.built_digests().peekable();

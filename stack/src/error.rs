@@ -11,7 +11,7 @@ use crate::files::folder_list::FOLDER_LIST;
 use crate::layer::check::CheckFault;
 use crate::note::ImagesBeside;
 
-/// What stands before the reason of a stage that gave up.
+/// The words before the reason of a stage that gave up.
 pub(crate) const GAVE_UP: &str = "the stage before gave up: ";
 
 /// An error in reading or writing a stack.
@@ -104,7 +104,7 @@ pub enum StackError {
     Check {
         /// The layer's index.
         layer: u32,
-        /// What differs.
+        /// The difference.
         fault: CheckFault,
     },
     /// The stack ends, but its last page was not the last when it was written.
@@ -191,7 +191,7 @@ pub enum StackError {
         "only what an earlier run wrote is replaced, and this folder has no {FOLDER_LIST} of one"
     )]
     NotOurs,
-    /// The folder to be replaced holds what its list does not name.
+    /// The folder to be replaced holds something that its list does not name.
     #[error("only what an earlier run wrote is replaced, and this folder holds {name}")]
     NotReplaceable {
         /// The name of such a file or folder.
@@ -311,7 +311,7 @@ pub enum PageFault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum UnsupportedFeature {
-    /// A TIFF in colour.
+    /// A TIFF in color.
     #[error("an RGB image")]
     Rgb,
     /// A TIFF with a palette.
@@ -346,7 +346,7 @@ pub enum UnsupportedFeature {
     /// An interlaced PNG.
     #[error("an interlaced PNG")]
     Interlaced,
-    /// A picture with a pixel that is not opaque, or a PNG with a transparent colour.
+    /// A picture with a pixel that is not opaque, or a PNG with a transparent color.
     #[error("a picture with transparency")]
     Transparency,
     /// A picture with 16 bits per sample.

@@ -1,10 +1,10 @@
-//! What each gray level leaves in the resin below.
+//! The light that each gray level leaves in the resin below.
 
 use crate::Length;
 
-/// What an exposure of each gray level leaves in the resin below, for one exposure time: critical
-/// doses at the layer's top, and the depth over which they fade by e. Resins make it, slicing
-/// layers whose doses add up reads it.
+/// The light that an exposure of each gray level leaves in the resin below, for one exposure time:
+/// critical doses at the layer's top, and the depth over which they fade by e. Resins make it;
+/// slicing layers whose doses add up reads it.
 ///
 /// # Guarantees
 /// A whiter level never leaves less, at any depth.
@@ -48,7 +48,7 @@ impl FadingLevels {
         self.shares[usize::from(level)]
     }
 
-    /// Returns the depth over which a level's light fades by e, in micrometres.
+    /// Returns the depth over which a level's light fades by e, in micrometers.
     #[inline]
     pub fn depth_um(&self, level: u8) -> f64 {
         self.depths_um[usize::from(level)]
@@ -60,15 +60,15 @@ impl FadingLevels {
         self.share(level) * (-depth_um / self.depth_um(level)).exp()
     }
 
-    /// Returns whether more than the level half-way above `level` is needed to leave so many critical
-    /// doses at a depth.
+    /// Returns whether leaving this many critical doses at a depth takes more than the level
+    /// half-way above `level`.
     #[inline]
     pub fn is_above(&self, level: usize, depth_um: f64, left: f64) -> bool {
         let [share, fading] = self.steps[level];
         left > 0.0 && share - depth_um * fading <= left.ln()
     }
 
-    /// Returns the level that most nearly leaves so many critical doses at a depth.
+    /// Returns the level that most nearly leaves this many critical doses at a depth.
     #[inline]
     pub fn level(&self, depth_um: f64, left: f64) -> u8 {
         if left <= 0.0 {

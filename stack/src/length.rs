@@ -5,34 +5,34 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// A length, stored in micrometres.
+/// A length, stored in micrometers.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default)]
 pub struct Length {
     um: f64,
 }
 
 impl Length {
-    /// Creates a length from micrometres.
+    /// Creates a length from micrometers.
     pub const fn from_um(um: f64) -> Self {
         Self { um }
     }
 
-    /// Creates a length from millimetres.
+    /// Creates a length from millimeters.
     pub const fn from_mm(mm: f64) -> Self {
         Self { um: mm * 1000.0 }
     }
 
-    /// Returns the length in micrometres.
+    /// Returns the length in micrometers.
     pub const fn um(self) -> f64 {
         self.um
     }
 
-    /// Returns the length in millimetres.
+    /// Returns the length in millimeters.
     pub const fn mm(self) -> f64 {
         self.um / 1000.0
     }
 
-    /// Rounds to whole nanometres, which removes the rounding errors of sums and differences.
+    /// Rounds to whole nanometers, which removes the rounding errors of sums and differences.
     pub fn to_whole_nm(self) -> Self {
         Self { um: (self.um * 1000.0).round() / 1000.0 }
     }
@@ -44,8 +44,8 @@ impl Length {
 }
 
 impl fmt::Display for Length {
-    /// Formats in micrometres below one millimetre, and in millimetres above where that is exact:
-    /// two lengths never have the same text, and a text is read as the length that it is of.
+    /// Formats in micrometers below one millimeter, and in millimeters above where that is exact.
+    /// Two lengths never have the same text, and reading a text gives exactly its length.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.um.abs() >= 1000.0 && Self::from_mm(self.mm()) == *self {
             write!(f, "{}mm", self.mm())
@@ -78,7 +78,7 @@ pub enum LengthError {
     NotAResolution(String),
 }
 
-/// Splits `100um` into its number and the micrometres in its unit (`None` without a unit).
+/// Splits `100um` into its number and the micrometers in its unit (`None` without a unit).
 fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
     let text = text.trim();
     let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || c == '"').trim_end();
@@ -115,7 +115,7 @@ impl FromStr for Length {
     }
 }
 
-/// A width and a height, such as those of a build area.
+/// A width and a height, such as a build area's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// The size along x.
@@ -127,7 +127,7 @@ pub struct Size {
 impl FromStr for Size {
     type Err = LengthError;
 
-    /// Parses `4x4.5in` or `100mm x 4in`. A width without a unit takes that of the height.
+    /// Parses `4x4.5in` or `100mm x 4in`. A width without a unit takes the height's unit.
     ///
     /// # Errors
     /// Returns an error if the text is not two positive lengths with an `x` between them.
@@ -147,7 +147,7 @@ impl FromStr for Size {
 }
 
 impl fmt::Display for Size {
-    /// Formats in millimetres where that is exact, and else in micrometres.
+    /// Formats in millimeters where that is exact, and else in micrometers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { width, height } = self;
         if [width, height].iter().all(|side| Length::from_mm(side.mm()) == **side) {
@@ -175,20 +175,20 @@ impl Dpi {
         self.0
     }
 
-    /// Returns the pixels per metre, rounded to a whole number.
+    /// Returns the pixels per meter, rounded to a whole number.
     pub(crate) fn per_metre(self) -> u32 {
         (self.0 / METRES_PER_INCH).round() as u32
     }
 
-    /// Converts whole pixels per metre. Prefers whole dots per inch that round to the same
-    /// number (59055 pixels per metre are 1500 dpi).
+    /// Converts whole pixels per meter. Prefers whole dots per inch that round to the same
+    /// number (59055 pixels per meter are 1500 dpi).
     pub(crate) fn from_per_metre(pixels: u32) -> Option<Self> {
         let exact = f64::from(pixels) * METRES_PER_INCH;
         let whole = Self::new(exact.round()).filter(|whole| whole.per_metre() == pixels);
         whole.or_else(|| Self::new(exact))
     }
 
-    /// Returns the distance between two pixel centres, 25.4 mm / dpi.
+    /// Returns the distance between two pixel centers, 25.4 mm / dpi.
     pub fn pitch(self) -> Length {
         Length::from_um(25_400.0 / self.0)
     }
@@ -205,8 +205,8 @@ impl Dpi {
     }
 }
 
-/// Returns whether pixels are as wide as they are high by their resolutions across and down: up to
-/// a thousandth, or `rounding` if that is more. A resolution that is not above zero says nothing.
+/// Returns whether pixels are square by their resolutions across and down: up to a thousandth, or
+/// `rounding` if that is more. A resolution that is not above zero says nothing.
 pub(crate) fn has_square_pixels(resolutions: [f64; 2], rounding: f64) -> bool {
     let [across, down] = resolutions;
     let are_stated = resolutions.iter().all(|side| side.is_finite() && *side > 0.0);
@@ -302,7 +302,7 @@ mod tests {
             assert_eq!(Dpi::from_per_metre(dpi.per_metre()), Some(dpi));
         }
         assert_eq!(Dpi::new(1500.0).unwrap().per_metre(), 59_055);
-        // 203.2 dpi are 8000 pixels a metre.
+        // 203.2 dpi are 8000 pixels a meter.
         assert_eq!(Dpi::from_per_metre(8000), Dpi::new(203.2));
         assert_eq!(Dpi::from_per_metre(0), None);
     }

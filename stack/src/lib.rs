@@ -1,7 +1,7 @@
 //! The vocabulary that every stage of LAMP shares.
 //!
 //! A layer image is never pixels here but runs: each row of a [`Mask`] is the
-//! sorted list of columns where the colour toggles. A [`Layer`] is an image
+//! sorted list of columns where the color toggles. A [`Layer`] is an image
 //! and what is known of it; a stack is a file, folder or stream of layers,
 //! bottom first, in TIFF or PNG. A stage is a function from layers to layers.
 //!

@@ -7,8 +7,8 @@ pub const MAX_SIDE: u32 = 1 << 26;
 /// The greatest number of runs of an image, far more than any layer has.
 pub const MAX_RUNS: usize = 1 << 27;
 
-/// How much a reader takes before it refuses a page: what a file claims must
-/// not decide how much memory is used.
+/// The most that a reader takes before it refuses a page: a file's claims must not decide how much
+/// memory is used.
 ///
 /// ```
 /// # fn main() -> Result<(), lamp_stack::StackError> {
@@ -65,7 +65,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Returns the limits, lowered to those of the images themselves.
+    /// Returns the limits, lowered to the limits of the images themselves.
     pub(crate) fn within_images(self) -> Self {
         Self { side: self.side.min(MAX_SIDE), runs: self.runs.min(MAX_RUNS), ..self }
     }

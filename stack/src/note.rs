@@ -1,9 +1,9 @@
-//! Defines what readers find beside the layers of a stack.
+//! Defines the notes of readers on a stack, besides its layers.
 
 use std::fmt;
 
-/// Something that a reader finds in a stack's file or folder: a reason to doubt that the layers are
-/// those of one whole stack, or what is left out because it is no layer.
+/// A note of a reader on a stack's file or folder: a reason to doubt that the layers belong to one
+/// whole stack, or something that is left out because it is no layer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StackNote {
@@ -20,7 +20,7 @@ pub enum StackNote {
 }
 
 impl StackNote {
-    /// Returns whether the layers may not be those of one whole stack.
+    /// Returns whether the note is a reason to doubt that the layers belong to one whole stack.
     pub fn is_doubt(&self) -> bool {
         match self {
             Self::Gaps(_) | Self::OtherPictures(_) | Self::Forms(_) => true,
@@ -48,7 +48,7 @@ pub struct ImagesBeside {
     pub reduced: u64,
     /// Transparency masks.
     pub masks: u64,
-    /// Images in directories below that of a page.
+    /// Images in directories below a page's directory.
     pub sub_images: u64,
 }
 

@@ -2,10 +2,10 @@
 
 use std::io::{self, Cursor, Read};
 
-/// Reads a text's bytes, in UTF-8 or any code that has ASCII in it: without a mark of the order
-/// of bytes, and of UTF-16 each character that ASCII lacks as `?`.
+/// Reads a text's bytes, in UTF-8 or any code that contains ASCII: without a mark of the order of
+/// bytes, and in UTF-16 each character that ASCII lacks as `?`.
 ///
-/// UTF-16 is known by its mark, or by the zeros in its first two characters.
+/// UTF-16 is recognized by its mark, or by the zeros in its first two characters.
 #[derive(Debug)]
 pub struct PlainText<R> {
     text: io::Chain<Cursor<Vec<u8>>, R>,
@@ -105,7 +105,7 @@ mod tests {
             PlainText::new(bytes).unwrap().read_to_end(&mut read).unwrap();
             assert_eq!(read, bytes);
         }
-        // Half a character at the end is none.
+        // Half a character at the end does not count.
         let mut read = Vec::new();
         PlainText::new(&b"a\0b\0c"[..]).unwrap().read_to_end(&mut read).unwrap();
         assert_eq!(read, b"ab");

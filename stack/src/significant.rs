@@ -26,7 +26,7 @@ pub fn round_significant(number: f64, digits: usize) -> f64 {
     text.parse().expect("a written number reads back")
 }
 
-/// Rounds millimetres to the nanometre, for more digits say nothing. Adding zero turns -0 into 0.
+/// Rounds millimeters to the nanometer, for more digits say nothing. Adding zero turns -0 into 0.
 pub fn to_nm(mm: f64) -> f64 {
     (mm * 1e6).round() / 1e6 + 0.0
 }

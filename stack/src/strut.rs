@@ -41,7 +41,7 @@ impl Strut {
         self.reach_mm(2).map(Length::from_mm)
     }
 
-    /// Returns the pixels whose centres are in its section at a height: at most one run a
+    /// Returns the pixels whose centers are in its section at a height: at most one run a
     /// row, as the row, the first column and the column after the last, from the top. The
     /// image's top left corner is at `origin_mm`, and it has `size` columns and rows.
     pub fn section(
@@ -55,7 +55,7 @@ impl Strut {
         let up_mm = height.mm() - self.from_mm[2];
         let [x0, y1] = origin_mm;
         let pitch_mm = dpi.pitch().mm();
-        // Pixel centres are whole numbers; the casts make negative values zero.
+        // Pixel centers are whole numbers; the casts make negative values zero.
         let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
         let [low, high] = self.rows_mm(up_mm);
         let rows = pixels(y1 - high).ceil() as u32..(pixels(y1 - low).floor() + 1.0) as u32;
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// Quarters of a millimetre, so that struts also stand upright and lie along an axis.
+    /// Quarters of a millimeter, so that struts also stand upright and lie along an axis.
     fn end() -> impl Strategy<Value = [f64; 3]> {
         [-8i32..60, -12i32..32, -4i32..20].prop_map(|end| end.map(|q| f64::from(q) / 4.0 + 0.013))
     }
@@ -154,7 +154,7 @@ mod tests {
                 let part = (0..3).map(|k| (centre[k] - from[k]) * along[k]).sum::<f64>() / square;
                 let away = (0..3).map(|k| (centre[k] - from[k] - part * along[k]).powi(2));
                 let [beyond, away] = [part.min(1.0 - part), radius - away.sum::<f64>().sqrt()];
-                // A centre on the surface may be in it or not.
+                // A center on the surface may be in it or not.
                 if beyond.abs().min(away.abs()) < 1e-9 {
                     continue;
                 }

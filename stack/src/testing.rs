@@ -14,8 +14,8 @@ pub(crate) fn mask_of<'a>(width: u32, rows: impl IntoIterator<Item = &'a [u32]>)
     mask.finish()
 }
 
-/// Masks whose rows are random, or the row above with some edges moved a
-/// little: what the modes of T.6 tell apart.
+/// Masks whose rows are random, or the row above with some edges moved a little: the cases that the
+/// modes of T.6 distinguish.
 pub(crate) fn arbitrary_mask() -> impl Strategy<Value = Mask> {
     let width = prop_oneof![0u32..70, Just(2560), Just(2561), 1000u32..9000];
     let edges =
@@ -66,7 +66,7 @@ pub(crate) fn arbitrary_gray() -> impl Strategy<Value = GrayMask> {
     })
 }
 
-/// Where an edge is, how far it moves from row to row, and what becomes of it.
+/// The place of an edge, its shift from row to row, and its fate.
 fn edge() -> impl Strategy<Value = (u32, i32, u8)> {
     (any::<u32>(), -4i32..=4, 0u8..30)
 }

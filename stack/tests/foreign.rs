@@ -170,7 +170,7 @@ fn differences(piece: &[u8], width: usize) -> Vec<u8> {
     piece.chunks(width).flat_map(row).collect()
 }
 
-/// Returns rows of bytes, most of which equal their neighbours.
+/// Returns rows of bytes, most of which equal their neighbors.
 fn rows_of_bytes() -> impl Strategy<Value = Vec<Vec<u8>>> {
     (1usize..50, 1usize..40).prop_flat_map(|(width, height)| {
         let byte = prop_oneof![4 => Just(0u8), 2 => Just(0xFF), 1 => any::<u8>()];

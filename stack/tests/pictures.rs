@@ -178,7 +178,7 @@ fn a_cut_picture_is_an_error() {
     }
 }
 
-/// Returns the gray picture in the colours that a format's encoder takes.
+/// Returns the gray picture in the colors that a format's encoder takes.
 fn coloured_for(format: ImageFormat) -> DynamicImage {
     match format {
         ImageFormat::Gif => coloured([0; 4]).into(),

@@ -24,7 +24,7 @@ fn encode_row(out: &mut Vec<u8>, changes: &[LevelChange], width: u32) {
 }
 
 /// Appends `length` bytes of `level`, always as repeats: these take two bytes per 128
-/// pixels, and gray pixels that differ from both neighbours are rare.
+/// pixels, and gray pixels that differ from both neighbors are rare.
 fn put_run(out: &mut Vec<u8>, mut length: u32, level: u8) {
     while length > 0 {
         let part = length.min(128);

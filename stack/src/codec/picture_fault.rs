@@ -25,7 +25,7 @@ impl PictureFault {
 
 /// Returns the gray level of a pixel: a level, or red, green and blue, with or without opacity.
 ///
-/// Colours may differ by one level, as lossy formats round each by itself.
+/// Colors may differ by one level, as lossy formats round each by itself.
 pub(crate) fn gray_level(pixel: &[u8]) -> Result<u8, PictureFault> {
     let (colours, opacity) = match pixel.len() {
         2 | 4 => pixel.split_at(pixel.len() - 1),

@@ -1,4 +1,4 @@
-//! The pictures that are read beside TIFF and PNG.
+//! The pictures that are read besides TIFF and PNG.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ pub enum PictureFormat {
     Bmp,
     /// Graphics Interchange Format.
     Gif,
-    /// JPEG, which is lossy: what was 1-bit has come out gray.
+    /// JPEG, which is lossy: an image that was 1-bit has become gray.
     Jpeg,
     /// Netpbm: PBM, PGM, PPM and PAM.
     Pnm,

@@ -49,7 +49,7 @@ pub(crate) fn decode(
         PictureFormat::Bmp => bits_of_bmp(file) == 1,
         _ => decoder.original_color_type() == ExtendedColorType::L1,
     };
-    // Decoders hold all pixels, so those of many threads could take much memory.
+    // Decoders hold all pixels, so decoders in many threads could take much memory.
     static ONE_LARGE_PICTURE: Mutex<()> = Mutex::new(());
     let is_large = decoder.total_bytes() > LARGE_PICTURE_BYTES;
     let _turn = is_large.then(|| ONE_LARGE_PICTURE.lock().unwrap_or_else(PoisonError::into_inner));
@@ -116,7 +116,7 @@ fn decoder<'a>(
     Ok(decoder)
 }
 
-/// Returns what decoders may take beside the pixels.
+/// Returns the memory that decoders may take besides the pixels.
 fn memory_limits(limits: &Limits) -> image::Limits {
     let mut memory = image::Limits::default();
     memory.max_alloc = Some(2 * limits.picture_bytes);
@@ -202,8 +202,8 @@ fn jfif_density(file: &[u8]) -> Option<[f64; 2]> {
     None
 }
 
-/// Returns whether a file lacks its end in a way that its decoder does not notice: that of JPEG
-/// takes what is missing for gray.
+/// Returns whether a file lacks its end in a way that its decoder does not notice: a JPEG decoder
+/// fills missing data with gray.
 fn is_cut_off(format: PictureFormat, file: &[u8]) -> bool {
     match format {
         PictureFormat::Jpeg => {

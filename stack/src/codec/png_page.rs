@@ -21,7 +21,7 @@ pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 /// The keyword of the text chunk that holds a page's JSON line.
 pub(crate) const DESCRIPTION: &str = "Description";
 
-/// The JSON key of the resolution, used if whole pixels per metre cannot express it.
+/// The JSON key of the resolution, used if whole pixels per meter cannot express it.
 pub(crate) const EXACT_DPI: &str = "dpi";
 
 /// The properties of a PNG's image, from the chunks before its data.
@@ -47,7 +47,7 @@ pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFaul
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
     if let Some(dims) = info.pixel_dims {
-        // Whole pixels a metre are rounded; a ratio is not.
+        // Whole pixels a meter are rounded; a ratio is not.
         let rounding = if dims.unit == Unit::Meter { 1.0 } else { 0.0 };
         let sides = [dims.xppu, dims.yppu].map(f64::from);
         if !has_square_pixels(sides, rounding) {
@@ -139,7 +139,7 @@ struct Samples {
     bits: usize,
     /// Samples per pixel.
     channels: usize,
-    /// The level of each sample value, or none for a palette's colour.
+    /// The level of each sample value, or none for a palette's color.
     levels: Vec<Option<u8>>,
 }
 
@@ -191,7 +191,7 @@ impl Samples {
 }
 
 /// Returns the resolution: from the JSON line's key if it rounds to the same whole pixels
-/// per metre (the key is then removed from the line), otherwise from these.
+/// per meter (the key is then removed from the line), otherwise from these.
 fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
     let pixels = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?.xppu;
     let whole = Dpi::from_per_metre(pixels);

@@ -40,7 +40,7 @@ where
 /// Encodes a layer as a PNG: 1-bit for a mask, 8-bit for a gray mask. A `tEXt` chunk with
 /// the keyword `Description` holds the page's JSON line.
 ///
-/// The `pHYs` chunk has whole pixels per metre. If these cannot express the resolution, the
+/// The `pHYs` chunk has whole pixels per meter. If these cannot express the resolution, the
 /// JSON line ends with it, as `"dpi":72.25`.
 ///
 /// # Errors

@@ -27,7 +27,7 @@ pub enum FileFormat {
     Archive(&'static str),
     /// Orders for a printer, which a part has become already.
     PrintJob(&'static str),
-    /// What a web server sends in place of a file.
+    /// The page that a web server sends in place of a file.
     WebPage,
     /// A few lines that stand for a file, as Git LFS writes them.
     Pointer(&'static str),
@@ -202,8 +202,8 @@ impl FileFormat {
     /// Returns the format of a file that starts with these bytes, of which [`FORMAT_BYTES`] or
     /// all are enough; `size` is the file's if it is known. `None` if it is not known.
     ///
-    /// A file whose size is that of the facets which its header counts is a binary STL, whatever
-    /// its header says.
+    /// A file whose size matches the number of facets in its header is a binary STL, whatever its
+    /// header contains.
     pub fn of_start(start: &[u8], size: Option<u64>) -> Option<Self> {
         if size.is_some_and(|size| is_counted(start, size)) {
             return Some(Self::Part(PartFormat::BinaryStl));
@@ -404,7 +404,7 @@ fn of_part(text: &[u8], is_whole: bool) -> Option<FileFormat> {
         return Some(FileFormat::Part(PartFormat::Step));
     }
     let Some(line) = lines(text).next() else {
-        // More comments than were read; an OBJ is what begins with so many.
+        // More comments than were read; only an OBJ begins with so many.
         let format = FileFormat::Part(PartFormat::Obj);
         return Some(format).filter(|_| !is_whole);
     };
@@ -435,7 +435,7 @@ fn is_number(word: &[u8]) -> bool {
     str::from_utf8(word).is_ok_and(|word| word.parse::<f64>().is_ok())
 }
 
-/// Returns the format of a text by what its lines begin with.
+/// Returns the format of a text by the first words of its lines.
 fn of_lines(text: &[u8]) -> Option<FileFormat> {
     let is_order = |line: &[u8]| match line {
         [b'g' | b'm', b'0'..=b'9', rest @ ..] => {

@@ -35,7 +35,7 @@ pub fn stacks_in(path: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(stacks)
 }
 
-/// Adds the stacks at a path, but not those of a folder that links have led to before.
+/// Adds the stacks at a path, except for stacks of a folder that links have led to before.
 fn add_stacks(
     path: &Path,
     seen: &mut HashSet<PathBuf>,

@@ -59,9 +59,9 @@ struct FileSource {
 }
 
 impl IndexedStack {
-    /// Opens a stack as [`Pages::open`] does, and reads what its pages say; images are passed over.
-    /// A stack that is cut off or damaged has the pages before, and [`Self::end`] says why no more
-    /// follow.
+    /// Opens a stack as [`Pages::open`] does, and reads the text of its pages; images are passed
+    /// over. A stack that is cut off or damaged has the pages before the damage, and [`Self::end`]
+    /// says why no more follow.
     ///
     /// # Errors
     /// Returns an error if not even the first page can be read.
@@ -123,7 +123,7 @@ impl IndexedStack {
         Ok(Self { headers, end, notes: pages.notes().to_vec(), source: source(places)? })
     }
 
-    /// Returns what the pages say, bottom first: at least one.
+    /// Returns the headers of the pages, bottom first: at least one.
     pub fn headers(&self) -> &[PageHeader] {
         &self.headers
     }
@@ -133,7 +133,7 @@ impl IndexedStack {
         self.end.as_ref()
     }
 
-    /// Returns what was found beside the layers.
+    /// Returns the notes on what was found besides the layers.
     pub fn notes(&self) -> &[StackNote] {
         &self.notes
     }
@@ -188,7 +188,7 @@ impl IndexedStack {
     }
 }
 
-/// What tells that a file was written to.
+/// The facts that show whether a file was written to.
 #[derive(Debug, PartialEq)]
 struct Stamp {
     bytes: u64,

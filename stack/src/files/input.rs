@@ -27,7 +27,7 @@ pub struct Pages {
     chain: Option<ChainReader>,
     images: bool,
     ended: bool,
-    /// What the names in a folder let doubt, until the first page shows whether its text proves
+    /// The doubts that names in a folder raise, until the first page shows whether its text proves
     /// more.
     doubts: Vec<StackNote>,
     /// Images of a folder's files that are no layers.
@@ -54,10 +54,9 @@ enum Source {
 }
 
 impl Pages {
-    /// Opens a TIFF file, a picture file, or a folder of single-page TIFF files or of pictures
-    /// of one format. Files of a folder are ordered by name, with numbers in names compared as
-    /// numbers. Pictures whose names are not those of pages are left out, with a
-    /// [note](Self::notes).
+    /// Opens a TIFF file, a picture file, or a folder of single-page TIFF files or of pictures of
+    /// one format. Files of a folder are ordered by name, with numbers in names compared as
+    /// numbers. Pictures without the names of pages are left out, with a [note](Self::notes).
     ///
     /// # Errors
     /// Returns an error if the input cannot be read or is of no such format, or if a folder
@@ -113,8 +112,8 @@ impl Pages {
         Self { listener: Some(Listener(Box::new(listener))), ..self }
     }
 
-    /// Returns what was found beside the layers so far, unless a listener took it. Only the end of
-    /// the stack completes it.
+    /// Returns the notes on what was found besides the layers so far, unless a listener took them.
+    /// Only the end of the stack completes them.
     pub fn notes(&self) -> &[StackNote] {
         &self.notes
     }
@@ -162,7 +161,7 @@ impl Pages {
         Self { chain: None, ..self }
     }
 
-    /// Returns what the pages say without their images, in order. Data is passed over.
+    /// Returns the headers of the pages, without images, in order. Data is passed over.
     pub fn headers(self) -> impl Iterator<Item = Result<PageHeader, StackError>> {
         self.without_images().map(|page| page.map(|page| page.header()))
     }
@@ -209,8 +208,8 @@ impl Pages {
         page
     }
 
-    /// Notes what names let doubt, unless the first page has a text of ours: that says which layers
-    /// there are.
+    /// Notes the doubts that names raise, unless the first page has a text of ours, which says
+    /// which layers there are.
     fn note_doubts(&mut self, first: &Page) {
         let info = first.info();
         let is_ours = info.stack.is_some() || info.z_um.is_some() || first.image_check().is_some();

@@ -1,15 +1,15 @@
-//! Names of temporary files that tell what they are for, locks that tell whether somebody still
-//! writes them, and the removal of what dead writers left.
+//! Names of temporary files that show their purpose, locks that show whether a writer still lives,
+//! and the removal of files that dead writers left.
 //!
-//! A writer locks its file or folder before it relies on it, and holds the lock until the end. So
-//! what can be locked has no living writer. Locks are those of the system, which ends them with the
-//! process, however that ends.
+//! A writer locks its file or folder before it relies on it, and holds the lock until the end. So a
+//! file or folder that can be locked has no living writer. Locks are the system's, which ends them
+//! with the process, however that ends.
 
 use std::fs::{self, DirEntry, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::Path;
 
-/// What stands between the final name and the random letters of a temporary one.
+/// The mark between the final name and the random letters of a temporary one.
 const MARK: &str = ".lamp-";
 /// The end of temporary names.
 pub(crate) const END: &str = ".part";
@@ -38,9 +38,9 @@ fn is_temporary(name: &str) -> bool {
 }
 
 /// Locks a new temporary file or folder for as long as `handle` is open. Returns false if it is
-/// lost: another process saw it before it was locked, and took it for a dead writer's.
+/// lost: another process saw it before it was locked, and mistook it for a dead writer's.
 pub(crate) fn claim(handle: &File, path: &Path) -> bool {
-    // On a file system without locks nothing is taken for a dead writer's.
+    // On a file system without locks nothing counts as a dead writer's.
     !matches!(handle.try_lock(), Err(TryLockError::WouldBlock)) && is_at(handle, path)
 }
 
@@ -60,7 +60,7 @@ fn remove_if_dead(entry: &DirEntry) -> io::Result<()> {
     if !kind.is_file() && !kind.is_dir() {
         return Ok(());
     }
-    // Network file systems lock only what is open for writing.
+    // Network file systems lock only files that are open for writing.
     let writable = OpenOptions::new().read(true).write(true).open(&path);
     let handle = writable.or_else(|_| File::open(&path))?;
     handle.try_lock()?;

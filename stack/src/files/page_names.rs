@@ -12,15 +12,15 @@ use crate::files::input::Pages;
 use crate::note::{PageGap, StackNote};
 use crate::text::one_line;
 
-/// The pages of a folder, and what the names in it show.
+/// The pages of a folder, and the notes on the names in it.
 #[derive(Debug)]
 pub(crate) struct PageFiles {
     /// The pages in order.
     pub(crate) files: Vec<PathBuf>,
-    /// What lets doubt that the names are those of one whole stack. The texts of pages, where they
+    /// Reasons to doubt that the names belong to one whole stack. The texts of pages, where they
     /// have any, prove more.
     pub(crate) doubts: Vec<StackNote>,
-    /// What is left out.
+    /// The files that are left out.
     pub(crate) left_out: Vec<StackNote>,
 }
 
@@ -39,7 +39,7 @@ impl PageFiles {
             match page_format(&entry.path()) {
                 _ if entry.path().is_dir() || name == FOLDER_LIST => {}
                 None => files.push(name),
-                // macOS and other systems put pictures of their own beside files.
+                // macOS and other systems put pictures of their own next to files.
                 Some(_) if name.starts_with('.') => pictures.push(name),
                 // A pipe would wait for a writer.
                 Some(_) if entry.path().metadata().is_ok_and(|it| !it.is_file()) => {
@@ -205,9 +205,9 @@ fn largest_form(pages: &[Picture]) -> Vec<&Picture> {
     forms.into_values().rev().max_by_key(Vec::len).unwrap_or_default()
 }
 
-/// Moves pictures whose names are not those of pages to `others`: where most have a number, those
-/// that have none, and those with another form of name and another size. Returns a doubt if names
-/// of several forms remain.
+/// Moves pictures without the names of pages to `others`: where most have a number, pictures that
+/// have none, and pictures with another form of name and another size. Returns a doubt if names of
+/// several forms remain.
 fn keep_numbered(
     pages: &mut Vec<Picture>,
     others: &mut Vec<String>,
@@ -348,7 +348,7 @@ fn name_with(page: &Picture, position: usize, value: f64, decimals: usize) -> St
 mod tests {
     use super::*;
 
-    /// Returns what a folder of empty files shows.
+    /// Returns the pages and notes of a folder of empty files.
     fn found(names: &[&str]) -> Result<PageFiles, StackError> {
         let folder = tempfile::tempdir()?;
         for name in names {

@@ -87,8 +87,8 @@ impl Drop for Registered {
 
 /// A temporary file in the folder of its final path, removed on drop unless [`persist`]ed.
 ///
-/// Its name tells the final one, and a lock that it is in use. What writers that were killed left
-/// in that folder is removed.
+/// Its name contains the final one, and its lock shows that it is in use. Files that killed writers
+/// left in that folder are removed.
 ///
 /// [`persist`]: Self::persist
 pub struct FileBeside {
@@ -122,7 +122,7 @@ impl FileBeside {
         Err(cannot_claim())
     }
 
-    /// Returns the file, for writing. All that write to it must be gone before it gets its name.
+    /// Returns the file, for writing. All writers to it must be gone before it gets its name.
     pub fn file(&self) -> Arc<File> {
         self.file.clone()
     }
@@ -139,8 +139,8 @@ impl FileBeside {
         sync_folder(folder_of(&path)?)
     }
 
-    /// Renames the file to its final name. A loss of power may take it, so that it must be one which
-    /// can be made again.
+    /// Renames the file to its final name. A loss of power may lose it, so that it must be one
+    /// which can be made again.
     ///
     /// # Errors
     /// Returns an error if the file cannot be closed, or renaming fails.
@@ -193,7 +193,7 @@ impl FolderBeside {
             let (folder, registered) = Registered::made(|| builder.tempdir_in(parent))?;
             let handle = match File::open(folder.path()) {
                 Ok(handle) if claim(&handle, folder.path()) => Some(handle),
-                // Another process took it for a dead writer's before it was locked.
+                // Another process mistook it for a dead writer's before it was locked.
                 Ok(_) => continue,
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(_) => None,
@@ -239,7 +239,7 @@ impl FolderBeside {
         sync_folder(folder_of(to)?)?;
         let from = self.folder.keep();
         if replaced {
-            // What remains of it is removed as a dead writer's.
+            // The rest of it is removed as a dead writer's.
             let _ = fs::remove_dir_all(from);
         }
         Ok(())
@@ -257,7 +257,7 @@ impl PrivateFile {
     /// Writes a file with a name between `start` and `end` that nobody can guess.
     ///
     /// It is in the user's folder for the session (`XDG_RUNTIME_DIR`), which is not on a disk, or
-    /// in that for temporary files.
+    /// in the folder for temporary files.
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
@@ -350,7 +350,7 @@ fn exchange_in_steps(new: &Path, old: &Path) -> io::Result<()> {
     fs::rename(aside, new)
 }
 
-/// What stands where a folder will be.
+/// The state of the place where a folder will be.
 #[derive(PartialEq, Eq)]
 enum Existing {
     /// Nothing, or an empty folder.
@@ -430,7 +430,7 @@ mod tests {
             }
             exchange(&new, &old).unwrap();
             assert!(old.join("new").exists() && new.join("old").exists());
-            // What cannot be exchanged stays where it is.
+            // Folders that cannot be exchanged stay where they are.
             assert!(exchange(&folder.path().join("none"), &old).is_err());
             assert!(old.join("new").exists());
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
@@ -487,7 +487,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("build.tif");
         let file = FileBeside::new(&path).unwrap();
-        // As a signal does, but for this one alone: other tests run in this process.
+        // As a signal does, for this file alone: other tests run in this process.
         live().as_mut().unwrap().remove(&*file.temporary);
         assert_eq!(file.persist().unwrap_err().kind(), io::ErrorKind::Interrupted);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -1,4 +1,4 @@
-//! Proves that a stack is whole, page by page.
+//! Checks page by page that a stack is complete and undamaged.
 
 use thiserror::Error;
 
@@ -9,7 +9,7 @@ use crate::layer::totals::StackTotals;
 use crate::length::{Dpi, Length};
 use crate::ordered::map_in_order;
 
-/// A reason why a stack is not whole.
+/// A reason why a stack is not complete and undamaged.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum VerifyError {
@@ -21,16 +21,16 @@ pub enum VerifyError {
     Page {
         /// The layer's index.
         layer: u32,
-        /// What is wrong with it.
+        /// The fault.
         fault: LayerFault,
     },
 }
 
-/// Something wrong with what a page says of its layer.
+/// A fault in a page's statements about its layer.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LayerFault {
-    /// The index does not follow that of the layer before.
+    /// The index does not follow the index of the layer before.
     #[error("it follows layer {before}: what is between them is missing")]
     Gap {
         /// The index of the layer before.
@@ -55,15 +55,15 @@ pub enum LayerFault {
         /// The number, in the unit of the page's key.
         number: f64,
     },
-    /// The image has another size in pixels than that of the first page.
+    /// The image's size in pixels differs from the first page's.
     #[error("its image has {} x {} pixels, that of the first page {} x {}", found[0], found[1], first[0], first[1])]
     Size {
         /// The image's width and height.
         found: [u32; 2],
-        /// Those of the first page.
+        /// The first page's width and height.
         first: [u32; 2],
     },
-    /// The resolution is not that of the first page.
+    /// The resolution differs from the first page's.
     #[error("its resolution is not that of the first page")]
     Resolution,
     /// A stray row is outside the image.
@@ -77,7 +77,7 @@ pub enum LayerFault {
 }
 
 /// Reads a stack to its end, and returns its facts if nothing is wrong: every page decodes; images,
-/// texts, order and number of pages are those that were written (as far as pages carry checks);
+/// texts, order and number of pages are as they were written (as far as pages carry checks);
 /// heights follow each other without a gap; and all images have one size and resolution.
 ///
 /// # Errors
@@ -104,7 +104,7 @@ pub fn verify(
     Ok(totals.ok_or(StackError::NoLayers)?)
 }
 
-/// Checks what a page says, given the pages before it.
+/// Checks a page's statements, given the pages before it.
 fn check(before: Option<&StackTotals>, page: &PageHeader) -> Result<(), LayerFault> {
     let info = &page.info;
     let numbers = [("thickness", info.thickness_um), ("exposure time", info.exposure_ms)];
@@ -142,7 +142,7 @@ fn check_height(before: &PageInfo, info: &PageInfo) -> Result<(), LayerFault> {
     let Some((bottom, _)) = info.z_um.zip(info.thickness_um) else {
         return Err(LayerFault::NoHeight);
     };
-    // Pages state whole nanometres.
+    // Pages state whole nanometers.
     let top = z + thickness;
     if (bottom - top).abs() > 0.002 {
         let [z, top] = [bottom, top].map(Length::from_um);

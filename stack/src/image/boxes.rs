@@ -1,4 +1,4 @@
-//! Rectangles around what is white in a mask.
+//! Rectangles around the white components of a mask.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -62,7 +62,7 @@ struct Live {
 }
 
 impl Live {
-    /// Returns the components of the next row; those that end are the largest's.
+    /// Returns the components of the next row; components that end go to `largest`.
     fn next(self, row: u32, transitions: &[u32], width: u32, largest: &mut Largest) -> Self {
         let Self { mut boxes, runs: above } = self;
         let old = boxes.len();

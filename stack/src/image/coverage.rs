@@ -52,7 +52,7 @@ pub fn mean_levels(
 struct BoxSums {
     columns: Range<u32>,
     side: NonZeroU32,
-    /// What a side that is a power of two shifts by.
+    /// The shift for a side that is a power of two.
     shift: Option<u32>,
     /// For each box, and one beyond: the level that ends in it times its columns until then, and
     /// the level that ends in it, which fills all boxes before it.

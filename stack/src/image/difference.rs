@@ -22,9 +22,9 @@ pub struct Overlaid<'a> {
 }
 
 impl<'a> Overlaid<'a> {
-    /// Lays `b` on `a`: its first pixel lies `shift` columns to the right of that of `a` and rows
-    /// below it, as [`shift_between`](crate::shift_between) tells. Images that lie on each other
-    /// are not copied.
+    /// Lays `b` on `a`: its first pixel is `shift` columns to the right of the first pixel of `a`
+    /// and rows below it, as [`shift_between`](crate::shift_between) returns. Images that lie on
+    /// each other are not copied.
     ///
     /// # Panics
     /// Panics if the frame has more than 2^32 columns or rows.
@@ -64,9 +64,9 @@ fn framed(image: &Image, frame: Frame) -> Cow<'_, Image> {
 /// The pixels that two images of one size do not agree on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// White where the second image is brighter: what it adds.
+    /// White where the second image is brighter: the pixels that it adds.
     pub added: Mask,
-    /// White where the first image is brighter: what the second lacks.
+    /// White where the first image is brighter: the pixels that the second lacks.
     pub missing: Mask,
 }
 
@@ -94,7 +94,7 @@ impl Difference {
     }
 }
 
-/// Gives a row of transitions a colour from a column on.
+/// Gives a row of transitions a color from a column on.
 fn toggle(row: &mut Vec<u32>, column: u32, is_white: bool) {
     if (row.len() % 2 == 1) != is_white {
         row.push(column);

@@ -28,7 +28,7 @@ impl Frame {
         (above, shown, below)
     }
 
-    /// Returns true if the frame is that of an image of this size.
+    /// Returns true if the frame equals an image of this size.
     pub fn is_whole(&self, width: u32, height: u32) -> bool {
         *self == Self { left: 0, top: 0, width, height }
     }
@@ -49,7 +49,7 @@ pub fn place_row<C: Change>(changes: &[C], width: u32, left: i64, into: u32, out
         change_to(first, start, into, out);
     }
     let visible = shown.partition_point(|&change| place(change) < into.into());
-    // What is visible has its place in 32 bits.
+    // The columns of visible changes fit in 32 bits.
     let right = left as u32;
     let moved = |&change: &C| change.moved(change.column().wrapping_add(right));
     out.extend(shown[..visible].iter().map(moved));

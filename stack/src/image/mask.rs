@@ -2,7 +2,7 @@
 
 use crate::image::runs::{RunError, RunImage};
 
-/// A 1-bit image, stored as the columns where each row changes colour.
+/// A 1-bit image, stored as the columns where each row changes color.
 ///
 /// ```text
 ///   column  0 1 2 3 4 5 6 7

@@ -190,7 +190,7 @@ impl<C: Change> RunImage<C> {
         (&self.row_offsets[1..], &self.changes)
     }
 
-    /// Returns where the changes of each row start, and where those of the last end.
+    /// Returns where the changes of each row start, and where the last row's changes end.
     pub(crate) fn row_offsets(&self) -> &[u32] {
         &self.row_offsets
     }
@@ -238,8 +238,8 @@ impl<C: Change> RunImage<C> {
         made
     }
 
-    /// Adds the row that `make` appends to the image's changes in canonical form. Adds nothing
-    /// and returns `None` if it does.
+    /// Adds the row that `make` appends to the image's changes in canonical form. If `make` returns
+    /// `None`, adds nothing and returns `None`.
     #[inline]
     pub(crate) fn push_row_made(
         &mut self,
@@ -256,7 +256,7 @@ impl<C: Change> RunImage<C> {
         Some(())
     }
 
-    /// Adds the last row once more, or a black one if there is none.
+    /// Adds the last row once more, or a black one if there is no row.
     pub(crate) fn push_again(&mut self) {
         if let Some(last) = (self.row_offsets.len() as u32 - 1).checked_sub(1) {
             self.changes.extend_from_within(self.changes_of(last));

@@ -1,5 +1,5 @@
-//! Disjoint sets in a flat list (union-find): each member points to a lower one of its set, the
-//! lowest, its root, to itself. A list `0, 1, 2, ...` is as many sets of one member.
+//! Disjoint sets in a flat list (union-find): each member points to a lower member of its set; the
+//! lowest, its root, points to itself. A list `0, 1, 2, ...` is as many sets of one member.
 //!
 //! ```
 //! use lamp_stack::sets::{root, unite};
@@ -20,7 +20,7 @@ pub fn root(parents: &mut [u32], mut member: u32) -> u32 {
     member
 }
 
-/// Makes one set of those of two members, and returns its root: the lower of both.
+/// Joins the sets of two members, and returns the root: the lower of both roots.
 #[inline]
 pub fn unite(parents: &mut [u32], a: u32, b: u32) -> u32 {
     let [a, b] = [root(parents, a), root(parents, b)];

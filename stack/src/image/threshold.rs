@@ -49,7 +49,7 @@ impl GrayMask {
 }
 
 impl Image {
-    /// Returns a mask of the pixels that have at least `level`; those of a mask have none or 255.
+    /// Returns a mask of the pixels that have at least `level`; a mask's pixels have 0 or 255.
     pub fn into_mask(self, level: NonZeroU8) -> Mask {
         match self {
             Self::Mask(mask) => mask,
@@ -76,7 +76,7 @@ impl Image {
         }
     }
 
-    /// Returns the image with levels: those of a mask are 0 and 255.
+    /// Returns the image with levels: a mask's levels are 0 and 255.
     pub fn to_gray(&self) -> Cow<'_, GrayMask> {
         match self {
             Self::Mask(mask) => Cow::Owned(mask.into()),

@@ -1,4 +1,4 @@
-//! Checks that pages carry: of their image and their text, and on the last page of all pages.
+//! Checks that pages carry: of their image and their text, and on the last page, of all pages.
 //!
 //! A page's JSON line ends with the key `check`:
 //!
@@ -6,10 +6,11 @@
 //! "check":{"image":"9f86d081","exposed_px":20133,"code":"0a4d55a8","dpi":1500,"text":"5d41402a"}
 //! ```
 //!
-//! `image` is the CRC-32 of the image's runs, whatever their coding; `code` that of their coding, so
-//! that a stage that passes it on need not decode it; `text` that of the line up to its own `text`.
-//! The last page also has `pages`, their number, and `chain`, the CRC-32 of the `text` of all pages
-//! before it: it tells of pages that are missing, moved or from another stack.
+//! `image` is the CRC-32 of the image's runs, whatever their coding; `code` is the CRC-32 of their
+//! coding, so that a stage that passes it on need not decode it; `text` is the CRC-32 of the line
+//! up to its own `text`. The last page also has `pages`, their number, and `chain`, the CRC-32 of
+//! the `text` of all pages before it: it shows whether pages are missing, moved or from another
+//! stack.
 
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
@@ -20,7 +21,7 @@ use crate::image::runs::{Change, RunImage};
 use crate::layer::page_info::{PageInfo, short_number};
 use crate::length::Dpi;
 
-/// What a page's line says of its image and of the stack up to the page.
+/// A page line's checks of its image and of the stack up to the page.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PageCheck {
     #[serde(flatten)]
@@ -31,12 +32,12 @@ pub(crate) struct PageCheck {
     /// The resolution in dpi, if the page states one.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub(crate) dpi: Option<f64>,
-    /// On the last page: what all pages must come to.
+    /// On the last page: the check of all pages.
     #[serde(flatten)]
     pub(crate) end: Option<EndCheck>,
 }
 
-/// What the last page says of the pages before it.
+/// The last page's check of the pages before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct EndCheck {
     /// The number of pages, with the last.
@@ -46,7 +47,7 @@ pub(crate) struct EndCheck {
     chain: u32,
 }
 
-/// What is computed from an image when it is written.
+/// The check that is computed from an image when it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct ImageCheck {
     /// The CRC-32 of the image's size and runs.
@@ -56,7 +57,7 @@ pub(crate) struct ImageCheck {
     pub(crate) exposed_px: u64,
 }
 
-/// What is computed from a coded image when it is written.
+/// The check that is computed from a coded image when it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CodeCheck {
     /// The CRC-32 of the image's size and the page's strip.
@@ -106,7 +107,7 @@ pub enum CheckFault {
     /// The page's text is not the one that its check was made of.
     #[error("its text is not the one that was written")]
     Text,
-    /// The pages before the last are not those that its check was made of.
+    /// The pages before the last differ from the pages that its check was made of.
     #[error(
         "the pages before it are not those that were written: {}",
         chain_text(*gap, *found, *written)
@@ -119,7 +120,7 @@ pub enum CheckFault {
         /// The number of pages that it states.
         written: u32,
     },
-    /// The page's resolution differs from that in its check.
+    /// The page's resolution differs from the resolution in its check.
     #[error("its resolution is {}, but it was written with {}", dpi_text(*found), dpi_text(*written))]
     Resolution {
         /// The resolution that the page states, in dpi.
@@ -170,7 +171,7 @@ impl CodeCheck {
         Self { crc, ends_white: rows_that_end_white(image) }
     }
 
-    /// Returns whether an image of a size and its strip are those that the check was made of.
+    /// Returns whether the check was made of this strip and an image of this size and kind.
     pub(crate) fn is_of(&self, size: [u32; 2], is_gray: bool, strip: &[u8]) -> bool {
         self.crc == code_crc(size, is_gray, strip)
     }
@@ -238,7 +239,7 @@ fn add_numbers<T: Copy, const N: usize>(
     }
 }
 
-/// What stands between the part of a line that `text` covers and the check, and after it.
+/// The characters between the part of a line that `text` covers and the check, and after it.
 const BEFORE_TEXT: &str = ",\"text\":\"";
 const AFTER_TEXT: &str = "\"}}";
 
@@ -299,7 +300,7 @@ impl Chain {
         format!("{line}{BEFORE_TEXT}{crc:08x}{AFTER_TEXT}")
     }
 
-    /// Returns what the next page must say if it is the last.
+    /// Returns the check that the next page must carry if it is the last.
     fn end(&self) -> EndCheck {
         EndCheck { pages: self.pages.saturating_add(1), chain: self.texts.clone().finalize() }
     }
@@ -326,7 +327,7 @@ pub(crate) struct LineCheck {
 }
 
 impl Line {
-    /// Returns what is known of a page without a line: its number.
+    /// Returns the facts of a page without a line: its number.
     pub(crate) fn without(page: u32) -> Self {
         Self { info: PageInfo { index: page, ..PageInfo::default() }, check: None }
     }
@@ -351,7 +352,7 @@ impl Line {
 }
 
 impl LineCheck {
-    /// Returns the check and that of its text, if the text is what it was.
+    /// Returns the check and its text's check, if the text is as it was written.
     fn intact(&self) -> Option<(&PageCheck, u32)> {
         let (text, crc) = covered(&self.text)?;
         Some((self.page.as_ref()?, crc)).filter(|_| crc32fast::hash(text) == crc)
@@ -427,7 +428,7 @@ impl ChainReader {
     }
 }
 
-/// Returns whether two resolutions are equal but for the rounding of other programs.
+/// Returns whether two resolutions are equal except for the rounding of other programs.
 fn is_same_dpi(found: Option<f64>, written: Option<f64>) -> bool {
     match (found, written) {
         (Some(found), Some(written)) => (found - written).abs() <= 1e-6 * written.abs(),

@@ -19,7 +19,7 @@ use crate::ordered::MemorySize;
 pub struct Layer {
     /// The content of the page's JSON line.
     pub info: PageInfo,
-    /// The image's resolution, if the page states one in inches or centimetres.
+    /// The image's resolution, if the page states one in inches or centimeters.
     pub dpi: Option<Dpi>,
     /// The image.
     pub image: LayerImage,

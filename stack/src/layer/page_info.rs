@@ -16,13 +16,13 @@ pub struct PageInfo {
     /// The layer's index, 0 at the bottom.
     #[serde(rename = "layer")]
     pub index: u32,
-    /// The height of the layer's bottom in part coordinates, in micrometres.
+    /// The height of the layer's bottom in part coordinates, in micrometers.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub z_um: Option<f64>,
-    /// The layer's thickness in micrometres.
+    /// The layer's thickness in micrometers.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
     pub thickness_um: Option<f64>,
-    /// The image's top left corner (x, y) in part coordinates, in millimetres.
+    /// The image's top left corner (x, y) in part coordinates, in millimeters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin_mm: Option<[f64; 2]>,
     /// The layer's exposure time in milliseconds.

@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::codec::tiff::PageHeader;
 use crate::length::Dpi;
 
-/// Heights this near to each other in micrometres are the same: pages state whole nanometres.
+/// Heights this near to each other in micrometers are the same: pages state whole nanometers.
 const SAME_HEIGHT_UM: f64 = 0.002;
 /// Images this near to whole pixels of each other, in pixels, lie on them: origins are rounded.
 const SAME_PIXEL: f64 = 0.01;
@@ -44,10 +44,10 @@ pub struct Pairing {
     partners: Vec<Option<usize>>,
 }
 
-/// What two stacks have at one height, or under one index: a layer of each, or of one of them.
+/// The layers of two stacks at one height, or under one index: a layer of each, or of one of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// The heights of its bottom and top in micrometres, if layers are paired by height.
+    /// The heights of its bottom and top in micrometers, if layers are paired by height.
     pub heights_um: Option<[f64; 2]>,
     /// The position of the first stack's layer, if it has one there.
     pub a: Option<usize>,
@@ -94,7 +94,7 @@ pub enum PairingError {
 }
 
 impl Pairing {
-    /// Pairs the layers of two stacks, given what their pages say.
+    /// Pairs the layers of two stacks, given the headers of their pages.
     pub fn of(a: &[PageHeader], b: &[PageHeader]) -> Self {
         match (heights(a), heights(b)) {
             (Some(a), Some(b)) => Self {
@@ -122,8 +122,8 @@ impl Pairing {
         self.partners.get(position).copied().flatten()
     }
 
-    /// Returns what both stacks have from the bottom up. By height, each range of heights in which
-    /// both are constant is a section.
+    /// Returns the sections of both stacks from the bottom up. By height, each range of heights in
+    /// which both are constant is a section.
     pub fn sections(&self) -> &[Section] {
         &self.sections
     }
@@ -159,7 +159,7 @@ pub fn shift_between(a: &PageHeader, b: &PageHeader) -> Result<[i64; 2], Pairing
     Ok(shift.map(|shift| shift.round() as i64))
 }
 
-/// Returns the bottoms and tops of all layers in micrometres, if all have them and they go up.
+/// Returns the bottoms and tops of all layers in micrometers, if all have them and they go up.
 fn heights(pages: &[PageHeader]) -> Option<Vec<[f64; 2]>> {
     let of_page = |page: &PageHeader| {
         let (bottom, thickness) = page.info.z_um.zip(page.info.thickness_um)?;

@@ -69,7 +69,7 @@ impl PassingLayer {
         }
     }
 
-    /// Returns the resolution, if the page states one in inches or centimetres.
+    /// Returns the resolution, if the page states one in inches or centimeters.
     pub fn dpi(&self) -> Option<Dpi> {
         match &self.0 {
             State::Decoded(layer) => layer.dpi,

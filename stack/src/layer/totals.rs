@@ -25,13 +25,13 @@ pub struct StackTotals {
     pub stray_layers: u64,
     /// Whether all images have the size of the first.
     pub one_size: bool,
-    /// The thicknesses of the layers that state one, in micrometres.
+    /// The thicknesses of the layers that state one, in micrometers.
     pub thickness_um: Option<NumberRange>,
     /// The exposure times of the layers that state one, in milliseconds.
     pub exposure_ms: Option<NumberRange>,
     /// The number of pixels that are not black, if every page states it.
     pub exposed_px: Option<u64>,
-    /// Their volume in cubic millimetres, if every page states their number, a resolution and
+    /// Their volume in cubic millimeters, if every page states their number, a resolution and
     /// a thickness.
     pub volume_mm3: Option<f64>,
 }
@@ -104,7 +104,7 @@ impl StackTotals {
         self.exposed_px.is_some()
     }
 
-    /// Returns the height of the last layer's top in millimetres, if it is known.
+    /// Returns the height of the last layer's top in millimeters, if it is known.
     pub fn top_mm(&self) -> Option<f64> {
         Some((self.last.z_um? + self.last.thickness_um?) / 1000.0)
     }

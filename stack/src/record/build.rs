@@ -49,7 +49,7 @@ pub struct BuiltPart {
     pub commands: Option<Vec<String>>,
     /// The width and height of its images.
     pub part_pixels: [u32; 2],
-    /// The top left corner (x, y) of its images in part coordinates, in millimetres.
+    /// The top left corner (x, y) of its images in part coordinates, in millimeters.
     #[serde(default)]
     pub part_origin_mm: Option<[f64; 2]>,
     /// The column and row of that corner in the part's stack, where this has more around it.

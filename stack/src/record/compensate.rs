@@ -8,7 +8,7 @@ use super::PageRecord;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CompensateRecord {
-    /// The least and the greatest distance, in micrometres, by which edges moved inwards.
+    /// The least and the greatest distance, in micrometers, by which edges moved inwards.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inwards_um: Option<[f64; 2]>,
     /// The number of walls that were too thin, and became lines.

@@ -5,10 +5,10 @@ pub(super) const MOST_PUT: u8 = 56;
 
 /// Bits that become bytes.
 pub(super) struct BitWriter {
-    /// The bytes that are full, `len` of them, and room.
+    /// The full bytes, `len` of them, and room.
     bytes: Vec<u8>,
     len: usize,
-    /// The bits of the byte that is not full yet, and fewer than eight are.
+    /// The bits of the byte that is not full yet, fewer than eight.
     held: u64,
     count: u8,
 }
@@ -22,13 +22,13 @@ impl BitWriter {
         Self { len: first.len(), bytes, held: 0, count: 0 }
     }
 
-    /// Appends the lowest `count` bits of `bits`, at most [`MOST_PUT`]; those above are zero.
+    /// Appends the lowest `count` bits of `bits`, at most [`MOST_PUT`]; higher bits are zero.
     #[inline]
     pub(super) fn put(&mut self, bits: u64, count: u8) {
         // No more than 63 bits: fewer than eight were held.
         self.held |= bits.wrapping_shl(self.count.into());
         let count = self.count.wrapping_add(count);
-        // Eight bytes at once are faster than as many as there are.
+        // Eight bytes at once are faster than exactly as many as there are.
         let end = self.len.wrapping_add(8);
         if end > self.bytes.len() {
             self.make_room();
@@ -92,7 +92,7 @@ impl<'a> BitReader<'a> {
         Some(())
     }
 
-    /// Takes four whole bytes, the greatest first, after those that are begun.
+    /// Takes four whole bytes, the most significant first, after the byte that is begun.
     pub(super) fn last_word(&mut self) -> Option<u32> {
         self.skip(self.count % 8)?;
         self.take(32).map(u32::swap_bytes)

@@ -137,7 +137,7 @@ impl Block {
         for (length, times) in (0..).zip(self.last).skip(3) {
             frequencies[usize::from(length_symbol(length))] += times;
         }
-        // A block of one colour may count beyond 32 bits; codes need no more than the order.
+        // A block of one color may count beyond 32 bits; codes need no more than the order.
         let longest = self.longest + u64::from(frequencies[SYMBOLS - 1]);
         frequencies[SYMBOLS - 1] = longest.try_into().unwrap_or(u32::MAX);
         frequencies
@@ -223,13 +223,13 @@ impl Often {
         Self { once: once.count, most: most.into(), all: all.bits }
     }
 
-    /// Returns the number of bits of so many times.
+    /// Returns the number of bits of this many times.
     #[inline]
     fn bits_of(&self, times: u32) -> u64 {
         u64::from(self.once).wrapping_mul(times.into())
     }
 
-    /// Returns the bits so many times, at most `most`.
+    /// Returns the bits this many times, at most `most`.
     #[inline]
     fn times(&self, times: u32) -> Bits {
         let count = self.bits_of(times) as u8;
@@ -320,7 +320,8 @@ fn adler32(image: &GrayMask) -> u32 {
     (((b % MODULUS) << 16) | (a % MODULUS)) as u32
 }
 
-/// Returns the sum of a row's bytes, and that of the bytes times their distance from the row's end.
+/// Returns the sum of a row's bytes, and the sum of the bytes times their distance from the row's
+/// end.
 ///
 /// A change to another level adds the step to all bytes up to the end. Sums wrap around on the way,
 /// but the whole ones fit: a row has no more than [`MAX_SIDE`](crate::MAX_SIDE) bytes.

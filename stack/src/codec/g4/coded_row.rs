@@ -12,8 +12,7 @@ pub(super) const WIDE: u32 = 7;
 /// A row's transitions, followed by [`LOOK`] places: the width, and more in wide steps.
 ///
 /// A run of length zero stays as two transitions at one column. In T.6's words there is no change
-/// there, but libtiff refers to both in the next row, and what most programs read is what libtiff
-/// decodes.
+/// there, but libtiff refers to both in the next row, and most programs read as libtiff decodes.
 pub(super) struct CodedRow {
     pub(super) places: Vec<u32>,
     pub(super) len: usize,
@@ -67,7 +66,7 @@ impl CodedRow {
         }
     }
 
-    /// Adds the row below those of a mask, without its runs of length zero.
+    /// Adds the row below a mask's rows, without its runs of length zero.
     #[inline]
     pub(super) fn push_to(&self, mask: &mut Mask) {
         if !self.has_empty_runs {

@@ -90,7 +90,7 @@ pub(super) const MAKE_UP_1: [Code; 27] = codes(
     ",
 );
 
-/// Make-up codes of both colours, lengths 1792, 1856, ... 2560.
+/// Make-up codes of both colors, lengths 1792, 1856, ... 2560.
 pub(super) const MAKE_UP_LONG: [Code; 13] = codes(
     "
     00000001000 00000001100 00000001101 000000010010 000000010011 000000010100 000000010101

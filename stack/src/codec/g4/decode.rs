@@ -27,7 +27,7 @@ pub fn decode(strip: &[u8], width: u32, height: u32) -> Result<Mask, G4Error> {
     Ok(mask)
 }
 
-/// Decodes a strip and adds its rows below those of `mask`.
+/// Decodes a strip and adds its rows below the rows of `mask`.
 pub(crate) fn decode_rows(
     strip: &[u8],
     width: u32,
@@ -69,7 +69,7 @@ pub(super) fn decode_row(
     row.clear();
     let (mut a0, mut started) = (0, false);
     let mut white = false;
-    // The index of b1; its parity is that of the colour.
+    // The index of b1; its parity is the color's parity.
     let mut j = 0;
     while a0 < width || !started {
         if let Some(count) = take_verticals(bits, above, j, a0, row, width) {
@@ -131,7 +131,7 @@ fn take_verticals(
         return None;
     }
     let b: &[u32; LOOK] = above.places.get(j..)?.first_chunk()?;
-    // The transition before b1 has the opposite colour. If it is left of the next a0, it
+    // The transition before b1 has the opposite color. If it is left of the next a0, it
     // cannot be the next b1.
     let alone = j == 0 || b[0] - above.places[j - 1] > 3;
     // Any difference that is too small sets the sign bit.
@@ -238,7 +238,7 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
     (0..1 << VERTICALS_BITS).map(begin).collect()
 });
 
-/// The run-length codes of both colours, 0 first.
+/// The run-length codes of both colors, 0 first.
 static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
     let table = |terminating: &[Code], make_up: &[Code]| {
         let mut table = vec![Entry { value: 0, len: 0 }; 1 << RUN_BITS];

@@ -10,7 +10,7 @@ use crate::image::mask::Mask;
 /// Encodes a mask as one T.6 (CCITT Group 4) strip, most significant bit first, ended by
 /// EOFB and padded to a byte. Black (0) is T.6's white.
 ///
-/// The codes are those of T.6's flow diagram, computed from the runs alone.
+/// The codes follow T.6's flow diagram, computed from the runs alone.
 ///
 /// Source: ITU-T Recommendation T.6, sections 2.2.1 to 2.2.5.
 pub fn encode(mask: &Mask) -> Vec<u8> {
@@ -31,14 +31,14 @@ pub fn encode(mask: &Mask) -> Vec<u8> {
 
 /// Encodes one row against the row above it, with the names of T.6: a0 is the current
 /// position, a1 and a2 are the next transitions of this row, b1 is the first transition of
-/// the reference row right of a0 to the opposite colour, and b2 the one after it.
+/// the reference row right of a0 to the opposite color, and b2 the one after it.
 fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) {
     let four_verticals = &*FOUR_VERTICALS;
     let at = |transitions: &[u32], i: usize| transitions.get(i).copied().unwrap_or(width);
     // The first a0 is an imaginary pixel left of the row: at 0, but not past
     // a transition at 0.
     let (mut a0, mut started) = (0, false);
-    // The indices of a1 and b1. Their parities agree, as both change to the same colour.
+    // The indices of a1 and b1. Their parities agree, as both change to the same color.
     let (mut i, mut j) = (0, 0);
     while a0 < width || !started {
         let (a1, b1, b2) = (at(row, i), at(reference, j), at(reference, j + 1));
@@ -64,7 +64,7 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
             bits.put(VERTICAL[a1.wrapping_sub(b1).wrapping_add(3) as usize]);
             a0 = a1;
             i += 1;
-            // The next transition of the other colour may be before this one.
+            // The next transition of the other color may be before this one.
             j = if j > 0 { j - 1 } else { j + 1 };
         } else {
             let a2 = at(row, i + 1);
@@ -79,9 +79,9 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     }
 }
 
-/// Returns the four codes of the next four transitions if each is within three pixels of the
-/// reference row's and the reference runs are wide enough (four pixels) to exclude pass mode
-/// and any other b1.
+/// Returns the codes of the next four transitions if each is within three pixels of the reference
+/// row's and the reference runs are wide enough (four pixels) to exclude pass mode and any other
+/// b1.
 #[inline]
 fn four_near(
     reference: &[u32],
@@ -141,7 +141,7 @@ static FOUR_VERTICALS: LazyLock<Vec<u32>> = LazyLock::new(|| {
     (0..4096).map(|index| join(index).map_or(0, |code| code.len << 27 | code.bits)).collect()
 });
 
-/// Returns the code of a run of less than 64 pixels, or of what is left of a longer one.
+/// Returns the code of a run of less than 64 pixels, or of the rest of a longer one.
 #[inline]
 fn terminating(length: u32, white: bool) -> Code {
     let codes = if white { &TERMINATING_1 } else { &TERMINATING_0 };
@@ -184,7 +184,7 @@ impl BitWriter {
         self.out.resize(2 * self.out.len(), 0);
     }
 
-    /// Appends two runs in horizontal mode, of which the first is white or the second.
+    /// Appends two runs in horizontal mode; either the first or the second is white.
     #[inline]
     fn put_horizontal(&mut self, [first, second]: [u32; 2], first_is_white: bool) {
         if first < 64 && second < 64 {

@@ -17,11 +17,11 @@ pub(crate) enum Group3 {
     TwoDimensional,
 }
 
-/// Decodes a Group 3 strip of `height` rows and adds them below those of `mask`. T.4's white
-/// is black (0).
+/// Decodes a Group 3 strip of `height` rows and adds them below the rows of `mask`. T.4's white is
+/// black (0).
 ///
-/// Fill zeros before an end of line are skipped. In one-dimensional coding, the first row's
-/// end of line may be missing, or those of all rows; any other row without one is damaged.
+/// Fill zeros before an end of line are skipped. In one-dimensional coding, the first row's end of
+/// line may be missing, or every row's; any other row without one is damaged.
 ///
 /// # Errors
 /// Returns an error in the same cases as [`decode`](super::decode); damaged rows are not

@@ -1,6 +1,6 @@
 //! Encodes and decodes CCITT Group 4 (T.6), and decodes Group 3 (T.4).
 //!
-//! Both codes describe the columns where a row changes colour, which is what a
+//! Both codes describe the columns where a row changes color, which is what a
 //! [`Mask`](crate::Mask) stores, so no bitmap is needed.
 
 mod coded_row;

@@ -1,4 +1,4 @@
-//! Packs bytes by zstd, and unpacks them without trusting what they say of their size.
+//! Packs bytes by zstd, and unpacks them without trusting the size that they claim.
 
 use std::io::Read;
 
@@ -8,7 +8,8 @@ use zstd::zstd_safe::CParameter;
 use super::numbers;
 use super::streams::{STREAMS, Streams};
 
-/// How far back zstd looks, as a power of 2: what a reader keeps of a block, whatever it says.
+/// How far back zstd looks, as a power of 2: the bytes of a block that a reader keeps, whatever it
+/// claims.
 const WINDOW_LOG: u32 = 20;
 /// Blocks up to this size are unpacked at once.
 const AT_ONCE: usize = 1 << WINDOW_LOG;
@@ -53,7 +54,7 @@ impl Packer {
     }
 }
 
-/// Returns how many bytes the streams take about when they are packed.
+/// Returns about how many bytes the streams take when they are packed.
 pub(super) fn packed_len(streams: &Streams) -> usize {
     let mut packer = Packer::new(1);
     streams.all().map(|stream| packer.pack(stream).len()).iter().sum()

@@ -1,4 +1,4 @@
-//! Frames, the index behind them, and what else stands in a packed file.
+//! Frames, the index behind them, and the other parts of a packed file.
 
 use super::blocks::{self, Packer};
 use super::image::{Mode, Shape};
@@ -12,13 +12,13 @@ pub(super) const START_BYTES: u64 = 9;
 /// The last bytes of a packed stack, after the length of the index.
 pub(super) const END: [u8; 4] = *b"PMAL";
 
-/// What a part of the file is, by its first byte.
+/// The kind of a part of the file, by its first byte.
 pub(super) const INDEX: u8 = 0;
 pub(super) const KEY_FRAME: u8 = 1;
 pub(super) const FRAME: u8 = 2;
 pub(super) const NOTICE: u8 = 3;
 
-/// What a part of the file starts with: its kind, a count (of pages in a frame, of frames in an
+/// The header of a part of the file: its kind, a count (of pages in a frame, of frames in an
 /// index), three sizes in bytes and two checks, each in four bytes, low byte first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PartHeader {
@@ -91,7 +91,7 @@ pub(super) fn part(
     [&header.bytes(), &packed, images].concat()
 }
 
-/// A page of a frame: its line and what is known of its image.
+/// A page of a frame: its line and the facts of its image.
 #[derive(Clone, Debug)]
 pub(super) struct FramePage {
     pub(super) shape: Shape,
@@ -100,7 +100,7 @@ pub(super) struct FramePage {
 
 /// Bits of the byte that a page's entry starts with; the lowest two are its mode.
 const GRAY: u8 = 4;
-/// The size is another than that of the page before.
+/// The size differs from the size of the page before.
 const OTHER_SIZE: u8 = 8;
 
 /// Returns the head of a frame: an entry for each page, then their lines.

@@ -1,4 +1,4 @@
-//! Codes images: against the layer below, by themselves, or as a strip that is kept.
+//! Codes images: against the layer below, by themselves, or as a kept strip.
 
 use super::blocks::packed_len;
 use super::levels::{self, Split};
@@ -15,7 +15,7 @@ use crate::limits::MAX_RUNS;
 /// How an image is coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// Rows against those of the layer below.
+    /// Rows against the rows of the layer below.
     Below,
     /// Rows against the rows above them.
     Above,
@@ -32,10 +32,10 @@ pub(super) struct CodedImage {
     pub(super) streams: Streams,
 }
 
-/// The most bytes of a strip that is kept, but for those that its image may need.
+/// The most bytes of a strip that is kept, except for bytes that its image may need.
 const MOST_KEPT: usize = 1 << 14;
 
-/// Codes an image. `below` is that of the layer below, if it has the same size and kind.
+/// Codes an image. `below` is the image of the layer below, if it has the same size and kind.
 pub(super) fn encode(image: &LayerImage, below: Option<&Image>) -> CodedImage {
     let (mask, strip) = match &**image {
         Image::Mask(mask) => (mask, image.strip().map(|strip| &strip.bytes)),
@@ -76,7 +76,7 @@ fn kept(strip: Vec<u8>) -> CodedImage {
     CodedImage { mode: Mode::Strip, streams }
 }
 
-/// Returns whether changes are so near to each other that few pixels stand between them.
+/// Returns whether changes are so close to each other that few pixels separate them.
 fn is_dense(mask: &Mask) -> bool {
     let bytes = u64::from(mask.height()) * u64::from(mask.width().div_ceil(8));
     bytes < 4 * mask.change_count() as u64
@@ -88,7 +88,7 @@ fn bits(mask: &Mask) -> CodedImage {
     CodedImage { mode: Mode::Bits, streams }
 }
 
-/// Decodes a mask of at most so many changes from its bits.
+/// Decodes a mask of at most this many changes from its bits.
 fn decode_bits([width, height]: [u32; 2], changes: usize, from: &mut Cursor<'_>) -> Option<Mask> {
     let bytes = width.div_ceil(8) as usize;
     let (rows, rest) = from.strips.split_at_checked(bytes.checked_mul(height as usize)?)?;
@@ -124,7 +124,7 @@ fn encode_gray(image: &Split, below: Option<&Image>) -> CodedImage {
     if packed_len(&alone.streams) < packed_len(&coded.streams) { alone } else { coded }
 }
 
-/// What is known of an image before it is decoded.
+/// The facts of an image before it is decoded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) mode: Mode,

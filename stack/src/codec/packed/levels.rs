@@ -26,8 +26,8 @@ impl Split {
     }
 }
 
-/// Codes the levels of an image as their distances from those of the changes in the reference
-/// rows that are nearest. `below` is the image of [`Reference::Below`].
+/// Codes the levels of an image as their distances from the levels of the nearest changes in the
+/// reference rows. `below` is the image of [`Reference::Below`].
 pub(super) fn encode(image: &Split, below: Option<&Split>, out: &mut Streams) {
     for row in 0..image.columns.height() {
         let (columns, levels) = (image.columns.row(row), image.of_row(row));
@@ -86,8 +86,8 @@ struct Nearest<'a> {
 }
 
 impl<'a> Nearest<'a> {
-    /// Returns for each column the level of its change in the reference row: the one of its
-    /// number, or where their counts differ the nearest. Without any, 0.
+    /// Returns for each column the level of its change in the reference row: the one of its number,
+    /// or the nearest where their counts differ. Without any, 0.
     fn of_all(mut self, columns: &'a [u32]) -> impl Iterator<Item = u8> + 'a {
         columns.iter().enumerate().map(move |(i, &column)| {
             if self.counts_agree {
@@ -104,7 +104,7 @@ impl<'a> Nearest<'a> {
 }
 
 impl Split {
-    /// Returns what the rows of an image of these columns are coded against.
+    /// Returns the reference that the rows of an image of these columns are coded against.
     pub(super) fn reference(below: Option<&Self>) -> Reference<'_> {
         below.map_or(Reference::Above, |below| Reference::Below(&below.columns))
     }

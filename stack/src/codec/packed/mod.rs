@@ -32,8 +32,8 @@ pub use write::{PackLevel, write_packed};
 
 /// Layers whose index is a multiple of this start a key frame, and a frame has at most as many.
 pub const KEY_LAYERS: u32 = 64;
-/// The most changes and rows of a frame's images together, unless it has a single one: what a
-/// reader decodes at once.
+/// The most changes and rows of a frame's images together, unless it has a single image: the amount
+/// that a reader decodes at once.
 const FRAME_COST: u64 = 4 << 20;
 /// A frame with more bytes than this, before they are packed, takes no other layer.
 const FRAME_BYTES: usize = 1 << 20;

@@ -16,7 +16,7 @@ use crate::{
     Compression, Dpi, Format, IndexedStack, JoinError, Pages, StackError, g4, write_stack,
 };
 
-/// What is written to a stream.
+/// The bytes that are written to a stream.
 #[derive(Clone, Default)]
 struct Shared(Arc<Mutex<Vec<u8>>>);
 

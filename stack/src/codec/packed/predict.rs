@@ -5,11 +5,11 @@ use crate::image::mask::Mask;
 
 /// A part of a pixel: shifts and bends are in 1/256 of one.
 const PIXEL: i32 = 256;
-/// Transitions of neighbouring rows that are farther apart, in pixels, belong to other edges.
+/// Transitions of neighboring rows that are farther apart, in pixels, belong to other edges.
 const FAR: u32 = 64;
 /// The greatest bend of an edge, in pixels, that is taken for the roughness of rounding.
 const ROUGH: i32 = 4;
-/// Weights of what was learned from a row, in 1/16: of an edge's first row, and at least.
+/// Weights of the shifts learned from a row, in 1/16: of an edge's first row, and at least.
 const FIRST_RATE: i32 = 16;
 const LAST_RATE: i32 = 4;
 
@@ -27,11 +27,11 @@ fn turned(residual: i32, side: i32) -> i32 {
 pub(super) struct Like<'a> {
     /// The transitions of all rows.
     changes: &'a [u32],
-    /// Where the row's own start, and how many they are.
+    /// The start of the row's own transitions, and their number.
     start: usize,
     count: usize,
-    /// How far before and behind them those of the rows above and below start, if both rows have
-    /// as many; else 0.
+    /// The distance from their start, back and forward, to the start of the transitions of the rows
+    /// above and below, if both rows have as many; else 0.
     around: usize,
 }
 
@@ -102,7 +102,7 @@ const THERE: [Four<u32>; TOGETHER + 1] = {
     masks
 };
 
-/// Replaces those of four entries that are behind the last `left` ones.
+/// Replaces the entries of four that are behind the last `left` ones.
 #[inline]
 pub(super) fn padded(four: Four<u32>, left: usize, width: u32) -> Four<u32> {
     let there = &THERE[left.min(TOGETHER)];
@@ -153,12 +153,12 @@ impl Expected {
     }
 }
 
-/// Predicts rows from reference rows, top down: those of the layer below or the rows above.
+/// Predicts rows from reference rows, top down: from the rows of the layer below or the rows above.
 ///
-/// An edge of the part moves from its reference by a shift that changes slowly from row to row.
-/// It is not a whole number of pixels, so it is averaged over the rows above. The reference itself
-/// stands on whole pixels, too: where the rows around it are known, their mean says where its
-/// edge was before it was rounded.
+/// An edge of the part moves from its reference by a shift that changes slowly from row to row. It
+/// is not a whole number of pixels, so it is averaged over the rows above. The reference itself is
+/// on whole pixels, too: where the rows around it are known, their mean gives the place of its edge
+/// before rounding.
 ///
 /// Sums wrap: damaged files make any numbers.
 #[derive(Default)]
@@ -259,7 +259,7 @@ impl Predictor {
         self.rates.clear();
         let mut j = 0;
         for (i, &column) in reference.iter().enumerate() {
-            // Both transitions are to the same colour.
+            // Both transitions are to the same color.
             if !(i + j).is_multiple_of(step) {
                 j = if j > 0 { j - 1 } else { j + 1 };
             }

@@ -35,7 +35,7 @@ pub(crate) struct Unpacker {
     last: Option<u32>,
     /// The frames before it, from the stack's first.
     frames: Vec<IndexEntry>,
-    /// What was read behind the frames that were decoded.
+    /// The frame read behind the decoded frames.
     ahead: Option<Result<Option<Frame>, StackError>>,
     /// The last image of the frames that were decoded.
     below: Option<Arc<Image>>,
@@ -150,7 +150,7 @@ impl Unpacker {
     ) -> Result<(), StackError> {
         let mut frames: Vec<Frame> = Vec::new();
         let mut room = TOGETHER_COST;
-        // What follows a key frame is for one thread.
+        // The frames behind a key frame are for one thread.
         let mut threads = if self.by_number { 1 } else { rayon::current_num_threads() };
         loop {
             let next = match self.ahead.take() {
@@ -380,7 +380,7 @@ impl Frame {
         self.pages.len()
     }
 
-    /// Returns the frame if its images are those that were written.
+    /// Returns the frame if its images are as they were written.
     pub(super) fn checked(self) -> Result<Self, StackError> {
         match crc32fast::hash(&self.images) == self.header.images_crc {
             true => Ok(self),

@@ -56,7 +56,7 @@ impl From<[Vec<u8>; STREAMS]> for Streams {
     }
 }
 
-/// What is unread of each stream.
+/// The unread rest of each stream.
 pub(super) struct Cursor<'a> {
     pub(super) rows: &'a [u8],
     pub(super) tokens: &'a [u8],

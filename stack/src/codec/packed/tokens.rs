@@ -1,6 +1,6 @@
 //! The tokens that rows are coded with, a byte each.
 //!
-//! A token tells of the next transitions of a row (from `i`) and of its reference row (from `j`).
+//! A token describes the next transitions of a row (from `i`) and of its reference row (from `j`).
 //! Both rows go on at the width behind their last transition. A row ends with the first transition
 //! at the width, or where a token of four ends with the reference.
 

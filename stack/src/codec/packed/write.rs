@@ -16,13 +16,13 @@ use crate::files::temporary::FileBeside;
 use crate::layer::Layer;
 use crate::ordered::map_in_order;
 
-/// How hard zstd tries to make a packed stack small: from 1 to 19, or by default as far as it
-/// costs little beside the coding of the images.
+/// How hard zstd tries to make a packed stack small: a level from 1 to 19, or by default as high as
+/// costs little compared with the coding of the images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PackLevel(Option<i32>);
 
 /// By default, the level of masks whose edges are where they are expected, and of other frames:
-/// zstd has less to do with few bytes, and finds more in those of noise and gray levels.
+/// zstd has less to do with few bytes, and finds more in the bytes of noise and gray levels.
 const LEVEL_OF_EDGES: i32 = 3;
 const LEVEL_OF_OTHERS: i32 = 6;
 /// The most and fewest changes and rows that take a byte where a mask's edges are expected.
@@ -48,7 +48,7 @@ impl PackLevel {
     }
 }
 
-/// Writes layers as a packed stack, coding them on all threads. `format` is that of the TIFF
+/// Writes layers as a packed stack, coding them on all threads. `format` is the format of the TIFF
 /// which [`Pages::packed_format`](crate::Pages::packed_format) of the packed stack will name.
 ///
 /// ```

@@ -113,8 +113,8 @@ impl Fields {
         })
     }
 
-    /// Refuses pixels that are not as wide as they are high. The unit does not matter: where there
-    /// is none, the numbers still say how wide a pixel is for its height.
+    /// Refuses pixels whose width differs from their height. The unit does not matter: without one,
+    /// the numbers still give the ratio of width to height.
     fn check_pixels(&self) -> Result<(), StackError> {
         let sides = self.resolution(X_RESOLUTION).zip(self.resolution(Y_RESOLUTION));
         match sides.filter(|&(across, down)| !has_square_pixels([across, down], 0.0)) {
@@ -181,7 +181,7 @@ impl Fields {
         })
     }
 
-    /// Returns whether fields that we do not need, but other programs do, are as we write them.
+    /// Returns whether fields that other programs need, but we do not, are as we write them.
     fn is_as_we_write(&self) -> bool {
         let resolution = |tag| self.values.get(&tag);
         resolution(X_RESOLUTION) == resolution(Y_RESOLUTION)

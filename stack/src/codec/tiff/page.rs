@@ -40,7 +40,7 @@ pub struct Page {
     /// The orientation that turns the image upright.
     pub(super) orientation: Orientation,
     pub(super) compression: Compression,
-    /// True if pixels are stored as differences from the left neighbour.
+    /// True if pixels are stored as differences from the left neighbor.
     pub(super) differences: bool,
     pub(super) layout: Layout,
     /// The strips or tiles, row by row. One without bytes has pixels of zero.
@@ -52,7 +52,7 @@ pub struct Page {
     pub(super) image: Option<Arc<Image>>,
 }
 
-/// What passes with the strip of a page: how it is coded, and its checks.
+/// The data that passes on with the strip of a page: its coding and its checks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassedCode {
     pub(crate) compression: Compression,
@@ -67,12 +67,12 @@ pub(crate) struct PackedShape {
     pub(crate) gray: bool,
 }
 
-/// What a page says of its layer, without the image.
+/// A page's statements about its layer, without the image.
 #[derive(Clone, Debug)]
 pub struct PageHeader {
     /// The content of the page's JSON line, or only the page's number if it has none.
     pub info: PageInfo,
-    /// The resolution, if the page states one in inches or centimetres.
+    /// The resolution, if the page states one in inches or centimeters.
     pub dpi: Option<Dpi>,
     /// The width and height in pixels of the upright image.
     pub size: [u32; 2],
@@ -181,7 +181,7 @@ impl Page {
         &mut self.info
     }
 
-    /// Returns the resolution, if the page states one in inches or centimetres.
+    /// Returns the resolution, if the page states one in inches or centimeters.
     pub(crate) fn dpi(&self) -> Option<Dpi> {
         self.dpi
     }
@@ -192,8 +192,8 @@ impl Page {
         if self.orientation.is_across() { [height, width] } else { [width, height] }
     }
 
-    /// Returns what a page of another stack takes over with the strip, if it may: the strip is the
-    /// one that was written.
+    /// Returns the facts that a page of another stack takes over with the strip, if it may: only if
+    /// the strip is as it was written.
     pub(crate) fn passed(&self) -> Option<PassedCode> {
         if self.compression == Compression::Packed {
             return None;
@@ -227,7 +227,8 @@ impl Page {
         self.data_bytes
     }
 
-    /// Checks that the page follows those that `chain` has seen, the last of them layer `before`.
+    /// Checks that the page follows the pages that `chain` has seen, the last of them layer
+    /// `before`.
     pub(crate) fn follow(
         &self,
         chain: &mut ChainReader,
@@ -236,7 +237,7 @@ impl Page {
         chain.follow(self.check.as_ref(), self.dpi, self.info.index, before)
     }
 
-    /// Returns what the page says, without its image.
+    /// Returns the page's statements, without its image.
     pub fn header(&self) -> PageHeader {
         let check = self.check.as_ref().and_then(|check| check.page.as_ref());
         PageHeader {
@@ -308,7 +309,7 @@ impl Page {
         if check.is_some_and(|check| check.crc != image_crc(&image)) {
             return Err(StackError::Check { layer: self.info.index, fault: CheckFault::Image });
         }
-        // A strip that is not the one that was written may be damaged where no pixel shows it.
+        // A strip that is not as it was written may be damaged where no pixel shows it.
         let strip = self.strip_compression().filter(|_| !self.is_coded_anew());
         let strip = strip
             .and_then(|compression| Some(Strip { compression, bytes: self.pieces.pop()?.into() }));

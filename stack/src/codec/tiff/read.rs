@@ -46,7 +46,7 @@ pub struct PageReader {
     seen: HashSet<u64>,
 }
 
-/// Returns the error of an input that starts with these bytes of no stack.
+/// Returns the error of an input that starts with these bytes and is no stack.
 fn not_tiff(start: Vec<u8>, mut source: Source) -> StackError {
     let size = source.length().ok().flatten();
     let more = source.read_up_to(start.len() as u64, (FORMAT_BYTES - start.len()) as u64);
@@ -248,7 +248,7 @@ impl PageReader {
         Ok(None)
     }
 
-    /// Counts the images that are no layers: that of a directory, or those below it.
+    /// Counts the images that are no layers: the image of a directory, or the images below it.
     fn is_beside(&mut self, entries: &[Entry]) -> bool {
         let value = |tag| {
             let entry = entries.iter().find(|entry| entry.tag == tag)?;
@@ -374,8 +374,8 @@ impl PageReader {
         Ok(page)
     }
 
-    /// Finds the lengths that a directory does not state: of plain pixels by their number, of others
-    /// up to what comes next in the file.
+    /// Finds the lengths that a directory does not state: for plain pixels by their number, for
+    /// others up to the next data in the file.
     fn find_lengths(
         &self,
         places: &mut [(u64, u64)],
@@ -469,7 +469,7 @@ impl PageReader {
     }
 }
 
-/// What the first bytes of a file say it is.
+/// The kind of a file by its first bytes.
 #[derive(Debug)]
 enum FileKind {
     /// A TIFF, or nothing that is read.

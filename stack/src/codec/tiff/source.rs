@@ -77,7 +77,7 @@ impl Source {
             Self::File { file, position } => {
                 if let Ok(gap) = i64::try_from(i128::from(offset) - i128::from(*position)) {
                     match file.seek_relative(gap) {
-                        // The offset is larger than that of any file.
+                        // The offset is larger than any file's.
                         Err(error) if error.kind() == io::ErrorKind::InvalidInput => {}
                         sought => {
                             sought?;

@@ -9,14 +9,14 @@ use crate::codec::packed::tokens::{
 };
 use crate::image::mask::Mask;
 
-/// The fewest rows like their references that are left out. Fewer are coded, which costs less
-/// than saying where they are, and keeps what was learned from the rows above.
+/// The fewest rows like their references that are left out. Fewer are coded, which costs less than
+/// recording their place, and keeps the shifts learned from the rows above.
 const LEFT_OUT: u32 = 8;
-/// A match farther away, in pixels, is none.
+/// The distance in pixels beyond which a match does not count.
 const NO_MATCH: u32 = 600;
 
 /// Codes the rows of an image. Changes of one edge stand `step` apart: 2 in a mask, whose
-/// transitions are to either colour, 1 in a gray image.
+/// transitions are to either color, 1 in a gray image.
 pub(in crate::codec::packed) fn encode(
     image: &Mask,
     reference: Reference<'_>,
@@ -58,7 +58,7 @@ pub(in crate::codec::packed) fn encode(
 struct RowEncoder<'a> {
     width: u32,
     step: usize,
-    /// The transitions of all rows, and those of the row that are not coded yet.
+    /// The transitions of all rows, and the row's transitions that are not coded yet.
     changes: &'a [u32],
     start: usize,
     next: usize,

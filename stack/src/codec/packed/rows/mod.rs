@@ -1,4 +1,4 @@
-//! Codes the rows of an image against those of the layer below, or against the rows above.
+//! Codes the rows of an image against the rows of the layer below, or against the rows above.
 
 mod decode;
 mod encode;
@@ -12,7 +12,7 @@ use crate::image::mask::Mask;
 /// The rows that an image's rows are coded against.
 #[derive(Clone, Copy)]
 pub(super) enum Reference<'a> {
-    /// Those of the layer below, an image of the same size.
+    /// The rows of the layer below, an image of the same size.
     Below(&'a Mask),
     /// The image's own rows, each above the next.
     Above,
