@@ -6,15 +6,15 @@ use crate::resin::{FadingLight, GrayLevel};
 /// millionth of a penetration depth.
 const NOTHING: f64 = 1e-9;
 
-/// Where the sum of several fading exposures is critical has no formula: the bracket is halved to a
-/// hundredth of a nanometre, far below the nanometre of heights in stacks.
+/// The depth at which the sum of several fading exposures is critical has no formula: the bracket
+/// is halved to a hundredth of a nanometer, far below the nanometer of heights in stacks.
 const BRACKET_UM: f64 = 1e-5;
 
-/// The depth over which the light of each gray level fades by e, in micrometres (002 eq. 38 and 40).
+/// The depth, in micrometers, over which each gray level's light fades by e (002 eq. 38 and 40).
 #[derive(Clone, Debug)]
 pub struct ResinDepths([f64; 256]);
 
-/// How much of each gray level's light is left at a depth.
+/// The share of each gray level's light that is left at a depth.
 #[derive(Clone, Debug)]
 pub struct Fades {
     depth_um: f64,
@@ -23,9 +23,9 @@ pub struct Fades {
 
 /// The exposures that a column of resin has got from above, and the resin that they fade in.
 ///
-/// Exposures are told in critical doses of their own gray level, and resin is cured where they come
-/// to 1 together (002 section 3.4.8 a). A column begins at a height without light; [`expose`] adds
-/// what an exposure brings to that height, and [`go_down`] moves the height.
+/// Exposures count in critical doses of their own gray level, and resin is cured where their sum
+/// reaches 1 (002 section 3.4.8 a). A column begins at a height without light; [`expose`] adds the
+/// light of an exposure at that height, and [`go_down`] moves the height.
 ///
 /// ```
 /// use lamp_grayscale::material::Material;
@@ -55,7 +55,7 @@ pub struct ColumnDose<'a> {
     resin: &'a ResinDepths,
 }
 
-/// How many critical doses of each level are left. Most columns are white alone.
+/// The critical doses of each level that are left. Most columns are white alone.
 #[derive(Clone, Debug, Default)]
 struct Exposures {
     white: f64,
@@ -69,7 +69,7 @@ impl ResinDepths {
         Self(std::array::from_fn(depth))
     }
 
-    /// Returns how much of each level's light is left at a depth (002 eq. 28).
+    /// Returns the share of each level's light that is left at a depth (002 eq. 28).
     pub fn fades(&self, depth_um: f64) -> Fades {
         Fades { depth_um, left: self.0.map(|of_level| (-depth_um / of_level).exp()) }
     }

@@ -7,7 +7,7 @@
 use lamp_stack::{Image, Length};
 
 /// The intervals of height in which a vertical line is inside something, as from and to
-/// in micrometres. They rise and do not touch.
+/// in micrometers. They rise and do not touch.
 pub type SolidHeights = Vec<[f64; 2]>;
 
 /// A line of an image's pixels, counted from the left or the top.
@@ -36,7 +36,7 @@ impl PixelLine {
         }
     }
 
-    /// Returns the runs along the line that are not black. Neighbours may have one level.
+    /// Returns the runs along the line that are not black. Neighbors may have one level.
     ///
     /// # Panics
     /// Panics if the line does not cross the image.
@@ -135,11 +135,11 @@ impl CuredLine {
     }
 }
 
-/// Layers this near touch: exposure times are rounded to the microsecond, which takes up to a
-/// nanometre off the depth that just cures a layer.
+/// Layers this close touch: exposure times are rounded to the microsecond, which takes up to a
+/// nanometer off the depth that just cures a layer.
 const TOUCHING_UM: f64 = 2e-3;
 
-/// Adds the interval that an exposure cures, merged with those that it meets.
+/// Adds the interval that an exposure cures, merged with the intervals that it meets.
 fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
     while let Some(&[before, reached]) = solid.last() {
         if reached < from - TOUCHING_UM {
@@ -154,8 +154,8 @@ fn cure(solid: &mut SolidHeights, [mut from, to]: [f64; 2]) {
 /// Heights of layers that touch differ in the last digits: they are sums of thicknesses.
 const SAME_UM: f64 = 1e-6;
 
-/// Adds an interval below those that a line has, which come from the top down, and joins it with
-/// the last of them where they touch.
+/// Adds an interval below a line's intervals, which come from the top down, and joins it with the
+/// last of them where they touch.
 pub fn add_below(solid: &mut SolidHeights, [from, to]: [f64; 2]) {
     match solid.last_mut() {
         Some(above) if above[0] <= to + SAME_UM => above[0] = from,

@@ -2,7 +2,7 @@
 //!
 //! Sources: R. W. Floyd and L. Steinberg, An adaptive algorithm for spatial
 //! greyscale, 1976, and F. Sierra, LIBVGA, 1990 ("Filter Lite"): the shares of the
-//! neighbours. R. A. Ulichney, Digital Halftoning, 1987: rows that turn, and varied
+//! neighbors. R. A. Ulichney, Digital Halftoning, 1987: rows that turn, and varied
 //! thresholds, against worms and checkerboards.
 
 use std::ops::Range;
@@ -19,7 +19,7 @@ const WHITE: i32 = 255 * 16;
 pub(crate) struct Diffusion {
     /// The sixteenths of a pixel's error that the next pixel gets.
     ahead: i32,
-    /// Those for the pixels below the one before and below the next. The rest of the error
+    /// The sixteenths for the pixels below the one before and below the next. The rest of the error
     /// goes straight down.
     below: [i32; 2],
     /// How much of the mask's thresholds differ from the middle, in sixteenths. The more, the
@@ -35,7 +35,7 @@ const ALL: i32 = 16;
 pub(crate) static FLOYD_STEINBERG: Diffusion =
     Diffusion { ahead: 7, below: [3, 1], strength: ALL, turns: false };
 
-/// With thresholds that differ as little as makes other dots in each layer.
+/// Thresholds differ just enough to make other dots in each layer.
 pub(crate) static SIERRA_LITE: Diffusion =
     Diffusion { ahead: 8, below: [4, 0], strength: 1, turns: true };
 
@@ -43,8 +43,8 @@ impl Diffusion {
     /// Dithers from the top row down. Errors that fall on black and white are dropped, so that
     /// no dot appears where there is no gray.
     ///
-    /// The thresholds are those of the blue-noise mask from `shift` on. Other thresholds give
-    /// other dots of the same density, so layers differ.
+    /// The thresholds are the blue-noise mask's from `shift` on. Other thresholds give other dots
+    /// of the same density, so layers differ.
     pub(crate) fn dither(&self, gray: &GrayMask, shift: [u32; 2]) -> Result<Mask, TooManyRuns> {
         let width = gray.width();
         let mut dots = Dots::new(width);
@@ -97,7 +97,7 @@ impl Diffusion {
     ) {
         let RunErrors { columns, here, below, ahead: carried } = run;
         let count = is_white.len();
-        // Below and beside black and white few errors come in: the mask makes the first dots.
+        // Below and next to black and white few errors come in: the mask makes the first dots.
         let strength = if here.iter().all(|&error| error == 0) { ALL } else { self.strength };
         let [before, next] = if TO_RIGHT { [0, 2] } else { [2, 0] };
         let edge = if TO_RIGHT { columns.start } else { columns.end };
@@ -156,7 +156,7 @@ struct RunErrors<'a> {
     columns: Range<usize>,
     /// The errors passed on to the run's pixels.
     here: &'a [i32],
-    /// The errors passed on to the pixels below them and below their neighbours.
+    /// The errors passed on to the pixels below them and below their neighbors.
     below: &'a mut [i32],
     ahead: &'a mut Ahead,
 }

@@ -18,8 +18,8 @@ pub enum DitherMethod {
     BlueNoise,
     /// Bayer's pattern of 16 x 16 thresholds. It moves from layer to layer.
     Ordered,
-    /// Error diffusion: each pixel's error goes to the gray pixels right of and below it.
-    /// The thresholds are those of the blue-noise mask.
+    /// Error diffusion: each pixel's error goes to the gray pixels right of and below it. The
+    /// thresholds are the blue-noise mask's.
     FloydSteinberg,
     /// Error diffusion in rows that turn, with thresholds that hardly differ: the most even gray
     /// within a layer.
@@ -40,7 +40,7 @@ lamp_stack::named!(DitherMethod {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DitherError {
-    /// The dots are more runs than any reader of stacks takes.
+    /// The dots make more runs than any reader of stacks takes.
     #[error(
         "layer {layer}: its dots make more than {MAX_RUNS} runs, too many for any reader of the \
          stack: expose part of the area at a time, or make fewer pixels gray"
@@ -87,8 +87,7 @@ fn dither_layer(mut layer: Layer, method: DitherMethod) -> Result<Layer, DitherE
 
 /// Turns the gray image of a layer into dots. Level 0 stays black and level 255 white.
 ///
-/// The layer's index shifts the pattern, so that the holes of one layer do not lie on
-/// those of the next.
+/// The layer's index shifts the pattern, so that the holes of consecutive layers do not align.
 ///
 /// # Errors
 /// Returns an error if the dots make more runs than [`MAX_RUNS`].

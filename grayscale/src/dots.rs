@@ -30,7 +30,7 @@ impl Dots {
         self.row.push(end);
     }
 
-    /// Makes those pixels from `start` to `end` white for which `is_white` is true.
+    /// Whitens the pixels from `start` to `end` for which `is_white` is true.
     pub(crate) fn push_each(
         &mut self,
         start: u32,
@@ -39,10 +39,10 @@ impl Dots {
     ) {
         let mut white = self.reopen(start);
         let mut len = self.row.len();
-        // Room for a change at every pixel: each is written, and kept only where the colour
+        // Room for a change at every pixel: each is written, and kept only where the color
         // changes.
         self.row.resize(len + (end - start) as usize + 1, 0);
-        // Dots change colour at random half of the time, which branches cannot predict.
+        // Dots change color at random half of the time, which branches cannot predict.
         for column in start..end {
             let next = is_white(column);
             self.row[len] = column;
@@ -114,10 +114,10 @@ impl Dots {
 /// A repeating row of dots.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pattern<'a> {
-    /// The columns whose colour differs from that of the column to their left, which is
-    /// the last column for column 0. Their number is even.
+    /// The columns whose color differs from the color of the column to their left, which is the
+    /// last column for column 0. Their number is even.
     pub(crate) changes: &'a [u8],
-    /// The colour of the last column.
+    /// The color of the last column.
     pub(crate) ends_white: bool,
 }
 

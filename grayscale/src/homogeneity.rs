@@ -1,9 +1,8 @@
-//! Tells whether a resin averages dots of a size or cures each by itself.
+//! Reports whether a resin averages dots of a size or cures each by itself.
 //!
-//! Source: 002 section 3.3.6 and figure 57. Checkerboards of one mean level
-//! cured to an even film with squares of 17 um, and to distinct cured and
-//! uncured regions with squares of 85, 170 and 255 um. Between 17 and 85 um
-//! nothing was tried.
+//! Source: 002 section 3.3.6 and figure 57. Checkerboards of one mean level cured to an even film
+//! with squares of 17 um, and to distinct cured and uncured regions with squares of 85, 170 and 255
+//! um. Nothing between 17 and 85 um was tried.
 
 use lamp_stack::Length;
 
@@ -12,16 +11,16 @@ pub const EVEN_DOTS: Length = Length::from_um(17.0);
 /// The narrowest dots that did not.
 pub const UNEVEN_DOTS: Length = Length::from_um(85.0);
 
-/// The source rounds pixels of 1500 dpi to whole micrometres: 85 stands for 84.67.
+/// The source rounds pixels of 1500 dpi to whole micrometers: 85 stands for 84.67.
 const ROUNDING: f64 = 0.01;
 
 /// How evenly a film cures under dots of some size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Homogeneity {
-    /// Evenly: the dots are no wider than those that did.
+    /// Evenly: the dots are no wider than dots that cured evenly.
     Even,
-    /// Unknown: the dots are wider than those that cured evenly, and narrower than
-    /// those that did not.
+    /// Unknown: the dots are wider than dots that cured evenly, and narrower than dots that did
+    /// not.
     Unknown,
     /// Each dot by itself.
     Uneven,

@@ -5,13 +5,12 @@
 //! - [`exposure`] says how long layers are exposed, by a material or a table of times.
 //! - [`calibrate`] finds a material's numbers from measurements, of images that [`target`]
 //!   makes.
-//! - [`dither`] turns gray layers into dots, for machines that expose a pixel or not: a
-//!   gray level becomes the share of white pixels (002 section 3.3.1). Black and white
-//!   stay as they are, so no dot appears outside the part. [`homogeneity`] tells whether
-//!   the resin averages dots of a size.
+//! - [`dither`] turns gray layers into dots, for machines that expose a pixel or not: a gray level
+//!   becomes the share of white pixels (002 section 3.3.1). Black and white stay as they are, so no
+//!   dot appears outside the part. [`homogeneity`] reports whether the resin averages dots of a
+//!   size.
 //! - [`CuredLine`] simulates what a stack cures, layer by layer, [`SummedLine`] where doses add up
-//!   down each [`ColumnDose`].
-//!   [`shared_height`] compares that with a part.
+//!   down each [`ColumnDose`]. [`shared_height`] compares that with a part.
 //!
 //! ```
 //! use lamp_grayscale::{DitherMethod, dither_image};

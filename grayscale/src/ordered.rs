@@ -9,7 +9,7 @@ use crate::screen::Screen;
 
 /// The bits of a column or row of the pattern.
 const BITS: u32 = 4;
-/// The side of the pattern. Its 256 thresholds tell 8-bit levels apart.
+/// The side of the pattern. Its 256 thresholds distinguish 8-bit levels.
 const SIDE: u32 = 1 << BITS;
 
 /// Bayer's pattern as thresholds.

@@ -1,4 +1,4 @@
-//! A part's outline within the pixels of a section, and what is cured of it.
+//! A part's outline within the pixels of a section, and how much of it is cured.
 
 use lamp_stack::Length;
 
@@ -7,9 +7,9 @@ use lamp_stack::Length;
 pub struct OutlinePiece {
     /// Where it begins and ends, in pixels from the pixel's first edge: within 0 to 1.
     pub along: [f64; 2],
-    /// The height of the lower edge at both places, in micrometres.
+    /// The height of the lower edge at both places, in micrometers.
     pub from_um: [f64; 2],
-    /// The height of the upper edge at both places, in micrometres.
+    /// The height of the upper edge at both places, in micrometers.
     pub to_um: [f64; 2],
 }
 
@@ -24,13 +24,12 @@ impl OutlinePiece {
     }
 }
 
-/// Returns how much of the heights that a whole pixel is cured at lies within a part, on average
+/// Returns how much of the heights that are cured over a whole pixel is within a part, on average
 /// over the pixel. It is exact to rounding.
 pub fn shared_height(cured: &[[f64; 2]], outline: &[OutlinePiece]) -> Length {
     let piece = |piece: &OutlinePiece| {
         let within = |&heights: &[f64; 2]| {
-            // Of two edges, the mean of what lies between is the difference of what lies below
-            // each.
+            // For two edges, the mean between them is the difference of the means below each.
             mean_within(piece.to_um, heights) - mean_within(piece.from_um, heights)
         };
         (piece.along[1] - piece.along[0]) * cured.iter().map(within).sum::<f64>()

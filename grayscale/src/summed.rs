@@ -8,8 +8,9 @@ use crate::column_dose::{ColumnDose, ResinDepths};
 use crate::cured::{LineRun, SolidHeights, add_below};
 use crate::resin::{ExposureTime, FadingLight, GrayLevel};
 
-/// What exposures cure along a line, each adding to the doses of all that it reaches: resin is
-/// cured where the shares of [`FadingLight`] come to 1. Light goes straight down.
+/// The heights that exposures cure along a line, where each adds to the doses of all the resin that
+/// it reaches: resin is cured where the shares of [`FadingLight`] sum to 1. Light goes straight
+/// down.
 ///
 /// Memory grows with the runs along the line.
 ///
@@ -53,7 +54,7 @@ struct LineExposure {
 }
 
 impl SummedLine {
-    /// Creates a line of so many pixels.
+    /// Creates a line of this many pixels.
     pub fn new(fading: FadingLight, pixels: u32) -> Self {
         let resin = Arc::new(ResinDepths::new(&fading));
         Self { fading, resin, pixels: pixels as usize, shares: None, layers: Vec::new() }
@@ -88,7 +89,7 @@ impl SummedLine {
         let mut columns = vec![ColumnDose::dark(&self.resin); self.pixels];
         // 002 eq. 28: light comes from above, so that a height gets all layers at or above it.
         for (number, layer) in self.layers.iter().enumerate().rev() {
-            // What is below the layer gets light through it down to the next top.
+            // The resin below the layer gets light through it down to the next top.
             let below = number.checked_sub(1).map(|below| self.layers[below].top_um);
             let end_um = below.unwrap_or_else(|| layer.bottom_um.min(floor_um)).min(layer.top_um);
             let fades = self.resin.fades(layer.top_um - end_um);

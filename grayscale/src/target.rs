@@ -178,7 +178,7 @@ mod tests {
         for (k, dose) in doses.iter().enumerate() {
             let (column, row) = (k as u32 % 5, k as u32 / 5);
             let (left, top) = (gap + column * (side + gap), gap + row * (side + gap));
-            // A square is of one dose, and nothing beside it has any.
+            // A square has one dose, and its surroundings have none.
             for (x, y, share) in [
                 (left, top, 1.0),
                 (left + side - 1, top + side - 1, 1.0),

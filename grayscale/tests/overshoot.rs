@@ -122,7 +122,7 @@ fn gray_layers_leave_a_small_share_of_the_error() {
     for (name, mesh, every) in
         [("wedge", wedge(), 5), ("sphere", sphere(6.0, 6_000), 61), ("tower", tower(6_000), 131)]
     {
-        // Through the pixels' centres, where depths are exact except for the 255
+        // Through the pixels' centers, where depths are exact except for the 255
         // levels, and all over the pixels, which have one depth each.
         for (fine, share) in [(1, 0.01), (3, 0.2)] {
             for overcure in [1.0, 1.6] {

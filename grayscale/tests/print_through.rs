@@ -1,5 +1,5 @@
 //! Checks gray levels that are chosen for doses that add up: column by column, against sections of
-//! the part through the pixels' centres.
+//! the part through the pixels' centers.
 
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, tower};
 use lamp_grayscale::material::Material;
@@ -74,7 +74,7 @@ impl Build {
         line.cured(layers[0].info.z_um.unwrap())
     }
 
-    /// Returns where the part is below each pixel centre of a row, above the platform.
+    /// Returns where the part is below each pixel center of a row, above the platform.
     fn inside(&self, grid: &PixelGrid, row: u32, floor_um: f64) -> Vec<SolidHeights> {
         let options = SectionOptions {
             units: Units::Millimetres,
@@ -110,7 +110,7 @@ fn plates() -> Mesh {
 }
 
 /// Returns the overshoot and what is missing of white, and of gray, in the columns through pixels'
-/// centres, in micrometres summed over the rows looked at; what white layers miss is what none is
+/// centers, in micrometers summed over the rows looked at; what white layers miss is what none is
 /// exposed for, without what others print through.
 fn errors(build: &Build, every: usize) -> [[f64; 2]; 2] {
     let (white, grid) = build.layers(false);
@@ -204,7 +204,7 @@ fn low_layers_are_darkened_first() {
             );
             between += usize::from(own.get(middle).is_some_and(|&level| level < 255));
             let is_same = |(a, b): (&Vec<u8>, &Vec<u8>)| (a[column] > 0) == (b[column] > 0);
-            // Pixels whose centres are on the underside are black.
+            // Pixels whose centers are on the underside are black.
             let differing = white.iter().zip(&gray).filter(|pair| !is_same(*pair)).count();
             assert!(differing <= 1, "{row} {column}");
         }

@@ -11,7 +11,7 @@ use crate::resin::{Dose, ExposureTime, Intensity};
 pub(super) const DOSE: &str = "dose_mj_per_cm2";
 pub(super) const EXPOSURE: &str = "exposure_ms";
 
-/// The plausible depths, widths and sides in um, from a nanometre to a metre. No measurement
+/// The plausible depths, widths and sides in um, from a nanometer to a meter. No measurement
 /// lies outside, but a typing error may.
 pub(super) const LENGTHS: RangeInclusive<f64> = 1e-3..=1e6;
 

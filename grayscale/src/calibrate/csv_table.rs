@@ -38,7 +38,7 @@ pub enum TableError {
         /// The header's line, from 1.
         line: usize,
     },
-    /// A column stands twice.
+    /// A column occurs twice.
     #[error("line {line}: column {column} stands twice")]
     Twice {
         /// The header's line, from 1.
@@ -59,8 +59,8 @@ pub enum TableError {
 }
 
 impl CsvTable {
-    /// Reads a table: a header, then rows. Blank lines and those that start with `#`
-    /// are skipped; quotes around a cell are removed.
+    /// Reads a table: a header, then rows. Blank lines and lines that start with `#` are skipped;
+    /// quotes around a cell are removed.
     ///
     /// # Errors
     /// Returns an error if there is no header, or a row has more or fewer cells than it.

@@ -16,11 +16,12 @@ pub(super) struct LinePoint {
 /// The numbers of the curve `(d + d' x) (ln E - ln(c + c' x))`: `c`, `c'`, `d`, `d'`.
 pub(super) type Numbers = [f64; 4];
 
-/// Where in [`Numbers`] the critical dose's line begins, and that of the penetration depth.
+/// The positions in [`Numbers`] where the lines of the critical dose and of the penetration depth
+/// begin.
 pub(super) const CRITICAL_DOSE: usize = 0;
 pub(super) const PENETRATION_DEPTH: usize = 2;
 
-/// The curve that fits points best, and how well they tell its numbers.
+/// The curve that fits points best, and how precisely they determine its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CurveLinesFit {
     pub(super) numbers: Numbers,
@@ -34,8 +35,8 @@ impl CurveLinesFit {
     /// Fits the numbers that are `free` by nonlinear least squares; the others are zero.
     ///
     /// # Errors
-    /// Returns an error if there are too few points for the numbers, if depths do not rise with
-    /// the dose, or if the points do not tell all numbers.
+    /// Returns an error if there are too few points for the numbers, if depths do not rise with the
+    /// dose, or if the points do not determine all numbers.
     pub(super) fn new(points: &[LinePoint], free: [bool; 4]) -> Result<Self, FitError> {
         let needed = 1 + free.iter().filter(|free| **free).count();
         if points.len() < needed {
@@ -185,7 +186,7 @@ mod tests {
             CurveLinesFit::new(&all[..4], ALL),
             Err(FitError::TooFew { points: 4, needed: 5 })
         );
-        // One x tells no rise.
+        // A single x determines no rise.
         let one: Vec<_> = all.iter().map(|point| LinePoint { x: 0.5, ..*point }).collect();
         assert_eq!(CurveLinesFit::new(&one, ALL), Err(FitError::NoLines));
     }

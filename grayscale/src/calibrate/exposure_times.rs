@@ -17,7 +17,7 @@ const TIMES: RangeInclusive<f64> = 1e-3..=1e9;
 /// Exposure times by thickness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExposureTimes {
-    /// Thickness in micrometres and time in milliseconds, by thickness.
+    /// Thickness in micrometers and time in milliseconds, by thickness.
     times: Vec<(f64, f64)>,
 }
 

@@ -6,7 +6,7 @@ use super::measurements::DepthPoint;
 use crate::material::{GivenRange, MeasuredRange};
 use crate::resin::Dose;
 
-/// Where measurements lie. Doses are those of full white.
+/// The range of measurements. Doses are doses of full white.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
     doses: GivenRange<Dose>,
@@ -14,13 +14,13 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Returns where films lie; none if there are none.
+    /// Returns the range of films; `None` if there are no films.
     pub(super) fn of_depths(points: &[DepthPoint]) -> Option<Self> {
         let depths = GivenRange::of(points.iter().map(|point| point.depth));
         Some(Self { depths, ..Self::of_doses(points.iter().map(|point| point.dose))? })
     }
 
-    /// Returns where measurements lie of which only the doses count.
+    /// Returns the range of measurements of which only the doses count.
     pub(super) fn of_doses(doses: impl Iterator<Item = Dose>) -> Option<Self> {
         GivenRange::of(doses).map(|doses| Self { doses, depths: None })
     }

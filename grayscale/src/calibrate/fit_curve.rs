@@ -27,8 +27,8 @@ pub struct CurveFit {
 /// Fits the working curve `C_d = D_p ln(E/E_c)` by linear regression of the depth
 /// on the logarithm of the dose that arrives (002 section 3.3.5).
 ///
-/// The interval of `D_p` is that of the slope, by Student's t; that of `E_c` comes
-/// from Fieller's theorem, and is not symmetric.
+/// The interval of `D_p` is the slope's, by Student's t; the interval of `E_c` comes from Fieller's
+/// theorem, and is not symmetric.
 ///
 /// # Errors
 /// Returns an error if there are fewer than three points or two doses, if the depth does

@@ -32,7 +32,7 @@ pub struct LevelFit {
     pub gray: GrayLevel,
     /// The number of its points.
     pub points: usize,
-    /// Its own curve, if its points tell one.
+    /// Its own curve, if its points determine one.
     pub curve: Option<CurveFit>,
 }
 
@@ -52,11 +52,12 @@ pub struct LineEstimate<T> {
 /// nonlinear least squares.
 ///
 /// A line whose fall is within its interval is kept level. Intervals come from the covariance of
-/// the fit, by Student's t; those of a level line are as wide as those of the line that falls.
+/// the fit, by Student's t; the interval of a level line is as wide as the interval of the line
+/// that falls.
 ///
 /// # Errors
-/// Returns an error if there are fewer than three levels or too few points to tell the lines, or
-/// if a line falls by more than its interval or begins at zero or less.
+/// Returns an error if there are fewer than three levels or too few points to determine the lines,
+/// or if a line falls by more than its interval or begins at zero or less.
 pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.gray.get().total_cmp(&b.gray.get()));
@@ -87,7 +88,7 @@ pub fn fit_gray(points: &[DepthPoint]) -> Result<GrayFit, FitError> {
     })
 }
 
-/// Returns the lines as they fit best, and with those kept level that would fall.
+/// Returns the lines of the best fit; lines that would fall are kept level.
 fn rising_lines(points: &[LinePoint]) -> Result<(CurveLinesFit, CurveLinesFit), FitError> {
     let sloped = CurveLinesFit::new(points, [true; 4])?;
     let (mut lines, mut free) = (sloped, [true; 4]);
@@ -233,7 +234,7 @@ mod tests {
 
     #[test]
     fn all_points_tell_the_lines_more_sharply_than_lines_through_levels_curves() {
-        // What a line through three levels' own numbers would say, by Student's t of one degree.
+        // A line through three levels' own numbers, by Student's t of one degree.
         let levels = [0.2, 0.5, 1.0];
         let measured: Vec<_> = points(of_lamp, 5.0, 9)
             .into_iter()
@@ -252,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_line_that_might_be_level_is_kept_level() {
-        // D_p falls by 2 um, which no such measurement can tell.
+        // D_p falls by 2 um, which no such measurement can show.
         let falls = |gray: GrayLevel, dose: Dose| {
             let arriving = dose.mj_per_cm2() * gray.get();
             (212.0 - 2.0 * gray.get()) * (arriving / (100.0 + 30.0 * gray.get())).ln()

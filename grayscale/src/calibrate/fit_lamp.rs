@@ -28,8 +28,8 @@ pub struct LampFit {
 /// Fits `C_d = D_p ln(E/E_c(I))` with a line `E_c(I)` (002 eq. 36) and one penetration depth to the
 /// films under all lights at once, by nonlinear least squares.
 ///
-/// Intervals are those of [`fit_gray`](super::fit_gray), and so is what becomes of a line that
-/// falls.
+/// Intervals are computed as in [`fit_gray`](super::fit_gray), and a line that falls is treated
+/// alike.
 ///
 /// # Errors
 /// Returns an error if there are fewer than two lights or too few points, or if the line falls by

@@ -114,8 +114,8 @@ impl TwoDepthFit {
         })
     }
 
-    /// Checks that no interval reaches zero. That of `D_pL` is on a logarithmic scale, where
-    /// a half width of one counts as reaching zero.
+    /// Checks that no interval reaches zero. The interval of `D_pL` is on a logarithmic scale,
+    /// where a half width of one counts as reaching zero.
     fn above_zero(self) -> Result<Self, FitError> {
         let vague = |what, value, half, unit| Err(FitError::Vague { what, value, half, unit });
         let onset = self.critical_dose;

@@ -22,7 +22,7 @@ pub struct WidthFit {
     pub r2: f64,
     /// The number of points.
     pub points: usize,
-    /// The number of those up to the critical dose.
+    /// The number of points up to the critical dose.
     pub below: usize,
     extent: Option<Extent>,
     hinge: HingeFit,
@@ -32,11 +32,12 @@ pub struct WidthFit {
 /// smallest, by least squares of the width over the dose, not over its logarithm (002 section
 /// 3.4.4).
 ///
-/// Squares that did not grow tell where growth begins, as those do that grew. Left out, they would
-/// leave those that errors of measurement make wider, and the critical dose would come out too low.
+/// Squares that did not grow show where growth begins, as squares that grew do. Without them, only
+/// the squares that errors of measurement make wider would remain, and the critical dose would be
+/// too low.
 ///
 /// Intervals hold all numbers whose least squares exceed the best ones by no more than Student's t
-/// allows. Where all squares grew, they are those of a straight line by Fieller's theorem.
+/// allows. Where all squares grew, the intervals equal a straight line's by Fieller's theorem.
 ///
 /// # Errors
 /// Returns an error if there are no points, if a size has fewer than three points or two doses, if
@@ -140,7 +141,7 @@ mod tests {
     }
 
     /// Fits of 3000 series of ten squares at 60 to 600 mJ/cm², whose growth of 0.1 um for each
-    /// mJ/cm² from `critical` on is measured to `spread` um. Some tell nothing.
+    /// mJ/cm² from `critical` on is measured to `spread` um. Some determine no line.
     fn fits(critical: f64, spread: f64) -> Vec<Result<WidthFit, FitError>> {
         let truth = truth(423.0, critical, 0.1);
         let mut noise = SplitMix(17);

@@ -5,14 +5,14 @@ use super::hinge_piece::{Piece, pieces};
 use super::regression::LineFit;
 use super::student_t::t_95;
 
-/// The hinge `s max(0, x - x_0)` of least squares, and all that fit about as well: those whose
+/// The hinge `s max(0, x - x_0)` of least squares, and all hinges that fit about as well: their
 /// squares exceed the least ones by no more than Student's t allows one parameter. Unlike tangents
 /// to the least squares, their range follows the bend at the onset.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HingeFit {
-    /// The onset `x_0`, and the range of those that fit about as well, from zero.
+    /// The onset `x_0`, and the range of onsets that fit about as well, from zero.
     pub(super) onset: [f64; 3],
-    /// The slope `s`, and the range of those that fit about as well.
+    /// The slope `s`, and the range of slopes that fit about as well.
     pub(super) slope: [f64; 3],
     /// The share of the scatter of y that the hinge explains.
     pub(super) r2: f64,
@@ -34,7 +34,7 @@ impl HingeFit {
         }
         let size = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(0.0, f64::max);
         let (x_size, y_size) = (size(|p| p.0), size(|p| p.1.abs()));
-        // Sums of squares of doses and of micrometres differ by orders of magnitude: in shares of
+        // Sums of squares of doses and of micrometers differ by orders of magnitude: in shares of
         // the largest, none is lost to rounding.
         let scaled = points.iter().map(|&(x, y)| (x / x_size, y / y_size)).collect();
         let fit = Self::of_scaled(scaled).map_err(|wrong| match wrong {
@@ -106,7 +106,7 @@ impl HingeFit {
         self.range(y, |piece| piece.heights(x, self.limit)).map(|y| y.max(0.0))
     }
 
-    /// Returns the fit of points whose x and y are so many times as large.
+    /// Returns the fit of points whose x and y are multiplied by these factors.
     fn times(self, x: f64, y: f64) -> Self {
         Self {
             onset: self.onset.map(|onset| onset * x),

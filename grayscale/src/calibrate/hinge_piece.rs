@@ -1,10 +1,10 @@
 //! The hinges whose onsets lie between the same two points.
 
-/// Onsets between two neighbouring x. All points from the upper one on lie on the line, and it is
-/// told by their sums.
+/// Onsets between two neighboring x. All points from the upper one on are on the line, which their
+/// sums determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
-    /// The lowest onset; below zero there is none for ranges.
+    /// The lowest onset; ranges use only onsets of zero or more.
     pub(super) from: f64,
     /// The highest onset.
     to: f64,
@@ -15,7 +15,7 @@ pub(super) struct Piece {
     /// The sum of squared distances of their x from the mean, and of the products with y.
     xx: f64,
     xy: f64,
-    /// The squares that the best line through them leaves, and those of the points before.
+    /// The squares that the best line through them leaves, plus the squares of the points before.
     left: f64,
 }
 
@@ -67,8 +67,8 @@ impl Piece {
         self.mean_x - onset
     }
 
-    /// Returns the best slope from an onset so far from the mean, and by how much its squares
-    /// exceed those of the line.
+    /// Returns the best slope from an onset at this distance from the mean, and by how much its
+    /// squares exceed the line's squares.
     fn best_at_reach(&self, reach: f64) -> (f64, f64) {
         let Self { count, mean_y, xx, .. } = *self;
         let (line, stiffness) = (self.line(), count * reach * reach + xx);
@@ -96,7 +96,7 @@ impl Piece {
         rising.min_by(|a, b| a.squares.total_cmp(&b.squares))
     }
 
-    /// Returns how many squares more than the line's a hinge may leave.
+    /// Returns by how much a hinge's squares may exceed the line's.
     fn slack(&self, limit: f64) -> Option<f64> {
         (self.left <= limit).then_some(limit - self.left)
     }
@@ -171,7 +171,7 @@ impl Piece {
         extent(found.into_iter())
     }
 
-    /// Returns the piece of points whose x and y are so many times as large.
+    /// Returns the piece of points whose x and y are multiplied by these factors.
     pub(super) fn times(self, x: f64, y: f64) -> Self {
         Self {
             from: self.from * x,

@@ -37,7 +37,7 @@ pub struct LampPoint {
 /// A measured cure width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthPoint {
-    /// The square's side in the image, to the nanometre.
+    /// The square's side in the image, to the nanometer.
     pub feature_size: Length,
     /// The dose.
     pub dose: Dose,
@@ -50,8 +50,8 @@ pub struct WidthPoint {
 pub struct Measured<T> {
     /// The measurements.
     pub points: Vec<T>,
-    /// The number of rows of which nothing is left to measure: films that did not cure, squares
-    /// that were washed away.
+    /// The number of rows with nothing left to measure: films that did not cure, squares that were
+    /// washed away.
     pub none: usize,
     /// The number of rows with an empty measurement.
     pub blank: usize,
@@ -97,7 +97,7 @@ pub enum DataError {
         column: &'static str,
         /// The cell's text.
         text: String,
-        /// What it should be.
+        /// The allowed values.
         wanted: &'static str,
     },
     /// No row has a measurement.
@@ -113,9 +113,9 @@ const SIZE: &str = "feature_um";
 const CURED: &str = "cured_um";
 const WIDTH: &str = "width_um";
 
-/// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light,
-/// `exposure_ms`; `depth_um`; and `gray`, white if that is absent. The doses are
-/// those of full white. Depths of zero and below cured nothing.
+/// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
+/// `depth_um`; and `gray`, white if that is absent. The doses are doses of full white. Rows of
+/// depth zero or below cured nothing.
 ///
 /// # Errors
 /// Returns an error if a column is missing or unknown, or a cell is not a number in its range.
@@ -176,11 +176,11 @@ pub fn lamp_points(table: &CsvTable) -> Result<Measured<LampPoint>, DataError> {
     })
 }
 
-/// Reads cure widths from a table of `dose_mj_per_cm2` or, under a light,
-/// `exposure_ms`; `feature_px` or `feature_um`, the squares' side in the image; and
-/// `cured_um`, their side after curing, or `width_um`, the cure width itself (002
-/// eq. 60). Squares that did not grow count, as do those that are smaller than their image by an
-/// error of measurement; those of a side of zero and below were washed away.
+/// Reads cure widths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
+/// `feature_px` or `feature_um`, the squares' side in the image; and `cured_um`, their side after
+/// curing, or `width_um`, the cure width itself (002 eq. 60). Squares that did not grow count, as
+/// do squares that are smaller than their image by an error of measurement. Squares of a side of
+/// zero or below were washed away.
 ///
 /// # Errors
 /// Returns an error if a column is missing or unknown, or a cell is not a number in its range.

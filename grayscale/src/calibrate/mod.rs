@@ -187,7 +187,7 @@ pub enum FitError {
         short(*.0)
     )]
     NoCriticalDose(f64),
-    /// Only the highest dose makes squares grow, which tells no line.
+    /// Only the highest dose makes squares grow, which determines no line.
     #[error(
         "squares grow at the highest dose alone, which does not tell from which dose on: measure \
          higher doses"
@@ -239,7 +239,7 @@ pub enum FitError {
     Within {
         /// The group.
         group: PointGroup,
-        /// What is wrong with them.
+        /// Their error.
         error: Box<FitError>,
     },
 }

@@ -88,9 +88,9 @@ impl LineFit {
         }
     }
 
-    /// Returns the x where a rising line is zero, and the ends of its 95% interval
-    /// by Fieller's theorem: those x at which the interval of y holds zero. Unlike that of
-    /// the delta method, this interval is exact, and lopsided.
+    /// Returns the x where a rising line is zero, and the ends of its 95% interval by Fieller's
+    /// theorem: every x at which the interval of y holds zero. Unlike the delta method's interval,
+    /// this one is exact, and lopsided.
     pub(super) fn zero(&self) -> [f64; 3] {
         let (a, b) = (self.mean_y, self.slope);
         // (a + b u)² = mean_half2 + slope_half2 u², with u = x - mean_x.

@@ -67,7 +67,7 @@ pub enum ExposureError {
     Cure {
         /// The material's name.
         material: String,
-        /// What the model refuses.
+        /// The model's error.
         problem: CureError,
     },
     /// The material does not say how light fades.
@@ -75,7 +75,7 @@ pub enum ExposureError {
     Fading {
         /// The material's name.
         material: String,
-        /// What it lacks.
+        /// The data that it lacks.
         problem: ResinError,
     },
     /// The table has no time for a thickness.
@@ -181,7 +181,8 @@ impl Exposure {
         levels.map_err(|problem| curing.failed(problem))
     }
 
-    /// Returns what each gray level leaves in layers of one thickness, where doses add up.
+    /// Returns the light that each gray level leaves in layers of one thickness, where doses add
+    /// up.
     ///
     /// # Errors
     /// Returns an error if the material does not say how light fades; a table of times never does.

@@ -14,8 +14,8 @@ use crate::resin::{
     WorkingCurve, refractive_contrast,
 };
 
-/// What a suspension is made of, from which the models of 002 sections 3.4.2.2 to 3.4.2.4 say how
-/// it cures, about.
+/// The ingredients of a suspension, from which the models of 002 sections 3.4.2.2 to 3.4.2.4
+/// estimate how it cures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Composition {
@@ -30,15 +30,15 @@ pub struct Composition {
     /// The peaks of a lamp that has several, instead of a wavelength and absorptivities there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub peaks: Vec<Peak>,
-    /// The ceramic; none in a liquid without particles.
+    /// The ceramic; absent in a liquid without particles.
     pub ceramic: Option<Ceramic>,
     /// The photoinitiator, `c_P` and `ε_P`.
     pub photoinitiator: Dissolved,
     /// The UV absorber, `c_D` and `ε_D`.
     pub uv_absorber: Option<Dissolved>,
-    /// What keeps the resin from curing.
+    /// The inhibitor that keeps the resin from curing.
     pub inhibition: InhibitionNumbers,
-    /// What shrinks, if that is wanted.
+    /// The monomers that shrink, if shrinkage is wanted.
     pub shrinkage: Option<ShrinkageNumbers>,
 }
 
@@ -54,7 +54,7 @@ pub struct Ceramic {
     pub refraction: Option<Refraction>,
 }
 
-/// Refractive indices, of which the contrast is told (002 eq. 55).
+/// Refractive indices, whose contrast is reported (002 eq. 55).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Refraction {
@@ -74,7 +74,7 @@ pub struct Dissolved {
     pub absorptivity: Option<Given<Absorptivity>>,
 }
 
-/// What attenuates the light whose photons use up the inhibitor.
+/// The substances that attenuate the light whose photons use up the inhibitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AttenuatedBy {
@@ -97,7 +97,7 @@ pub struct InhibitionNumbers {
     pub radicals_per_dye: Option<GivenNumber>,
     /// `Ω`.
     pub radicals_per_photon: GivenNumber,
-    /// What attenuates the light meanwhile.
+    /// The substances that attenuate the light meanwhile.
     #[serde(default)]
     pub attenuated_by: AttenuatedBy,
 }
@@ -149,7 +149,7 @@ pub enum CompositionError {
     /// A number is impossible.
     #[error("{0} must be {1}")]
     Number(&'static str, &'static str),
-    /// The light is not told, or told twice.
+    /// The light is not given, or given twice.
     #[error("{0}")]
     Light(&'static str),
     /// Shrinkage needs one of two.
@@ -216,7 +216,7 @@ impl ShrinkageNumbers {
         number((0.0..=1.0).contains(&conversion), "shrinkage.conversion", "from 0 to 1")
     }
 
-    /// Returns the conversion that is given or measured; none if both are, or none is.
+    /// Returns the conversion that is given or measured; `None` if both are, or neither is.
     fn conversion(&self) -> Option<f64> {
         let areas = |[stretching, twisting, carbonyl]: [f64; 3]| shrinkage::PeakAreas {
             stretching,
@@ -245,7 +245,7 @@ impl Composition {
         }
     }
 
-    /// Returns a substance as the models have it: mol a litre, and l/(mol cm) to base e; of a lamp
+    /// Returns a substance as the models have it: mol a liter, and l/(mol cm) to base e; of a lamp
     /// with peaks, the mean over its light.
     fn absorber(
         &self,
@@ -257,19 +257,19 @@ impl Composition {
         let absorptivity =
             of.absorptivity.as_ref().map_or_else(|| mean(&self.peaks, |_| 1.0, at_peak), number);
         Absorber {
-            // 1 mol/m³ is a thousandth of a mol a litre.
+            // 1 mol/m³ is a thousandth of a mol a liter.
             concentration: of.concentration.value.mol_per_m3() / 1000.0,
             // 1 m²/mol is 10 l/(mol cm), and tables are to base 10.
             extinction: absorptivity * 10.0 * std::f64::consts::LN_10,
         }
     }
 
-    /// Returns the wavelength; of a lamp with peaks, that of the photons that the photoinitiator
-    /// absorbs at the surface, in the mean.
+    /// Returns the wavelength. For a lamp with peaks, it is the mean wavelength of the photons that
+    /// the photoinitiator absorbs at the surface.
     fn wavelength(&self) -> Length {
         let of_peaks = || {
-            // At the surface each peak has all of its light, of which the photoinitiator takes a
-            // part as its absorptivity.
+            // At the surface each peak has all of its light, of which the photoinitiator absorbs a
+            // part in proportion to its absorptivity.
             let absorbed = |peak: &Peak| peak.photoinitiator.value.m2_per_mol();
             Length::from_um(mean(&self.peaks, absorbed, |peak| peak.wavelength.value.um()))
         };
@@ -285,7 +285,7 @@ impl Composition {
         WorkingCurve::new(critical, suspension.penetration_depth())
     }
 
-    /// Returns what keeps the resin from curing.
+    /// Returns the inhibition that keeps the resin from curing.
     pub fn inhibition(&self) -> Inhibition {
         let of = &self.inhibition;
         Inhibition {
@@ -298,7 +298,7 @@ impl Composition {
     }
 
     /// Returns the share of its volume by which the suspension shrinks as it cures, if the
-    /// composition says what shrinks (002 eq. 51 to 54).
+    /// composition has monomers that shrink (002 eq. 51 to 54).
     pub fn volume_shrinkage(&self) -> Option<f64> {
         let of = self.shrinkage.as_ref()?;
         let monomer = |it: &MonomerNumbers| {
@@ -319,9 +319,9 @@ impl Composition {
         Some(refractive_contrast(of.ceramic.value, of.liquid.value))
     }
 
-    /// Returns the material that the models make of it: a working curve by 002 eq. 57 and 58
-    /// or 59, and as constants what no cure model reads, the shrinkage (eq. 51 to 54) and the contrast of the
-    /// refractive indices (eq. 55).
+    /// Returns the material that the models make of it: a working curve by 002 eq. 57 and 58 or 59,
+    /// and as constants that no cure model reads, the shrinkage (eq. 51 to 54) and the contrast of
+    /// the refractive indices (eq. 55).
     ///
     /// # Errors
     /// Returns an error if the numbers give no working curve.

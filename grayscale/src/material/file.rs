@@ -16,7 +16,7 @@ pub enum MaterialError {
     Model {
         /// The model's table.
         table: &'static str,
-        /// What is wrong with its numbers.
+        /// The fault in its numbers.
         problem: ModelError,
     },
     /// The light of full white is not above zero.
@@ -28,8 +28,7 @@ pub enum MaterialError {
     /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
-    /// A dimmed lamp's curve keeps the penetration depth of a working curve, and
-    /// there is none.
+    /// A dimmed lamp's curve keeps the penetration depth of a working curve, which is missing.
     #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
     NoWorkingCurve,
     /// Gray levels were measured under an unknown light.

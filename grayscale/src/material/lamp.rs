@@ -7,11 +7,11 @@ impl Material {
     /// Returns the material under a lamp of another light, as one that has aged (002 section 3.3.8).
     ///
     /// The critical dose follows the lamp by [`dimmed_lamp`](Self::dimmed_lamp) (eq. 36); the
-    /// penetration depth stays. Of a gray level, which passes the share `G` of the light, the
-    /// critical dose moves by `G` times as much, and the penetration depth stays that of the level:
-    /// it depends on the screen and not on the light (002 figure 65). 002 does not combine the two.
-    /// Two penetration depths stay as they are, and so does all of a material that does not say
-    /// how it follows the lamp; its doses then only take other times.
+    /// penetration depth stays. For a gray level, which passes the share `G` of the light, the
+    /// critical dose moves by `G` times as much, and the level keeps its penetration depth: it
+    /// depends on the screen and not on the light (002 figure 65). 002 does not combine the two.
+    /// Two penetration depths stay as they are. So does a material that does not say how it follows
+    /// the lamp; its doses then only take other times.
     ///
     /// # Errors
     /// Returns an error if the lines make no model under that light, or if gray levels follow the
@@ -20,7 +20,7 @@ impl Material {
         let mut under = self.clone();
         let source = "the lamp's present light".to_owned();
         under.intensity = Some(Given { value: lamp, plus_minus: None, source });
-        // The light is now that of a wide field.
+        // The light is now the light of a wide field.
         if let Some(spread) = &mut under.spread {
             spread.pixel = None;
         }
@@ -64,8 +64,8 @@ impl Material {
         self.dimmed_lamp.is_some()
     }
 
-    /// Returns whether a light is one of those under which the critical dose was measured; also if
-    /// the file does not say which those are.
+    /// Returns whether the critical dose was measured under this light; also true if the file does
+    /// not list the lights.
     pub fn knows_lamp(&self, lamp: Intensity) -> bool {
         let lights = self.dimmed_lamp.as_ref().and_then(|lines| lines.lights);
         lights.is_none_or(|lights| lights.holds(lamp))
@@ -113,7 +113,7 @@ mod tests {
         let curve = under.gray_curve().unwrap().unwrap().at(half);
         near(curve.critical_dose().mj_per_cm2(), 101.8 + 0.5 * (35.6 - 18.31 * 0.7));
         near(curve.penetration_depth().um(), 193.1 + 0.5 * 22.1);
-        // Lines over the light: E_c is that of 0.45 W/cm2, D_p that of the level.
+        // Lines over the light: E_c is the value at 0.45 W/cm2, D_p the value of the level.
         let only_light = Material { gray: None, ..lamp() };
         let under = only_light.under_lamp(watts(0.9)).unwrap();
         let curve = under.gray_lines().unwrap().unwrap().under(watts(0.9)).at(half);

@@ -47,8 +47,8 @@ pub struct Material {
     pub name: String,
     /// A description of one line.
     pub description: String,
-    /// The light of full white, `I_0`: that of a wide field, or of one pixel where
-    /// [`SpreadNumbers::pixel`] says so. [`Material::light`] is that of a wide field.
+    /// The light of full white, `I_0`: of a wide field, or of one pixel where
+    /// [`SpreadNumbers::pixel`] says so. [`Material::light`] is always for a wide field.
     pub intensity: Option<Given<Intensity>>,
     /// How far a pixel's light spreads sideways (001 eq. 5).
     pub spread: Option<SpreadNumbers>,
@@ -81,7 +81,7 @@ pub struct Material {
 pub struct SpreadNumbers {
     /// The standard deviation `σ`, half of 002's Gaussian width `W_o`.
     pub sigma: Given<Length>,
-    /// The side of the pixel that the intensity is told for, if not for a wide field.
+    /// The side of the pixel that the intensity is stated for, if not for a wide field.
     pub pixel: Option<Given<Length>>,
 }
 
@@ -177,7 +177,8 @@ impl Material {
     /// # Errors
     /// Returns an error if a number of the spread is impossible.
     pub fn light(&self) -> Result<Option<Intensity>, MaterialError> {
-        // 001 eq. 5 has the light of one pixel alone: in a wide field, those around add theirs.
+        // 001 eq. 5 has the light of one pixel alone: in a wide field, the pixels around add
+        // theirs.
         let gain = self.spread()?.map_or(1.0, |spread| spread.field_gain());
         let wide = |light: f64| Intensity::from_mw_per_cm2(light * gain);
         Ok(self.intensity.as_ref().map(|light| wide(light.value.mw_per_cm2())))
@@ -271,7 +272,7 @@ impl Material {
     /// Returns the cure width, if there is one.
     ///
     /// # Errors
-    /// Returns an error if a number is not above zero, or a size stands twice.
+    /// Returns an error if a number is not above zero, or a size occurs twice.
     pub fn cure_width(&self) -> Result<Option<CureWidth>, MaterialError> {
         if self.cure_width.is_empty() {
             return Ok(None);
@@ -286,10 +287,10 @@ impl Material {
     }
 
     /// Returns how its light fades, for doses that add up, by the most detailed model: the curves
-    /// of the gray levels, those of the light that gray levels pass, or the working curve.
+    /// of the gray levels, the curves of the light that gray levels pass, or the working curve.
     ///
     /// # Errors
-    /// Returns an error if there is none of them or no intensity, or if numbers are impossible.
+    /// Returns an error if there is no such model or no intensity, or if numbers are impossible.
     pub fn fading(&self) -> Result<FadingLight, ResinError> {
         let no_light = || ResinError::NoLight(self.name.clone());
         let light = || self.light()?.ok_or_else(no_light);
@@ -305,12 +306,12 @@ impl Material {
         Ok(FadingLight::of_curve(light()?, curve).map_err(of("working-curve"))?)
     }
 
-    /// Returns the most detailed cure model: the curves of the gray levels, those of the light
+    /// Returns the most detailed cure model: the curves of the gray levels, the curves of the light
     /// that gray levels pass, two penetration depths, or the working curve.
     ///
     /// # Errors
-    /// Returns an error if there is none, if numbers are impossible, or if the curves are those of
-    /// the light that gray levels pass and there is no intensity.
+    /// Returns an error if there is no model, if numbers are impossible, or if the model is the
+    /// curves of the light that gray levels pass and there is no intensity.
     pub fn cure_model(&self) -> Result<Box<dyn CureModel>, ResinError> {
         if let Some(gray) = self.gray_curve()? {
             return Ok(Box::new(gray));

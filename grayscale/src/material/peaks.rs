@@ -18,11 +18,11 @@ pub struct Peak {
     pub share: GivenNumber,
     /// The photoinitiator's absorptivity there, in powers of ten.
     pub photoinitiator: Given<Absorptivity>,
-    /// That of the UV absorber, if there is one.
+    /// The UV absorber's absorptivity there, if there is one.
     pub uv_absorber: Option<Given<Absorptivity>>,
 }
 
-/// Returns the mean of a number over the light of peaks, each with a weight besides.
+/// Returns the mean of a number over the light of peaks, each with an additional weight.
 pub(super) fn mean(
     peaks: &[Peak],
     weight: impl Fn(&Peak) -> f64,
@@ -34,7 +34,7 @@ pub(super) fn mean(
     sum / weights.sum::<f64>()
 }
 
-/// Checks that a composition tells the light once: by a wavelength, with absorptivities there, or
+/// Checks that a composition states the light once: by a wavelength, with absorptivities there, or
 /// by peaks, which have their own.
 pub(super) fn check_light(of: &Composition) -> Result<(), CompositionError> {
     let light = |is_told, words| if is_told { Ok(()) } else { Err(CompositionError::Light(words)) };

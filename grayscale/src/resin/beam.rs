@@ -6,9 +6,9 @@ use super::model::{CureModel, ModelError, positive};
 use super::units::{Dose, GrayLevel};
 use super::working_curve::WorkingCurve;
 
-/// A beam whose light falls off as `exp(-2 y²/W_o²)` with the distance `y` from its
-/// centre (002 eq. 41), as that of a laser and nearly that of one projected pixel.
-/// Adjacent pixels are beams side by side (002 figure 69).
+/// A beam whose light falls off as `exp(-2 y²/W_o²)` with the distance `y` from its center (002 eq.
+/// 41), as a laser beam does and nearly one projected pixel. Adjacent pixels are adjacent beams
+/// (002 figure 69).
 ///
 /// # Guarantees
 /// The width is above zero.
@@ -28,15 +28,15 @@ impl GaussianBeam {
     }
 
     /// Returns the share of the light, and so of the dose, that arrives at a
-    /// distance from the centre (002 eq. 41 and 42).
+    /// distance from the center (002 eq. 41 and 42).
     pub fn share(&self, y: Length) -> GrayLevel {
         // The exponent has 2 where a standard deviation would have 1/2: W_o is two of them.
         let share = (-2.0 * (y.um() / self.width.um()).powi(2)).exp();
         GrayLevel::clamped(share)
     }
 
-    /// Returns the dose at a distance `y` from the centre and a depth `z`, in a
-    /// resin that absorbs by Beer and Lambert; `peak` is the dose at the centre
+    /// Returns the dose at a distance `y` from the center and a depth `z`, in a
+    /// resin that absorbs by Beer and Lambert; `peak` is the dose at the center
     /// of the surface (002 eq. 43, whose left side says `z = 0` by mistake).
     pub fn dose(&self, peak: Dose, y: Length, z: Length, resin: &WorkingCurve) -> Dose {
         let through = (-z.um() / resin.penetration_depth().um()).exp();
@@ -44,7 +44,7 @@ impl GaussianBeam {
         Dose::from_mj_per_cm2(at_surface.mj_per_cm2() * through)
     }
 
-    /// Returns the depth that cures at a distance from the centre: `z* = D_p
+    /// Returns the depth that cures at a distance from the center: `z* = D_p
     /// ln(E/E_c) - 2 D_p y²/W_o²` (002 eq. 44), or zero if that is below zero.
     pub fn cure_depth(&self, peak: Dose, y: Length, resin: &WorkingCurve) -> Length {
         resin.depth(peak * self.share(y))
@@ -105,7 +105,7 @@ mod tests {
         let depth = |y| beam().cure_depth(peak, um(y), &lamp()).um();
         assert!(depth(half - 1e-6) > 0.0);
         assert_eq!(depth(half + 1e-6), 0.0);
-        // Eq. 44: a parabola, deepest at the centre.
+        // Eq. 44: a parabola, deepest at the center.
         assert_eq!(depth(0.0), lamp().depth(peak).um());
         let parabola = depth(0.0) - 2.0 * 211.0 * (5.0_f64 / 17.0).powi(2);
         assert!((depth(5.0) - parabola).abs() < 1e-9);

@@ -12,13 +12,13 @@ use super::working_curve::WorkingCurve;
 /// Avogadro's number times Planck's constant times the speed of light, in J m/mol.
 const MOLAR_PHOTON: f64 = 6.022_140_76e23 * 6.626_070_15e-34 * 299_792_458.0;
 
-/// Micrometres in a centimetre.
+/// Micrometers in a centimeter.
 const UM_PER_CM: f64 = 1e4;
 
 /// A substance that absorbs light in the liquid: the photoinitiator or the dye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorber {
-    /// `c`, in mol a litre of liquid.
+    /// `c`, in mol a liter of liquid.
     pub concentration: f64,
     /// `ε`, in l/(mol cm), to base e: `I = I_0 exp(-c ε z)`. Most tables give it
     /// to base 10, which is smaller by `ln 10`.
@@ -29,7 +29,7 @@ impl Absorber {
     /// No absorber.
     pub const NONE: Self = Self { concentration: 0.0, extinction: 0.0 };
 
-    /// `c ε`, for each centimetre of liquid.
+    /// `c ε`, for each centimeter of liquid.
     fn attenuation(self) -> f64 {
         self.concentration * self.extinction
     }
@@ -52,7 +52,7 @@ pub struct Suspension {
 /// The inhibitor, which keeps a resin from curing until it is used up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inhibition {
-    /// `c_INH`: oxygen and what stabilises the monomer, in mol a litre of liquid.
+    /// `c_INH`: oxygen and what stabilizes the monomer, in mol a liter of liquid.
     pub inhibitor: f64,
     /// `γ_INH`: radicals that each molecule of it removes.
     pub radicals_per_inhibitor: f64,
@@ -72,7 +72,7 @@ pub fn refractive_contrast(ceramic: f64, liquid: f64) -> f64 {
 
 impl Suspension {
     /// Returns the attenuation `1/D_p = 1/l_sc + (1 - Φ)(c_P ε_P + c_D ε_D)`, for
-    /// each centimetre (002 eq. 56 and 57).
+    /// each centimeter (002 eq. 56 and 57).
     fn attenuation(&self) -> f64 {
         // Ceramic scatters and does not absorb: of 002 eq. 56, the term of the ceramic is zero.
         let scattered = self.scattering_length.map_or(0.0, |length| UM_PER_CM / length.um());
@@ -102,7 +102,7 @@ impl Suspension {
         self.dose_over(inhibition, path)
     }
 
-    /// Returns the dose whose photons, absorbed over `path` centimetres, make the
+    /// Returns the dose whose photons, absorbed over `path` centimeters, make the
     /// radicals that inhibitor and dye take.
     fn dose_over(&self, inhibition: &Inhibition, path: f64) -> Dose {
         let taken = inhibition.radicals_per_inhibitor * inhibition.inhibitor

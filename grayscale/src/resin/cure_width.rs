@@ -50,8 +50,7 @@ impl CureWidth {
     /// Creates the model of features of these sizes, in any order.
     ///
     /// # Errors
-    /// Returns an error if there is no size, one stands twice, or a number is not
-    /// above zero.
+    /// Returns an error if there is no size, a size occurs twice, or a number is not above zero.
     pub fn new(mut lines: Vec<WidthLine>) -> Result<Self, ModelError> {
         for line in &lines {
             positive(line.feature_size.um(), "feature-size")?;
@@ -99,9 +98,9 @@ impl CureWidth {
     }
 
     /// Returns the size `s` to be exposed so that a feature cures to a size `L`:
-    /// `s + 2 C_w(s) = L`, as the measured sizes are those of exposed squares.
+    /// `s + 2 C_w(s) = L`, since measured sizes are sizes of exposed squares.
     ///
-    /// Zero if the least feature cures larger than that.
+    /// Zero if the least feature cures larger than `L`.
     pub fn exposed_size(&self, dose: Dose, cured_size: Length) -> Length {
         let wanted = cured_size.um();
         let [mut low, mut high] = [0.0, wanted.max(0.0)];
@@ -116,7 +115,7 @@ impl CureWidth {
         Length::from_um(low)
     }
 
-    /// Returns the growth of each edge of features that cure to a size: that of the exposed one.
+    /// Returns the growth of each edge of features that cure to a size, by their exposed size.
     pub fn width_of_cured(&self, dose: Dose, cured_size: Length) -> Length {
         self.width(dose, self.exposed_size(dose, cured_size))
     }

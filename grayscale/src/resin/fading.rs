@@ -7,12 +7,12 @@ use super::model::ModelError;
 use super::units::{Dose, ExposureTime, GrayLevel, Intensity};
 use super::working_curve::WorkingCurve;
 
-/// What exposures of each gray level leave in the resin below: shares of the critical dose, which
-/// add up (002 section 3.4.8 a).
+/// The shares of the critical dose that exposures of each gray level leave in the resin below; the
+/// shares add up (002 section 3.4.8 a).
 ///
-/// A level `G` brings `G I_0 t / E_c(G)` critical doses to the surface, which fade by e over its own
-/// `D_p(G)` (002 eq. 28, 39 and 40). So an exposure alone cures just as deep as its working curve
-/// says; resin is cured where the shares of all exposures that reach it come to 1.
+/// A level `G` brings `G I_0 t / E_c(G)` critical doses to the surface, which fade by e over its
+/// own `D_p(G)` (002 eq. 28, 39 and 40). So an exposure alone cures exactly to the depth of its
+/// working curve; resin is cured where the shares of all exposures that reach it sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FadingLight {
     light: Intensity,
@@ -49,7 +49,7 @@ impl FadingLight {
         dose.mj_per_cm2() / self.curve.at(gray).critical_dose().mj_per_cm2()
     }
 
-    /// Returns what each gray level leaves in an exposure, for slicing.
+    /// Returns the light that each gray level leaves in an exposure, for slicing.
     pub fn levels(&self, time: ExposureTime) -> FadingLevels {
         FadingLevels::new(|gray| {
             let gray = GrayLevel::clamped(gray);

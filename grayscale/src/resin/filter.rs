@@ -49,7 +49,7 @@ mod tests {
             let found = OpticalDensity::of(lamp, passed).unwrap();
             assert!((found.get() - od).abs() < 1e-12);
         }
-        // What 002 goes on with is another filter's.
+        // The number that 002 continues with belongs to another filter.
         let printed = OpticalDensity::of(lamp, Intensity::from_mw_per_cm2(896.0)).unwrap();
         assert!((printed.get() - 0.251812).abs() < 1e-6);
     }

@@ -105,7 +105,7 @@ impl IntensityLines {
 /// The working curve of each gray level: `C_d = D_p(G) ln(G I_0 t / E_c(G))`
 /// (002 eq. 39 and 40), where `I_0 t` is the dose of white.
 ///
-/// As a [`CureModel`], its doses are those of full white.
+/// As a [`CureModel`], its doses are doses of full white.
 ///
 /// # Guarantees
 /// Every gray level has a working curve, and a whiter one cures deeper
@@ -157,7 +157,7 @@ impl CureModel for GrayCurve {
         let [mut low, mut high] = [0.0, 1.0];
         loop {
             let middle = f64::midpoint(low, high);
-            // No number lies between two neighbours: their midpoint is one of them.
+            // No number lies between two neighbors: their midpoint is one of them.
             if middle <= low || middle >= high {
                 return Ok(GrayLevel::clamped(high));
             }

@@ -87,9 +87,9 @@ impl Kinetics {
             * watt_per_m2
     }
 
-    /// Returns by which power of e light fades in a micrometre of a mol/m³ of initiator.
+    /// Returns by which power of e light fades in a micrometer of a mol/m³ of initiator.
     pub fn fading(&self) -> f64 {
-        // The exponent 2.3 ε [In] z of 003 eq. 4, for z of a micrometre.
+        // The exponent 2.3 ε [In] z of 003 eq. 4, for z of a micrometer.
         1e-6 * DECADES * self.absorptivity.number()
     }
 }

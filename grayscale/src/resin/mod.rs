@@ -104,12 +104,12 @@ impl Resin {
         Ok(self.model.dose(depth)? / self.light)
     }
 
-    /// Returns the gray levels that cure each depth in an exposure, for slicing: those of
-    /// [`Self::gray_for`], rounded to 8 bits. Depths that white just cures, and deeper
-    /// ones, are white.
+    /// Returns the gray levels that cure each depth in an exposure, for slicing: levels by
+    /// [`Self::gray_for`], rounded to 8 bits. Depths that white just cures, and deeper ones, are
+    /// white.
     ///
     /// # Errors
-    /// Returns an error if the model does not hold for all depths up to that of white.
+    /// Returns an error if the model does not hold for all depths up to the depth of white.
     pub fn depth_levels(&self, time: ExposureTime) -> Result<DepthLevels, CureError> {
         depth_levels(self.model(), self.light * time)
     }
@@ -119,7 +119,7 @@ impl Resin {
 /// as [`Resin::depth_levels`] does: a level needs only doses.
 ///
 /// # Errors
-/// Returns an error if the model does not hold for all depths up to that of white.
+/// Returns an error if the model does not hold for all depths up to the depth of white.
 pub fn depth_levels(model: &dyn CureModel, white: Dose) -> Result<DepthLevels, CureError> {
     let depths = model.depths();
     let reach = model.gray_depth(GrayLevel::WHITE, white);

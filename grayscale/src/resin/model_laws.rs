@@ -9,7 +9,7 @@ use proptest::test_runner::TestRunner;
 use super::{CureError, CureModel, Dose, GrayLevel};
 
 /// The films of 000 appendix A: seconds at 0.2064 mW/cm², and measured heights in
-/// micrometres.
+/// micrometers.
 pub(crate) const APPENDIX_A: [(f64, f64); 10] = [
     (170.0, 611.4583333),
     (160.0, 581.6666667),
@@ -80,7 +80,7 @@ fn gray_is_undone(
     if let [a, b] = levels[..] {
         prop_assert!((depths[0] <= depths[1]) == (a <= b) || a == b, "{:?} {:?}", a, b);
     }
-    // What white cures takes white, to rounding.
+    // The depth that white cures needs white, to rounding.
     prop_assert!(model.gray_for(deepest, white).unwrap().get() > 1.0 - 1e-9);
     Ok(())
 }

@@ -4,7 +4,7 @@ use lamp_stack::Length;
 
 use super::model::{ModelError, positive, zero_or_more};
 
-/// Light that falls off as `exp(-r²/2σ²)` with the distance `r` from a pixel's centre
+/// Light that falls off as `exp(-r²/2σ²)` with the distance `r` from a pixel's center
 /// (001 eq. 3 and 5). `σ` is half of 002's Gaussian width `W_o` (002 eq. 41).
 ///
 /// # Guarantees
@@ -16,18 +16,18 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Light that does not spread, told for a wide field.
+    /// Light that does not spread, stated for a wide field.
     pub const NONE: Self = Self { sigma: Length::from_um(0.0), pixel: None };
 
-    /// The largest standard deviation, ten times those of 001 and 002: what is beyond is a slip of
-    /// the unit, and would have every pixel light the whole image.
+    /// The largest standard deviation, ten times the values of 001 and 002: larger ones are slips
+    /// of the unit, and would have every pixel light the whole image.
     pub const WIDEST: Length = Length::from_um(2000.0);
 
     /// Creates the spread of a standard deviation `σ`; zero is light that does not spread.
     ///
-    /// `pixel` says what a lamp's intensity was told for: the centre of one lit pixel of that
-    /// side alone (001 eq. 5, whose kernel is not normalised), or, without it, a wide white
-    /// field, as a radiometer reads it.
+    /// `pixel` says what a lamp's intensity was stated for: the center of one lit pixel of that
+    /// side alone (001 eq. 5, whose kernel is not normalized), or, without it, a wide white field,
+    /// as a radiometer reads it.
     ///
     /// # Errors
     /// Returns an error if `σ` is below zero or above [`Self::WIDEST`], the pixel is not above
@@ -46,8 +46,8 @@ impl Spread {
         self.sigma
     }
 
-    /// Returns the side of the pixel that the lamp's intensity was told for, if not for a
-    /// wide field.
+    /// Returns the side of the pixel that the lamp's intensity was stated for, if not for a wide
+    /// field.
     pub const fn pixel(&self) -> Option<Length> {
         self.pixel
     }
@@ -59,7 +59,7 @@ impl Spread {
         let sigma_px = self.sigma.um() / pixel.um();
         // From two pixels on the sum is the integral to the last bit.
         let line = if sigma_px < 2.0 {
-            // Below two pixels of spread, the twentieth neighbour has less than exp(-45) of the
+            // Below two pixels of spread, the twentieth neighbor has less than exp(-45) of the
             // light.
             let pairs = (1..20).map(|x| (-0.5 * (f64::from(x) / sigma_px).powi(2)).exp());
             1.0 + 2.0 * pairs.sum::<f64>()

@@ -81,7 +81,7 @@ fn windows_of_diffused_errors_have_the_density_of_the_level() {
     }
 }
 
-/// The side of the largest square of one colour.
+/// The side of the largest square of one color.
 fn largest_square(mask: &Mask) -> usize {
     let solid = |&side: &usize| {
         let all = (side * side) as u32;
