@@ -11,18 +11,17 @@ use crate::table::HeightTable;
 /// The relative precision to which bounds are found.
 const PRECISION: f64 = 0.01;
 
-/// That of guesses, which cost little.
+/// The relative precision of guesses, which cost little.
 const GUESS_PRECISION: f64 = 0.001;
 
 /// Bounds below this one are rounding.
 const NOTHING: f64 = 1e-9;
 
 impl HeightSearch<'_> {
-    /// Finds the smallest bound, to one percent, whose layers together cost at most
-    /// `max`, and these layers. Each is the one that costs least for its thickness among
-    /// those within the bound; of all ways to place as many at the same cost or less, the
-    /// layers are those that lose and gain least. `cost` returns the cost of a layer by its
-    /// thickness; a cost of 1 counts layers.
+    /// Finds the smallest bound, to one percent, whose layers together cost at most `max`, and
+    /// these layers. Each layer is the one within the bound that costs least for its thickness. Of
+    /// all ways to place as many layers at the same cost or less, these lose and gain least. `cost`
+    /// returns the cost of a layer by its thickness; a cost of 1 counts layers.
     ///
     /// The bound is infinite if the budget needs layers whose error is infinite.
     ///
@@ -45,7 +44,7 @@ impl HeightSearch<'_> {
         Ok((bound, self.placed(&grid, climb, &known, bound, Some(budget))))
     }
 
-    /// Returns what layers cost if none is too bad.
+    /// Returns the cost of the layers if no error is too large.
     fn least_cost(&self, grid: &Grid<'_>, budget: Budget<'_>) -> f64 {
         let (mut step, mut cost) = (0, 0.0);
         while step < grid.end() {
@@ -131,7 +130,7 @@ impl HeightSearch<'_> {
         (low, found)
     }
 
-    /// Guesses the smallest bound within the budget. It is infinite if there is none.
+    /// Guesses the smallest bound within the budget: infinite if no bound is.
     fn guess_bound(
         &self,
         grid: &Grid<'_>,

@@ -1,15 +1,14 @@
-//! Tells whether a mesh is closed without finding which facets are neighbours.
+//! Checks whether a mesh is closed without finding neighboring facets.
 
 use lamp_slicer::PlacedFacet;
 
-/// A sum over the edges of facets that is zero if each edge is passed as often one way as the
-/// other. Edges count by numbers that have nothing to do with each other, so of meshes with gaps
-/// about one in 2^64 sums to zero.
+/// A sum over the edges of facets: zero if each edge is passed equally often in both directions.
+/// Edges count by unrelated numbers, so about one in 2^64 meshes with gaps sums to zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct EdgeSum(u64);
 
 impl EdgeSum {
-    /// Adds the edges of a facet. Those of bodies with different names are never the same.
+    /// Adds the edges of a facet. Edges of bodies with different names are never the same.
     pub(crate) fn add(&mut self, facet: &PlacedFacet, body: u32) {
         let corners = facet.map(|corner| number_of(corner, body));
         for k in 0..3 {
@@ -23,7 +22,8 @@ impl EdgeSum {
         }
     }
 
-    /// Returns true if the mesh has no gap, no edge of one facet and none that turns over.
+    /// Returns true if the mesh has no gap, no edge of a single facet and no edge where the
+    /// orientation flips.
     pub(crate) fn is_closed(self) -> bool {
         self.0 == 0
     }

@@ -35,13 +35,12 @@ impl Criterion for VolumeDeviation {
         layer.deviation()
     }
 
-    // Let the last of the layers be `w` thick and hold the volume `V1`, of which at
-    // least `L` is wrong in any thicker layer. A layer of thickness `(1 + r) w` whose
-    // section has the area `a` holds `V1 + V2`, of which `S1` and `S2` are wrong.
-    // What its section lacks of the part above `w` is wrong, so `V2 <= S2 + r w a`;
-    // what it has beyond the part below is wrong, so `w a <= S1 + V1`. If it is
-    // within the bound `d`, then `S1 + S2 <= d (V1 + V2)`, and with `m = max(1, r)`
-    // follows `V1 + V2 <= V1 (1 + r) / (1 - m d)`. But `L <= S1`: where `L` is more
+    // Let the last of the layers be `w` thick and hold the volume `V1`, of which at least `L` is
+    // wrong in any thicker layer. A layer of thickness `(1 + r) w` whose section has the area `a`
+    // holds `V1 + V2`, of which `S1` and `S2` are wrong. The part above `w` that its section lacks
+    // is wrong, so `V2 <= S2 + r w a`; the excess of its section over the part below is wrong, so
+    // `w a <= S1 + V1`. If it is within the bound `d`, then `S1 + S2 <= d (V1 + V2)`, and with
+    // `m = max(1, r)` follows `V1 + V2 <= V1 (1 + r) / (1 - m d)`. But `L <= S1`: where `L` is more
     // than `d` times that, no such layer is within the bound.
     fn rules_out_thicker(&self, layers: &SweptLayers, max_um: f64, bound: f64) -> bool {
         let Some(last) = layers.each.last() else { return false };
@@ -53,7 +52,7 @@ impl Criterion for VolumeDeviation {
     }
 }
 
-/// The cusp height in micrometres: the distance of the layer's edge from the part's
+/// The cusp height in micrometers: the distance of the layer's edge from the part's
 /// surface, along its normal, `c = t |N_z|`.
 ///
 /// Source: Dolenc and Makela, by 002 equations 7 to 10.
@@ -72,9 +71,8 @@ impl Criterion for CuspHeight {
     }
 }
 
-/// The change of the section's area from the layer's bottom to its top, as a share
-/// of that at the bottom. It does not see walls that lean without a change of area
-/// (002 figure 45).
+/// The change of the section's area from the layer's bottom to its top, as a share of the area at
+/// the bottom. It does not see walls that lean without a change of area (002 figure 45).
 ///
 /// Source: Jamieson and Hacker, by 002 equation 23.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,9 +1,9 @@
-//! What facets alone say of layers: exact where no other facet is above or below them.
+//! Measures layers by facets alone: exact where no other facet is above or below them.
 //!
-//! A facet is a plane, and the area that it covers between two heights, seen from above, is
-//! a tent over height: none at the lowest and the highest corner, most at the one between.
-//! So what it makes a layer lose or gain is a cubic polynomial of the layer's top. The
-//! section at the layer's bottom is enclosed by the segments in which facets cut it.
+//! A facet is a plane. The area that it covers between two heights, seen from above, is a tent over
+//! height: zero at the lowest and the highest corner, largest at the one between. So the volume
+//! that it makes a layer lose or gain is a cubic polynomial of the layer's top. The segments in
+//! which facets cut the layer's bottom enclose the section there.
 
 use lamp_slicer::PlacedFacet;
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ pub(crate) struct Facets {
 }
 
 impl Facets {
-    /// Sums facets up, with tops above the bottom in micrometres, rising. Returns nothing if
+    /// Sums facets up, with tops above the bottom in micrometers, rising. Returns nothing if
     /// there are no facets.
     pub(crate) fn sum(facets: &[(PlacedFacet, u32)], bottom_um: f64, tops: &[f64]) -> Option<Self> {
         let [x, y, _] = facets.first()?.0[0];
@@ -57,8 +57,8 @@ impl Facets {
         x.abs() + y.abs() <= CLOSED * self.bottom.length
     }
 
-    /// Returns the area within the contours at the bottom, in square millimetres; as often as
-    /// they wind around it.
+    /// Returns the area within the contours at the bottom, in square millimeters, counted as often
+    /// as they wind around it.
     pub(crate) fn bottom_area(&self) -> f64 {
         self.bottom.area
     }
@@ -83,7 +83,7 @@ fn add_facet(facet: &PlacedFacet, profile: &mut Profile<'_>) {
     if low == high {
         return add([low, high], whole, [1.0; 2]);
     }
-    // The area covered below the middle corner is to all as its height is.
+    // The share of the area below the middle corner is its share of the height.
     let below = whole * ((middle - low) / (high - low));
     for (ends, extent, density) in
         [([low, middle], below, [0.0, 2.0]), ([middle, high], whole - below, [2.0, 0.0])]
@@ -96,7 +96,7 @@ fn add_facet(facet: &PlacedFacet, profile: &mut Profile<'_>) {
             add(ends, extent, density);
             continue;
         }
-        // What is left above the bottom, of a density that goes evenly.
+        // The rest above the bottom: its density changes linearly.
         let at_bottom = density[1] + (density[0] - density[1]) * share;
         let mean = 0.5 * (at_bottom + density[1]);
         if mean > 0.0 {
@@ -147,8 +147,8 @@ impl Contours {
     }
 }
 
-/// Returns where an edge meets height 0, from its end below to that above, so that both
-/// facets on it agree.
+/// Returns where an edge meets height 0, going from its lower to its upper end, so that both facets
+/// on it agree.
 fn at_bottom(below: [f64; 3], above: [f64; 3]) -> [f64; 2] {
     let share = below[2] / (below[2] - above[2]);
     [0, 1].map(|axis| below[axis] + share * (above[axis] - below[axis]))

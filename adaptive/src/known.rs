@@ -9,7 +9,7 @@ use crate::table::HeightTable;
 /// The step below some layers, and for each thickness in steps, rising, the layer.
 pub(crate) type Known = BTreeMap<usize, Vec<(usize, SweptLayer)>>;
 
-/// Keeps layers from one step; those that were asked about further up, if there are others.
+/// Keeps layers from one step; of two lists from the same step, the longer.
 pub(crate) fn know(known: &mut Known, step: usize, layers: Vec<(usize, SweptLayer)>) {
     match known.entry(step) {
         Entry::Occupied(mut before) if before.get().len() < layers.len() => {
@@ -22,8 +22,8 @@ pub(crate) fn know(known: &mut Known, step: usize, layers: Vec<(usize, SweptLaye
     }
 }
 
-/// Guesses layers from one step: they lose and gain what the table says, less what it says too
-/// much of known layers with the same top from the nearest step.
+/// Guesses layers from one step: they lose and gain the table's values, less the table's excess
+/// over known layers with the same top from the nearest step.
 pub(crate) fn guessed(
     table: &HeightTable,
     known: &Known,

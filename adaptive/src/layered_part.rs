@@ -46,9 +46,9 @@ impl Rows {
 
 /// A part seen along rows, for comparing it with layers.
 ///
-/// Volumes are exact for the facets wherever a vertical line meets one facet of a layer at
-/// most. Where it meets several, the difference is exact along x and z, and along y a sum
-/// over rows, as in images. If the mesh has a gap, so is all.
+/// Volumes are exact for the facets wherever a vertical line meets at most one facet of a layer.
+/// Where it meets several, the difference is exact along x and z, and along y a sum over rows, as
+/// in images. If the mesh has a gap, rows measure the whole part.
 #[derive(Debug)]
 pub struct LayeredPart {
     facets: FacetIndex,
@@ -59,7 +59,7 @@ pub struct LayeredPart {
     overlaps: Mutex<Option<Arc<OverlapRows>>>,
 }
 
-/// What is known of all facets together.
+/// The data of all facets together.
 #[derive(Clone, Copy, Debug)]
 struct MeshFacts {
     is_closed: bool,
@@ -84,7 +84,7 @@ impl LayeredPart {
         Ok(Self { facets, rows, rule, mesh: OnceLock::new(), overlaps: Mutex::new(None) })
     }
 
-    /// Returns the heights of the lowest and the highest point, in micrometres.
+    /// Returns the heights of the lowest and the highest point, in micrometers.
     pub fn heights_um(&self) -> [f64; 2] {
         [self.facets.min()[2], self.facets.max()[2]]
     }
@@ -128,7 +128,7 @@ impl LayeredPart {
         MeshFacts { is_closed: edges.is_closed(), mean_height_um }
     }
 
-    /// Returns the heights of flat faces in micrometres, rising: of level facets whose
+    /// Returns the heights of flat faces in micrometers, rising: of level facets whose
     /// areas add up to at least a row's pitch squared. The lowest corner counts, since
     /// faces that were turned into their place are level only up to rounding.
     pub fn flat_faces_um(&self) -> Vec<f64> {
@@ -148,7 +148,7 @@ impl LayeredPart {
     }
 
     /// Returns the layers from one height to each of several rising tops, all in
-    /// micrometres. A layer that holds the part's top has its section there, as in the
+    /// micrometers. A layer that holds the part's top has its section there, as in the
     /// slicer.
     ///
     /// # Panics
@@ -174,7 +174,7 @@ impl LayeredPart {
         }
     }
 
-    /// Returns the changes from the bottom to each plane above it: those of facets alone, and
+    /// Returns the changes from the bottom to each plane above it: the changes by facets alone, and
     /// how rows differ from them. Where the mesh has a gap, rows alone count.
     fn all(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripes = self.stripes(facets);
@@ -255,7 +255,7 @@ impl LayeredPart {
     }
 }
 
-/// Changes of a part's section from a bottom up, in square millimetres and micrometres of
+/// Changes of a part's section from a bottom up, in square millimeters and micrometers of
 /// height.
 pub(crate) struct Rise {
     /// For each plane.
@@ -283,7 +283,7 @@ pub(crate) fn cosine_to_vertical(facet: &PlacedFacet) -> f64 {
     if length > 0.0 { normal[2].abs() / length } else { 0.0 }
 }
 
-/// Returns a facet's normal, as long as twice its area in square millimetres.
+/// Returns a facet's normal, as long as twice its area in square millimeters.
 fn normal(facet: &PlacedFacet) -> [f64; 3] {
     let [a, b, c] = facet.map(|[x, y, z_um]| [x, y, z_um / 1000.0]);
     let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));

@@ -1,8 +1,9 @@
 //! The rows in which facets lie above each other within a layer, found once for a whole part.
 //!
-//! Elsewhere facets by themselves say all of a layer ([`HeightTable`](crate::table::HeightTable)),
-//! and a search that tries layers from many heights need not meet them with rows each time. Slabs
-//! much higher than a layer tell where that is so: rows meet each facet about once.
+//! Elsewhere facets by themselves give layers completely
+//! ([`HeightTable`](crate::table::HeightTable)), and a search that tries layers from many heights
+//! need not meet them with rows each time. Slabs much higher than a layer show where this holds:
+//! rows meet each facet about once.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -32,7 +33,7 @@ const ROWS_PER_CHUNK: usize = 64;
 /// Fewer lines than this are not worth several threads.
 const MANY_LINES: usize = 16_384;
 
-/// A row in which facets do not say all.
+/// A row in which facets do not give layers completely.
 #[derive(Clone, Copy, Debug)]
 struct OverlapRow {
     row: u32,
@@ -45,7 +46,7 @@ struct OverlapRow {
 struct Parts(u64);
 
 impl Parts {
-    /// Returns the parts that a range meets. All heights are in micrometres.
+    /// Returns the parts that a range meets. All heights are in micrometers.
     fn of(range: [f64; 2], [bottom_um, top_um]: [f64; 2]) -> Self {
         let part = |height: f64| (64.0 * (height - bottom_um) / (top_um - bottom_um)) as u32;
         let [first, last] = range.map(|height| part(height).min(63));
@@ -61,7 +62,7 @@ impl Parts {
     }
 }
 
-/// By slab, the rows in which facets do not say all of layers up to some thickness.
+/// By slab, the rows in which facets do not give layers up to some thickness completely.
 #[derive(Debug)]
 pub(crate) struct OverlapRows {
     reach_um: f64,
@@ -140,12 +141,12 @@ struct SlabLines {
     by_row: Grouped<Line>,
 }
 
-/// How layers differ from what facets say of them one by one.
+/// The differences of layers from the sums of single facets.
 #[derive(Debug)]
 pub(crate) struct Overlaps<'a> {
     part: &'a LayeredPart,
     rows: Arc<OverlapRows>,
-    /// Those of the slab that was asked about last: layers are asked about from the bottom up.
+    /// The lines of the last slab asked about: layers are asked about from the bottom up.
     lines: RefCell<SlabLines>,
 }
 
@@ -177,8 +178,9 @@ impl<'a> Overlaps<'a> {
         told.into_iter().enumerate().map(layer).collect()
     }
 
-    /// Returns how layers from a height to each of several planes above it differ from what
-    /// facets say, if they do. Heights are in micrometres, those of planes above the bottom.
+    /// Returns the differences of layers, from a height to each of several planes above it, from
+    /// the sums of facets, if there are any. Heights are in micrometers; planes' heights are above
+    /// the bottom.
     fn differences(&self, bottom_um: f64, planes: &[f64]) -> Option<Rise> {
         let slab = self.rows.slab_of(self.part, bottom_um);
         let rows = &self.rows.slabs[slab];

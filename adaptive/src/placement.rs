@@ -11,8 +11,8 @@ use crate::thicknesses::Thicknesses;
 /// longer than the search.
 const MAX_WAYS: usize = 50_000_000;
 
-/// What layers cost: how many are past the bound, and the volume that they lose and gain, in
-/// cubic millimetres.
+/// The cost of layers: how many are past the bound, and the volume that they lose and gain, in
+/// cubic millimeters.
 type Cost = (u32, f64);
 
 /// All ways to place layers between whole steps.
@@ -22,7 +22,7 @@ pub(crate) struct LayerPlacement<'a> {
     pub(crate) criterion: &'a dyn Criterion,
     pub(crate) ends: &'a [usize],
     pub(crate) bound: f64,
-    /// Layers that are known better than the table does.
+    /// Layers that are known better than from the table.
     pub(crate) known: &'a Known,
 }
 
@@ -33,12 +33,12 @@ struct Way {
 }
 
 impl LayerPlacement<'_> {
-    /// Returns the thicknesses, in steps, of the layers that cost least, of as many as end in
-    /// `tops`. Returns nothing if none cost less than `worthwhile`, or too many are to compare.
+    /// Returns the thicknesses, in steps, of the layers that cost least, as many as `tops` has.
+    /// Returns nothing if none cost less than `worthwhile`, or too many are to compare.
     ///
-    /// Each layer is to end above where the layer before was found to end, and no higher than
-    /// it was found to end itself. Where thicker layers are worse, no others are of use: those
-    /// found reach as high as so many can, and from lower down it takes more to the end.
+    /// Each layer is to end above the found end of the layer before, and no higher than its own
+    /// found end. Where thicker layers are worse, no other ways are of use: the layers found reach
+    /// as high as so many can, and from lower down it takes more to the end.
     pub(crate) fn least_error(&self, tops: &[usize], worthwhile: Cost) -> Option<Vec<usize>> {
         let end = *tops.last()?;
         // Dynamic programming looks at every end with every thickness.
@@ -92,8 +92,8 @@ impl LayerPlacement<'_> {
         known_of(self.known.get(&step)?, steps)
     }
 
-    /// Returns the layers that the search may take from a step, and that may end where they do:
-    /// those within the bound, or the thinnest if no layer is.
+    /// Returns the layers that the search may take from a step and that may end where they do: the
+    /// layers within the bound, or the thinnest if no layer is.
     fn ways(&self, step: usize, may_end: impl Fn(usize) -> bool) -> Vec<Way> {
         let choices = self.thicknesses.choices(step, self.ends);
         let known = self.known.get(&step);
@@ -120,7 +120,7 @@ impl LayerPlacement<'_> {
     }
 }
 
-/// Returns the layer of a thickness, in steps, of those known from one step.
+/// Among the layers known from one step, returns the layer of a thickness in steps.
 fn known_of(known: &[(usize, SweptLayer)], steps: usize) -> Option<SweptLayer> {
     let place = known.binary_search_by_key(&steps, |(steps, _)| *steps).ok()?;
     Some(known[place].1)

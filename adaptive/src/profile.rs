@@ -19,7 +19,7 @@ const MANY_TOPS: usize = 6;
 const SMALL_PART: usize = 50;
 
 /// A change as a layer's top rises past lines: of the section's area in square
-/// millimetres, and of volumes in square millimetres times micrometres.
+/// millimeters, and of volumes in square millimeters times micrometers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ProfileChange {
     pub(crate) area: f64,
@@ -44,7 +44,7 @@ const LEVEL_UM: f64 = 1e-4;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
     pub(crate) heights: [f64; 2],
-    /// The area that it covers, seen from above, in square millimetres.
+    /// The area that it covers, seen from above, in square millimeters.
     pub(crate) extent: f64,
     /// How dense this area is at its ends, as a share of its mean.
     pub(crate) density: [f64; 2],
@@ -141,9 +141,9 @@ impl Polynomials {
 /// Changes by top, over many surfaces.
 #[derive(Debug)]
 pub(crate) struct Profile<'a> {
-    /// Tops above the layer's bottom, in micrometres, rising.
+    /// Tops above the layer's bottom, in micrometers, rising.
     tops: &'a [f64],
-    /// About how many tops lie in a micrometre.
+    /// About how many tops lie in a micrometer.
     per_um: f64,
     /// The polynomials that begin at each top, and hold from there on.
     starts: Vec<Polynomials>,

@@ -6,7 +6,7 @@ use std::ops::Range;
 /// places, however long it is.
 #[derive(Debug)]
 pub(crate) struct RangeMax {
-    /// What is known of the 2^k places from each on.
+    /// The greatest known number of the 2^k places from each on.
     levels: Vec<Vec<f64>>,
 }
 
@@ -16,10 +16,10 @@ impl RangeMax {
         Self { levels: vec![vec![0.0; count]] }
     }
 
-    /// Raises the places of a range to a number at least.
+    /// Raises the numbers of the places of a range to at least `number`.
     ///
     /// # Panics
-    /// Panics if the range is empty, or does not lie within the places.
+    /// Panics if the range is empty, or not within the places.
     pub(crate) fn raise(&mut self, range: Range<usize>, number: f64) {
         let level = range.len().ilog2() as usize;
         while self.levels.len() <= level {

@@ -6,7 +6,7 @@ use lamp_stack::Grouped;
 
 use crate::sweep::{Slope, Toggle};
 
-/// What rows see of facets between two heights.
+/// The lines of facets between two heights, as rows see them.
 #[derive(Debug, Default)]
 pub(crate) struct RowCuts {
     pub(crate) toggles: Vec<Toggle>,
@@ -14,7 +14,7 @@ pub(crate) struct RowCuts {
 }
 
 impl RowCuts {
-    /// Adds what some rows see of a body's facet between two heights (micrometres).
+    /// Adds a body's facet between two heights (micrometers), as some rows see it.
     pub(crate) fn add_facet(&mut self, facet: &RowFacet, body: u32, rows: [u32; 2], z: [f64; 2]) {
         let seen = facet.rows_between(z);
         let seen = seen.start.max(rows[0])..seen.end.min(rows[1]);
@@ -54,7 +54,7 @@ impl RowCuts {
         if to[1] > top {
             high = at(top);
         }
-        // An upright line has no columns above it: what it parts, its toggle says.
+        // An upright line has no columns above it: its toggle records its effect.
         if low[0] != high[0] {
             let (left, right) = if low[0] < high[0] { (low, high) } else { (high, low) };
             let turn = Turn::new(body, if start[0] < end[0] { 1 } else { -1 });
@@ -64,7 +64,7 @@ impl RowCuts {
     }
 }
 
-/// What rows see, row by row.
+/// The lines that rows see, row by row.
 pub(crate) struct CutRows {
     toggles: Grouped<Toggle>,
     slopes: Grouped<Slope>,
@@ -81,7 +81,7 @@ impl CutRows {
         }
     }
 
-    /// Returns what a row sees, sorted from the left, given how far it is from the first.
+    /// Returns the lines that a row sees, sorted from the left; `row` counts from the first.
     pub(crate) fn sorted_row(&mut self, row: usize) -> (&[Toggle], &[Slope]) {
         let (toggles, slopes) = (self.toggles.group_mut(row), self.slopes.group_mut(row));
         toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));

@@ -29,12 +29,12 @@ pub struct HeightSearch<'a> {
     pub criterion: &'a dyn Criterion,
     /// Makes layers end at flat faces.
     pub snap: bool,
-    /// Is told of each layer found.
+    /// Is called for each layer found.
     pub watch: Watch<'a>,
 }
 
-/// What is told of each layer that a search finds. A search that tries several bounds begins
-/// again at the bottom.
+/// The report of a layer that a search finds. A search that tries several bounds begins again at
+/// the bottom for each.
 #[derive(Clone, Copy)]
 pub struct Watch<'a>(pub &'a dyn Fn(&SweptLayer));
 
@@ -55,7 +55,7 @@ impl fmt::Debug for Watch<'_> {
 pub struct Heights {
     /// The layers.
     pub layers: Vec<SweptLayer>,
-    /// The part's volume above the last layer, in cubic millimetres: heights are
+    /// The part's volume above the last layer, in cubic millimeters: heights are
     /// rounded to whole layers or steps.
     pub unbuilt_mm3: f64,
 }
@@ -82,7 +82,7 @@ impl Heights {
     }
 
     /// Returns the volume lost (and not built), the volume gained and the part's
-    /// volume, in cubic millimetres.
+    /// volume, in cubic millimeters.
     pub fn volumes_mm3(&self) -> [f64; 3] {
         let sum = |of: fn(&SweptLayer) -> f64| self.layers.iter().map(of).sum::<f64>();
         let [lost, gained, volume] = [
@@ -94,7 +94,7 @@ impl Heights {
     }
 }
 
-/// A limit to what layers cost together.
+/// A limit on the cost of all layers together.
 #[derive(Clone, Copy)]
 pub(crate) struct Budget<'a> {
     /// Returns the cost of a layer by its thickness.
@@ -122,8 +122,8 @@ pub(crate) struct Grid<'a> {
     /// Where layers are to end; the last is the part's top.
     ends: Vec<usize>,
     pub(crate) table: Option<HeightTable>,
-    /// How layers differ from what the table says, if that can be told without looking at all of
-    /// their rows.
+    /// The differences of layers from the table, if they are known without looking at all rows of
+    /// the layers.
     overlaps: Option<Overlaps<'a>>,
 }
 
@@ -149,13 +149,14 @@ pub(crate) struct Climb {
     tops: Vec<usize>,
 }
 
-/// A placement must promise to err less than this share of what was found, to be looked at.
+/// A placement is looked at only if it promises to err less than this share of the found layers'
+/// error.
 const WORTHWHILE: f64 = 0.99;
 
 impl HeightSearch<'_> {
-    /// Finds the layers within a bound: as many as are found from the bottom up, where each is
-    /// the thickest whose measure is at most `bound`, or the thinnest if there is none; of all
-    /// ways to place as many, the one that loses and gains least. They end at the part's top,
+    /// Finds the layers within a bound: as many as are found from the bottom up, where each is the
+    /// thickest whose measure is at most `bound`, or the thinnest if no measure is. Of all ways to
+    /// place as many, this is the one that loses and gains least. They end at the part's top,
     /// rounded to whole steps.
     ///
     /// Source: 002 section 3.2.3, algorithms 12 and 13. These bisect; but thicker layers
@@ -172,7 +173,7 @@ impl HeightSearch<'_> {
         Ok(self.placed(&grid, climb, &known, bound, None))
     }
 
-    /// Returns the steps where layers may end, and what facets say of them.
+    /// Returns the steps where layers may end, and the table of the facets.
     pub(crate) fn grid(&self) -> Result<Grid<'_>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
         let step_um = self.thicknesses.step().um();
@@ -218,8 +219,7 @@ impl HeightSearch<'_> {
         Some(Climb { heights: Heights::of(self.part, layers), tops: ended })
     }
 
-    /// Finds the layers from the bottom up by what facets say alone, and by what is known of
-    /// layers nearby.
+    /// Finds the layers from the bottom up by facets alone and known layers nearby.
     pub(crate) fn guess(
         &self,
         grid: &Grid<'_>,
@@ -312,7 +312,7 @@ impl HeightSearch<'_> {
             None => good.next(),
             Some(budget) => {
                 let per_um = |k: &usize| budget.of(&layers[*k]) / layers[*k].thickness_um;
-                // The thickest of those that cost the same.
+                // The thickest of the layers that cost the same.
                 good.min_by(|a, b| per_um(a).total_cmp(&per_um(b)))
             }
         };

@@ -1,13 +1,13 @@
 //! Sweeps a row of a part between two heights from left to right.
 //!
-//! Facets are lines over x here. All columns between two neighbouring ends of
-//! lines pass the same lines in the same order. Going up such a column, the part
-//! begins and ends in turn, and the layer's top decides which of these stretches
-//! the layer lacks or has too much. Nothing is sampled along x or z.
+//! Facets are lines over x here. All columns between two neighboring ends of lines pass the same
+//! lines in the same order. Going up such a column, the part begins and ends in turn, and the
+//! layer's top decides which of these stretches the layer lacks or has too much. Nothing is sampled
+//! along x or z.
 //!
-//! Most columns pass one facet at most. There, facets alone say what is lost and gained,
-//! without rows ([`Facets`](crate::facets::Facets)). So rows need only add how other columns
-//! differ from that.
+//! Most columns pass one facet at most. There, facets alone give the volume lost and gained,
+//! without rows ([`Facets`](crate::facets::Facets)). So rows need only add how other columns differ
+//! from that.
 
 use lamp_slicer::{FillRule, Position, Turn};
 
@@ -23,7 +23,7 @@ pub(crate) struct Toggle {
 }
 
 /// A facet's line along a row: its two ends, the left one first, with their heights
-/// in micrometres above the layer's bottom.
+/// in micrometers above the layer's bottom.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slope {
     pub(crate) row: u32,
@@ -44,12 +44,12 @@ impl Slope {
     }
 }
 
-/// What rows add to a profile.
+/// The content that rows add to a profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RowsAdd {
-    /// All that they see.
+    /// Everything in the rows.
     All,
-    /// How that differs from what facets say alone, each as if no other were above or below.
+    /// The differences from facets alone, each taken as if no other were above or below.
     Differences,
 }
 
@@ -106,7 +106,7 @@ impl<'a> Sweep<'a> {
         true
     }
 
-    /// Calls `each` with all columns between two neighbouring ends of lines, while the lines
+    /// Calls `each` with all columns between two neighboring ends of lines, while the lines
     /// over them are open, with the position at the layer's bottom and the winding number there.
     fn columns(
         &mut self,
@@ -141,9 +141,9 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Calls `untold` with ranges of height in which facets do not say all of a row: where lines
-    /// are no more than `reach_um` above each other, or what a line parts is not the outside below
-    /// and the inside above, or the other way round.
+    /// Calls `untold` with ranges of height in which facets do not give a row completely: where
+    /// lines are no more than `reach_um` above each other, or where a line separates neither
+    /// outside below from inside above nor the reverse.
     pub(crate) fn untold(
         &mut self,
         toggles: &[Toggle],
@@ -172,7 +172,7 @@ impl<'a> Sweep<'a> {
         });
     }
 
-    /// Returns true if facets say all of a line that no other is above or below.
+    /// Returns true if facets give a line completely that has no other line above or below it.
     fn is_told(&self, slope: Slope, position: &Position<'_>) -> bool {
         self.adds == RowsAdd::Differences && tells(slope.turn, &mut position.clone())
     }
@@ -246,8 +246,8 @@ fn tells(turn: Turn, position: &mut Position<'_>) -> bool {
     i32::from(position.is_inside()) - i32::from(below) == turn.winding()
 }
 
-/// What a line changes once the top is past it: the section, and at its two ends the heights
-/// lost and gained.
+/// The change by a line once the top is past it: of the section and, at its two ends, of the
+/// heights lost and gained.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Change {
     section: f64,
@@ -321,8 +321,7 @@ mod tests {
         }
     }
 
-    /// A plate from 12 to 15 is lost by tops above it, and gained from 0 to 12 by
-    /// those in it.
+    /// A plate from 12 to 15: tops above it lose it, and tops in it gain from 0 to 12.
     #[test]
     fn columns_that_pass_several_lines_have_what_is_between() {
         let slopes = [slope([0.0, 2.0], [12.0; 2], 1), slope([0.0, 2.0], [25.0; 2], -1)];

@@ -6,18 +6,18 @@ use crate::profile::ProfileChange;
 /// the part between the same heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SweptLayer {
-    /// The height of its bottom, in micrometres.
+    /// The height of its bottom, in micrometers.
     pub bottom_um: f64,
-    /// Its thickness, in micrometres.
+    /// Its thickness, in micrometers.
     pub thickness_um: f64,
-    /// The part's volume between its bottom and its top, in cubic millimetres.
+    /// The part's volume between its bottom and its top, in cubic millimeters.
     pub volume_mm3: f64,
     /// The volume of the part that the layer lacks (algorithm 14, line 10).
     pub lost_mm3: f64,
     /// The volume of the layer outside the part (algorithm 14, line 12).
     pub gained_mm3: f64,
     /// The area of the part's section just above the layer's bottom, in square
-    /// millimetres.
+    /// millimeters.
     pub bottom_area_mm2: f64,
     /// The area of its section at the top, which is the layer's.
     pub top_area_mm2: f64,
@@ -32,9 +32,9 @@ pub struct SweptLayer {
 /// A section above a layer's bottom, and how the part changes up to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Section {
-    /// Its height above the layer's bottom, in micrometres.
+    /// Its height above the layer's bottom, in micrometers.
     pub(crate) plane_um: f64,
-    /// The area of the section at the bottom, in square millimetres.
+    /// The area of the section at the bottom, in square millimeters.
     pub(crate) bottom_area: f64,
     pub(crate) change: ProfileChange,
 }
@@ -67,14 +67,14 @@ impl Section {
 pub struct SweptLayers {
     /// One for each top, the lowest first.
     pub each: Vec<SweptLayer>,
-    /// The least error, in cubic millimetres, below the last layer's top of any layer
+    /// The least error, in cubic millimeters, below the last layer's top of any layer
     /// that reaches this top or higher: along each vertical line, the lesser of the
     /// lengths inside and outside the part.
     pub unavoidable_mm3: f64,
 }
 
 impl SweptLayer {
-    /// Returns the height of its top, in micrometres.
+    /// Returns the height of its top, in micrometers.
     pub fn top_um(&self) -> f64 {
         self.bottom_um + self.thickness_um
     }

@@ -1,9 +1,9 @@
-//! What facets say of all layers between whole steps, summed once for the whole part.
+//! All layers between whole steps by their facets, summed once for the whole part.
 //!
-//! A layer's error is a sum over the steps in it, as long as no vertical line meets two of
-//! its facets. Where one does, the layer loses and gains less than the sum says. So, for a
-//! part whose bodies do not overlap, it is a bound: a search by the table alone may miss a
-//! layer, but takes none that is worse than it says.
+//! A layer's error is a sum over the steps in it, as long as no vertical line meets two of its
+//! facets. Where one does, the layer loses and gains less than the sum. So, for a part whose bodies
+//! do not overlap, the sum is a bound: a search by the table alone may miss a layer, but takes none
+//! that is worse than the table gives.
 
 use lamp_slicer::PlacedFacet;
 
@@ -16,20 +16,20 @@ use crate::swept_layer::{Section, SweptLayer};
 /// Areas seen from above that differ by no more than this share of all are the same.
 const CLOSED: f64 = 1e-9;
 
-/// Facets that face one way, in a step. The area that a facet covers for each micrometre of
-/// height goes evenly between its corners. Within a step it adds to `area` and `moment`; over
-/// the whole steps between, to where its density begins and ends, so that high facets cost no
-/// more than low ones.
+/// Facets that face one way, in a step. The area that a facet covers for each micrometer of height
+/// changes linearly between its corners. Within a step it adds to `area` and `moment`. Over the
+/// whole steps between, it adds to the steps where its density begins and ends, so that high facets
+/// cost no more than low ones.
 #[derive(Clone, Copy, Debug, Default)]
 struct Facing {
-    /// The area that they cover, in square millimetres.
+    /// The area that they cover, in square millimeters.
     area: f64,
-    /// The same times the height above the step's lower end, in micrometres.
+    /// The same times the height above the step's lower end, in micrometers.
     moment: f64,
-    /// What is added to the density from this step's lower end on, and to its slope.
+    /// The terms added to the density, and to its slope, from this step's lower end on.
     density: f64,
     slope: f64,
-    /// How many pieces of facets begin at the lower end, less those that end there.
+    /// The number of facet pieces that begin at the lower end, less the pieces that end there.
     pieces: i32,
 }
 
@@ -49,9 +49,9 @@ struct Step {
     level_down: f64,
     steepest: f64,
     level_steepest: f64,
-    /// The section's area just above the lower end, in square millimetres.
+    /// The section's area just above the lower end, in square millimeters.
     area: f64,
-    /// How many facets more reach above the lower end than above that of the step below.
+    /// The number of facets that reach above the lower end, less the number for the step below.
     facets: i32,
 }
 
@@ -105,8 +105,7 @@ impl HeightTable {
         (guess + above) - usize::from(guess > 0 && self.at(guess) > height_um)
     }
 
-    /// Returns the layers from one step to each of several rising thicknesses, in steps, as facets
-    /// say.
+    /// Returns the layers from one step to each of several rising thicknesses, in steps, by facets.
     pub(crate) fn layers<'a>(
         &'a self,
         bottom: usize,
@@ -118,7 +117,7 @@ impl HeightTable {
         })
     }
 
-    /// Returns the thicknesses of the same layers in micrometres, their sections, and the greatest
+    /// Returns the thicknesses of the same layers in micrometers, their sections, and the greatest
     /// |N_z| of the facets in them.
     pub(crate) fn sections<'a>(
         &'a self,
@@ -211,7 +210,7 @@ impl Filling {
         }
     }
 
-    /// Adds a piece of a facet that lies within a step.
+    /// Adds a piece of a facet within a step.
     fn add_within(&mut self, step: usize, [from, to]: [f64; 2], [a, b]: [f64; 2], up: bool) {
         let start = self.table.at(step);
         let [p, q] = [from - start, to - start];
@@ -220,8 +219,8 @@ impl Filling {
         facing.moment += (q - p) * (a * (2.0 * p + q) + b * (p + 2.0 * q)) / 6.0;
     }
 
-    /// Adds what facets cover over whole steps to these, and the areas of sections. Where no facet
-    /// is left, nothing is, whatever rounding says.
+    /// Adds the area that facets cover over whole steps to these, and the areas of sections. Where
+    /// no facet is left, the area is zero, whatever rounding gives.
     fn finish(self) -> HeightTable {
         let Self { mut table, steepest } = self;
         let um = table.step_um;
@@ -258,7 +257,7 @@ impl Filling {
         let here = &mut self.table.steps[step];
         let known = if above == 0.0 { &mut here.level_steepest } else { &mut here.steepest };
         *known = known.max(steepest);
-        // No section lies above the part's highest faces.
+        // The section above the part's highest faces is empty.
         if is_top {
             return;
         }

@@ -30,7 +30,7 @@ impl Thicknesses {
     /// ```
     ///
     /// # Errors
-    /// Returns an error if there are none, or more than a search tries.
+    /// Returns an error if there is no thickness, or there are more than a search tries.
     pub fn new(min: Length, max: Length, step: Length) -> Result<Self, HeightsError> {
         let [min_um, max_um, step_um] = [min, max, step].map(Length::um);
         // Limits that are whole steps may miss them by rounding.
@@ -64,10 +64,10 @@ impl Thicknesses {
         steps.div_ceil(*self.steps.end()) * self.steps.start() <= steps
     }
 
-    /// Returns the thicknesses that a layer may have at `bottom`, below the next of
-    /// `ends`, where layers are to end: those after which layers can fill the rest. Ends
-    /// that cannot be reached are skipped. The last one, where the part ends, is then
-    /// exceeded by as little as possible. All are in steps.
+    /// Returns the thicknesses that a layer may have at `bottom`, below the next of `ends`, where
+    /// layers are to end. After each of them, layers can fill the rest. Ends that cannot be reached
+    /// are skipped. The last one, where the part ends, is then exceeded by as little as possible.
+    /// All are in steps.
     pub(crate) fn choices(&self, bottom: usize, ends: &[usize]) -> Vec<usize> {
         let ahead = &ends[ends.partition_point(|&end| end <= bottom)..];
         let reached = ahead.iter().find(|&&end| self.can_fill(end - bottom));
@@ -89,7 +89,7 @@ impl Thicknesses {
     /// Returns a height in steps from which on layers can fill any, if there is one.
     fn all_fill_from(&self) -> Option<usize> {
         let (start, end) = (self.steps.start(), self.steps.end());
-        // From here on, what so many layers fill reaches what one more does.
+        // From here on, the ranges of so many layers and of one more meet.
         let count = (start - 1).div_ceil((end - start).max(1)).max(1);
         (end > start || *start == 1).then_some(count * start)
     }

@@ -1,4 +1,4 @@
-//! What layer heights are to be like, and those that were found.
+//! The requirements for layer heights, and the heights found.
 
 use std::fmt;
 
@@ -43,14 +43,14 @@ impl Measure {
     }
 }
 
-/// What decides how far layers may err.
+/// The goal that decides how far layers may err.
 #[derive(Clone, Copy)]
 pub enum Goal<'a> {
     /// Every layer is within this bound.
     Bound(f64),
-    /// There are at most so many layers, with the smallest bound that allows it.
+    /// At most this many layers, with the smallest bound that allows it.
     Layers(u32),
-    /// All layers together cost at most so much, with the smallest bound that allows it.
+    /// All layers together cost at most this much, with the smallest bound that allows it.
     Cost {
         /// Returns the cost of a layer by its thickness, as the seconds that it takes.
         of_layer: &'a dyn Fn(Length) -> f64,
@@ -69,14 +69,14 @@ impl fmt::Debug for Goal<'_> {
     }
 }
 
-/// What layer heights are to be like.
+/// The requirements for layer heights.
 #[derive(Clone, Debug)]
 pub struct WantedHeights<'a> {
     /// The thicknesses that the machine builds.
     pub thicknesses: Thicknesses,
     /// The measure of a layer's error.
     pub measure: Measure,
-    /// What decides its bound.
+    /// The goal that decides its bound.
     pub goal: Goal<'a>,
     /// Makes layers end at flat faces.
     pub snap: bool,
@@ -87,7 +87,7 @@ pub struct WantedHeights<'a> {
 pub struct FoundHeights {
     /// The measure of a layer's error.
     pub measure: Measure,
-    /// The largest error of a layer, unless none within the limits is as small.
+    /// The largest error of a layer, unless no layer within the limits has one as small.
     pub bound: f64,
     /// The layers.
     pub heights: Heights,
@@ -109,7 +109,7 @@ pub enum HeightsDoubt {
 }
 
 impl WantedHeights<'_> {
-    /// Searches for the heights of a part. `watch` is told of each layer found.
+    /// Searches for the heights of a part. Calls `watch` for each layer found.
     ///
     /// # Errors
     /// Returns an error if the part is too high, or if no layers within the limits keep a budget.
@@ -138,7 +138,7 @@ impl FoundHeights {
         self.heights.layers.iter().map(|layer| Length::from_um(layer.thickness_um))
     }
 
-    /// Returns what rows could not be measured, if there were some.
+    /// Returns why the heights may be worse than their numbers, if they may.
     pub fn doubt(&self) -> Option<HeightsDoubt> {
         let left_out = self.heights.layers.iter().filter(|layer| layer.rows_left_out > 0);
         let (layers, rows) = left_out.fold((0, 0), |(layers, rows), layer| {

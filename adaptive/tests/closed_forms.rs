@@ -21,8 +21,8 @@ fn along_rows(mesh: &Mesh, pitch_um: f64) -> LayeredPart {
     LayeredPart::new(facets, Length::from_um(pitch_um), Fill::EvenOdd).unwrap()
 }
 
-/// Returns the volumes lost, gained and of the part in a layer, in cubic millimetres, from areas
-/// by height in millimetres.
+/// Returns the volumes lost, gained and of the part in a layer, in cubic millimeters, from areas
+/// by height in millimeters.
 fn integrated(bottom: f64, top: f64, of: impl Fn(f64) -> [f64; 3]) -> [f64; 3] {
     const STEPS: u32 = 2000;
     let dz = (top - bottom) / f64::from(STEPS);

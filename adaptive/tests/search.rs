@@ -156,7 +156,7 @@ fn budgets_are_kept_and_used() {
         assert!(count <= layers && count > 0.9 * layers, "{count} of {layers}");
         assert_eq!(search.heights(bound).unwrap().layers.len(), heights.layers.len());
     }
-    // 2 s per layer plus 10 ms per micrometre.
+    // 2 s per layer plus 10 ms per micrometer.
     let cost = |thickness: Length| 2000.0 + 10.0 * thickness.um();
     let (_, heights) = search.within_budget(cost, 1.2e6).unwrap();
     let spent: f64 =
