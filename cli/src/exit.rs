@@ -38,9 +38,9 @@ pub(crate) enum Exit {
     Output(anyhow::Error),
     /// The work is done, but found what needs a person: status 3.
     Findings(String),
-    /// A task of a batch failed, with the status that tells its engine what to do.
+    /// A task of a batch failed, with the status by which its engine decides what to do.
     Task(u8, String),
-    /// The work is done, and two stacks differ: status 1, as of `cmp` and `diff`. All is told.
+    /// The work is done, and two stacks differ: status 1, as of `cmp` and `diff`. All is reported.
     Different,
 }
 
@@ -182,8 +182,8 @@ failures!(
     CatalogueError<MaterialError>, CatalogueError<MachineError>, CatalogueError<ProjectorError>,
 );
 
-/// Tells failures to write from stacks without layers; errors of the layers pass through as they
-/// are.
+/// Distinguishes failures to write from stacks without layers; errors of the layers pass through as
+/// they are.
 impl From<StackError> for Exit {
     fn from(error: StackError) -> Self {
         match error {

@@ -37,7 +37,7 @@ struct Lamp {
     #[command(subcommand)]
     command: Command,
 
-    /// Print the licences of all that is in the program
+    /// Print the licenses of all that is in the program
     #[arg(long, alias = "licenses", help_heading = GENERAL)]
     licences: bool,
 
@@ -142,7 +142,7 @@ fn keep_freed_memory() {
 fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
     wait_if_ending();
     match result {
-        // What differs stands on standard output.
+        // The differences are on standard output.
         Err(error @ Exit::Different) => ExitCode::from(error.status()),
         Err(error) if !error.is_reader_gone() => {
             say(&format!("{name}: {error}"));

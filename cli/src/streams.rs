@@ -1,4 +1,4 @@
-//! Reads and writes stacks: files, folders, pipes and what stands beside them.
+//! Reads and writes stacks: files, folders, pipes and the files next to them.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -28,7 +28,7 @@ pub(crate) type Layers<'a> = Box<dyn Iterator<Item = Result<Layer, Exit>> + 'a>;
 /// The part on standard input, of which a process has one.
 static PIPED_PART: OnceLock<String> = OnceLock::new();
 
-/// Returns the part of the stack on standard input, as soon as its first page has told it.
+/// Returns the part of the stack on standard input, as soon as its first page has named it.
 pub(crate) fn piped_part() -> Option<&'static str> {
     PIPED_PART.get().map(String::as_str)
 }
@@ -124,7 +124,7 @@ pub(crate) fn failed_at(place: impl Display + Send + Sync + 'static, error: Stac
 /// Whether the next stage waits for a stack that this command has not begun.
 static IS_AWAITED: AtomicBool = AtomicBool::new(false);
 
-/// Tells the next stage why no stack comes, if it waits for one. Wrong usage writes nothing.
+/// Informs the next stage why no stack comes, if it waits for one. Wrong usage writes nothing.
 pub(crate) fn give_up(error: &Exit) {
     if !matches!(error, Exit::Usage(_)) && IS_AWAITED.swap(false, Ordering::Relaxed) {
         // Only the original error is reported.
@@ -176,7 +176,7 @@ pub(crate) fn layers_of_input(
     decoded(pages_of_input(pages, input, progress), input.stack.clone())
 }
 
-/// Reads the wanted layers of a stack, in order. Those that can pass as their pages have them are
+/// Reads the wanted layers of a stack, in order. Layers that can pass as their pages have them are
 /// not decoded.
 pub(crate) fn read_passing(
     input: &Input,

@@ -15,7 +15,7 @@ use crate::terminal::progress::Progress;
 /// Layers in order, coded or not.
 pub(crate) type PassingLayers = Box<dyn Iterator<Item = Result<PassingLayer, Exit>>>;
 
-/// Reads the wanted layers of a stack, those that can pass undecoded, or the layers of the build
+/// Reads the wanted layers of a stack, undecoded where they can pass, or the layers of the build
 /// that a folder of strips makes.
 pub(crate) fn read_passing_or_strips(
     input: &Input,

@@ -1,5 +1,5 @@
-//! Parses arguments: those of the command line, then what an options file and a machine's file
-//! give where the command line is silent.
+//! Parses arguments: the words of the command line, then options from an options file and a
+//! machine's file where the command line is silent.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -56,8 +56,8 @@ pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Ex
 
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// Returns the words of the process's command line, without the program's name, with those of the
-/// files that had a say.
+/// Returns the words of the process's command line, without the program's name, and the words of
+/// the files that contributed.
 pub(crate) fn words_in_effect() -> &'static [OsString] {
     WORDS.get().and_then(|words| words.split_first()).map_or(&[], |(_, words)| words)
 }
@@ -126,7 +126,7 @@ impl Arguments {
             path.iter().try_fold(&self.lamp, |command, name| command.find_subcommand(name));
         let command = command.expect("a command that was parsed is one of lamp's");
         let words = words_left_open(command, matches, settings);
-        // What stands behind `--` is no option.
+        // Words after `--` are not options.
         let end = self.words.iter().position(|word| word == "--").unwrap_or(self.words.len());
         self.words.splice(end..end, words);
         self.from.push(input_name(file));

@@ -111,7 +111,7 @@ pub(crate) struct Input {
 pub(crate) struct Output {
     /// Where to write the stack: a file, a folder of pages, or - for standard output
     ///
-    /// A folder's name ends in /, or is that of an empty folder
+    /// A folder's name ends in /, or names an empty folder
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: PathBuf,
 
@@ -207,7 +207,7 @@ pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
     if length.um() == 0.0 { Err("the length must be above zero".to_owned()) } else { Ok(length) }
 }
 
-/// Parses an area that is not below zero, in square millimetres.
+/// Parses an area that is not below zero, in square millimeters.
 pub(crate) fn parse_area(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let number = |text: &str| text.trim_end().parse::<f64>().ok();

@@ -66,7 +66,7 @@ impl Reader<'_> {
         path: Option<&[String]>,
     ) -> Result<(), String> {
         let mut entries: Vec<_> = table.iter().collect();
-        // Options first: those of tables further down replace them.
+        // Options first: options of tables further down replace them.
         entries.sort_by_key(|(key, value)| (value.get_ref().is_table(), key.span().start));
         for (key, value) in entries {
             let name = key.get_ref();

@@ -15,11 +15,11 @@ use crate::args::lamp_option::LampOption;
 use crate::args::options::one_of_described;
 use crate::exit::Exit;
 
-/// What `--help` says of the heights in a layer.
+/// The heights in a layer, as `--help` describes them.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
     ["Where light enters it", "Half-way", "Where it must reach what it rests on"];
 
-/// What is to be cured, and by which light.
+/// The target to cure, and the light that cures it.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlanningOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file; it must say how far
@@ -43,7 +43,7 @@ pub(crate) struct PlanningOptions {
     #[arg(long, value_name = "SHARE", default_value = "0.1%", value_parser = parse_gap)]
     pub(crate) gap: f64,
 
-    /// Where in its layer a voxel's dose is told
+    /// Height in its layer at which a voxel's dose is computed
     #[arg(long, value_name = "HEIGHT", default_value = "top")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     pub(crate) at: SampleHeight,

@@ -6,17 +6,17 @@ use lamp_stack::{Length, LengthError};
 
 use lamp_pipeline::heights::parse_share;
 
-/// The speeds of a platform of which none are told, in micrometres a second.
+/// The speeds of a platform if none are given, in micrometers a second.
 pub(crate) const DEFAULT_SPEEDS: (Speed, Speed) = (5.0, 2000.0);
 
-/// What the platform can do.
+/// The limits of the platform.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlatformOptions {
     /// Slowest and fastest speed of the platform: a layer's thickness divided by its time
     #[arg(long, value_name = "A..B", default_value = "5um/s..2mm/s", value_parser = parse_speeds)]
     speed: (Speed, Speed),
 
-    /// By how much the speed may differ from that of a neighbouring layer, as 20%
+    /// Greatest difference of the speed from a neighboring layer's speed, as 20%
     #[arg(long, value_name = "SHARE", value_parser = parse_change)]
     max_change: Option<f64>,
 }

@@ -55,7 +55,7 @@ pub(crate) struct SlicingArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 1)]
     margin: u32,
 
-    /// Top left corner of the image in part coordinates, in millimetres, instead of around the
+    /// Top left corner of the image in part coordinates, in millimeters, instead of around the
     /// part's bounding box; the image must contain the part and keep its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
@@ -94,7 +94,7 @@ pub(crate) struct SlicingArgs {
     print_through: bool,
 }
 
-/// What is sliced, and how.
+/// The part to slice, and the options of slicing.
 #[derive(Args, Clone)]
 pub(crate) struct SliceStageArgs {
     /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
@@ -119,13 +119,13 @@ pub(crate) struct SliceStageArgs {
     layers: Option<Range<u32>>,
 
     /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
-    /// [default: a quarter of what there is, as far as it helps]. Facets in no order of height are
-    /// first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
+    /// [default: a quarter of available memory, or as much as helps]. Facets in no order of height
+    /// are first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
     /// memory, 49 bytes per facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
-    /// An STL of the same STEP part, in millimetres. Layers where the STEP part has gaps are cut up
+    /// An STL of the same STEP part, in millimeters. Layers where the STEP part has gaps are cut up
     /// to 10 um off their plane, or else taken from this STL, as are layers that lack contours of
     /// it
     #[arg(long, value_name = "PART.stl", help_heading = STEP)]
@@ -185,7 +185,7 @@ impl TryFrom<&SliceStageArgs> for SliceStage {
     }
 }
 
-/// Parses `X,Y` in millimetres.
+/// Parses `X,Y` in millimeters.
 fn parse_origin(text: &str) -> Result<Numbers<2>, String> {
     let wrong = || format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())

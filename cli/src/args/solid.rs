@@ -40,7 +40,7 @@ pub(crate) struct SolidArgs {
     #[arg(long, value_parser = one_of::<Bodies>(), default_value_t)]
     bodies: Bodies,
 
-    /// Cut this file out of the part, such as a core out of its mould; may be given several times
+    /// Cut this file out of the part, such as a core out of its mold; may be given several times
     #[arg(long, value_name = "FILE", value_parser = part_file())]
     subtract: Vec<PartFile>,
 
@@ -80,7 +80,7 @@ pub(crate) struct PlacementArgs {
     #[arg(long, value_name = "AXIS:DEGREES", value_delimiter = ',', help_heading = PLACEMENT)]
     rotate: Vec<Rotation>,
 
-    /// Move the part, in millimetres. The image moves along: its origin and the layers' heights are
+    /// Move the part, in millimeters. The image moves along: its origin and the layers' heights are
     /// in the moved part's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = PLACEMENT)]
     #[arg(allow_hyphen_values = true)]

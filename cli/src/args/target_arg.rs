@@ -1,4 +1,4 @@
-//! What planners on a fixed glass cure: a built-in target or a file.
+//! Targets of planners on a fixed glass: a built-in target or a file.
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -38,8 +38,9 @@ pub(crate) struct TargetReading {
 /// The target that a plan is for.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct TargetArg {
-    /// What to cure: a built-in target (lens-array, sphere, hemisphere, ...; any other name lists
-    /// them), a TOML file of shapes, a PNG height map (--pixel, --full) or a part with a flat bottom
+    /// Target to cure: a built-in target (lens-array, sphere, hemisphere, ...; any other name lists
+    /// them), a TOML file of shapes, a PNG height map (--pixel, --full) or a part with a flat
+    /// bottom
     #[arg(value_name = "TARGET")]
     pub(crate) target: PathBuf,
 
@@ -95,8 +96,8 @@ impl GivenTarget {
 }
 
 impl TargetReading {
-    /// Returns the built-in target of a name, or that of a file, which the projector's light must
-    /// cover.
+    /// Returns the built-in target of a name, or the target in a file. The projector's light must
+    /// cover it.
     pub(crate) fn open(
         &self,
         path: &Path,

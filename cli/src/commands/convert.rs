@@ -42,7 +42,7 @@ Examples:
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: Input,
-    /// What to write for a part, in millimetres: a binary STL of a STEP part, or a STEP file of a
+    /// File to write for a part, in millimeters: a binary STL of a STEP part, or a STEP file of a
     /// mesh
     #[arg(value_name = "PART.stl|PART.step", value_parser = parse_part)]
     part: Option<PathBuf>,
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     let layers = layers_of_input(pages, &args.input, &progress).map(|layer| {
         let mut layer = layer?;
         if let Some(stack) = layer.info.stack.as_mut().filter(|_| args.ignore_checks) {
-            // What is missing would be missed again.
+            // Missing layers would be reported missing again.
             stack.layers = None;
         }
         Ok(layer)

@@ -35,10 +35,10 @@ use crate::terminal::progress::Progress;
 /// they come to the critical dose. With --alone each exposure cures by itself, as deep as its gray
 /// level reaches in the material's cure model. A stack with gray layers is drawn twice: on the left
 /// with every pixel that is not black exposed in full, on the right by its gray levels. Resin cured
-/// outside the part is red, uncured places of the part are blue, and the part's outline is yellow;
-/// the areas, which are exact over whole pixels, are printed; beside them, as `pixels`, those of
-/// columns of pixels that cure just the part at their centres, as exact as pixels can be. Dots are drawn as they are, so use a
-/// stack from before `dither`.
+/// outside the part is red, uncured places of the part are blue, and the part's outline is yellow.
+/// The areas, which are exact over whole pixels, are printed; next to them, as `pixels`, the areas
+/// of columns of pixels that cure just the part at their centers, as exact as pixels can be. Dots
+/// are drawn as they are, so use a stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

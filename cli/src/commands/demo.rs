@@ -23,7 +23,7 @@ use crate::output::picture::{Picture, PictureScale, Region};
 use crate::streams::{failed_at, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
-/// Run the whole pipeline on a built-in blade mould, and draw the result
+/// Run the whole pipeline on a built-in blade mold, and draw the result
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,12 +35,12 @@ pub(crate) struct DemoArgs {
     #[arg(value_name = "DIR", default_value = "lamp-demo")]
     folder: PathBuf,
 
-    /// Approximate number of facets of the mould
+    /// Approximate number of facets of the mold
     #[arg(long, value_name = "N", default_value = "750k", value_parser = parse_count)]
     facets: usize,
 
     /// Make all layers of the build in its mesh instead of twenty. This takes many times as long,
-    /// because the mesh has many more edges than the mould
+    /// because the mesh has many more edges than the mold
     #[arg(long)]
     whole_build: bool,
 }

@@ -109,8 +109,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     written
 }
 
-/// What was found in a layer: a line for all that was corrected, and one for
-/// each band that was left.
+/// Findings in a layer: a line for all that was corrected, and one for each band that was left.
 fn describe(fixed: &Fixed<'_>, options: &FixOptions) -> Vec<String> {
     let info = &fixed.before.info;
     let corrected: Vec<&Band> =

@@ -162,7 +162,7 @@ impl HeightsArgs {
     }
 }
 
-/// What is known of a layer, under the names of the table's columns.
+/// The numbers of a layer, under the names of the table's columns.
 #[derive(Serialize)]
 struct LayerRow {
     z_um: f64,
@@ -222,8 +222,8 @@ fn write_table(
     Ok(())
 }
 
-/// A choice of layers: how many there are, how far they are off by volume, how far the worst is by
-/// the criterion, and how many are past the bound.
+/// A choice of layers: their number, their error by volume, the worst error by the criterion, and
+/// the number past the bound.
 #[derive(Serialize)]
 struct Choice {
     name: String,
@@ -311,7 +311,7 @@ fn plots(part: &str, all: &[(String, Heights)]) -> [Plot; 3] {
     ]
 }
 
-/// Returns the heights of a layer's bottom and top, in millimetres.
+/// Returns the heights of a layer's bottom and top, in millimeters.
 fn z_mm(layer: &SweptLayer) -> [f64; 2] {
     [layer.bottom_um, layer.top_um()].map(|um| um / 1000.0)
 }

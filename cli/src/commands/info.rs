@@ -16,9 +16,9 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 
 /// Describe a stack: pages, size, resolution, heights, area, exposure, checks
 ///
-/// Only directories and texts are read, which takes a moment for any file. Area and volume are
-/// those that the pages state. lamp verify also decodes the images. Of a folder of strips, totals and
-/// each strip are described.
+/// Only directories and texts are read, which takes a moment for any file. Area and volume are the
+/// numbers that the pages state. lamp verify also decodes the images. Of a folder of strips, totals
+/// and each strip are described.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
     if args.json {
         return print_answer("lamp-info-1", &facts.json());
     }
-    // The first page has told the part of standard input.
+    // The first page has named the part of standard input.
     print(&facts.text(&input_name(&args.input.stack)))
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
     write_layers(counted(layers, &progress), &args.output, &progress)
 }
 
-/// Returns whether a stack is packed. One that cannot be opened is told of later.
+/// Returns whether a stack is packed. A stack that cannot be opened is reported later.
 fn is_packed(stack: &Path) -> bool {
     Pages::open(stack).is_ok_and(|pages| pages.packed_format().is_some())
 }
@@ -88,7 +88,7 @@ fn join_one(folder: &Path, output: &Output, progress: &Progress) -> Result<(), E
     write_layers(counted(layers.map(|layer| layer.map_err(failed)), progress), output, progress)
 }
 
-/// Tells the report how many layers there will be, where the first says so.
+/// Passes the number of layers to the progress report, where the first layer states it.
 fn counted(
     layers: impl Iterator<Item = Result<Layer, Exit>>,
     progress: &Progress,

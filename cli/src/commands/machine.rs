@@ -60,7 +60,7 @@ fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
     print_answer("lamp-machine-1", &json!({ "machines": machines }))
 }
 
-/// A machine's fields; what is not known is null.
+/// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> Value {
     let Machine { name, description, area, height, dpi, thickness, .. } = machine;
     let Machine { strips, recoating, times, defaults, .. } = machine;

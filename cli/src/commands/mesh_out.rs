@@ -17,9 +17,9 @@ use crate::terminal::progress::Progress;
 /// Write the surface of a stack as a mesh
 ///
 /// The stack is divided into cubic cells, a whole number of pixels wide. The surface runs where
-/// cells are half white: what is thinner than half a cell is left out, and edges are rounded by up
-/// to half a cell. Gray levels count by their share of white. The mesh is a closed binary STL in
-/// millimetres, at the place of the part.
+/// cells are half white: features thinner than half a cell are left out, and edges are rounded by
+/// up to half a cell. Gray levels count by their share of white. The mesh is a closed binary STL in
+/// millimeters, at the place of the part.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -40,7 +40,7 @@ pub(crate) struct MeshOutArgs {
     cells: NonZeroU32,
 }
 
-/// What an STL of two gigabytes holds.
+/// The triangles in an STL of two gigabytes.
 const MAX_TRIANGLES: usize = 40_000_000;
 
 fn parse_cells(text: &str) -> Result<NonZeroU32, String> {

@@ -31,7 +31,7 @@ pub(crate) struct PackArgs {
     #[command(flatten)]
     output: Output,
 
-    /// How hard to try to make it small, from 1 to 19 [default: what costs little]
+    /// Effort to make it small, from 1 to 19 [default: a level that costs little]
     #[arg(long, value_name = "N", value_parser = parse_level)]
     level: Option<PackLevel>,
 }

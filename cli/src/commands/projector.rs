@@ -71,7 +71,7 @@ fn answer(projectors: impl IntoIterator<Item = Projector>) -> Result<(), Exit> {
     print_answer("lamp-projector-1", &json!({ "projectors": projectors }))
 }
 
-/// What is known of a projector, and what follows from it.
+/// The known properties of a projector, and their consequences.
 fn fields(projector: &Projector) -> Value {
     let (cone, sigma) = match projector.spread() {
         SpreadOf::Cone(half) => (Some(half.um()), None),

@@ -18,7 +18,7 @@ use crate::streams::{check_beside, check_not_input, progress, unless_found, writ
 
 /// Slice a part into a stack of layer images
 ///
-/// A pixel is white (cured) exactly when its centre is inside the part's section at the layer's
+/// A pixel is white (cured) exactly when its center is inside the part's section at the layer's
 /// plane. Gaps in the mesh leave rows whose crossings do not balance; they are listed on their
 /// page, and `fix` corrects them.
 #[derive(Args)]
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     Ok(())
 }
 
-/// What a stack without white calls for.
+/// The advice for a stack without white.
 const BLANK: &str = "no layer has a white pixel: check the part, its unit and --layers";
 
 impl SliceArgs {

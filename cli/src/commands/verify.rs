@@ -1,4 +1,4 @@
-//! `lamp verify`: proves that stacks are whole.
+//! `lamp verify`: checks that stacks are complete and undamaged.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::output::stack_facts::StackFacts;
 use crate::streams::{input_name, is_stream, learning_part, open_pages, print};
 use crate::terminal::progress::printable;
 
-/// Prove that stacks are whole: every page, image, text and height
+/// Check that stacks are complete and undamaged: every page, image, text and height
 ///
 /// Each stack is read to its end and gets one line. Pages decode to the images that were written,
 /// in the order that they were written in, up to the last; each layer starts where the one before
@@ -77,7 +77,7 @@ fn digest_of_part(part: &Path) -> Result<String, Exit> {
     Ok(digest().with_context(|| part.display().to_string())?)
 }
 
-/// Returns the stacks at the paths. Where there is none, a path stands for itself.
+/// Returns the stacks at the paths. A path without a stack stands for itself.
 fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
     let mut stacks = Vec::new();
     for path in paths {
@@ -91,7 +91,7 @@ fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
     Ok(stacks)
 }
 
-/// What was found about a stack.
+/// The result of checking a stack.
 struct Verdict {
     name: String,
     /// The facts of a stack without fault (a folder of strips has none of its own), or a sentence
@@ -104,11 +104,11 @@ struct Verdict {
 impl Verdict {
     fn of(path: &Path, digests: &[String]) -> Self {
         let result = Self::checked(path, digests).map(Some).map_err(|error| error.to_string());
-        // The first page has told the part of standard input.
+        // The first page has named the part of standard input.
         Self { name: input_name(path), result, compared: !digests.is_empty() }
     }
 
-    /// Checks that the strips in a folder are those of one build.
+    /// Checks that the strips in a folder belong to one build.
     fn of_strips(folder: &Path) -> Self {
         let name = input_name(folder);
         let joined =
@@ -166,7 +166,7 @@ fn compare(totals: &StackTotals, digests: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What cannot be known of a stack without checks.
+/// The facts that cannot be known of a stack without checks.
 fn unproven(totals: &StackTotals) -> &'static str {
     match totals.first.info.stack.as_ref().and_then(|stack| stack.layers) {
         Some(_) => "a changed image or text",

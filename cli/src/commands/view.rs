@@ -22,10 +22,11 @@ use crate::terminal::progress::Progress;
 
 /// Look at layers in a browser
 ///
-/// Prints an address to open; it has a secret and works once, so that nobody else on this machine can
-/// see the layers. Zoom and place stay while the layer changes. Shown on demand: what is new over the layer
-/// below, what a second stack adds or lacks, stray rows and what `fix` changed, findings of `lamp
-/// check`, and the part in 3D. A part is sliced first. Ctrl-C ends the viewer.
+/// Prints an address to open; it has a secret and works once, so that nobody else on this machine
+/// can see the layers. Zoom and place stay while the layer changes. Shown on demand: white that is
+/// new over the layer below, pixels that a second stack adds or lacks, stray rows and what `fix`
+/// changed, findings of `lamp check`, and the part in 3D. A part is sliced first. Ctrl-C ends the
+/// viewer.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,7 +49,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, conflicts_with = "report")]
     check: bool,
 
-    /// Show what a report of `lamp check` or `lamp support` tells of the first stack
+    /// Show what a report of `lamp check` or `lamp support` says of the first stack
     #[arg(long, value_name = "FILE.json")]
     report: Vec<PathBuf>,
 
@@ -60,7 +61,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_name = "BYTES", default_value = "512MB", value_parser = parse_memory)]
     memory: u64,
 
-    /// Print the licences of the libraries in the page
+    /// Print the licenses of the libraries in the page
     #[arg(long, alias = "licenses")]
     licences: bool,
 

@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::output::picture::{Region, levels_of_region};
 use crate::streams::new_folder;
 
-/// Rows above and below a band, and columns beside it, that are shown with it.
+/// Rows above and below a band, and columns at its sides, that are shown with it.
 const ROWS_AROUND: u32 = 16;
 const COLUMNS_AROUND: u32 = 48;
 /// Largest region shown, from the gap and the first row on: a stray run may cross the whole image,
@@ -19,7 +19,7 @@ const MAX_COLUMNS: u32 = 400;
 const MAX_ROWS: u32 = 200;
 /// Picture pixels per image pixel, on a side.
 const SCALE: usize = 4;
-/// Colour of the gap between two panels.
+/// Color of the gap between two panels.
 const GUTTER: [u8; 3] = [128; 3];
 
 /// A folder of pictures, one for each band.

@@ -1,4 +1,4 @@
-//! What the ending of a file's name says, and which endings an output may have.
+//! The meaning of a file name's ending, and the endings that an output may have.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,8 @@ use lamp_stack::STACK_ENDINGS;
 use crate::exit::Exit;
 use crate::streams::extension;
 
-/// What a command writes to a file or a folder. A name may have no ending, one that says nothing,
-/// or one of these.
+/// The output of a command, to a file or a folder. A name may have no ending, one that says
+/// nothing, or one of these.
 pub(crate) struct Writes {
     /// The sentence for a name with the ending of another format.
     sentence: &'static str,
@@ -94,7 +94,7 @@ const FORMATS: [(&[&str], &str); 13] = [
     (&["mp4", "avi", "mov", "mkv", "webm", "npy", "npz", "h5", "nrrd", "mat", "exe"], "other data"),
 ];
 
-/// Refuses to write to a name that ends as those of another format.
+/// Refuses to write to a name with the ending of another format.
 ///
 /// # Errors
 /// Returns wrong usage: a sentence that names the ending and what is written.
@@ -144,7 +144,7 @@ pub(crate) fn parse_toml(text: &str) -> Result<PathBuf, String> {
 
 fn parse(text: &str, writes: &Writes) -> Result<PathBuf, String> {
     let path = Path::new(text);
-    // Those of stacks are refused once it is known whether that stack is written or read.
+    // Endings of stacks are refused once it is known whether that stack is written or read.
     if STACK.endings.contains(&&*extension(path)) {
         return Ok(path.to_owned());
     }

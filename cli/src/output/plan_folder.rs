@@ -22,14 +22,14 @@ pub(crate) struct PlanFiles<'a> {
     pub(crate) part: &'a str,
     /// The command that made the plan.
     pub(crate) command: String,
-    /// From the image of a mirror to that of the next.
+    /// The distance from the image of a mirror to the image of the next.
     pub(crate) pitch: Length,
     /// In the order in which they are displayed.
     pub(crate) bitmaps: &'a [ShownBitmap],
     pub(crate) report: &'a Value,
-    /// What is wanted, if that is known.
+    /// The wanted heights, if known.
     pub(crate) target: Option<&'a HeightMap>,
-    /// What is cured, on the same columns.
+    /// The cured heights, on the same columns.
     pub(crate) cured: &'a HeightMap,
 }
 

@@ -1,4 +1,4 @@
-//! Pictures of what pixels are, each kind in a colour.
+//! Pictures of pixels by kind, each kind in a color.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -13,9 +13,9 @@ const SHARE_AROUND: u32 = 4;
 /// The most that small regions are enlarged.
 const MOST_ENLARGED: u32 = 8;
 
-/// What a pixel shows. Of several pixels that share a picture's, the greatest wins.
+/// The kind of a pixel. Of several pixels that share a picture's, the greatest wins.
 pub(crate) trait Shade: Copy + Ord {
-    /// What is not painted.
+    /// The kind that is not painted.
     const NONE: Self;
 
     /// Returns red, green and blue.

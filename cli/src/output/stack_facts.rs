@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use lamp_stack::to_nm;
 
-/// What the pages of a stack say.
+/// The statements of a stack's pages.
 #[derive(Serialize)]
 pub(crate) struct StackFacts<'a> {
     part: Option<&'a str>,

@@ -1,5 +1,5 @@
-//! What follows on the stages of parts: stacks checked, builds laid out. Each does what its command
-//! does, with the same bytes.
+//! Calls that follow the stages of parts: stacks checked, builds laid out. Each does what its
+//! command does, with the same bytes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub(crate) struct Tiling(TileArgs);
 
 impl Tiling {
     /// Reads options as they stand on a command line, split into words, the stacks left out. Files
-    /// stand in `folder`, unless their paths are absolute. `copies` are those of each stack.
+    /// stand in `folder`, unless their paths are absolute. `copies` are the copies of each stack.
     ///
     /// # Errors
     /// Returns a sentence about the first option that is refused.
@@ -76,13 +76,13 @@ impl Tiling {
     }
 }
 
-/// What is looked for in a stack: the options of `lamp check`.
+/// The findings to look for in a stack: the options of `lamp check`.
 pub(crate) struct Checking(CheckArgs);
 
-/// What a check found.
+/// Findings of a check.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CheckFindings {
-    /// How many of each kind, those that need a person.
+    /// The number of findings of each kind that need a person.
     pub(crate) kinds: BTreeMap<String, usize>,
     /// A line for each finding, also for notes, the worst first.
     pub(crate) lines: Vec<String>,

@@ -15,7 +15,7 @@ use lamp_pipeline::Chain;
 pub(crate) use after::After;
 pub(crate) use parse::StageError;
 
-/// What is done to a part: first layer by layer, in ranges, then to the whole stack.
+/// The stages of a part: first layer by layer, in ranges, then on the whole stack.
 pub(crate) struct Stages {
     pub(crate) chain: Chain,
     pub(crate) after: Vec<After>,

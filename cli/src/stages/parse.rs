@@ -94,7 +94,7 @@ pub(super) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages, Sta
             "support" => after.push(After::Support(reader.support())),
             _ => {
                 let stage = reader.per_layer(name).map_err(refused)?;
-                // What follows a stage of the whole stack works on the whole stack, too.
+                // Stages after a stage of the whole stack work on the whole stack, too.
                 if after.is_empty() {
                     per_layer.push(stage);
                 } else {
@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
         let mut command = crate::stage(lamp, name);
         command.build();
         let mut words: Vec<OsString> = words.iter().map(OsString::from).collect();
-        // What the list of stages leaves out.
+        // The words that the list of stages leaves out.
         match name {
             "slice" => words.push(PART.into()),
             "support" => words.push(format!("--part={PART}").into()),

@@ -1,4 +1,4 @@
-//! What to try on the command line when a library reports an error.
+//! Advice for the command line when a library reports an error.
 //!
 //! Libraries state facts and know no options; this is the one place that adds them.
 

@@ -1,4 +1,4 @@
-//! The licences of what is in the program: `lamp --licences`.
+//! The licenses of all that is in the program: `lamp --licences`.
 
 /// The notices of the crates, as `licences/update` wrote them.
 const CRATES: &str = include_str!("../../licences/notices.txt");
@@ -8,13 +8,13 @@ const OWN: &str = include_str!("../../../LICENSE-MIT");
 const RULE: &str =
     "--------------------------------------------------------------------------------";
 
-/// Whether the process is only to print [`licences`]. That is no command, and clap wants one.
+/// Whether the process is only to print [`licences`]. This is not a command, and clap wants one.
 pub(crate) fn are_asked_for() -> bool {
     let words: Vec<_> = std::env::args_os().skip(1).collect();
     matches!(&words[..], [word] if word == "--licences" || word == "--licenses")
 }
 
-/// Returns the name, version, licence and notice of all that is in the program.
+/// Returns the name, version, license and notice of all that is in the program.
 pub(crate) fn licences() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let own = OWN.trim_end();

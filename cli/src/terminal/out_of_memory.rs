@@ -87,7 +87,7 @@ fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
 /// Ends the process, in the first thread that gets here. Takes no memory itself.
 #[cold]
 fn end(bytes: usize) -> ! {
-    /// A thread is known by the address of a variable of its own; zero is none.
+    /// A thread is known by the address of a variable of its own; zero is no thread.
     static ENDS_IT: AtomicUsize = AtomicUsize::new(0);
     thread_local! { static OWN: u8 = const { 0 } }
     let thread = OWN.with(|own| std::ptr::from_ref(own).addr());
@@ -117,7 +117,7 @@ fn tell(bytes: usize) {
     );
     let end = cursor.position() as usize;
     if let (Ok(()), Ok(stderr)) = (written, io::stderr().as_fd().try_clone_to_owned()) {
-        // Nobody is left to tell.
+        // No one is left to report to.
         let _ = File::from(stderr).write_all(&line[..end]);
     }
 }

@@ -56,7 +56,7 @@ impl Progress {
         self.bar.inc(1);
     }
 
-    /// Prints a line of what is told only to who asks for it with `--verbose`.
+    /// Prints a line only if `--verbose` is given.
     pub(crate) fn detail(&self, line: &str) {
         if self.verbose {
             self.warn(line);

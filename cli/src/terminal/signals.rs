@@ -22,15 +22,15 @@ static ENDS: AtomicBool = AtomicBool::new(false);
 
 const WATCH: &str = "the thread that waits for signals";
 
-/// If a signal or a lack of memory is ending the process, waits for that: what fails meanwhile,
-/// because its files are gone, is not to be told.
+/// If a signal or a lack of memory is ending the process, waits for the end: a failure meanwhile,
+/// because the process's files are gone, must not be reported.
 pub(crate) fn wait_if_ending() {
     while ENDS.load(Relaxed) {
         thread::park();
     }
 }
 
-/// Keeps what fails from now on from being told, since the process is about to end.
+/// Keeps failures from now on from being reported, since the process is about to end.
 pub(crate) fn say_no_more() {
     ENDS.store(true, Relaxed);
 }
@@ -56,8 +56,8 @@ pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     Ok(())
 }
 
-/// The signals that this process was started to ignore, as bits from signal 1
-/// on; none where the system does not tell.
+/// The signals that this process was started to ignore, as bits from signal 1 on; zero where the
+/// system does not report them.
 fn ignored_signals() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

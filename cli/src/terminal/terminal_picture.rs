@@ -4,13 +4,13 @@ use std::io::{self, Write};
 
 use crate::output::picture::{Picture, PictureScale, Region};
 
-/// The width to draw for where the terminal does not tell its own, in characters.
+/// The width to draw for where the terminal does not report its own, in characters.
 const USUAL_COLUMNS: u32 = 80;
 /// The width of a character of most terminals, in pixels.
 const COLUMN_PIXELS: u32 = 8;
 /// Characters that look the brighter the later they stand.
 const RAMP: &[u8; 10] = b" .:-=+*#%@";
-/// The gray levels of a sixel picture. Terminals have 16 colours at least.
+/// The gray levels of a sixel picture. Terminals have 16 colors at least.
 const GRAYS: u32 = 16;
 /// The rows of pixels that a row of sixels has.
 const SIXEL_ROWS: usize = 6;
@@ -41,15 +41,15 @@ impl TerminalForm {
     }
 }
 
-/// Returns the terminal's width in characters: what `COLUMNS` says, or the terminal itself.
+/// Returns the terminal's width in characters: from `COLUMNS`, or from the terminal itself.
 fn columns() -> u32 {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse::<u16>().ok());
     let own = || terminal_size::terminal_size().map(|(width, _)| width.0);
     told.filter(|&columns| columns > 0).or_else(own).map_or(USUAL_COLUMNS, u32::from).max(1)
 }
 
-/// Writes a line for each two rows: characters are twice as high as wide. What is not black is never
-/// blank.
+/// Writes a line for each two rows: characters are twice as high as wide. Pixels that are not black
+/// are never blank.
 fn write_ascii(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
     let mut rows = picture.into_rows();
     while let Some(upper) = rows.next() {
@@ -73,7 +73,7 @@ fn character(sum: u32, count: u32) -> u8 {
     RAMP[step.max(u32::from(sum > 0)) as usize]
 }
 
-/// Writes a picture in the form of DEC's VT340: rows of sixels, each colour of a row by itself.
+/// Writes a picture in the form of DEC's VT340: rows of sixels, each color of a row by itself.
 fn write_sixel(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
     let (width, height) = (picture.width, picture.height);
     write!(out, "\x1bP0;1q\"1;1;{width};{height}")?;

@@ -26,7 +26,7 @@ pub(crate) fn show(error: &clap::Error) {
         // One line, since a line break may be the argument's.
         say(error.render().to_string().trim_end().trim_end_matches(MORE).trim_end());
     } else {
-        // There is nobody left to tell if it cannot be printed.
+        // No one is left to report to if it cannot be printed.
         let _ = error.print();
     }
 }
@@ -49,7 +49,7 @@ fn with_known_words(error: &clap::Error) -> Option<clap::Error> {
     let problem = source.to_string();
     let option = error.get(ContextKind::InvalidArg)?;
     let value = error.get(ContextKind::InvalidValue)?.to_string();
-    // What people see should not tell how many bits a number has.
+    // Messages to people should not show how many bits a number has.
     let least = problem.strip_suffix(&format!("..={}", u32::MAX));
     let todo = match least.and_then(|text| text.rsplit(' ').next()) {
         Some(_) if value.parse().is_ok_and(|value: i128| value > 0) => {

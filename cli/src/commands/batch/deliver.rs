@@ -23,7 +23,7 @@ pub(super) struct Deliverer<'a> {
     pub(super) output: &'a NightOutput,
 }
 
-/// What was delivered where, and what the file looked like then.
+/// A delivered file: its place, and its state when it was delivered.
 #[derive(PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Delivered {
     key: Key,

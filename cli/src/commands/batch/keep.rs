@@ -1,4 +1,4 @@
-//! `lamp batch verify` and `gc`: what keeps a store sound and small.
+//! `lamp batch verify` and `gc`: keep a store sound and small.
 
 use anyhow::anyhow;
 use lamp_batch::{Damage, collect as collect_garbage};
@@ -13,7 +13,7 @@ use crate::exit::Exit;
 use crate::streams::print;
 use crate::terminal::progress::Progress;
 
-/// Hashes all results anew, and takes away those that are damaged; and what was delivered of them.
+/// Hashes all results anew and removes damaged results. Checks delivered files, too.
 pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
     let (store, night) = store_of(args)?;
     let progress = Progress::new("batch verify", common, true);

@@ -58,8 +58,8 @@ pub(crate) struct RunArgs {
     #[arg(value_name = "NIGHT.toml")]
     night: Option<PathBuf>,
 
-    /// What runs tasks. HyperQueue and Slurm find their servers as hq and sbatch do; all machines
-    /// must see the store, the parts and this program under the same paths
+    /// Engine that runs tasks. HyperQueue and Slurm find their servers as hq and sbatch do; all
+    /// machines must see the store, the parts and this program under the same paths
     #[arg(long, value_name = "NAME", default_value_t)]
     #[arg(value_parser = one_of_described::<EngineName>(&[
         "Processes on this machine",
@@ -87,7 +87,7 @@ pub(crate) struct RunArgs {
     notify: Option<String>,
 }
 
-/// What runs tasks, as people name it.
+/// The engine that runs tasks, by the name that people use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum EngineName {
     #[default]
@@ -112,7 +112,7 @@ enum BatchCommand {
     Verify(StoreArgs),
     /// Remove results that no batch names which was run lately
     Gc(GcArgs),
-    /// Do one task: what engines run
+    /// Do one task, as engines call it
     #[command(hide = true)]
     Task(TaskArgs),
 }

@@ -8,8 +8,8 @@ use serde_json::json;
 use super::summary::Summary;
 use crate::terminal::progress::Progress;
 
-/// Runs a command by the shell, with a summary on its input and the status in its environment.
-/// That it fails changes nothing but is told.
+/// Runs a command by the shell, with a summary on its input and the status in its environment. A
+/// failure only prints a warning.
 pub(super) fn notify(command: &str, status: u8, summary: &Summary, progress: &Progress) {
     let text = json!({ "schema": "lamp-batch-1", "status": status, "summary": summary });
     match run(command, status, &format!("{text}\n")) {
@@ -25,7 +25,7 @@ fn run(command: &str, status: u8, text: &str) -> io::Result<i32> {
         .stdin(Stdio::piped())
         .spawn()?;
     let written = child.stdin.take().map_or(Ok(()), |mut input| input.write_all(text.as_bytes()));
-    // A command that does not read its input is none the worse.
+    // A command need not read its input.
     if let Err(error) = written
         && error.kind() != io::ErrorKind::BrokenPipe
     {

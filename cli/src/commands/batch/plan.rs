@@ -34,7 +34,7 @@ pub(super) struct Plan {
 pub(super) struct Subject {
     pub(super) name: String,
     pub(super) is_build: bool,
-    /// What is wanted, or why it cannot be planned.
+    /// The wanted result, or why it cannot be planned.
     pub(super) wanted: Result<Wanted, String>,
 }
 
@@ -43,7 +43,7 @@ pub(super) struct Subject {
 pub(super) struct Wanted {
     pub(super) stack: Key,
     pub(super) check: Option<Key>,
-    /// Names that stand for those of parts in the stack, each with that of today.
+    /// Stored names of parts in the stack, each with the part's name of today.
     pub(super) names: Vec<(String, String)>,
     /// The bytes of the stack, estimated.
     pub(super) bytes: u64,
@@ -73,7 +73,7 @@ impl Plan {
             checks: HashMap::new(),
         };
         let night = &file.night;
-        // Before the work of surveys, all that is wrong with the file is told.
+        // Reports all errors in the file before the work of surveys.
         for part in &night.parts {
             planner.stages(&part.stages)?;
             planner.check_options(part)?;
@@ -384,9 +384,9 @@ impl Planner<'_> {
     }
 }
 
-/// What a build takes for each byte of its copies as packed, in seconds of a processor.
+/// The time of a build for each byte of its packed copies, in seconds of a processor.
 const TILE_S_PER_BYTE: f64 = 1e-6;
-/// What a build holds of layers at once, in bytes.
+/// The layers that a build holds at once, in bytes.
 const TILE_BYTES: u64 = 256 << 20;
 
 /// Returns what a task is made of: keys of results, and digests of files.

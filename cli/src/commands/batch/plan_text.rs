@@ -1,4 +1,4 @@
-//! `lamp batch plan`: what a night will do, before it does it.
+//! `lamp batch plan`: shows the work of a night before it starts.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;

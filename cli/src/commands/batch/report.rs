@@ -27,7 +27,7 @@ use crate::terminal::progress::printable;
 /// The most findings of a part that are listed.
 const MOST_LINES: usize = 5;
 
-/// What tasks of a part or a build took.
+/// Time and memory that tasks of a part or a build took.
 #[derive(Clone, Copy, Default)]
 struct Took {
     seconds: f64,
@@ -86,8 +86,8 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Returns whether the report is there and tells of this. A run that was killed before it wrote its
-/// own leaves that of an earlier one.
+/// Returns whether the report is there and describes this summary. A run that was killed before it
+/// wrote its own report leaves the report of an earlier run.
 pub(super) fn is_written(path: &Path, store: &Store, summary: &Summary) -> Result<bool, Exit> {
     Ok(path.exists() && store.note(note(path)) == Some(digest(summary)?))
 }
@@ -126,7 +126,7 @@ fn took(done: &[Event]) -> HashMap<&str, Took> {
     took
 }
 
-/// What a person must know first: what failed, and what to look at.
+/// The first things to know: failures, and results to look at.
 fn first(summary: &Summary) -> Markup {
     let is_told = |line: &&Line| line.state != LineState::Done;
     let mut told: Vec<&Line> = summary.lines().filter(is_told).collect();

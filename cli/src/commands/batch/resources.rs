@@ -1,4 +1,4 @@
-//! What this process has taken of processors and memory.
+//! Processor time and memory that this process has taken.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use std::fs;
 /// programs as 100).
 const TICKS_PER_S: f64 = 100.0;
 
-/// Returns the seconds of processors that this process has taken, where the system tells.
+/// Returns the seconds of processors that this process has taken, where the system reports them.
 pub(super) fn cpu_s() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may hold blanks.
@@ -15,7 +15,7 @@ pub(super) fn cpu_s() -> Option<f64> {
     Some((fields.next()?.ok()? + fields.next()?.ok()?) / TICKS_PER_S)
 }
 
-/// Returns the most bytes of memory that this process has held, where the system tells.
+/// Returns the most bytes of memory that this process has held, where the system reports them.
 pub(super) fn peak_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! What a night takes of disks, against what is free there.
+//! The disk space that a night takes, and the free space.
 
 use std::path::Path;
 
@@ -8,7 +8,8 @@ use lamp_pipeline::memory::in_words;
 use super::deliver::Deliverer;
 use super::plan::Plan;
 
-/// What a task takes besides its result: what it does, its manifest, and three blocks that are not full.
+/// The room of a task besides its result: its work, its manifest, and three blocks that are not
+/// full.
 const TASK_BYTES: u64 = 3 * 4096;
 
 /// The room that a night takes, estimated, and the room that there is, in bytes.
@@ -64,7 +65,7 @@ fn is_one_disk(_: &Path, _: &Path) -> bool {
     true
 }
 
-/// Returns the bytes that are free for this user on the disk of a folder, where the system tells.
+/// Returns the bytes that are free for this user on a folder's disk, where the system reports them.
 #[cfg(target_os = "linux")]
 fn free(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;

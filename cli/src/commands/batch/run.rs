@@ -125,7 +125,7 @@ impl Running<'_> {
         }
     }
 
-    /// Tells of an attempt, and writes what no task could tell to the journal.
+    /// Reports an attempt, and writes a crash to the journal, since its task could not.
     fn tell(&mut self, attempt: &Attempt, store: &lamp_batch::Store) {
         let task = self.plan.graph.task(attempt.key);
         let name = format!("{} ({})", task.subject, task.label);

@@ -1,4 +1,4 @@
-//! `lamp batch status`: what has become of each part and build.
+//! `lamp batch status`: prints the state of each part and build.
 
 use std::collections::BTreeMap;
 

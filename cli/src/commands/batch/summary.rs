@@ -1,4 +1,4 @@
-//! What has become of each part and build.
+//! The state of each part and build.
 
 use lamp_batch::{Ledger, Manifest, State, Store};
 use serde::Serialize;
@@ -7,7 +7,7 @@ use super::deliver::Deliverer;
 use super::plan::{Plan, Subject, Wanted};
 use super::task::{FINDINGS, ISLANDS, LAYERS, findings_of};
 
-/// The parts and builds of a night: what failed first, then what needs a person.
+/// The parts and builds of a night: failures first, then results that need a person.
 #[derive(Serialize)]
 pub(super) struct Summary {
     pub(super) parts: Vec<Line>,
@@ -24,8 +24,7 @@ pub(super) struct Line {
     /// Where its stack is.
     pub(super) file: Option<String>,
     pub(super) layers: Option<u64>,
-    /// Bands of stray rows that `fix` corrected, and those that it left; without `fix`, stray
-    /// rows.
+    /// Bands of stray rows that `fix` corrected, and bands that it left; without `fix`, stray rows.
     pub(super) stray_fixed: u64,
     pub(super) stray_left: u64,
     pub(super) islands: u64,
@@ -38,7 +37,7 @@ pub(super) struct Line {
     pub(super) place: usize,
 }
 
-/// What has become of a part or a build, the worst first.
+/// The state of a part or a build, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum LineState {
@@ -66,7 +65,7 @@ impl LineState {
 }
 
 impl Summary {
-    /// Gathers what the store has, and what a run tells of the rest.
+    /// Gathers results from the store, and the rest from a run.
     pub(super) fn new(plan: &Plan, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Self {
         let all = plan.subjects.iter().enumerate();
         let mut lines: Vec<(bool, Line)> = all

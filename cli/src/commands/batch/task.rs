@@ -1,4 +1,4 @@
-//! `lamp batch task KEY`: does one task. What engines run.
+//! `lamp batch task KEY`: does one task. Engines run it.
 
 use std::env;
 use std::io;
@@ -95,7 +95,7 @@ fn end_with(parent: i32) {
 #[cfg(not(target_os = "linux"))]
 fn end_with(_: i32) {}
 
-/// Returns the status that tells engines what to do.
+/// Returns the status by which engines decide what to do.
 fn status_of(error: &Exit) -> i32 {
     if error.cause::<Damage>().is_some() {
         return status::DAMAGED;
@@ -146,7 +146,7 @@ fn do_task(store: &Store, task: &Task) -> Result<(), Exit> {
     Ok(store.publish(&manifest).map_err(anyhow::Error::new)?)
 }
 
-/// Checks that files are still those that the task was planned for.
+/// Checks that files have not changed since the task was planned.
 fn check_files(store: &Store, task: &Task) -> Result<(), Exit> {
     let mut digests = Digests::of(store);
     for file in &task.files {

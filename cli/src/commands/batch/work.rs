@@ -1,4 +1,4 @@
-//! What tasks do, as a store keeps it for the processes that do them.
+//! The work of tasks, as a store keeps it for the processes that do it.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::commands::report::Picture;
 
-/// What a task does, and where.
+/// The work of a task, and its place.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Work {
     /// The folder that names of files are from.
@@ -17,7 +17,7 @@ pub(super) struct Work {
     pub(super) what: What,
 }
 
-/// What a task does.
+/// The work of a task.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum What {
@@ -32,7 +32,7 @@ pub(super) enum What {
     },
     /// Joins ranges.
     Join,
-    /// Applies a stage to a whole stack: which of those that need one.
+    /// Applies a stage to a whole stack: `which` is its index among the stages that need one.
     Whole {
         #[serde(with = "path_bytes")]
         part: PathBuf,
@@ -45,7 +45,7 @@ pub(super) enum What {
     Tile { words: Vec<String>, copies: Vec<Option<u32>> },
 }
 
-/// What is found in a part, as the result of its check.
+/// Findings in a part, as the result of its check.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Checked {
     /// A line for each finding, the worst first.

@@ -19,7 +19,7 @@ use crate::terminal::progress::Progress;
 /// Fit a working curve to measured cure depths
 ///
 /// The CSV file has a header with the columns dose_mj_per_cm2 (or exposure_ms, with --intensity)
-/// and depth_um, and gray (0 black to 1 white) for the gray model. Doses are those of full white.
+/// and depth_um, and gray (0 black to 1 white) for the gray model. Doses are doses of full white.
 /// Rows with a depth of 0 or less are uncured and left out.
 #[derive(Args)]
 #[command(after_help = "\
@@ -161,7 +161,7 @@ impl DepthFit {
     }
 }
 
-/// Writes what a level's own points tell.
+/// Writes the estimates from a level's own points.
 fn write_level(text: &mut EstimateTable, level: &LevelFit) {
     let (gray, points) = (level.gray.get(), level.points);
     let points = if points == 1 { "1 point".to_owned() } else { format!("{points} points") };

@@ -10,8 +10,8 @@ pub(super) struct EstimateTable {
 }
 
 impl EstimateTable {
-    /// Starts with how many rows were used of those that are there. `none` says what
-    /// the others are that hold no point.
+    /// Starts with the number of rows that were used, out of all rows. `none` names the rows that
+    /// hold no point.
     pub(super) fn new<T>(measured: &Measured<T>, none: &str) -> Self {
         let Measured { points, none: without, blank } = measured;
         let points = points.len();

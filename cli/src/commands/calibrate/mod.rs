@@ -73,7 +73,7 @@ struct CalibrationFiles {
     #[arg(short, long, value_name = "OUT", value_parser = parse_toml)]
     output: Option<PathBuf>,
 
-    /// Name of the material [default: that of --material, or of the file]
+    /// Name of the material [default: the name of --material, or of the file]
     #[arg(long, value_name = "NAME", requires = "output")]
     name: Option<String>,
 

@@ -22,7 +22,7 @@ use crate::terminal::progress::Progress;
 /// The CSV file has a header with the columns feature_px (the squares' side in the image; or
 /// feature_um), dose_mj_per_cm2 (or exposure_ms, with --intensity), and cured_um (the side after
 /// curing; or width_um, the distance of each edge outside its image). Squares no larger than their
-/// image count: they say from which dose on squares grow. Leave out none but those that were washed
+/// image count: they show from which dose on squares grow. Leave out only squares that were washed
 /// away, or write 0 as their side. lamp target squares writes a file to fill in.
 #[derive(Args)]
 #[command(after_help = "\
@@ -37,7 +37,8 @@ pub(super) struct WidthArgs {
     #[arg(long, default_value = "1500")]
     dpi: Dpi,
 
-    /// Compute the broadening depth from this material's cure depth [default: that of --material]
+    /// Compute the broadening depth from this material's cure depth [default: the cure depth of
+    /// --material]
     #[arg(long, value_name = "MATERIAL")]
     depth_material: Option<PathBuf>,
 }
@@ -116,10 +117,10 @@ fn size_name(fit: &WidthFit, dpi: Dpi) -> String {
     format!("{} px ({} um)", two(size.pixels(dpi)), two(size.um()))
 }
 
-/// Adds a size's numbers, in place of those that the material has of that size.
+/// Adds a size's numbers, and replaces the material's numbers of that size.
 fn add_to(material: &mut Material, fit: &WidthFit, source: &str) {
     let um = fit.feature_size.um();
-    // Sizes are told to the nanometre.
+    // Sizes are given to the nanometer.
     material.cure_width.retain(|size| (size.feature_size.um() - um).abs() > 1e-3);
     material.cure_width.push(fit.numbers(source));
     material.cure_width.sort_by(|a, b| a.feature_size.um().total_cmp(&b.feature_size.um()));

@@ -41,8 +41,8 @@ use report::write_report;
 /// An island is white that rests on nothing: the recoating blade sweeps it away. Each gets a line,
 /// as do weak joints, pockets that hold resin, overhangs, bodies off balance, white at the border
 /// and empty layers; the worst come first. A part is sliced on the way, by the options of `slice`;
-/// its mesh then says where islands must be, too. What rounding to pixels makes, and islands that
-/// never hold a square of --speck pixels, is only in the report.
+/// its mesh then says where islands must be, too. Effects of rounding to pixels, and islands that
+/// never hold a square of --speck pixels, are only in the report.
 #[derive(Args, Clone, Serialize)]
 #[command(after_help = "\
 Examples:
@@ -60,7 +60,7 @@ pub(crate) struct CheckArgs {
     #[serde(skip)]
     inputs: Vec<PathBuf>,
 
-    /// What to tell
+    /// Kinds of findings to report
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     #[arg(value_parser = one_of_described::<FindingGroup>(&[
         "White that rests on nothing",
@@ -112,8 +112,8 @@ pub(crate) struct CheckArgs {
     #[serde(skip)]
     report: Option<PathBuf>,
 
-    /// Write pictures of the worst findings into a new folder: what is found in red, other white
-    /// without white below in yellow, the layer below in gray
+    /// Write pictures of the worst findings into a new folder: findings in red, other white without
+    /// white below in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
     #[serde(skip)]
     evidence: Option<PathBuf>,
@@ -177,8 +177,8 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     found.filter(|_| args.strict).map_or(Ok(()), |found| Err(Exit::Findings(found)))
 }
 
-/// Finds what `lamp check` finds with its usual options, and what it says of each. The blade is
-/// that of `machine`, or of the usual one.
+/// Returns the findings of `lamp check` with its usual options, and its words on each. The blade is
+/// the blade of `machine`, or the usual one.
 fn found_by_default<T: MemorySize + Send>(
     layers: impl Iterator<Item = Result<T, Exit>>,
     decode: impl Fn(T) -> Result<Layer, Exit> + Sync,
@@ -322,7 +322,7 @@ impl CheckArgs {
         Ok(slices.layers.map(|layer| Ok(layer?)))
     }
 
-    /// Returns the minima of a part's mesh, if islands are told.
+    /// Returns the minima of a part's mesh, if islands are reported.
     fn minima(&self, input: &Input) -> Result<Vec<IslandMinimum>, Exit> {
         let Input::Part(part) = input else { return Ok(Vec::new()) };
         if !self.tells(FindingGroup::Islands) || part.model.is_cut() {
@@ -377,14 +377,14 @@ impl CheckArgs {
     }
 }
 
-/// What is checked.
+/// The input to check.
 enum Input {
     Stack(KeptStack),
     Part(Box<SlicedPart>),
 }
 
 impl Input {
-    /// Tells a stack from a part by how it begins, and opens a part.
+    /// Distinguishes a stack from a part by its first bytes, and opens a part.
     fn open(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<Self, Exit> {
         let progress = Progress::new("check", common, true);
         let part = SlicedPart::open(path, slicing, &progress)?;

@@ -20,7 +20,7 @@ const MOST_PICTURES: usize = 24;
 /// The longer side of pictures, in pixels.
 const SIDE: u32 = 480;
 
-/// What a pixel shows. Of several pixels that share a picture's, the last named wins.
+/// The kind of a pixel. Of several pixels that share a picture's, the last named wins.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Black,

@@ -1,4 +1,4 @@
-//! `lamp compare`: tells where two stacks differ.
+//! `lamp compare`: finds where two stacks differ.
 
 mod picture;
 mod report;
@@ -21,7 +21,7 @@ use picture::write_picture;
 use report::{Comparison, answer, text};
 use walk::walk;
 
-/// Tell where two stacks differ: pixels added and missing, layer by layer
+/// Find where two stacks differ: pixels added and missing, layer by layer
 ///
 /// Layers of one height are compared, or of one index where a stack states no heights. Images lie
 /// where their pages' origins and resolutions say, by whole pixels. A pixel that is brighter in B is
@@ -47,9 +47,9 @@ pub(crate) struct CompareArgs {
 
     /// Forgive edges that lie this far apart, as 1px or 20um [default: 0px]
     ///
-    /// A pixel that differs is forgiven if, within this distance, A somewhere has the colour that B
-    /// has at the pixel, and B somewhere that of A. Gaps that close and walls that appear or vanish
-    /// are still told
+    /// A pixel that differs is forgiven if, within this distance, A somewhere has the color that B
+    /// has at the pixel, and B somewhere has A's color. Gaps that close and walls that appear or
+    /// vanish are still reported
     #[arg(long, value_name = "DISTANCE")]
     tolerance: Option<Tolerance>,
 

@@ -13,7 +13,7 @@ use crate::streams::{failed_at, write_file};
 /// The longer side of the picture, in pixels.
 const SIDE: u32 = 1200;
 
-/// What a pixel shows.
+/// The kind of a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Black,

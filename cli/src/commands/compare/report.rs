@@ -1,4 +1,4 @@
-//! What a comparison tells: lines for people, and JSON.
+//! The result of a comparison: lines for people, and JSON.
 
 use std::cmp::Reverse;
 
@@ -14,11 +14,11 @@ use crate::terminal::progress::printable;
 const MOST_LINES: usize = 20;
 const MOST_BOX_LINES: usize = 3;
 
-/// What was found between two stacks.
+/// Differences between two stacks.
 pub(super) struct Comparison<'a> {
     pub(super) names: [String; 2],
     pub(super) pairing: &'a Pairing,
-    /// What the pages of the first and of the second stack say.
+    /// The headers of the pages of the first and of the second stack.
     pub(super) headers: [&'a [PageHeader]; 2],
     /// In pixels.
     pub(super) tolerance: f64,
@@ -42,7 +42,7 @@ impl Comparison<'_> {
         differing.min_by_key(|found| Reverse(found.pixels()))
     }
 
-    /// Returns the page whose pixels boxes are in: that of the first stack, if it has one there.
+    /// Returns the page whose pixels boxes are in: the first stack's page, if it has one there.
     fn header(&self, found: &SectionDifference) -> &PageHeader {
         let of_stack = |stack: usize, position: Option<usize>| {
             position.map(|position| &self.headers[stack][position])
@@ -157,7 +157,7 @@ fn box_mm(
     Some([x0, x1, y0, y1])
 }
 
-/// Returns what scripts are told.
+/// Returns the answer for scripts.
 pub(super) fn answer(comparison: &Comparison<'_>) -> impl Serialize {
     let page = |stack: usize, position: Option<usize>| {
         position.map(|position| comparison.headers[stack][position].info.index)

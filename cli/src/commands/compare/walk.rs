@@ -17,7 +17,7 @@ const MOST_BOXES: usize = 100;
 /// A stack and its name.
 pub(super) type NamedStack<'a> = (&'a IndexedStack, &'a str);
 
-/// What two stacks do not agree on at one height.
+/// Differences of two stacks at one height.
 pub(super) struct SectionDifference {
     pub(super) section: Section,
     /// The number of pixels that are brighter in the second stack, and in the first.
@@ -64,7 +64,7 @@ impl MemorySize for Pages {
     }
 }
 
-/// Compares all sections, and returns those that differ or in which something was forgiven.
+/// Compares all sections, and returns sections that differ or in which something was forgiven.
 pub(super) fn walk(
     stacks: [NamedStack<'_>; 2],
     pairing: &Pairing,
@@ -152,7 +152,7 @@ pub(super) struct Images {
 pub(super) struct Compared<'a> {
     pub(super) overlaid: Overlaid<'a>,
     pub(super) all: Difference,
-    /// What is not forgiven.
+    /// The difference that is not forgiven.
     pub(super) left: Difference,
 }
 

@@ -100,7 +100,7 @@ fn new_folder_of(folder: &Path) -> Result<FolderBeside, Exit> {
     new_folder(if already { &unused } else { folder }, false)
 }
 
-/// Tells why a job cannot be begun a second time.
+/// Returns the reason why a job cannot be begun a second time.
 fn refuse_second(folder: &Path, stack: &Path, digest: &str) -> Result<Exit, Exit> {
     let (folder, stack) = (folder.to_owned(), input_name(stack));
     let there = JobFile::read(&folder)?;

@@ -34,7 +34,7 @@ const MAX_TABLE: u64 = 64 << 20;
 /// A job is a folder that keeps a stack, its material, and all prints: the times of each and what
 /// was measured. Begin one with a stack that has exposure times, print it, and give what you
 /// measured: the heights of faces that look down, or the wrongly cured pixels of each layer. The
-/// times for the next print are written, and whether such steps make errors smaller is told.
+/// times for the next print are written, and whether such steps make errors smaller is printed.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -46,14 +46,14 @@ pub(crate) struct LearnArgs {
     #[arg(value_name = "JOB")]
     job: PathBuf,
 
-    /// Begin the job with this stack, whose pages state their exposures: those of print 0
+    /// Begin the job with this stack, whose pages state the exposures of print 0
     #[arg(long, value_name = "STACK", conflicts_with = "measured")]
     start: Option<PathBuf>,
 
     #[command(flatten)]
     kept: KeptOptions,
 
-    /// What was measured on a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
+    /// Measurements of a print: x_mm, y_mm, z_mm, measured_mm and sd_um, or layer, over_px and
     /// under_px
     #[arg(long, value_name = "FILE.csv", requires = "output")]
     measured: Option<PathBuf>,
@@ -78,7 +78,7 @@ pub(crate) struct LearnArgs {
     #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
     output: Option<PathBuf>,
 
-    /// Write the errors of all prints and what is told of the next as JSON
+    /// Write the errors of all prints and the numbers for the next as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report, requires = "measured")]
     report: Option<PathBuf>,
 
@@ -86,12 +86,12 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "FILE", requires = "measured")]
     plot: Option<PathBuf>,
 
-    /// Memory to work in, beside the layers' edges [default: a quarter of what there is]
+    /// Memory to work in, besides the layers' edges [default: a quarter of available memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 }
 
-/// What a job is begun with, and keeps.
+/// The options that a job begins with, and keeps.
 #[derive(Args, Clone, Debug)]
 struct KeptOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file
@@ -105,7 +105,7 @@ struct KeptOptions {
     #[arg(long, value_name = "LEVEL", requires = "start")]
     wanted: Option<NonZeroU8>,
 
-    /// Where in its layer a voxel's dose is told [default: top]
+    /// Height in its layer at which a voxel's dose is computed [default: top]
     #[arg(long, value_name = "HEIGHT", requires = "start")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     at: Option<SampleHeight>,
@@ -118,7 +118,7 @@ struct KeptOptions {
     #[arg(long, value_name = "A..B", requires = "start", value_parser = parse_speeds)]
     speed: Option<(Speed, Speed)>,
 
-    /// By how much the speed may differ from that of a neighbouring layer, as 20%
+    /// Greatest difference of the speed from a neighboring layer's speed, as 20%
     #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_change)]
     max_change: Option<f64>,
 }

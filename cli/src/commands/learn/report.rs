@@ -1,4 +1,4 @@
-//! Tells what was learnt, in lines and as JSON.
+//! Reports what was learned, in lines and as JSON.
 
 use std::path::Path;
 

@@ -81,7 +81,7 @@ fn answer(materials: impl IntoIterator<Item = Material>) -> Result<(), Exit> {
     print_answer("lamp-material-1", &json!({ "materials": materials }))
 }
 
-/// What is known of a material, and what follows from it.
+/// The known properties of a material, and their consequences.
 fn fields(material: &Material) -> Value {
     let resin = material.resin();
     let example = resin.as_ref().ok().map(example);
@@ -130,7 +130,7 @@ fn light_of(material: &Material) -> Option<Intensity> {
     material.light().ok().flatten().map(significant)
 }
 
-/// Light to six digits: that of a field is a sum.
+/// Light to six digits: the light of a field is a sum.
 fn significant(light: Intensity) -> Intensity {
     let digits = format!("{:.5e}", light.mw_per_cm2());
     Intensity::from_mw_per_cm2(digits.parse().unwrap_or(light.mw_per_cm2()))
@@ -211,7 +211,7 @@ fn allows(material: &Material) -> String {
 }
 
 /// Returns a layer and the time in which full white cures it, or why it does not: a layer of the
-/// seed's machine (002 table 1), or as thin as can be told.
+/// seed's machine (002 table 1), or as thin as can be printed.
 fn example(resin: &Resin) -> (Length, Result<ExposureTime, String>) {
     let least = resin.model().depths().from;
     let layer = if least.um() > 100.0 { least } else { Length::from_um(100.0) };

@@ -17,8 +17,8 @@ use crate::terminal::progress::Progress;
 
 /// Print the profile that a line of light cures: how wide at the surface, how deep where
 ///
-/// The light falls off as exp(-2 y^2/Wo^2) with the distance y from the line, as that of one pixel
-/// nearly does, and down in the resin by its working curve (002 equations 41 to 45). Ceramic
+/// The light falls off as exp(-2 y^2/Wo^2) with the distance y from the line, as the light of one
+/// pixel nearly does, and down in the resin by its working curve (002 equations 41 to 45). Ceramic
 /// scatters, too: give a width and a critical dose that were fitted to cured lines (equation 46).
 #[derive(Args)]
 #[command(after_help = "\
@@ -91,7 +91,7 @@ fn table(beam: GaussianBeam, peak: Dose, curve: &WorkingCurve, critical: Dose) -
     for step in 0..=STEPS {
         let y = Length::from_um(half * f64::from(step) / f64::from(STEPS));
         let dose = beam.dose(peak, y, Length::default(), curve);
-        // The last is where the depth ends, but for rounding.
+        // The last is where the depth ends, except for rounding.
         let depth = if step == STEPS { 0.0 } else { beam.cure_depth(peak, y, curve).um() };
         let [y, dose, depth] = [y.um(), dose.mj_per_cm2(), depth].map(short);
         text += &format!("{y:>12}{dose:>18}{depth:>12}\n");

@@ -1,4 +1,4 @@
-//! What is found about a mesh, as JSON.
+//! Findings about a mesh, as JSON.
 
 use lamp_slicer::topology::{
     Crossings, Deed, Doubled, Lump, Mass, MeshCheck, Repaired, RimLoop, ShellOverlap, ShellReport,

@@ -15,9 +15,10 @@ use crate::streams::print;
 
 /// Find what is wrong with a mesh, and what its shells enclose
 ///
-/// Lists shells with their Euler numbers, areas, volumes, centres of mass and inertia, and the lumps
-/// of material that they make with their voids; holes, edges of three facets and more, facets turned
-/// over, doubled, without area or not finite; shells that overlap. Facets are numbered from 0.
+/// Lists shells with their Euler numbers, areas, volumes, centers of mass and inertia, and the
+/// lumps of material that they make with their voids; holes, edges of three facets and more, facets
+/// turned over, doubled, without area or not finite; shells that overlap. Facets are numbered from
+/// 0.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -45,7 +46,7 @@ pub(super) struct CheckArgs {
     json: bool,
 }
 
-/// What a check finds.
+/// Findings of a check.
 pub(super) struct Findings {
     pub(super) table: CornerTable,
     pub(super) check: MeshCheck,

@@ -41,7 +41,7 @@ pub(super) struct RepairArgs {
     output: PathBuf,
 
     /// Make vertices of open edges one if they are no farther apart [default: 1/20000 of the part's
-    /// diagonal, at most a quarter of the shortest open edge, at least what 32 bits tell apart]
+    /// diagonal, at most a quarter of the shortest open edge, at least the resolution of 32 bits]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     weld: Option<Length>,
 
@@ -112,7 +112,7 @@ fn is_stl(input: &Path, bytes: &[u8]) -> Result<bool, Exit> {
     Ok(is_binary || start.trim_ascii_start().starts_with(b"solid"))
 }
 
-/// What tells an STL: its header and count, or its first word after some blanks.
+/// The bytes that identify an STL: its header and count, or its first word after some blanks.
 const START_BYTES: u64 = 4096;
 
 fn copy(input: &Path, mut bytes: &[u8], out: &mut dyn Write) -> io::Result<()> {

@@ -1,4 +1,4 @@
-//! What is found about a mesh, as text.
+//! Findings about a mesh, as text.
 
 use std::fmt::Write;
 

@@ -22,8 +22,8 @@ use crate::terminal::progress::Progress;
 
 /// Find how to turn a part so that few islands float, and little overhangs
 ///
-/// Islands, pits, overhanging area and size of each pose follow from the mesh alone. Poses that
-/// another one betters in every respect are left out; the best of the rest are sliced, and islands
+/// Islands, pits, overhanging area and size of each pose follow from the mesh alone. A pose is left
+/// out if another pose is better in every respect; the best of the rest are sliced, and islands
 /// counted on their images.
 #[derive(Args)]
 #[command(after_help = "\
@@ -50,7 +50,7 @@ pub(crate) struct OrientArgs {
     #[arg(long, value_name = "ANGLE", default_value = "45deg", value_parser = parse_overhang_angle)]
     max_overhang_angle: f64,
 
-    /// Layer thickness: islands and pits that are less deep are none
+    /// Layer thickness: islands and pits that are less deep do not count
     #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
     thickness: Length,
 
@@ -82,7 +82,7 @@ fn parse_overhang_angle(text: &str) -> Result<f64, String> {
 /// The poses of a part, and what is known of them.
 struct Compared {
     poses: Vec<PoseFacts>,
-    /// Those that no other betters, the best first.
+    /// Pareto-optimal poses, the best first.
     pareto: Vec<usize>,
     /// Islands on the images of the first of these.
     image_islands: Vec<u64>,

@@ -1,4 +1,4 @@
-//! Tells what poses a part has, as a table or as JSON.
+//! Reports the poses of a part, as a table or as JSON.
 
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::solid::name_of_all;

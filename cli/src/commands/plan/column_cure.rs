@@ -63,7 +63,7 @@ pub(super) struct ColumnCureArgs {
     #[arg(long)]
     gray: bool,
 
-    /// What is to be nearest to the target's
+    /// Quantity to bring nearest to the target's
     #[arg(long, default_value = "dose", value_parser = one_of_described::<ColumnObjective>(&[
         "Doses",
         "Cured heights: light that cures nothing costs nothing",
@@ -84,11 +84,11 @@ pub(super) struct ColumnCureArgs {
     #[arg(long, value_name = "NxM", value_parser = parse_rays)]
     rays: Option<Tracing>,
 
-    /// Light of each mirror: a gray PNG of the display's size, told against its mean
+    /// Light of each mirror: a gray PNG of the display's size, relative to its mean
     #[arg(long, value_name = "FILE.png")]
     flat_field: Option<PathBuf>,
 
-    /// Side of a column [default: what the projector's file says]
+    /// Side of a column [default: the side in the projector's file]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
     voxel: Option<Length>,
 
@@ -176,7 +176,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
 }
 
 impl ColumnCureArgs {
-    /// Returns the target's columns, with room for light beside it, and the light on them.
+    /// Returns the target's columns, with room for light around it, and the light on them.
     fn light(
         &self,
         projector: &Projector,

@@ -1,4 +1,4 @@
-//! What is told of cured columns beside their target.
+//! Reports cured columns against their target.
 
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{HeightCurve, Measures};

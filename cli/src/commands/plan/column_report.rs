@@ -1,4 +1,4 @@
-//! What a plan of column cure reaches, in lines and as JSON.
+//! The result of a plan of column cure, in lines and as JSON.
 
 use lamp_planning::column::{
     ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Measures, Tracing,

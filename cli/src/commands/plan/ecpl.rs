@@ -23,9 +23,9 @@ use crate::terminal::progress::Progress;
 ///
 /// Oxygen stops the reaction until light has used it up, and comes back from where there is no
 /// light, so doses do not just add up. This computes the reaction in the chamber, and finds the
-/// time of each ring of mirrors with which what is cured is nearest to the target. Rings begin
-/// together, so that each bitmap lies within the one before. The folder gets bitmaps.tif,
-/// report.json and pictures.
+/// time of each ring of mirrors that cures a part nearest to the target. Rings begin together, so
+/// that each bitmap is inside the one before. The folder gets bitmaps.tif, report.json and
+/// pictures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -120,11 +120,11 @@ pub(super) fn setting_of(
         .map_err(|error| failed(error).at(projector.name.clone()))
 }
 
-/// Columns of maps are so wide, in micrometres, or wider for large parts.
+/// The least width of columns of maps, in micrometers; for large parts they are wider.
 const FINEST_UM: f64 = 2.0;
 const MOST_ROWS: f64 = 1000.0;
 
-/// Returns columns that hold all of a part, with room beside it.
+/// Returns columns that hold all of a part, with room around it.
 pub(super) fn grid_of(cured: &Profile, radius_um: f64) -> Grid {
     let radius_um = 1.1 * radius_um.max(cured.base_um) + 10.0;
     let pitch_um = (2.0 * radius_um / MOST_ROWS).max(FINEST_UM);

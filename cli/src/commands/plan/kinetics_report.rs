@@ -1,9 +1,9 @@
-//! What is told of what bitmaps cure by kinetics.
+//! Reports what bitmaps cure by kinetics.
 
 use lamp_planning::ecpl::{Profile, RingExposure, RingSimulation, WantedProfile};
 use serde_json::{Map, Value, json};
 
-/// What bitmaps cure, and what is wanted if that is known.
+/// The part that bitmaps cure, and the wanted part if known.
 pub(super) struct Cured<'a> {
     pub(super) simulation: &'a RingSimulation,
     pub(super) exposures: &'a [RingExposure],
@@ -11,7 +11,7 @@ pub(super) struct Cured<'a> {
     pub(super) wanted: Option<&'a WantedProfile>,
 }
 
-/// How far a part may lie aside, in micrometres.
+/// Distances by which a part may lie aside, in micrometers.
 const ASIDE_UM: [f64; 3] = [1.0, 3.0, 5.0];
 
 /// The light of a lamp that differs by 2 %.
@@ -115,7 +115,7 @@ fn other_light(of: &Cured<'_>, times: f64) -> Value {
     fields
 }
 
-/// All bitmaps come from one display: what is aside lies so as a whole.
+/// All bitmaps come from one display, so a part that lies aside does so as a whole.
 fn aside(wanted: &WantedProfile, cured: &Profile) -> Value {
     let one = |um| json!({ "aside_um": um, "rms_um": rounded(wanted.rms_aside_um(cured, um)) });
     Value::Array(ASIDE_UM.map(one).to_vec())

@@ -27,10 +27,9 @@ use crate::terminal::progress::Progress;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///
-/// Light that cures a layer also cures below and beside it. The images stay as they are; each
-/// layer gets the time with which as few voxels as possible are cured wrongly, within what the
-/// platform can do. What the best plan could do is bounded, and told. Pages must state thickness
-/// and resolution.
+/// Light that cures a layer also cures below it and to its sides. The images stay as they are; each
+/// layer gets the time with which as few voxels as possible are cured wrongly, within the limits of
+/// the platform. A bound on the best plan is printed. Pages must state thickness and resolution.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -60,8 +59,8 @@ pub(super) struct SpeedArgs {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// Memory to work in, beside the layers' edges; with less, the search sees fewer pixels
-    /// [default: a quarter of what there is, as far as it helps]
+    /// Memory to work in, besides the layers' edges; with less, the search sees fewer pixels
+    /// [default: a quarter of available memory, or as much as helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 

@@ -11,7 +11,7 @@ pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {
     vec![wrong(planned), times(planned), doses(planned), light(planned), search(planned)]
 }
 
-/// The layers' heights in millimetres, and numbers of theirs.
+/// The layers' heights in millimeters, and a number for each.
 fn over_z(planned: &Planned<'_>, number: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
     let layer = |(at, layer): (usize, &lamp_planning::speed::TimedLayer)| {
         [layer.z.mm(), layer.z.mm() + layer.thickness.mm()].map(|z| (z, number(at)))

@@ -1,4 +1,4 @@
-//! What a plan of times reaches, in lines and as JSON.
+//! The result of a plan of times, in lines and as JSON.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ impl Planned<'_> {
         self.plan.times.iter().map(|time| time.ms() / 1000.0).sum()
     }
 
-    /// The platform's speed in a layer, in micrometres a second.
+    /// The platform's speed in a layer, in micrometers a second.
     pub(super) fn speed(&self, layer: usize) -> f64 {
         1000.0 * self.part.layers()[layer].thickness.um() / self.plan.times[layer].ms()
     }

@@ -28,9 +28,9 @@ use crate::terminal::stack_notes::doubts;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///
-/// Light that cures a layer also cures below and beside it. Given the wanted part, 1-bit or gray,
-/// this writes gray pages under which as few voxels as possible are cured wrongly, and tells how
-/// far from the best plan they can be at most. Pages must state thickness and resolution.
+/// Light that cures a layer also cures below it and to its sides. Given the wanted part, 1-bit or
+/// gray, this writes gray pages under which as few voxels as possible are cured wrongly, and prints
+/// how far from the best plan they can be at most. Pages must state thickness and resolution.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -46,14 +46,14 @@ pub(super) struct VoxelsArgs {
     #[command(flatten)]
     planning: PlanningOptions,
 
-    /// What the plan makes least
+    /// Quantity that the plan minimizes
     #[arg(long, default_value = "wrong", value_parser = one_of_described::<VoxelObjective>(&[
         "How far doses lie on the wrong side of the critical one",
         "The dose next to the part, while all that white light cures stays cured",
     ]))]
     objective: VoxelObjective,
 
-    /// Pixels whose light is chosen: those of the part (lit), and 3 around it (grow:3px), or 1
+    /// Pixels whose light is chosen: pixels of the part (lit), and 3 around it (grow:3px), or 1
     /// along its outlines only, while others stay white (shell:1px)
     #[arg(long, value_name = "WHICH", default_value = "lit", value_parser = parse_sources)]
     sources: Sources,
@@ -84,7 +84,7 @@ pub(super) struct VoxelsArgs {
     plot: Option<PathBuf>,
 
     /// Memory to work in; with less, fewer layers are planned at a time, which takes longer and
-    /// moves gray levels a little [default: a quarter of what there is, as far as it helps]
+    /// moves gray levels a little [default: a quarter of available memory, or as much as helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 

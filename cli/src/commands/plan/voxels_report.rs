@@ -1,4 +1,4 @@
-//! What a plan of gray levels reaches, in lines and as JSON.
+//! The result of a plan of gray levels, in lines and as JSON.
 
 use std::path::Path;
 
@@ -57,14 +57,14 @@ fn change(before: u64, after: u64) -> String {
         return String::new();
     }
     let percent = 100.0 * (after as f64 / before as f64 - 1.0);
-    // As many decimals as tell what is left from nothing.
+    // Enough decimals to distinguish the rest from nothing.
     let is_told =
         |&decimals: &usize| after == 0 || !format!("{percent:.decimals$}").starts_with("-100");
     let decimals = (1..8).find(is_told).unwrap_or(8);
     format!(" ({percent:+.decimals$}%)")
 }
 
-/// Tells of wanted voxels that white light does not cure.
+/// Describes wanted voxels that white light does not cure.
 fn uncurable(layers: &[LayerOutcome]) -> Option<String> {
     let short = |layer: &&LayerOutcome| layer.targets < layer.wanted;
     let first = layers.iter().find(short)?.index;

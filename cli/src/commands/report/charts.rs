@@ -6,10 +6,10 @@ use super::gather::StackReport;
 use super::measure::LayerNumbers;
 use crate::output::plots::{Series, by_layer, curve, inline_svg};
 
-/// The most points of a curve; of more, the least and the greatest of neighbours stay.
+/// The most points of a curve; of more, the least and the greatest of neighbors stay.
 const MOST_POINTS: usize = 1200;
 
-/// Returns the curves as SVG: those that the stack has.
+/// Returns the stack's curves as SVG.
 pub(super) fn charts(report: &StackReport) -> Vec<String> {
     let layers = &report.layers;
     let pitch_mm = report.totals.first.dpi.map(|dpi: Dpi| dpi.pitch().mm());
@@ -99,7 +99,7 @@ pub(super) fn same_thickness_um(layers: &[LayerNumbers]) -> Option<f64> {
     layers.iter().all(|layer| layer.thickness_um == Some(first)).then_some(first)
 }
 
-/// Returns points of which at most so many are left, with the extremes of neighbours.
+/// Returns at most so many points, with the extremes of neighbors.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let step = points.len().div_ceil(MOST_POINTS / 2);
     if step <= 2 {

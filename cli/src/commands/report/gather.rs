@@ -1,4 +1,4 @@
-//! Gathers all that a report tells of a stack, in one pass over its layers.
+//! Gathers the contents of a stack's report, in one pass over its layers.
 
 use std::cell::RefCell;
 
@@ -19,18 +19,18 @@ use crate::terminal::progress::Progress;
 const SHEET: usize = 12;
 const MOST_DRAWN: usize = 5;
 
-/// What is known of a stack.
+/// The known facts of a stack.
 pub(super) struct StackReport {
     pub(super) name: String,
     pub(super) totals: StackTotals,
     pub(super) layers: Vec<LayerNumbers>,
-    /// What `lamp check` finds, or why it cannot check the stack.
+    /// The findings of `lamp check`, or why it cannot check the stack.
     pub(super) found: Result<Found, String>,
     pub(super) sheet: Vec<Picture>,
     pub(super) time: BuildTime,
 }
 
-/// What `lamp check` finds.
+/// The findings of `lamp check`.
 pub(super) struct Found {
     pub(super) findings: Findings,
     pub(super) records: Vec<FindingRecord>,

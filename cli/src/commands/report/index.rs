@@ -10,7 +10,7 @@ use crate::terminal::progress::printable;
 /// A line of the index.
 pub(super) struct Entry {
     name: String,
-    /// The page, or why there is none.
+    /// The page, or why it is missing.
     page: Result<Row, String>,
 }
 

@@ -2,7 +2,7 @@
 
 use lamp_stack::{FixRecord, Image, Layer, Mask, gray_runs, white_in_both, white_in_row};
 
-/// What is counted in a layer, and what its page says.
+/// The counts of a layer, and the statements of its page.
 #[derive(Clone, Debug)]
 pub(super) struct LayerNumbers {
     pub(super) index: u32,

@@ -1,4 +1,4 @@
-//! `lamp report`: one page to send that tells of a stack, or a folder of such pages.
+//! `lamp report`: one page to send about a stack, or a folder of such pages.
 
 mod charts;
 mod gather;
@@ -31,11 +31,11 @@ use gather::StackReport;
 pub(super) use page::document;
 pub(super) use pictures::{Picture, of_layer};
 
-/// Write a page to send that tells of a stack: warnings, numbers, curves, pictures
+/// Write a page to send about a stack: warnings, numbers, curves, pictures
 ///
 /// The page is one HTML file that needs no network and no script, and prints on A4 and letter. Of a
 /// folder of stacks, -o names a folder, which gets a page for each stack and an index.html. Numbers
-/// are those of `lamp info` and, with its usual options, of `lamp check`.
+/// equal the numbers of `lamp info` and, with its usual options, of `lamp check`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

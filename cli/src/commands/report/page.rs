@@ -148,7 +148,7 @@ fn findings(found: &Found) -> Markup {
     }
 }
 
-/// Returns a line that a terminal is told with the signs of units that charts have, too.
+/// Returns a terminal's line with units as signs, as in charts.
 fn with_signs(line: &str) -> String {
     let signs = [(" mm2", " mm²"), (" mm3", " mm³"), (" um", " µm")];
     signs.iter().fold(line.to_owned(), |line, (letters, sign)| line.replace(letters, sign))

@@ -48,9 +48,9 @@ const CHOICE: &str = "Choice of supports";
 ///
 /// Supports stay in the mould and become features of the casting, so look at each before you build.
 /// From the middle of an island, directions over a cone below it are tried: the shortest one wins
-/// that meets the part where it is smooth, even and away from creases, and that can be built. What
-/// has no such way is left, and told. The plan is a list of edits: delete or exchange supports in
-/// it, and let lamp edit draw it.
+/// that meets the part where it is smooth, even and away from creases, and that can be built.
+/// Islands without such a way are left, and reported. The plan is a list of edits: delete or
+/// exchange supports in it, and let lamp edit draw it.
 #[derive(Args, Serialize, Clone)]
 #[command(after_help = "\
 Examples:

@@ -53,7 +53,7 @@ fn strut(support: &Support) -> String {
     )
 }
 
-/// Writes a point to whole nanometres.
+/// Writes a point to whole nanometers.
 fn point(point: [Length; 3]) -> String {
     let mut text = String::new();
     for (k, length) in point.into_iter().enumerate() {

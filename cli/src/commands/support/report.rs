@@ -1,4 +1,4 @@
-//! Tells what supports were planned: lines for people, and JSON.
+//! Reports planned supports: lines for people, and JSON.
 
 use std::path::Path;
 

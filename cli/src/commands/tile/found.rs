@@ -1,4 +1,4 @@
-//! What is wrong with a build: stray rows, copies without a place, too great a height.
+//! Errors of a build: stray rows, copies without a place, too great a height.
 
 use lamp_build::StrayRows;
 use lamp_machine::Machine;

@@ -26,7 +26,7 @@ pub(super) struct MeshArgs {
     #[serde(with = "path")]
     mesh: PathBuf,
 
-    /// Distance between the centres of neighbouring cells [default: 5mm]
+    /// Distance between the centers of neighboring cells [default: 5mm]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     #[serde(with = "optional")]
     cell: Option<Length>,
@@ -41,7 +41,7 @@ pub(super) struct MeshArgs {
     #[serde(with = "optional")]
     clearance: Option<Length>,
 
-    /// What the moat follows [default: rising]
+    /// Shape that the moat follows [default: rising]
     #[arg(long, help_heading = HEADING, value_parser = one_of_described::<Moat>(&[
         "The part in each layer and in those below it: no mesh stands on faces that look up",
         "The part in each layer: mesh cures onto faces that look up, and in cross bores",
@@ -50,8 +50,8 @@ pub(super) struct MeshArgs {
     #[serde(with = "optional")]
     moat: Option<Moat>,
 
-    /// Least area of a piece of mesh in a layer: smaller ones are left out, and so are those that
-    /// hang on no mesh below; 0 keeps all that hang [default: 1mm2]
+    /// Least area of a piece of mesh in a layer: smaller pieces are left out, and so are pieces
+    /// that hang on no mesh below; 0 keeps all that hang [default: 1mm2]
     #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
     #[serde(with = "optional")]
@@ -122,7 +122,7 @@ impl MeshArgs {
         }
     }
 
-    /// Returns the mesh, unless it is none.
+    /// Returns the mesh, unless it is `none`.
     pub(super) fn options(&self) -> Result<Option<MeshOptions>, Exit> {
         if self.mesh == Path::new("none") {
             return Ok(None);

@@ -42,7 +42,7 @@ use turns_arg::{TurnsArg, TurnsParser};
 
 /// Lay out copies of parts on a build area, in a mesh
 ///
-/// Copies of one part stand in rows from the top left, centred as a whole; --pack outline places
+/// Copies of one part stand in rows from the top left, centered as a whole; --pack outline places
 /// them by their outlines if more fit. The first page records where they stand. Several stacks are
 /// matched by the heights of their layers; shorter parts end first. Gray layers make a gray build.
 ///
@@ -115,7 +115,7 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     fit: bool,
 
-    /// What copies are kept apart by; outline implies --fit
+    /// Shape by which copies are kept apart; outline implies --fit
     #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
         "The boxes around the parts",
         "The parts' outlines, one after another or, of one part, on a lattice, if boxes place fewer",
@@ -249,7 +249,7 @@ pub(crate) struct Build {
     pub(crate) no_mesh: Rc<RefCell<NoMesh>>,
     /// Its recipe, if that is wanted: complete after the last layer.
     recipe: Option<Rc<RefCell<Recipe>>>,
-    /// What its layers are made of, if that is wanted: complete after the last layer.
+    /// The contents of its layers, if wanted: complete after the last layer.
     totals: Rc<RefCell<BuildTotals>>,
 }
 

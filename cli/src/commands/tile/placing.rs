@@ -1,4 +1,4 @@
-//! Places the copies of a build, and tells where they stand.
+//! Places the copies of a build, and reports their places.
 
 use std::path::Path;
 
@@ -48,7 +48,7 @@ impl TileArgs {
         self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(TileOptions::default().gap)
     }
 
-    /// Tells which copies found no place, and which stand nearer than was asked for.
+    /// Reports copies that found no place, and copies that stand nearer than was asked for.
     pub(super) fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
         if self.layout.is_none() {
             let placed = layout.parts().iter().enumerate();
@@ -70,7 +70,7 @@ impl TileArgs {
         Ok(())
     }
 
-    /// Tells which copies of some parts, of which so many are placed, found no place.
+    /// Reports copies of some parts, of which so many are placed, that found no place.
     pub(super) fn tell_left_over(
         &self,
         placed: &[(String, usize)],

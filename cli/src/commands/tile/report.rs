@@ -1,4 +1,4 @@
-//! What a build is made of, and the report of it.
+//! The contents of a build, and the report of it.
 
 use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_machine::Machine;
@@ -13,8 +13,8 @@ use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 use crate::streams::{is_stream, print};
 
-/// What the layers of a build are made of: numbers of each part and of each layer, whatever the number
-/// of copies.
+/// The contents of a build's layers: numbers of each part and of each layer, whatever the number of
+/// copies.
 pub(super) struct BuildTotals {
     /// The number of copies of each part.
     copies: Vec<u64>,
@@ -137,7 +137,7 @@ fn with(mut object: Value, more: Value) -> Value {
 }
 
 impl TileArgs {
-    /// Writes the report and tells the time of a build that is done, if they are wanted.
+    /// Writes the report and prints the time of a build that is done, if they are wanted.
     pub(super) fn tell_totals(
         &self,
         layout: &Layout,

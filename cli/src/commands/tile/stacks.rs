@@ -49,7 +49,7 @@ impl StackArg {
 
 type Layers = Box<dyn Iterator<Item = Result<Layer, Exit>>>;
 
-/// What was seen of a stack's layers when all of them were read.
+/// Facts about a stack's layers, known when all of them were read.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReadLayers {
     /// The stages that changed pages, as these say.

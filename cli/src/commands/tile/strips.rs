@@ -33,8 +33,7 @@ pub(super) struct StripArgs {
     #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
     overlap: Option<u32>,
 
-    /// What a swath and the next expose of the columns that they share; together it is always the
-    /// build
+    /// Exposure of the columns that a swath and the next share; together it is always the build
     #[arg(long, default_value_t, requires = "strips", help_heading = HEADING)]
     #[arg(value_parser = one_of_described::<Seam>(&[
         "Each pixel belongs to one of the two: each row changes over at a column of its own, and in each \

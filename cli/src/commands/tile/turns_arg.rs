@@ -10,9 +10,9 @@ use lamp_build::{FreeTurns, Turns};
 /// The turns that packing may use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TurnsArg {
-    /// Those of images.
+    /// Turns of images.
     Images(Turns),
-    /// Those that take stacks sliced at other angles, too.
+    /// Turns that take stacks sliced at other angles, too.
     Free(FreeTurns),
 }
 

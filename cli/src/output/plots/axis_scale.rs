@@ -44,8 +44,8 @@ impl ValueFormatter<f64> for AxisScale {
 /// More ticks than this cannot be read.
 const MAX_TICKS: usize = 30;
 
-/// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten, or over
-/// many decades powers of ten; none where the range is none.
+/// Round numbers of a range: multiples of 1, 2 or 5 times a power of ten, or over many decades
+/// powers of ten; empty for an empty range.
 fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
     let length = range.end - range.start;
     if !(length.is_normal() && length > 0.0) {

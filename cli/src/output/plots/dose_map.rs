@@ -12,7 +12,7 @@ use crate::exit::Exit;
 /// Doses of the same voxels in two cases, side by side.
 pub(crate) struct DoseMap {
     pub(crate) title: String,
-    /// What the critical dose is, in mJ/cm².
+    /// The critical dose, in mJ/cm².
     pub(crate) critical_mj: f64,
     /// Voxels in a row.
     pub(crate) width: usize,

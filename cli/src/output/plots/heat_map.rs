@@ -1,4 +1,4 @@
-//! Draws a number for each square of a lattice as its colour, with a scale beside it.
+//! Draws a number for each square of a lattice as its color, with a scale next to the lattice.
 
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
@@ -10,18 +10,18 @@ use crate::exit::Exit;
 /// Numbers on a square lattice, its middle on the axis of the light.
 pub(crate) struct HeatMap {
     pub(crate) title: String,
-    /// What the numbers are, with their unit.
+    /// The name of the numbers, with their unit.
     pub(crate) label: String,
     /// Squares in a row.
     pub(crate) columns: usize,
     /// The numbers, row by row; the first row has the greatest y.
     pub(crate) values: Vec<f64>,
-    /// The side of a square, in millimetres.
+    /// The side of a square, in millimeters.
     pub(crate) pitch_mm: f64,
     pub(crate) colours: Colours,
 }
 
-/// How numbers are coloured.
+/// How numbers are colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Colours {
     /// Blue below zero, red above, as far in both directions.
@@ -33,7 +33,7 @@ pub(crate) enum Colours {
 /// The longer side of a map, and the most pixels of a square.
 const SIDE: usize = 1000;
 const MOST_PIXELS: usize = 40;
-/// What stands around a map, in points: title, axes and the scale.
+/// The margins of a map, in points: title, axes and the scale.
 const TITLE: u32 = 40;
 const LEFT: u32 = 62;
 const BELOW: u32 = 44;
@@ -55,8 +55,8 @@ impl HeatMap {
         self.values.len() / self.columns
     }
 
-    /// Returns a map of at most [`SIDE`] squares along a side. Each stands for several, by that of
-    /// them that is farthest from zero.
+    /// Returns a map of at most [`SIDE`] squares along a side. Each stands for several, by the
+    /// number among them that is farthest from zero.
     fn coarsened(&self) -> Self {
         let many = self.columns.max(self.rows()).div_ceil(SIDE);
         let [columns, rows] = [self.columns, self.rows()].map(|count| count / many);
@@ -166,7 +166,7 @@ impl HeatMap {
     }
 }
 
-/// The colours from the least to the greatest number.
+/// The colors from the least to the greatest number.
 struct ColourScale {
     least: f64,
     most: f64,
@@ -186,7 +186,7 @@ impl ColourScale {
     }
 }
 
-/// Blue, white and red, which also those who see few colours can tell apart.
+/// Blue, white and red, also distinct to people who see few colors.
 const DIVERGING: [[f64; 3]; 5] = [
     [33.0, 102.0, 172.0],
     [146.0, 197.0, 222.0],

@@ -17,8 +17,8 @@ const SIDE: u32 = 1600;
 const MARGIN: i32 = 24;
 const LEGEND: i32 = 60;
 
-/// The bytes of a picture of a layout: outlines where they are known, boxes, and
-/// each copy's number among those of its part.
+/// The bytes of a picture of a layout: outlines where they are known, boxes, and each copy's number
+/// among the copies of its part.
 pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Exit> {
     let picture = LayoutPicture::new(layout);
     picture_of(&picture, picture.size(), path)
@@ -154,7 +154,7 @@ impl Drawing for LayoutPicture<'_> {
     }
 }
 
-/// A light tint of a colour, which lies on itself without a trace.
+/// A light tint of a color, which lies on itself without a trace.
 fn tint(RGBColor(red, green, blue): RGBColor) -> RGBColor {
     let [red, green, blue] = [red, green, blue].map(|c| 255 - (255 - c) / 3);
     RGBColor(red, green, blue)

@@ -80,13 +80,13 @@ pub(crate) fn linear(label: &str, range: Range<f64>) -> PlotAxis {
     PlotAxis { label: label.to_owned(), range, logarithmic: false }
 }
 
-/// Returns the corners of steps of a width, given where each begins and how high it is.
+/// Returns the corners of steps of a width, given the begin and the height of each.
 pub(crate) fn stairs(steps: impl Iterator<Item = (f64, f64)>, width: f64) -> Vec<(f64, f64)> {
     steps.flat_map(|(from, height)| [(from, height), (from + width, height)]).collect()
 }
 
-/// Returns a plot of curves over the height of layers in millimetres, whose y axis has all of
-/// them and zero.
+/// Returns a plot of curves over the height of layers in millimeters, whose y axis has all of them
+/// and zero.
 pub(crate) fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
     let all = || series.iter().flat_map(|series| series.curve.iter().chain(&series.points));
     let ends = |of: fn(&(f64, f64)) -> f64| {
@@ -143,7 +143,7 @@ pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Exit> {
     }
 }
 
-/// What is drawn by itself, not as a plot of curves.
+/// A drawing of its own, not a plot of curves.
 trait Drawing {
     fn draw<B: DrawingBackend>(
         &self,
@@ -213,7 +213,7 @@ fn fine((width, height): (u32, u32)) -> (u32, u32) {
     (width * SCALE, height * SCALE)
 }
 
-/// The size of several plots, given that of one.
+/// The size of several plots, given the size of one.
 fn all_of((width, height): (u32, u32), plots: &[Plot]) -> (u32, u32) {
     (width, height * plots.len() as u32)
 }
@@ -283,8 +283,8 @@ impl Plot {
 const GRAY_INK: RGBColor = RGBColor(90, 90, 90);
 const GRID: RGBColor = RGBColor(222, 222, 222);
 
-/// Colours that can be told apart, also by those who see few (Okabe and Ito), again
-/// from the start after eight.
+/// Colors that are distinct, also to people who see few (Okabe and Ito), again from the start after
+/// eight.
 fn inks() -> impl Iterator<Item = RGBColor> {
     const INKS: [RGBColor; 8] = [
         RGBColor(0, 114, 178),

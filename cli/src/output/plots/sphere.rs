@@ -20,7 +20,7 @@ const LEGEND: i32 = 110;
 const SIZE: (u32, u32) =
     ((4 * RADIUS + 3 * MARGIN) as u32, (2 * RADIUS + 2 * MARGIN + HEAD + LEGEND) as u32);
 
-/// Colours of no island, one, and more: dark where there are many (after Viridis).
+/// Colors of no island, one, and more: dark where there are many (after Viridis).
 const SHADES: [(&str, RGBColor); 5] = [
     ("no island", RGBColor(253, 231, 37)),
     ("1", RGBColor(94, 201, 98)),
@@ -41,8 +41,8 @@ fn shade(islands: usize) -> RGBColor {
 }
 
 /// The bytes of a picture of both halves of the sphere, seen from its poles: a dot for each
-/// direction, coloured by islands, and a ring around that of the best pose. Areas are true to scale
-/// (Lambert's projection).
+/// direction, colored by islands, and a ring around the dot of the best pose. Areas are true to
+/// scale (Lambert's projection).
 pub(crate) fn sphere_picture(
     title: &str,
     poses: &[PoseFacts],
@@ -77,7 +77,7 @@ impl Half {
 
     /// Returns where a direction of this half is drawn.
     fn at(self, [x, y, z]: [f64; 3]) -> (i32, i32) {
-        // The distance from the pole is 2 sin(angle / 2), and that of the rim the root of 2.
+        // The distance from the pole is 2 sin(angle / 2), and for the rim the root of 2.
         let scale = f64::from(RADIUS) / SQRT_2 * (2.0 / (1.0 + z.abs())).sqrt();
         let (cx, cy) = self.centre();
         (cx + (scale * x).round() as i32, cy - (scale * y).round() as i32)

@@ -15,7 +15,7 @@ const OVERSHOOT: [u8; 3] = [226, 72, 52];
 const MISSING: [u8; 3] = [52, 130, 226];
 const OUTLINE: [u8; 3] = [255, 205, 60];
 
-/// What the pictures of a section show.
+/// The contents of the pictures of a section.
 pub(super) struct Scene<'a> {
     pub(super) pixels: Range<u32>,
     pub(super) heights_um: Range<f64>,
@@ -37,13 +37,13 @@ impl Scene<'_> {
         (self.size(scale)[0] + GAP) * self.cured.len() - GAP
     }
 
-    /// Returns the rows of the pictures side by side: what is at their pixels' centres.
+    /// Returns the rows of the pictures side by side: the material at their pixels' centers.
     pub(super) fn rows(&self, scale: PictureScale) -> impl Iterator<Item = Vec<u8>> {
         let [width, height] = self.size(scale);
         let step_um = self.pitch_um / factor(scale);
         let (top_um, bottom_um) = (self.heights_um.end, self.heights_um.start);
         let z_at = move |row: usize| top_um - (row as f64 + 0.5) * step_um;
-        // What lies outside the picture makes no edge.
+        // Places outside the picture make no edge.
         let below_um = move |row: usize| z_at(row + 1).max(bottom_um);
         let place = |column: usize| (column as f64 + 0.5) / factor(scale);
         let pixel = |column: usize| {

@@ -1,4 +1,4 @@
-//! What bitmaps cure where doses add up, column by column (000).
+//! Simulates what bitmaps cure where doses add up, column by column (000).
 
 use lamp_planning::MirrorSeconds;
 use lamp_planning::column::{GlassLight, HeightCurve, Measures, Setup, Tracing};

@@ -1,4 +1,4 @@
-//! What bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
+//! Simulates what bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
 
 use anyhow::anyhow;
 use lamp_planning::ShownBitmap;

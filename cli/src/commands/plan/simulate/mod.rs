@@ -1,4 +1,4 @@
-//! `lamp plan simulate`: what bitmaps cure on a fixed glass.
+//! `lamp plan simulate`: computes what bitmaps cure on a fixed glass.
 
 mod column;
 mod exposures;
@@ -24,10 +24,10 @@ use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 use exposures::Exposures;
 
-/// Tell what bitmaps cure on a fixed glass, a plan's or any others
+/// Compute what bitmaps cure on a fixed glass, a plan's or any others
 ///
-/// Bitmaps are a stack whose pages say how long they are shown, or discs and rings typed in. With
-/// --target, what is cured is compared with what is wanted. -o writes it all, with pictures.
+/// Bitmaps are a stack whose pages state their exposure times, or discs and rings typed in. With
+/// --target, the cured part is compared with the wanted one. -o writes it all, with pictures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -61,7 +61,7 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "POINTSxDIRECTIONS", value_parser = parse_rays)]
     rays: Option<Tracing>,
 
-    /// What should be cured, to compare with: as the target of lamp plan column-cure
+    /// Target to compare with: as the target of lamp plan column-cure
     #[arg(long, value_name = "TARGET")]
     target: Option<PathBuf>,
 
@@ -95,7 +95,7 @@ pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
     rays.ok_or_else(|| format!("`{text}` is not a number of rays: write 9x15, each from 1 to 99"))
 }
 
-/// What bitmaps are shown for.
+/// Exposures of bitmaps, and the setup in which they are shown.
 struct Shown {
     exposures: Exposures,
     projector: Projector,
@@ -103,14 +103,14 @@ struct Shown {
     target: Option<GivenTarget>,
 }
 
-/// What bitmaps cure.
+/// The outcome of showing bitmaps.
 struct Outcome {
     cured: HeightMap,
-    /// What is wanted, on the same columns.
+    /// The wanted heights, on the same columns.
     wanted: Option<HeightMap>,
-    /// What to print.
+    /// Lines to print.
     lines: Vec<String>,
-    /// What the report says beside what was given.
+    /// Fields of the report besides the given input.
     report: Map<String, Value>,
 }
 

@@ -70,7 +70,7 @@ impl TileArgs {
         print(&self.script(&plan, &from, turns, gap))
     }
 
-    /// Tells what turns gain, and which copies found no place.
+    /// Reports the gain by turns, and copies that found no place.
     fn tell_plan(
         &self,
         plan: &TurnedPlan,

@@ -12,7 +12,7 @@ use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 use super::super::stacks::{InputStack, ReadLayers};
 use crate::exit::Exit;
 
-/// What a stack says of how it was sliced.
+/// A stack's record of how it was sliced.
 pub(super) struct SlicedFrom {
     settings: SliceSettings,
     /// The part's files as words, with their placements.
@@ -25,8 +25,8 @@ pub(super) struct SlicedFrom {
 }
 
 impl SlicedFrom {
-    /// Reads what a stack records, and looks for the part's files beside it and in the current
-    /// folder.
+    /// Reads what a stack records, and looks for the part's files next to the stack and in the
+    /// current folder.
     ///
     /// # Errors
     /// Returns an error if the stack does not record how it was sliced, or more than that.

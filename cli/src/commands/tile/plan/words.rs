@@ -19,7 +19,7 @@ const SETTLED: [&str; 10] = [
 ];
 
 /// Returns the options that `tile` was given, by a command line and by an options file, without
-/// those that a plan settles. Stacks, and the name of the command, are left out, too.
+/// options that a plan settles. Stacks, and the name of the command, are left out, too.
 pub(super) fn kept(words: &[OsString], tile: &Command) -> Vec<OsString> {
     let mut kept = Vec::new();
     let mut words = words.iter();
