@@ -3,25 +3,21 @@
 use std::fmt;
 use std::io;
 
-use lamp_adaptive::HeightsError;
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_grayscale::exposure::{ExposureError, LampError};
-use lamp_grayscale::material::MaterialError;
-use lamp_machine::{MachineError, MachineLimit};
+use lamp_machine::MachineLimit;
 use lamp_offset::CompensateError;
 use lamp_pipeline::ErrorKind;
-use lamp_pipeline::compensate::NoDose;
 use lamp_planning::learn::{JobError, LearnError};
-use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::{PartError, PlatformError, SpeedPlanError};
 use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
-use lamp_stack::{CatalogueError, JoinError, SplitError, StackError};
+use lamp_stack::{JoinError, SplitError, StackError};
 use lamp_supports::{CheckError, SupportError};
 use lamp_view::SurfaceError;
 
@@ -73,7 +69,7 @@ impl Exit {
     /// Returns the error of one type that caused it, if any.
     pub(crate) fn cause<E: std::error::Error + Send + Sync + 'static>(&self) -> Option<&E> {
         let Self::Failed(error) = self else { return None };
-        error.chain().find_map(|cause| cause.downcast_ref())
+        causes(error).find_map(|cause| cause.downcast_ref())
     }
 
     /// Returns what kind of reading or writing failed, if that is the cause.
@@ -83,7 +79,7 @@ impl Exit {
             Some(StackError::Io(error)) => Some(error.kind()),
             _ => cause.downcast_ref().map(io::Error::kind),
         };
-        error.chain().find_map(kind)
+        causes(error).find_map(kind)
     }
 
     pub(crate) fn status(&self) -> u8 {
@@ -99,7 +95,7 @@ impl Exit {
     /// failure of this one.
     pub(crate) fn is_reader_gone(&self) -> bool {
         let Self::Output(error) = self else { return false };
-        error.chain().any(|cause| {
+        causes(error).any(|cause| {
             let io = match cause.downcast_ref::<StackError>() {
                 Some(StackError::Io(io)) => Some(io),
                 _ => cause.downcast_ref::<io::Error>(),
@@ -116,7 +112,7 @@ impl fmt::Display for Exit {
             Self::Different => f.write_str("the stacks differ"),
             Self::Usage(error) | Self::Failed(error) | Self::Output(error) => {
                 write!(f, "{error:#}")?;
-                match error.chain().find_map(hint) {
+                match causes(error).find_map(hint) {
                     Some(hint) => write!(f, ": {hint}"),
                     None => Ok(()),
                 }
@@ -125,28 +121,43 @@ impl fmt::Display for Exit {
     }
 }
 
-/// Makes errors of libraries failures, and finds their types again behind boxes, so that hints know
-/// them.
+/// The cause in an error of a room, which has its type in a box.
+#[derive(Debug)]
+struct Boxed(Box<dyn std::error::Error + Send + Sync>);
+
+impl fmt::Display for Boxed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::error::Error for Boxed {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.0.source()
+    }
+}
+
+/// Returns an error whose type is in a box, so that [`Exit::cause`] and hints know it.
+pub(crate) fn boxed(cause: Box<dyn std::error::Error + Send + Sync>) -> anyhow::Error {
+    anyhow::Error::new(Boxed(cause))
+}
+
+/// Returns an error and its causes, each under its own type.
+fn causes(error: &anyhow::Error) -> impl Iterator<Item = &(dyn std::error::Error + 'static)> {
+    error.chain().map(|cause| match cause.downcast_ref() {
+        Some(Boxed(cause)) => &**cause as &(dyn std::error::Error + 'static),
+        None => cause,
+    })
+}
+
+/// Makes errors of libraries failures.
 macro_rules! failures {
-    ($($error:ty),+ $(,)?; boxed only: $($boxed:ty),+ $(,)?) => {
+    ($($error:ty),+ $(,)?) => {
         $(impl From<$error> for Exit {
             fn from(error: $error) -> Self {
                 Self::Failed(error.into())
             }
         })+
-
-        /// Returns the error in a box under its own type.
-        pub(crate) fn unboxed(cause: Box<dyn std::error::Error + Send + Sync>) -> anyhow::Error {
-            $(let cause = match cause.downcast::<$error>() {
-                Ok(error) => return anyhow::Error::new(*error),
-                Err(cause) => cause,
-            };)+
-            $(let cause = match cause.downcast::<$boxed>() {
-                Ok(error) => return anyhow::Error::new(*error),
-                Err(cause) => cause,
-            };)+
-            anyhow::Error::from_boxed(cause)
-        }
     };
 }
 
@@ -177,9 +188,7 @@ failures!(
     DataError,
     FitError,
     ExposureError,
-    LampError;
-    boxed only: StackError, io::Error, HeightsError, NoDose,
-    CatalogueError<MaterialError>, CatalogueError<MachineError>, CatalogueError<ProjectorError>,
+    LampError,
 );
 
 /// Distinguishes failures to write from stacks without layers; errors of the layers pass through as
@@ -193,12 +202,11 @@ impl From<StackError> for Exit {
     }
 }
 
-/// The cause keeps its type, so that hints know it.
 impl From<lamp_pipeline::Error> for Exit {
     fn from(error: lamp_pipeline::Error) -> Self {
         let kind = error.kind();
         let (cause, places) = error.into_parts();
-        let error = places.into_iter().fold(unboxed(cause), anyhow::Error::context);
+        let error = places.into_iter().fold(boxed(cause), anyhow::Error::context);
         match kind {
             ErrorKind::Settings => Self::Usage(error),
             ErrorKind::Work => Self::Failed(error),

@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, anyhow};
 pub(crate) use lamp_pipeline::documents::is_stream;
+use lamp_pipeline::documents::{open_stack, refuse_terminal};
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
     PageWriter, Pages, PassingLayer, StackError, StackInfo, close, map_in_order, sync,
@@ -73,15 +74,10 @@ pub(crate) fn print(text: &str) -> Result<(), Exit> {
 
 /// Opens a stack's pages.
 pub(crate) fn open_pages(path: &Path) -> Result<Pages, Exit> {
-    let pages = if is_stream(path) {
-        refuse_terminal()?;
+    if is_stream(path) {
         widen_pipe(&io::stdin());
-        Pages::from_stream(io::stdin())
-    } else {
-        Pages::open(path)
-    };
-    let pages = pages.map_err(|error| failed_at(input_name(path), error))?;
-    Ok(noting(pages, path))
+    }
+    Ok(noting(open_stack(path)?, path))
 }
 
 /// Opens a stack of which any page can be read; standard input is kept in a temporary file.
@@ -93,15 +89,6 @@ pub(crate) fn open_indexed(path: &Path) -> Result<IndexedStack, Exit> {
     let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
     stack.notes().iter().for_each(|note| print_note(path, note));
     Ok(stack)
-}
-
-fn refuse_terminal() -> Result<(), Exit> {
-    if io::stdin().is_terminal() {
-        return Err(Exit::usage(
-            "no stack to read: name a file, or pipe one in (--help shows how)",
-        ));
-    }
-    Ok(())
 }
 
 /// Keeps standard input in a temporary file without a name, to be read twice.
@@ -231,13 +218,6 @@ fn decoded(
         layer.info.stack = stack;
         Ok(layer)
     })
-}
-
-/// Opens a stack that is used beside the first, for a stage.
-pub(crate) fn open_beside(path: &Path) -> Result<Pages, lamp_pipeline::Error> {
-    let pages = if is_stream(path) { Pages::from_stream(io::stdin()) } else { Pages::open(path) };
-    let pages = pages.map_err(|error| lamp_pipeline::Error::from(error).at(input_name(path)))?;
-    Ok(noting(pages, path))
 }
 
 /// Reads all layers of a stack that is used beside the first, decoded, in order.

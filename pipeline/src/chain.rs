@@ -87,7 +87,7 @@ impl Stage {
             Self::Fix(settings) => Working::Fix(Fixing::new(settings)),
             Self::Compensate(settings) => Working::Compensate(Compensating::new(settings)?),
             Self::Dither(settings) => Working::Dither(settings, Box::new(remarks.of("dither"))),
-            Self::Edit(settings) => Working::Edit(Editing::new(settings)?),
+            Self::Edit(settings) => Working::Edit(Editing::new(settings)?, remarks.clone()),
         })
     }
 }
@@ -100,8 +100,8 @@ pub enum Working<'a> {
     Compensate(Compensating<'a>),
     /// Dots, and what takes warnings of them.
     Dither(&'a DitherSettings, Box<dyn Watcher + 'a>),
-    /// Edits.
-    Edit(Editing),
+    /// Edits, and the lines to which notes on other stacks are added.
+    Edit(Editing, KeptRemarks),
 }
 
 impl Working<'_> {
@@ -127,12 +127,13 @@ impl Working<'_> {
             Self::Dither(settings, watcher) => {
                 Box::new(settings.layers(layers, decode, &**watcher))
             }
-            Self::Edit(editing) => {
-                let open = |path: &Path| {
-                    let pages = Pages::open(path);
-                    pages.map_err(|error| Error::from(error).at(path.display().to_string()))
+            Self::Edit(editing, remarks) => {
+                let noting = |pages: Pages, path: &Path| {
+                    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    let remarks = remarks.clone();
+                    pages.with_listener(move |note| remarks.keep(format!("edit: {name}: {note}")))
                 };
-                Box::new(editing.layers(layers, range, is_end, &open)?)
+                Box::new(editing.layers(layers, range, is_end, &noting)?)
             }
         })
     }
@@ -146,7 +147,7 @@ impl Working<'_> {
                 findings.of_range.extend(lines.map(|line| format!("compensate: {line}")));
             }
             Self::Dither(..) => {}
-            Self::Edit(editing) => {
+            Self::Edit(editing, _) => {
                 findings.unused_edits.extend(editing.unused().map(|edit| (stage, edit)));
             }
         }

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, IsTerminal, Read};
 use std::path::{Path, PathBuf};
 
-use lamp_stack::{Builtin, Catalogued, digest_of, file_word};
+use lamp_stack::{Builtin, Catalogued, Pages, digest_of, file_word};
 
 use crate::error::{Error, ErrorKind};
 
@@ -26,6 +26,33 @@ pub fn is_stream(path: &Path) -> bool {
 /// Returns the name of an input for messages.
 pub fn input_name(path: &Path) -> String {
     if is_stream(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Opens a stack: a file, a folder of pages, or standard input.
+///
+/// # Errors
+/// Returns an error with the stack's name if it cannot be read, or if nothing is piped in.
+pub fn open_stack(path: &Path) -> Result<Pages, Error> {
+    let pages = if is_stream(path) {
+        refuse_terminal()?;
+        Pages::from_stream(io::stdin())
+    } else {
+        Pages::open(path)
+    };
+    pages.map_err(|error| Error::from(error).at(input_name(path)))
+}
+
+/// Refuses to read a stack from a terminal.
+///
+/// # Errors
+/// Returns an error if standard input is one.
+pub fn refuse_terminal() -> Result<(), Error> {
+    if io::stdin().is_terminal() {
+        return Err(Error::settings(
+            "no stack to read: name a file, or pipe one in (--help shows how)",
+        ));
+    }
+    Ok(())
 }
 
 /// Returns the built-in document of a name, or the document in a file.

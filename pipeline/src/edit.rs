@@ -12,7 +12,7 @@ use lamp_stack::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::documents::{input_name, is_stream, read_text};
+use crate::documents::{input_name, is_stream, open_stack, read_text};
 use crate::error::{Error, ErrorKind};
 use crate::words::text;
 
@@ -102,8 +102,8 @@ pub struct Editing {
     counts: RefCell<Vec<usize>>,
 }
 
-/// Opens another stack, of which notes are printed or kept.
-pub type OpenStack<'a> = &'a dyn Fn(&Path) -> Result<Pages, Error>;
+/// Has the notes on the pages of another stack or a picture printed or kept.
+pub type Noting<'a> = &'a dyn Fn(Pages, &Path) -> Pages;
 
 impl Editing {
     /// Reads the list of edits, if there is one.
@@ -138,16 +138,17 @@ impl Editing {
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
         counted: Range<u32>,
         is_end: [bool; 2],
-        open: OpenStack<'_>,
+        noting: Noting<'_>,
     ) -> Result<impl Iterator<Item = Result<PassingLayer, E>> + 'a, Error> {
         let EditFiles { edits, stacks, pictures, .. } = &self.files;
         let may_reach_beyond = is_end.map(|is_end| !is_end);
         let other = |file: &PathBuf| {
-            let layers = Box::new(layers_beside(open(file)?, file));
+            let layers = Box::new(layers_beside(noting(open_stack(file)?, file), file));
             Ok(OtherLayers { name: input_name(file), layers, may_reach_beyond })
         };
         let others = stacks.iter().map(other).collect::<Result<_, Error>>()?;
-        let pictures = pictures.iter().map(|file| open_picture(file)).collect::<Result<_, Error>>();
+        let pictures =
+            pictures.iter().map(|file| open_picture(file, noting)).collect::<Result<_, Error>>();
         let count = move |page: &PageInfo, done: &[usize]| {
             if counted.contains(&page.index) {
                 done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
@@ -195,7 +196,10 @@ fn open_list(path: &Path) -> Result<LabelList, Error> {
 }
 
 /// Opens a picture. Reads a copy in a temporary file, so that the digest fits the stamped picture.
-fn open_picture<E: From<Error> + Send + 'static>(path: &Path) -> Result<OtherPicture<E>, Error> {
+fn open_picture<E: From<Error> + Send + 'static>(
+    path: &Path,
+    noting: Noting<'_>,
+) -> Result<OtherPicture<E>, Error> {
     let name = path.display().to_string();
     let max = Limits::default().png_bytes;
     let copied = || -> io::Result<(File, u64, String)> {
@@ -212,5 +216,5 @@ fn open_picture<E: From<Error> + Send + 'static>(path: &Path) -> Result<OtherPic
         return Err(Error::work(why).at(name));
     }
     let pages = Pages::from_file(copy).map_err(|error| Error::from(error).at(name.clone()))?;
-    Ok(OtherPicture { name, digest, pages: Box::new(layers_beside(pages, path)) })
+    Ok(OtherPicture { name, digest, pages: Box::new(layers_beside(noting(pages, path), path)) })
 }

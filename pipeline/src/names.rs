@@ -11,7 +11,7 @@ use lamp_stack::{
 use serde_json::Value;
 
 use crate::error::Error;
-use crate::part_file::recorded;
+use crate::part_file::PartFile;
 use crate::slice::stem;
 
 /// Returns the name under which stored results record a part, given its digest (`blake3:` and
@@ -66,8 +66,11 @@ impl Names {
                 for (stored, file) in &self.0 {
                     // Commands have the whole name, everything else the text before the last dot.
                     let [short, file_short] = [stored, file].map(|name| stem(Path::new(name)));
-                    if text.contains(&short) {
-                        let file = recorded(file, None);
+                    let file = PartFile { path: file.into(), placement: None }.to_string();
+                    // A record has the file alone, a command has it quoted among other words.
+                    if text == stored {
+                        *text = file;
+                    } else if text.contains(&short) {
                         *text = text.replace(stored, &quoted(&file)).replace(&short, &file_short);
                     }
                 }
@@ -75,6 +78,28 @@ impl Names {
             Value::Array(values) => values.iter_mut().for_each(|value| self.rename(value)),
             Value::Object(values) => values.values_mut().for_each(|value| self.rename(value)),
             _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::slice_settings::{SliceSettings, SlicingRecord};
+
+    #[test]
+    fn a_stored_stack_gets_the_record_of_its_file() {
+        let stored = stored_name("blake3:0123456789abcdef");
+        let sliced = |name: &str| {
+            let mut stack = StackInfo { part: stem(Path::new(name)), ..StackInfo::default() };
+            let parts = vec![PartFile { path: name.into(), placement: None }];
+            let settings = SliceSettings::default();
+            SlicingRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
+            stack
+        };
+        for name in ["t.stl", "my part.stl", "it's@1,2.stl", "-x.stl"] {
+            let names = Names::new([(stored.clone(), name.to_owned())]);
+            assert_eq!(names.named(sliced(&stored)), sliced(name));
         }
     }
 }

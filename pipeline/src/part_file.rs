@@ -56,11 +56,6 @@ impl PartFile {
         Self { path: self.file().into(), placement: self.placement }
     }
 
-    /// Returns the words by which a stack records it.
-    pub fn recorded(&self) -> String {
-        self.named().to_string()
-    }
-
     /// Returns true if a stack records the same place for both.
     pub fn stands_like(&self, other: &Self) -> bool {
         let [a, b] = [self, other].map(|part| part.placement.unwrap_or_default());
@@ -69,18 +64,31 @@ impl PartFile {
 }
 
 impl fmt::Display for PartFile {
-    /// Writes text that [`PartFile::parse`] reads.
+    /// Writes text that [`FromStr`] and [`PartFile::parse`] read.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&recorded(&self.path.to_string_lossy(), self.placement))
+        let file = self.path.to_string_lossy();
+        // In a name with an `@`, the rest would be read as the placement.
+        let placement = self.placement.or_else(|| file.contains('@').then(PartPlacement::default));
+        f.write_str(&if is_stream(&self.path) { file } else { file_word(&file) })?;
+        placement.map_or(Ok(()), |placement| write!(f, "@{placement}"))
     }
 }
 
-/// Returns a stack's record of a file of a part, so that [`PartFile::parse`] reads it.
-pub fn recorded(file: &str, placement: Option<PartPlacement>) -> String {
-    // In a name with an `@`, the rest would be read as the placement.
-    let placement = placement.or_else(|| file.contains('@').then(PartPlacement::default));
-    let file = if file == "-" { file.into() } else { file_word(file) };
-    placement.map_or_else(|| file.clone().into_owned(), |placement| format!("{file}@{placement}"))
+impl FromStr for PartFile {
+    type Err = std::convert::Infallible;
+
+    /// Reads a recorded file, whatever files there are here.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let placed = text.rsplit_once('@').and_then(|(file, placement)| {
+            Some(Self { path: file.into(), placement: Some(placement.parse().ok()?) })
+        });
+        Ok(placed.unwrap_or_else(|| Self { path: text.into(), placement: None }))
+    }
+}
+
+/// Returns files and placements as a stack records them, for messages.
+pub fn names_of(files: &[PartFile]) -> String {
+    files.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// Returns the paths of parts.
@@ -182,7 +190,25 @@ mod tests {
             assert_eq!((at.path, at.placement.is_some()), (alone.path, true));
         }
         assert!(PartFile::parse(format!("{plain}@1,x").into()).unwrap_err().contains("`1,x`"));
-        assert_eq!(parsed(&format!("{placed}@1,2")).recorded(), "d@1,2@1,2,0,0");
-        assert_eq!(parsed("-@1,2").recorded(), "-@1,2,0,0");
+        assert_eq!(parsed(&format!("{placed}@1,2")).named().to_string(), "d@1,2@1,2,0,0");
+        assert_eq!(parsed("-@1,2").named().to_string(), "-@1,2,0,0");
+    }
+
+    #[test]
+    fn a_record_is_read_as_it_was_written() {
+        let placement: PartPlacement = "5,-2,0.5,90".parse().unwrap();
+        for (name, placement, text) in [
+            ("a b.stl", None, "a b.stl"),
+            ("a.stl", Some(placement), "a.stl@5,-2,0.5,90"),
+            ("b@1,2", None, "b@1,2@0,0,0,0"),
+            ("./--x.stl", None, "./--x.stl"),
+            ("-", Some(placement), "-@5,-2,0.5,90"),
+        ] {
+            let file = PartFile { path: name.into(), placement };
+            assert_eq!(file.to_string(), text);
+            let Ok(read) = text.parse::<PartFile>();
+            assert_eq!((read.to_string().as_str(), read.path.to_str()), (text, Some(name)));
+            assert!(read.stands_like(&file));
+        }
     }
 }

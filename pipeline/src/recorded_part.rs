@@ -4,7 +4,7 @@ use lamp_slicer::Part;
 use lamp_stack::StackInfo;
 
 use crate::error::Error;
-use crate::part_file::PartFile;
+use crate::part_file::{PartFile, names_of};
 use crate::slice_settings::{SliceSettings, SlicingRecord};
 use crate::solid::{Reading, name_of_all};
 use crate::watcher::Watcher;
@@ -14,7 +14,7 @@ pub struct RecordedSlicing<'a> {
     /// The settings.
     pub settings: SliceSettings,
     /// The part's files, with their placements.
-    files: Vec<String>,
+    files: Vec<PartFile>,
     digest: &'a str,
 }
 
@@ -45,11 +45,9 @@ impl<'a> RecordedSlicing<'a> {
             )));
         }
         // Names of files may have changed since, but not where the parts stand.
-        let recorded = self.files.iter().map(|file| PartFile::parse(file.into()));
-        let recorded = recorded.collect::<Result<Vec<_>, _>>().unwrap_or_default();
-        let same = recorded.iter().zip(parts).all(|(a, b)| a.stands_like(b));
-        if recorded.len() != parts.len() || !same {
-            let files = self.files.join(" ");
+        let same = self.files.iter().zip(parts).all(|(a, b)| a.stands_like(b));
+        if self.files.len() != parts.len() || !same {
+            let files = names_of(&self.files);
             return Err(Error::work(format!(
                 "{name} was sliced from {files}: give --part with the same placements"
             )));

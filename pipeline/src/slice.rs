@@ -22,7 +22,7 @@ use crate::fallback::Bridged;
 use crate::heights;
 use crate::memory::{available, in_words};
 use crate::overlaps::overlap_text;
-use crate::part_file::{PartFile, paths, recorded};
+use crate::part_file::{PartFile, paths};
 use crate::size::short;
 use crate::slice_settings::{GrayRule, SliceSettings, SlicingRecord, Thickness};
 use crate::solid::{Reading, SolidSettings, at_part, name_of_all};
@@ -122,7 +122,7 @@ impl SliceSettings {
     pub fn slices(
         &self,
         model: Part,
-        parts: Vec<String>,
+        parts: Vec<PartFile>,
         layers: Option<Range<u32>>,
         memory: Option<u64>,
         exposure: Option<RecordedExposure>,
@@ -131,6 +131,7 @@ impl SliceSettings {
         let mut settings = self.clone();
         settings.exposure.name(exposure.as_ref());
         settings.solid.name();
+        settings.solid.step.reader.kernel = settings.solid.step.reader.kernel.of_images();
         let record = SlicingRecord { parts, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
         let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;
@@ -259,8 +260,8 @@ impl SliceStage {
             return Err(Error::settings("--fallback needs a STEP part"));
         }
         let files = match name {
-            Some(name) => vec![recorded(name, None)],
-            None => parts.iter().map(PartFile::recorded).collect(),
+            Some(name) => vec![PartFile { path: name.into(), placement: None }],
+            None => parts.iter().map(PartFile::named).collect(),
         };
         let (slices, mut pages) = settings
             .slices(part.clone(), files, self.layers.clone(), self.memory, exposure, watcher)

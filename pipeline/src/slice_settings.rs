@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 use crate::exposure::{ExposureSettings, RecordedExposure};
 use crate::heights::HeightSettings;
+use crate::part_file::PartFile;
 use crate::placement::{Numbers, Rotation};
 use crate::solid::{SolidSettings, is_default};
-use crate::words::{differing, optional, text, words_of};
+use crate::words::{differing, optional, parts, text, words_of};
 
 /// The settings that decide the images of a part.
 ///
@@ -207,8 +208,9 @@ impl SliceSettings {
     }
 
     /// Returns the command as people type it, for files that stay where they are.
-    pub fn command(&self, files: &[String]) -> String {
-        let files: String = files.iter().map(|file| format!(" {}", quoted(file))).collect();
+    pub fn command(&self, files: &[PartFile]) -> String {
+        let word = |file: &PartFile| format!(" {}", quoted(&file.to_string()));
+        let files: String = files.iter().map(word).collect();
         format!("slice{files}{}", words_of(self))
     }
 
@@ -297,9 +299,9 @@ impl SliceSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct SlicingRecord {
-    /// The part's files without their folders, each with its placement, as `PartFile::parse` reads
-    /// them.
-    pub parts: Vec<String>,
+    /// The part's files without their folders, and where they stand.
+    #[serde(with = "parts")]
+    pub parts: Vec<PartFile>,
     /// The settings; files are words with digests.
     #[serde(flatten)]
     pub settings: SliceSettings,
@@ -351,6 +353,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::step::Kernel;
 
     #[test]
     fn records_are_read_as_they_were_written() {
@@ -391,8 +394,9 @@ mod tests {
             ),
         ] {
             let settings: SliceSettings = serde_json::from_value(settings).unwrap();
-            let parts = vec!["my --part@1,2.stl".to_owned(), "a.stl@1,0,0,0".to_owned()];
-            let command = format!("slice 'my --part@1,2.stl' a.stl@1,0,0,0 {words}");
+            let parts =
+                ["my --part.stl", "a.stl@1,0,0,0"].map(|text| text.parse().unwrap()).to_vec();
+            let command = format!("slice 'my --part.stl' a.stl@1,0,0,0 {words}");
             assert_eq!(settings.command(&parts), command);
             for fallback in [None, Some("b c.stl".to_owned())] {
                 let settings = settings.clone();
@@ -410,7 +414,7 @@ mod tests {
     #[test]
     fn a_record_with_a_setting_that_is_not_known_is_none() {
         let mut stack = StackInfo::default();
-        let (settings, parts) = (SliceSettings::default(), vec!["a.stl".to_owned()]);
+        let (settings, parts) = (SliceSettings::default(), vec!["a.stl".parse().unwrap()]);
         SlicingRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
         assert!(SlicingRecord::of(&stack).is_some());
         stack.other[SlicingRecord::KEY]["color"] = "red".into();
@@ -434,6 +438,11 @@ mod tests {
         assert_eq!(usual.stated(None), None);
         let at = |dpi| SliceSettings { dpi: Dpi::new(dpi).unwrap(), ..SliceSettings::default() };
         assert_eq!(at(300.0).stated(None).as_deref(), Some("dpi"));
+        let mut both = SliceSettings::default();
+        both.solid.step.reader.kernel = Kernel::Both;
+        assert_eq!(both.stated(None).as_deref(), Some("kernel"));
+        // A result without a second opinion is another one.
+        assert_ne!(both.canonical(), usual.canonical());
         let gray = SliceSettings { gray: GrayRule::PrintThrough, ..usual };
         assert_eq!(gray.stated(None).as_deref(), Some("gray"));
     }

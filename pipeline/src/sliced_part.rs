@@ -86,7 +86,7 @@ impl SlicedPart {
     ) -> Result<LayersOfPart<impl Iterator<Item = Result<Layer, Error>> + use<>>, Error> {
         let slicing = &self.settings;
         let (parts, _) = slicing.solid.files(std::slice::from_ref(&self.file));
-        let (model, names) = (self.model.clone(), vec![self.file.recorded()]);
+        let (model, names) = (self.model.clone(), vec![self.file.named()]);
         let slices = slicing.slices(model, names, layers, memory, slicing.exposure()?, watcher);
         let (slices, words) = slices.map_err(|error| at_part(error, &parts))?;
         let count = slices.layer_count() as u64;

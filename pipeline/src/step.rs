@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::documents::is_stream;
 use crate::error::Error;
+use crate::solid::is_default;
 use crate::words::optional;
 
 /// How STEP parts become facets.
@@ -32,7 +33,7 @@ pub struct StepSettings {
 #[serde(default)]
 pub struct ReaderSettings {
     /// The kernel.
-    #[serde(skip_serializing_if = "Kernel::is_usual")]
+    #[serde(skip_serializing_if = "is_default")]
     pub kernel: Kernel,
     /// Its time limit. It decides no image.
     #[serde(skip)]
@@ -53,9 +54,9 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// Returns whether images are the images of the default kernel.
-    fn is_usual(&self) -> bool {
-        *self != Self::Occt
+    /// Returns the kernel whose images a stack has. The other one only agrees or refuses.
+    pub(crate) fn of_images(self) -> Self {
+        if self == Self::Both { Self::Lamp } else { self }
     }
 
     /// Returns the library's kernel.

@@ -1,6 +1,6 @@
 //! Watchers of a stage at work: a terminal, or a list of lines.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// How much a line matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,10 +49,10 @@ pub trait Watcher {
     fn heights_found(&self) {}
 }
 
-/// Keeps lines that are worth knowing, each after the name of its stage.
-#[derive(Debug, Default)]
+/// Keeps lines that are worth knowing, each after the name of its stage. Clones share the lines.
+#[derive(Clone, Debug, Default)]
 pub struct KeptRemarks {
-    lines: Mutex<Vec<String>>,
+    lines: Arc<Mutex<Vec<String>>>,
 }
 
 impl KeptRemarks {

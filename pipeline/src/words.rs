@@ -50,7 +50,7 @@ fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(text: &str) -> Re
 
 /// Files with their placements as texts, for serde.
 pub mod parts {
-    use super::{Deserialize, Deserializer, Error, Serializer};
+    use super::{Deserialize, Deserializer, Serializer};
     use crate::part_file::PartFile;
 
     /// Writes them.
@@ -67,8 +67,7 @@ pub mod parts {
     /// Returns an error if a text does not parse.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PartFile>, D::Error> {
         let texts = Vec::<String>::deserialize(from)?;
-        let parsed = texts.into_iter().map(|text| PartFile::parse(text.into()));
-        parsed.collect::<Result<_, _>>().map_err(D::Error::custom)
+        texts.iter().map(|text| super::parsed::<PartFile, D>(text)).collect()
     }
 }
 

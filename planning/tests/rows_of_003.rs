@@ -1,5 +1,5 @@
 //! The numbers of 003 that its text or a solver of the same equations gives, with the tolerances of
-//! docs/plan.md.
+//! docs/reproduce.md.
 
 use std::sync::LazyLock;
 

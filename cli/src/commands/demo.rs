@@ -14,6 +14,7 @@ use lamp_grayscale::DitherMethod;
 use lamp_machine::Machine;
 use lamp_pipeline::SliceSettings;
 use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::part_file::PartFile;
 use lamp_slicer::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, StackError};
 
@@ -112,7 +113,7 @@ fn part_layers(
 ) -> Result<impl Iterator<Item = Result<Layer, Exit>>, Exit> {
     let options = SliceSettings::default();
     let model = Part::open(stl, &OpenOptions::default())?;
-    let files = vec![stl.file_name().unwrap_or_default().to_string_lossy().into_owned()];
+    let files = vec![PartFile { path: stl.to_owned(), placement: None }.named()];
     let (slices, words) = options.slices(model, files, range, None, None, progress)?;
     progress.expect(slices.layer_count() as u64);
     let layers = slices.map(move |layer| {

@@ -8,9 +8,9 @@ use crate::args::options::{Common, Input, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
 use crate::streams::{
-    check_not_input, decoding, input_name, is_stream, open_beside, progress, read_passing,
-    write_passing,
+    check_not_input, decoding, input_name, is_stream, progress, read_passing, write_passing,
 };
+use crate::terminal::stack_notes::noting;
 
 /// Change a design at image level, without slicing it again
 ///
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     // Layers that are not wanted are no loss.
     let is_whole = [args.input.layers.is_none(); 2];
     let layers = read_passing(&args.input, &progress)?;
-    let edited = editing.layers(layers, 0..u32::MAX, is_whole, &open_beside)?;
+    let edited = editing.layers(layers, 0..u32::MAX, is_whole, &noting)?;
     let written = write_passing(edited, decoding(&args.input), &args.output, &progress);
     written.map_err(|error| match error {
         Exit::Failed(error) if error.is::<EditError>() => {

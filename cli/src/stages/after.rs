@@ -1,7 +1,6 @@
 //! Stages that need the whole stack, and those behind them.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use lamp_machine::Machine;
 use lamp_pipeline::documents::is_file;
@@ -68,7 +67,7 @@ impl After {
         stack: &Path,
         write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
     ) -> Result<RangeFindings, Exit> {
-        let kept = Arc::new(KeptRemarks::default());
+        let kept = KeptRemarks::default();
         let mut findings = RangeFindings::new(Counts::default(), false);
         match self {
             Self::Support(args) => {
@@ -89,11 +88,12 @@ impl After {
                         page.decode().map(PassingLayer::from).map_err(failed)
                     });
                 let layers = working.layers(Box::new(layers), 0..u32::MAX, [true; 2])?;
-                let decoded = layers.map(|layer| {
+                let mut decoded = layers.map(|layer| {
                     let layer = layer.and_then(|layer| Ok(layer.decode()?));
                     layer.map_err(|error| Exit::from(named(error, part)))
                 });
-                write(&mut { decoded })?;
+                write(&mut decoded)?;
+                drop(decoded);
                 working.find(0, &part.display().to_string(), &mut findings);
             }
         }

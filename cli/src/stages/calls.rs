@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use lamp_build::TILE_CODE;
 use lamp_pipeline::watcher::KeptRemarks;
@@ -67,7 +66,7 @@ impl Tiling {
         stacks: &[(PathBuf, Option<u32>)],
         write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
     ) -> Result<Vec<String>, Exit> {
-        let kept = Arc::new(KeptRemarks::default());
+        let kept = KeptRemarks::default();
         let build = self.0.build_of(stacks, &Progress::keeping("tile", &kept))?;
         let Build { mut layers, stray_rows, no_mesh, .. } = build;
         write(&mut layers)?;

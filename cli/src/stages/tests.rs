@@ -206,6 +206,18 @@ fn whatever_reaches_beyond_the_part_is_told_by_the_range_at_that_end() {
 }
 
 #[test]
+fn notes_on_other_stacks_are_findings() {
+    let bench = Bench::with_tower();
+    bench.lamp("slice @t.stl --dpi 100 --thickness 1mm -o @other.tif");
+    bench.lamp("convert @other.tif -o @pages/");
+    bench.lamp("show @other.tif --layer 0 -o @pages/cover.png");
+    let stages = bench.stages(&[COARSE, "edit --union @pages"]);
+    let found = bench.range("t.stl", &stages, 0..20, &bench.path("a.tif"));
+    let notes = found.notes();
+    assert!(notes.iter().any(|note| note.starts_with("edit: pages: ")), "{notes:?}");
+}
+
+#[test]
 fn findings_of_ranges_add_up_to_those_of_the_whole() {
     let bench = Bench::with_tower();
     let stages = bench.stages(&[COARSE, "fix --max-width 1", "edit - @edits.toml"]);

@@ -20,13 +20,13 @@ pub(crate) struct Progress {
     /// How far a search for layer heights has come, while there is one.
     heights: Arc<Mutex<Option<ProgressBar>>>,
     /// Where lines go instead of standard error.
-    kept: Option<Arc<KeptRemarks>>,
+    kept: Option<KeptRemarks>,
 }
 
 impl Progress {
     /// Returns progress without a bar, whose lines are kept, details left out.
-    pub(crate) fn keeping(command: &'static str, kept: &Arc<KeptRemarks>) -> Self {
-        let kept = Some(Arc::clone(kept));
+    pub(crate) fn keeping(command: &'static str, kept: &KeptRemarks) -> Self {
+        let kept = Some(kept.clone());
         let (bar, heights) = (ProgressBar::hidden(), Arc::default());
         Self { command, quiet: false, verbose: false, watched: false, bar, heights, kept }
     }

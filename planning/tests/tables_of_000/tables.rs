@@ -1,4 +1,4 @@
-//! The rows that 000 prints. `docs/plan.md` compares them with the results.
+//! The rows that 000 prints. `docs/reproduce.md` compares them with the results.
 //!
 //! Numbers checked more closely than the printed ones were computed separately from this code.
 

@@ -2,10 +2,11 @@
 
 use std::fs::File;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::anyhow;
 use lamp_build::{PartStack, TurnedSlicing};
+use lamp_pipeline::part_file::{PartFile, names_of};
 use lamp_pipeline::{SliceSettings, SlicingRecord};
 use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
@@ -15,8 +16,8 @@ use crate::exit::Exit;
 /// A stack's record of how it was sliced.
 pub(super) struct SlicedFrom {
     settings: SliceSettings,
-    /// The part's files as words, with their placements.
-    files: Vec<String>,
+    /// The part's files, with their placements.
+    files: Vec<PartFile>,
     /// The part's files as the stack records them, if they were not found.
     pub(super) missing: Option<String>,
     /// The stages that changed pages since.
@@ -56,7 +57,7 @@ impl SlicedFrom {
         record.find_exposure(&folders).map_err(|error| error.at(part.name()))?;
         let SlicingRecord { parts: recorded, settings, .. } = record;
         let found = folders.iter().find_map(|folder| files_in(folder, &recorded, &stack.digest));
-        let missing = found.is_none().then(|| recorded.join(" "));
+        let missing = found.is_none().then(|| names_of(&recorded));
         let files = found.unwrap_or(recorded);
         let ReadLayers { stages, range } = input.read_layers().clone();
         Ok(Self { settings, files, missing, stages, layers: range })
@@ -71,8 +72,7 @@ impl SlicedFrom {
 
     /// Returns the command that slices the part for a plan.
     pub(super) fn command(&self, slicing: &TurnedSlicing, all_layers: bool, out: &str) -> String {
-        let files: Vec<_> = self.files.iter().map(|file| file_word(file).into_owned()).collect();
-        let slice = self.settings.clone().turned(slicing).command(&files);
+        let slice = self.settings.clone().turned(slicing).command(&self.files);
         let Range { start, end } = self.layers;
         let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
         format!("{slice}{layers} -o {}", quoted(&file_word(out)))
@@ -80,23 +80,11 @@ impl SlicedFrom {
 }
 
 /// Returns the files of a part that are in a folder, with their placements, if their digest is this.
-fn files_in(folder: &Path, recorded: &[String], digest: &str) -> Option<Vec<String>> {
-    let found: Vec<(PathBuf, String)> =
-        recorded.iter().map(|name| file_in(folder, name)).collect::<Option<_>>()?;
-    let digests = found.iter().map(|(path, _)| digest_of(File::open(path).ok()?).ok());
+fn files_in(folder: &Path, recorded: &[PartFile], digest: &str) -> Option<Vec<PartFile>> {
+    let file_in = |file: &PartFile| PartFile { path: folder.join(&file.path), ..file.clone() };
+    let found: Vec<PartFile> = recorded.iter().map(file_in).collect();
+    let digests = found.iter().map(|file| digest_of(File::open(&file.path).ok()?).ok());
     let digests: Vec<String> = digests.collect::<Option<_>>()?;
     let is_it = digest_of_digests(digests.iter().map(String::as_str)) == digest;
-    is_it.then(|| found.into_iter().map(|(_, word)| word).collect())
-}
-
-/// Returns the path of a file in a folder, and the word for it with its placement.
-fn file_in(folder: &Path, name: &str) -> Option<(PathBuf, String)> {
-    let is_file = |name: &str| folder.join(name).is_file();
-    let (file, placement) = match name.rsplit_once('@') {
-        Some((file, _)) if !is_file(name) => (file, &name[file.len()..]),
-        _ => (name, ""),
-    };
-    let path = folder.join(file);
-    let word = format!("{}{placement}", path.to_str()?);
-    path.is_file().then_some((path, word))
+    is_it.then_some(found)
 }
