@@ -15,6 +15,7 @@ use lamp_planning::learn::{JobError, LearnError};
 use lamp_planning::speed::{PartError, PlatformError, SpeedPlanError};
 use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
+use lamp_plots::PlotError;
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::NoSolid;
 use lamp_stack::{JoinError, SplitError, StackError};
@@ -198,6 +199,15 @@ impl From<StackError> for Exit {
         match error {
             StackError::NoLayers => Self::Failed(error.into()),
             error => Self::Output(error.into()),
+        }
+    }
+}
+
+impl From<PlotError> for Exit {
+    fn from(error: PlotError) -> Self {
+        match error {
+            PlotError::Name(_) => Self::Usage(error.into()),
+            error => Self::Failed(error.into()),
         }
     }
 }

@@ -11,6 +11,7 @@ use lamp_offset::CompensateError;
 use lamp_planning::speed::SpeedPlanError;
 use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
+use lamp_plots::PlotError;
 use lamp_slicer::SliceError;
 use lamp_stack::StackError;
 use lamp_supports::{CheckError, SupportError};
@@ -46,6 +47,7 @@ errors!(
     Night(NightError),
     NoLight(NoLight),
     Pipeline(lamp_pipeline::Error),
+    Plot(PlotError),
     Recipe(RecipeError),
     Slice(SliceError),
     SpeedPlan(SpeedPlanError),

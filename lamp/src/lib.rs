@@ -11,7 +11,7 @@
 //! - [`build`] lays copies of parts out on the area of a [`machine`].
 //! - [`supports`] finds what floats or is trapped, and holds it.
 //! - [`planning`] chooses exposures, [`pipeline`] runs stages from their settings, [`batch`] keeps the
-//!   results of nights, and [`view`] shows layers in a browser.
+//!   results of nights, [`plots`] draws curves and maps, and [`view`] shows layers in a browser.
 //! - [`stack`] has what they share: images as runs, layers, lengths, files and streams.
 //!
 //! A stage takes and gives an iterator over `Result<Layer, E>`, so stages are chained
@@ -158,6 +158,7 @@ pub use lamp_machine as machine;
 pub use lamp_offset as offset;
 pub use lamp_pipeline as pipeline;
 pub use lamp_planning as planning;
+pub use lamp_plots as plots;
 pub use lamp_slicer as slicer;
 pub use lamp_stack as stack;
 pub use lamp_supports as supports;

@@ -13,7 +13,7 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-slicer"],
     &["lamp-adaptive", "lamp-grayscale", "lamp-fix", "lamp-offset", "lamp-machine", "lamp-batch"],
     &["lamp-build", "lamp-planning", "lamp-supports"],
-    &["lamp-edit", "lamp-view"],
+    &["lamp-edit", "lamp-view", "lamp-plots"],
     &["lamp-pipeline"],
     &["lamp"],
     &["lamp-cli"],

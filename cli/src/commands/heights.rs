@@ -27,9 +27,9 @@ use crate::args::solid::part_file;
 use crate::exit::Exit;
 use crate::output::endings::parse_table;
 use crate::output::json_report::print_answer;
-use crate::output::plots::{self, Plot, PlotAxis, Series, drawn};
 use crate::streams::{check_beside, print, write_file};
 use crate::terminal::progress::Progress;
+use lamp_plots::{self as plots, Plot, PlotAxis, Series, drawn};
 
 /// Find how thick each layer of a part may be, and what that saves
 ///

@@ -1,4 +1,4 @@
-//! Files and answers of commands: JSON, plots, pictures, the endings of names.
+//! Files and answers of commands: JSON, pictures, the endings of names.
 
 pub(crate) mod band_pictures;
 pub(crate) mod endings;
@@ -6,7 +6,6 @@ pub(crate) mod json_report;
 pub(crate) mod mesh_report;
 pub(crate) mod picture;
 pub(crate) mod plan_folder;
-pub(crate) mod plots;
 pub(crate) mod section;
 pub(crate) mod shades;
 pub(crate) mod stack_facts;

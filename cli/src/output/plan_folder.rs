@@ -8,8 +8,8 @@ use lamp_stack::Length;
 use serde_json::Value;
 
 use crate::exit::Exit;
-use crate::output::plots::{Colours, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 use crate::streams::new_folder;
+use lamp_plots::{Colors, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 
 const REPORT: &str = "report.json";
 const SECTION: &str = "section.svg";
@@ -99,7 +99,7 @@ fn residual(files: &PlanFiles<'_>, target: &HeightMap) -> HeatMap {
         columns: target.grid.columns,
         values: files.cured.less(target),
         pitch_mm: target.grid.pitch_um / 1000.0,
-        colours: Colours::AboutZero,
+        colors: Colors::AboutZero,
     }
 }
 
@@ -112,6 +112,6 @@ fn times(files: &PlanFiles<'_>) -> HeatMap {
         columns: sum.mirrors[0],
         values: sum.seconds,
         pitch_mm: files.pitch.mm(),
-        colours: Colours::FromZero,
+        colors: Colors::FromZero,
     }
 }

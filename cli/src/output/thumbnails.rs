@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use lamp_stack::{Layer, write_gray_animation};
 
 use crate::output::picture::{Picture, PictureScale, Region};
-use crate::output::plots::{CAPTION_HEIGHT, caption};
+use lamp_plots::{CAPTION_HEIGHT, caption};
 
 /// The level around thumbnails and behind their captions. Neither black nor white, so that the
 /// edges of images show.

@@ -20,9 +20,9 @@ use super::task::middle;
 use super::work::Checked;
 use crate::commands::report::{Picture, document};
 use crate::exit::Exit;
-use crate::output::plots::{Plot, curve, inline_svg, linear};
 use crate::streams::write_file;
 use crate::terminal::progress::printable;
+use lamp_plots::{Plot, curve, inline_svg, linear};
 
 /// The most findings of a part that are listed.
 const MOST_LINES: usize = 5;

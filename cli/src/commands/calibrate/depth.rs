@@ -13,8 +13,8 @@ use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::args::options::{Common, one_of_described};
 use crate::exit::Exit;
-use crate::output::plots::{Plot, PlotAxis, Series, highest};
 use crate::terminal::progress::Progress;
+use lamp_plots::{Plot, PlotAxis, Series, highest};
 
 /// Fit a working curve to measured cure depths
 ///

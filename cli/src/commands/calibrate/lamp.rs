@@ -10,8 +10,8 @@ use super::depth::{levelled, write_line};
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::plots::{Plot, PlotAxis, Series, highest};
 use crate::terminal::progress::Progress;
+use lamp_plots::{Plot, PlotAxis, Series, highest};
 
 /// Fit how the critical dose follows a lamp that ages, from cure depths under several lights
 ///

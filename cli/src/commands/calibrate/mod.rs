@@ -21,8 +21,8 @@ use crate::args::options::{Common, parse_light};
 use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::output::endings::parse_toml;
-use crate::output::plots::{self, Plot, drawn};
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use lamp_plots::{self as plots, Plot, drawn};
 
 /// Fit a resin's parameters to measured cure depths or widths
 ///

@@ -14,8 +14,8 @@ use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::plots::{Plot, PlotAxis, Series, highest};
 use crate::terminal::progress::Progress;
+use lamp_plots::{Plot, PlotAxis, Series, highest};
 
 /// Fit the cure width of features of several sizes to measured squares
 ///

@@ -21,9 +21,9 @@ use crate::args::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::output::endings::{parse_report, parse_table};
-use crate::output::plots;
 use crate::streams::{check_beside, input_name, is_stream, print, read_beside, write_file};
 use crate::terminal::progress::Progress;
+use lamp_plots as plots;
 use report::{lines_of, write_report};
 
 /// Measurements are read whole.

@@ -4,7 +4,7 @@ use lamp_planning::learn::{Job, JobPrint, PrintMeasurements};
 use lamp_planning::speed::TimedLayer;
 
 use super::report::{PrintError, error_of};
-use crate::output::plots::{Plot, Series, by_layer, curve, linear};
+use lamp_plots::{Plot, Series, by_layer, curve, linear};
 
 /// The most prints that are drawn: the first, and the last.
 const MOST: usize = 8;

@@ -16,9 +16,9 @@ use crate::args::options::{Common, parse_angle, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
-use crate::output::plots::{self, sphere_picture};
 use crate::streams::{check_beside, write_file};
 use crate::terminal::progress::Progress;
+use lamp_plots::{self as plots, sphere_picture};
 
 /// Find how to turn a part so that few islands float, and little overhangs
 ///

@@ -10,7 +10,7 @@ use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
 use crate::output::picture::Region;
-use crate::output::plots::{DoseMap, dose_map};
+use lamp_plots::{DoseMap, dose_map};
 
 /// The options of a map.
 #[derive(Args)]

@@ -18,12 +18,12 @@ use crate::args::platform_options::PlatformOptions;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::output::endings::{parse_report, parse_table};
-use crate::output::plots;
 use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
 };
 use crate::terminal::progress::Progress;
+use lamp_plots as plots;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///

@@ -4,7 +4,7 @@ use lamp_pipeline::heights::{significant, time_text};
 use lamp_planning::speed::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 
 use super::speed_report::{Planned, seconds};
-use crate::output::plots::{Plot, PlotAxis, Series, by_layer, curve, linear, stairs};
+use lamp_plots::{Plot, PlotAxis, Series, by_layer, curve, linear, stairs};
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {

@@ -18,13 +18,13 @@ use crate::args::options::{Common, Input, Output, one_of_described, parse_memory
 use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::exit::Exit;
 use crate::output::endings::parse_report;
-use crate::output::plots;
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
 };
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
+use lamp_plots as plots;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///

@@ -4,7 +4,7 @@ use lamp_pipeline::heights::significant;
 use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
 
 use super::voxels_report::Planned;
-use crate::output::plots::{Plot, PlotAxis, Series, curve, linear};
+use lamp_plots::{Plot, PlotAxis, Series, curve, linear};
 
 /// The plots of a plan, one below the other.
 pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {

@@ -4,7 +4,7 @@ use lamp_stack::Dpi;
 
 use super::gather::StackReport;
 use super::measure::LayerNumbers;
-use crate::output::plots::{Series, by_layer, curve, inline_svg};
+use lamp_plots::{Series, by_layer, curve, inline_svg};
 
 /// The most points of a curve; of more, the least and the greatest of neighbors stay.
 const MOST_POINTS: usize = 1200;

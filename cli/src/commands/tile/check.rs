@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::Exit;
-use crate::output::plots;
 use crate::streams::{check_beside, check_not_input};
+use lamp_plots as plots;
 
 use super::TileArgs;
 

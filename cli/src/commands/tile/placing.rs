@@ -9,9 +9,9 @@ use lamp_stack::{Length, Size};
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
-use crate::output::plots;
 use crate::streams::write_file;
 use crate::terminal::progress::Progress;
+use lamp_plots as plots;
 
 use super::TileArgs;
 use super::found::left_over;

@@ -3,27 +3,29 @@
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
-use super::axis_scale::AxisScale;
-use super::{Drawing, GRAY_INK, SCALE, font, picture_of, with_font};
-use crate::exit::Exit;
+use crate::PlotError;
+use crate::axis_scale::AxisScale;
+use crate::{Drawing, GRAY_INK, SCALE, font, picture_of, with_font};
 
 /// Numbers on a square lattice, its middle on the axis of the light.
-pub(crate) struct HeatMap {
-    pub(crate) title: String,
+pub struct HeatMap {
+    /// The text above it.
+    pub title: String,
     /// The name of the numbers, with their unit.
-    pub(crate) label: String,
+    pub label: String,
     /// Squares in a row.
-    pub(crate) columns: usize,
+    pub columns: usize,
     /// The numbers, row by row; the first row has the greatest y.
-    pub(crate) values: Vec<f64>,
+    pub values: Vec<f64>,
     /// The side of a square, in millimeters.
-    pub(crate) pitch_mm: f64,
-    pub(crate) colours: Colours,
+    pub pitch_mm: f64,
+    /// The colors of the values.
+    pub colors: Colors,
 }
 
 /// How numbers are colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Colours {
+pub enum Colors {
     /// Blue below zero, red above, as far in both directions.
     AboutZero,
     /// Dark at zero, light at the most.
@@ -45,7 +47,7 @@ type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType
 type Area<B> = DrawingArea<B, plotters::coord::Shift>;
 
 /// The bytes of a map as a PNG.
-pub(crate) fn heat_map(map: &HeatMap) -> Result<Vec<u8>, Exit> {
+pub fn heat_map(map: &HeatMap) -> Result<Vec<u8>, PlotError> {
     let map = map.coarsened();
     picture_of(&map, map.size(), "map.png".as_ref())
 }
@@ -72,7 +74,7 @@ impl HeatMap {
             columns,
             values: (0..columns * rows).map(worst).collect(),
             pitch_mm: self.pitch_mm * many as f64,
-            colours: self.colours,
+            colors: self.colors,
         }
     }
 
@@ -93,11 +95,11 @@ impl HeatMap {
         ((width + beside * SCALE).max(460 * SCALE), height)
     }
 
-    fn scale(&self) -> ColourScale {
+    fn scale(&self) -> ColorScale {
         let most = self.values.iter().map(|value| value.abs()).fold(0.0, f64::max).max(1e-9);
-        match self.colours {
-            Colours::AboutZero => ColourScale { least: -most, most, stops: &DIVERGING },
-            Colours::FromZero => ColourScale { least: 0.0, most, stops: &RISING },
+        match self.colors {
+            Colors::AboutZero => ColorScale { least: -most, most, stops: &DIVERGING },
+            Colors::FromZero => ColorScale { least: 0.0, most, stops: &RISING },
         }
     }
 
@@ -130,8 +132,8 @@ impl HeatMap {
         let (cell, scale) = (self.cell(), self.scale());
         let mut pixels = Vec::with_capacity(3 * self.values.len() * cell * cell);
         for row in self.values.chunks_exact(self.columns) {
-            let colours = row.iter().map(|&value| scale.colour(value));
-            let line: Vec<u8> = colours
+            let colors = row.iter().map(|&value| scale.color(value));
+            let line: Vec<u8> = colors
                 .flat_map(|RGBColor(red, green, blue)| [red, green, blue].repeat(cell))
                 .collect();
             (0..cell).for_each(|_| pixels.extend_from_slice(&line));
@@ -142,7 +144,7 @@ impl HeatMap {
     fn draw_scale<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
         const STEPS: u32 = 256;
         let scale = self.scale();
-        let ColourScale { least, most, .. } = scale;
+        let ColorScale { least, most, .. } = scale;
         let axis = |range| AxisScale { range, logarithmic: false };
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(BELOW * SCALE)
@@ -160,21 +162,21 @@ impl HeatMap {
         let value = |step: u32| least + (most - least) * f64::from(step) / f64::from(STEPS);
         chart.draw_series((0..STEPS).map(|step| {
             let (low, high) = (value(step), value(step + 1));
-            Rectangle::new([(0.0, low), (1.0, high)], scale.colour((low + high) / 2.0).filled())
+            Rectangle::new([(0.0, low), (1.0, high)], scale.color((low + high) / 2.0).filled())
         }))?;
         Ok(())
     }
 }
 
 /// The colors from the least to the greatest number.
-struct ColourScale {
+struct ColorScale {
     least: f64,
     most: f64,
     stops: &'static [[f64; 3]; 5],
 }
 
-impl ColourScale {
-    fn colour(&self, value: f64) -> RGBColor {
+impl ColorScale {
+    fn color(&self, value: f64) -> RGBColor {
         let share = ((value - self.least) / (self.most - self.least)).clamp(0.0, 1.0);
         let at = share * (self.stops.len() - 1) as f64;
         let below = (at as usize).min(self.stops.len() - 2);
@@ -225,42 +227,42 @@ impl Drawing for HeatMap {
 mod tests {
     use super::*;
 
-    fn map(columns: usize, values: Vec<f64>, colours: Colours) -> HeatMap {
+    fn map(columns: usize, values: Vec<f64>, colors: Colors) -> HeatMap {
         let [title, label] = ["A map", "height (um)"].map(str::to_owned);
-        HeatMap { title, label, columns, values, pitch_mm: 0.01, colours }
+        HeatMap { title, label, columns, values, pitch_mm: 0.01, colors }
     }
 
     #[test]
     fn zero_is_white_and_the_ends_are_as_far() {
-        let scale = map(2, vec![-1.0, 0.0, 0.5, 4.0], Colours::AboutZero).scale();
+        let scale = map(2, vec![-1.0, 0.0, 0.5, 4.0], Colors::AboutZero).scale();
         assert_eq!([scale.least, scale.most], [-4.0, 4.0]);
-        assert_eq!(scale.colour(0.0), RGBColor(247, 247, 247));
-        assert_eq!(scale.colour(4.0), RGBColor(178, 24, 43));
-        assert_eq!(scale.colour(-9.0), RGBColor(33, 102, 172));
+        assert_eq!(scale.color(0.0), RGBColor(247, 247, 247));
+        assert_eq!(scale.color(4.0), RGBColor(178, 24, 43));
+        assert_eq!(scale.color(-9.0), RGBColor(33, 102, 172));
     }
 
     #[test]
     fn a_coarser_map_keeps_the_worst() {
         let mut values = vec![0.0; 3000 * 1500];
         (values[7], values[3000 * 1499 + 2999]) = (-5.0, 3.0);
-        let coarse = map(3000, values, Colours::AboutZero).coarsened();
+        let coarse = map(3000, values, Colors::AboutZero).coarsened();
         assert_eq!((coarse.columns, coarse.rows()), (1000, 500));
         assert_eq!((coarse.values[2], coarse.values[1000 * 500 - 1]), (-5.0, 3.0));
         assert!((coarse.pitch_mm - 0.03).abs() < 1e-12);
     }
 
     #[test]
-    fn every_square_is_painted_in_its_colour() {
-        let map = map(3, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0], Colours::FromZero);
+    fn every_square_is_painted_in_its_color() {
+        let map = map(3, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0], Colors::FromZero);
         let bytes = heat_map(&map).unwrap();
         assert_eq!(bytes, heat_map(&map).unwrap());
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
-        let (colours, _) = pixels.as_chunks::<3>();
+        let (colors, _) = pixels.as_chunks::<3>();
         for value in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
-            let RGBColor(red, green, blue) = map.scale().colour(value);
-            let count = colours.iter().filter(|&&ink| ink == [red, green, blue]).count();
+            let RGBColor(red, green, blue) = map.scale().color(value);
+            let count = colors.iter().filter(|&&ink| ink == [red, green, blue]).count();
             assert!(count >= 1600, "{value}: {count} of {}x{}", info.width, info.height);
         }
     }
@@ -268,8 +270,8 @@ mod tests {
     #[test]
     fn any_numbers_can_be_drawn() {
         for values in [vec![0.0], vec![f64::NAN], vec![f64::INFINITY, -1e300], vec![1e-320; 4]] {
-            for colours in [Colours::AboutZero, Colours::FromZero] {
-                assert!(heat_map(&map(values.len(), values.clone(), colours)).is_ok());
+            for colors in [Colors::AboutZero, Colors::FromZero] {
+                assert!(heat_map(&map(values.len(), values.clone(), colors)).is_ok());
             }
         }
     }

@@ -9,8 +9,8 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{Drawing, FAMILY, GRAY_INK, inks, picture_of, with_font};
-use crate::exit::Exit;
+use crate::PlotError;
+use crate::{Drawing, FAMILY, GRAY_INK, inks, picture_of, with_font};
 
 /// The longer side of a build area, and the room around it, in pixels.
 const SIDE: u32 = 1600;
@@ -19,7 +19,7 @@ const LEGEND: i32 = 60;
 
 /// The bytes of a picture of a layout: outlines where they are known, boxes, and each copy's number
 /// among the copies of its part.
-pub(crate) fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, Exit> {
+pub fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, PlotError> {
     let picture = LayoutPicture::new(layout);
     picture_of(&picture, picture.size(), path)
 }
@@ -109,13 +109,13 @@ impl<'a> LayoutPicture<'a> {
     fn draw_legend<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, plotters::coord::Shift>,
-        colours: &[RGBColor],
+        colors: &[RGBColor],
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let PixelSize { height, .. } = self.layout.pixels();
         let (mut x, y) = self.at(0, height);
         let y = y + 36;
         let parts = self.layout.parts().iter().enumerate();
-        let entries = parts.map(|(part, about)| (self.entry(part, about), colours[part]));
+        let entries = parts.map(|(part, about)| (self.entry(part, about), colors[part]));
         let build = format!("{} at {} dpi", self.layout.area(), self.layout.dpi());
         for (text, ink) in std::iter::once((build, GRAY_INK)).chain(entries) {
             let style = (FAMILY, 28).into_text_style(area).color(&ink);
@@ -142,14 +142,14 @@ impl Drawing for LayoutPicture<'_> {
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         with_font();
         area.fill(&WHITE)?;
-        let colours: Vec<RGBColor> = inks().take(self.layout.parts().len()).collect();
+        let colors: Vec<RGBColor> = inks().take(self.layout.parts().len()).collect();
         for (at, number) in self.layout.placements().iter().zip(self.layout.numbers()) {
-            self.draw_copy(area, at, number, colours[at.part])?;
+            self.draw_copy(area, at, number, colors[at.part])?;
         }
         let PixelSize { width, height } = self.layout.pixels();
         let border = GRAY_INK.stroke_width(3);
         area.draw(&Rectangle::new([self.at(0, 0), self.at(width, height)], border))?;
-        self.draw_legend(area, &colours)?;
+        self.draw_legend(area, &colors)?;
         area.present()
     }
 }

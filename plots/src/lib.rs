@@ -1,4 +1,20 @@
-//! Plots curves and measured points as SVG or PNG.
+//! Plots as SVG and PNG: curves and measured points, maps of doses and heights, islands over the
+//! sphere of poses, and layouts of builds. Equal plots give equal bytes, on every system: the one
+//! font comes with the crate.
+//!
+//! ```
+//! use lamp_plots::{Plot, curve, drawn, linear};
+//!
+//! let plot = Plot {
+//!     title: "Cure depth".to_owned(),
+//!     x: linear("dose (mJ/cm²)", 0.0..100.0),
+//!     y: linear("depth (µm)", 0.0..200.0),
+//!     series: vec![curve("HDDA", vec![(10.0, 0.0), (100.0, 180.0)])],
+//! };
+//! let svg = drawn(&[plot], "depth.svg".as_ref())?;
+//! assert!(svg.starts_with(b"<svg"));
+//! # Ok::<(), lamp_plots::PlotError>(())
+//! ```
 
 mod axis_scale;
 mod caption;
@@ -7,43 +23,56 @@ mod heat_map;
 mod layout;
 mod sphere;
 
-use std::io;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-use anyhow::Context;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
 use axis_scale::AxisScale;
 
-pub(crate) use caption::{CAPTION_HEIGHT, caption};
-pub(crate) use dose_map::{DoseMap, dose_map};
-pub(crate) use heat_map::{Colours, HeatMap, heat_map};
-pub(crate) use layout::layout_picture;
-pub(crate) use sphere::sphere_picture;
+pub use caption::{CAPTION_HEIGHT, caption};
+pub use dose_map::{DoseMap, dose_map};
+pub use heat_map::{Colors, HeatMap, heat_map};
+pub use layout::layout_picture;
+pub use sphere::sphere_picture;
 
-use crate::exit::Exit;
+/// The error of a plot.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlotError {
+    /// The file's name ends in no format of plots.
+    #[error("{}: a plot is an SVG or a PNG: end its name in .svg or .png", .0.display())]
+    Name(PathBuf),
+    /// The library that draws refuses what it was given.
+    #[error("the picture cannot be drawn: {0}")]
+    Drawing(String),
+}
 
 /// A plot of curves over one axis.
 #[derive(Debug)]
-pub(crate) struct Plot {
-    pub(crate) title: String,
-    pub(crate) x: PlotAxis,
-    pub(crate) y: PlotAxis,
-    pub(crate) series: Vec<Series>,
+pub struct Plot {
+    /// The text above it.
+    pub title: String,
+    /// The axis across.
+    pub x: PlotAxis,
+    /// The axis up.
+    pub y: PlotAxis,
+    /// The curves, each in its color.
+    pub series: Vec<Series>,
 }
 
 /// An axis. Values must lie in its range.
 #[derive(Debug)]
-pub(crate) struct PlotAxis {
+pub struct PlotAxis {
     /// The quantity, with its unit.
-    pub(crate) label: String,
-    pub(crate) range: Range<f64>,
+    pub label: String,
+    /// The values at its ends.
+    pub range: Range<f64>,
     /// Whether the axis is logarithmic; its range is then above zero.
-    pub(crate) logarithmic: bool,
+    pub logarithmic: bool,
 }
 
 impl PlotAxis {
@@ -54,40 +83,42 @@ impl PlotAxis {
 
 /// Measured points, the curve through them, or both.
 #[derive(Debug)]
-pub(crate) struct Series {
+pub struct Series {
     /// Text in the legend.
-    pub(crate) name: String,
-    pub(crate) points: Vec<(f64, f64)>,
-    pub(crate) curve: Vec<(f64, f64)>,
+    pub name: String,
+    /// Measured points: x and y.
+    pub points: Vec<(f64, f64)>,
+    /// Corners of the curve: x and y.
+    pub curve: Vec<(f64, f64)>,
     /// Confidence band of the curve: x, and the lowest and highest y.
-    pub(crate) band: Vec<[f64; 3]>,
+    pub band: Vec<[f64; 3]>,
 }
 
 /// Returns the highest y of all points and bands.
-pub(crate) fn highest(series: &[Series]) -> f64 {
+pub fn highest(series: &[Series]) -> f64 {
     let points = series.iter().flat_map(|series| &series.points).map(|point| point.1);
     let bands = series.iter().flat_map(|series| &series.band).map(|ends| ends[2]);
     points.chain(bands).fold(0.0, f64::max)
 }
 
 /// Returns a series that is a curve alone.
-pub(crate) fn curve(name: &str, curve: Vec<(f64, f64)>) -> Series {
+pub fn curve(name: &str, curve: Vec<(f64, f64)>) -> Series {
     Series { name: name.to_owned(), points: Vec::new(), curve, band: Vec::new() }
 }
 
 /// Returns a linear axis.
-pub(crate) fn linear(label: &str, range: Range<f64>) -> PlotAxis {
+pub fn linear(label: &str, range: Range<f64>) -> PlotAxis {
     PlotAxis { label: label.to_owned(), range, logarithmic: false }
 }
 
 /// Returns the corners of steps of a width, given the begin and the height of each.
-pub(crate) fn stairs(steps: impl Iterator<Item = (f64, f64)>, width: f64) -> Vec<(f64, f64)> {
+pub fn stairs(steps: impl Iterator<Item = (f64, f64)>, width: f64) -> Vec<(f64, f64)> {
     steps.flat_map(|(from, height)| [(from, height), (from + width, height)]).collect()
 }
 
 /// Returns a plot of curves over the height of layers in millimeters, whose y axis has all of them
 /// and zero.
-pub(crate) fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
+pub fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
     let all = || series.iter().flat_map(|series| series.curve.iter().chain(&series.points));
     let ends = |of: fn(&(f64, f64)) -> f64| {
         let numbers = || all().map(of);
@@ -118,28 +149,33 @@ const PAGE_SIZE: (u32, u32) = (560, 390);
 const SCALE: u32 = 2;
 
 /// Checks, before the work, that a plot can have that name.
-pub(crate) fn check_name(path: &Path) -> Result<(), Exit> {
+///
+/// # Errors
+/// Returns an error if the name ends in no format of plots.
+pub fn check_name(path: &Path) -> Result<(), PlotError> {
     format_of(path).map(|_| ())
 }
 
-fn format_of(path: &Path) -> Result<PlotFormat, Exit> {
+fn format_of(path: &Path) -> Result<PlotFormat, PlotError> {
     let is = |end: &str| path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end));
     if is("svg") {
         Ok(PlotFormat::Svg)
     } else if is("png") {
         Ok(PlotFormat::Png)
     } else {
-        let path = path.display();
-        Err(Exit::usage(format!("{path}: a plot is an SVG or a PNG: end its name in .svg or .png")))
+        Err(PlotError::Name(path.to_owned()))
     }
 }
 
 /// The bytes of plots below each other, in the format that the file's name says.
 /// Equal plots give equal bytes.
-pub(crate) fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, Exit> {
+///
+/// # Errors
+/// Returns an error if the name ends in no format of plots, or the plots cannot be drawn.
+pub fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, PlotError> {
     match format_of(path)? {
         PlotFormat::Svg => Ok(svg(plots, SIZE).into_bytes()),
-        PlotFormat::Png => Ok(png(plots).with_context(|| path.display().to_string())?),
+        PlotFormat::Png => png(plots),
     }
 }
 
@@ -152,7 +188,7 @@ trait Drawing {
 }
 
 /// The bytes of a picture, in the format that the file's name says.
-fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<Vec<u8>, Exit> {
+fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<Vec<u8>, PlotError> {
     match format_of(path)? {
         PlotFormat::Svg => {
             let mut text = String::new();
@@ -162,15 +198,12 @@ fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<V
             drop(area);
             Ok(text.into_bytes())
         }
-        PlotFormat::Png => {
-            let drawn = png_of(size, |area| drawing.draw(area));
-            Ok(drawn.with_context(|| path.display().to_string())?)
-        }
+        PlotFormat::Png => png_of(size, |area| drawing.draw(area)),
     }
 }
 
 /// Returns a plot as an element of a page, which takes the width that the page gives it.
-pub(crate) fn inline_svg(plot: &Plot) -> String {
+pub fn inline_svg(plot: &Plot) -> String {
     svg(std::slice::from_ref(plot), PAGE_SIZE)
 }
 
@@ -185,7 +218,7 @@ fn svg(plots: &[Plot], size: (u32, u32)) -> String {
     text.replacen(&drawn, &shown, 1)
 }
 
-fn png(plots: &[Plot]) -> anyhow::Result<Vec<u8>> {
+fn png(plots: &[Plot]) -> Result<Vec<u8>, PlotError> {
     png_of(all_of(fine(SIZE), plots), |area| draw_all(plots, area))
 }
 
@@ -195,16 +228,17 @@ fn png_of<E: std::error::Error + Send + Sync>(
     draw: impl FnOnce(
         &DrawingArea<BitMapBackend<'_>, plotters::coord::Shift>,
     ) -> Result<(), DrawingAreaErrorKind<E>>,
-) -> anyhow::Result<Vec<u8>> {
+) -> Result<Vec<u8>, PlotError> {
     let mut pixels = vec![0; width as usize * height as usize * 3];
     let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-    draw(&area).map_err(|error| io::Error::other(error.to_string()))?;
+    draw(&area).map_err(|error| PlotError::Drawing(error.to_string()))?;
     drop(area);
     let mut bytes = Vec::new();
     let mut png = png::Encoder::new(&mut bytes, width, height);
     png.set_color(png::ColorType::Rgb);
     png.set_depth(png::BitDepth::Eight);
-    png.write_header()?.write_image_data(&pixels)?;
+    let written = png.write_header().and_then(|mut png| png.write_image_data(&pixels));
+    written.map_err(|error| PlotError::Drawing(error.to_string()))?;
     Ok(bytes)
 }
 
@@ -310,7 +344,7 @@ fn font(points: u32) -> TextStyle<'static> {
 fn with_font() {
     static DONE: Once = Once::new();
     DONE.call_once(|| {
-        let font = include_bytes!("../../../../fonts/roboto-subset.ttf");
+        let font = include_bytes!("../../fonts/roboto-subset.ttf");
         let registered = register_font(FAMILY, FontStyle::Normal, font);
         assert!(registered.is_ok(), "the font that comes with the program is one");
     });
@@ -353,13 +387,13 @@ mod tests {
     #[test]
     fn a_png_has_ink_where_the_curve_is() {
         let bytes = drawn(&plots(), Path::new("a.png")).unwrap();
-        let mut reader = png::Decoder::new(io::Cursor::new(bytes)).read_info().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
         assert_eq!((info.width, info.height), fine(SIZE));
-        let (colours, _) = pixels.as_chunks::<3>();
-        assert!(colours.contains(&[0, 114, 178]));
-        assert_eq!(colours[0], [255; 3]);
+        let (colors, _) = pixels.as_chunks::<3>();
+        assert!(colors.contains(&[0, 114, 178]));
+        assert_eq!(colors[0], [255; 3]);
     }
 
     #[test]
@@ -389,7 +423,8 @@ mod tests {
             assert!(check_name(Path::new(name)).is_ok(), "{name}");
         }
         for name in ["-", "a", "a.pdf", "svg"] {
-            assert_eq!(check_name(Path::new(name)).unwrap_err().status(), 2, "{name}");
+            let refused = check_name(Path::new(name));
+            assert!(matches!(refused, Err(PlotError::Name(_))), "{name}");
         }
     }
 }

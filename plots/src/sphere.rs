@@ -9,8 +9,8 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{Drawing, GRAY_INK, GRID, font, picture_of, with_font};
-use crate::exit::Exit;
+use crate::PlotError;
+use crate::{Drawing, GRAY_INK, GRID, font, picture_of, with_font};
 
 /// The radius of a half of the sphere, and the room around it, in pixels.
 const RADIUS: i32 = 400;
@@ -43,12 +43,12 @@ fn shade(islands: usize) -> RGBColor {
 /// The bytes of a picture of both halves of the sphere, seen from its poles: a dot for each
 /// direction, colored by islands, and a ring around the dot of the best pose. Areas are true to
 /// scale (Lambert's projection).
-pub(crate) fn sphere_picture(
+pub fn sphere_picture(
     title: &str,
     poses: &[PoseFacts],
     best: usize,
     path: &Path,
-) -> Result<Vec<u8>, Exit> {
+) -> Result<Vec<u8>, PlotError> {
     picture_of(&SpherePicture { title, poses, best }, SIZE, path)
 }
 

@@ -6,20 +6,21 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{Drawing, FAMILY, GRAY_INK, picture_of, with_font};
-use crate::exit::Exit;
+use crate::PlotError;
+use crate::{Drawing, FAMILY, GRAY_INK, picture_of, with_font};
 
 /// Doses of the same voxels in two cases, side by side.
-pub(crate) struct DoseMap {
-    pub(crate) title: String,
+pub struct DoseMap {
+    /// The text above it.
+    pub title: String,
     /// The critical dose, in mJ/cm².
-    pub(crate) critical_mj: f64,
+    pub critical_mj: f64,
     /// Voxels in a row.
-    pub(crate) width: usize,
+    pub width: usize,
     /// Which voxels are wanted, row by row.
-    pub(crate) wanted: Vec<bool>,
+    pub wanted: Vec<bool>,
     /// The cases: a name, and the doses in units of the critical dose.
-    pub(crate) cases: [(&'static str, Vec<f64>); 2],
+    pub cases: [(&'static str, Vec<f64>); 2],
 }
 
 /// The longer side of a map, and the sides of its cells, in pixels.
@@ -36,7 +37,7 @@ const OVERCURED: RGBColor = RGBColor(235, 120, 90);
 const UNDERCURED: RGBColor = RGBColor(120, 170, 235);
 
 /// The bytes of a map, in the format that the file's name says.
-pub(crate) fn dose_map(map: &DoseMap, path: &Path) -> Result<Vec<u8>, Exit> {
+pub fn dose_map(map: &DoseMap, path: &Path) -> Result<Vec<u8>, PlotError> {
     picture_of(map, map.size(), path)
 }
 
