@@ -52,9 +52,18 @@ fn levels(layer: &Layer) -> Vec<Vec<u8>> {
     }
 }
 
-/// Where the vertical line through (x, y) passes facets: heights, and whether
-/// they face up. `None` where it is too near to an edge to say.
-fn passes(facets: &[[Point; 3]], [x, y]: [f64; 2]) -> Option<Vec<(f64, bool)>> {
+/// Where a vertical line passes a facet.
+struct Pass {
+    z: f64,
+    faces_up: bool,
+    /// Half of what must lie between this and others to be compared: the slicer joins facets
+    /// that are 2 nm apart, or that a step aside of 2 millionths of a pixel brings together.
+    tie: f64,
+}
+
+/// Where the vertical line through (x, y) passes facets. `None` where it is too near to an edge to
+/// say.
+fn passes(facets: &[[Point; 3]], [x, y]: [f64; 2], pixel_mm: f64) -> Option<Vec<Pass>> {
     let mut met = Vec::new();
     for [a, b, c] in facets {
         let side = |p: &Point, q: &Point| {
@@ -79,35 +88,36 @@ fn passes(facets: &[[Point; 3]], [x, y]: [f64; 2]) -> Option<Vec<(f64, bool)>> {
             let weights = [area(b, c), area(c, a), area(a, b)];
             let sum: f64 = weights.iter().sum();
             let z = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum;
-            met.push((z, sum > 0.0));
+            let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));
+            let across = (u[1] * v[2] - u[2] * v[1]).hypot(u[2] * v[0] - u[0] * v[2]);
+            let steepness = across / sum.abs();
+            met.push(Pass { z, faces_up: sum > 0.0, tie: 2e-6 * (1.0 + steepness * pixel_mm) });
         }
     }
-    met.sort_by(|a, b| b.partial_cmp(a).unwrap());
+    met.sort_by(|a, b| b.z.partial_cmp(&a.z).unwrap());
     Some(met)
 }
 
-/// The depth of part below a height on a vertical line, `None` where it stands
+/// The depth of part below a height on a vertical line, with its tolerance; `None` where it stands
 /// on what is below `end`, and whether the line is inside the part at the
 /// height at all.
 fn depth_below(
-    met: &[(f64, bool)],
+    met: &[Pass],
     plane: f64,
     end: f64,
     fill: Fill,
-) -> Option<(bool, Option<f64>)> {
+) -> Option<(bool, Option<(f64, f64)>)> {
     let inside = |winding: i32| match fill {
         Fill::EvenOdd => winding % 2 != 0,
         Fill::Solid => winding != 0,
     };
     let mut winding = 0;
     let mut at_plane = None;
-    // The slicer joins facets that are 2 nm apart, steep ones farther: too near to compare.
-    let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
-    if met.windows(2).any(|pair| near(pair[0].0, pair[1].0)) {
+    if met.windows(2).any(|pair| pair[0].z - pair[1].z < pair[0].tie + pair[1].tie) {
         return None;
     }
-    for &(z, faces_up) in met {
-        if near(z, plane) {
+    for &Pass { z, faces_up, tie } in met {
+        if (z - plane).abs() < tie {
             return None;
         }
         if z < plane && at_plane.is_none() {
@@ -115,7 +125,7 @@ fn depth_below(
         }
         winding += if faces_up { 1 } else { -1 };
         if z < plane && at_plane == Some(true) && !inside(winding) {
-            return Some((true, (z > end).then_some(plane - z)));
+            return Some((true, (z > end).then_some((plane - z, tie))));
         }
     }
     Some((at_plane.unwrap_or(false), None))
@@ -138,6 +148,7 @@ fn referee(
     let gray_options = gray(overcure, options);
     let grid = *Slices::new(model(mesh), options).unwrap().grid();
     let layers = slice(mesh, &gray_options);
+    let pixel_mm = options.dpi.pitch().mm();
     let check = |layer: &Layer| -> Result<(usize, usize, usize), String> {
         let index = layer.info.index as usize;
         let [bottom, top] = match &options.heights {
@@ -152,17 +163,18 @@ fn referee(
         let (mut open, mut seen, mut grays) = (0, 0, 0);
         for (row, levels) in levels(layer).iter().enumerate() {
             for (column, &level) in levels.iter().enumerate() {
-                let met = passes(&facets, centre(&grid, column, row));
+                let met = passes(&facets, centre(&grid, column, row), pixel_mm);
                 let found = met.and_then(|met| depth_below(&met, plane, end, options.fill));
                 let Some((inside, depth)) = found else {
                     open += 1;
                     continue;
                 };
-                let depth = depth.map(|depth| (depth + top - plane) * 1000.0);
+                let depth =
+                    depth.map(|(depth, tie)| [depth + top - plane, tie].map(|mm| mm * 1000.0));
                 let expected = match (inside, depth) {
                     (false, _) => [0, 0],
                     (true, None) => [255, 255],
-                    (true, Some(um)) => [of_um(um - 2e-3), of_um(um + 2e-3)],
+                    (true, Some([um, tie_um])) => [of_um(um - tie_um), of_um(um + tie_um)],
                 };
                 if !expected.contains(&level) {
                     let place = format!("layer {}, {column}, {row}", layer.info.index);
