@@ -87,11 +87,10 @@ impl Removed {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::Map;
 
     use super::*;
     use crate::key::Kind;
-    use crate::store::Manifest;
+    use crate::store::{Facts, Manifest};
     use crate::task::Graph;
     use crate::task::tests::task;
 
@@ -108,7 +107,7 @@ mod tests {
             let result = store.begin(key).unwrap();
             io::Write::write_all(&mut result.file(), b"layers").unwrap();
             let result = Some(result.finish().unwrap());
-            store.publish(&Manifest { recipe, result, facts: Map::new() }).unwrap();
+            store.publish(&Manifest { recipe, result, facts: Facts::default() }).unwrap();
         };
         [a, b, c, low].into_iter().for_each(publish);
         NamedTasks::new("night.toml".into(), &graph, &[low, high]).keep(&store).unwrap();

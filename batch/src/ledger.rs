@@ -179,7 +179,7 @@ impl<'a> Ledger<'a> {
 mod tests {
     use super::*;
     use crate::key::Kind;
-    use crate::store::Manifest;
+    use crate::store::{Facts, Manifest};
     use crate::task::tests::task;
 
     struct Batch {
@@ -204,7 +204,7 @@ mod tests {
 
         fn publish(&self, key: Key) {
             let recipe = self.graph.task(key).recipe.clone();
-            let manifest = Manifest { recipe, result: None, facts: serde_json::Map::new() };
+            let manifest = Manifest { recipe, result: None, facts: Facts::default() };
             self.store.publish(&manifest).unwrap();
         }
     }

@@ -5,7 +5,9 @@
 //! absent, so running the same batch again does only the missing tasks. An [`Engine`] runs tasks as
 //! processes.
 //!
-//! The program that runs tasks knows what a stage is; this crate does not.
+//! A [`NightPlan`] has the tasks of a night, [`perform`] does one of them, a [`Deliverer`] gives
+//! results today's names, and a [`Summary`] says what has become of each part and build. Options
+//! of commands belong to the program with the command line, which implements [`Commands`].
 //!
 //! ```
 //! use std::io::Write;
@@ -32,7 +34,11 @@
 //! # }
 //! ```
 
+mod assignment;
+mod commands;
+mod deliver;
 mod engine;
+mod error;
 mod gc;
 mod journal;
 mod key;
@@ -40,17 +46,33 @@ mod ledger;
 mod named;
 mod night;
 pub mod path_bytes;
+mod perform;
+mod plan;
+mod resources;
+mod room;
 mod store;
+mod summary;
 mod task;
 
+pub use commands::{
+    Call, Commands, JOIN_CODE, LayersOf, PACK_CODE, StageError, Stages, WriteLayers,
+};
+pub use deliver::{Delivered, Deliverer, check_delivered};
 pub use engine::{
     Attempt, Engine, EngineError, Launcher, Local, SchedulerError, Work, end_children, status,
 };
+pub use error::BatchError;
 pub use gc::{Removed, collect};
 pub use journal::{Event, Journal, events, host, now};
 pub use key::{Key, KeyError, Kind, Recipe};
 pub use ledger::{End, Ledger, State};
 pub use named::{NamedTask, NamedTasks};
 pub use night::{Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage};
-pub use store::{Damage, Digests, Manifest, Store, StoreError, Unpublished, Written};
+pub use perform::perform;
+pub use plan::{NightPlan, Subject, WantedResults};
+pub use room::DiskRoom;
+pub use store::{
+    CheckCounts, Damage, Digests, Facts, Manifest, Store, StoreError, Unpublished, Written,
+};
+pub use summary::{SubjectState, SubjectSummary, Summary};
 pub use task::{Cost, Graph, InputFile, Task};

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io;
 
+use lamp_batch::BatchError;
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
@@ -199,6 +200,20 @@ impl From<StackError> for Exit {
         match error {
             StackError::NoLayers => Self::Failed(error.into()),
             error => Self::Output(error.into()),
+        }
+    }
+}
+
+impl From<BatchError> for Exit {
+    fn from(error: BatchError) -> Self {
+        match error {
+            BatchError::Night { .. } | BatchError::Stage(_) | BatchError::Options(_) => {
+                Self::Usage(error.into())
+            }
+            BatchError::Begin(_) | BatchError::Result(_) => Self::Output(error.into()),
+            BatchError::Join(error) => error.into(),
+            BatchError::Stages(error) => error.into(),
+            error => Self::Failed(error.into()),
         }
     }
 }

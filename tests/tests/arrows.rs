@@ -11,10 +11,11 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-stack", "lamp-brep"],
     &["lamp-brep-occt", "lamp-fixtures"],
     &["lamp-slicer"],
-    &["lamp-adaptive", "lamp-grayscale", "lamp-fix", "lamp-offset", "lamp-machine", "lamp-batch"],
+    &["lamp-adaptive", "lamp-grayscale", "lamp-fix", "lamp-offset", "lamp-machine"],
     &["lamp-build", "lamp-planning", "lamp-supports"],
     &["lamp-edit", "lamp-view", "lamp-plots"],
     &["lamp-pipeline"],
+    &["lamp-batch"],
     &["lamp"],
     &["lamp-cli"],
     // Crates that test the others. Nothing is built on them.

@@ -1,7 +1,7 @@
 //! The manifest of a result: how it was made, its digest, and findings on the way.
 
+use lamp_pipeline::RangeFindings;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 
 use crate::key::Recipe;
 
@@ -12,15 +12,35 @@ pub struct Manifest {
     pub recipe: Recipe,
     /// The result, if the task has one besides facts.
     pub result: Option<Written>,
-    /// The task's findings, by name.
-    pub facts: Map<String, Value>,
+    /// Counts and findings of the task.
+    pub facts: Facts,
 }
 
-impl Manifest {
-    /// Returns a fact that is a count; zero if it is not recorded.
-    pub fn count(&self, fact: &str) -> u64 {
-        self.facts.get(fact).and_then(Value::as_u64).unwrap_or(0)
-    }
+/// Counts and findings of a task. A fact that the task does not have is left out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Facts {
+    /// The layers of its stack.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layers: Option<u64>,
+    /// The findings of stages in those layers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stages: Option<RangeFindings>,
+    /// Remarks on the way.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// The findings of its check.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub check: Option<CheckCounts>,
+}
+
+/// The number of findings of a check.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CheckCounts {
+    /// Islands.
+    pub islands: u64,
+    /// All findings that need a person.
+    pub findings: u64,
 }
 
 /// A result as it was written.

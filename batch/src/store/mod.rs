@@ -31,7 +31,7 @@ use crate::key::Key;
 use crate::task::Task;
 
 pub use digests::Digests;
-pub use manifest::{Manifest, Written};
+pub use manifest::{CheckCounts, Facts, Manifest, Written};
 pub use unpublished::Unpublished;
 
 /// A folder of results.
@@ -254,6 +254,12 @@ impl Store {
     /// Returns the work of a task, if a batch has written it.
     pub fn task(&self, key: Key) -> Option<Task> {
         sealed::read(&self.of_task(key, "task"))
+    }
+
+    /// Returns the name of a task for people.
+    pub fn name_of(&self, key: Key) -> String {
+        let task = self.task(key);
+        task.map_or_else(|| key.short(), |task| format!("{} ({})", task.subject, task.label))
     }
 
     /// Returns a note, if there is one.

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use lamp_batch::{Call, WriteLayers};
 use lamp_machine::Machine;
 use lamp_pipeline::documents::is_file;
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::Counts;
 use lamp_pipeline::watcher::KeptRemarks;
 use lamp_pipeline::{Error, RangeFindings, Stage, named};
-use lamp_stack::{Layer, Page, Pages, PassingLayer, map_in_order};
+use lamp_stack::{Page, Pages, PassingLayer, map_in_order};
 
 use crate::commands::support::SupportArgs;
 use crate::exit::Exit;
@@ -26,37 +27,33 @@ pub(crate) enum After {
     Layers(Stage),
 }
 
-impl After {
-    /// Returns its options that matter to bytes as one text.
-    pub(crate) fn canonical(&self) -> String {
+impl Call for After {
+    fn canonical(&self) -> String {
         match self {
             Self::Support(args) => args.canonical(),
             Self::Layers(stage) => stage.canonical(),
         }
     }
 
-    /// Returns the files that its options name.
-    ///
-    /// # Errors
-    /// Returns an error if a list of edits cannot be read.
-    pub(crate) fn input_files(&self) -> Result<Vec<PathBuf>, Exit> {
+    fn input_files(&self) -> Result<Vec<PathBuf>, Error> {
         match self {
             Self::Support(args) => {
                 let machine = Some(args.machine.clone());
                 Ok(machine.into_iter().filter(|path| is_file::<Machine>(path)).collect())
             }
-            Self::Layers(stage) => Ok(stage.input_files()?),
+            Self::Layers(stage) => stage.input_files(),
         }
     }
 
-    /// Returns its name, and the number that changes when its bytes do.
-    pub(crate) fn code(&self) -> (&'static str, u32) {
+    fn code(&self) -> (&'static str, u32) {
         match self {
             Self::Support(_) => ("support", SUPPORT_CODE),
             Self::Layers(stage) => stage.code(),
         }
     }
+}
 
+impl After {
     /// Makes the layers that come of a stack of a part, and gives them to `write`.
     ///
     /// # Errors
@@ -65,7 +62,7 @@ impl After {
         &self,
         part: &Path,
         stack: &Path,
-        write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
+        write: &mut WriteLayers<'_, Exit>,
     ) -> Result<RangeFindings, Exit> {
         let kept = KeptRemarks::default();
         let mut findings = RangeFindings::new(Counts::default(), false);

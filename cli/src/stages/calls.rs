@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use lamp_batch::{Call, WriteLayers};
 use lamp_build::TILE_CODE;
 use lamp_pipeline::watcher::KeptRemarks;
-use lamp_stack::Layer;
 use lamp_supports::FindingRecord;
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +16,7 @@ use crate::commands::tile::{Build, TileArgs};
 use crate::exit::Exit;
 use crate::terminal::progress::Progress;
 
-/// Change when other bytes come from the same options and stacks.
-pub(crate) const JOIN_CODE: u32 = 2;
-pub(crate) const PACK_CODE: u32 = 2;
+/// Changes when other findings come from the same options and stack.
 const CHECK_CODE: u32 = 1;
 
 /// How a build is laid out: the options of `lamp tile`.
@@ -41,21 +39,6 @@ impl Tiling {
         Ok(Self(args))
     }
 
-    /// Returns the options as one text. The number of copies belongs to the stacks.
-    pub(crate) fn canonical(&self) -> String {
-        self.0.canonical()
-    }
-
-    /// Returns the files that options name.
-    pub(crate) fn input_files(&self) -> Vec<PathBuf> {
-        self.0.clone().files_mut().map(|path| path.clone()).collect()
-    }
-
-    /// Returns its name, and the number that changes when its bytes do.
-    pub(crate) fn code() -> (&'static str, u32) {
-        ("tile", TILE_CODE)
-    }
-
     /// Lays out copies of stacks, and gives the layers of the build to `write`. Returns what is to
     /// be said.
     ///
@@ -64,7 +47,7 @@ impl Tiling {
     pub(crate) fn run(
         &self,
         stacks: &[(PathBuf, Option<u32>)],
-        write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Exit>>) -> Result<(), Exit>,
+        write: &mut WriteLayers<'_, Exit>,
     ) -> Result<Vec<String>, Exit> {
         let kept = KeptRemarks::default();
         let build = self.0.build_of(stacks, &Progress::keeping("tile", &kept))?;
@@ -72,6 +55,21 @@ impl Tiling {
         write(&mut layers)?;
         let found = [stray_rows.borrow().text(), no_mesh.borrow().text()].into_iter().flatten();
         Ok(kept.take().into_iter().chain(found.map(|text| format!("tile: {text}"))).collect())
+    }
+}
+
+impl Call for Tiling {
+    /// Returns the options as one text. The number of copies belongs to the stacks.
+    fn canonical(&self) -> String {
+        self.0.canonical()
+    }
+
+    fn input_files(&self) -> Result<Vec<PathBuf>, lamp_pipeline::Error> {
+        Ok(self.0.clone().files_mut().map(|path| path.clone()).collect())
+    }
+
+    fn code(&self) -> (&'static str, u32) {
+        ("tile", TILE_CODE)
     }
 }
 
@@ -106,16 +104,6 @@ impl Checking {
         parse_check(options, folder).map(Self)
     }
 
-    /// Returns the options as one text.
-    pub(crate) fn canonical(&self) -> String {
-        self.0.canonical()
-    }
-
-    /// Returns its name, and the number that changes when its findings do.
-    pub(crate) fn code() -> (&'static str, u32) {
-        ("check", CHECK_CODE)
-    }
-
     /// Finds what there is in a stack.
     ///
     /// # Errors
@@ -130,5 +118,19 @@ impl Checking {
             found.findings.push(record);
         }
         Ok(found)
+    }
+}
+
+impl Call for Checking {
+    fn canonical(&self) -> String {
+        self.0.canonical()
+    }
+
+    fn input_files(&self) -> Result<Vec<PathBuf>, lamp_pipeline::Error> {
+        Ok(self.0.input_file().into_iter().cloned().collect())
+    }
+
+    fn code(&self) -> (&'static str, u32) {
+        ("check", CHECK_CODE)
     }
 }

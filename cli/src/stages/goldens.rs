@@ -7,11 +7,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use lamp_batch::{JOIN_CODE, PACK_CODE};
+use lamp_build::TILE_CODE;
 use lamp_pipeline::{compensate, dither, edit, fix, slice};
 use lamp_stack::digest_of;
 
 use super::after;
-use super::calls::{JOIN_CODE, PACK_CODE, Tiling};
 use super::tests::{Bench, COARSE, GRAY};
 
 const GOLDENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/stages/goldens.txt");
@@ -89,7 +90,7 @@ fn a_stage_whose_bytes_change_has_another_number() {
         ("support", after::SUPPORT_CODE),
         ("join", JOIN_CODE),
         ("pack", PACK_CODE),
-        Tiling::code(),
+        ("tile", TILE_CODE),
     ]);
     let found = lines(&numbers);
     let text = fs::read_to_string(GOLDENS).unwrap_or_default();

@@ -1,12 +1,12 @@
 //! Reads stages as they stand on a command line.
 
 use std::ffi::OsString;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use lamp_batch::{StageError, Stages};
 use lamp_machine::Machine;
 
 use lamp_pipeline::compensate::{CompensateSettings, Compensating};
@@ -16,7 +16,6 @@ use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::{Chain, Stage};
 
-use super::Stages;
 use super::after::After;
 use crate::Lamp;
 use crate::args::arguments::{settings_of_machine, words_left_open};
@@ -29,24 +28,6 @@ use crate::exit::Exit;
 use crate::streams::is_stream;
 use crate::terminal::help::formed;
 use crate::terminal::usage::sentence;
-
-/// A stage that is refused, and why in one sentence.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct StageError {
-    /// Its place in the list, from 0.
-    pub(crate) stage: usize,
-    /// Its command.
-    pub(crate) name: String,
-    pub(crate) why: String,
-}
-
-impl fmt::Display for StageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.name, self.why)
-    }
-}
-
-impl std::error::Error for StageError {}
 
 /// The stages that there are.
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
@@ -73,7 +54,7 @@ const REFUSED: [(&str, &str); 17] = [
 ];
 
 /// Reads stages. Files that options name stand in `folder`, unless their paths are absolute.
-pub(super) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages, StageError> {
+pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<After>, StageError> {
     let (mut slice, mut per_layer, mut after) = (None, Vec::new(), Vec::new());
     for (stage, words) in stages.iter().enumerate() {
         let name = words.first().map_or("", String::as_str);

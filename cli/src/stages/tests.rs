@@ -5,17 +5,21 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use lamp_batch::LayersOf;
 use lamp_pipeline::{Names, RangeFindings, stored_name};
 use lamp_stack::{Destination, Format, Layer, join, write_stack};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use tempfile::TempDir;
 
-use super::Stages;
+use super::after::After;
 use super::calls::{CheckFindings, Checking, Tiling};
+use super::parse::parse;
 use crate::Lamp;
 use crate::args::options::Common;
 use crate::exit::Exit;
+
+type Stages = lamp_batch::Stages<After>;
 
 /// A folder with a part, and results.
 pub(super) struct Bench {
@@ -120,8 +124,7 @@ impl Bench {
             words.map(ToOwned::to_owned).collect()
         };
         let stages: Vec<Vec<String>> = stages.iter().map(words).collect();
-        Stages::parse(&stages, self.folder.path())
-            .map_err(|error| format!("{}: {error}", error.stage))
+        parse(&stages, self.folder.path()).map_err(|error| format!("{}: {error}", error.stage))
     }
 }
 
@@ -329,13 +332,13 @@ fn what_follows_on_ranges_does_what_its_command_does() {
     // Under the name of its content, from the part to the build.
     let sliced = path("sliced.tif");
     stages.chain.run(&part, names[1], 0..76, |layers| write(layers, sliced.clone())).unwrap();
-    stages.after[0].run(&part, &sliced, |layers| write(layers, path("held.tif"))).unwrap();
-    let to_dots = |layers: &mut dyn Iterator<Item = _>| write(layers, path("dots.tif"));
+    stages.after[0].run(&part, &sliced, &mut |layers| write(layers, path("held.tif"))).unwrap();
+    let to_dots = &mut |layers: &mut LayersOf<'_, Exit>| write(layers, path("dots.tif"));
     stages.after[1].run(&part, &path("held.tif"), to_dots).unwrap();
     let words: Vec<String> = ["--mesh", "none", "--area", "8x8in"].map(str::to_owned).to_vec();
     let tiling = Tiling::parse(&words, &[Some(2)], bench.folder.path()).unwrap();
     let dots = [(path("dots.tif"), Some(2))];
-    tiling.run(&dots, |layers| write(layers, path("build.tif"))).unwrap();
+    tiling.run(&dots, &mut |layers| write(layers, path("build.tif"))).unwrap();
     // Out of the store with today's name: the bytes of the commands by hand.
     let by_hand = bench.by_hand("t.stl", &[COARSE, "support --radius 1mm", "dither"]);
     let names = Names::new([(names[1].to_owned(), names[0].to_owned())]);

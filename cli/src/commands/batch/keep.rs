@@ -1,12 +1,10 @@
 //! `lamp batch verify` and `gc`: keep a store sound and small.
 
 use anyhow::anyhow;
-use lamp_batch::{Damage, collect as collect_garbage};
+use lamp_batch::{Damage, check_delivered, collect as collect_garbage};
 use lamp_pipeline::memory::in_words;
 
-use super::deliver::check_files;
 use super::night_file::store_of;
-use super::task::named;
 use super::{GcArgs, StoreArgs};
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -25,7 +23,7 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
             Err(Damage::NoManifest) if !store.has_manifest(key) => {}
             Err(damage) => {
                 damaged += 1;
-                let name = named(&store, key);
+                let name = store.name_of(key);
                 let then = match store.forget(key) {
                     Ok(()) => "taken away, the next run makes it again".to_owned(),
                     Err(error) => Exit::from(anyhow::Error::new(error)).to_string(),
@@ -35,7 +33,7 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
         }
     }
     let (delivered, wrong) = match &night {
-        Some(night) => check_files(night, &store)?,
+        Some(night) => check_delivered(night, &store)?,
         None => (0, Vec::new()),
     };
     wrong.iter().for_each(|problem| progress.warn(problem));

@@ -1,19 +1,13 @@
 //! `lamp batch`: parts and builds overnight, from one file.
 
-mod deliver;
 mod keep;
 mod night_file;
 mod notify;
-mod plan;
 mod plan_text;
 mod report;
-mod resources;
-mod room;
 mod run;
 mod status;
-mod summary;
 mod task;
-mod work;
 
 use std::path::PathBuf;
 use std::time::Duration;

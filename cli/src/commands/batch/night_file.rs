@@ -4,9 +4,10 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use lamp_batch::{Night, Store, StoreError};
+use lamp_batch::{BatchError, Night, NightPlan, Store, StoreError};
 
 use super::StoreArgs;
+use super::task::LampCommands;
 use crate::catalogue::read_text;
 use crate::exit::Exit;
 
@@ -47,6 +48,17 @@ impl NightFile {
             None => Exit::Failed(error.into()),
         };
         Store::create(&self.night.store).map_err(at_its_place)
+    }
+}
+
+impl NightFile {
+    /// Plans the night. Files in it are from the folder of the night file, where this process works.
+    pub(super) fn plan(&self, store: &Store) -> Result<NightPlan, Exit> {
+        let folder = env::current_dir().context("the folder of the night file")?;
+        NightPlan::new(&self.night, &folder, &LampCommands, store).map_err(|error| match error {
+            BatchError::Night { .. } => Exit::from(error).at(self.name.clone()),
+            error => error.into(),
+        })
     }
 }
 

@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 use std::process::{Command, Stdio};
 
+use lamp_batch::Summary;
 use serde_json::json;
 
-use super::summary::Summary;
 use crate::terminal::progress::Progress;
 
 /// Runs a command by the shell, with a summary on its input and the status in its environment. A

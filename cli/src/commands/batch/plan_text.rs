@@ -3,14 +3,11 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
-use lamp_batch::{Cost, Key, Kind, Ledger};
+use lamp_batch::{Cost, Deliverer, DiskRoom, Key, Kind, Ledger};
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 
-use super::deliver::Deliverer;
 use super::night_file::NightFile;
-use super::plan::Plan;
-use super::room::Room;
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::streams::print;
@@ -19,7 +16,7 @@ use crate::terminal::progress::printable;
 pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;
     let store = file.store()?;
-    let plan = Plan::new(&file, &store)?;
+    let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
     let to_do: HashSet<Key> = ledger.keys().into_iter().collect();
     let mut text = String::new();
@@ -49,7 +46,7 @@ pub(super) fn run(night: &Path, common: &Common) -> Result<(), Exit> {
     let cost: Cost = kinds.values().map(|(.., cost)| *cost).sum();
     text += &line("all", to_do.len(), plan.graph.keys().len(), &cost);
     let deliverer = Deliverer { store: &store, output: &file.night.output };
-    if let Some(shortage) = Room::of(&plan, &ledger, &deliverer).shortage() {
+    if let Some(shortage) = DiskRoom::of(&plan, &ledger, &deliverer).shortage() {
         text += &printable(&shortage);
         text.push('\n');
     }

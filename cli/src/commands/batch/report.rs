@@ -6,18 +6,15 @@ use std::path::Path;
 
 use anyhow::Context;
 use lamp_batch::path_bytes::WrittenPath;
-use lamp_batch::{Event, Key, Store, events};
+use lamp_batch::{Event, Key, NightPlan, Store, SubjectState, SubjectSummary, Summary, events};
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 use lamp_stack::digest_of;
 use maud::{Markup, PreEscaped, html};
 
 use super::night_file::NightFile;
-use super::plan::Plan;
 use super::run::counts;
-use super::summary::{Line, LineState, Summary};
-use super::task::middle;
-use super::work::Checked;
+use super::task::{CheckResult, middle};
 use crate::commands::report::{Picture, document};
 use crate::exit::Exit;
 use crate::streams::write_file;
@@ -39,7 +36,7 @@ struct Took {
 pub(super) fn write(
     path: &Path,
     file: &NightFile,
-    plan: &Plan,
+    plan: &NightPlan,
     store: &Store,
     summary: &Summary,
 ) -> Result<(), Exit> {
@@ -102,7 +99,7 @@ fn digest(summary: &Summary) -> Result<String, Exit> {
 }
 
 /// Returns how each task of the plan was done, the last time.
-fn done(plan: &Plan, store: &Store) -> Result<Vec<Event>, Exit> {
+fn done(plan: &NightPlan, store: &Store) -> Result<Vec<Event>, Exit> {
     let all = events(store).context("the journal")?.into_iter().filter(Event::is_done);
     let last: BTreeMap<Key, Event> = all.map(|event| (event.key, event)).collect();
     let mut done: Vec<Event> =
@@ -128,8 +125,8 @@ fn took(done: &[Event]) -> HashMap<&str, Took> {
 
 /// The first things to know: failures, and results to look at.
 fn first(summary: &Summary) -> Markup {
-    let is_told = |line: &&Line| line.state != LineState::Done;
-    let mut told: Vec<&Line> = summary.lines().filter(is_told).collect();
+    let is_told = |line: &&SubjectSummary| line.state != SubjectState::Done;
+    let mut told: Vec<&SubjectSummary> = summary.lines().filter(is_told).collect();
     told.sort_by_key(|line| line.state);
     html! {
         @if told.is_empty() {
@@ -150,7 +147,7 @@ fn first(summary: &Summary) -> Markup {
     }
 }
 
-fn table(lines: &[Line], took: &HashMap<&str, Took>) -> Markup {
+fn table(lines: &[SubjectSummary], took: &HashMap<&str, Took>) -> Markup {
     let known = |number: Option<u64>| number.map_or_else(String::new, |n| n.to_string());
     html! {
         table.index {
@@ -184,7 +181,7 @@ fn table(lines: &[Line], took: &HashMap<&str, Took>) -> Markup {
 }
 
 /// Returns the picture of a part or a build, and its findings.
-fn seen(line: &Line, plan: &Plan, store: &Store) -> Option<(Picture, Vec<String>)> {
+fn seen(line: &SubjectSummary, plan: &NightPlan, store: &Store) -> Option<(Picture, Vec<String>)> {
     let wanted = plan.subjects[line.place].wanted.as_ref().ok()?;
     let Some(check) = wanted.check else {
         store.manifest(wanted.stack)?;
@@ -192,7 +189,7 @@ fn seen(line: &Line, plan: &Plan, store: &Store) -> Option<(Picture, Vec<String>
     };
     store.manifest(check)?;
     let text = fs::read(store.result(check)).ok()?;
-    let checked: Checked = serde_json::from_slice(&text).ok()?;
+    let checked: CheckResult = serde_json::from_slice(&text).ok()?;
     Some((checked.picture?, checked.lines))
 }
 

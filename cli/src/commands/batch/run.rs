@@ -5,17 +5,14 @@ use std::thread;
 
 use anyhow::{Context, anyhow};
 use lamp_batch::{
-    Attempt, End, Engine, Event, Journal, Launcher, Ledger, Local, NamedTasks, Work, host, now,
+    Attempt, Deliverer, DiskRoom, End, Engine, Event, Journal, Launcher, Ledger, Local, NamedTasks,
+    NightPlan, SubjectState, Summary, Work, host, now,
 };
 use lamp_pipeline::memory::available;
 
-use super::deliver::Deliverer;
 use super::night_file::NightFile;
 use super::notify::notify;
-use super::plan::Plan;
 use super::report;
-use super::room::Room;
-use super::summary::{LineState, Summary};
 use super::{EngineName, RunArgs};
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -28,7 +25,7 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("batch", common, true);
     let file = NightFile::open(night)?;
     let store = file.store()?;
-    let plan = Plan::new(&file, &store)?;
+    let plan = file.plan(&store)?;
     let goals = plan.goals();
     let named = NamedTasks::new(file.path.clone(), &plan.graph, &goals);
     named.keep(&store).map_err(anyhow::Error::new)?;
@@ -42,7 +39,7 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     }
     let mut ledger = Ledger::new(&plan.graph, &store, &goals, args.retries);
     let is_new = !ledger.keys().is_empty();
-    if is_new && let Some(shortage) = Room::of(&plan, &ledger, &deliverer).shortage() {
+    if is_new && let Some(shortage) = DiskRoom::of(&plan, &ledger, &deliverer).shortage() {
         progress.warn(&shortage);
     }
     let report = file.night.output.folder.join("report.html");
@@ -74,7 +71,8 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     });
     let failed = failed.map_err(|error| Exit::Failed(error.into()))?;
     let mut summary = Summary::new(&plan, &deliverer, &ledger);
-    summary.add_failures(&failed);
+    let failed = failed.into_iter().map(|(name, error)| (name, Exit::from(error).to_string()));
+    summary.add_failures(&failed.collect::<Vec<_>>());
     if is_new || !report::is_written(&report, &store, &summary)? {
         report::write(&report, &file, &plan, &store, &summary)?;
     }
@@ -104,7 +102,7 @@ impl RunArgs {
 
 /// A run, for who watches it.
 struct Running<'a> {
-    plan: &'a Plan,
+    plan: &'a NightPlan,
     progress: &'a Progress,
     engine: Engine,
     done: usize,
@@ -112,7 +110,7 @@ struct Running<'a> {
 
 impl Running<'_> {
     fn begin(&self, ledger: &Ledger<'_>) {
-        let Plan { graph, subjects } = self.plan;
+        let NightPlan { graph, subjects } = self.plan;
         let to_do = ledger.keys().len();
         for subject in subjects.iter().filter(|subject| !subject.is_build) {
             if let Err(why) = &subject.wanted {
@@ -173,11 +171,15 @@ fn end(summary: &Summary, ledger: &Ledger<'_>) -> Result<(), Exit> {
             "the store's disk is full: make room, and run the same command again to go on";
         return Err(Exit::Failed(anyhow!(problem)));
     }
-    let [failed, skipped, waiting, person] =
-        [LineState::Failed, LineState::Skipped, LineState::Waiting, LineState::NeedsPerson]
-            .map(|state| summary.count(state));
+    let [failed, skipped, waiting, person] = [
+        SubjectState::Failed,
+        SubjectState::Skipped,
+        SubjectState::Waiting,
+        SubjectState::NeedsPerson,
+    ]
+    .map(|state| summary.count(state));
     if failed + skipped + waiting > 0 {
-        let names = summary.lines().filter(|line| line.state == LineState::Failed);
+        let names = summary.lines().filter(|line| line.state == SubjectState::Failed);
         let names: Vec<&str> = names.map(|line| line.name.as_str()).take(5).collect();
         let skipped =
             if skipped > 0 { format!(", {skipped} skipped for them") } else { String::new() };
@@ -190,7 +192,7 @@ fn end(summary: &Summary, ledger: &Ledger<'_>) -> Result<(), Exit> {
         return Err(Exit::Failed(anyhow!(problem)));
     }
     if person > 0 {
-        let names = summary.lines().filter(|line| line.state == LineState::NeedsPerson);
+        let names = summary.lines().filter(|line| line.state == SubjectState::NeedsPerson);
         let text = names
             .take(5)
             .map(|line| format!("{}: {}", line.name, line.why.as_deref().unwrap_or_default()));

@@ -2,13 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use lamp_batch::{Key, Ledger, events};
+use lamp_batch::{Deliverer, Key, Ledger, SubjectState, SubjectSummary, Summary, events};
 
-use super::deliver::Deliverer;
 use super::night_file::NightFile;
-use super::plan::Plan;
 use super::run::counts;
-use super::summary::{Line, LineState, Summary};
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::streams::print;
@@ -17,12 +14,12 @@ use crate::terminal::progress::printable;
 pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(night)?;
     let store = file.store()?;
-    let plan = Plan::new(&file, &store)?;
+    let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
     let deliverer = Deliverer { store: &store, output: &file.night.output };
     let summary = Summary::new(&plan, &deliverer, &ledger);
     let mut text = String::new();
-    for line in summary.lines().filter(|line| line.state != LineState::Done || common.verbose) {
+    for line in summary.lines().filter(|line| line.state != SubjectState::Done || common.verbose) {
         text += &told(line);
     }
     let to_do = ledger.keys();
@@ -44,14 +41,14 @@ pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> 
             text += &format!("{key} {state}: {} ({})\n", printable(&task.subject), task.label);
         }
     }
-    let done = summary.count(LineState::Done) + summary.count(LineState::NeedsPerson);
+    let done = summary.count(SubjectState::Done) + summary.count(SubjectState::NeedsPerson);
     let all = summary.lines().count();
     let counts = counts(&summary);
     text += &format!("{done} of {all} are done ({counts}), {} tasks are to do\n", to_do.len());
     print(&text)
 }
 
-fn told(line: &Line) -> String {
+fn told(line: &SubjectSummary) -> String {
     let why = line.why.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
     format!("{}: {}{}\n", printable(&line.name), line.state.words(), printable(&why))
 }

@@ -27,7 +27,7 @@ use crate::output::endings::parse_report;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
-use lamp_pipeline::documents::{canonical_word, document};
+use lamp_pipeline::documents::{canonical_word, document, is_file};
 use lamp_pipeline::solid::at_part;
 use lamp_pipeline::words::{list, optional, path, text, words_of};
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
@@ -235,6 +235,11 @@ impl CheckArgs {
         let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
         let records = self.records(&findings, &disagreements, machine);
         Ok(CheckedInput { name: input_name(path), input, findings, records })
+    }
+
+    /// Returns the file that the machine is from, if it is not built in.
+    pub(crate) fn input_file(&self) -> Option<&PathBuf> {
+        Some(&self.machine).filter(|path| is_file::<Machine>(path))
     }
 
     /// Returns the machine, to be changed.

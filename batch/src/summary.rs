@@ -1,46 +1,54 @@
 //! The state of each part and build.
 
-use lamp_batch::{Ledger, Manifest, State, Store};
 use serde::Serialize;
 
-use super::deliver::Deliverer;
-use super::plan::{Plan, Subject, Wanted};
-use super::task::{FINDINGS, ISLANDS, LAYERS, findings_of};
+use crate::deliver::Deliverer;
+use crate::ledger::{Ledger, State};
+use crate::plan::{NightPlan, Subject, WantedResults};
+use crate::store::{Manifest, Store};
 
 /// The parts and builds of a night: failures first, then results that need a person.
 #[derive(Serialize)]
-pub(super) struct Summary {
-    pub(super) parts: Vec<Line>,
-    pub(super) builds: Vec<Line>,
+pub struct Summary {
+    /// The parts.
+    pub parts: Vec<SubjectSummary>,
+    /// The builds.
+    pub builds: Vec<SubjectSummary>,
 }
 
 /// A part or a build.
 #[derive(Clone, Serialize)]
-pub(super) struct Line {
-    pub(super) name: String,
-    pub(super) state: LineState,
+pub struct SubjectSummary {
+    /// The name in the night file.
+    pub name: String,
+    /// What has become of it.
+    pub state: SubjectState,
     /// Why it failed or waits, or what a person should look at.
-    pub(super) why: Option<String>,
+    pub why: Option<String>,
     /// Where its stack is.
-    pub(super) file: Option<String>,
-    pub(super) layers: Option<u64>,
-    /// Bands of stray rows that `fix` corrected, and bands that it left; without `fix`, stray rows.
-    pub(super) stray_fixed: u64,
-    pub(super) stray_left: u64,
-    pub(super) islands: u64,
+    pub file: Option<String>,
+    /// The layers of its stack.
+    pub layers: Option<u64>,
+    /// Bands of stray rows that `fix` corrected.
+    pub stray_fixed: u64,
+    /// Bands of stray rows that `fix` left; without `fix`, stray rows.
+    pub stray_left: u64,
+    /// Islands that its check finds.
+    pub islands: u64,
     /// All that `lamp check` finds.
-    pub(super) findings: u64,
+    pub findings: u64,
     /// The digest of the file.
-    pub(super) digest: Option<String>,
+    pub digest: Option<String>,
     /// Where it is among the parts and builds of the plan.
     #[serde(skip)]
-    pub(super) place: usize,
+    pub place: usize,
 }
 
 /// The state of a part or a build, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum LineState {
+pub enum SubjectState {
+    /// It failed.
     Failed,
     /// A part of the build failed.
     Skipped,
@@ -48,12 +56,13 @@ pub(super) enum LineState {
     Waiting,
     /// It is done, with findings that need a person.
     NeedsPerson,
+    /// It is done.
     Done,
 }
 
-impl LineState {
+impl SubjectState {
     /// Returns the words for it.
-    pub(super) fn words(self) -> &'static str {
+    pub fn words(self) -> &'static str {
         match self {
             Self::Failed => "failed",
             Self::Skipped => "skipped",
@@ -66,9 +75,9 @@ impl LineState {
 
 impl Summary {
     /// Gathers results from the store, and the rest from a run.
-    pub(super) fn new(plan: &Plan, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Self {
+    pub fn new(plan: &NightPlan, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Self {
         let all = plan.subjects.iter().enumerate();
-        let mut lines: Vec<(bool, Line)> = all
+        let mut lines: Vec<(bool, SubjectSummary)> = all
             .map(|(place, subject)| (subject.is_build, line(place, subject, deliverer, ledger)))
             .collect();
         // The sort keeps the order of the night file.
@@ -80,20 +89,21 @@ impl Summary {
         Self { parts: of(false), builds: of(true) }
     }
 
-    pub(super) fn lines(&self) -> impl Iterator<Item = &Line> {
+    /// Returns parts, and then builds.
+    pub fn lines(&self) -> impl Iterator<Item = &SubjectSummary> {
         self.parts.iter().chain(&self.builds)
     }
 
     /// Returns how many parts and builds are in a state.
-    pub(super) fn count(&self, state: LineState) -> usize {
+    pub fn count(&self, state: SubjectState) -> usize {
         self.lines().filter(|line| line.state == state).count()
     }
 
     /// Says that results could not be delivered.
-    pub(super) fn add_failures(&mut self, failures: &[(String, String)]) {
+    pub fn add_failures(&mut self, failures: &[(String, String)]) {
         for line in self.parts.iter_mut().chain(&mut self.builds) {
             if let Some((_, why)) = failures.iter().find(|(name, _)| *name == line.name) {
-                line.state = LineState::Failed;
+                line.state = SubjectState::Failed;
                 line.why = Some(why.clone());
             }
         }
@@ -102,10 +112,15 @@ impl Summary {
     }
 }
 
-fn line(place: usize, subject: &Subject, deliverer: &Deliverer<'_>, ledger: &Ledger<'_>) -> Line {
-    let mut line = Line {
+fn line(
+    place: usize,
+    subject: &Subject,
+    deliverer: &Deliverer<'_>,
+    ledger: &Ledger<'_>,
+) -> SubjectSummary {
+    let mut line = SubjectSummary {
         name: subject.name.clone(),
-        state: LineState::Waiting,
+        state: SubjectState::Waiting,
         why: None,
         file: None,
         layers: None,
@@ -119,7 +134,8 @@ fn line(place: usize, subject: &Subject, deliverer: &Deliverer<'_>, ledger: &Led
     let wanted = match &subject.wanted {
         Ok(wanted) => wanted,
         Err(why) => {
-            line.state = if subject.is_build { LineState::Skipped } else { LineState::Failed };
+            line.state =
+                if subject.is_build { SubjectState::Skipped } else { SubjectState::Failed };
             line.why = Some(why.clone());
             return line;
         }
@@ -133,14 +149,14 @@ fn line(place: usize, subject: &Subject, deliverer: &Deliverer<'_>, ledger: &Led
         line.file = delivered.as_ref().map(|_| deliverer.path(subject).display().to_string());
         line.digest = delivered.map(|delivered| delivered.digest);
     }
-    if let Some(Some(check)) = &check {
-        line.islands = check.count(ISLANDS);
-        line.findings = check.count(FINDINGS);
+    if let Some(counts) = check.as_ref().and_then(|check| check.as_ref()?.facts.check) {
+        line.islands = counts.islands;
+        line.findings = counts.findings;
     }
     (line.state, line.why) = if stack.is_some() && check.is_none_or(|check| check.is_some()) {
         match line.needs() {
-            None => (LineState::Done, None),
-            needs => (LineState::NeedsPerson, needs),
+            None => (SubjectState::Done, None),
+            needs => (SubjectState::NeedsPerson, needs),
         }
     } else {
         line.unfinished(subject, wanted, ledger, store)
@@ -148,10 +164,10 @@ fn line(place: usize, subject: &Subject, deliverer: &Deliverer<'_>, ledger: &Led
     line
 }
 
-impl Line {
+impl SubjectSummary {
     fn add_stack(&mut self, stack: &Manifest) {
-        self.layers = Some(stack.count(LAYERS));
-        let Some(found) = findings_of(stack) else { return };
+        self.layers = Some(stack.facts.layers.unwrap_or(0));
+        let Some(found) = &stack.facts.stages else { return };
         self.stray_fixed = found.bands_corrected as u64;
         let is_fixed = found.bands_corrected + found.bands_left > 0;
         let left = if is_fixed { found.bands_left } else { found.stray_rows };
@@ -175,19 +191,19 @@ impl Line {
     fn unfinished(
         &self,
         subject: &Subject,
-        wanted: &Wanted,
+        wanted: &WantedResults,
         ledger: &Ledger<'_>,
         store: &Store,
-    ) -> (LineState, Option<String>) {
+    ) -> (SubjectState, Option<String>) {
         let missing: Vec<_> = wanted.goals().filter(|key| store.manifest(*key).is_none()).collect();
         let why = missing.iter().find_map(|key| ledger.why(*key)).map(str::to_owned);
         let is_own = missing.iter().any(|key| matches!(ledger.state(*key), State::Failed(_)));
         match why {
             Some(why) if subject.is_build && !is_own => {
-                (LineState::Skipped, Some(format!("a part of it failed: {why}")))
+                (SubjectState::Skipped, Some(format!("a part of it failed: {why}")))
             }
-            Some(why) => (LineState::Failed, Some(why)),
-            None => (LineState::Waiting, ledger.no_room().map(str::to_owned)),
+            Some(why) => (SubjectState::Failed, Some(why)),
+            None => (SubjectState::Waiting, ledger.no_room().map(str::to_owned)),
         }
     }
 }

@@ -1,100 +1,107 @@
 //! From a night to its tasks.
 
 use std::collections::HashMap;
-use std::env;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::{Context, anyhow};
-use lamp_batch::{
-    Build, Cost, Digests, Graph, InputFile, Key, Kind, Part, Recipe, Stage, Store, Task,
-};
 use lamp_pipeline::documents::without_digest;
 use lamp_pipeline::{Survey, stored_name};
 
-use super::night_file::NightFile;
-use super::work::{What, Work};
-use crate::exit::Exit;
-use crate::stages::Stages;
-use crate::stages::calls::{Checking, JOIN_CODE, PACK_CODE, Tiling};
+use crate::assignment::{Assignment, Work};
+use crate::commands::{Call, Commands, JOIN_CODE, PACK_CODE, Stages};
+use crate::error::BatchError;
+use crate::key::{Key, Kind, Recipe};
+use crate::night::{Build, Night, Part, Place, Stage};
+use crate::store::{Digests, Store};
+use crate::task::{Cost, Graph, InputFile, Task};
 
 /// A range takes about so many seconds of a processor, unless the night file says how many there
 /// are: few enough that a crash costs little, enough that starting it costs nothing.
 const RANGE_S: f64 = 30.0;
 
 /// The tasks of a night.
-pub(super) struct Plan {
-    pub(super) graph: Graph,
+pub struct NightPlan {
+    /// The tasks.
+    pub graph: Graph,
     /// Parts and then builds, each in the order of the night file.
-    pub(super) subjects: Vec<Subject>,
+    pub subjects: Vec<Subject>,
 }
 
 /// A part or a build.
-pub(super) struct Subject {
-    pub(super) name: String,
-    pub(super) is_build: bool,
+pub struct Subject {
+    /// The name in the night file.
+    pub name: String,
+    /// Whether it is a build.
+    pub is_build: bool,
     /// The wanted result, or why it cannot be planned.
-    pub(super) wanted: Result<Wanted, String>,
+    pub wanted: Result<WantedResults, String>,
 }
 
 /// The results that are wanted of a part or a build.
 #[derive(Clone)]
-pub(super) struct Wanted {
-    pub(super) stack: Key,
-    pub(super) check: Option<Key>,
+pub struct WantedResults {
+    /// The task that makes the stack.
+    pub stack: Key,
+    /// The task that checks it. Builds have none.
+    pub check: Option<Key>,
     /// Stored names of parts in the stack, each with the part's name of today.
-    pub(super) names: Vec<(String, String)>,
+    pub names: Vec<(String, String)>,
     /// The bytes of the stack, estimated.
-    pub(super) bytes: u64,
+    pub bytes: u64,
 }
 
-impl Wanted {
-    pub(super) fn goals(&self) -> impl Iterator<Item = Key> {
+impl WantedResults {
+    /// Returns the tasks that make the results.
+    pub fn goals(&self) -> impl Iterator<Item = Key> {
         [Some(self.stack), self.check].into_iter().flatten()
     }
 }
 
-impl Plan {
-    /// Plans a night. Parts that cannot be read are planned as such.
+impl NightPlan {
+    /// Plans a night. Names of files in it are from `folder`. Parts that cannot be read are planned
+    /// as such.
     ///
     /// # Errors
-    /// Returns an error if the night file asks for what there is not, with its place.
-    pub(super) fn new(file: &NightFile, store: &Store) -> Result<Self, Exit> {
-        let folder = env::current_dir().context("the folder of the night file")?;
-        let digests = Digests::of(store);
-        let mut planner = Planner {
-            file,
+    /// Returns an error if the night file asks for what there is not, with its place, or the store
+    /// cannot be written.
+    pub fn new(
+        night: &Night,
+        folder: &Path,
+        commands: &impl Commands,
+        store: &Store,
+    ) -> Result<Self, BatchError> {
+        let mut planner = NightPlanner {
+            commands,
             store,
-            folder,
-            digests,
+            folder: folder.to_owned(),
+            digests: Digests::of(store),
             graph: Graph::default(),
             chains: HashMap::new(),
             checks: HashMap::new(),
         };
-        let night = &file.night;
         // Reports all errors in the file before the work of surveys.
         for part in &night.parts {
             planner.stages(&part.stages)?;
-            planner.check_options(part)?;
+            planner.check_call(part)?;
         }
-        let tiles = night.builds.iter().map(|build| planner.tile_options(build));
+        let tiles = night.builds.iter().map(|build| planner.tile_call(build));
         let tiles = tiles.collect::<Result<Vec<_>, _>>()?;
         let mut subjects: Vec<Subject> = Vec::new();
         for part in &night.parts {
-            let wanted = planner.part(part).map_err(|error| error.to_string());
+            let wanted = planner.part(part).map_err(|error| planner.sentence(error));
             subjects.push(Subject { name: part.name.clone(), is_build: false, wanted });
         }
         for (build, tile) in night.builds.iter().zip(tiles) {
             let wanted = planner.build(build, tile, &subjects);
             subjects.push(Subject { name: build.name.clone(), is_build: true, wanted });
         }
-        planner.digests.keep().map_err(anyhow::Error::new)?;
+        planner.digests.keep()?;
         Ok(Self { graph: planner.graph, subjects })
     }
 
     /// Returns the parts and builds whose stack is the result of a task.
-    pub(super) fn stacks_of(&self, key: Key) -> impl Iterator<Item = usize> {
+    pub fn stacks_of(&self, key: Key) -> impl Iterator<Item = usize> {
         let is_it = move |subject: &Subject| {
             subject.wanted.as_ref().is_ok_and(|wanted| wanted.stack == key)
         };
@@ -103,61 +110,70 @@ impl Plan {
     }
 
     /// Returns the tasks whose results are wanted.
-    pub(super) fn goals(&self) -> Vec<Key> {
+    pub fn goals(&self) -> Vec<Key> {
         let wanted = self.subjects.iter().filter_map(|subject| subject.wanted.as_ref().ok());
-        wanted.flat_map(Wanted::goals).collect()
+        wanted.flat_map(WantedResults::goals).collect()
     }
 }
 
-struct Planner<'a> {
-    file: &'a NightFile,
+struct NightPlanner<'a, C: Commands> {
+    commands: &'a C,
     store: &'a Store,
     folder: PathBuf,
     digests: Digests,
     graph: Graph,
     /// Stages by their words, since most parts have the same.
-    chains: HashMap<Vec<Vec<String>>, Rc<Chained>>,
-    /// Options of checks, likewise, in canonical form.
-    checks: HashMap<Vec<String>, String>,
+    chains: HashMap<Vec<Vec<String>>, Rc<Chained<C>>>,
+    /// Checks, likewise.
+    checks: HashMap<Vec<String>, Rc<Called>>,
 }
 
 /// Stages, and what of them decides bytes.
-struct Chained {
+struct Chained<C: Commands> {
     words: Vec<Vec<String>>,
-    stages: Stages,
+    stages: Stages<C::Whole>,
     options: Vec<String>,
     /// Files that options name, with their digests.
     files: Vec<InputFile>,
     code: Vec<(String, u32)>,
 }
 
-/// Options of a build, and what of them decides bytes.
-struct TileOptions {
+/// A command, and what of it decides bytes.
+#[derive(Clone)]
+struct Called {
     words: Vec<String>,
     options: String,
     files: Vec<InputFile>,
+    code: Vec<(String, u32)>,
 }
 
-impl Planner<'_> {
-    fn at(&self, place: lamp_batch::Place, error: impl std::fmt::Display) -> Exit {
-        Exit::usage(format!("{}: {place}: {error}", self.file.name))
+impl<C: Commands> NightPlanner<'_, C> {
+    /// Returns an error as people read it.
+    fn sentence(&self, error: BatchError) -> String {
+        C::Error::from(error).to_string()
+    }
+
+    fn at(&self, place: Place, error: BatchError) -> BatchError {
+        BatchError::Night { place, why: self.sentence(error) }
     }
 
     /// Parses stages, once for all parts that have them.
-    fn stages(&mut self, stages: &[Stage]) -> Result<Rc<Chained>, Exit> {
+    fn stages(&mut self, stages: &[Stage]) -> Result<Rc<Chained<C>>, BatchError> {
         let words: Vec<_> = stages.iter().map(|stage| stage.words.clone()).collect();
         if let Some(known) = self.chains.get(&words) {
             return Ok(Rc::clone(known));
         }
-        let parsed = Stages::parse(&words, &self.folder)
-            .map_err(|error| self.at(stages[error.stage].place, &error))?;
+        let parsed = self.commands.stages(&words, &self.folder);
+        let parsed = parsed.map_err(|error| {
+            let place = stages.get(error.stage).map_or(Place { line: 1, column: 1 }, |at| at.place);
+            BatchError::Night { place, why: error.to_string() }
+        })?;
         let files = parsed.chain.input_files();
         let files = files
-            .map_err(Exit::from)
+            .map_err(BatchError::from)
             .and_then(|files| self.inputs(files))
             .map_err(|error| self.at(stages[0].place, error))?;
-        let code = parsed.chain.code().into_iter().chain([("join", JOIN_CODE)]);
-        let code = coded(code);
+        let code = coded(parsed.chain.code().into_iter().chain([("join", JOIN_CODE)]));
         let options = parsed.chain.canonical();
         let chained =
             Rc::new(Chained { words: words.clone(), stages: parsed, options, files, code });
@@ -165,48 +181,56 @@ impl Planner<'_> {
         Ok(chained)
     }
 
-    fn tile_options(&mut self, build: &Build) -> Result<TileOptions, Exit> {
-        let words = build.tile.words[1..].to_vec();
-        let copies: Vec<_> = build.parts.iter().map(|(_, copies)| *copies).collect();
-        let tiling = Tiling::parse(&words, &copies, &self.folder);
-        let tiling = tiling.map_err(|why| self.at(build.tile.place, format!("tile: {why}")))?;
-        let files = self.inputs(tiling.input_files());
-        let files = files.map_err(|error| self.at(build.tile.place, error))?;
-        Ok(TileOptions { words, options: tiling.canonical(), files })
+    /// Returns what decides the bytes of a command that stands in the night file.
+    fn called(
+        &mut self,
+        stage: &Stage,
+        call: Result<impl Call, String>,
+    ) -> Result<Called, BatchError> {
+        let [name, words @ ..] = &stage.words[..] else { unreachable!("stages have a command") };
+        let call = call.map_err(|why| BatchError::Night {
+            place: stage.place,
+            why: format!("{name}: {why}"),
+        })?;
+        let files = call.input_files().map_err(BatchError::from);
+        let files = files.and_then(|files| self.inputs(files));
+        let files = files.map_err(|error| self.at(stage.place, error))?;
+        let code = coded([call.code()]);
+        Ok(Called { words: words.to_vec(), options: call.canonical(), files, code })
     }
 
-    /// Returns the options of a part's check, and their canonical form.
-    fn check_options(&mut self, part: &Part) -> Result<(Vec<String>, String), Exit> {
-        let words = part.check.words[1..].to_vec();
-        if let Some(options) = self.checks.get(&words) {
-            return Ok((words, options.clone()));
+    fn tile_call(&mut self, build: &Build) -> Result<Called, BatchError> {
+        let copies: Vec<_> = build.parts.iter().map(|(_, copies)| *copies).collect();
+        let tile = self.commands.tile(&build.tile.words[1..], &copies, &self.folder);
+        self.called(&build.tile, tile)
+    }
+
+    fn check_call(&mut self, part: &Part) -> Result<Rc<Called>, BatchError> {
+        if let Some(known) = self.checks.get(&part.check.words) {
+            return Ok(Rc::clone(known));
         }
-        let checking = Checking::parse(&words, &self.folder);
-        let checking =
-            checking.map_err(|why| self.at(part.check.place, format!("check: {why}")))?;
-        let options = checking.canonical();
-        self.checks.insert(words.clone(), options.clone());
-        Ok((words, options))
+        let check = self.commands.check(&part.check.words[1..], &self.folder);
+        let called = Rc::new(self.called(&part.check, check)?);
+        self.checks.insert(part.check.words.clone(), Rc::clone(&called));
+        Ok(called)
     }
 
     /// Returns files with their digests.
-    fn inputs(&mut self, files: Vec<PathBuf>) -> Result<Vec<InputFile>, Exit> {
+    fn inputs(&mut self, files: Vec<PathBuf>) -> Result<Vec<InputFile>, BatchError> {
         files.into_iter().map(|path| self.input(&path)).collect()
     }
 
-    fn input(&mut self, path: &Path) -> Result<InputFile, Exit> {
+    fn input(&mut self, path: &Path) -> Result<InputFile, BatchError> {
         let (name, _) = without_digest(path);
         let path = self.folder.join(&name);
-        let read = self.digests.digest(&path);
-        let digest =
-            read.map_err(|error| Exit::Failed(error.into()).at(name.display().to_string()))?;
+        let digest = self.digests.digest(&path).map_err(BatchError::file(&name))?;
         Ok(InputFile { path, digest })
     }
 
     /// Adds the tasks of a part.
-    fn part(&mut self, part: &Part) -> Result<Wanted, Exit> {
+    fn part(&mut self, part: &Part) -> Result<WantedResults, BatchError> {
         if let Some(fault) = &part.fault {
-            return Err(Exit::Failed(anyhow!("{fault}")));
+            return Err(BatchError::Part(fault.clone()));
         }
         let chained = self.stages(&part.stages)?;
         let input = self.input(&part.file)?;
@@ -225,17 +249,17 @@ impl Planner<'_> {
                 code: coded([after.code()]),
             };
             let (part_file, stages) = (part.file.clone(), chained.words.clone());
-            let what = What::Whole { part: part_file, stages, which };
+            let work = Work::Whole { part: part_file, stages, which };
             let cost = Cost { cpu_s: all_s * 0.3, memory: survey.memory, disk: bytes };
             let label = format!("{} of the whole stack", after.code().0);
-            stack = self.add(recipe, &part.name, label, vec![stack], files, cost, what);
+            stack = self.add(recipe, &part.name, label, vec![stack], files, cost, work);
         }
-        let (words, options) = self.check_options(part)?;
+        let check = Called::clone(&*self.check_call(part)?);
         let recipe = Recipe {
             kind: Kind::Check,
-            options: vec![options],
-            inputs: vec![stack.to_string()],
-            code: coded([Checking::code()]),
+            options: vec![check.options],
+            inputs: inputs_of([stack.to_string()], &check.files),
+            code: check.code,
         };
         let cost = Cost { cpu_s: all_s * 0.2, memory: survey.memory, disk: 1 << 14 };
         let check = self.add(
@@ -243,12 +267,12 @@ impl Planner<'_> {
             &part.name,
             "check".to_owned(),
             vec![stack],
-            vec![],
+            check.files,
             cost,
-            What::Check { words },
+            Work::Check { words: check.words },
         );
         let file = part.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Wanted { stack, check: Some(check), names: vec![(stored, file)], bytes })
+        Ok(WantedResults { stack, check: Some(check), names: vec![(stored, file)], bytes })
     }
 
     /// Adds the tasks that make the layers of a part: ranges and their join, or one task where one
@@ -256,7 +280,7 @@ impl Planner<'_> {
     fn layers(
         &mut self,
         part: &Part,
-        chained: &Chained,
+        chained: &Chained<C>,
         input: &InputFile,
         survey: &Survey,
     ) -> Key {
@@ -272,7 +296,7 @@ impl Planner<'_> {
             inputs: inputs_of([], &files),
             code: chained.code.clone(),
         };
-        let what = |layers: Range<u32>| What::Range {
+        let work = |layers: Range<u32>| Work::Range {
             part: part.file.clone(),
             stored_name: stored_name(&input.digest),
             stages: chained.words.clone(),
@@ -298,7 +322,7 @@ impl Planner<'_> {
                 vec![],
                 files.clone(),
                 cost(&all),
-                what(all),
+                work(all),
             );
         }
         let add = |range: &Range<u32>| {
@@ -311,17 +335,22 @@ impl Planner<'_> {
                 vec![],
                 files.clone(),
                 cost(range),
-                what(range.clone()),
+                work(range.clone()),
             )
         };
         let needs: Vec<Key> = ranges.iter().map(add).collect();
         let label = format!("join of {} ranges", needs.len());
         let cost = Cost { cpu_s: survey.cost_s(&all) * 0.05, ..cost(&all) };
-        self.add(recipe(Kind::Join, None), &part.name, label, needs, vec![], cost, What::Join)
+        self.add(recipe(Kind::Join, None), &part.name, label, needs, vec![], cost, Work::Join)
     }
 
     /// Returns what a part takes, from the store if it has been surveyed.
-    fn survey(&self, chained: &Chained, file: &Path, input: &InputFile) -> Result<Survey, Exit> {
+    fn survey(
+        &self,
+        chained: &Chained<C>,
+        file: &Path,
+        input: &InputFile,
+    ) -> Result<Survey, BatchError> {
         let chain = &chained.stages.chain;
         let files = inputs_of([], std::iter::once(input).chain(&chained.files));
         let note = Key::of_note("survey", &(files, &chained.options, &chained.code));
@@ -329,7 +358,7 @@ impl Planner<'_> {
             return Ok(known);
         }
         let survey = chain.survey(file)?;
-        self.store.keep_note(note, &survey).map_err(anyhow::Error::new)?;
+        self.store.keep_note(note, &survey)?;
         Ok(survey)
     }
 
@@ -337,9 +366,9 @@ impl Planner<'_> {
     fn build(
         &mut self,
         build: &Build,
-        tile: TileOptions,
+        tile: Called,
         parts: &[Subject],
-    ) -> Result<Wanted, String> {
+    ) -> Result<WantedResults, String> {
         let mut of_parts = Vec::new();
         for (name, copies) in &build.parts {
             let part = parts.iter().find(|part| part.name == *name).expect("names are checked");
@@ -355,15 +384,15 @@ impl Planner<'_> {
             kind: Kind::Tile,
             options: vec![tile.options, told.collect::<Vec<_>>().join(" ")],
             inputs: inputs_of(needs.iter().map(ToString::to_string), &tile.files),
-            code: coded([Tiling::code()]),
+            code: tile.code,
         };
         let bytes = of_parts.iter().map(|(part, n)| part.bytes * u64::from(n.unwrap_or(1))).sum();
         let cost = Cost { cpu_s: bytes as f64 * TILE_S_PER_BYTE, memory: TILE_BYTES, disk: bytes };
         let label = format!("build of {} parts", build.parts.len());
         let names = of_parts.iter().flat_map(|(part, _)| part.names.clone()).collect();
-        let what = What::Tile { words: tile.words, copies };
-        let stack = self.add(recipe, &build.name, label, needs, tile.files, cost, what);
-        Ok(Wanted { stack, check: None, names, bytes })
+        let work = Work::Tile { words: tile.words, copies };
+        let stack = self.add(recipe, &build.name, label, needs, tile.files, cost, work);
+        Ok(WantedResults { stack, check: None, names, bytes })
     }
 
     #[expect(clippy::too_many_arguments, reason = "they are the fields of a task")]
@@ -375,9 +404,9 @@ impl Planner<'_> {
         needs: Vec<Key>,
         files: Vec<InputFile>,
         cost: Cost,
-        what: What,
+        work: Work,
     ) -> Key {
-        let work = Work { folder: self.folder.clone(), what };
+        let work = Assignment { folder: self.folder.clone(), what: work };
         let work = serde_json::to_value(work).expect("work has text keys");
         let subject = subject.to_owned();
         self.graph.add(Task { recipe, subject, label, needs, files, cost, work })

@@ -7,7 +7,7 @@ use std::fs;
 const TICKS_PER_S: f64 = 100.0;
 
 /// Returns the seconds of processors that this process has taken, where the system reports them.
-pub(super) fn cpu_s() -> Option<f64> {
+pub(crate) fn cpu_s() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in brackets, may hold blanks.
     let after_name = text.rsplit_once(')')?.1;
@@ -16,7 +16,7 @@ pub(super) fn cpu_s() -> Option<f64> {
 }
 
 /// Returns the most bytes of memory that this process has held, where the system reports them.
-pub(super) fn peak_memory() -> Option<u64> {
+pub(crate) fn peak_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)

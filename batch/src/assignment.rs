@@ -3,24 +3,23 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use lamp_batch::path_bytes;
 use serde::{Deserialize, Serialize};
 
-use crate::commands::report::Picture;
+use crate::path_bytes;
 
 /// The work of a task, and its place.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Work {
+pub(crate) struct Assignment {
     /// The folder that names of files are from.
     #[serde(with = "path_bytes")]
-    pub(super) folder: PathBuf,
-    pub(super) what: What,
+    pub(crate) folder: PathBuf,
+    pub(crate) what: Work,
 }
 
 /// The work of a task.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum What {
+pub(crate) enum Work {
     /// Makes layers of a part.
     Range {
         #[serde(with = "path_bytes")]
@@ -43,13 +42,4 @@ pub(super) enum What {
     Check { words: Vec<String> },
     /// Lays out copies.
     Tile { words: Vec<String>, copies: Vec<Option<u32>> },
-}
-
-/// Findings in a part, as the result of its check.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Checked {
-    /// A line for each finding, the worst first.
-    pub(super) lines: Vec<String>,
-    /// A layer in the middle.
-    pub(super) picture: Option<Picture>,
 }

@@ -7,56 +7,62 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{Scope, ScopedJoinHandle};
 use std::time::UNIX_EPOCH;
 
-use anyhow::Context;
-use lamp_batch::path_bytes::WrittenPath;
-use lamp_batch::{Damage, Key, Night, NightFormat, NightOutput, Store};
 use lamp_pipeline::Names;
 use lamp_stack::{Destination, digest_of};
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Subject, Wanted};
-use crate::exit::Exit;
+use crate::error::BatchError;
+use crate::key::Key;
+use crate::night::{Night, NightFormat, NightOutput};
+use crate::path_bytes::WrittenPath;
+use crate::plan::{Subject, WantedResults};
+use crate::store::{Damage, Store};
 
 /// Delivers results to a folder.
-pub(super) struct Deliverer<'a> {
-    pub(super) store: &'a Store,
-    pub(super) output: &'a NightOutput,
+pub struct Deliverer<'a> {
+    /// The store of the night.
+    pub store: &'a Store,
+    /// Where results go.
+    pub output: &'a NightOutput,
 }
 
 /// A delivered file: its place, and its state when it was delivered.
 #[derive(PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Delivered {
+pub struct Delivered {
     key: Key,
     names: Vec<(String, String)>,
     bytes: u64,
     /// Nanoseconds since 1970.
     modified: u128,
     /// The digest of the file, `blake3:` and 64 hexadecimal digits.
-    pub(super) digest: String,
+    pub digest: String,
 }
 
 impl Deliverer<'_> {
     /// Returns where a result goes.
-    pub(super) fn path(&self, subject: &Subject) -> PathBuf {
+    pub fn path(&self, subject: &Subject) -> PathBuf {
         path(self.output, &subject.name, subject.is_build)
     }
 
     /// Takes a result away that is still to be delivered, if it was damaged. Returns what is wrong with
     /// it.
-    pub(super) fn take_damaged(&self, subject: &Subject) -> Result<Option<Damage>, Exit> {
+    ///
+    /// # Errors
+    /// Returns an error if the result cannot be removed.
+    pub fn take_damaged(&self, subject: &Subject) -> Result<Option<Damage>, BatchError> {
         let Ok(wanted) = &subject.wanted else { return Ok(None) };
         if !self.store.has_manifest(wanted.stack) {
             return Ok(None);
         }
         let damage = self.store.check(wanted.stack).err();
         if damage.is_some() {
-            self.store.forget(wanted.stack).map_err(anyhow::Error::new)?;
+            self.store.forget(wanted.stack)?;
         }
         Ok(damage)
     }
 
     /// Returns what is there, if it is what is wanted.
-    pub(super) fn delivered(&self, subject: &Subject) -> Option<Delivered> {
+    pub fn delivered(&self, subject: &Subject) -> Option<Delivered> {
         let wanted = subject.wanted.as_ref().ok()?;
         let path = self.path(subject);
         let known: Delivered = self.store.note(note(&path))?;
@@ -66,46 +72,46 @@ impl Deliverer<'_> {
     }
 
     /// Delivers a result, unless it is there.
-    fn deliver(&self, subject: &Subject, wanted: &Wanted) -> Result<(), Exit> {
+    fn deliver(&self, subject: &Subject, wanted: &WantedResults) -> Result<(), BatchError> {
         let path = self.path(subject);
-        let name = || path.display().to_string();
         if self.delivered(subject).is_some() {
             return Ok(());
         }
         let folder = path.parent().unwrap_or(Path::new("."));
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        self.write(wanted, &path).map_err(|error| error.at(name()))?;
-        let digest = File::open(&path).and_then(digest_of).with_context(name)?;
+        fs::create_dir_all(folder).map_err(BatchError::file(folder))?;
+        let written = self.write(wanted, &path);
+        written.map_err(|error| error.at(path.display().to_string()))?;
+        let digest = File::open(&path).and_then(digest_of).map_err(BatchError::file(&path))?;
         let (bytes, modified) = stamp(&path).unwrap_or_default();
         let names = wanted.names.clone();
         let delivered = Delivered { key: wanted.stack, names, bytes, modified, digest };
-        Ok(self.store.keep_note(note(&path), &delivered).map_err(anyhow::Error::new)?)
+        Ok(self.store.keep_note(note(&path), &delivered)?)
     }
 
-    fn write(&self, wanted: &Wanted, path: &Path) -> Result<(), Exit> {
+    fn write(&self, wanted: &WantedResults, path: &Path) -> Result<(), lamp_pipeline::Error> {
         let to = Destination::File(path.to_owned());
         let names = Names::new(wanted.names.iter().cloned());
         let stored = self.store.result(wanted.stack);
         match self.output.format {
-            NightFormat::Lamp => Ok(names.copy(&stored, to)?),
-            NightFormat::Tif => Ok(names.unpack(&stored, to)?),
+            NightFormat::Lamp => names.copy(&stored, to),
+            NightFormat::Tif => names.unpack(&stored, to),
         }
     }
 
     /// Starts a thread that delivers what it is sent, while other tasks go on. It returns what
     /// failed, with the names of parts and builds.
-    pub(super) fn start<'s>(
+    pub fn start<'s>(
         &'s self,
         scope: &'s Scope<'s, '_>,
         subjects: &'s [Subject],
-    ) -> (Sender<usize>, ScopedJoinHandle<'s, Vec<(String, String)>>) {
+    ) -> (Sender<usize>, ScopedJoinHandle<'s, Vec<(String, BatchError)>>) {
         let (sender, wanted): (Sender<usize>, Receiver<usize>) = channel();
         let work = move || {
             let mut failed = Vec::new();
             for subject in wanted.into_iter().map(|place| &subjects[place]) {
                 let Ok(wanted) = &subject.wanted else { continue };
                 if let Err(error) = self.deliver(subject, wanted) {
-                    failed.push((subject.name.clone(), error.to_string()));
+                    failed.push((subject.name.clone(), error));
                 }
             }
             failed
@@ -122,7 +128,10 @@ fn path(output: &NightOutput, name: &str, is_build: bool) -> PathBuf {
 
 /// Hashes all files anew that were delivered for a night. Returns how many are as they were, and what
 /// is wrong with each other one, which the next run delivers again.
-pub(super) fn check_files(night: &Night, store: &Store) -> Result<(usize, Vec<String>), Exit> {
+///
+/// # Errors
+/// Returns an error if the store cannot be written.
+pub fn check_delivered(night: &Night, store: &Store) -> Result<(usize, Vec<String>), BatchError> {
     let parts = night.parts.iter().map(|part| path(&night.output, &part.name, false));
     let builds = night.builds.iter().map(|build| path(&night.output, &build.name, true));
     let (mut whole, mut wrong) = (0, Vec::new());
@@ -138,7 +147,7 @@ pub(super) fn check_files(night: &Night, store: &Store) -> Result<(usize, Vec<St
             Err(error) => error.to_string(),
         };
         wrong.push(format!("{}: {problem}: the next run delivers it again", path.display()));
-        store.forget_note(note(&path)).map_err(anyhow::Error::new)?;
+        store.forget_note(note(&path))?;
     }
     Ok((whole, wrong))
 }

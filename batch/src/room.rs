@@ -2,26 +2,26 @@
 
 use std::path::Path;
 
-use lamp_batch::Ledger;
 use lamp_pipeline::memory::in_words;
 
-use super::deliver::Deliverer;
-use super::plan::Plan;
+use crate::deliver::Deliverer;
+use crate::ledger::Ledger;
+use crate::plan::NightPlan;
 
 /// The room of a task besides its result: its work, its manifest, and three blocks that are not
 /// full.
 const TASK_BYTES: u64 = 3 * 4096;
 
 /// The room that a night takes, estimated, and the room that there is, in bytes.
-pub(super) struct Room {
+pub struct DiskRoom {
     store: u64,
     delivered: u64,
     free: Option<u64>,
 }
 
-impl Room {
+impl DiskRoom {
     /// Adds up what is to be done, and to be delivered to the disk of the store.
-    pub(super) fn of(plan: &Plan, ledger: &Ledger<'_>, deliverer: &Deliverer<'_>) -> Self {
+    pub fn of(plan: &NightPlan, ledger: &Ledger<'_>, deliverer: &Deliverer<'_>) -> Self {
         let tasks = ledger.keys();
         let results: u64 = tasks.iter().map(|&key| plan.graph.task(key).cost.disk).sum();
         let store = results + TASK_BYTES * tasks.len() as u64;
@@ -38,7 +38,7 @@ impl Room {
     }
 
     /// Returns a sentence if there is less than the night takes.
-    pub(super) fn shortage(&self) -> Option<String> {
+    pub fn shortage(&self) -> Option<String> {
         let free = self.free.filter(|&free| free < self.store + self.delivered)?;
         let [all, store, delivered, free] =
             [self.store + self.delivered, self.store, self.delivered, free].map(in_words);
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_shortage_is_told_in_one_sentence() {
-        let room = |free| Room { store: 3_000_000, delivered: 2_000_000, free };
+        let room = |free| DiskRoom { store: 3_000_000, delivered: 2_000_000, free };
         assert_eq!(room(None).shortage(), None);
         assert_eq!(room(Some(5_000_000)).shortage(), None);
         let told = room(Some(4_999_999)).shortage().unwrap();
