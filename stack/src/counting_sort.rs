@@ -98,6 +98,7 @@ impl KeyCounts {
         if self.steps.is_empty() {
             self.steps.resize(self.counts.len(), 0);
         }
+        // Only the ends of the range change, so a long range costs no more than a short one.
         self.steps[keys.start] += 1;
         self.steps[keys.end] -= 1;
     }
@@ -107,6 +108,7 @@ impl KeyCounts {
         let mut starts = self.counts;
         let mut of_ranges = 0;
         for (count, step) in starts[2..].iter_mut().zip(&self.steps) {
+            // A range takes back at its end what it added, so the sum is never negative.
             of_ranges += step;
             *count += of_ranges as u32;
         }
@@ -129,6 +131,7 @@ impl<T> UnfinishedGroups<T> {
     #[inline]
     pub fn put(&mut self, key: usize, item: T) -> Option<u32> {
         let Grouped { starts, items } = &mut self.0;
+        // Counts stood at k + 2, so the place of the next item of key k is at k + 1.
         let place = starts[key + 1];
         *items.get_mut(place as usize)? = item;
         starts[key + 1] += 1;

@@ -79,7 +79,9 @@ impl LevelSteps {
         assert!(steps_um.len() <= 255, "a level has eight bits");
         let last_um = steps_um.last().copied().unwrap_or(0.0);
         let finite = last_um.is_finite() && last_um > 0.0;
+        // Without a depth above zero all depths share a bin, and the steps alone decide.
         let bins_per_um = if finite { Self::BINS as f64 / last_um } else { 0.0 };
+        // With 256 entries, an index of eight bits needs no check.
         let mut padded = Box::new([f64::INFINITY; 256]);
         padded[..steps_um.len()].copy_from_slice(&steps_um);
         let (count, below) = (steps_um.len() as u8, vec![0; Self::BINS + 1]);
@@ -114,6 +116,7 @@ impl LevelSteps {
         const WHOLE: f64 = (1u64 << 52) as f64;
         const LAST: f64 = LevelSteps::BINS as f64;
         let bin = depth_um * self.bins_per_um;
+        // Comparisons with NaN are false, so NaN falls into the first bin.
         let bin = if bin > 0.0 { bin } else { 0.0 };
         let bin = if bin < LAST { bin } else { LAST };
         (bin + WHOLE).to_bits() as u16 as usize

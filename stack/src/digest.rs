@@ -35,6 +35,7 @@ pub fn digest_of_range(
     size: u64,
     read_at: impl Fn(&mut [u8], u64) -> io::Result<()> + Sync,
 ) -> io::Result<String> {
+    // An empty input is a tree, too: one piece without bytes.
     let pieces = size.div_ceil(PIECE_BYTES as u64).max(1);
     let read = |buffer: &mut Vec<u8>, piece: u64| -> io::Result<Hasher> {
         let start = piece * PIECE_BYTES as u64;
@@ -44,12 +45,14 @@ pub fn digest_of_range(
         hasher.set_input_offset(start).update(buffer);
         Ok(hasher)
     };
+    // A piece alone is the root of its tree, which BLAKE3 finalizes in another way than a subtree.
     if pieces == 1 {
         return Ok(text(read(&mut Vec::new(), 0)?.finalize()));
     }
     let subtree =
         |buffer: &mut Vec<u8>, piece| io::Result::Ok(read(buffer, piece)?.finalize_non_root());
     let subtrees = (0..pieces).into_par_iter().map_init(Vec::new, subtree);
+    // A value takes 32 bytes for 64 KiB of input, so all of them fit in memory.
     let subtrees = subtrees.collect::<io::Result<Vec<ChainingValue>>>()?;
     let (left, right) = halves(&subtrees);
     Ok(text(merge_subtrees_root(&joined(left), &joined(right), Mode::Hash)))
@@ -81,6 +84,7 @@ pub fn digest_of_digests<'a>(digests: impl IntoIterator<Item = &'a str>) -> Stri
     if digests.iter().any(|digest| digest.is_empty()) {
         return String::new();
     }
+    // All digests have the same length, so no separators are needed.
     let mut hasher = Hasher::new();
     for digest in digests {
         hasher.update(digest.as_bytes());
@@ -99,6 +103,7 @@ impl StackInfo {
         let whole = digest_of_digests(digests.iter().map(String::as_str));
         let mut parts = self.built_digests().peekable();
         let is_given = |part: &str| digests.iter().any(|digest| part == digest);
+        // Unknown digests are empty and match nothing, and `all` is true of no parts.
         (!whole.is_empty() && self.digest == whole)
             || (parts.peek().is_some() && parts.all(is_given))
     }
@@ -115,7 +120,9 @@ pub fn sealed(text: &str) -> String {
 
 /// Returns the text that [`sealed`] wrote, if it is as it was.
 pub fn unsealed(text: &str) -> Option<&str> {
+    // The last seal counts, for the text itself may quote one.
     let before = &text[..text.rfind(SEAL)?];
+    // Comparing the whole text also refuses whatever follows the seal.
     (sealed(before) == text).then_some(before)
 }
 

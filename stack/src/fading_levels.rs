@@ -33,6 +33,7 @@ impl FadingLevels {
         let level = |level: usize| of(level as f64 / 255.0);
         let step = |i: usize| {
             let (share, depth) = of((i as f64 + 0.5) / 255.0);
+            // The logarithm of fading light is linear in depth, so levels compare without `exp`.
             [share.ln(), 1.0 / depth.um()]
         };
         Self {
@@ -71,10 +72,12 @@ impl FadingLevels {
     /// Returns the level that most nearly leaves this many critical doses at a depth.
     #[inline]
     pub fn level(&self, depth_um: f64, left: f64) -> u8 {
+        // Zero has no logarithm, and black leaves nothing.
         if left <= 0.0 {
             return 0;
         }
         let wanted = left.ln();
+        // A whiter level never leaves less at any depth, so the steps rise at every depth.
         self.steps.partition_point(|[share, fading]| share - depth_um * fading <= wanted) as u8
     }
 }

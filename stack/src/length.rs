@@ -81,13 +81,16 @@ pub enum LengthError {
 /// Splits `100um` into its number and the micrometers in its unit (`None` without a unit).
 fn split_unit(text: &str) -> Result<(f64, Option<f64>), LengthError> {
     let text = text.trim();
+    // Letters at the end are the unit, so `inf` and `nan` are no numbers.
     let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || c == '"').trim_end();
     let number: f64 = match digits.parse() {
+        // 1e999 reads as infinity.
         Ok(n) if f64::is_finite(n) => n,
         _ => return Err(LengthError::NotALength(text.to_owned())),
     };
     let um_per_unit = match text[digits.len()..].trim() {
         "" => None,
+        // The micro sign and the Greek letter look alike, and both are in use.
         "um" | "µm" | "μm" => Some(1.0),
         "mm" => Some(1000.0),
         "cm" => Some(10_000.0),
@@ -108,6 +111,7 @@ impl FromStr for Length {
     /// Returns an error if the number is missing or the unit is missing or unknown.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         match split_unit(text)? {
+            // A finite number may leave the range of doubles with its unit.
             (number, Some(um)) if (number * um).is_finite() => Ok(Self::from_um(number * um)),
             (_, Some(_)) => Err(LengthError::NotALength(text.trim().to_owned())),
             (_, None) => Err(LengthError::NoUnit { text: text.trim().to_owned() }),
@@ -198,9 +202,11 @@ impl Dpi {
     pub(crate) fn to_rational(self) -> (u32, u32) {
         let holds = |den: &u32| {
             let scaled = self.0 * f64::from(*den);
+            // The fourth decimal of 100 000 dpi is 1e-9 of it; rounding errors are far smaller.
             (scaled - scaled.round()).abs() < 1e-9 * scaled
         };
         let den = [1, 10, 100, 1000].into_iter().find(holds).unwrap_or(10_000);
+        // At most 100 000 times 10 000, which 32 bits hold.
         ((self.0 * f64::from(den)).round() as u32, den)
     }
 }

@@ -47,6 +47,7 @@ impl UnknownName {
 macro_rules! named {
     ($type:ident { $($case:ident = $name:literal $(| $alias:literal)*),+ $(,)? }) => {
         impl $type {
+            // Macros cannot count their cases, but the length of an array can.
             /// Every case.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$case),+];
 
@@ -64,6 +65,7 @@ macro_rules! named {
 
         impl ::std::fmt::Display for $type {
             fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+                // Unlike `write_str`, `pad` heeds the width that a format asks for.
                 f.pad(self.name())
             }
         }

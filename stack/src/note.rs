@@ -55,6 +55,7 @@ pub struct ImagesBeside {
 impl ImagesBeside {
     /// Returns the number of all images.
     pub fn count(&self) -> u64 {
+        // A file may claim any number of images below its pages.
         self.reduced.saturating_add(self.masks).saturating_add(self.sub_images)
     }
 

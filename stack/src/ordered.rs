@@ -37,6 +37,7 @@ where
     E: Send,
 {
     let threads = rayon::current_num_threads();
+    // Batches ask again behind the end, where an iterator may start over.
     let mut input = input.fuse();
     let mut failed = false;
     let mut ready = VecDeque::new();
@@ -45,6 +46,7 @@ where
             ready = map_batch(take_batch(&mut input, threads), &work);
         }
         let next: Option<Result<U, E>> = ready.pop_front();
+        // One thread alone would stop here, so no result behind the error counts.
         if matches!(next, Some(Err(_))) {
             failed = true;
             ready.clear();
@@ -72,6 +74,7 @@ pub fn take_batch<T: MemorySize, E>(
     let mut bytes = 0;
     while batch.len() < threads || (batch.len() < MAX_A_THREAD * threads && bytes < ENOUGH_BYTES) {
         let Some(item) = input.next() else { break };
+        // An error fills the batch, for nothing behind it is used.
         bytes += item.as_ref().map_or(ENOUGH_BYTES, MemorySize::bytes);
         batch.push(item);
     }

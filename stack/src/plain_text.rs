@@ -22,6 +22,7 @@ impl<R: Read> PlainText<R> {
     /// Returns an error if they cannot be read.
     pub fn new(mut text: R) -> io::Result<Self> {
         let mut start = Vec::new();
+        // Four bytes hold the longest mark, or two characters of UTF-16.
         text.by_ref().take(4).read_to_end(&mut start)?;
         let (mark, ascii_byte) = match *start {
             [0xEF, 0xBB, 0xBF, ..] => (3, None),
@@ -43,9 +44,11 @@ impl<R: Read> Read for PlainText<R> {
         loop {
             let held = usize::from(self.half.is_some());
             pairs[0] = self.half.unwrap_or_default();
+            // No more pairs than bytes that are wanted: decoded bytes are kept nowhere.
             let room = pairs.len().min(2 * to.len());
             let read = self.text.read(&mut pairs[held..room])?;
             let (whole, rest) = pairs[..held + read].as_chunks::<2>();
+            // At the end, half a character is left out.
             self.half = rest.first().copied().filter(|_| read > 0);
             for (to, pair) in to.iter_mut().zip(whole) {
                 *to = match [pair[1 - ascii_byte], pair[ascii_byte]] {
@@ -55,6 +58,7 @@ impl<R: Read> Read for PlainText<R> {
                     _ => b'?',
                 };
             }
+            // No bytes would mean the end, so half a character waits for its other half.
             if read == 0 || !whole.is_empty() || to.is_empty() {
                 return Ok(whole.len());
             }

@@ -12,9 +12,11 @@ use std::borrow::Cow;
 /// ```
 pub fn quoted(word: &str) -> Cow<'_, str> {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+@%".contains(letter);
+    // Without quotes, an empty word would be none.
     if !word.is_empty() && word.chars().all(is_plain) {
         return Cow::Borrowed(word);
     }
+    // POSIX knows no escape within single quotes (XCU 2.2.2), so they end and begin again.
     Cow::Owned(format!("'{}'", word.replace('\'', r"'\''")))
 }
 
@@ -40,6 +42,7 @@ pub fn words(text: &str) -> Result<Vec<String>, char> {
             None if letter.is_whitespace() => words.extend(word.take()),
             None if matches!(letter, '\'' | '"') => {
                 quote = Some(letter);
+                // Quotes with nothing between them make a word, too.
                 word.get_or_insert_default();
             }
             None if letter == '\\' => {

@@ -11,6 +11,7 @@ pub fn format_significant(number: f64, digits: usize) -> String {
     // Taken from the rounded text: 99.9999 has three digits before the point.
     let exponent: i32 = text.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
     match exponent {
+        // Zero has no significant digits, and -0 is zero.
         _ if number == 0.0 => "0".to_owned(),
         -4..7 => format!("{number:.*}", (decimals as i32 - exponent).max(0) as usize),
         _ => text,

@@ -31,6 +31,7 @@ impl Strut {
         let [from_mm, to_mm] = [from, to].map(|end| end.map(Length::mm));
         let along: [f64; 3] = std::array::from_fn(|k| to_mm[k] - from_mm[k]);
         let length_mm = dot(along, along).sqrt();
+        // A length of zero makes these NaN; then there is no strut.
         let direction = along.map(|part| part / length_mm);
         let radius_mm = diameter.mm() / 2.0;
         (length_mm > 0.0).then_some(Self { from_mm, direction, length_mm, radius_mm })
@@ -56,6 +57,7 @@ impl Strut {
         let [x0, y1] = origin_mm;
         let pitch_mm = dpi.pitch().mm();
         // Pixel centers are whole numbers; the casts make negative values zero.
+        // An inch is 127/5 mm: whole numbers, which doubles hold exactly, unlike 25.4.
         let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
         let [low, high] = self.rows_mm(up_mm);
         let rows = pixels(y1 - high).ceil() as u32..(pixels(y1 - low).floor() + 1.0) as u32;
@@ -74,6 +76,7 @@ impl Strut {
     fn reach_mm(&self, axis: usize) -> [f64; 2] {
         let along = self.direction[axis];
         let (a, b) = (self.from_mm[axis], self.from_mm[axis] + self.length_mm * along);
+        // Half the extent of the round ends: r sqrt(1 - d²). Rounding may take d² past 1.
         let across = self.radius_mm * (1.0 - along * along).max(0.0).sqrt();
         [a.min(b) - across, a.max(b) + across]
     }
@@ -88,6 +91,7 @@ impl Strut {
         let middle = self.from_mm[1] + up_mm * dy / dz;
         // Not by 1 - dx^2, which is 0 for a strut that is a trifle off the x axis.
         let half = self.radius_mm * dy.hypot(dz) / dz.abs();
+        // Flat ends cut the ellipse off, so the whole strut's reach limits it, too.
         [low.max(middle - half), high.min(middle + half)]
     }
 
@@ -97,18 +101,22 @@ impl Strut {
         // A point at x is `x dx + s` along the axis, and `x^2 + y^2 + z^2` less the square of
         // that from it, squared.
         let s = y * dy + z * dz;
+        // 1 - dx², without its cancellation where dx is near 1.
         let a = dy * dy + dz * dz;
         let c = y * y + z * z - s * s - self.radius_mm * self.radius_mm;
         let within = if a > 0.0 {
+            // Inside where a x² - 2 dx s x + c < 0: between the roots.
             let square = dx * s * dx * s - a * c;
             let root = (square > 0.0).then(|| square.sqrt())?;
             [(dx * s - root) / a, (dx * s + root) / a]
         } else {
+            // Along x, the distance from the axis is the same everywhere.
             (c < 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY])?
         };
         let between = if dx == 0.0 {
             (0.0..self.length_mm).contains(&s).then_some([f64::NEG_INFINITY, f64::INFINITY])?
         } else {
+            // The planes through the ends: x dx + s is between 0 and the length.
             let [a, b] = [-s / dx, (self.length_mm - s) / dx];
             [a.min(b), a.max(b)]
         };

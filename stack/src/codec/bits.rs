@@ -15,6 +15,7 @@ pub(crate) fn set_bits(row: &[(u32, u8)], width: u32) -> Vec<u32> {
         }
         column += 8 * length;
     }
+    // Padding in the last byte may have any bits.
     columns.truncate(columns.partition_point(|&column| column < width));
     columns
 }
@@ -27,6 +28,7 @@ pub(crate) fn bit_transitions(row: &[(u32, u8)], width: u32) -> Vec<u32> {
         // A run of 00 or FF toggles at most at its start.
         let visited = if matches!(byte, 0 | 0xFF) { 1 } else { length };
         for start in (column..).step_by(8).take(visited as usize) {
+            // A pixel toggles if it differs from the one before, which may be in the byte before.
             let toggles = byte ^ (byte >> 1 | before << 7);
             let toggled = (0..8).filter(|bit| toggles << bit & 0x80 != 0);
             transitions.extend(toggled.map(|bit| start + bit));
@@ -56,6 +58,7 @@ pub(crate) fn bits(transitions: &[u32], width: u32) -> Vec<u8> {
         }
         bytes[first] |= from;
         bytes[first + 1..last].fill(0xFF);
+        // A run that ends with a whole byte has nothing in the next, which may not exist.
         if to != 0 {
             bytes[last] |= to;
         }

@@ -59,7 +59,9 @@ impl Iterator for Runs<'_> {
         while self.literal == 0 {
             match self.byte()? {
                 header @ 0..=127 => self.literal = usize::from(header) + 1,
+                // -128 is no operation (TIFF 6.0, section 9).
                 128 => {}
+                // A header of -n repeats the byte n + 1 times (TIFF 6.0, section 9).
                 header => return Some((257 - u32::from(header), self.byte()?)),
             }
         }

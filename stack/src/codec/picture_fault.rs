@@ -37,6 +37,7 @@ pub(crate) fn gray_level(pixel: &[u8]) -> Result<u8, PictureFault> {
     match *colours {
         [level] => Ok(level),
         [r, g, b] if r.max(g).max(b) - r.min(g).min(b) <= 1 => {
+            // One more rounds the mean of three to the nearest level.
             Ok(((u16::from(r) + u16::from(g) + u16::from(b) + 1) / 3) as u8)
         }
         _ => Err(PictureFault::Unsupported(UnsupportedFeature::Colour)),

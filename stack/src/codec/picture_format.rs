@@ -35,6 +35,7 @@ impl PictureFormat {
             [b'B', b'M', ..] => Some(Self::Bmp),
             [b'G', b'I', b'F', b'8', ..] => Some(Self::Gif),
             [0xFF, 0xD8, 0xFF, ..] => Some(Self::Jpeg),
+            // White space follows the number, or a text that begins with P1 would count.
             [b'P', b'1'..=b'7', blank, ..] if blank.is_ascii_whitespace() => Some(Self::Pnm),
             [b'R', b'I', b'F', b'F', ..] => Some(Self::WebP),
             _ => None,

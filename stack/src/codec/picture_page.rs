@@ -28,6 +28,7 @@ pub(crate) fn header(
 ) -> Result<Header, PictureFault> {
     let (width, height) = decoder(format, &mut Cursor::new(file), limits)?.dimensions();
     if let Some(resolutions) = resolutions(format, file)
+        // Both resolutions are whole numbers, each rounded by itself.
         && !has_square_pixels(resolutions, 1.0)
     {
         return Err(PictureFault::Rectangular(resolutions));
@@ -46,15 +47,18 @@ pub(crate) fn decode(
     let decoder = decoder(format, &mut reader, limits)?;
     let (width, _) = decoder.dimensions();
     let are_bits = match format {
+        // The decoder widens pixels, and does not state their number of bits in the file.
         PictureFormat::Bmp => bits_of_bmp(file) == 1,
         _ => decoder.original_color_type() == ExtendedColorType::L1,
     };
     // Decoders hold all pixels, so decoders in many threads could take much memory.
     static ONE_LARGE_PICTURE: Mutex<()> = Mutex::new(());
     let is_large = decoder.total_bytes() > LARGE_PICTURE_BYTES;
+    // The lock guards no data, so a panic of its holder spoils nothing.
     let _turn = is_large.then(|| ONE_LARGE_PICTURE.lock().unwrap_or_else(PoisonError::into_inner));
     let samples = usize::from(decoder.color_type().channel_count());
     let pixels = match format {
+        // The decoder's own pixels do not show whether other frames follow.
         PictureFormat::Gif => {
             drop(decoder);
             only_frame(file, limits)?
@@ -65,6 +69,7 @@ pub(crate) fn decode(
             pixels
         }
     };
+    // A PNM file may have several images behind each other.
     if format == PictureFormat::Pnm && !rest(&reader).trim_ascii().is_empty() {
         return Err(PictureFault::Unsupported(UnsupportedFeature::SeveralImages));
     }
@@ -104,6 +109,7 @@ fn decoder<'a>(
     if side > limits.side || width.min(height) == 0 {
         return Err(PictureFault::Malformed(PageFault::Side(side.into())));
     }
+    // The size is a claim of the header, and decoders allocate all of it.
     if decoder.total_bytes() > limits.picture_bytes {
         let bytes = decoder.total_bytes();
         return Err(PictureFault::Malformed(PageFault::PictureBytes(bytes)));
@@ -160,6 +166,7 @@ fn gray_mask(
 
 /// Returns the bits of a pixel of a BMP, from one of its two kinds of headers.
 fn bits_of_bmp(file: &[u8]) -> u8 {
+    // A BITMAPCOREHEADER has 12 bytes, a BITMAPINFOHEADER and its successors have more.
     let is_old = file.get(14) == Some(&12);
     file.get(if is_old { 24 } else { 28 }).copied().unwrap_or(0)
 }
@@ -169,6 +176,7 @@ fn resolutions(format: PictureFormat, file: &[u8]) -> Option<[f64; 2]> {
     match format {
         PictureFormat::Bmp => {
             let is_old = file.get(14) == Some(&12);
+            // Only the longer headers have XPelsPerMeter and YPelsPerMeter.
             let at = |from: usize| Some(i32::from_le_bytes(*file.get(from..)?.first_chunk()?));
             Some([at(38).filter(|_| !is_old)?.into(), at(42)?.into()])
         }
@@ -189,6 +197,7 @@ fn jfif_density(file: &[u8]) -> Option<[f64; 2]> {
     while let [0xFF, marker @ 0xC0..=0xFE, high, low, ..] = *rest
         && marker != 0xDA
     {
+        // A segment's length counts its own two bytes (ITU-T T.81, B.1.1.4).
         let segment = rest.get(4..2 + usize::from(u16::from_be_bytes([high, low])))?;
         if let (0xE0, [b'J', b'F', b'I', b'F', 0, _, _, unit, x1, x0, y1, y0, ..]) =
             (marker, segment)
@@ -207,10 +216,12 @@ fn jfif_density(file: &[u8]) -> Option<[f64; 2]> {
 fn is_cut_off(format: PictureFormat, file: &[u8]) -> bool {
     match format {
         PictureFormat::Jpeg => {
+            // Zeros behind the end of the image are padding.
             let padding = file.iter().rev().take_while(|&&byte| byte == 0).count();
             !file[..file.len() - padding].ends_with(&[0xFF, 0xD9])
         }
         PictureFormat::WebP => {
+            // The size in a RIFF header leaves out the header's first eight bytes.
             let claimed = file.get(4..8).and_then(|size| size.try_into().ok());
             claimed.is_none_or(|size| (file.len() as u64) < 8 + u64::from(u32::from_le_bytes(size)))
         }

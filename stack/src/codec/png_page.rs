@@ -85,8 +85,10 @@ fn decode_mask(
     while let Some(row) = reader.next_row()? {
         byte_runs(row.data(), &mut runs);
         mask.push(&bit_transitions(&runs, width));
+        // Checked after each row: a small file may expand to any number of runs.
         check_runs(mask.change_count(), max_runs)?;
     }
+    // A palette may call white 0.
     Ok(Image::Mask(if samples.levels[0] == Some(0) { mask } else { mask.inverted() }))
 }
 
@@ -116,6 +118,7 @@ fn decode_gray(
 
 fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), PictureFault> {
     let mut decoder = Decoder::new(Cursor::new(file));
+    // A profile decides no gray level here, so a broken one must not refuse the page.
     decoder.set_ignore_iccp_chunk(true);
     let reader = decoder.read_info()?;
     let info = reader.info();
@@ -123,6 +126,7 @@ fn open<'a>(file: &'a [u8], limits: &Limits) -> Result<(PngRows<'a>, Samples), P
     if side > limits.side {
         return Err(PictureFault::Malformed(PageFault::Side(side.into())));
     }
+    // An interlaced image comes in seven passes, not in rows from the top (PNG, section 8).
     if info.interlaced {
         return Err(PictureFault::Unsupported(UnsupportedFeature::Interlaced));
     }
@@ -158,8 +162,10 @@ impl Samples {
         let levels = match info.color_type {
             ColorType::Indexed => {
                 let palette = info.palette.as_deref().unwrap_or_default();
+                // A color that no pixel uses does no harm.
                 palette.chunks(3).map(|entry| gray_level(entry).ok()).collect()
             }
+            // 255 is a multiple of 1, 3, 15 and 255, so levels are exact.
             _ => (0..=highest).map(|sample| Some((sample * 255 / highest) as u8)).collect(),
         };
         Ok(Self { bits, channels: info.color_type.samples(), levels })
@@ -185,6 +191,7 @@ impl Samples {
         for byte in row {
             samples.extend((0..8).step_by(self.bits).map(|b| byte >> (8 - self.bits - b) & mask));
         }
+        // The last byte may hold samples beyond the width.
         samples.truncate(width as usize);
         Ok(())
     }
@@ -193,6 +200,7 @@ impl Samples {
 /// Returns the resolution: from the JSON line's key if it rounds to the same whole pixels
 /// per meter (the key is then removed from the line), otherwise from these.
 fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
+    // Other units give only the ratio of the sides.
     let pixels = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?.xppu;
     let whole = Dpi::from_per_metre(pixels);
     let stated = line.and_then(|line| {

@@ -78,8 +78,10 @@ impl PageFile for PngPage {
     fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
         let line = chain.close(&self.line, is_last);
         let body = [b"tEXt", DESCRIPTION.as_bytes(), &[0], line.as_bytes()].concat();
+        // The length counts the data alone, the CRC covers the type, too (PNG, section 5.3).
         let length = (body.len() - 4) as u32;
         let crc = crc32fast::hash(&body);
+        // Before the image's data, so that readers find the line without decoding.
         let (header, rest) = self.png.split_at(HEADER_END);
         [header, &length.to_be_bytes(), &body, &crc.to_be_bytes(), rest].concat()
     }
@@ -154,6 +156,7 @@ pub fn write_gray_animation(
 ) -> io::Result<()> {
     noting_failures(out, |out| {
         let mut encoder = Encoder::new(out, width, height);
+        // Zero plays are plays without end.
         encoder.set_animated(pictures.len() as u32, 0)?;
         encoder.set_frame_delay(1, per_second)?;
         let mut writer = encoder.write_header()?;

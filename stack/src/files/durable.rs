@@ -15,6 +15,7 @@ static SKIPS_SYNC: AtomicBool = AtomicBool::new(false);
 /// Lets outputs of this process have their names before the disk has their bytes, so that a loss of
 /// power, or a disk that fails late, may take them. For disks whose files can be made again.
 pub fn skip_sync() {
+    // The flag guards no other data, so its order does not matter.
     SKIPS_SYNC.store(true, Ordering::Relaxed);
 }
 
@@ -35,6 +36,7 @@ pub fn sync(file: &File) -> io::Result<()> {
 
 /// Returns true if nothing of that kind can be synced.
 fn is_unable(error: &io::Error) -> bool {
+    // fsync(2): EINVAL and EROFS say that pipes and other special files cannot be synced.
     #[cfg(unix)]
     if matches!(error.raw_os_error(), Some(libc::EINVAL | libc::ENOTSUP | libc::EROFS)) {
         return true;

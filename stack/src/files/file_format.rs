@@ -216,7 +216,9 @@ impl FileFormat {
 
 /// Returns true if a file has the size of the facets that its header counts.
 fn is_counted(start: &[u8], size: u64) -> bool {
+    // The range has four bytes, as many as the array.
     let count = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
+    // A binary STL has a header of 80 bytes, the count, and 50 bytes a facet.
     count.is_some_and(|count| 84 + 50 * u64::from(count) == size)
 }
 
@@ -226,6 +228,7 @@ fn of_bytes(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     let length = |at: usize| Some(u32::from_le_bytes(start.get(at..at + 4)?.try_into().ok()?));
     // Their signatures are short, and may begin a text.
     let is_picture = match PictureFormat::of_start(start) {
+        // A BMP has four reserved bytes, zero, behind its size.
         Some(PictureFormat::Bmp) => has(6, &[0; 4]),
         Some(PictureFormat::WebP) => has(8, b"WEBP"),
         _ => true,
@@ -237,6 +240,7 @@ fn of_bytes(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
         Some(PictureFormat::Jpeg) => Layers("a JPEG file"),
         Some(PictureFormat::Pnm) => Layers("a PNM file"),
         Some(PictureFormat::WebP) => Layers("a WebP file"),
+        // A 3DS file is one chunk, which states its own length.
         None if has(0, b"MM") && length(2).map(u64::from) == size => Model("a 3DS file"),
         None if has(0, b"FORM") && (has(8, b"LWO2") || has(8, b"LWOB")) => {
             Model("a LightWave file")
@@ -264,6 +268,7 @@ fn of_text(start: &[u8], size: Option<u64>) -> Option<FileFormat> {
     let mut text = Vec::new();
     PlainText::new(start).ok()?.read_to_end(&mut text).ok()?;
     text.make_ascii_lowercase();
+    // Zeros and 0x1A, the end of texts in CP/M and DOS, pad some files.
     let padding = |byte: &u8| matches!(byte, 0 | 0x1A) || byte.is_ascii_whitespace();
     let has_zeros = text.contains(&0);
     let Some(last) = text.iter().rposition(|byte| !padding(byte)) else {
@@ -351,6 +356,7 @@ fn of_xml(text: &[u8]) -> Option<FileFormat> {
 fn of_columns(text: &[u8]) -> Option<FileFormat> {
     let begun = text.trim_ascii_start();
     let number = |word: &[u8]| !word.is_empty() && word.iter().all(u8::is_ascii_digit);
+    // Lines of IGES have their section's letter in column 73, then a number.
     if text.get(72) == Some(&b's') && text.get(73..80).is_some_and(|it| number(it.trim_ascii())) {
         return Some(Model("an IGES file"));
     }
@@ -412,6 +418,7 @@ fn of_part(text: &[u8], is_whole: bool) -> Option<FileFormat> {
     let first = of_line.next()?;
     let is_stl = match first {
         b"facet" => matches!(words(rest).nth(1), Some(b"normal" | b"outer" | b"vertex")),
+        // Other texts may begin with `solid`, so facets must prove the format.
         _ => {
             first.starts_with(b"solid")
                 && (has_words(text, b"facet") || has_words(text, b"endsolid") || !is_whole)

@@ -88,12 +88,14 @@ impl IndexedStack {
     /// Returns an error if not even the first page can be read.
     pub fn from_file(file: File) -> Result<Self, StackError> {
         let stamp = Stamp::of(&file.metadata()?);
+        // The file may have been read before it came here.
         (&file).rewind()?;
         Self::read(Pages::from_file(file.try_clone()?)?, |places| {
             let places = places.into_iter().filter_map(|place| match place {
                 PagePlace::Offset(offset) => Some(offset),
                 PagePlace::File(_) => None,
             });
+            // A clone shares its position with the file, which reading has moved.
             (&file).rewind()?;
             let reader = Mutex::new(PageReader::from_file(file.try_clone()?)?);
             let places = places.collect();
@@ -170,6 +172,7 @@ impl IndexedStack {
             Source::Folder(files) => {
                 let (path, stamp) = &files[position];
                 let file = File::open(path)?;
+                // The open file counts: its name may be another file's by now.
                 stamp.check(&file.metadata()?)?;
                 only_page(&mut PageReader::from_file(file)?.numbered(number, before))
             }

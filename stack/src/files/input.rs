@@ -108,6 +108,7 @@ impl Pages {
 
     /// Has `listener` take the notes, each as it is found, instead of [`Self::notes`].
     pub fn with_listener(mut self, mut listener: impl FnMut(StackNote) + Send + 'static) -> Self {
+        // Notes on a folder's names came before the listener.
         self.notes.drain(..).for_each(&mut listener);
         Self { listener: Some(Listener(Box::new(listener))), ..self }
     }
@@ -129,6 +130,7 @@ impl Pages {
     pub fn with_limits(self, limits: Limits) -> Self {
         let source = match self.source {
             Source::One(reader) => Source::One(Box::new(reader.with_limits(limits))),
+            // The files of a folder get their limits as they are opened.
             folder @ Source::Folder(_) => folder,
         };
         Self { source, limits, ..self }
@@ -297,6 +299,7 @@ impl Iterator for Pages {
                 }
                 self.count += 1;
                 self.last_whole = Some(page.info().index);
+                // With its check, the page would still be compared when it is decoded.
                 Some(Ok(if self.chain.is_some() { page } else { page.without_check() }))
             }
             Err(error) => {

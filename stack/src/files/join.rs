@@ -214,6 +214,7 @@ impl Joined {
             None => self.stack.take(),
             // The reader has checked the order within one file.
             Some((_, before)) if Arc::ptr_eq(&before, &path) => page.info().stack.clone(),
+            // Only the first page of the joined stack has its metadata.
             Some((last, _)) if last.checked_add(1) == Some(layer) => None,
             Some((last, before)) => {
                 let (before, path) = (before.to_path_buf(), path.to_path_buf());

@@ -22,6 +22,7 @@ const MAX_BYTES: usize = 100;
 /// have, or as much of it as fits.
 pub(crate) fn start_of_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // Cut between letters, for a part of a letter is no UTF-8.
     let ends = name.char_indices().map(|(at, letter)| at + letter.len_utf8());
     let end = ends.take_while(|&end| end <= MAX_BYTES).last().unwrap_or(0);
     format!(".{}{MARK}", &name[..end])
@@ -65,6 +66,7 @@ fn remove_if_dead(entry: &DirEntry) -> io::Result<()> {
     let handle = writable.or_else(|_| File::open(&path))?;
     handle.try_lock()?;
     match kind.is_dir() {
+        // Since the folder was listed, the file may have got its final name.
         _ if !is_at(&handle, &path) => Ok(()),
         true => fs::remove_dir_all(path),
         false => fs::remove_file(path),

@@ -49,6 +49,7 @@ impl PageFiles {
             }
         }
         let is_usual = |page: &Picture| matches!(page.format, "TIFF" | "PNG");
+        // Next to TIFF and PNG pages, pictures in other formats are previews and the like.
         if pages.iter().any(is_usual) {
             pictures.extend(pages.extract_if(.., |page| !is_usual(page)).map(|page| page.name));
         }
@@ -108,6 +109,7 @@ impl Number {
     /// Compares values. Names may have more digits than any type of numbers.
     fn order(&self, other: &Self) -> Ordering {
         let digits = |number: &Self| {
+            // Without zeros in front, the longer number is the greater.
             let whole = number.whole.trim_start_matches('0').to_owned();
             (whole.len(), whole, number.fraction.trim_end_matches('0').to_owned())
         };
@@ -116,6 +118,7 @@ impl Number {
 
     /// Returns the value, if it is exact.
     fn value(&self) -> Option<f64> {
+        // Doubles hold 15 decimal digits exactly.
         let is_short = self.whole.len() + self.fraction.len() <= 15;
         is_short.then(|| format!("{}.{}", self.whole, self.fraction).parse().ok())?
     }
@@ -202,6 +205,7 @@ fn largest_form(pages: &[Picture]) -> Vec<&Picture> {
     for page in pages {
         forms.entry(&page.texts).or_default().push(page);
     }
+    // `max_by_key` takes the last of several, and the first form should win.
     forms.into_values().rev().max_by_key(Vec::len).unwrap_or_default()
 }
 
@@ -223,6 +227,7 @@ fn keep_numbered(
     let is_twice = |pair: &&[Picture]| {
         has_number(&pair[0]) && pair[0].order(&pair[1]).is_eq() && pair[0].format == pair[1].format
     };
+    // In order, pages of one number are neighbors.
     if let Some(pair) = pages.windows(2).find(is_twice) {
         return Err(StackError::SamePage { files: [pair[0].name.clone(), pair[1].name.clone()] });
     }
@@ -234,6 +239,7 @@ fn keep_numbered(
     let of_form = |page: &Picture| page.texts == texts;
     if form.len() > 1 {
         let size = form[0].size();
+        // A picture that cannot be read stays, for reading it says why.
         let is_other = |page: &mut Picture| {
             !of_form(page) && size.zip(page.size()).is_some_and(|(form, size)| form != size)
         };
@@ -283,6 +289,7 @@ fn page_numbers(form: &[&Picture]) -> Option<(usize, Vec<f64>)> {
     let mut varying: Vec<_> = (0..count).filter_map(values).filter(varies).collect();
     let increase = |(_, values): &(usize, Vec<f64>)| values.is_sorted_by(|a, b| a < b);
     let run_on = |numbers: &(usize, Vec<f64>)| {
+        // Values that vary are two at least.
         let step = numbers.1[1] - numbers.1[0];
         increase(numbers) && numbers.1.windows(2).all(|pair| is_step(pair, step))
     };

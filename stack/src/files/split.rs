@@ -127,6 +127,7 @@ impl Plan<'_> {
     fn check_cuts(&self) -> Result<(), SplitError> {
         let (SplitPoints::At(cuts), Some(last)) = (self.cuts, self.last) else { return Ok(()) };
         let first = self.first;
+        // A cut at the first layer would leave a file without layers before it.
         match cuts.iter().find(|&&cut| cut <= first || cut > last) {
             Some(&cut) => Err(SplitError::NoCut { cut, first, last }),
             None => Ok(()),

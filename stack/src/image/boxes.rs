@@ -44,6 +44,7 @@ pub fn largest_boxes(mask: &Mask, most: usize) -> (Vec<WhiteBox>, u64) {
     let mut largest = Largest { most, boxes: Vec::new(), count: 0 };
     let mut above = Live::default();
     for (row, transitions) in (0..).zip(mask.rows()) {
+        // A black row below a black row begins and ends nothing.
         if !transitions.is_empty() || !above.boxes.is_empty() {
             above = above.next(row, transitions, mask.width(), &mut largest);
         }
@@ -75,6 +76,7 @@ impl Live {
         let mut parents: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut next = 0;
         for (run, (start, end)) in (old as u32..).zip(here) {
+            // A run that ends where this one starts still touches it at a corner.
             while above.get(next).is_some_and(|(other, _)| other.end < start) {
                 next += 1;
             }
@@ -125,6 +127,7 @@ impl Largest {
     fn add(&mut self, each: WhiteBox) {
         self.count += 1;
         self.boxes.push(each);
+        // Cutting at twice the number keeps the cost of sorting in proportion.
         if self.boxes.len() > 2 * self.most + 64 {
             self.cut();
         }

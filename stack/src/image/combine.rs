@@ -50,6 +50,7 @@ impl Op {
                 out.clear();
                 out.extend_from_slice(row);
             }
+            // An intersection with black is black, and so is black less something.
             ([], _, _) | (_, [], _) => out.clear(),
             _ => combine_rows([a, b], |[a, b]| Combine::combined(self, a, b), out),
         }

@@ -100,6 +100,7 @@ impl BoxSums {
             fall(change.column() - start, level(pixel) - level(next));
             pixel = next;
         }
+        // A run that goes on behind the region ends at its border here.
         if pixel != C::Pixel::default() {
             fall(end - start, level(pixel));
         }
@@ -111,10 +112,13 @@ impl BoxSums {
         let side = u64::from(self.side.get());
         let width = self.columns.len() as u64;
         let mut means = vec![0; boxes];
+        // Runs that end at the region's border may end in the box beyond the last.
         let [_, mut after] = std::mem::take(&mut self.ends[boxes]);
+        // From the right, because a level that ends in a box fills all boxes before it.
         for index in (0..boxes).rev() {
             let [part, whole] = std::mem::take(&mut self.ends[index]);
             let columns = side.min(width - index as u64 * side);
+            // Single changes may count below zero, but their sum is a sum of levels.
             let sum = (part + columns as i64 * after) as u64;
             let pixels = columns * rows as u64;
             means[index] = ((2 * sum + pixels) / (2 * pixels)) as u8;

@@ -21,8 +21,10 @@ impl Frame {
     /// frame, and the number of black rows below.
     fn rows(&self, height: u32) -> (u32, std::ops::Range<u32>, u32) {
         let within = |row: i64| row.clamp(0, height.into()) as u32;
+        // A frame may lie anywhere in 64 bits, so sums saturate.
         let shown = within(self.top)..within(self.top.saturating_add(self.height.into()));
         let above = self.top.saturating_neg().clamp(0, self.height.into()) as u32;
+        // Without a row of the image, all rows are black, and counted once.
         let above = if shown.is_empty() { self.height } else { above };
         let below = self.height - above - shown.len() as u32;
         (above, shown, below)

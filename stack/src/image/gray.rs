@@ -81,6 +81,7 @@ impl GrayMask {
         let of_row = |changes: &[LevelChange]| {
             let (mut sum, mut since, mut exposed) = (0, 0, 0);
             for change in changes {
+                // A mask instead of a branch, which would often be mispredicted in noise.
                 sum += (change.column - since) & exposed;
                 (since, exposed) = (change.column, if change.level > 0 { u32::MAX } else { 0 });
             }
@@ -106,6 +107,7 @@ impl GrayMask {
         self.push_row_with(|width, row, changes| {
             let (mut column, mut level) = (0u32, 0);
             for (length, next) in runs {
+                // An empty run would make two changes at one column.
                 if next != level && length > 0 {
                     changes.push(LevelChange { column, level: next });
                     level = next;

@@ -98,6 +98,7 @@ impl Image {
     /// Panics if `row` is not below the height.
     pub fn runs(&self, row: u32) -> impl Iterator<Item = (u32, u32, u8)> {
         let width = self.width();
+        // Two optional iterators make one type without a box.
         let (mask, gray) = match self {
             Self::Mask(mask) => (Some(white_runs(mask.row(row), width)), None),
             Self::Gray(gray) => (None, Some(gray_runs(gray.row(row), width))),

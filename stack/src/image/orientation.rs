@@ -113,6 +113,7 @@ impl Orientation {
     /// Returns whether to reverse the columns and the rows, after exchanging rows and columns if
     /// the orientation [`is_across`](Self::is_across).
     fn reversed(self) -> (bool, bool) {
+        // By 90° anticlockwise: rows and columns exchanged, rows reversed; by 270°, columns.
         let (columns, rows) = (self.quarters >= 2, matches!(self.quarters, 1 | 2));
         if self.mirrored { (!rows, columns) } else { (columns, rows) }
     }
@@ -224,6 +225,7 @@ fn stretches_that_differ<C: Change>(
         (start, pixels) = (column, next);
     };
     walk_rows([above, row], &mut end);
+    // Ends a stretch that reaches the width.
     end(width, [C::Pixel::default(); 2]);
 }
 
@@ -244,6 +246,7 @@ fn by_column<T: Copy>(
     // First, the difference between the counts of each column and the one before it.
     let mut starts = vec![0u32; width as usize + 1];
     visit(&mut |stretch, _| {
+        // u32::MAX is -1: counts wrap, and their sums are right again.
         for (column, step) in [(stretch.start, 1), (stretch.end, u32::MAX)] {
             let more = &mut starts[column as usize];
             *more = more.wrapping_add(step);

@@ -135,6 +135,7 @@ impl<C: Change> RunImage<C> {
         if !image.has_partition() {
             return Err(RunError::Offsets);
         }
+        // A pass without branches accepts nearly all images; the second one names the fault.
         if !image.rows().all(|changes| image.is_canonical(changes)) {
             for (row, changes) in image.rows().enumerate() {
                 image.check_row(row, changes)?;

@@ -13,6 +13,7 @@
 #[inline]
 pub fn root(parents: &mut [u32], mut member: u32) -> u32 {
     while parents[member as usize] != member {
+        // Path halving (Tarjan and van Leeuwen 1984): one pass, and no recursion.
         let next = parents[parents[member as usize] as usize];
         parents[member as usize] = next;
         member = next;
@@ -24,6 +25,7 @@ pub fn root(parents: &mut [u32], mut member: u32) -> u32 {
 #[inline]
 pub fn unite(parents: &mut [u32], a: u32, b: u32) -> u32 {
     let [a, b] = [root(parents, a), root(parents, b)];
+    // The lower root wins, whatever the sets' sizes: callers number sets by their first members.
     parents[a.max(b) as usize] = a.min(b);
     a.min(b)
 }

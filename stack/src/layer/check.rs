@@ -229,6 +229,7 @@ fn add_numbers<T: Copy, const N: usize>(
     items: &[T],
     numbers: impl Fn(T) -> [u32; N],
 ) {
+    // Few enough to stay in the processor's first cache: 4 KiB at most.
     const ITEMS: usize = 512;
     let mut bytes = [[[0; 4]; N]; ITEMS];
     for items in items.chunks(ITEMS) {
@@ -271,6 +272,7 @@ impl OpenLine {
             if c.is_ascii() {
                 line.push(c);
             } else {
+                // Escapes are units of UTF-16 (RFC 8259, section 7): some characters take two.
                 for unit in c.encode_utf16(&mut [0; 2]) {
                     line.push_str(&format!("\\u{unit:04x}"));
                 }
@@ -336,6 +338,7 @@ impl Line {
     pub(crate) fn parse(description: &[u8]) -> Option<Self> {
         let checked = |page| LineCheck { page, text: description.to_vec() };
         let line = serde_json::from_slice(description).ok().map(|mut info: PageInfo| {
+            // `shift_remove` keeps the order of the other keys.
             let check = info.other.shift_remove("check");
             let check = check.map(|check| checked(serde_json::from_value(check).ok()));
             Self { info, check }
@@ -411,6 +414,7 @@ impl ChainReader {
             return Err(CheckFault::Resolution { found, written: page.dpi });
         }
         self.state = ChainState::Checked { ended: page.end.is_some() };
+        // Taken before this page is added: a text cannot hold a check of itself.
         let end = self.chain.end();
         self.chain.add(crc);
         match page.end {

@@ -105,6 +105,7 @@ impl PageInfo {
 pub(crate) fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
     match *number {
         None => to.serialize_none(),
+        // Below 2^53, whole doubles are exact as integers.
         Some(n) if n.fract() == 0.0 && n.abs() < 1e15 => to.serialize_i64(n as i64),
         Some(n) => to.serialize_f64(n),
     }

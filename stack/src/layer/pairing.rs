@@ -144,6 +144,7 @@ pub fn shift_between(a: &PageHeader, b: &PageHeader) -> Result<[i64; 2], Pairing
     let Some(([ax, ay], [bx, by])) = a.info.origin_mm.zip(b.info.origin_mm) else {
         return Ok([0, 0]);
     };
+    // Rows count down and y goes up, so the difference along y turns its sign.
     let shift = [bx - ax, ay - by].map(|mm| mm / dpi.pitch().mm());
     let sides = |side: usize| [-f64::from(b.size[side]), f64::from(a.size[side])];
     let meets = |side: usize| {
@@ -164,6 +165,7 @@ fn heights(pages: &[PageHeader]) -> Option<Vec<[f64; 2]>> {
     let of_page = |page: &PageHeader| {
         let (bottom, thickness) = page.info.z_um.zip(page.info.thickness_um)?;
         let usable =
+            // A thinner layer would vanish between heights that count as the same.
             bottom.is_finite() && thickness.is_finite() && thickness > 2.0 * SAME_HEIGHT_UM;
         usable.then_some([bottom, bottom + thickness])
     };
@@ -195,6 +197,7 @@ fn sections_by_height(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<Section> {
         let bottoms = next.iter().flatten().map(|layer| layer[0].max(at));
         let Some(bottom) = bottoms.reduce(f64::min) else { return sections };
         let holds = |layer: &&[f64; 2]| layer[0] <= bottom + SAME_HEIGHT_UM;
+        // A section ends at the top of a layer that holds it, or at the bottom of one above.
         let ends = next.iter().flatten().map(|layer| layer[usize::from(holds(layer))]);
         let top = ends.reduce(f64::min).expect("one of both stacks goes on");
         sections.push(Section {

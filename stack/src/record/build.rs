@@ -85,6 +85,7 @@ impl StackInfo {
         &self,
     ) -> Option<impl Iterator<Item = Result<BuiltPart, serde_json::Error>> + '_> {
         let build = self.other.get(KEY)?;
+        // A build of one part has the part's keys itself.
         let parts = build["parts"].as_array().map_or(std::slice::from_ref(build), Vec::as_slice);
         Some(parts.iter().map(BuiltPart::deserialize))
     }
@@ -103,6 +104,7 @@ impl StackInfo {
 
     /// Moves all copies of a build to the left and up.
     pub fn move_copies(&mut self, [left, up]: [i64; 2]) {
+        // Changed in place, so that unknown keys stay as they are.
         let Some(build) = self.other.get_mut(KEY) else { return };
         let parts = match build.get_mut("parts").and_then(Value::as_array_mut) {
             Some(parts) => parts.as_mut_slice(),

@@ -41,6 +41,7 @@ impl BitWriter {
 
     #[cold]
     fn make_room(&mut self) {
+        // Doubling alone would make no room of none.
         self.bytes.resize(2 * self.bytes.len() + 4096, 0);
     }
 
@@ -69,6 +70,7 @@ impl<'a> BitReader<'a> {
     /// Returns the next 32 bits at least, without taking them.
     #[inline]
     pub(super) fn peek(&mut self) -> u64 {
+        // With fewer than 32 bits held, 32 more fit.
         if self.count < 32 {
             if let Some((word, rest)) = self.rest.split_first_chunk::<4>() {
                 self.held |= u64::from(u32::from_le_bytes(*word)) << self.count;

@@ -11,7 +11,9 @@ use super::{END_OF_BLOCK, LENGTH_ORDER, MOST_BITS, copies_of};
 /// Takes at most eight times as many runs as the stream has bytes.
 pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
     let (&[method, flags], data) = stream.split_first_chunk()?;
+    // Method 8, a window up to 32 KiB and no preset dictionary (RFC 1950, section 2.2).
     let is_zlib = method & 0x0F == 8 && method >> 4 <= 7 && flags & 0x20 == 0;
+    // FCHECK makes the header a multiple of 31.
     if !is_zlib || !u16::from_be_bytes([method, flags]).is_multiple_of(31) {
         return None;
     }
@@ -19,6 +21,7 @@ pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
     let mut reader = RunReader { runs: Vec::new(), left: bytes };
     loop {
         let is_last = bits.take(1)? == 1;
+        // BTYPE (RFC 1951, section 3.2.3). Stored blocks are left to a decoder of bytes.
         let [symbols, distances] = match bits.take(2)? {
             1 => fixed_codes()?,
             2 => own_codes(&mut bits)?,
@@ -68,6 +71,7 @@ impl RunReader {
                 return None;
             }
             let (before, _) = self.runs.last_mut()?;
+            // Copies that follow each other may pass 32 bits.
             *before = before.checked_add(length)?;
             self.left = self.left.saturating_sub(length.into());
         }
@@ -82,6 +86,7 @@ fn adler32(runs: &[(u32, u8)]) -> u32 {
         let (mut left, byte) = (u64::from(length), u64::from(byte));
         while left > 0 {
             let part = left.min(1 << 16);
+            // b adds up all values of a: n a + byte (1 + 2 + ... + n) (RFC 1950, section 8.2).
             b += part * a + byte * (part * (part + 1) / 2);
             a += part * byte;
             // Remainders are seldom taken: both sums still fit.
@@ -99,12 +104,14 @@ fn adler32(runs: &[(u32, u8)]) -> u32 {
 
 /// The codes of blocks that state none.
 fn fixed_codes() -> Option<[Symbols; 2]> {
+    // RFC 1951, section 3.2.6: there are 288 codes, although the last two never occur.
     let lengths: Vec<u8> =
         [(144, 8), (112, 9), (24, 7), (8, 8)].iter().flat_map(|&(n, k)| vec![k; n]).collect();
     Some([Symbols::new(&lengths)?, Symbols::new(&[5; 32])?])
 }
 
 fn own_codes(bits: &mut BitReader<'_>) -> Option<[Symbols; 2]> {
+    // HLIT, HDIST and HCLEN (RFC 1951, section 3.2.7).
     let symbols = bits.take(5)? as usize + 257;
     let distances = bits.take(5)? as usize + 1;
     let stated = bits.take(4)? as usize + 4;
@@ -114,6 +121,7 @@ fn own_codes(bits: &mut BitReader<'_>) -> Option<[Symbols; 2]> {
     }
     let of_lengths = Symbols::new(&of_lengths)?;
     let mut lengths = Vec::new();
+    // Both kinds of lengths are one sequence: repeats may cross from one to the other.
     while lengths.len() < symbols + distances {
         let (length, count) = match of_lengths.read(bits)? {
             16 => (*lengths.last()?, 3 + bits.take(2)?),

@@ -19,6 +19,7 @@ pub(crate) fn encode(image: &GrayMask) -> Vec<u8> {
     let mut runs = ByteRuns { block: Block::new(), out: &mut out, byte: 0, since: 0 };
     for (row, changes) in (0..).zip(image.rows()) {
         let start = row * u64::from(image.width());
+        // A row starts black, which ends a run that the row before left open.
         if changes.first().is_none_or(|first| first.column > 0) {
             runs.change_at(start, 0);
         }
@@ -93,6 +94,7 @@ struct Copies {
 impl Copies {
     #[inline]
     fn of(length: u32) -> Self {
+        // Runs of no bytes were left out, so this does not wrap.
         let copied = length.wrapping_sub(1);
         let (longest, last) = (copied / MOST_COPIED, (copied % MOST_COPIED) as u16);
         // No copy is shorter than three.
@@ -182,6 +184,7 @@ fn put_runs(out: &mut BitWriter, runs: &[(u32, u8)], code: impl Fn(usize) -> Bit
         let first = bytes[usize::from(copies.bytes.wrapping_sub(1))][usize::from(byte)];
         let last = last[usize::from(copies.last)];
         let others = u64::from(first.count.wrapping_add(last.count));
+        // Nearly all runs fit in one write.
         if longest.bits_of(copies.longest).wrapping_add(others) <= MOST_PUT.into() {
             let all = first.then(longest.times(copies.longest)).then(last);
             out.put(all.bits, all.count);
@@ -250,6 +253,7 @@ impl Often {
 /// Returns the symbol of a copy's length, 3 to 257.
 fn length_symbol(length: u32) -> u16 {
     let from_three = length - 3;
+    // RFC 1951, section 3.2.5: eight lengths alone, then four for each number of extra bits.
     let index = if from_three < 8 {
         from_three
     } else {
@@ -269,6 +273,7 @@ fn put_lengths(out: &mut BitWriter, lengths: &[u8]) {
     tokens.iter().for_each(|&(symbol, ..)| frequencies[usize::from(symbol)] += 1);
     let of_lengths = code_lengths(&frequencies, MOST_LENGTH_BITS);
     let codes = codes(&of_lengths);
+    // HLIT, HDIST and HCLEN: all symbols, one distance, and all lengths of lengths.
     out.put(SYMBOLS as u64 - 257, 5);
     out.put(0, 5);
     out.put(LENGTH_ORDER.len() as u64 - 4, 4);
@@ -281,11 +286,13 @@ fn put_lengths(out: &mut BitWriter, lengths: &[u8]) {
 
 /// Adds the symbols, with bits that count on, of codes of one length that follow each other.
 fn put_length_run(tokens: &mut Vec<(u8, u32, u8)>, length: u8, mut count: usize) {
+    // Symbol 16 repeats the length before, so the first one is written itself.
     if length > 0 {
         tokens.push((length, 0, 0));
         count -= 1;
     }
     while count > 0 {
+        // Repeat codes of RFC 1951, section 3.2.7; none is shorter than three.
         let (symbol, least, most, bits) = match (length, count) {
             (_, 1 | 2) => (length, 1, 1, 0),
             (1.., _) => (16, 3, 6, 2),
@@ -333,6 +340,7 @@ fn row_sums(changes: &[LevelChange], width: u32) -> (u64, u64) {
         let left = u64::from(width.wrapping_sub(change.column));
         let once = step.wrapping_mul(left);
         sum = sum.wrapping_add(once);
+        // The step has distances 1 to `left` from the end, left (left + 1) / 2 in sum.
         twice_weighted = twice_weighted.wrapping_add(once.wrapping_mul(left.wrapping_add(1)));
         before = change.level;
     }

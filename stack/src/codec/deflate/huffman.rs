@@ -15,6 +15,7 @@ pub(super) fn code_lengths(frequencies: &[u32], most: u8) -> Vec<u8> {
     let mut counts = count_depths(&weights, most.into());
     // The sum of 2^(most - length) is to be 2^most.
     let mut sum: u64 = (1..).zip(&counts[1..]).map(|(k, &n)| n << (usize::from(most) - k)).sum();
+    // Cutting lengths breaks Kraft's inequality. Longer codes for others restore it.
     while sum > 1 << most {
         // One code of the longest moves below the longest shorter one, which moves down too.
         counts[usize::from(most)] -= 1;
@@ -49,6 +50,7 @@ fn count_depths(weights: &[u64], most: usize) -> Vec<u64> {
     while inner.len() < leaves - 1 {
         let mut sum = 0;
         for _ in 0..2 {
+            // On a tie, a leaf goes before an inner node, which keeps the tree flat.
             let is_leaf = leaf < leaves && inner.get(node).is_none_or(|&n| weights[leaf] <= n);
             let (weight, index) = if is_leaf {
                 leaf += 1;
@@ -63,6 +65,7 @@ fn count_depths(weights: &[u64], most: usize) -> Vec<u64> {
         inner.push(sum);
     }
     let mut depths = vec![0; 2 * leaves - 1];
+    // Parents stand behind their children, and the root is last, at depth 0.
     for index in (0..2 * leaves - 2).rev() {
         depths[index] = depths[parents[index]] + 1;
     }
@@ -78,6 +81,7 @@ pub(super) fn codes(lengths: &[u8]) -> Vec<u16> {
     let code = |&length: &u8| {
         let code = next[usize::from(length)];
         next[usize::from(length)] += u32::from(length > 0);
+        // Codes are packed from their first bit on, all else from the lowest (RFC 1951, 3.1.1).
         if length == 0 { 0 } else { (code as u16).reverse_bits() >> (16 - length) }
     };
     lengths.iter().map(code).collect()
@@ -89,6 +93,7 @@ fn first_codes(lengths: &[u8]) -> [u32; MOST_BITS as usize + 1] {
     lengths.iter().filter(|&&length| length > 0).for_each(|&k| counts[usize::from(k)] += 1);
     let mut first = [0; MOST_BITS as usize + 1];
     for length in 1..first.len() {
+        // RFC 1951, section 3.2.2, step 2.
         first[length] = (first[length - 1] + counts[length - 1]) << 1;
     }
     first
@@ -108,6 +113,7 @@ impl Symbols {
         let room = |length: u8| 1u32 << (bits - length);
         let used = || lengths.iter().filter(|&&length| length > 0);
         let sum: u32 = used().map(|&length| room(length)).sum();
+        // A single code has one bit, and the other bit stays unused (RFC 1951, section 3.2.7).
         let is_single = used().count() == 1 && bits == 1;
         if bits == 0 || (sum != 1 << bits && !is_single) {
             return None;

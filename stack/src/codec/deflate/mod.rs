@@ -32,6 +32,7 @@ const LENGTH_ORDER: [usize; 19] =
 fn copies_of(symbol: u16) -> Option<(u32, u8)> {
     Some(match u32::from(symbol.checked_sub(END_OF_BLOCK + 1)?) {
         index @ 0..=7 => (index + 3, 0),
+        // The longest copy has a symbol without extra bits (RFC 1951, section 3.2.5).
         28 => (MOST_COPIED, 0),
         index @ 8..=27 => {
             let bits = index / 4 - 1;

@@ -61,6 +61,7 @@ impl CodedRow {
     #[inline]
     pub(super) fn end(&mut self, width: u32) {
         self.make_room();
+        // Wide apart, so that no run behind the last transition counts as narrow.
         for (k, place) in self.places[self.len..][..LOOK].iter_mut().enumerate() {
             *place = width.saturating_add(WIDE * k as u32);
         }
@@ -74,6 +75,7 @@ impl CodedRow {
         }
         let mut row: Vec<u32> = Vec::new();
         for &column in &self.places[..self.len] {
+            // An empty run changes no color: both of its transitions go.
             if row.pop_if(|last| *last == column).is_none() {
                 row.push(column);
             }

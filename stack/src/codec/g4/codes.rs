@@ -25,6 +25,7 @@ const fn codes<const N: usize>(digits: &str) -> [Code; N] {
             table[code].bits = table[code].bits << 1 | (digits[i] - b'0') as u32;
             table[code].len += 1;
         } else if table[code].len > 0 && code + 1 < N {
+            // White space behind the last code begins none.
             code += 1;
         }
         i += 1;
@@ -36,6 +37,7 @@ const fn code(digits: &str) -> Code {
     codes::<1>(digits)[0]
 }
 
+// T.6, table 1.
 pub(super) const PASS: Code = code("0001");
 pub(super) const HORIZONTAL: Code = code("001");
 /// T.4's end of line. Two of these end a T.6 page (EOFB).
@@ -44,6 +46,7 @@ pub(super) const EOL: Code = code("000000000001");
 /// Vertical codes by `a1 - b1 + 3`: VL3 to VR3.
 pub(super) const VERTICAL: [Code; 7] = codes("0000010 000010 010 1 011 000011 0000011");
 
+// T.4, table 2, for both colors.
 /// Terminating codes of runs of 0 bits (T.4's white), lengths 0 to 63.
 pub(super) const TERMINATING_0: [Code; 64] = codes(
     "
@@ -70,6 +73,7 @@ pub(super) const TERMINATING_1: [Code; 64] = codes(
     ",
 );
 
+// T.4, table 3a, for both colors.
 /// Make-up codes of runs of 0 bits, lengths 64, 128, ... 1728.
 pub(super) const MAKE_UP_0: [Code; 27] = codes(
     "
@@ -90,6 +94,7 @@ pub(super) const MAKE_UP_1: [Code; 27] = codes(
     ",
 );
 
+// T.4, table 3b.
 /// Make-up codes of both colors, lengths 1792, 1856, ... 2560.
 pub(super) const MAKE_UP_LONG: [Code; 13] = codes(
     "
@@ -104,6 +109,7 @@ pub(super) const LONGEST_MAKE_UP: u32 = 2560;
 /// Returns the make-up code of a run of `64 * units` pixels, `units` from 1 to 40.
 pub(super) fn make_up(white: bool, units: u32) -> Code {
     match (units as usize, white) {
+        // From 1792 pixels on, both colors share their codes.
         (28.., _) => MAKE_UP_LONG[units as usize - 28],
         (units, false) => MAKE_UP_0[units - 1],
         (units, true) => MAKE_UP_1[units - 1],

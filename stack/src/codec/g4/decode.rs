@@ -39,6 +39,7 @@ pub(crate) fn decode_rows(
     let (mut above, mut row) = (CodedRow::black(width), CodedRow::black(width));
     let mut index = 0;
     while index < height {
+        // Below a black row, a black row is a single bit, V0.
         if above.len == 0 {
             let black = bits.take_ones(height - index);
             mask.push_black_rows(black);
@@ -91,9 +92,11 @@ pub(super) fn decode_row(
                 row.toggle(a1, width);
                 a0 = a1;
                 white = !white;
+                // b1 must now change to the other color, and the one before it may be right of a0.
                 j = if j > 0 { j - 1 } else { j + 1 };
             }
             Mode::Pass => {
+                // a0 moves below b2, and the color stays.
                 a0 = above.at(j + 1);
                 j += 2;
             }
@@ -149,6 +152,7 @@ fn take_verticals(
     for k in 0..AT_ONCE {
         moved[k] = b[k].wrapping_add_signed(codes.shifts[k].into());
     }
+    // The moved transitions stay in order, so the last bounds all.
     if moved[count - 1] > width {
         return None;
     }
@@ -174,6 +178,7 @@ struct Entry<T> {
 
 /// The longest mode code in bits, and so the bits of the table's index.
 const MODE_BITS: u32 = 7;
+// The longest codes of runs, black ones, have 13 bits.
 const RUN_BITS: u32 = 13;
 
 /// Stores `value` at every index that begins with `code`.
@@ -278,6 +283,7 @@ impl<'a> BitReader<'a> {
     /// Returns the next `n` bits, zeros past the end, without taking them.
     #[inline]
     pub(super) fn peek(&mut self, n: u32) -> usize {
+        // No table's index has more than 13 bits, so 32 are enough.
         if self.count < 32 {
             self.refill();
         }
@@ -292,6 +298,7 @@ impl<'a> BitReader<'a> {
             // The bits after the last whole byte are loaded again next time.
             self.pending |= u64::from_be_bytes(*word) >> self.count;
             self.rest = &self.rest[(63 - self.count) as usize / 8..];
+            // All bytes that fit: afterwards the count is 56 to 63, with the same low three bits.
             self.count |= 56;
         } else {
             while (0..=56).contains(&self.count) && !self.rest.is_empty() {
@@ -314,6 +321,7 @@ impl<'a> BitReader<'a> {
         let mut taken = 0;
         loop {
             self.peek(1);
+            // Bits beyond the count are there, too, but come again with the next refill.
             let ones = self.pending.leading_ones().min(self.count.max(0) as u32).min(most - taken);
             if ones == 0 {
                 return taken;
@@ -327,6 +335,7 @@ impl<'a> BitReader<'a> {
     pub(super) fn take(&mut self, len: u8) -> Result<(), G4Fault> {
         self.pending <<= len;
         self.count -= i32::from(len);
+        // Zeros past the end may look like a code.
         if self.count < 0 { Err(G4Fault::EndsEarly) } else { Ok(()) }
     }
 
@@ -355,6 +364,7 @@ impl<'a> BitReader<'a> {
                 .checked_add(entry.value.into())
                 .filter(|&length| length <= room)
                 .ok_or(G4Fault::OutsideRow)?;
+            // A terminating code follows any make-up codes, even for a rest of no pixels.
             if entry.value < 64 {
                 return Ok(length);
             }
@@ -363,6 +373,7 @@ impl<'a> BitReader<'a> {
 
     /// Skips to the next byte boundary.
     pub(super) fn align(&mut self) -> Result<(), G4Fault> {
+        // Bits were buffered as whole bytes, so the count modulo 8 is the rest of the begun byte.
         self.take((self.count % 8) as u8)
     }
 

@@ -14,9 +14,11 @@ use crate::image::mask::Mask;
 ///
 /// Source: ITU-T Recommendation T.6, sections 2.2.1 to 2.2.5.
 pub fn encode(mask: &Mask) -> Vec<u8> {
+    // A transition takes some four bits, a black row one.
     let mut bits = BitWriter::new(mask.change_count() / 2 + mask.height() as usize / 8 + 16);
     let mut reference: &[u32] = &[];
     for row in mask.rows() {
+        // a1 and b1 are both at the width: one vertical code.
         if row.is_empty() && reference.is_empty() {
             bits.put(VERTICAL[3]);
             continue;
@@ -40,12 +42,14 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
     let (mut a0, mut started) = (0, false);
     // The indices of a1 and b1. Their parities agree, as both change to the same color.
     let (mut i, mut j) = (0, 0);
+    // Even a row without columns has a code.
     while a0 < width || !started {
         let (a1, b1, b2) = (at(row, i), at(reference, j), at(reference, j + 1));
         let is_near = a1.abs_diff(b1) <= 3;
         if is_near {
             if let Some(code) = four_near(reference, row, i, j, width, four_verticals) {
                 (i, j) = (i + 4, j + 4);
+                // Both rows are at their ends, so the row's end is one more vertical code.
                 if i == row.len() && j == reference.len() {
                     return bits.put(code.then(VERTICAL[3]));
                 }
@@ -57,6 +61,7 @@ fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) 
                 return bits.put(code);
             }
         }
+        // T.6 asks for pass mode first, even if a1 is near b1.
         if b2 < a1 {
             bits.put(PASS);
             (a0, j) = (b2, j + 2);
@@ -198,6 +203,7 @@ impl BitWriter {
     }
 
     fn put_run(&mut self, mut length: u32, white: bool) {
+        // Up to 2623 pixels take one make-up code and a terminating code.
         while length >= LONGEST_MAKE_UP + 64 {
             self.put(make_up(white, LONGEST_MAKE_UP / 64));
             length -= LONGEST_MAKE_UP;

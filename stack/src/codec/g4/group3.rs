@@ -64,6 +64,7 @@ struct Group3Rows<'a> {
 impl Group3Rows<'_> {
     /// Moves to the codes of row `index` and returns whether they refer to the row above.
     fn start(&mut self, index: u32) -> Result<bool, G4Fault> {
+        // TIFF 6.0, section 10: rows have no ends of line, and begin at a byte.
         if self.kind == Group3::ModifiedHuffman {
             return self.bits.align().map(|()| false);
         }
@@ -77,6 +78,7 @@ impl Group3Rows<'_> {
         if self.kind == Group3::OneDimensional {
             return Ok(false);
         }
+        // A tag bit of 1 announces run lengths, 0 codes against the row above (T.4, section 4.2).
         let tag = self.bits.peek(1);
         self.bits.take(1)?;
         Ok(tag == 0)

@@ -38,6 +38,7 @@ impl Packer {
             return bytes.to_vec();
         }
         let packed = self.0.compress(bytes).expect("memory grows, so nothing else can fail");
+        // Equal sizes mark bytes that are not packed, so packed ones must be fewer.
         if packed.len() < bytes.len() { packed } else { bytes.to_vec() }
     }
 
@@ -56,6 +57,7 @@ impl Packer {
 
 /// Returns about how many bytes the streams take when they are packed.
 pub(super) fn packed_len(streams: &Streams) -> usize {
+    // The fastest level: the result is only compared.
     let mut packer = Packer::new(1);
     streams.all().map(|stream| packer.pack(stream).len()).iter().sum()
 }
@@ -66,12 +68,14 @@ pub(super) fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     if packed.len() == length {
         return Some(packed.to_vec());
     }
+    // The length is a claim, and unpacking at once allocates all of it.
     let bytes = if length <= AT_ONCE {
         zstd::bulk::decompress(packed, length).ok()?
     } else {
         let mut decoder = zstd::stream::read::Decoder::with_buffer(packed).ok()?.single_frame();
         decoder.window_log_max(WINDOW_LOG).ok()?;
         let mut bytes = Vec::new();
+        // One byte more shows a block that is too long.
         decoder.take(length as u64 + 1).read_to_end(&mut bytes).ok()?;
         bytes
     };

@@ -39,6 +39,7 @@ pub(super) fn pairs<E: From<StackError>>(
             return Err(StackError::Malformed { page: page as u32, fault }.into());
         }
         let before = below.replace(Arc::clone(&layer));
+        // By the layer's index, not the page: ranges cut there then join to the bytes of the whole.
         let is_key = layer.info.index.is_multiple_of(KEY_LAYERS);
         let below = before.filter(|below| !is_key && is_alike(&below.image, &layer.image));
         Ok(Pair { layer, below })
@@ -132,6 +133,7 @@ impl<E, I: Iterator<Item = Result<CodedLayer, E>>> Frames<I> {
         }
         let mut frame = OpenFrame::default();
         while let Some(layer) = self.held.take() {
+            // The line must say whether the layer is the last, which only the next one shows.
             self.held = self.layers.next().transpose()?;
             frame.is_key |= layer.is_key;
             frame.streams.append(&layer.streams);

@@ -106,6 +106,7 @@ const OTHER_SIZE: u8 = 8;
 /// Returns the head of a frame: an entry for each page, then their lines.
 pub(super) fn head_of(pages: &[FramePage]) -> Vec<u8> {
     let mut out = Vec::new();
+    // No image has a side of 0, so the first page states its size.
     let mut size = [0; 2];
     for FramePage { shape, line } in pages {
         let mode = match shape.mode {
@@ -134,6 +135,7 @@ pub(super) fn pages_of(
     packed_head: &[u8],
     limits: &Limits,
 ) -> Option<Vec<FramePage>> {
+    // An entry is a byte and up to four numbers, far below 64 bytes, and a line.
     let most = u64::from(header.count).saturating_mul(limits.field_bytes + 64);
     if !(1..=KEY_LAYERS).contains(&header.count) || u64::from(header.head) > most {
         return None;
@@ -163,6 +165,7 @@ pub(super) fn pages_of(
         }
         pages.push((shape, length as usize));
     }
+    // An image alone may cost more, for nothing divides it.
     if pages.len() > 1 && cost(pages.iter().map(|page| &page.0)) > FRAME_COST {
         return None;
     }
@@ -225,6 +228,7 @@ pub(super) fn index(entries: &[IndexEntry], packer: &mut Packer) -> Vec<u8> {
 
 /// Reads the index. Returns `None` if it is damaged.
 pub(super) fn entries_of(header: &PartHeader, packed_head: &[u8]) -> Option<Vec<IndexEntry>> {
+    // Two numbers of at most ten bytes for each frame.
     if header.images != 0 || header.head > header.count.saturating_mul(20) {
         return None;
     }

@@ -43,6 +43,7 @@ pub(super) fn encode(image: &LayerImage, below: Option<&Image>) -> CodedImage {
     };
     // A strip with far more bytes than its image needs is coded anew.
     let most = MOST_KEPT + 4 * (mask.change_count() + mask.height() as usize);
+    // Our own codes can be made again from the image; only others must be kept.
     let own = strip.filter(|strip| strip.len() <= most && ***strip != *g4::encode(mask));
     if let Some(strip) = own {
         return kept(strip.to_vec());
@@ -117,6 +118,7 @@ fn encode_gray(image: &Split, below: Option<&Image>) -> CodedImage {
         CodedImage { mode, streams }
     };
     let coded = code(below.as_ref());
+    // More than two bytes a change are the mark of noise, which its own rows may predict better.
     if below.is_none() || coded.streams.len() < 2 * image.levels.len() {
         return coded;
     }

@@ -33,6 +33,7 @@ pub fn join_packed(
     format: Format,
     level: PackLevel,
 ) -> Result<(), JoinError> {
+    // Two readers go side by side: one has the texts, the other the images as they are packed.
     let mut pages =
         Joined::new(stacks.to_vec(), survey(stacks)?, Arc::new(|_, _| {})).without_images();
     let mut joined = Frames::new(to, format, level)?;
@@ -71,6 +72,7 @@ pub fn copy_packed(
     let mut copied = Frames::new(to, frames.unpacker.format(), level)?;
     while let Some(frame) = frames.next()? {
         let line = |_| {
+            // Fewer pages than the frames have: the file was written to between both readings.
             let page = pages.next().ok_or(StackError::Changed)??;
             let of_stack = page.info().stack.clone().map(&change);
             line_of(&page, &PageInfo { stack: of_stack, ..page.info().clone() })
@@ -108,6 +110,7 @@ impl RawFrames {
 
     fn next(&mut self) -> Result<Option<Frame>, StackError> {
         let frame = self.unpacker.read_frame(&mut self.source, &Limits::default(), true)?;
+        // Nothing decodes these images, so their check alone finds damage.
         frame.map(Frame::checked).transpose()
     }
 }

@@ -39,6 +39,7 @@ pub(super) fn encode(image: &Split, below: Option<&Split>, out: &mut Streams) {
         let (at, of) = reference
             .map_or((&[][..], &[][..]), |(like, row)| (like.columns.row(row), like.of_row(row)));
         let nearest = Nearest { at, of, counts_agree: at.len() == columns.len(), j: 0 };
+        // Modulo 256, so that each distance is a byte.
         out.levels
             .extend(nearest.of_all(columns).zip(levels).map(|(near, l)| l.wrapping_sub(near)));
     }
@@ -94,6 +95,7 @@ impl<'a> Nearest<'a> {
                 self.j = i;
             } else {
                 let distance = |j: usize| self.at[j].abs_diff(column);
+                // Of two that are as near, the right one.
                 while self.j + 1 < self.at.len() && distance(self.j + 1) <= distance(self.j) {
                     self.j += 1;
                 }

@@ -15,6 +15,7 @@ pub(super) fn take(bytes: &mut &[u8]) -> Option<u64> {
     for shift in (0..64).step_by(7) {
         let byte = *bytes.split_off_first()?;
         let bits = u64::from(byte & 0x7F);
+        // Higher bits would be lost.
         if bits << shift >> shift != bits {
             return None;
         }
@@ -33,6 +34,7 @@ pub(super) fn take_u32(bytes: &mut &[u8]) -> Option<u32> {
 
 /// Makes small numbers of numbers near zero.
 pub(super) fn folded(number: i32) -> u64 {
+    // Zigzag: 0, -1, 1, -2 become 0, 1, 2, 3.
     u64::from(((number << 1) ^ (number >> 31)) as u32)
 }
 

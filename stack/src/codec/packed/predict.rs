@@ -19,6 +19,7 @@ pub(super) type Four<T> = [T; TOGETHER];
 /// Turns a residual's sign where its side is -1; turning it twice gives it back.
 #[inline]
 fn turned(residual: i32, side: i32) -> i32 {
+    // In two's complement, (r ^ -1) - -1 is -r; a side of 0 leaves r.
     (residual ^ side).wrapping_sub(side)
 }
 
@@ -105,6 +106,7 @@ const THERE: [Four<u32>; TOGETHER + 1] = {
 /// Replaces the entries of four that are behind the last `left` ones.
 #[inline]
 pub(super) fn padded(four: Four<u32>, left: usize, width: u32) -> Four<u32> {
+    // Masks instead of branches: the ends of rows would be mispredicted.
     let there = &THERE[left.min(TOGETHER)];
     std::array::from_fn(|k| four[k] & there[k] | width & !there[k])
 }
@@ -114,6 +116,7 @@ impl Expected {
     /// it are more often 1 than -1.
     #[inline]
     fn side(&self, k: usize) -> i32 {
+        // Bit 7 is the half: if it is set, the place was rounded up, and the edge is left of it.
         self.by[k] << 24 >> 31
     }
 
@@ -137,6 +140,7 @@ impl Expected {
     /// Returns how far an edge is from where it was expected before rounding, in 1/256 pixel.
     #[inline]
     fn missed(&self, k: usize, residual: i32) -> i32 {
+        // The error of rounding to a pixel: 256 floor((by + 128) / 256) - by.
         let error = PIXEL / 2 - (self.by[k].wrapping_add(PIXEL / 2) & (PIXEL - 1));
         turned(residual, self.side(k)).wrapping_mul(PIXEL).wrapping_add(error)
     }
@@ -211,6 +215,7 @@ impl Predictor {
         let there = &THERE[left.min(TOGETHER)];
         let by: Four<i32> = std::array::from_fn(|k| {
             let bend = above[k].wrapping_add(below[k]).wrapping_sub(here[k].wrapping_mul(2)) as i32;
+            // One comparison for both ends of the range.
             let is_rough = (bend.wrapping_add(ROUGH) as u32) <= 2 * ROUGH as u32;
             // The mean of the three rows is a third of the bend away.
             let bent = i32::from(bend as i16) * (PIXEL / 3);
@@ -271,6 +276,7 @@ impl Predictor {
             self.shifts.push(if near { shifts[j] } else { 0 });
             self.rates.push(if near { rates[j] } else { FIRST_RATE });
         }
+        // Four are read at once, from any transition on.
         self.shifts.resize(reference.len() + TOGETHER, 0);
         self.rates.resize(reference.len() + TOGETHER, 0);
         self.count = Some(reference.len());

@@ -117,6 +117,7 @@ impl Unpacker {
                 break;
             }
         }
+        // Pages of the same key frame are ready: reading on from there reaches the page, too.
         let is_ahead = (key.0..=number).contains(&self.first_ready) && !self.ready.is_empty();
         if !is_ahead {
             (self.pages, self.offset) = (key.0, key.1);
@@ -135,6 +136,7 @@ impl Unpacker {
         match &self.ready[(number - self.first_ready) as usize] {
             Ok(page) => Ok(Some(page.clone())),
             Err(_) => {
+                // An error cannot be copied, so it goes out; the next call reads its frame again.
                 let mut ready = std::mem::take(&mut self.ready);
                 ready.swap_remove_front((number - self.first_ready) as usize).transpose()
             }
@@ -160,6 +162,7 @@ impl Unpacker {
             match next {
                 Ok(Some(frame)) => {
                     let cost = cost(frame.pages.iter().map(|page| &page.0.shape));
+                    // The first frame is taken whatever it costs.
                     if !frames.is_empty() {
                         threads -= usize::from(frame.header.kind == KEY_FRAME);
                         if cost > room || threads == 0 || !images {
@@ -171,6 +174,7 @@ impl Unpacker {
                     frames.push(frame);
                 }
                 Err(error) if frames.is_empty() => return Err(error),
+                // Pages before an error are whole, and come first.
                 end => {
                     if !frames.is_empty() {
                         self.ahead = Some(end);
@@ -206,6 +210,7 @@ impl Unpacker {
                 let mut pages = Vec::new();
                 for frame in group {
                     frame.decode(&mut below, *limits, &mut pages);
+                    // The next images are coded against the one that is missing.
                     if matches!(pages.last(), Some(Err(_))) {
                         break;
                     }
@@ -232,6 +237,7 @@ impl Unpacker {
             KEY_FRAME | FRAME => {}
             INDEX => {
                 let entries = entries_of(&header, &head).ok_or_else(|| damaged("index"))?;
+                // The index must name the frames that were read, or one is missing or doubled.
                 if entries != self.frames {
                     return Err(damaged("index"));
                 }
@@ -252,6 +258,7 @@ impl Unpacker {
             }
             _ => return Err(damaged("frame")),
         }
+        // No image lies below to code this one against.
         if header.kind == FRAME && self.pages == 0 {
             return Err(damaged("frame"));
         }
@@ -359,6 +366,7 @@ impl Unpacker {
         let entries = part.and_then(|(header, head)| entries_of(&header, &head));
         // Frames reach from the file's start to the index.
         let reach = |entries: &Vec<IndexEntry>| {
+            // The sizes in a damaged index may pass 64 bits.
             let bytes = entries.iter().map(|entry| u128::from(entry.bytes)).sum::<u128>();
             let pages = entries.iter().map(|entry| u64::from(entry.pages)).sum::<u64>();
             bytes + u128::from(START_BYTES) == u128::from(start) && pages <= u64::from(u32::MAX)
@@ -397,6 +405,7 @@ impl Frame {
     /// Returns each page's part of the bytes of the packed images.
     fn shares(&self) -> Vec<u64> {
         let (bytes, count) = (u64::from(self.header.images), self.pages.len() as u64);
+        // Differences of rounded sums, so that the shares add up to the bytes.
         (0..count).map(|page| bytes * (page + 1) / count - bytes * page / count).collect()
     }
 
@@ -435,6 +444,7 @@ impl Frame {
             pages.iter().zip(lines).zip(shares).zip(numbers).enumerate()
         {
             let decoded = decode(&page.shape, below.as_deref(), &mut from);
+            // Bytes that no image needed are damage.
             let decoded = decoded.filter(|_| k + 1 < count || from.is_at_end());
             let Some((image, strip)) = decoded else {
                 to.push(Err(malformed(number, "image")));

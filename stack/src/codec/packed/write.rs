@@ -142,6 +142,7 @@ impl Sink {
         }
         self.out.write_all(&index(&self.entries, &mut Packer::new(1)))?;
         self.out.flush()?;
+        // All writers to the file must be gone before it gets its name.
         drop(self.out);
         if let Some(temporary) = self.temporary {
             temporary.persist()?;

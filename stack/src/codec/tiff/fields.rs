@@ -91,6 +91,7 @@ impl Fields {
 
     fn dpi(&self) -> Option<Dpi> {
         let value = self.resolution(X_RESOLUTION)?;
+        // Inches are the default (TIFF 6.0, section 8, ResolutionUnit).
         match self.number_or(RESOLUTION_UNIT, PER_INCH).ok()? {
             PER_INCH => Dpi::new(value),
             PER_CENTIMETRE => Dpi::new(value * 2.54),
@@ -105,6 +106,7 @@ impl Fields {
         let long = |bytes: &[u8]| number(bytes, self.little_endian) as u32;
         let first = bytes.get(..size).filter(|_| size > 0)?;
         Some(match *kind {
+            // 0/0 makes NaN, which is no resolution.
             RATIONAL => f64::from(long(&first[..4])) / f64::from(long(&first[4..])),
             SRATIONAL => f64::from(long(&first[..4]) as i32) / f64::from(long(&first[4..]) as i32),
             FLOAT => f32::from_bits(long(first)).into(),
@@ -128,6 +130,7 @@ impl Fields {
     /// Returns the text of the page's description, if it has one.
     pub(super) fn description(&self) -> Option<&[u8]> {
         let (_, text) = self.values.get(&IMAGE_DESCRIPTION)?;
+        // A field of ASCII may hold several texts, each ended by NUL (TIFF 6.0, section 2).
         text.split(|&byte| byte == 0).next()
     }
 
@@ -157,6 +160,7 @@ impl Fields {
             return Err(malformed(self.page, PageFault::TooWideToTurn(width)));
         }
         let Line { info, check } = self.line();
+        // Other programs use these fields, and would see another image than the checked one.
         if check.is_some() && !self.is_as_we_write() {
             let (layer, fault) = (info.index, CheckFault::Directory);
             return Err(StackError::Check { layer, fault });

@@ -37,6 +37,7 @@ impl Layout {
     pub(super) fn plain_bytes(&self, i: usize, gray: bool) -> u64 {
         let row = if gray { self.width } else { self.width.div_ceil(8) };
         let top = (i / self.across) as u64 * u64::from(self.rows);
+        // Tiles are stored whole, with padding beyond the page (TIFF 6.0, section 15).
         let rows = match self.tiled {
             true => self.rows.into(),
             false => u64::from(self.rows).min(u64::from(self.page_height).saturating_sub(top)),
@@ -64,6 +65,7 @@ impl Layout {
     /// Returns the page's rows in each strip or row of tiles.
     pub(super) fn row_ranges(&self) -> impl Iterator<Item = Range<u32>> {
         let (rows, height) = (self.rows, self.page_height);
+        // The end of the last strip may pass 32 bits before it is cut to the page.
         (0..height.div_ceil(rows)).map(move |i| i * rows..height.min((i + 1).saturating_mul(rows)))
     }
 }

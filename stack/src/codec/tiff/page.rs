@@ -358,6 +358,7 @@ impl Page {
                 self.check_runs(tiles.iter().map(RunImage::change_count).sum())?;
             }
             join_tiles(&tiles, image);
+            // Joining adds a run where one tile ends white and the next begins black.
             self.check_runs(image.change_count())?;
         }
         Ok(())
@@ -392,6 +393,7 @@ impl Page {
         mask: &mut Mask,
     ) -> Result<(), StackError> {
         let (width, height) = (self.layout.width, rows.end - rows.start);
+        // GDAL leaves out strips and tiles of zeros.
         if piece.is_empty() {
             mask.push_black_rows(height);
             return Ok(());
@@ -447,6 +449,7 @@ impl Page {
         each: impl FnMut(&[(u32, u8)]) -> bool,
     ) -> Result<(), StackError> {
         let name = if self.layout.tiled { "tile" } else { "strip" };
+        // Differences of bits need no undoing: their set bits are the transitions.
         let differences = self.differences && self.gray;
         let shape = PieceShape { row_bytes, rows, differences };
         unpack(self.compression, piece, &shape, each).map_err(|fault| match fault {

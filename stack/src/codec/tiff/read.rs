@@ -49,6 +49,7 @@ pub struct PageReader {
 /// Returns the error of an input that starts with these bytes and is no stack.
 fn not_tiff(start: Vec<u8>, mut source: Source) -> StackError {
     let size = source.length().ok().flatten();
+    // The bytes only help to name the format, so a failure here does not count.
     let more = source.read_up_to(start.len() as u64, (FORMAT_BYTES - start.len()) as u64);
     let bytes = [&start[..], &more.unwrap_or_default()].concat();
     // Without its size, a text that ends early is whole.
@@ -116,6 +117,7 @@ impl PageReader {
             _ => return Err(not_tiff(start, source)),
         };
         let next = if matches!(kind, FileKind::Tiff) {
+            // BigTIFF has the size of offsets before the first link.
             if big {
                 start = source.read_up_to(8, 8)?;
             } else {
@@ -126,6 +128,7 @@ impl PageReader {
             }
             number(&start, little_endian)
         } else {
+            // Not zero, which would mean that no page follows.
             start.len() as u64
         };
         Ok(Self {
@@ -163,6 +166,7 @@ impl PageReader {
         if let FileKind::Packed(unpacker) = &mut self.kind {
             return unpacker.page(place as u32, &mut self.source, &self.limits);
         }
+        // A page that is asked for again is no loop.
         self.seen.clear();
         self.next = place;
         self.next().transpose()
@@ -357,6 +361,7 @@ impl PageReader {
         page.pieces = vec![Vec::new(); count];
         // Offsets in increasing order can be read from a stream.
         places.sort_by_key(|(_, (offset, _))| *offset);
+        // FillOrder 2: the first pixel is in the lowest bit.
         let reversed = fields.number_or(FILL_ORDER, 1)? == 2;
         let mut end = 0;
         for (i, (offset, length)) in places {
@@ -393,6 +398,7 @@ impl PageReader {
         }
         starts.sort_unstable();
         let stated = places.iter().fold(0u64, |sum, (_, length)| sum.saturating_add(*length));
+        // Guessed lengths together stay within what any coding needs.
         let mut most = page.layout.most_bytes().saturating_sub(stated);
         for (i, (offset, length)) in places.iter_mut().enumerate() {
             if *length > 0 || *offset == 0 {
@@ -430,6 +436,7 @@ impl PageReader {
         loop {
             let head = self.read(file.len() as u64, 8)?;
             let (length, kind) = (number(&head[..4], false), &head[4..]);
+            // The types of chunks are letters (PNG, section 5.3).
             if !kind.iter().all(u8::is_ascii_alphabetic) {
                 return Err(malformed(self.number, PageFault::PngGap));
             }

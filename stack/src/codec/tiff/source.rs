@@ -58,6 +58,7 @@ impl Source {
                 *position += skipped;
                 Ok(skipped == gap)
             }
+            // Nothing is read: the file's length shows whether the bytes are there.
             Self::File { file, .. } => Ok(file.get_ref().metadata()?.len() >= end),
         }
     }
@@ -76,6 +77,7 @@ impl Source {
             }
             Self::File { file, position } => {
                 if let Ok(gap) = i64::try_from(i128::from(offset) - i128::from(*position)) {
+                    // Unlike `seek`, this keeps what is buffered.
                     match file.seek_relative(gap) {
                         // The offset is larger than any file's.
                         Err(error) if error.kind() == io::ErrorKind::InvalidInput => {}

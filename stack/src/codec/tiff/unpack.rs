@@ -43,6 +43,7 @@ pub(super) fn unpack(
             let length = u64::from(shape.row_bytes) * u64::from(shape.rows);
             match deflate::runs(bytes, length) {
                 Some(runs) => cut_runs(runs.into_iter(), shape, each),
+                // Other programs also copy from farther back.
                 None => cut_zlib(bytes, shape, each),
             }
         }
@@ -137,6 +138,7 @@ struct LzwReader<'a> {
 
 impl<'a> LzwReader<'a> {
     fn new(rest: &'a [u8]) -> Self {
+        // TIFF's LZW widens its codes one code early (TIFF 6.0, section 13).
         Self { decoder: Decoder::with_tiff_size_switch(BitOrder::Msb, 8), rest }
     }
 }

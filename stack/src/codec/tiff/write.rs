@@ -35,6 +35,7 @@ pub enum Format {
 impl Format {
     fn header(self) -> &'static [u8] {
         match self {
+            // The first directory follows the header: at 16, or at 8.
             Self::Big => &[b'I', b'I', 43, 0, 8, 0, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0],
             Self::Classic => &[b'I', b'I', 42, 0, 8, 0, 0, 0],
         }
@@ -163,6 +164,7 @@ impl EncodedPage {
         if !is_gray {
             fields.push(long(T6_OPTIONS, 0));
         }
+        // Entries must stand in the order of their tags (TIFF 6.0, section 2).
         fields.sort_by_key(|field| field.0);
         fields
     }
@@ -195,6 +197,7 @@ impl Format {
             out.extend_from_slice(&tag.to_le_bytes());
             out.extend_from_slice(&kind.to_le_bytes());
             self.put_word(&mut out, count);
+            // A value that fits stands in place of its offset, at the left (TIFF 6.0, section 2).
             if value.len() <= word {
                 value.resize(word, 0);
                 out.extend_from_slice(&value);

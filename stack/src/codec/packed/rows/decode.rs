@@ -45,6 +45,7 @@ pub(in crate::codec::packed) fn decode(
             }
         }
         row += coded;
+        // Behind the last coded row there is no number of equal ones.
         if row == height {
             break;
         }
@@ -54,6 +55,8 @@ pub(in crate::codec::packed) fn decode(
             Reference::Above => {
                 for _ in 0..alike {
                     image.push_again();
+                    // Each copy takes memory without any bytes behind it, so the limit holds on the
+                    // way.
                     if image.change_count() > most {
                         return None;
                     }
@@ -101,6 +104,7 @@ impl RowDecoder<'_> {
                 }
             };
             for _ in 0..times {
+                // `None` behind the reference's last, so that damaged counts end here.
                 let expected = self.predictor.expect(self.like, self.j, self.width)?;
                 self.predictor.learn(self.j, &expected, residuals);
                 let columns = expected.columns(residuals);
@@ -111,6 +115,7 @@ impl RowDecoder<'_> {
                 break;
             }
         }
+        // Four may reach behind the row's end, where they stand at the width.
         while row[start..].last() == Some(&self.width) {
             row.pop();
         }

@@ -32,10 +32,12 @@ pub(in crate::codec::packed) fn encode(
     let mut predictor = Predictor::default();
     let (mut row, mut coded, mut alike_to) = (0, 0, 0);
     while row < height {
+        // Each row is compared once: the next one that differs stays known.
         if row >= alike_to {
             alike_to = (row..height).find(|&row| !is_alike(row)).unwrap_or(height);
         }
         let alike = alike_to - row;
+        // At the image's end any number is left out, for no row needs the shifts.
         if alike >= LEFT_OUT || (alike > 0 && alike_to == height) {
             numbers::put(&mut out.rows, coded);
             numbers::put(&mut out.rows, alike.into());
@@ -109,6 +111,7 @@ impl<'a> RowEncoder<'a> {
                     continue;
                 }
             }
+            // Tokens must stand in the order of the row.
             self.put_zeros();
             if left == 0 {
                 self.out.tokens.push(END);
@@ -150,6 +153,7 @@ impl<'a> RowEncoder<'a> {
         let column = columns[0];
         let place = |k| expected.map_or(self.width, |expected| expected.place(k));
         let distance = column.abs_diff(place(0));
+        // The next ones of the reference lie before the column, and the one behind them is nearer.
         let is_passed = self.j + step <= count
             && place(step - 1) < column
             && place(step).abs_diff(column) < distance;
@@ -190,6 +194,7 @@ impl<'a> RowEncoder<'a> {
             numbers::put(&mut self.out.numbers, (column - before).into());
             before = column;
         }
+        // Columns behind the row's end are padding.
         self.next = self.end.min(self.next + columns.len());
         before == self.width
     }
