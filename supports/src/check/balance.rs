@@ -25,6 +25,7 @@ impl Weight {
     pub(super) fn grow(&mut self, layer: &Labelled, components: &[u32], thickness_um: f64) {
         for &component in components {
             let component = &layer.components.all[component as usize];
+            // Weight is in proportion to thickness; density and pixel area cancel in the center.
             let moments = component.moments().map(|moment| moment * thickness_um);
             self.unite(&Self { mass: component.area as f64 * thickness_um, moments });
         }
@@ -42,6 +43,7 @@ impl Base {
         let mut corners = Vec::new();
         for &component in components {
             for (row, columns) in layer.components.runs(&layer.mask, component) {
+                // A pixel stands on all of its area: the hull is of corners, not of centers.
                 let [top, bottom] = [row, row + 1].map(i64::from);
                 let [left, right] = [columns.start, columns.end].map(i64::from);
                 corners.extend([[left, top], [right, top], [left, bottom], [right, bottom]]);
@@ -54,6 +56,7 @@ impl Base {
     /// Joins another body to this one.
     pub(super) fn unite(&mut self, other: Self) {
         let mut corners = std::mem::take(&mut self.hull);
+        // Points within either hull are within the hull of both, so corners are enough.
         corners.extend(other.hull);
         self.hull = convex_hull(corners);
         self.region.unite(&other.region);
@@ -61,6 +64,7 @@ impl Base {
         self.off = match (self.off.take(), other.off) {
             (Some(mut a), Some(b)) => {
                 a.layer = a.layer.min(b.layer);
+                // At equal distances the lower layer counts.
                 let worse = (b.off_pixels, a.worst_layer) > (a.off_pixels, b.worst_layer);
                 Some(if worse { OffBalance { layer: a.layer, ..b } } else { a })
             }
@@ -98,6 +102,7 @@ impl Base {
 
     /// Returns how the body is off balance, with its base, if it ever is.
     pub(super) fn off(self) -> Option<OffBalance> {
+        // Bodies that joined later have enlarged the base since.
         self.off.map(|off| OffBalance { base: self.region, ..off })
     }
 }
@@ -110,6 +115,7 @@ fn convex_hull(mut points: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
     if points.len() < 3 {
         return points;
     }
+    // Rising points give the one half, falling points the other.
     let mut hull = half_hull(points.iter().copied());
     hull.extend(half_hull(points.iter().rev().copied()));
     hull
@@ -134,6 +140,7 @@ fn half_hull(points: impl Iterator<Item = [i64; 2]>) -> Vec<[i64; 2]> {
 fn distance(hull: &[[i64; 2]], point: [f64; 2]) -> f64 {
     let corners = hull.iter().map(|corner| corner.map(|place| place as f64));
     let sides: Vec<_> = corners.clone().zip(corners.cycle().skip(1)).collect();
+    // Inside is left of all sides, as the corners go counter-clockwise.
     let is_left = |[a, b]: [[f64; 2]; 2]| {
         (b[0] - a[0]) * (point[1] - a[1]) >= (b[1] - a[1]) * (point[0] - a[0])
     };
@@ -143,6 +150,7 @@ fn distance(hull: &[[i64; 2]], point: [f64; 2]) -> f64 {
     let to_side = |(a, b): &([f64; 2], [f64; 2])| {
         let along = [b[0] - a[0], b[1] - a[1]];
         let from = [point[0] - a[0], point[1] - a[1]];
+        // Corners of a hull differ, so no side has length zero.
         let length = along[0] * along[0] + along[1] * along[1];
         let part = ((from[0] * along[0] + from[1] * along[1]) / length).clamp(0.0, 1.0);
         (from[0] - part * along[0]).hypot(from[1] - part * along[1])

@@ -86,6 +86,7 @@ impl Component {
 impl Components {
     pub(super) fn of(mask: &Mask) -> Self {
         let mut sets = Sets::default();
+        // A row of n transitions has n + 1 segments.
         let mut labels = vec![NONE; mask.change_count() + mask.height() as usize];
         let mut row_starts = Vec::with_capacity(mask.height() as usize + 1);
         let (mut start, mut above_start) = (0, 0);
@@ -94,6 +95,7 @@ impl Components {
             row_starts.push(start as u32);
             let (before, of_row) = labels[..start + row.len() + 1].split_at_mut(start);
             let labels_above = &before[above_start..];
+            // Most rows follow the row above segment by segment: one copy labels them.
             if number > 0 && in_step(above, row) {
                 of_row.copy_from_slice(labels_above);
             } else {
@@ -139,6 +141,7 @@ impl Components {
     /// Returns whether a component holds a full square of pixels.
     pub(super) fn holds_square(&self, mask: &Mask, component: u32, side: u32) -> bool {
         let Component { area, rows, columns, .. } = &self.all[component as usize];
+        // Box and area refuse most components before their runs are read.
         let room = rows.len().min(columns.len()) as u64;
         room >= u64::from(side)
             && *area >= u64::from(side).pow(2)
@@ -159,15 +162,18 @@ pub(super) fn holds_square(runs: impl Iterator<Item = (u32, Range<u32>)>, side: 
     let mut last_row = None;
     let mut runs = runs.peekable();
     while let Some((row, columns)) = runs.next() {
+        // A shorter run is in no square.
         if columns.end - columns.start >= side {
             of_row.push(columns);
         }
         if runs.peek().is_some_and(|(next, _)| *next == row) {
             continue;
         }
+        // A row without runs ends all squares.
         if last_row.is_none_or(|last| last + 1 != row) {
             common.iter_mut().for_each(Vec::clear);
         }
+        // From the most rows down, so that each list is read before it changes.
         for rows in (1..side as usize).rev() {
             let [upper, here] = common.get_disjoint_mut([rows - 1, rows]).expect("they differ");
             intersect(upper, &of_row, side, here);
@@ -311,6 +317,7 @@ impl Sets {
                 }
             };
         }
+        // Without a union, labels are numbers already.
         if all.len() < numbers.len() {
             let renamed = labels.iter_mut().filter(|label| **label != NONE);
             renamed.for_each(|label| *label = numbers[*label as usize]);
@@ -327,6 +334,7 @@ fn infer_background(all: &mut [Component], mask: &Mask) {
         return;
     }
     let pixels = u64::from(mask.width()) * u64::from(mask.height());
+    // Most black runs are of the background, and inference saves counting them.
     first.area = pixels - others.iter().map(|other| other.area).sum::<u64>();
     (first.columns, first.rows) = (0..mask.width(), 0..mask.height());
 }

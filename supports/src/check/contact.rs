@@ -67,11 +67,13 @@ impl Contact {
         let mut joints = Joints::new(layer.components.all.len());
         let mut unheld = Vec::new();
         let width = layer.mask.width();
+        // 1e9 is beyond any image, and keeps the cast exact.
         let reach = limit.map(f64::floor).map_or(u32::MAX, |limit| limit.min(1e9) as u32);
         for row in 0..layer.mask.height() {
             let [under, over] = [below, layer].map(|layer| layer.mask.row(row));
             let [labels_under, labels] = [below, layer].map(|layer| layer.components.of_row(row));
             let is_near = |(a, b): (&u32, &u32)| a.abs_diff(*b) <= reach;
+            // All white is within reach of white in its own row, so only joints are left to count.
             if in_step(under, over) && under.iter().zip(over).all(is_near) {
                 joints.add_row([under, over], [labels_under, labels], width);
                 continue;
@@ -88,6 +90,7 @@ impl Contact {
             });
         }
         let joints = joints.finish();
+        // White that rests on nothing is an island, not an overhang.
         let is_held = |component: u32| {
             joints.binary_search_by_key(&component, |joint| joint.component).is_ok()
         };
@@ -116,6 +119,7 @@ struct Joints {
 
 impl Joints {
     fn new(components: usize) -> Self {
+        // Without pixels yet: `finish` drops such entries.
         let last = (0..components as u32).map(|component| Joint { component, below: 0, pixels: 0 });
         Self { last: last.collect(), earlier: Vec::new() }
     }

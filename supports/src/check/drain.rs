@@ -76,8 +76,10 @@ impl Drain {
         let rooms: Vec<Labelled> =
             numbers.into_par_iter().map(|number| Labelled::new(self.crowded(number))).collect();
         for (room, number) in rooms.into_iter().zip(self.done..) {
+            // Only joints matter here: overhangs are found in the layers themselves.
             let contact = self.last.as_ref().map(|below| Contact::new(below, &room, None, 1));
             let near = &self.window[number];
+            // The center of a ball that fits is in the layer's own black.
             for black in room.of_colour(false) {
                 let [column, row] = black.first;
                 let labelled = &near.layer.labelled;
@@ -91,6 +93,7 @@ impl Drain {
             self.last = Some(room);
         }
         self.done += ready;
+        // Layers out of reach of the next unfinished one are no longer needed.
         let Some(next_um) = self.window.get(self.done).map(|near| near.middle_um) else { return };
         while self.window[0].middle_um + self.radius_um <= next_um {
             self.window.pop_front();
@@ -104,7 +107,9 @@ impl Drain {
         self.rooms.finish();
         let Listed { mut list, left_out } = self.rooms.pockets;
         list.retain(|pocket| {
+            // Places were added by layer and first pixel, so they are in order.
             let body = self.within.binary_search_by_key(&pocket.born(), |(born, _)| *born);
+            // A body without any way out is listed already, with the other pockets.
             body.is_ok_and(|place| hollows.is_open(self.within[place].1))
         });
         list.iter_mut().for_each(|pocket| pocket.kind = PocketKind::Narrow);
@@ -144,6 +149,7 @@ impl Drain {
                 reaches.push((off_um, Reach { mask: &near.layer.labelled.mask, aside }));
             }
         }
+        // Near layers reach farthest, and leave farther ones little to do.
         reaches.sort_by(|a, b| a.0.total_cmp(&b.0));
         reaches.into_iter().map(|(_, reach)| reach).collect()
     }
@@ -163,6 +169,7 @@ fn asides(radius_um: f64, off_um: f64, pitch_um: f64) -> Vec<u32> {
     let is_near = |columns: u64, rows: u64| ((columns * columns + rows * rows) as f64) < limit;
     let aside = |rows: u64| {
         let mut columns = (limit - (rows * rows) as f64).sqrt() as u64;
+        // Rounding may have made the root one too large.
         while columns > 0 && !is_near(columns, rows) {
             columns -= 1;
         }

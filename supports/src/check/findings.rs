@@ -245,6 +245,7 @@ impl LayerFacts {
         Self {
             index: info.index,
             z_um: info.z_um,
+            // A thickness that is not above zero states nothing.
             thickness_um: info.thickness_um.filter(|um| um.is_finite() && *um > 0.0),
             stray_rows: info.stray_rows.len() as u32,
             has_white: false,
@@ -257,6 +258,7 @@ impl Findings {
     /// Puts the worst of each kind first; equals stay in the order of the layers.
     pub(super) fn sort(&mut self) {
         self.islands.list.sort_by_key(|island| (Reverse(island.floating_pixels), island.number));
+        // Specks come from rounding to pixels: their size says nothing, so they stay in order.
         self.specks.list.sort_by_key(|island| island.number);
         let share = |joint: &WeakJoint| joint.support as f64 / joint.area as f64;
         self.weak_joints

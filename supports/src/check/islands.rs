@@ -56,8 +56,10 @@ impl Growth {
         ended.into_iter().for_each(|body| self.end(body));
         for Group { bodies, components } in groups {
             let mut body = match (bodies.is_empty(), contact) {
+                // Nothing is below the first layer: it stands on the platform.
                 (true, None) => Body::Standing(Base::of(layer, &components)),
                 (true, Some(_)) => {
+                    // Only a body joins components of a layer, so a group that begins has one.
                     self.begin(&layer.components.all[components[0] as usize], number)
                 }
                 (false, _) => self.unite(bodies, number),
@@ -109,6 +111,7 @@ impl Growth {
         if let Some(mut base) = base {
             let end = End::JoinsPart { layer };
             for island in floating {
+                // The island's weight rests on the base from here on.
                 base.carry(&island.weight);
                 self.list(island, end);
             }
@@ -158,6 +161,7 @@ impl Floating {
         if area > island.largest_area {
             (island.largest_area, island.largest_layer) = (area, number);
         }
+        // One square is enough, and the search reads all runs.
         self.holds_square = self.holds_square || layer.hold_square(components, speck);
     }
 }

@@ -58,6 +58,7 @@ impl<B> Live<B> {
             if layer.is_white(component) != self.is_white {
                 continue;
             }
+            // Each component that is on no body begins a group of its own.
             let mut begun = NONE;
             let group = match body {
                 NONE => &mut begun,
@@ -89,6 +90,7 @@ impl<B> Live<B> {
 
     /// Returns the body of each component of the last layer; `None` for the other color.
     pub(super) fn of_components(&self) -> impl Iterator<Item = Option<&B>> {
+        // The other color has `NONE`, which is beyond any list.
         self.of_component.iter().map(|&body| self.bodies.get(body as usize))
     }
 

@@ -113,6 +113,7 @@ where
     T: MemorySize + Send,
     E: From<CheckError> + Send,
 {
+    // A batch may end the layers, and the next one asks again.
     let mut layers = layers.fuse();
     // Of large layers two are in work at most, however many threads there are.
     let at_once = rayon::current_num_threads().min(2);
@@ -132,9 +133,11 @@ where
             Some(checker) => checker,
             none => none.insert(Checker::new(&batch[0], options)?),
         };
+        // Rows are compared by number and column, so sizes must agree before any comparison.
         for layer in &batch {
             checker.compare(layer)?;
         }
+        // The layer below the first of the batch is the last of the batch before, if there was one.
         let below = last.iter().chain(&batch[..batch.len() - 1]).map(Some);
         let below: Vec<_> = last.is_none().then_some(None).into_iter().chain(below).collect();
         let contacts = batch.par_iter().zip(below).map(|(layer, below)| {
@@ -143,6 +146,7 @@ where
             below.map(|below| Contact::new(&below.labelled, &layer.labelled, limit, speck))
         });
         let contacts: Vec<_> = contacts.collect();
+        // Bodies pass from layer to layer, so this part goes in order.
         for (layer, contact) in batch.iter().zip(&contacts) {
             checker.add(layer, contact.as_ref())?;
         }
@@ -284,6 +288,7 @@ impl Checker {
         self.hollows.add(&layer.labelled, contact, number, thickness_um);
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);
+            // On a slope, patches of neighboring layers may be a limit and a pixel apart.
             let near = self.limit(&layer.facts).map_or(0, |limit| limit.ceil().min(1e9) as u32 + 1);
             self.overhangs.add(&contact.patches, number, near);
         }

@@ -65,6 +65,7 @@ fn reaches(limit: f64) -> impl Iterator<Item = (u32, u32)> {
         let squared = u64::from(rows).pow(2);
         is_within(squared, limit).then(|| {
             let mut reach = (limit * limit - squared as f64).max(0.0).sqrt() as u64;
+            // The root may be rounded down; the exact test decides.
             while is_within(squared + (reach + 1).pow(2), limit) {
                 reach += 1;
             }
@@ -167,6 +168,7 @@ impl Farthest<'_> {
         let aside = runs.iter().map(|(_, c)| column.abs_diff(c.start).max(column.abs_diff(c.end)));
         let aside = f64::from(aside.max().unwrap_or_default());
         let along = f64::from((row - runs[0].0).max(runs[runs.len() - 1].0 - row));
+        // Only a larger whole square matters; the margin takes up the rounding of roots.
         let least = ((self.squared + 1) as f64).sqrt() - aside.hypot(along) - 1e-6;
         let squared = self.measure(column, *row, least.max(0.0).powi(2) as u64);
         if (squared as f64).sqrt() >= least {
@@ -208,6 +210,7 @@ fn nearest(mask: &Mask, column: u32, row: u32, enough: u64) -> u64 {
     let mut nearest = u64::MAX;
     for distance in 0..mask.height() {
         let squared = u64::from(distance).pow(2);
+        // Rows at this distance hold nothing nearer.
         if squared >= nearest || nearest < enough {
             break;
         }

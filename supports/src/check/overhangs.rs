@@ -36,6 +36,7 @@ impl Overhangs {
         }
         let mut root_of = |item: usize| root(&mut parents, item as u32) as usize;
         let continued: Vec<usize> = of_patch.iter().map(|(_, own)| root_of(*own)).collect();
+        // Older overhangs have lower numbers, so that they stay in the order in which they began.
         let mut kept: Vec<usize> = continued.clone();
         kept.sort_unstable();
         kept.dedup();
@@ -47,6 +48,7 @@ impl Overhangs {
             }
         }
         self.open = kept.iter().filter_map(|&k| merged[k].take()).collect();
+        // Overhangs without a patch in this layer have ended.
         merged.into_iter().flatten().for_each(|overhang| self.ended.push(overhang));
         let place = |root: &usize| kept.binary_search(root).expect("it is kept");
         self.last = of_patch

@@ -77,6 +77,7 @@ impl Findings {
             let shown = islands[first..].iter().take_while(|it| place.layers.contains(&it.layer));
             place.is_deep && !shown.into_iter().any(|island| place.begins(island))
         };
+        // Minima are in the order of heights, so no later place begins in a lower layer.
         let begins_nowhere = |island: &&Island| {
             !places
                 .iter()
@@ -134,6 +135,7 @@ impl Grid {
         let z_mm = minimum.point_mm[2];
         let layer = self.layer_above(z_mm);
         let &thickness_mm = self.thickness_mm.get(layer).filter(|_| layer > 0)?;
+        // It may show a layer later than it begins, once it is as large as a pixel.
         let last = self.layer_above(z_mm + minimum.depth_mm).max(layer + 1);
         let [x, [least_y, most_y]] = minimum.box_mm;
         let sides = [x.map(|x| self.column(x)), [most_y, least_y].map(|y| self.row(y))];
@@ -142,6 +144,7 @@ impl Grid {
             // A curved surface reaches below its facets.
             layers: layer as u32 - 1..=last as u32,
             first: layer as u32,
+            // Files round heights, so a depth of one layer may pass it by a hair.
             is_deep: minimum.depth_mm > thickness_mm + PLANE_TOLERANCE.mm(),
             sides,
             drift: 2.0 * thickness_mm / self.pitch_mm,
@@ -175,6 +178,7 @@ impl Place<'_> {
 
     fn lone(&self, grid: &Grid) -> LoneMinimum {
         let [x, y, _] = self.minimum.point_mm;
+        // A minimum may lie outside the images.
         let pixel = |at: f64, size: u32| (at.max(0.0) as u32).min(size.saturating_sub(1));
         LoneMinimum {
             layer: self.first,

@@ -76,6 +76,7 @@ impl Hollows {
             });
             let mut hollow = united.unwrap_or_else(|| {
                 let first = &layer.components.all[components[0] as usize];
+                // Without numbers, no body is asked for by its number.
                 Hollow::begin(first, number, self.numbers.as_mut().map_or(0, Numbers::begin))
             });
             hollow.grow(layer, &components, number, thickness_um, self.speck);
@@ -104,12 +105,14 @@ impl Hollows {
 
     fn end(&mut self, hollow: Hollow, is_at_top: bool) {
         if let Some(numbers) = &mut self.numbers {
+            // Bodies that united have the lowest of their numbers, which is the root of the set.
             numbers.is_open[hollow.number as usize] = hollow.is_open;
         }
         if hollow.is_open || !hollow.holds_square {
             return;
         }
         let kind = match (is_at_top, hollow.is_on_platform) {
+            // The platform closes a hole until the part is off, even if it opens at the top.
             (_, true) => PocketKind::Sealed,
             (true, false) => PocketKind::Cup,
             (false, false) => PocketKind::Trap,
@@ -164,6 +167,7 @@ impl Hollow {
             self.pocket.pixels_um += component.area as f64 * thickness_um;
             self.pocket.region.unite(&component.region());
         }
+        // An open body is no pocket, so its squares need no search.
         self.holds_square =
             self.is_open || self.holds_square || layer.hold_square(components, speck);
     }

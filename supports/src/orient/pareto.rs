@@ -20,6 +20,7 @@ pub fn pareto(facts: &[PoseFacts]) -> Vec<usize> {
 fn measures(facts: &PoseFacts) -> [f64; 5] {
     let [width, depth] = facts.footprint_mm;
     let counts = [facts.islands, facts.pits].map(|count| count as f64);
+    // 002 section 4.3 takes the orientation with the least islands, so they count first.
     [counts[0], facts.overhang_mm2, counts[1], facts.height_mm, width * depth]
 }
 

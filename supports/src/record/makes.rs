@@ -22,6 +22,7 @@ pub fn records(
 ) -> Vec<FindingRecord> {
     use FindingRecord as Record;
     let scale = &Scale::new(findings);
+    // Stray rows come first: they look like islands until `fix` corrects them.
     let mut records = stray_rows(findings, scale);
     let island = |island: &Island| Record::Island(IslandRecord::new(island, scale, shear_pa));
     records.extend(findings.islands.list.iter().map(island));
@@ -169,6 +170,7 @@ fn empty(findings: &Findings, scale: &Scale<'_>) -> Vec<FindingRecord> {
     let record = |layers: [u32; 2]| {
         let is_top = layers[1] as usize + 1 == findings.layers.len();
         let place = match (is_top, layers[0]) {
+            // Empty layers above the part harm nothing, but below white they leave it without hold.
             (false, _) => EmptyPlace::Below,
             (true, 0) => EmptyPlace::Everywhere,
             (true, _) => EmptyPlace::Above,

@@ -65,6 +65,7 @@ impl fmt::Display for PointRecord {
         let [column, row] = self.at_px;
         match self.at_mm {
             Some([x, y]) => write!(f, "x {x:.2}, y {y:.2} mm"),
+            // Truncated: the pixel that holds the point.
             None => write!(f, "column {}, row {}", column as u64, row as u64),
         }
     }

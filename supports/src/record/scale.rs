@@ -26,6 +26,7 @@ impl<'a> Scale<'a> {
             .findings
             .origin_mm
             .zip(self.pitch_mm)
+            // Rows count down, and y goes up.
             .map(|([x, y], pitch)| [to_nm(x + at_px[0] * pitch), to_nm(y - at_px[1] * pitch)]);
         PointRecord { at_mm, at_px }
     }
@@ -38,6 +39,7 @@ impl<'a> Scale<'a> {
     pub(super) fn bounds(&self, region: &Region) -> BoxRecord {
         let Region { columns, rows } = region;
         let corner = |column: u32, row: u32| self.point([column.into(), row.into()]).at_mm;
+        // The first row has the greatest y, so this corner has the least x and the greatest y.
         let low = corner(columns.start, rows.start);
         let box_mm = low.zip(corner(columns.end, rows.end));
         BoxRecord {
@@ -61,6 +63,7 @@ impl<'a> Scale<'a> {
 
     /// Returns the volume of pixels times thicknesses, if all layers have one.
     pub(super) fn volume_mm3(&self, pixels_um: f64) -> Option<f64> {
+        // Layers without a thickness were weighed as 1 um, which makes no volume.
         let known = self.findings.layers.iter().all(|layer| layer.thickness_um.is_some());
         let pitch = self.pitch_mm.filter(|_| known)?;
         Some(to_nm(pixels_um / 1000.0 * pitch.powi(2)))
@@ -85,6 +88,7 @@ impl<'a> Scale<'a> {
     /// Returns how hard a recoating blade drags on an island's largest floating area, in
     /// millinewtons, given the shear stress on what it passes in pascals (002 section 4.2.2).
     pub fn drag_mn(&self, island: &Island, shear_pa: Option<f64>) -> Option<f64> {
+        // A pascal on a square millimeter is a micronewton.
         Some(self.area_mm2(island.largest_area)? * shear_pa? / 1000.0)
     }
 }

@@ -28,6 +28,7 @@ pub(super) fn divided(runs: &Runs, hold: f64, least: f64, most: usize) -> Option
         let in_rows = runs.iter().filter(|(row, _)| cell.0.contains(row));
         let clipped =
             in_rows.map(|(row, run)| (*row, run.start.max(cell.1.start)..run.end.min(cell.1.end)));
+        // Clipping leaves an empty or a reversed range of a run outside the cell.
         clipped.filter(|(_, run)| !run.is_empty()).collect()
     };
     let grid = down.iter().flat_map(|rows| across.iter().map(move |columns| (rows, columns)));
@@ -47,6 +48,7 @@ fn bounds(ranges: impl Iterator<Item = Range<u32>>) -> Range<u32> {
 /// Divides a range evenly into parts up to `hold` long, if they are not too many.
 fn cells(range: &Range<u32>, hold: f64, most: usize) -> Option<Vec<Range<u32>>> {
     let length = u64::from(range.end - range.start);
+    // A cell is never narrower than a pixel.
     let count = (length as f64 / hold).ceil().clamp(1.0, length.max(1) as f64) as u64;
     let at = |k: u64| range.start + (length * k / count) as u32;
     (count <= most as u64).then(|| (0..count).map(|k| at(k)..at(k + 1)).collect())
@@ -60,6 +62,7 @@ fn piece(runs: &Runs) -> Piece {
     let y = runs.iter().map(|(row, run)| (f64::from(*row) + 0.5) * count(run));
     let y = y.sum::<f64>() / area as f64;
     let pixel = [x, y].map(|place| place as u32);
+    // The centroid of a ring or a hook may be outside of it.
     if runs.iter().any(|(row, run)| *row == pixel[1] && run.contains(&pixel[0])) {
         return Piece { area, middle: [x, y] };
     }

@@ -85,6 +85,7 @@ impl Surroundings<'_> {
             let [x, y] = self.raster.place_mm([column, row].map(|place| f64::from(place) + 0.5));
             dot(sub([x, y, middle.mm()], contact.at_mm), contact.normal)
         };
+        // Along a run the distance from a plane is linear, so the ends have the extremes.
         let ends =
             |row: u32, run: &Range<u32>| [outside(run.start, row), outside(run.end - 1, row)];
         for (row, run) in section {
@@ -122,11 +123,13 @@ impl Surroundings<'_> {
             let mut held: Vec<_> = self.window.white_in(number - 1, *row, run).collect();
             held.extend(self.window.white_in(number, *row, run));
             held.extend(overlaps(below, *row, run));
+            // White of both layers and the strut may overlap, and counts once.
             let held = covered(held);
             of_component = if is_joined { of_component + held } else { held };
             resting += held;
             all += run.end - run.start;
         }
+        // A section between pixel centers has no pixels that could rest on others.
         let is_steady = section.is_empty() || (of_component > 0 && 2 * resting >= all);
         if is_steady { Ok(()) } else { Err(Rejection::Unsteady) }
     }
@@ -157,6 +160,7 @@ pub(super) fn distance_mm([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
     let (u, v, w) = (sub(b, a), sub(d, c), sub(a, c));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
     let crossed = uu * vv - uv * uv;
+    // Parallel lines are equally far apart everywhere, so any point will do.
     let s = if crossed > 0.0 { ((uv * vw - vv * uw) / crossed).clamp(0.0, 1.0) } else { 0.0 };
     let t = (uv * s + vw) / vv;
     // The point of one axis that is nearest to the other's line may be past its end.

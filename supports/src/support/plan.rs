@@ -63,6 +63,7 @@ pub fn plan_supports<E: From<SupportError>>(
     for (number, layer) in (0..).zip(layers) {
         let Some(next) = islands.get(plans.len()) else { break };
         let mask = layer?.image.into_image().into_mask(options.threshold);
+        // One layer below the lowest stays, for the lowest section may rest on it.
         window.forget_below(planner.lowest(next).saturating_sub(1));
         for island in &islands[plans.len()..] {
             if island.layer != number {
@@ -70,6 +71,7 @@ pub fn plan_supports<E: From<SupportError>>(
             }
             plans.push(planner.plan(island, &window, &mask)?);
         }
+        // Added after planning: supports of an island rest on the layers below its own.
         window.push(&mask, regions[number as usize].as_ref());
     }
     if plans.len() == islands.len() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
@@ -122,6 +124,7 @@ impl<'a> Planner<'a> {
         let (radius, length) = (self.options.radius.mm(), self.options.max_length.mm());
         let (sin, _) = self.options.max_tilt.to_radians().sin_cos();
         let length = length + MOST_RADII * radius;
+        // The greatest tilt reaches farthest to the side, straight down reaches deepest.
         [length * sin + radius, length + radius]
     }
 
@@ -179,6 +182,7 @@ impl<'a> Planner<'a> {
         let [hold, radius] =
             [self.options.hold, self.options.radius].map(|length| length.pixels(self.raster.dpi));
         let most = MOST_SUPPORTS - self.built.len();
+        // Pieces are connected: one smaller than the section of a strut needs none of its own.
         let pieces =
             divided(&runs, hold, PI * radius * radius, most).ok_or(SupportError::TooMany)?;
         let mut places = Vec::new();
@@ -194,6 +198,7 @@ impl<'a> Planner<'a> {
     /// Returns the surface that supports of an island may meet.
     fn near(&self, island: &Island) -> NearSurface {
         let [aside, down] = self.reach_mm();
+        // Creases count up to the clearance beyond a contact.
         let more = aside + self.options.edge_clearance.mm();
         let Region { columns, rows } = &island.region;
         let [left, top] = self.raster.place_mm([columns.start.into(), rows.start.into()]);
@@ -219,6 +224,7 @@ impl<'a> Planner<'a> {
         let mut supports: Vec<Support> = tried.into_iter().filter_map(Result::ok).collect();
         supports.sort_by(by_length);
         supports.truncate(self.options.keep.max(1));
+        // Only the support to build is turned, as each turn tries six struts in the images.
         if let Some(shortest) = supports.first_mut() {
             self.shorten(shortest, near, around);
         }
@@ -228,6 +234,7 @@ impl<'a> Planner<'a> {
     /// Turns a support in ever smaller steps, beginning with half the angle between directions, as
     /// long as a turn makes it shorter.
     fn shorten(&self, support: &mut Support, near: &NearSurface, around: &Surroundings<'_>) {
+        // A direction's share of the solid angle, 2π (1 - cos), is about a step squared.
         let cone = 2.0 * PI * (1.0 - self.options.max_tilt.to_radians().cos());
         let mut step = (cone / self.directions.len() as f64).sqrt() / 2.0;
         while step > LEAST_STEP {
@@ -251,6 +258,7 @@ impl<'a> Planner<'a> {
         around: &Surroundings<'_>,
     ) -> Result<Support, Rejection> {
         let options = self.options;
+        // The costly check, in the images, comes last.
         let contact = near.entered(origin_mm, direction).ok_or(Rejection::Far)?;
         if contact.length_mm > options.max_length.mm() {
             return Err(Rejection::Far);
@@ -263,6 +271,7 @@ impl<'a> Planner<'a> {
             return Err(Rejection::Curved);
         }
         let apart = |other: &[Vec3; 2]| distance_mm(*other, [origin_mm, contact.at_mm]);
+        // A pixel between struts keeps them apart in the images, too.
         let least = 2.0 * options.radius.mm() + self.raster.dpi.pitch().mm();
         if self.built.iter().any(|other| apart(other) < least) {
             return Err(Rejection::Crossing);
@@ -295,6 +304,7 @@ fn direction_of(support: &Support) -> Vec3 {
 fn ends(origin: Vec3, direction: Vec3, contact: &Contact, radius_mm: f64) -> [[Length; 3]; 2] {
     // The tangent of the angle between the axis and a plane's normal.
     let slope = |cosine: f64| (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+    // A disc that is tilted against a plane passes it by its radius times this along the axis.
     let above = slope(-direction[2]).min(MOST_RADII);
     let beyond = slope(-dot(direction, contact.normal)).clamp(1.0, MOST_RADII);
     let from = along(origin, direction, -radius_mm * above);

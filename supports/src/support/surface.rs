@@ -19,10 +19,12 @@ pub struct Surface {
 impl Surface {
     /// Takes the facets of a part. All facets are needed to decide which side is inside.
     pub fn new(facets: FacetIndex) -> Self {
+        // Far from the origin, rounding would drown the differences that make the volume.
         let middle = facets.min();
         let mut volume = 0.0;
         facets.for_each(|facet, _| {
             let [a, b, c] = facet.map(|corner| sub(corner, middle));
+            // Six times the volume of a tetrahedron; the sum is negative if facets are clockwise.
             volume += dot(a, cross(b, c));
         });
         Self { facets, is_turned: volume < 0.0 }
@@ -30,6 +32,7 @@ impl Surface {
 
     /// Returns the surface in a box.
     pub(super) fn near(&self, low: Vec3, high: Vec3) -> NearSurface {
+        // The index has heights in micrometers, all else is in millimeters.
         let found = self.facets.between(low[2] * 1000.0, high[2] * 1000.0);
         let facets = found.iter().map(|(facet, _)| self.corners(facet));
         NearSurface::new(facets.filter_map(NearFacet::new), &AABB::from_corners(low, high))
@@ -90,12 +93,14 @@ impl NearFacet {
     fn entered(&self, origin: Vec3, direction: Vec3) -> Option<f64> {
         let [a, b, c] = self.corners.map(|corner| sub(corner, origin));
         let facing = dot(self.normal, direction);
+        // The ray leaves the part here, or passes along the facet.
         if facing >= 0.0 {
             return None;
         }
         // The ray passes on the same side of all three sides (Möller and Trumbore).
         let sides = [(a, b), (b, c), (c, a)];
         let is_met = sides.iter().all(|&(a, b)| dot(cross(a, b), direction) <= 0.0);
+        // Where the ray meets the plane: normal · (far direction) = normal · a.
         let far = dot(self.normal, a) / facing;
         (is_met && far > 0.0).then_some(far)
     }
@@ -185,6 +190,7 @@ fn key(facet: &NearFacet, side: usize) -> [[u64; 3]; 2] {
 ///
 /// Where facets stand for a curve, each turns against the next by its width times the curvature.
 fn turn((a, of_a): (&NearFacet, usize), (b, of_b): (&NearFacet, usize)) -> Turn {
+    // Exact for small angles, unlike the arc cosine.
     let angle = length(cross(a.normal, b.normal)).atan2(dot(a.normal, b.normal));
     let width = f64::midpoint(a.height(of_a), b.height(of_b));
     if angle > CREASE { Turn::Crease } else { Turn::Smooth(angle / width) }
@@ -199,9 +205,11 @@ struct Ray {
 impl SelectionFunction<NearFacet> for Ray {
     fn should_unpack_parent(&self, envelope: &AABB<Vec3>) -> bool {
         let (low, high) = (envelope.lower(), envelope.upper());
+        // The ray must be between all three pairs of planes at once (Kay and Kajiya 1986).
         let (mut from, mut to) = (0.0f64, f64::INFINITY);
         for k in 0..3 {
             let (start, along) = (self.origin[k], self.direction[k]);
+            // 0 / 0 would be NaN where the ray starts on a plane of the box.
             if along == 0.0 {
                 if start < low[k] || start > high[k] {
                     return false;

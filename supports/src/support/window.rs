@@ -53,6 +53,7 @@ impl Window {
     /// Adds the next layer, or nothing of it.
     pub(super) fn push(&mut self, mask: &Mask, region: Option<&Region>) {
         let nothing = Region { columns: 0..0, rows: 0..0 };
+        // Even an empty layer takes its place, for layers are found by their number.
         let region = region.cloned().unwrap_or(nothing);
         let mask = mask.framed(Frame {
             left: region.columns.start.into(),
