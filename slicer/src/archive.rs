@@ -32,6 +32,7 @@ pub(crate) fn not_three_mf(file: &PartFile, error: ThreeMfError) -> SliceError {
     };
     let names = archive.file_names().filter_map(Result::ok);
     let names: Vec<String> = names.map(|name| name.to_ascii_lowercase()).collect();
+    // Folders have entries of their own.
     let names: Vec<&String> = names.iter().filter(|name| !name.ends_with('/')).collect();
     let find = |end: &str| names.iter().find(|name| name.ends_with(end));
     if let Some((_, format)) = NAMES.iter().find(|(end, _)| find(end).is_some()) {

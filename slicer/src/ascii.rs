@@ -44,6 +44,7 @@ enum Keyword {
 impl Keyword {
     #[inline]
     fn of(word: &[u8]) -> Option<Self> {
+        // No keyword has more than 8 letters. Longer words end here.
         let mut lower = [0; 8];
         let lower = lower.get_mut(..word.len())?;
         lower.copy_from_slice(word);
@@ -102,6 +103,7 @@ impl<R: Read> AsciiReader<R> {
                 Some(Keyword::EndSolid) => self.end_solid()?,
                 Some(Keyword::End) => match self.next_keyword()? {
                     Some(Keyword::Solid) => self.end_solid()?,
+                    // The file was cut off within `end solid`, after its last facet.
                     _ if self.words.word().is_empty() => {}
                     _ => return Err(self.unexpected("`facet` or `endsolid`")),
                 },
@@ -157,6 +159,7 @@ impl<R: Read> AsciiReader<R> {
                 self.words.hold();
                 break;
             }
+            // A name may hold the word `facet`. Only the word after it shows where a facet begins.
             if Keyword::of(self.words.word()) != Some(Keyword::Facet) {
                 continue;
             }
@@ -262,6 +265,7 @@ impl<R: Read> AsciiReader<R> {
             return Ok(());
         }
         let word = self.words.word();
+        // Some names follow `solid` without a space.
         if begins_with(word, b"solid") {
             return self.solid();
         }
@@ -274,6 +278,7 @@ impl<R: Read> AsciiReader<R> {
         if is_property(word) {
             return self.property();
         }
+        // A file cut off within `facet` lacks a facet; one cut off within `endsolid` lacks nothing.
         if self.words.ends_text() && b"facet".starts_with(&word.to_ascii_lowercase()) {
             return Err(self.failed(AsciiFault::CutOff));
         }

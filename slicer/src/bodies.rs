@@ -69,7 +69,9 @@ impl Turn {
     /// Creates a step about a body; `winding` is +1 or -1.
     #[inline]
     pub fn new(body: u32, winding: i32) -> Self {
+        // Bodies are far fewer than 2^31, so a bit is left for the sign.
         let number = body as i32;
+        // `!number` and not `-number`: body 0 has a sign too.
         Self(if winding < 0 { !number } else { number })
     }
 
@@ -112,12 +114,15 @@ impl From<Fill> for FillRule {
 impl FillRule {
     /// Creates the rule for the bodies of a part, file by file.
     pub(crate) fn new(fill: Fill, bodies: Bodies, rules: Vec<BodyRule>) -> Self {
+        // A single body needs no numbers, so its crossings take half the memory.
         if let [rule] = &rules[..]
             && !rule.is_cutter()
         {
             return fill.into();
         }
+        // Most parts only unite. Then any body decides, without a look at the others.
         let is_union = fill == Fill::Solid && !rules.iter().any(BodyRule::is_cutter);
+        // The bodies of an intersecting file unite first, so files count.
         let files = rules.chunk_by(|a, b| a.file == b.file);
         let intersections = files.filter(|bodies| bodies[0].join == Join::Intersect).count();
         Self { fill, bodies, rules, is_union, intersections, is_mirrored: false }
@@ -190,6 +195,7 @@ impl FillRule {
         let is_alike = |(a, rule): (u32, &BodyRule), (b, other): (u32, &BodyRule)| {
             rule.file == other.file && (a == b || self.bodies == Bodies::Unite)
         };
+        // Few bodies hold a point, so comparing pairs is cheaper than collecting them.
         let units = |join: Join| {
             let firsts = of(join).enumerate();
             firsts.filter(move |&(k, body)| of(join).take(k).all(|other| !is_alike(body, other)))
@@ -239,6 +245,7 @@ impl<'a> Position<'a> {
         self.winding = 0;
         self.windings.clear();
         self.unsigned.clear();
+        // Even-odd needs no signs.
         if self.rule.fill == Fill::EvenOdd {
             return;
         }
@@ -277,6 +284,8 @@ impl<'a> Position<'a> {
             Some(at) => {
                 self.windings[at].1 += winding;
                 if self.windings[at].1 == 0 {
+                    // The list stays as short as the number of bodies around the point. Its order
+                    // has no meaning.
                     self.windings.swap_remove(at);
                 }
             }
@@ -436,6 +445,7 @@ impl SharedVolumes {
         };
         let cutters = rule.rules.iter().filter(|of| of.join != Join::Unite).map(|of| of.file);
         let mut idle: Vec<_> = cutters.filter(|&file| !cuts(file)).collect();
+        // Bodies of one file follow each other.
         idle.dedup();
         idle
     }

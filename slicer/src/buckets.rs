@@ -56,6 +56,7 @@ impl Buckets {
         let order = BucketOrder::new(planes, reach_um, slabs);
         let count = order.per_slab * slabs.len();
         // As many workers as there is memory for their chunks.
+        // Chunks have 4 kB at least: smaller ones scatter a slab's facets all over the file.
         let workers = (memory / (count << 12)).clamp(1, rayon::current_num_threads());
         let chunk_bytes = (memory / (workers * count)).clamp(1 << 12, 1 << 18);
         let file = tempfile::tempfile()?;
@@ -67,15 +68,18 @@ impl Buckets {
             let mut gathered: Vec<_> =
                 (0..count).map(|_| Vec::with_capacity(chunk_bytes)).collect();
             let piece = |block: usize| model.model.place_of(block).0;
+            // A chunk's piece gives its facets their transform and body.
             for blocks in blocks.chunk_by(|&a, &b| piece(a) == piece(b)) {
                 let piece = piece(blocks[0]);
                 let transform = model.transform_of(piece);
                 let write = |bucket, records: &mut _| write(&writer, bucket, records, piece);
                 for &block in blocks {
+                    // The closure cannot end the loop, so the first error waits for its end.
                     let mut result = Ok(());
                     model.model.for_each_in_block(block, |facet| {
                         order.for_each_bucket(&transform.placed(facet), piece as u32, |bucket| {
                             let records = &mut gathered[bucket];
+                            // As in the file: placed corners would take twice the room.
                             records.extend_from_slice(&record(facet));
                             if records.len() + RECORD_BYTES > chunk_bytes && result.is_ok() {
                                 result = write(bucket, records);
@@ -131,6 +135,7 @@ impl<'a> BucketOrder<'a> {
     fn for_each_bucket(&self, facet: &PlacedFacet, body: u32, mut each: impl FnMut(usize)) {
         let (low, high) = facet_heights(facet);
         let planes = self.planes.of_body(body);
+        // Gray layers also need the facets below their sections.
         let met = match self.reach_um > 0.0 {
             true => planes.near(low, high + self.reach_um),
             false => planes.between(low, high),
@@ -141,6 +146,7 @@ impl<'a> BucketOrder<'a> {
             return;
         }
         each(bucket);
+        // A facet that begins below a slab counts to the slab's first bucket.
         let slabs_above = self.slabs.iter().enumerate().skip(bucket / self.per_slab + 1);
         let met_above = slabs_above.take_while(|(_, layers)| layers.start < met.end);
         met_above.for_each(|(slab, _)| each(slab * self.per_slab));

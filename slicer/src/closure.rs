@@ -44,6 +44,8 @@ impl RowSums {
     /// Adds an end of a segment. Ends with different salts are different points.
     #[inline]
     pub(crate) fn add(&self, row: u32, point: [f64; 2], salt: u64) {
+        // Exclusive or gives the same sum in any order, and sums are read after all workers have
+        // ended.
         self.0[row as usize].fetch_xor(hash(point, salt), Relaxed);
     }
 

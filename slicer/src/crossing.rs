@@ -15,6 +15,7 @@ pub(crate) struct Crossing(u64);
 impl Crossing {
     #[inline]
     fn new(row: u32, column: u32, rising: bool) -> Self {
+        // Columns are at most 2^24, so column and direction fit in the lower half.
         Self(u64::from(row) << 32 | u64::from(column) << 1 | u64::from(rising))
     }
 
@@ -54,6 +55,7 @@ impl ShortCrossing {
 
     #[inline]
     pub(crate) fn new(crossing: Crossing) -> Self {
+        // Where `hold` is true, column and direction are below bit 16, to which the row moves.
         Self((crossing.0 >> 16) as u32 | crossing.0 as u32)
     }
 

@@ -52,6 +52,7 @@ impl Cutter<'_> {
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
+        // The number of crossings that take as much memory as one segment.
         const AS_MUCH: usize = size_of::<RowSegment>() / size_of::<Crossing>();
         let mut count = 0;
         let salt = self.rule.salt(body);
@@ -128,6 +129,7 @@ impl Cutter<'_> {
         let long = [low, high];
         let short = [[low, middle], [middle, high]];
         let second_z = sorted.corners[1][Z];
+        // Most facets meet a single plane, where one comparison replaces the search.
         let second = match met.len() {
             1 => met.start + usize::from(self.planes.side_um(met.start) <= second_z),
             _ => self.planes.at_or_below(second_z),
@@ -152,6 +154,7 @@ impl Cutter<'_> {
         let rising = down != is_reversed;
         let (first, end) = (self.first_row(upper), self.first_row(lower));
         (first < end).then(|| {
+            // A row is between the ends, so they differ along y.
             let columns_per_row = (lower[0] - upper[0]) / (lower[1] - upper[1]);
             RowSegment::new(upper, columns_per_row, first..end, rising)
         })

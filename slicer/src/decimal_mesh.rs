@@ -55,6 +55,7 @@ impl DecimalMesh {
         }
         let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         std::array::from_fn(|axis| {
+            // Below zero if the mesh surrounds the origin.
             let nearest = low[axis].max(-high[axis]);
             if nearest.is_finite() && nearest > FAR * size { low[axis] } else { 0.0 }
         })

@@ -279,6 +279,7 @@ pub enum SliceError {
 }
 
 fn where_count_is_wrong(declared: u32, size: u64) -> String {
+    // A header of 84 bytes, and 50 for each facet.
     let held = size.saturating_sub(84) / 50;
     if held < u64::from(declared) {
         format!("it was cut off after facet {held}")

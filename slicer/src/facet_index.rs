@@ -57,6 +57,7 @@ impl HeightBins {
         let height_um = 2.0 * survey.mean_height_um();
         let count = if height_um > 0.0 { (end_um - start_um) / height_um } else { 1.0 };
         let count = count.clamp(1.0, MAX_BINS).ceil();
+        // A flat part has no height to divide by.
         let height_um = ((end_um - start_um) / count).max(f64::MIN_POSITIVE);
         Self { start_um, height_um, count: count as usize }
     }
@@ -64,6 +65,7 @@ impl HeightBins {
     /// Returns the bin of a height; heights outside get the first or the last bin.
     #[inline]
     fn of(&self, z_um: f64) -> usize {
+        // Casts saturate: heights below the first bin become 0.
         (((z_um - self.start_um) / self.height_um) as usize).min(self.count - 1)
     }
 
@@ -94,6 +96,7 @@ impl FacetIndex {
         let bins = HeightBins::new(&survey);
         let (mut facets, mut from_below) = (KeyCounts::new(bins.count), KeyCounts::new(bins.count));
         let blocks = 0..model.model.block_count();
+        // Counted first and put afterward, so that bins need no lists that grow.
         for block in blocks.clone() {
             model.for_each_in_block(block, |facet| {
                 let met = bins.of_facet(facet);

@@ -82,6 +82,7 @@ impl FileLooks {
         let in_facets = |at: u64| at.saturating_sub(HEADER_BYTES) as usize;
         let byte_of = |facet: usize| HEADER_BYTES + (facet * FACET_BYTES) as u64;
         let end = start + bytes.len() as u64;
+        // A facet belongs to the bytes in which it begins, so each is examined once.
         let begun = in_facets(end).div_ceil(FACET_BYTES).min(self.count);
         let ended = (in_facets(end) / FACET_BYTES).min(self.count);
         let mut first = in_facets(start).div_ceil(FACET_BYTES);
@@ -107,6 +108,7 @@ impl FileLooks {
     /// Returns the file's blocks, once all bytes have passed.
     pub(crate) fn blocks(self) -> Vec<FileBlock> {
         let mut looks = self.looks.into_inner().expect("no thread panics");
+        // In the file's order: rounded sums must not depend on threads.
         looks.sort_unstable_by_key(|(first, _)| *first);
         let of_block = |looks: &[(usize, FileBlock)]| {
             looks.iter().map(|(_, block)| *block).reduce(FileBlock::joined).expect("none is empty")

@@ -72,6 +72,7 @@ impl PixelGrid {
     /// # Errors
     /// Returns an error if a side is not between 1 and 2^24 pixels.
     pub fn at(origin_mm: [f64; 2], width: f64, height: f64, dpi: Dpi) -> Result<Self, SliceError> {
+        // No range contains `NaN`.
         let allowed = 1.0..=f64::from(MAX_SIDE);
         if !allowed.contains(&width) || !allowed.contains(&height) {
             return Err(SliceError::TooLarge { width, height });
@@ -116,6 +117,7 @@ impl PixelGrid {
 
 /// Returns the pixels in 127 mm, five times the dpi: whole for whole resolutions.
 fn pixels_per_127_mm(dpi: Dpi) -> f64 {
+    // 25.4 mm has no exact binary fraction. Five times as much, 127 mm, is a whole number.
     dpi.get() * 5.0
 }
 

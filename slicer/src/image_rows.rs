@@ -83,6 +83,7 @@ pub(crate) fn make_rows<M: RowMaker, C: InRow>(
 fn sort<T: Copy + Ord>(items: &mut [T]) {
     match items {
         [a, b] => in_order(a, b),
+        // The sorting network of four items with the fewest comparisons, five.
         [a, b, c, d] => {
             in_order(a, b);
             in_order(c, d);
@@ -103,6 +104,7 @@ fn in_order<T: Copy + Ord>(a: &mut T, b: &mut T) {
 /// Sorts the items of a row: few by insertion, without a call.
 #[inline]
 pub(crate) fn sort_by<T: Copy>(items: &mut [T], order: impl Fn(&T, &T) -> Ordering) {
+    // Insertion takes time in proportion to the square of their number.
     if items.len() > 16 {
         return items.sort_unstable_by(order);
     }
@@ -128,6 +130,7 @@ pub(crate) fn even_odd(places: &[RowCrossing], transitions: &mut Vec<u32>) -> bo
         return places.len().is_multiple_of(2);
     }
     for place in places {
+        // Before `start` are the transitions of the row above.
         if transitions.len() > start && transitions.last() == Some(&place.column()) {
             transitions.pop();
         } else {
@@ -185,6 +188,7 @@ fn wound(
             winding += place.winding();
             rest = others;
         }
+        // `outward` is the winding within a single clean shell, where there is no doubt.
         if before != 0 && before != outward {
             doubts.add(outward * before, here - column);
         }
@@ -198,6 +202,7 @@ fn wound(
     }
     transitions.truncate(start);
     let is_even = even_odd(places, transitions);
+    // Without a sum of zero, signs mean nothing. An odd row is a stray row, not a doubt.
     *doubts = Doubts { unsigned_rows: u64::from(is_even), ..Doubts::default() };
     is_even
 }
@@ -218,6 +223,7 @@ pub(crate) fn by_body(
         let here = group[0].column();
         shared.add(position, here - column);
         for &(body, winding) in position.windings() {
+            // Cutters may face either way.
             let is_doubtful = winding != outward && !position.is_cut_out(body);
             if is_doubtful && !position.unsigned().contains(&body) {
                 let doubts = doubts.of_bodies.entry(body).or_default();

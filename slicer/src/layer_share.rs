@@ -41,6 +41,7 @@ impl LayerShare {
     /// Returns the list of crossings, ready to add the crossings of a body.
     #[inline]
     pub(crate) fn of_body(&mut self, body: u32) -> &mut Vec<Crossing> {
+        // Facets of a body follow each other, so one entry stands for many crossings.
         if self.bodies.last().map_or(0, |&(_, last)| last) != body {
             self.bodies.push((self.crossings.len() as u32, body));
         }

@@ -81,6 +81,7 @@ impl<R: Read> ObjReader<R> {
             let failed = |fault| SliceError::Obj { line, fault };
             match self.words.word() {
                 [b'v' | b'V'] => self.vertex()?.map_err(failed)?,
+                // `fo` is an obsolete form of `f`.
                 [b'f' | b'F'] | b"fo" => self.face()?.map_err(failed)?,
                 [b'#', ..] => self.words.skip_line()?,
                 _ => self.other_line()?.map_err(failed)?,
@@ -102,6 +103,7 @@ impl<R: Read> ObjReader<R> {
     /// at its end.
     #[inline]
     fn advance(&mut self) -> io::Result<bool> {
+        // A `\` may also follow the last word of a line without a space.
         let continues = u64::from(self.words.word().ends_with(b"\\"));
         let mut line = self.words.line() + continues;
         loop {
@@ -224,6 +226,7 @@ fn vertex_number(corner: &[u8]) -> Option<i64> {
     let (length, number) = digits.fold((0, 0), |(length, number): (usize, i64), digit| {
         (length + 1, number.wrapping_mul(10).wrapping_add(i64::from(digit - b'0')))
     });
+    // 18 digits always fit in 64 bits. A longer product may have wrapped.
     if (1..=18).contains(&length) && matches!(corner.get(length), None | Some(b'/')) {
         return Some(number);
     }

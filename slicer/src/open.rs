@@ -172,6 +172,7 @@ fn unpacked(
 ) -> Result<Contents, SliceError> {
     let of_one = |piece, notes| Contents { pieces: vec![piece], notes };
     let format = FileFormat::of_start(start, Some(file.size()));
+    // A binary STL may hold any bytes, even the bytes of a package.
     let is_counted = format == Some(FileFormat::Part(PartFormat::BinaryStl));
     if !is_counted && looks_packaged(file, start)? {
         return three_mf::read(file).map_err(|error| not_three_mf(file, error));
@@ -192,6 +193,7 @@ fn unpacked(
             let (facets, notes) = ascii::read(|| file.reader())?;
             Ok(of_facets(Facets::Memory(Arc::new(facets)), notes))
         }
+        // Unknown bytes may be an STL with a wrong count, which `stl::open` names or mends.
         Some(FileFormat::Part(PartFormat::BinaryStl)) | None => {
             let (facets, notes) = stl::open(file, start)?;
             Ok(of_facets(facets, notes))
@@ -235,6 +237,7 @@ pub fn read_step(bytes: Arc<[u8]>, options: &OpenOptions) -> Result<Prepared, Sl
     match receiver.recv_timeout(timeout) {
         Ok(prepared) => Ok(prepared?),
         Err(RecvTimeoutError::Timeout) => Err(SliceError::Timeout { timeout, tolerance }),
+        // `prepare` catches panics of kernels, so this one is outside of it.
         Err(RecvTimeoutError::Disconnected) => {
             Err(BrepError::Panicked { doing: "reading the file", what: String::new() }.into())
         }

@@ -52,6 +52,7 @@ impl Part {
     /// Creates a part from facets in memory.
     pub fn from_facets(name: &str, facets: Vec<Facet>) -> Self {
         let numbers = facets.iter().flatten().flatten();
+        // Little-endian, so that all machines get the same digest.
         let bytes: Vec<u8> = numbers.flat_map(|number| number.to_le_bytes()).collect();
         let digest = digest_of(&bytes[..]).expect("memory can be read");
         Self::new(name, vec![Piece::new(Facets::Memory(Arc::new(facets)))], digest)
@@ -93,6 +94,7 @@ impl Part {
     /// Returns the file of a body, and the body's number there, from 0.
     pub(crate) fn body_in_file(&self, body: u32) -> (usize, usize) {
         let file = self.pieces[body as usize].file;
+        // Pieces are in the order of their files.
         let first = self.pieces.partition_point(|piece| piece.file < file);
         (file, body as usize - first)
     }
@@ -115,6 +117,7 @@ impl Part {
         let bodies = models.first().map_or_else(Bodies::default, |model| model.bodies);
         let mut pieces = Vec::new();
         for model in models {
+            // Files are numbered from 0 in each part.
             let files = pieces.last().map_or(0, |last: &Piece| last.file + 1);
             let of_model = model.pieces.into_iter();
             pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
@@ -191,6 +194,7 @@ impl Part {
 
     /// Returns the reason for an error: if reading failed, the change of a file.
     pub(crate) fn reason(&self, error: SliceError) -> SliceError {
+        // A file that changed shows as damage of any kind.
         self.check_unchanged().err().unwrap_or(error)
     }
 
@@ -202,6 +206,7 @@ impl Part {
     pub(crate) fn place_of(&self, block: usize) -> (usize, Range<usize>) {
         let piece = self.block_ends.partition_point(|&end| end <= block);
         let facets = &self.pieces[piece].facets;
+        // Added first: block numbers are unsigned, and the end is above this one.
         let in_piece = block + facets.blocks() - self.block_ends[piece];
         let start = in_piece * facets.per_block();
         (piece, start..facets.count().min(start + facets.per_block()))

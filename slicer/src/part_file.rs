@@ -171,6 +171,7 @@ impl FileState {
         let entry_time = u64::try_from(changed.0)
             .map_or(SystemTime::UNIX_EPOCH, |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s));
         let is_fresh = written.is_none_or(|time| age(time) <= CLOCK_STEP)
+            // The entry's time is cut to whole seconds.
             || age(entry_time) <= CLOCK_STEP + Duration::from_secs(1);
         Self { size: metadata.len(), written, changed, identity, is_fresh }
     }
@@ -223,6 +224,7 @@ pub(crate) fn for_each_record<const N: usize>(
     mut each: impl FnMut(&[u8; N]),
 ) -> io::Result<()> {
     let mut buffer = [0; READ_BYTES];
+    // Whole records, so that none is split between two reads.
     let at_once = (READ_BYTES / N * N) as u64;
     let mut at = range.start;
     while at < range.end {
@@ -237,6 +239,7 @@ pub(crate) fn for_each_record<const N: usize>(
 
 fn read_exact_at(file: &File, mut to: &mut [u8], mut at: u64) -> io::Result<()> {
     while !to.is_empty() {
+        // The standard library's `read_exact_at` exists only on Unix.
         match read_at(file, to, at) {
             Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(read) => {

@@ -74,6 +74,7 @@ impl Piece {
             units: Some(Units::Millimetres),
             ..Self::new(Facets::Surfaces { prepared: prepared.clone(), facets })
         };
+        // Facets are sorted by face, so a body's range of faces is a range of facets.
         let before = |face| prepared.mesh.facets.partition_point(|facet| facet.face < face);
         let bodies = prepared.kernel.bodies().iter();
         bodies.map(|body| piece(before(body.faces.start)..before(body.faces.end))).collect()
@@ -94,6 +95,7 @@ impl Piece {
         range: Range<usize>,
         mut each: impl FnMut(&Facet),
     ) -> io::Result<()> {
+        // A mirror turns facets over. Swapping two corners turns them back.
         if self.placement.is_mirror() {
             self.facets.for_each(range, |&[a, b, c]| each(&[a, c, b]))
         } else {

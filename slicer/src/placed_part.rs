@@ -41,12 +41,14 @@ impl PlacedPart {
             let units = piece.units.unwrap_or(units);
             let from_corner =
                 Placement::default().translated(piece.offset.map(|offset| offset * units.mm()));
+            // Offsets are in the file's coordinates, so they come first.
             let placement = from_corner.then(&piece.placement).then(placement);
             let transform = Transform::new(&placement, units);
             // Pieces with the same placement follow each other.
             if transforms.last() != Some(&transform) {
                 transforms.push(transform);
             }
+            // Bodies of one file share their surfaces.
             let is_of_next_file = file_before.replace(piece.file) != Some(piece.file);
             if let Some(prepared) = piece.surfaces().filter(|_| is_of_next_file) {
                 let Prepared { kernel, mesh, .. } = &**prepared;

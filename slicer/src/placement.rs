@@ -53,6 +53,7 @@ impl Placement {
     /// Turns counterclockwise, as seen from the axis's tip. Quarter turns are exact.
     #[must_use]
     pub fn rotated(mut self, axis: Axis, degrees: f64) -> Self {
+        // Sine and cosine of 90° in radians are not exactly 1 and 0.
         let quarters = (degrees / 90.0).round();
         let (mut sin, mut cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
         for _ in 0..quarters.rem_euclid(4.0) as u32 {
@@ -112,6 +113,7 @@ impl Placement {
     pub(crate) fn is_mirror(&self) -> bool {
         let [a, b, c] = self.rows;
         let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+        // The determinant is negative.
         a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1) < 0.0
     }
 

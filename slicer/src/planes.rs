@@ -115,6 +115,7 @@ enum Spacing {
 
 impl Spacing {
     fn even(thickness_um: f64) -> Self {
+        // Each facet looks its planes up, and a product is faster than a division.
         Self::Even { thickness_um, per_um: 1.0 / thickness_um }
     }
 }
@@ -131,6 +132,7 @@ impl Planes {
         tolerance: Length,
     ) -> Result<Self, SliceError> {
         let thickness_um = thickness.um();
+        // A part thinner than half a layer still gets one.
         let count = ((top_um - bottom_um) / thickness_um).round().max(1.0);
         // Negated, so that a thickness of NaN also fails.
         if !(thickness_um > 0.0 && count < MAX_LAYERS) {
@@ -168,6 +170,7 @@ impl Planes {
             let plane = match rule {
                 PlaneRule::Top => top,
                 PlaneRule::Middle => bottom + 0.5 * (top - bottom),
+                // A flat underside at the bottom itself would have no section.
                 PlaneRule::Bottom => return bottom.next_up(),
             };
             // A part that ends at the layer's bottom has its section in the layer below.
@@ -205,6 +208,7 @@ impl Planes {
     /// top and bottom may differ from the part's.
     pub(crate) fn with_bodies(mut self, bodies_um: &[[f64; 2]]) -> Self {
         let alone = self.clone();
+        // Many bodies end at the same heights. They share one copy of the planes.
         let mut numbers: HashMap<Vec<(usize, [u64; 2])>, u32> = HashMap::new();
         for &body_um in bodies_um {
             let moves = alone.moves_of(body_um);
@@ -288,6 +292,7 @@ impl Planes {
     #[inline]
     pub(crate) fn of_body(&self, body: u32) -> &Self {
         match self.own_of.get(body as usize) {
+            // Most bodies begin and end with the part's layers.
             None | Some(0) => self,
             Some(&number) => &self.own[number as usize - 1],
         }
@@ -414,6 +419,8 @@ impl Planes {
     pub(crate) fn at_or_below(&self, z_um: f64) -> usize {
         match &self.spacing {
             Spacing::Even { per_um, .. } => {
+                // A quotient of even planes is off by rounding and moved ends: the walk corrects
+                // it.
                 let guess = (z_um - self.sides_um[0]) * per_um + 1.0;
                 count_at_or_below(&self.sides_um, z_um, guess)
             }
@@ -459,6 +466,7 @@ struct PlaneBins {
 impl PlaneBins {
     /// Sorts planes, the lowest first, into bins.
     fn new(planes_um: &[f64]) -> Self {
+        // As many bins as planes, so that most bins have one plane or a few.
         let [start_um, end_um] = [planes_um[0], planes_um[planes_um.len() - 1]];
         let count = planes_um.len();
         // All planes are in one bin if they have the same height.

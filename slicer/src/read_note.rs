@@ -98,6 +98,7 @@ impl ReadNote {
         let words = notes.iter().filter(|note| matches!(note, Self::Statements { .. })).count();
         let is_known =
             |note: &Self| matches!(note, Self::Statements { word, .. } if *word == quoted);
+        // A damaged text has a new word in each line, and its notes would fill screens.
         if words >= MAX_WORDS && !notes.iter().any(is_known) {
             quoted.clear();
         }

@@ -24,10 +24,12 @@ pub fn ceil_clamped(value: f64, max: u32) -> u32 {
     // nearest. Casts and `f64::ceil` take several times as long.
     const WHOLE: f64 = (1u64 << 52) as f64;
     let max = f64::from(max);
+    // No comparison holds for `NaN`, so it becomes 0.
     let value = if value > 0.0 { value } else { 0.0 };
     let value = if value < max { value } else { max };
     let moved = value + WHOLE;
     let nearest = moved - WHOLE;
+    // The lowest bits of 2^52 + n are n.
     (moved.to_bits() as u32).wrapping_add(u32::from(nearest < value))
 }
 
@@ -63,6 +65,7 @@ impl<const ALONG: usize> SortedFacet<ALONG> {
         // A table is used because facets come in any order, so a processor could not predict
         // branches.
         const ORDERS: [([u8; 3], bool); 8] = {
+            // Bits 0b011 and 0b100 contradict themselves.
             let impossible = ([0, 1, 2], false);
             let mut orders = [impossible; 8];
             orders[0b001] = ([1, 0, 2], true);
@@ -124,6 +127,7 @@ impl<const ALONG: usize> FacetEdge<ALONG> {
     /// Joins two corners, the lesser one first.
     #[inline]
     pub(crate) fn new(from: [f64; 3], to: [f64; 3]) -> Self {
+        // Only edges that a line crosses get here, so the length is above zero.
         let length = to[ALONG] - from[ALONG];
         Self { from, to, slopes: Self::ACROSS.map(|axis| (to[axis] - from[axis]) / length) }
     }
@@ -189,6 +193,7 @@ impl RowFacet {
             }
         }
         let Range { start, end } = self.rows();
+        // A thousandth of a row is far more than rounding.
         ceil_clamped(first - 1e-3, end).max(start)..ceil_clamped(last + 1e-3, end)
     }
 

@@ -45,6 +45,7 @@ pub type Inside = Vec<[f64; 2]>;
 /// many rows.
 pub fn section(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError> {
     let part = model.clone();
+    // A change of the file explains any other error.
     let rows = rows(model, options).map_err(|error| part.reason(error))?;
     part.check_unchanged()?;
     Ok(rows)
@@ -58,6 +59,7 @@ fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError
             crossings.push((row, cutter.grid.to_mm(column, 0.0)[0], turn));
         });
     })?;
+    // All fields count, so that the order of threads has no effect.
     crossings.par_sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut rows = vec![Inside::new(); options.rows as usize];
     let mut position = Position::outside(&cut.rule);
@@ -81,6 +83,7 @@ impl CutPart {
         let model = PlacedPart::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
         survey.check_extent(&model)?;
+        // One column is enough: crossings keep their x, and only rows are counted.
         let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
         let rule = model.model.fill_rule(options.fill);
         Ok(Self { model, survey, grid, planes: Planes::one(options.z, PLANE_TOLERANCE), rule })

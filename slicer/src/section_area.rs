@@ -75,6 +75,7 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
     })?;
     sides.sort_by(|a, b| {
         let by_ends = a.rows.cmp(&b.rows).then(a.turn.cmp(&b.turn));
+        // The survey has refused coordinates that are not finite.
         by_ends.then(a.x_mm.partial_cmp(&b.x_mm).expect("coordinates are numbers"))
     });
     let mut position = Position::outside(&cut.rule);
@@ -115,6 +116,7 @@ fn cut_between(
     let ends = |side: &&Side| ([lines.start, lines.end].map(|line| side.x_at(line)), side.turn);
     let mut cut: Vec<([f64; 2], Turn)> = sides.iter().map(ends).collect();
     cut.sort_by(|([a, b], s), ([c, d], t)| (a + b).total_cmp(&(c + d)).then(s.cmp(t)));
+    // Sides that end in one point differ there by rounding.
     let tie_mm = 1e-9;
     let is_crossed = |pair: &[([f64; 2], Turn)]| {
         let [a, b] = [pair[0].0, pair[1].0];

@@ -189,6 +189,7 @@ impl Slices {
         let model = PlacedPart::new(model, &options.placement, options.units);
         let survey = Survey::of(&model)?;
         survey.check_extent(&model)?;
+        // After the survey, so that polishing changes neither the layers nor the size of images.
         let model = if options.polish { model } else { model.on_facets() };
         model.surfaces().iter().for_each(PlacedSurfaces::examine);
         let rule = model.model.fill_rule(options.fill).placed(&options.placement);
@@ -203,6 +204,7 @@ impl Slices {
             }
         };
         let planes = match model.model.pieces() {
+            // The only body's ends are the part's.
             [_] => planes,
             _ => planes.with_bodies(&survey.heights_of_bodies(&model)),
         };
@@ -310,6 +312,7 @@ impl Slices {
         let below = reach_um.unwrap_or(0.0);
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
+        // A single layer cannot become smaller, so it has no limit.
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
         let Made { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
@@ -385,6 +388,7 @@ impl Slices {
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
         let gray = self.shading.reach_um();
         let reach_um = gray.unwrap_or(0.0);
+        // The table forgets its counts when it is filled.
         self.polished = self.polished.joined(self.table.polished());
         loop {
             let layers = start..end;
@@ -443,7 +447,9 @@ impl Slices {
         let layer = |layer| self.image_of(layer, &self.table, cutter, &self.open_rows);
         let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
         let mut new_depths = Vec::new();
+        // One after another: rounded sums depend on the order.
         for (index, Made { layer, depths, shared, doubts }) in batch.zip(made) {
+            // Layers around the wanted ones only give light, or have undersides.
             if self.wanted.contains(&index) {
                 let pitch_mm = self.grid.dpi.pitch().mm();
                 let pixel_mm3 = pitch_mm * pitch_mm * self.planes.thickness_um(index) / 1000.0;
@@ -478,6 +484,7 @@ impl Slices {
         choose(light, &self.columns, first, &mut self.waiting.make_contiguous()[..count]);
         self.ready.extend(self.waiting.drain(..count));
         if first + count < self.wanted.end {
+            // Waiting layers look no deeper, so memory is bounded.
             self.columns.forget_below(light.first_below(first + count));
         }
     }
@@ -514,6 +521,7 @@ impl Slices {
     fn batch_len(&self) -> usize {
         let row_offsets = size_of::<u32>() * self.grid.height as usize;
         let table = size_of::<Crossing>() * self.max_crossings;
+        // Several layers for each thread, as some take longer than others.
         let max = (table / row_offsets).clamp(1, 16 * rayon::current_num_threads());
         // In the worst case, all gray pixels differ.
         let mut room = table / size_of::<LevelChange>();
@@ -552,11 +560,14 @@ impl Iterator for Slices {
         while self.ready.is_empty() {
             if self.pending.is_empty() {
                 if self.pending.end == self.cut.end {
+                    // Layers of a file that was changed are worthless, so an error follows the last
+                    // of them.
                     let is_checked = std::mem::replace(&mut self.is_checked, true);
                     let change = || self.model.model.check_unchanged().err();
                     return if is_checked { None } else { change().map(Err) };
                 }
                 if let Err(error) = self.fill_slab() {
+                    // Further layers would hide that some are missing.
                     self.pending = self.cut.end..self.cut.end;
                     self.is_checked = true;
                     return Some(Err(self.model.model.reason(error)));

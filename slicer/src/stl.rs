@@ -47,6 +47,8 @@ pub(crate) fn open(
     let held = (size - HEADER_BYTES) / FACET_BYTES as u64;
     let counted = held.min(declared.into());
     let first = tally(file, 0..counted.min(FIRST_FACETS))?;
+    // Of random bytes, only a record in a hundred is plausible. Four letters of a text are a count
+    // above 2^29.
     if 2 * first.plausible < first.records || (held == 0 && declared >= UNKNOWN_COUNT / 16) {
         return Err(SliceError::NotStl { size });
     }
@@ -60,6 +62,7 @@ pub(crate) fn open(
         0
     } else {
         let further = tally(file, counted..held)?;
+        // Programs append data of their own.
         if further.records == 0 || further.facets < further.records {
             counted
         } else {
@@ -106,7 +109,9 @@ fn tally(file: &PartFile, records: Range<u64>) -> io::Result<Tally> {
         tally.facets += u64::from(is_facet(record));
         let [a, b, c] = parse(record).map(point_hash);
         for [from, to] in [[a, b], [b, c], [c, a]] {
+            // Rotated, so that an edge differs from its reverse.
             let edge = |from: u64, to: u64| mixed(from.wrapping_add(to.rotate_left(32)));
+            // The neighbor follows the edge the other way, so both contributions cancel.
             tally.edges = tally.edges.wrapping_add(edge(from, to)).wrapping_sub(edge(to, from));
         }
     })?;

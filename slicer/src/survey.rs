@@ -47,6 +47,7 @@ impl BlockSurvey {
         Self { min: [f64::MAX; 3], max: [f64::MIN; 3], yz_area: 0.0, facets: 0, heights_um: 0.0 };
 
     fn of(model: &PlacedPart, block: usize) -> io::Result<Result<Self, SliceError>> {
+        // The digest's pass has seen this block. Only a bad one is read again, to name its facet.
         if let Some((seen, scale)) = model.seen_block(block)
             && seen.is_finite
         {
@@ -193,6 +194,7 @@ impl Survey {
             (0..3).all(|axis| depth(axis) > TOUCHING[axis])
         };
         let pairs = order.iter().enumerate().flat_map(|(place, &a)| {
+            // A sweep along x: boxes that begin after this one's end cannot meet it.
             let may_meet = move |b: &&usize| boxes[**b].0[0] < boxes[a].1[0];
             order[place + 1..].iter().take_while(may_meet).map(move |&b| (a.min(b), a.max(b)))
         });
@@ -213,6 +215,7 @@ impl Survey {
         (0..self.blocks.len())
             .filter(|&block| {
                 let BlockSurvey { min, max, .. } = self.blocks[block];
+                // As for planes: a vertex at the height is above it.
                 min[2] < high_um && max[2] >= low_um
             })
             .collect()

@@ -108,12 +108,14 @@ impl Table {
         self.tally = Tally::default();
         let tally = &self.tally;
         let has_surfaces = (0..facets.pieces()).any(|piece| facets.surfaces(piece).is_some());
+        // Crossings are settled on surfaces one by one, so segments cannot stand for them.
         let needs_no_body = !cutter.rule.has_bodies() && !has_surfaces;
         self.shares.par_iter_mut().try_for_each(|shares| -> io::Result<()> {
             shares.iter_mut().for_each(LayerShare::clear);
             shares.resize_with(shares.len().max(layers.len()), LayerShare::default);
             let mut unclaimed = 0;
             loop {
+                // Pieces differ in work, so a thread takes the next one when it is done.
                 let piece = next.fetch_add(1, Relaxed);
                 if piece >= facets.pieces() {
                     return Ok(());
@@ -125,6 +127,7 @@ impl Table {
                     let mut cut =
                         ExactCut::new(surfaces, first, body, tally, cutter, layers, reach_um);
                     facets.for_each_in(piece, |facet| {
+                        // The loop over a piece cannot be left, so its rest is passed over.
                         if !budget.is_spent() {
                             unclaimed += cut.cut(facet, shares);
                             budget.claim(&mut unclaimed);
@@ -268,6 +271,7 @@ impl Table {
         let in_bin = |segment: &RowSegment| (segment.bin(grid, BINS), *segment);
         let segments = || self.shares(layer).flat_map(|share| &share.segments).map(in_bin);
         let segments = Grouped::new(BINS, segments).into_items();
+        // Counted first and put afterward: a list for each row would take an allocation each.
         let mut counts = KeyCounts::new(grid.height as usize);
         short().for_each(|crossing| counts.add(crossing.row()));
         singles().for_each(|crossing| counts.add(crossing.row()));

@@ -131,6 +131,7 @@ impl Tracer<'_> {
                 self.explain(some.concat(), &sightings, &mut trace, &mut known)?;
                 done += some.len();
             } else {
+                // Only several layers are too many, so at least one is left.
                 count = some.len() / 2;
             }
         }
@@ -152,6 +153,7 @@ impl Tracer<'_> {
         };
         let found = AtomicUsize::new(0);
         let too_many =
+            // Twice, since the lists of blocks are joined to one.
             || layers.len() > 1 && found.load(Relaxed) * 2 * size_of::<Sighting>() > self.memory;
         let of_block = |block| -> io::Result<Vec<Sighting>> {
             let (piece, mut facets) = self.model.model.place_of(block);
@@ -208,6 +210,7 @@ impl Tracer<'_> {
         known: &mut KnownEdges,
     ) -> io::Result<()> {
         for band in bands {
+            // An end just below the band has the row after its last.
             let of_band = |s: &Sighting| (s.layer, s.row) <= (band.layer, band.rows.end);
             let (near, rest) = sightings.split_at(sightings.partition_point(of_band));
             sightings = rest;
@@ -246,6 +249,7 @@ impl Tracer<'_> {
             let [from, to] = sighting.edge.map(usize::from);
             // Numbered along the facet: 0 1, 1 2, 2 0.
             let [from, to] = if (from + 1) % 3 == to { [from, to] } else { [to, from] };
+            // Adding 0 makes -0 the same bits as 0, which is the same place.
             let [a, b] = [from, to].map(|k| corners[k].map(|v| v + 0.0));
             let forwards = a.map(f32::to_bits) <= b.map(f32::to_bits);
             let ends = if forwards { [a, b] } else { [b, a] };

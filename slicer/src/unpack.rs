@@ -29,6 +29,8 @@ pub(crate) fn most_unpacked(packed: u64) -> u64 {
 /// Returns an error if it is damaged, contains more than a mesh would, or the disk is full.
 pub(crate) fn unpack(file: &PartFile) -> Result<PartFile, SliceError> {
     let most = most_unpacked(file.size());
+    // One byte more than allowed shows that there is too much. A gzip file may have several members
+    // (RFC 1952, section 2.2).
     let mut bytes = MultiGzDecoder::new(BufReader::new(file.reader())).take(most + 1);
     let mut unpacked = tempfile::tempfile()?;
     let size = io::copy(&mut bytes, &mut unpacked).map_err(SliceError::Packed)?;

@@ -14,6 +14,7 @@ pub(crate) fn as_utf8<'a>(mut text: impl BufRead + 'a) -> io::Result<Box<dyn Buf
         [0xEF, 0xBB, 0xBF] => (3, None),
         [0xFF, 0xFE, ..] => (2, Some(false)),
         [0xFE, 0xFF, ..] => (2, Some(true)),
+        // Without a mark, the first character is ASCII, so one of its two bytes is zero.
         [0, first, ..] if first > 0 => (0, Some(true)),
         [first, 0, ..] if first > 0 => (0, Some(false)),
         _ => (0, None),
@@ -40,6 +41,7 @@ struct Utf16<R> {
 impl<R: Read> Utf16<R> {
     fn decode(&mut self) -> io::Result<()> {
         let mut bytes = Vec::new();
+        // An even number, so that no unit of two bytes is split.
         self.text.by_ref().take(1 << 13).read_to_end(&mut bytes)?;
         let is_last = bytes.is_empty();
         let unit = |pair: &[u8; 2]| match self.is_big {

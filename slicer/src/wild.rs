@@ -99,6 +99,7 @@ fn samples(part: &PlacedPart) -> io::Result<Vec<Point>> {
             samples.extend(part.transform_of(number).placed(&facet).map(in_mm));
             next += step;
         }
+        // Counted on into the next piece, so that small pieces are not sampled too often.
         next -= count;
     }
     Ok(samples)
@@ -112,6 +113,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Returns the step that a distance falls into.
 #[inline]
 fn step_of(distance_mm: f64) -> usize {
+    // The bits of numbers above zero rise with the numbers, so this is a logarithm without its
+    // cost.
     ((distance_mm as f32).to_bits() >> STEP_BITS) as usize
 }
 
@@ -163,6 +166,7 @@ fn first_beyond(
     let mut found = None;
     for block in 0..part.model.block_count() {
         let (piece, facets) = part.model.place_of(block);
+        // In the file's order, on one thread: the error names the first such facet.
         let mut numbers = facets.start..;
         part.for_each_in_block(block, |placed| {
             let facet = numbers.next().unwrap_or_default();

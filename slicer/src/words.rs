@@ -47,6 +47,7 @@ impl<R: Read> Words<R> {
         if std::mem::take(&mut self.is_held) {
             return Ok(!self.word.is_empty());
         }
+        // No line end precedes the first word of a text.
         self.begins_line = self.word.is_empty() && self.line == 1;
         self.word = self.unread.start..self.unread.start;
         self.skip_blanks()?;
@@ -60,6 +61,7 @@ impl<R: Read> Words<R> {
                 }
                 None => length += bytes.len(),
             }
+            // A file without blanks must not become a single word in memory.
             if length >= MAX_WORD_BYTES || !self.fill()? {
                 break;
             }
@@ -133,6 +135,7 @@ impl<R: Read> Words<R> {
                     return Ok(());
                 }
                 if matches!(byte, b'\n' | b'\r') {
+                    // A line feed after a carriage return ends the same line.
                     self.line += u64::from(byte == b'\r' || !self.after_return);
                     self.begins_line = true;
                 }

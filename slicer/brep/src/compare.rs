@@ -185,6 +185,7 @@ impl Comparison {
     pub fn most_apart(&self, is_kind: impl Fn(&Measure) -> bool) -> f64 {
         let measures = self.pairs.iter().flat_map(|pair| &pair.measures);
         let of_kind = measures.filter(|measured| is_kind(&measured.what));
+        // A coordinate may be zero, and must not divide.
         let share = |Measured { values: [a, b], .. }: &Measured| (a - b).abs() / b.abs().max(1e-9);
         of_kind.map(share).fold(0.0, f64::max)
     }
@@ -199,6 +200,7 @@ fn pair_up(reports: [&[BodyReport]; 2]) -> (Vec<[usize; 2]>, [Vec<usize>; 2]) {
     let [ours, theirs] = reports;
     let all = (0..ours.len()).flat_map(|a| (0..theirs.len()).map(move |b| [a, b]));
     let mut all: Vec<_> = all.map(|[a, b]| (away(&ours[a], &theirs[b]), [a, b])).collect();
+    // The nearest pairs first, so that no body loses its partner to a neighbor.
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut is_free = reports.map(|reports| vec![true; reports.len()]);
     let mut pairs = Vec::new();
@@ -245,6 +247,7 @@ impl<'a> ReadBody<'a> {
 /// Returns where a plane cuts a facet, with the body on the left on the way from the first
 /// point to the second.
 fn segment(corners: &[Vec3; 3], z_mm: f64) -> Option<[[f64; 2]; 2]> {
+    // A corner on the plane is above it for all its facets, so contours close.
     let is_above = corners.map(|corner| corner[2] >= z_mm);
     let mut ends = [None, None];
     for k in 0..3 {
@@ -268,10 +271,12 @@ fn measures(bodies: &[ReadBody<'_>; 2]) -> Vec<Measured> {
     let side = |end: usize, axis: usize| Measured {
         what: if end == 0 { Measure::Least(axis) } else { Measure::Greatest(axis) },
         values: reports.map(|report| report.box_mm[end][axis]),
+        // Facets may lie on either side of their surface, by a chord in each reading.
         allowed: chords[0] + chords[1],
     };
     let sides = (0..2).flat_map(|end| (0..3).map(move |axis| (end, axis)));
     let mut measures: Vec<Measured> = sides.map(|(end, axis)| side(end, axis)).collect();
+    // The volumes of the surfaces hardly depend on either kernel's choice of facets.
     let volumes = reports.map(|report| report.exact_volume_mm3);
     let area_mm2 = f64::max(reports[0].area_mm2, reports[1].area_mm2);
     measures.push(Measured {

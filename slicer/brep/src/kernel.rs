@@ -155,6 +155,7 @@ impl Tessellation {
 }
 
 fn of_faces<'a>(facets: &'a [Facet], faces: &std::ops::Range<u32>) -> &'a [Facet] {
+    // Facets are sorted by face, so two binary searches find a body's.
     let start = facets.partition_point(|facet| facet.face < faces.start);
     let end = facets.partition_point(|facet| facet.face < faces.end);
     &facets[start..end]

@@ -30,6 +30,7 @@ impl BrepModel {
                 edges.iter().for_each(|(edge, _)| uses[*edge] += 1);
             }
         }
+        // An edge without length, as at a pole, has no second face.
         let is_free = |edge: &usize| uses[*edge] == 1 && !self.is_point(&self.edges[*edge]);
         (0..uses.len()).filter(is_free).collect()
     }
@@ -56,6 +57,7 @@ impl BrepModel {
 
     fn is_point(&self, edge: &BrepEdge) -> bool {
         let [start, end] = edge.ends.map(|vertex| self.vertices[vertex]);
+        // A closed edge has equal ends too. Only its middle shows that it has a length.
         distance(start, end) < POINT_MM && distance(start, self.middle(edge)) < POINT_MM
     }
 }

@@ -22,11 +22,13 @@ pub(crate) fn turn_shells(
     let mut is_turned = false;
     let is_open = |fault: &BodyFault| matches!(fault, BodyFault::Open { .. });
     for (body, report) in kernel.bodies().iter().zip(reports) {
+        // An open shell has no inside: the sign of its volume and its hits mean nothing.
         if report.faults.iter().any(is_open) {
             continue;
         }
         let facets = mesh.of_faces(&body.faces);
         let shells = shells(facets);
+        // The volume's sign alone decides about a single shell, in `orient.rs`.
         let Some(count) = shells.iter().max().map(|last| last + 1).filter(|count| *count > 1)
         else {
             continue;
@@ -45,6 +47,7 @@ pub(crate) fn turn_shells(
 fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize) -> Vec<bool> {
     let mut volumes = vec![0.0; count];
     let mut widest = vec![(0.0, 0); count];
+    // Near the body, products stay small and lose few digits when their sum cancels.
     let about = facets.first().map_or([0.0; 3], |facet| mesh.corners(facet)[0]);
     for (number, facet) in facets.iter().enumerate() {
         let shell = shells[number];
@@ -59,7 +62,9 @@ fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize)
     let is_wrong = |(shell, hits): (usize, Vec<Hit>)| {
         let own = hits.iter().position(|hit| hit.facet == rays[shell].facet).unwrap_or(0);
         let others = hits[..own].iter().filter(|hit| shells[hit.facet] != shell);
+        // An odd number of surfaces before the point puts this shell within another one.
         let is_void = others.count() % 2 == 1;
+        // A void's facets point into it, so they enclose a negative volume.
         is_void == (volumes[shell] > 0.0)
     };
     hits(mesh, facets, &rays).into_iter().enumerate().map(is_wrong).collect()
@@ -74,6 +79,7 @@ fn shells(facets: &[Facet]) -> Vec<usize> {
             if parent == point {
                 return point;
             }
+            // Path halving: each search shortens the way for the next one.
             let above = *parents.entry(parent).or_insert(parent);
             parents.insert(point, above);
             point = above;
@@ -110,9 +116,11 @@ fn turn(
         }
     }
     faces.dedup_by_key(|(face, _)| *face);
+    // Facets are sorted by face, so these faces are sorted too.
     let is_in =
         |facet: &&mut Facet| faces.binary_search_by_key(&facet.face, |(face, _)| *face).is_ok();
     mesh.tips.iter_mut().filter(is_in).for_each(Facet::turn_over);
+    // A stable sort: the finding names the shell's first face.
     faces.sort_by_key(|(_, shell)| *shell);
     faces.dedup_by_key(|(_, shell)| *shell);
     let finding = |(face, _): (u32, usize)| Finding {
@@ -164,6 +172,7 @@ fn samples(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
         let seen = |k: &usize| seen_mm2(mesh, &of_face[*k]).abs();
         let best = (0..of_face.len()).max_by(|a, b| seen(a).total_cmp(&seen(b)));
+        // A facet seen edge-on gives uncertain depths, and rays through it soon meet an edge.
         let least = best.map_or(0.0, |best| LEAST_SEEN * seen(&best));
         let spread = (0..of_face.len()).step_by(of_face.len().div_ceil(SAMPLES));
         let others = spread.filter(|k| Some(*k) != best && seen(k) > least);
@@ -189,6 +198,7 @@ fn wrong(hits: &[Hit], loose_mm: f64) -> Option<Hit> {
     let mut inside = 0;
     hits.windows(2).find_map(|pair| {
         inside += wound(&pair[0]);
+        // A slanted ray is longer than the gap between two faces. The cosine makes up for that.
         let flat = pair[0].cosine.abs().min(pair[1].cosine.abs());
         let apart = (pair[1].depth_mm - pair[0].depth_mm) * flat;
         (!(0..=1).contains(&inside) && apart > loose_mm).then_some(pair[0])

@@ -36,10 +36,12 @@ pub(crate) fn turn_over(
 ) -> Turned {
     let mut all = Turned::default();
     for (number, (body, report)) in kernel.bodies().iter().zip(reports).enumerate() {
+        // A good body needs no change, which could only spoil it.
         if report.faults.is_empty() || report.facets == 0 {
             continue;
         }
         let mut turned = inverted(mesh, body);
+        // If all faces turn, their loops agree with each other and only the body's sign is wrong.
         if !turned.iter().all(|&turned| turned) {
             for (face, turned) in body.faces.clone().zip(&mut turned) {
                 if *turned && kernel.face(face).is_closed {
@@ -85,6 +87,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
         };
         let [one, other] = [area(false), area(true)];
         let is_clear = one.min(other) < CLEARLY_SMALLER * one.max(other);
+        // The choice may be wrong for a single piece, as the volume's sign corrects it below.
         if is_clear || pieces.len() == 1 {
             let smaller = other <= one;
             piece.iter().for_each(|(face, side)| turned[*face] = *side == smaller);
@@ -126,6 +129,8 @@ pub(crate) fn neighbours<'a>(
 ) -> Vec<Vec<(usize, bool)>> {
     let mut list = vec![Vec::new(); count];
     for uses in uses {
+        // Four uses belong to solids that touch along an edge, and do not show who is whose
+        // neighbor.
         if let &[(a, way), (b, other)] = uses.as_slice()
             && a != b
         {

@@ -55,6 +55,7 @@ pub struct Attempt {
 /// The uncertainty assumed for files that state none, in millimeters.
 const USUAL_MM: f64 = 1e-3;
 /// Healing tolerances, as multiples of the file's own.
+// The file's own first. A tighter one joins less by mistake, a looser one closes more.
 const HEALS: [f64; 3] = [1.0, 0.1, 10.0];
 /// Healing tolerances, as multiples of the chord.
 const LOOSEST: [f64; 2] = [0.1, 1.0];
@@ -119,6 +120,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(bytes: &'a [u8], read: ReadFn, chord_mm: f64) -> Self {
+        // A placeholder: `begin` or `settle_open` replaces it.
         let none = Err(BrepError::Chord { chord_mm });
         Self { bytes, read, chord_mm, tries: Vec::new(), best: none, open: None, longest_mm: 0.0 }
     }
@@ -167,6 +169,7 @@ impl<'a> Search<'a> {
             let heal_mm = self.tries[index].heal_mm;
             let mut chord_mm = f64::max(OPEN_CHORD * self.chord_mm, OPEN_PART * self.longest_mm);
             let mut made = facets(kernel.clone(), heal_mm, chord_mm);
+            // These facets only show where gaps are, so any chord that works is good enough.
             while matches!(made, Err(BrepError::Fine { .. })) {
                 chord_mm *= OPEN_CHORD;
                 made = facets(kernel.clone(), heal_mm, chord_mm);
@@ -215,6 +218,7 @@ fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepar
         let mut mesh = kernel.tessellate(chord_mm)?;
         let mut reports = check(kernel.as_ref(), &mesh);
         let turned = turn_over(kernel.as_ref(), &mut mesh, &reports);
+        // `turn_shells` comes first, as `||` would skip it.
         if turn_shells(kernel.as_ref(), &mut mesh, &reports) || turned.is_changed {
             reports = check(kernel.as_ref(), &mesh);
         }
@@ -259,6 +263,7 @@ fn faults(reports: &[BodyReport]) -> String {
 
 /// Counts bodies with faults, then open edges, then faults, as a key: greater is worse.
 fn wrong(reports: &[BodyReport]) -> [usize; 3] {
+    // Healing that closes some edges, but not all, is progress.
     let open = |fault: &BodyFault| match fault {
         BodyFault::Open { edges, .. } => *edges,
         _ => 0,

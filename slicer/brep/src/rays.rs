@@ -18,6 +18,7 @@ pub(crate) struct RayPoint {
 }
 
 /// The shares at which to send rays, in order, until a ray meets no edge.
+// Not quite a third each: rays through the middles of a symmetric part's facets meet its edges.
 pub(crate) const SHARES: [[f64; 3]; 4] = [
     [0.334_1, 0.332_7, 0.333_2],
     [0.521_3, 0.237_9, 0.240_8],
@@ -85,7 +86,10 @@ fn depth_mm(corners: &[Vec3; 3], p: [f64; 2]) -> Option<f64> {
         (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
     };
     let sides = [0, 1, 2].map(side);
+    // Strict: a ray exactly through an edge misses both facets. Then its hits do not add up, and
+    // another ray replaces it.
     let is_met = sides.iter().all(|x| *x > 0.0) || sides.iter().all(|x| *x < 0.0);
+    // The areas of the three parts are the point's barycentric coordinates.
     let weighted: f64 = (0..3).map(|k| sides[k] * corners[k][2]).sum();
     is_met.then(|| weighted / sides.iter().sum::<f64>())
 }

@@ -13,8 +13,8 @@ use crate::volume::{facet_volume, surface_volume};
 /// The greatest relative difference of a body's two volumes.
 pub(crate) const VOLUMES_APART: f64 = 1e-3;
 
-/// The least volume of a body, as a part of the volume of a cube with the same area: a smaller
-/// volume is within rounding errors.
+/// The least volume of a body, as a part of the volume of a cube whose face has the body's area: a
+/// smaller volume is within rounding errors.
 const LEAST_VOLUME: f64 = 1e-9;
 
 /// Checks every body: facets follow each edge as often in one direction as in the other; no face
@@ -24,6 +24,7 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
     let report = |body: &crate::kernel::Body| {
         let facets = mesh.of_faces(&body.faces);
         let box_mm = bounds(mesh, facets);
+        // Volumes about a point within the body lose the fewest digits when they cancel.
         let middle = scale(crate::vector::add(box_mm[0], box_mm[1]), 0.5);
         let mut report = BodyReport {
             name: body.name.clone(),
@@ -43,6 +44,7 @@ pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
 /// Returns a fault if a body's two volumes differ by more than the chord allows.
 fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
     let (facets_mm3, surfaces_mm3) = (report.volume_mm3, report.exact_volume_mm3);
+    // Between facets and surfaces is at most a layer as thick as the chord.
     let most = f64::max(VOLUMES_APART * facets_mm3.abs(), chord_mm * report.area_mm2);
     // `NaN` must fail the comparison.
     let is_within = (facets_mm3 - surfaces_mm3).abs() <= most;
@@ -76,6 +78,7 @@ fn faults(
     } else if report.volume_mm3 < 0.0 {
         faults.push(BodyFault::InsideOut { volume_mm3: report.volume_mm3 });
     }
+    // Rays through an open body find crossings that are only its gaps.
     if faults.is_empty() {
         let crossed = crossed(kernel, mesh, facets);
         faults.extend(crossed.map(|crossed| match horn {
@@ -89,6 +92,7 @@ fn faults(
 /// Returns a fault unless facets follow each edge as often in one direction as in the other.
 fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
     // The number of uses of each edge, with ascending and with descending point indices.
+    // In a closed mesh an edge takes two of the facets' three sides.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
     for [a, b] in facets.iter().flat_map(sides) {
         edges.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
@@ -169,10 +173,12 @@ fn face_mm2(mesh: &Tessellation, facets: &[Facet], face: u32) -> f64 {
 /// Returns the faces that share an edge of facets with a face.
 fn neighbours(facets: &[Facet], face: u32) -> Vec<u32> {
     let own = facets.iter().filter(|facet| facet.face == face);
+    // A neighbor follows the common edge in the other direction.
     let edges: HashSet<[u32; 2]> = own.flat_map(sides).map(|[a, b]| [b, a]).collect();
     let others = facets.iter().filter(|facet| facet.face != face);
     let near = others.filter(|facet| sides(facet).iter().any(|side| edges.contains(side)));
     let mut near: Vec<u32> = near.map(|facet| facet.face).collect();
+    // Facets are sorted by face, so equal faces are adjacent.
     near.dedup();
     near
 }

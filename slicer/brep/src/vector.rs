@@ -51,6 +51,7 @@ pub fn middle(a: Vec3, b: Vec3) -> Vec3 {
 /// Returns the direction with length 1, or `None` if its length is 0 or not finite.
 pub fn unit(a: Vec3) -> Option<Vec3> {
     let length = length(a);
+    // A shorter vector is the rounding error of a difference.
     (length > 1e-12 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
@@ -72,6 +73,7 @@ impl Axes {
     pub(crate) fn new(origin: Vec3, z: Vec3, x: Option<Vec3>) -> Option<Self> {
         let z = unit(z)?;
         let across = |x: Vec3| unit(along(x, z, -dot(x, z)));
+        // The projection of a nearly parallel axis would be a rounding error.
         let default = if z[0].abs() < 1.0 - 1e-9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let x = x.and_then(unit).and_then(across).or_else(|| across(default))?;
         Some(Self { origin, directions: [x, cross(z, x), z] })
@@ -109,12 +111,14 @@ impl Axes {
     /// Returns the axes, rotated by half a turn about x.
     pub(crate) fn turned(&self) -> Axes {
         let [x, y, z] = self.directions;
+        // Conics are symmetric to x, so they run backward in these axes: t becomes -t.
         Axes { origin: self.origin, directions: [x, scale(y, -1.0), scale(z, -1.0)] }
     }
 
     /// Returns the inverse: `self.then(&self.inverse())` is the world.
     pub(crate) fn inverse(&self) -> Axes {
         let [x, y, z] = self.directions;
+        // The directions are orthonormal, so the transpose is their inverse.
         let directions = [0, 1, 2].map(|k| [x[k], y[k], z[k]]);
         let origin = self.directions.map(|axis| -dot(axis, self.origin));
         Axes { origin, directions }

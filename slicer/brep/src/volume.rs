@@ -10,6 +10,8 @@ use crate::vector::{Vec3, add, cross, dot, length, middle, scale, sub, unit};
 pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[Facet], about: Vec3) -> f64 {
     let six = |facet: &Facet| {
         let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, about));
+        // The triple product is six times the tetrahedron from the origin to the facet. Its sign
+        // removes the space outside the body.
         dot(a, cross(b, c))
     };
     facets.iter().map(six).sum::<f64>() / 6.0
@@ -56,6 +58,7 @@ fn middles(kernel: &dyn Kernel, facets: &[Facet]) -> Vec<[Jet; 3]> {
 fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
     let mut waiting: HashMap<[u32; 2], (usize, usize)> = HashMap::new();
     for (number, facet) in facets.iter().enumerate() {
+        // A tip's side at its pole has no length, and no neighbor.
         for (side, [a, b]) in sides(facet).into_iter().enumerate().filter(|(_, [a, b])| a != b) {
             let Some((other, of_other)) = waiting.remove(&[b, a]) else {
                 waiting.insert([a, b], (number, side));
@@ -86,6 +89,8 @@ fn meeting([start, end]: [Vec3; 2], jets: [Jet; 2], chord_mm: f64) -> Vec3 {
     let (Some(n), Some(m), Some(way)) = (normals[0], normals[1], unit(sub(end, start))) else {
         return between;
     };
+    // Cramer's rule for three planes: both tangent planes, and the plane across the side through
+    // its middle, whose offset is zero.
     let volume = dot(n, cross(m, way));
     let about = middle(start, end);
     let off = [dot(n, sub(p, about)), dot(m, sub(q, about))];
@@ -131,6 +136,7 @@ fn six_volumes(corners: [Vec3; 3], middles: [Vec3; 3]) -> f64 {
     };
     let flux = |[s, t]: [f64; 2]| {
         let r = 1.0 - s - t;
+        // Quadratic shape functions of a triangle with six nodes.
         let place = mixed([
             r * (2.0 * r - 1.0),
             s * (2.0 * s - 1.0),
@@ -139,11 +145,13 @@ fn six_volumes(corners: [Vec3; 3], middles: [Vec3; 3]) -> f64 {
             4.0 * s * t,
             4.0 * t * r,
         ]);
+        // The derivative of r (2r - 1): r falls as s or t rises.
         let first = 1.0 - 4.0 * r;
         let along_s = mixed([first, 4.0 * s - 1.0, 0.0, 4.0 * (r - s), 4.0 * t, -4.0 * t]);
         let along_t = mixed([first, 0.0, 4.0 * t - 1.0, -4.0 * s, 4.0 * s, 4.0 * (r - t)]);
         dot(place, cross(along_s, along_t))
     };
+    // Weights add up to 1 over an area of 1/2, so their sum is twice the flux: six thirds of it.
     GAUSS.iter().map(|(at, weight)| weight * flux(*at)).sum()
 }
 

@@ -55,6 +55,7 @@ impl<'a> Batch<'a> {
         cutter.for_each_segment(facet, &self.layers.clone(), |layer, segment| {
             let [a, b] = segment.ends.map(|end| end.at);
             let share = &mut shares[layer - self.layers.start];
+            // Contours close on facets: polishing moves crossings, not the ends of segments.
             share.ends.add([a, b], salt);
             let z_mm = cutter.planes.z_um(layer) / 1000.0;
             cutter.for_each_crossing(a, b, segment.is_reversed, |row, column, rising| {
@@ -67,6 +68,7 @@ impl<'a> Batch<'a> {
                     share.of_body(self.body).push(crossing);
                     return;
                 }
+                // Many facets cross no row, and need no chart.
                 let chart = chart.get_or_insert_with(|| surfaces.chart(number));
                 let at_mm = [x_mm, y_mm, z_mm];
                 self.points.push(FacetPoint::new(number, chart.uv_at(at_mm), at_mm, rising));
@@ -115,6 +117,7 @@ impl FlatFace {
     fn x_mm(&self, x_mm: f64, y_mm: f64, z_mm: f64) -> f64 {
         let [nx, ny, nz] = self.normal;
         let [x, y, z] = self.corner;
+        // n · (p - corner) = 0, solved for x.
         let exact = x - (ny * (y_mm - y) + nz * (z_mm - z)) / nx;
         // A row along the plane crosses it anywhere, so the facet's x is kept.
         if (exact - x_mm).abs() < ROUNDING_MM { exact } else { x_mm }

@@ -72,6 +72,7 @@ impl CurvedEdges {
 
 /// Finds the curved edges between facets.
 fn curved_edges(surfaces: &PlacedSurfaces) -> Vec<CurvedEdge> {
+    // Most facets are within one face, which their points show without a search for neighbors.
     let is_shared = shared_points(surfaces);
     let count = surfaces.mesh().facets.len();
     let starts: Vec<usize> = (0..count).step_by(BATCH).collect();
@@ -247,6 +248,7 @@ impl CurvedEdge {
         let width = b.share - a.share;
         let (low, high) = (a.at_mm[axis] - level_mm, b.at_mm[axis] - level_mm);
         let mut t = (low / (low - high)).clamp(0.0, 1.0);
+        // A few Newton steps are enough for a start.
         for _ in 0..3 {
             let [value, slope] = cubic(axis, width, [a, b], t);
             let next = t - (value - level_mm) / slope;
@@ -280,6 +282,7 @@ impl CurvedEdge {
                 break;
             }
             if (value < 0.0) == (b.1 < 0.0) {
+                // Halving the value of an end that stays keeps false position from creeping.
                 a.1 *= 0.5;
             } else {
                 a = b;
@@ -355,6 +358,7 @@ impl CurvedEdge {
 fn cubic(axis: usize, width: f64, [a, b]: [&EdgePoint; 2], t: f64) -> [f64; 2] {
     let (p, q) = (a.at_mm[axis], b.at_mm[axis]);
     let (m, n) = (width * a.slope[axis], width * b.slope[axis]);
+    // Hermite's cubic, by its values and slopes at both ends.
     let (c, d) = (3.0 * (q - p) - 2.0 * m - n, 2.0 * (p - q) + m + n);
     [p + t * (m + t * (c + t * d)), m + t * (2.0 * c + t * 3.0 * d)]
 }
@@ -375,6 +379,7 @@ fn slope(jets: &[Jet; 2], way: Vec3) -> Option<Vec3> {
     let sine = length(across);
     let along = dot(across, way);
     let is_loose = along.abs() < LOOSE * sine * length(way);
+    // Scaled so that its part along the chord is the chord itself.
     let slope = scale(across, dot(way, way) / along);
     (sine > TANGENT && !is_loose && slope.iter().all(|c| c.is_finite())).then_some(slope)
 }
@@ -382,6 +387,7 @@ fn slope(jets: &[Jet; 2], way: Vec3) -> Option<Vec3> {
 /// Returns the change of parameters that moves a point of a surface as far as possible along a
 /// vector.
 fn parameters(jet: &Jet, way: Vec3) -> [f64; 2] {
+    // Least squares: the normal equations of u du + v dv = way.
     let (uu, uv, vv) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
     let (u, v) = (dot(jet.du, way), dot(jet.dv, way));
     let det = uu * vv - uv * uv;

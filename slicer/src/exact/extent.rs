@@ -67,6 +67,7 @@ impl PlacedSurfaces {
         near.sort_by(|&a, &b| tops[b as usize].total_cmp(&tops[a as usize]));
         near.truncate(MAX_FACETS);
         let levels = near.into_iter().filter_map(|facet| self.level_point(facet, direction));
+        // A point farther out lies on the surface beyond its face.
         let most = of_facets + 2.0 * self.tolerance_mm();
         let edges = self.curved_edges().all.iter();
         let turns = edges.filter_map(|edge| edge.turns[direction.axis]);
@@ -90,6 +91,7 @@ impl PlacedSurfaces {
             let rise =
                 |jet: &Jet| [direction.along(jet.du) * size[0], direction.along(jet.dv) * size[1]];
             let [g, gu, gv] = [rise(&jets[0]), rise(&jets[1]), rise(&jets[2])];
+            // Both mixed derivatives are equal, except for the error of differences.
             let [a, b, d] = [gu[0] - g[0], (gu[1] - g[1] + gv[0] - g[0]) / 2.0, gv[1] - g[1]]
                 .map(|bend| bend / DIFFERENCE);
             if g.iter().all(|g| g.abs() < 1e-11) {
@@ -102,6 +104,7 @@ impl PlacedSurfaces {
             let (a, d) = (a - least, d - least);
             let det = a * d - b * b;
             let step = [(b * g[1] - d * g[0]) / det, (b * g[0] - a * g[1]) / det];
+            // Four facets away, another facet finds the point.
             if !step.iter().all(|step| step.abs() < 4.0) {
                 return None;
             }

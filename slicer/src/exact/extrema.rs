@@ -56,6 +56,7 @@ impl CriticalPoints {
             level.filter_map(|candidate| Saddle::on(surfaces, candidate.facet)).collect();
         let mut saddles: Vec<Saddle> = Vec::new();
         for saddle in found {
+            // All facets around a saddle find it.
             if !saddles.iter().any(|other| saddle.is_same(other, surfaces)) {
                 saddles.push(saddle);
             }
@@ -97,6 +98,7 @@ impl PlacedSurfaces {
         let mut kept: Vec<Extremum> = Vec::with_capacity(extrema.len());
         for extremum in extrema {
             let is_near = |other: &&Extremum| extremum.at_mm[1] - other.at_mm[1] < SAME_MM;
+            // Sorted by y, so only the last ones can be the same.
             let mut near = kept.iter().rev().take_while(is_near);
             if !near.any(|other| extremum.is_same(other, self)) {
                 kept.push(extremum);
@@ -124,6 +126,7 @@ impl Extremum {
                 return Self::at(surfaces, facet, at, &jet, n, turned);
             }
             let ([zu, zv], [xu, xv]) = ([jet.du[2], jet.dv[2]], [turned[0][0], turned[1][0]]);
+            // Newton's step by Cramer's rule, over the derivatives of z and of the normal's x.
             let det = zu * xv - zv * xu;
             let step = [(e * xv - f * zv) / det, (f * zu - e * xu) / det];
             // A step longer than two facets would leave the seed's surroundings.
@@ -157,6 +160,7 @@ impl Extremum {
         let turns = steep > STEEP && bend_per_mm.is_finite() && bend_per_mm != 0.0;
         turns.then_some(Self {
             at_mm: jet.point,
+            // A distance across the surface is longer along y, by the normal's y.
             reach_mm: 2.0 * surfaces.tolerance_mm() / steep,
             facet,
             uv,
@@ -168,12 +172,14 @@ impl Extremum {
 
     /// Returns the greatest distance of facets from the contour along x, in millimeters.
     pub(super) fn width_mm(&self) -> f64 {
+        // Here the parabola is the reach away from its tangent.
         (2.0 * self.reach_mm / self.bend_per_mm.abs()).sqrt()
     }
 
     /// Returns a row's crossings near the extremum.
     pub fn contact(&self, surfaces: &PlacedSurfaces, y_mm: f64) -> RowContact {
         let [x, y, z_mm] = self.at_mm;
+        // y = y* + bend/2 (x - x*)², solved for (x - x*)².
         let square = 2.0 * (y_mm - y) / self.bend_per_mm;
         if square < 0.0 {
             return RowContact::Nothing;
@@ -254,6 +260,7 @@ fn seeds(surfaces: &PlacedSurfaces, candidate: &CandidateFacet, z_mm: f64) -> Ve
         }
     }
     match ends[..] {
+        // The normal's x is nearly linear along the cut, so its zero is close to the extremum.
         [(p, a), (q, b)] if a != b => vec![mixed(p, q, (a / (a - b)).clamp(0.0, 1.0))],
         _ => uv.to_vec(),
     }

@@ -92,6 +92,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         if on_chord.is_none() && !is_turning {
             return Vec::new();
         }
+        // For most edges an estimate replaces the search on both surfaces.
         if turn.is_none() && on_chord.is_some_and(|at| self.is_far(edge, at)) {
             return Vec::new();
         }
@@ -220,6 +221,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
         let share = edge.share_at(ALONG, self.level_mm, &edge.ends);
         let about = [0, 1, 2].map(|axis| edge.about(axis, share));
         let on_curve = self.placed_in_pixels([about[0], about[1], 0.0])[Self::ACROSS];
+        // The cubic is an estimate, so the cells must agree within its error too.
         let more = ROUGH * (on_curve - on_chord).abs();
         let (low, high) = (on_curve.min(on_chord) - more, on_curve.max(on_chord) + more);
         self.cell(low) == self.cell(high)
@@ -235,6 +237,8 @@ impl<const ALONG: usize> Line<'_, ALONG> {
     /// Returns whether a point in pixels and micrometers is before the line, computed as for
     /// facets.
     fn is_before(&self, at: [f64; 3]) -> bool {
+        // As in `cut.rs`: a vertex at a plane's side is above it, and a point on a row's center is
+        // above the row.
         if ALONG == Z { at[Z] < self.side } else { at[Y] <= self.side }
     }
 

@@ -21,6 +21,7 @@ impl PlacedSurfaces {
         let away = |facet: u32| (self.distance_to(facet, point), facet);
         let mut nearest = away(facet);
         for _ in 0..MAX_FACETS {
+            // Around corners, not only across sides: the next facet may touch this one in a point.
             let corners = self.facet(nearest.1).corners.into_iter();
             let around = corners.flat_map(|corner| self.facets_by_point().group(corner as usize));
             let next = around
@@ -48,6 +49,7 @@ impl PlacedSurfaces {
         }
         let to_side = |(p, q): (Vec3, Vec3)| {
             let (way, to) = (sub(q, p), sub(point, p));
+            // Facets at a pole may have a side without length.
             let part = (dot(to, way) / dot(way, way).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             distance(add(p, scale(way, part)), point)
         };

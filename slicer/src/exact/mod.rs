@@ -69,6 +69,7 @@ impl<'a> ExactCut<'a> {
 
     /// Adds the next facet. Returns the number of crossings that would need the same memory.
     pub(crate) fn cut(&mut self, facet: &PlacedFacet, shares: &mut [LayerShare]) -> usize {
+        // Facets come in their order, so counting numbers them.
         let number = self.next;
         self.next += 1;
         let below = self.depths.as_mut();

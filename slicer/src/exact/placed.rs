@@ -42,6 +42,7 @@ impl PlacedSurfaces {
     /// Places a model with the affine map `rows` from model to machine coordinates, in
     /// millimeters.
     pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
+        // The longest column is the greatest stretch if axes stay at right angles.
         let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
         let faces = kernel.bodies().iter().map(|body| body.faces.end).max().unwrap_or(0);
@@ -160,6 +161,7 @@ impl PlacedSurfaces {
     /// on a facet without area.
     pub(super) fn normal(&self, facet: u32, jet: &Jet) -> Option<Vec3> {
         let (across, flat) = (unit(cross(jet.du, jet.dv))?, self.facet_normal(facet)?);
+        // du × dv may point into the part. The facet's corners show the outside.
         Some(scale(across, dot(across, flat).signum()))
     }
 
@@ -187,6 +189,7 @@ impl Chart {
         let det = ee * ff - ef * ef;
         // All points of a facet without area get the parameters of its first corner.
         let per = if det > 0.0 { 1.0 / det } else { 0.0 };
+        // The dual basis of both sides: 1 along its own side, 0 along the other.
         let share = |a: Vec3, aa: f64, b: Vec3| scale(sub(scale(a, aa), scale(b, ef)), per);
         Self { corner: *a, shares: [share(e, ff, f), share(f, ee, e)], uv }
     }

@@ -68,6 +68,7 @@ fn is_same_point(
         below.is_some_and(|below| surfaces.facet(below).face == surfaces.facet(point.facet).face)
     };
     let by_mm = jet.point[axis] - point.at_mm[axis];
+    // The move along the axis times the cosine is the move across the surface.
     let is_too_far = by_mm.abs() * outwards.abs() > MAX_MOVE * surfaces.tolerance_mm();
     let is_near_facet = || is_near(&surfaces.facet(point.facet).uv, uv);
     !is_other_side && !is_too_far && (is_near_facet() || is_on_face())
@@ -80,5 +81,6 @@ fn is_near([p, q, r]: &[[f64; 2]; 3], uv: [f64; 2]) -> bool {
     };
     let whole = double(*p, *q, *r);
     let parts = [double(uv, *q, *r), double(*p, uv, *r), double(*p, *q, uv)];
+    // Barycentric coordinates. Dividing removes the sense of the facet in parameters.
     parts.iter().all(|part| part / whole >= -MAX_BEYOND)
 }

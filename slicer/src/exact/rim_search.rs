@@ -48,6 +48,7 @@ impl Rims {
             all.crossings.extend(row.crossings);
             all.settled_mm.extend(row.settled_mm);
         }
+        // By height, so that a layer finds its crossings by binary search.
         all.crossings.sort_by(|a, b| a.z_um.total_cmp(&b.z_um));
         all
     }
@@ -164,6 +165,7 @@ impl RimSearch<'_> {
     /// Returns the crossing that a face gains or loses.
     fn found(&self, pixel: [u32; 2], facet: u32, side: &LensSide) -> Option<FacetPoint> {
         match (side.gained, side.lost) {
+            // A face with a facet there has a crossing to lose.
             (Some(_), Some(lost)) if self.is_covered(pixel, facet) => Some(lost),
             (gained, lost) => gained.or(lost),
         }
@@ -191,6 +193,7 @@ impl RimSearch<'_> {
         let [row, column] = pixel.map(f64::from);
         let [x, y] = grid.to_mm(column, row);
         let point = |facet: u32| {
+            // Rounded as the slicer rounds it, so that the line meets the same facets.
             let sheet = Sheet::new(&self.cutter, &surfaces.placed_facet(facet), 0)?;
             let at_mm = [x, y, sheet.height_um(pixel, grid.width)? / 1000.0];
             let uv = surfaces.chart(facet).uv_at(at_mm);

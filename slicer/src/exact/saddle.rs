@@ -17,9 +17,12 @@ impl Saddle {
         let level = surfaces.level_point(facet, AxisDirection::UP)?;
         let ([xu, yu, _], [xv, yv, _]) = (level.jet.du, level.jet.dv);
         let det = xu * yv - xv * yu;
+        // The inverse of the derivatives of x and y by u and v.
         let uv_by = [[yv / det, -xv / det], [-yu / det, xu / det]];
         let [[ux, uy], [vx, vy]] = uv_by;
         let [uu, uv, vv] = level.bend;
+        // The chain rule for second derivatives. The first ones are zero here, so the parameters'
+        // own bends drop out.
         let bend = |p: [f64; 2], q: [f64; 2]| {
             uu * p[0] * q[0] + uv * (p[0] * q[1] + p[1] * q[0]) + vv * p[1] * q[1]
         };
@@ -59,10 +62,12 @@ impl Saddle {
     pub(super) fn contact(&self, surfaces: &PlacedSurfaces, y_mm: f64, z_mm: f64) -> RowContact {
         let ([x, y, z], [a, b, c]) = (self.at_mm, self.form);
         let (dy, dz) = (y_mm - y, z_mm - z);
+        // The surface's quadratic form, solved for dx.
         let square = (b * b - a * c) * dy * dy + 2.0 * a * dz;
         if square < 0.0 {
             return RowContact::Nothing;
         }
+        // With the sign of a, the left crossing comes first.
         let ends = [-1.0, 1.0].map(|side| (-b * dy + side * a.signum() * square.sqrt()) / a);
         surfaces.locate_pair(ends.map(|dx| {
             let uv = [0, 1].map(|k| self.uv[k] + self.uv_by[k][0] * dx + self.uv_by[k][1] * dy);

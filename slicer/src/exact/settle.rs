@@ -50,6 +50,7 @@ pub(crate) fn settle(
     for planes in cutter.planes.each_at(layer) {
         let z_mm = planes.z_um(layer) / 1000.0;
         let plane = Line::of_layer(cutter.grid, planes, layer);
+        // Bodies with planes of their own are cut at another height.
         let is_cut = |body: u32| cutter.planes.of_body(body).z_um(layer) == planes.z_um(layer);
         for surfaces in surfaces {
             for edge in &surfaces.curved_edges().all {
@@ -81,6 +82,7 @@ pub(crate) fn settle(
         return Vec::new();
     }
     for (body, crossing) in crossings {
+        // Most rows have nothing to settle, and need no list.
         if let Some(row) = rows.get_mut(&(body, crossing.row() as u32)) {
             row.found.push(crossing);
             row.lists.exact.push(crossing);
@@ -94,6 +96,7 @@ pub(crate) fn settle(
     for (surfaces, near, z_mm) in all_near {
         near.settle(surfaces, tally, z_mm, cutter, &mut rows);
     }
+    // Settling has noted the sides for which some switches wait.
     for row in rows.values_mut() {
         row.switch(tally);
         row.add_sides(tally);
@@ -176,6 +179,7 @@ impl UnsettledRow {
     /// Returns the crossings to add to the found crossings. A surplus crossing is canceled by its
     /// reverse in the same column.
     fn changes(mut self) -> impl Iterator<Item = Crossing> {
+        // The table has the found crossings already, so only differences are returned.
         let mut cancelled = Vec::new();
         for crossing in self.found {
             match self.lists.exact.iter().position(|other| *other == crossing) {
@@ -291,6 +295,7 @@ impl Near {
     fn set_side(&self, tally: &Tally, side: Crossing, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[side]);
         let is_there = row.lists.exact.iter().any(|other| is_same(side, *other));
+        // With another number of kept crossings, none of them is sure to be this one.
         if is_there || kept.len() != 1 || winding(&kept) != side.in_row().winding() {
             row.lists.sides.push(side);
             return;
@@ -309,6 +314,7 @@ impl Near {
         let has_both = pair
             .iter()
             .all(|crossing| there.iter().filter(|other| is_same(*crossing, **other)).count() == 1);
+        // The pair's windings sum to zero, so the crossings that it replaces must do so too.
         let is_settled = kept.is_empty() && has_both;
         if is_settled || winding(&kept) + winding(&there) != 0 {
             return;

@@ -48,6 +48,7 @@ pub(super) fn solve(
                 NewtonStep::Found => found[k] = Some((uv, jets[i])),
                 NewtonStep::Lost => {}
                 NewtonStep::Next(next) => {
+                    // Open points move to the front, so that the next call evaluates no others.
                     (open[kept], at[kept]) = (k, next);
                     kept += 1;
                 }
@@ -78,6 +79,7 @@ fn step(
     }
     let ([au, bu], [av, bv]) = ([jet.du[a], jet.du[b]], [jet.dv[a], jet.dv[b]]);
     let det = au * bv - av * bu;
+    // Cramer's rule. A zero determinant gives no finite step.
     let next = [u + (e * bv - f * av) / det, v + (f * au - e * bu) / det];
     if next.iter().all(|t| t.is_finite()) { NewtonStep::Next(next) } else { NewtonStep::Lost }
 }

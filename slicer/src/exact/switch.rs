@@ -73,6 +73,7 @@ impl RowLists {
     pub(super) fn switch(&mut self, switches: &mut Vec<Switch>) -> usize {
         let mut left = Vec::new();
         loop {
+            // On a copy: a switch that fails may take another one's crossing with it.
             let mut lists = self.clone();
             let unknown = lists.take(switches);
             if unknown.is_empty() {

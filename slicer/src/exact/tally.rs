@@ -65,6 +65,7 @@ impl Tally {
     /// Counts added and removed crossings, and crossings that are no longer kept.
     pub(crate) fn mend(&self, mended: usize, kept: usize) {
         self.mended.fetch_add(mended as u64, Relaxed);
+        // Polishing has counted these as kept.
         self.kept.fetch_sub(kept as u64, Relaxed);
     }
 

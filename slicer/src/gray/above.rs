@@ -85,6 +85,7 @@ impl<'a> AboveRows<'a> {
 
     /// Starts a band of so many rows, with nothing known.
     pub(super) fn start(&mut self, band: usize, rows: usize) {
+        // Any layer looks farther up than 0, so the first one forgets the last band's results.
         (self.band, self.end) = (band, 0);
         self.known.resize_with(rows, Vec::new);
     }
@@ -147,6 +148,7 @@ impl<'a> AboveRows<'a> {
         self.unseen.push(LookUp { next: self.layer + 1, above });
         while let Some(mut piece) = self.unseen.pop() {
             while !piece.is_done(self.end) {
+                // The undersides below a layer's pixels also show which pixels are part.
                 let row = self.columns.below(piece.next as usize, self.band, in_band);
                 let Above { start, end, .. } = piece.above;
                 let at = row.partition_point(|below| below.end <= start);

@@ -40,6 +40,8 @@ impl<'a> Around<'a> {
     /// Returns the levels under this number of white layers.
     fn levels_under(&self, white: usize) -> &LevelsByDepth {
         self.by_depth[white].get_or_init(|| {
+            // White as far up as light counts is taken as white all the way, so that layers share a
+            // table.
             let goes_on = self.end < self.light.len() && white + 1 == self.end - self.layer;
             self.light.levels_by_depth(self.layer, if goes_on { None } else { Some(white) })
         })
@@ -146,6 +148,7 @@ impl<'a> BandChooser<'a> {
     /// Chooses a row, given its number in the band.
     fn choose_row(&mut self, around: &Around<'_>, in_band: u32) {
         let row = self.below(around.layer, in_band);
+        // Most rows of thick parts end here.
         if row.iter().all(|below| below.layer == DEEP) {
             return row.iter().for_each(|below| self.rows.push(below.start, below.end, 255));
         }
@@ -268,7 +271,9 @@ impl<'a> BandChooser<'a> {
                 255
             } else {
                 let before = self.column.left(depth_um) + self.light.least_below(layer, depth_um);
+                // No pixel of the part is black, so that outlines stay.
                 let level = levels.level(depth_um, 1.0 - before).max(1);
+                // Counted once, in the layer that has the underside.
                 let is_lowest = layer == around.layer && depth_um < self.light.step_um(layer);
                 if is_lowest && level == 255 {
                     let left = before + levels.left(level, depth_um);
@@ -330,6 +335,7 @@ impl ColumnLight {
     }
 
     fn add(&mut self, depth_um: f64, share: f64) {
+        // Light with one penetration depth fades alike, however many layers it comes from.
         match self.0.iter_mut().find(|(known, _)| *known == depth_um) {
             Some((_, sum)) => *sum += share,
             None => self.0.push((depth_um, share)),
@@ -338,11 +344,13 @@ impl ColumnLight {
 
     /// Returns the critical doses at a depth below.
     fn left(&self, below_um: f64) -> f64 {
+        // Beer-Lambert: light falls to 1/e in each penetration depth.
         self.0.iter().map(|&(depth_um, share)| share * (-below_um / depth_um).exp()).sum()
     }
 
     fn go_down(&mut self, by_um: f64) {
         self.0.iter_mut().for_each(|(depth_um, share)| *share *= (-by_um / *depth_um).exp());
+        // A millionth of the critical dose moves no underside, and exponentials cost time.
         self.0.retain(|(_, share)| *share > 1e-6);
     }
 }

@@ -66,6 +66,7 @@ impl Columns {
         let Some(lowest) = self.depths.front() else { return };
         self.below.resize_with(lowest.height().div_ceil(BAND_ROWS) as usize, VecDeque::new);
         let depths = &self.depths;
+        // A layer needs the one below it, but no other band.
         self.below.par_iter_mut().enumerate().for_each(|(band, of_layers)| {
             for (k, rows) in depths.iter().enumerate().skip(known) {
                 let layer_below = k.checked_sub(1).map(|below| &of_layers[below]);
@@ -90,11 +91,13 @@ impl Columns {
 
     /// Chooses the levels of some layers, given all layers below and above that count.
     pub(crate) fn choose(&self, light: &PrintThrough, layers: Range<usize>) -> Vec<ChosenLayer> {
+        // A layer that is cut again has none above it here.
         let around = |layer| Around::new(light, layer, light.end_above(layer).min(self.end()));
         let around: Vec<Around<'_>> = layers.clone().map(around).collect();
         let chooser = || BandChooser::new(self, light);
         let bands = (0..self.below.len()).into_par_iter();
         let bands: Vec<_> =
+            // A chooser keeps the memory of its lists from band to band.
             bands.map_init(chooser, |chooser, band| chooser.choose(band, &around)).collect();
         let whole = |k: usize| {
             let of_bands = bands.iter().map(|band| &band[k]);

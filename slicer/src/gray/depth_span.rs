@@ -13,6 +13,7 @@ pub(crate) struct DepthSpan {
     pub(crate) start: u32,
     pub(crate) end: u32,
     /// Below the layer's top, at the first column.
+    // 32 bits are exact to a tenth of a nanometer in a millimeter, and halve the memory.
     pub(super) depth_um: f32,
     pub(super) um_per_column: f32,
     /// The distance by which rounding may put it on the other side of the plane. Negative if the

@@ -43,6 +43,7 @@ impl PrintThrough {
             };
             white[layer] = own.share(255) + above.map_or(0.0, faded);
             above = Some((tops_um[layer], white[layer]));
+            // Beer-Lambert: share e^(-depth / Dp) falls to 1, the critical dose, at Dp ln(share).
             let reach = own.depth_um(255) * white[layer].ln();
             // Where even white falls short, the underside within the layer must still be found.
             reach_um = reach_um.max(reach).max(planes.thickness_um(layer));
@@ -131,6 +132,7 @@ impl PrintThrough {
         if let Some(known) = self.known.lock().expect("no thread failed").get(&around) {
             return Arc::clone(known);
         }
+        // Without the lock, so that no thread waits. Two may do the same work, with one result.
         let levels = Arc::new(around.levels(&self.levels, self.reach_um));
         self.known.lock().expect("no thread failed").insert(around, Arc::clone(&levels));
         levels
@@ -193,16 +195,19 @@ impl Surroundings {
                 (low, high) = (high, high + 2.0 * (high - from_um));
             }
             high = high.min(reach_um);
+            // A hundredth of a micrometer is far below any error of a cure depth.
             while high - low > 0.01 {
                 let middle = f64::midpoint(low, high);
                 if is_above(middle) { high = middle } else { low = middle }
             }
             step_um = (high - from_um).max(0.1);
             from_um = low;
+            // Levels must not fall with depth, whatever the search finds.
             rising_um = high.max(rising_um);
             rising_um
         });
         let steps_um: Vec<f64> = steps_um.collect();
+        // The depth at which white itself leaves the critical dose.
         let falls_short_um = white_um * (above + own.share(255)).ln();
         let [first_um, white_um] = [steps_um[1], steps_um[254]];
         LevelsByDepth { first_um, white_um, steps: LevelSteps::new(steps_um), falls_short_um }

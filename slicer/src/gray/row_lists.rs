@@ -42,6 +42,7 @@ impl<T> RowLists<T> {
 
     /// Starts lists with room for about as many items as another has.
     pub(crate) fn like(other: &Self) -> Self {
+        // Neighboring layers are alike. With an eighth more, most lists need not grow.
         Self::with_room(other.starts.len(), other.items.len() + other.items.len() / 8)
     }
 

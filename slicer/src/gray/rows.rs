@@ -149,10 +149,12 @@ impl ShadedRows for DepthRows {
     type Change = (u32, f32);
 
     const OUTSIDE: f32 = 0.0;
+    // Infinite, so that any comparison with a depth treats it as deeper.
     const DEEP: f32 = f32::INFINITY;
 
     #[inline]
     fn of_depth(&self, depth_um: f64) -> f32 {
+        // A facet that counts as on the plane may be slightly above the layer's top.
         depth_um.max(0.0) as f32
     }
 

@@ -62,6 +62,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         self.last = R::OUTSIDE;
         self.open.clear();
         for ends in transitions.chunks(2) {
+            // The last run of a stray row ends with the image.
             let (start, end) = (ends[0], ends.get(1).copied().unwrap_or(self.width));
             while spans.first().is_some_and(|span| span.end <= start) {
                 spans = &spans[1..];
@@ -137,6 +138,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         let to = span.end.min(end);
         let tie_um = span.tie_um().max(self.planes.tolerance_um());
         let near_um = self.plane_depth_um(span.body()) + tie_um;
+        // The usual case: one facet, clear of the plane, needs no sorting.
         let is_alone = spans.get(1).is_none_or(|next| next.start >= span.end);
         if !is_alone || span.depth_um(column).min(span.depth_um(to - 1)) <= near_um {
             self.open.push(span);
@@ -158,6 +160,7 @@ impl<'a, R: ShadedRows> Shader<'a, R> {
         if self.open.is_empty() {
             return self.push(start, R::DEEP);
         }
+        // Over level facets, all columns have the depth of the first.
         let end = if self.open.iter().all(|span| span.is_level()) { start + 1 } else { end };
         for column in start..end {
             let exit = self.exit_um(column, position);

@@ -38,9 +38,11 @@ impl Sheet {
         let [u, v] = [b, c].map(|to| [0, 1, 2].map(|axis| to[axis] - a[axis]));
         let cross = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
         let area = cross(0, 1);
+        // Seen from above it is a line, and its neighbors take the pixels on both sides.
         if area == 0.0 {
             return None;
         }
+        // |dz/dx| + |dz/dy|, by the components of the normal.
         let um_per_pixel = (cross(1, 2).abs() + cross(2, 0).abs()) / area.abs();
         let (low_um, high_um) = facet_heights(facet);
         Some(Self {
@@ -48,6 +50,7 @@ impl Sheet {
             low_um,
             high_um,
             steepness: 1.0 + um_per_pixel / cutter.grid.dpi.pitch().um(),
+            // At most a micrometer, or steep facets would touch all around them.
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
             // Rows count downward: facets that face down turn clockwise in y.
             winding: if area > 0.0 { 1 } else { -1 },

@@ -29,6 +29,7 @@ impl SolidRow {
     /// no light comes from above that layer.
     pub(crate) fn start(&mut self, width: u32, most_above: u32, is_top: bool) {
         self.width = width;
+        // Two whole blocks are as long as the window.
         self.block = most_above.div_ceil(2).max(1);
         self.left = if is_top { self.block } else { (most_above / 2).max(1) };
         for (columns, all) in
@@ -77,6 +78,7 @@ fn push_common(columns: &[(u32, u32)], part: impl Iterator<Item = (u32, u32)>, t
                 Some((_, last)) if *last == from => *last = within,
                 _ => to.push((from, within)),
             }
+            // The columns go on in the next piece.
             if until > end {
                 break;
             }

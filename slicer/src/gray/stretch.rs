@@ -33,6 +33,7 @@ impl RowStretch {
             return None;
         }
         let heights = [long[1], short[1]].map(|z| z.clamp(low_um, high_um));
+        // A column is between the ends, so they differ.
         let um_per_column = (heights[1] - heights[0]) / (ends[1] - ends[0]);
         Some(Self { columns: a.min(b)..a.max(b), ends, heights, um_per_column })
     }
@@ -123,6 +124,7 @@ impl RowStretch {
                 each(layer, columns, depth_um);
                 layer += 1;
             } else {
+                // No column is in reach, so the sweep jumps to the layer of the next one.
                 let low_um = height(low) - looks.tie_um;
                 layer = looks.planes.near(low_um, low_um).start.max(layer + 1);
             }

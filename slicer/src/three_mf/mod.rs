@@ -230,6 +230,7 @@ impl Models<'_> {
             is_in_project: outer.is_in_project || is_listed,
             kind,
         };
+        // Negative volumes cut only the item, or the object of the project, that lists them.
         if outer.depth == 0 || (is_listed && !outer.is_in_project) {
             place.object = found.objects;
             found.objects += 1;
@@ -276,6 +277,7 @@ impl Models<'_> {
             }
         };
         found.facets += piece.facets.count() as u64;
+        // A few bytes may place one mesh thousands of times.
         if found.facets > self.package.most {
             return Err(ThreeMfError::Copies(self.package.most));
         }

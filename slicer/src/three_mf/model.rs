@@ -184,6 +184,7 @@ impl<'a> ModelReader<'a> {
             "object" => self.begin_object(tag)?,
             "component" => self.components.push(self.reference(tag)?),
             "item" => self.items.push(self.reference(tag)?),
+            // Cura also writes the settings of an object as its metadata.
             "metadata" if self.object.is_some() => self.setting = attribute(tag, "name")?,
             _ => {}
         }
@@ -245,6 +246,7 @@ impl<'a> ModelReader<'a> {
     }
 
     fn begin_model(&mut self, tag: &BytesStart<'_>) -> Result<(), ModelFault> {
+        // Millimeters are the default of the 3MF core specification.
         self.units = match attribute(tag, "unit")?.as_deref() {
             None | Some("millimeter") => Units::Millimetres,
             Some("micron") => Units::Micrometres,
@@ -256,6 +258,7 @@ impl<'a> ModelReader<'a> {
         };
         for prefix in attribute(tag, "requiredextensions")?.unwrap_or_default().split_whitespace() {
             let name = attribute(tag, &format!("xmlns:{prefix}"))?;
+            // The core specification demands an error: such an extension may change any shape.
             if name.as_deref().and_then(effect_of).is_none() {
                 let name: String = name.unwrap_or_else(|| prefix.to_owned());
                 return Err(ModelFault::Extension(name.chars().take(100).collect()));
@@ -330,6 +333,7 @@ fn volumes_of(mesh: &Piece, volumes: &[Volume]) -> Option<Vec<(VolumeKind, Piece
     let mut add = |range: std::ops::Range<usize>, kind: &VolumeKind| {
         let first_facet = mesh.first_facet + range.start;
         let facets = match range.len() == count {
+            // A mesh of one volume needs no copy.
             true => facets.clone(),
             false => Arc::new(facets[range].to_vec()),
         };
@@ -361,6 +365,7 @@ fn transform(text: &str, units: Units) -> Option<Placement> {
     let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
     let m: [f64; 12] = numbers.try_into().ok()?;
     let is_finite = m.iter().all(|number| number.is_finite());
+    // The core specification multiplies row vectors by the matrix, so its columns are rows here.
     let row = |k: usize| [m[k], m[3 + k], m[6 + k], m[9 + k] * units.mm()];
     is_finite.then(|| Placement::of_rows([row(0), row(1), row(2)]))
 }

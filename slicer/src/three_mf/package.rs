@@ -62,6 +62,7 @@ impl<'a> Package<'a> {
         name: &str,
         read: impl FnOnce(&mut BoundedText<&mut dyn BufRead>) -> T,
     ) -> Result<T, ThreeMfError> {
+        // All files of a package share the limit.
         let most = self.most - self.unpacked;
         let file = self.files.get(&plain(name));
         let (number, _) = file.ok_or_else(|| ThreeMfError::NoModel(without_root(name)))?;
@@ -180,6 +181,8 @@ pub(crate) fn looks_packaged(file: &PartFile, start: &[u8]) -> io::Result<bool> 
     reader.take(LONGEST_COMMENT + END_BYTES as u64).read_to_end(&mut tail)?;
     let u16_at = |at: usize| usize::from(u16::from_le_bytes([tail[at], tail[at + 1]]));
     let is_end = |&at: &usize| {
+        // The end of central directory record (ZIP's APPNOTE, 4.3.16) with its comment ends the
+        // file.
         tail[at..].starts_with(b"PK\x05\x06") && at + END_BYTES + u16_at(at + 20) == tail.len()
     };
     let Some(end) = (0..(tail.len() + 1).saturating_sub(END_BYTES)).rfind(is_end) else {
@@ -187,6 +190,7 @@ pub(crate) fn looks_packaged(file: &PartFile, start: &[u8]) -> io::Result<bool> 
     };
     // It is preceded by the directory, or by the end of a long one.
     let size = u64::from(u32::from_le_bytes(tail[end + 12..][..4].try_into().expect("four bytes")));
+    // Counted back from the end: bytes before a package make the record's own offset wrong.
     let Some(directory) = (tail_start + end as u64).checked_sub(size) else {
         return Ok(tail[..end].ends_with(b"PK\x06\x07"));
     };

@@ -175,6 +175,7 @@ impl Project {
     ) -> VolumeKind {
         let volumes = self.volumes(object).unwrap_or_default();
         let mut volumes = volumes.iter().filter(|volume| volume.component == Some(component));
+        // An object may be several components, each with a kind. Missing kinds repeat the last one.
         let volume = volumes.clone().nth(before).or_else(|| volumes.next_back());
         volume.map_or(VolumeKind::Solid, |volume| volume.kind.clone())
     }

@@ -94,6 +94,7 @@ impl Slice {
         let sides = self.polygons.iter().flat_map(|polygon| polygon.windows(2));
         let twice = sides.map(|side| {
             let [a, b] = [side[0], side[1]].map(|number| self.vertices[number as usize]);
+            // Gauss's area formula: clockwise polygons, which are holes, count negative.
             a[0] * b[1] - b[0] * a[1]
         });
         0.5 * twice.sum::<f64>()
@@ -114,6 +115,7 @@ impl Prisms {
     pub(super) fn add(&mut self, stack: &SliceStack, most_facets: u64) -> Result<(), &'static str> {
         let mut bottom = stack.bottom;
         for slice in &stack.slices {
+            // A further stack begins where the last one ends, or higher.
             let rises = slice.top > bottom && self.top.is_none_or(|top| bottom >= top);
             if !rises || !slice.top.is_finite() {
                 return Err("slices whose heights do not rise");
@@ -123,6 +125,7 @@ impl Prisms {
             }
             self.volume += slice.area() * (slice.top - bottom);
             for polygon in &slice.polygons {
+                // A prism of n sides has 2 n facets around it and n - 2 at each end.
                 self.facets += 4 * polygon.len() as u64;
                 if self.facets > most_facets.min(u64::from(u32::MAX)) {
                     return Err("more slices than a package of its size explains");

@@ -131,9 +131,11 @@ pub(super) fn numbers<T: FromStr + Copy, const N: usize>(
     names: [&'static str; N],
 ) -> Result<[T; N], ModelFault> {
     let mut found = [None; N];
+    // Looking for repeated attributes costs time in each of millions of tags.
     for attribute in tag.attributes().with_checks(false) {
         let attribute = attribute.map_err(|error| ModelFault::Xml(error.into()))?;
         if let Some(place) = names.iter().position(|name| *name == attribute.key.as_ref()) {
+            // An attribute that is not a number counts as missing, and the error names it.
             found[place] = attribute.value.trim().parse().ok();
         }
     }

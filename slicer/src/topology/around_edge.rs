@@ -39,6 +39,7 @@ fn sorted(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> Option<Vec<Leaf
     let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
     let along = sub(point(high), point(low));
     let apex = |corner: u32| sub(point(vertex(corner)), point(low));
+    // Axes across the edge, with the first facet at angle zero.
     let up = cross(along, apex(corners[0]));
     let out = cross(up, along);
     let scales = (length(up), length(out));
@@ -49,6 +50,7 @@ fn sorted(corners: &[u32], points: &[Vec3], vertices: &[u32]) -> Option<Vec<Leaf
     };
     let mut leaves: Vec<Leaf> = corners.iter().map(leaf).collect();
     leaves.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+    // The first facet follows the last one.
     let full = leaves[0].angle + std::f64::consts::TAU;
     let ends = leaves.iter().skip(1).map(|leaf| leaf.angle).chain([full]);
     let differ = leaves.iter().zip(ends).all(|(leaf, end)| end - leaf.angle > SAME_ANGLE);

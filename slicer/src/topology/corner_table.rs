@@ -55,6 +55,7 @@ impl CornerTable {
     /// Panics if a vertex is not among the points, the number of corners is not three per facet, or
     /// there are 2^32 - 1 corners.
     pub fn new(points: Vec<[f64; 3]>, vertices: Vec<u32>) -> Self {
+        // With too many facets, `of_bodies` panics.
         let facets = u32::try_from(vertices.len() / 3).unwrap_or(NONE);
         Self::of_bodies(points, vertices, vec![facets])
     }
@@ -65,6 +66,7 @@ impl CornerTable {
         vertices: Vec<u32>,
         body_ends: Vec<u32>,
     ) -> Self {
+        // No corner's number may equal `NONE`.
         assert!(vertices.len().is_multiple_of(3) && vertices.len() < NONE as usize);
         let edges = Edges::of(&points, &vertices);
         Self { points, vertices, edges, body_ends }
@@ -174,6 +176,7 @@ impl CornerTable {
     /// Returns true if a facet has two corners at one vertex, or a coordinate that is not finite.
     #[inline]
     pub fn is_idle(&self, facet: u32) -> bool {
+        // No corner of an idle facet has an edge, so one is enough to look at.
         self.edges.numbers[3 * facet as usize] == NONE
     }
 
@@ -193,6 +196,7 @@ impl CornerTable {
 
     /// Returns the size of the arrays in bytes.
     pub fn bytes(&self) -> usize {
+        // Three coordinates a point; vertex, opposite corner and edge for each corner.
         24 * self.points.len() + 4 * (self.vertices.len() * 3 + self.body_ends.len())
     }
 }

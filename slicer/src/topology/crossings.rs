@@ -57,9 +57,11 @@ impl Crossings {
                     found.is_partial = true;
                     break;
                 }
+                // The tree meets itself, so each pair comes twice.
                 if a.data < b.data && cross(table, a.data, b.data) && counts(a.data, b.data) {
                     found.count += 1;
                     found.pairs.push([a.data, b.data]);
+                    // Sorted only when twice as many are found, so that each pair costs little.
                     if found.pairs.len() / 2 > most {
                         found.keep(most);
                     }
@@ -92,6 +94,7 @@ fn pierces(table: &CornerTable, edges: [u32; 3], facet: [u32; 3]) -> bool {
     };
     let [a, b, c] = facet.map(point);
     // The sides of the plane for the ends.
+    // A common vertex only touches. Other signs are exact, by Shewchuk's predicate.
     let sides = edges.map(|vertex| match facet.contains(&vertex) {
         true => 0.0,
         false => orient3d(a, b, c, point(vertex)),

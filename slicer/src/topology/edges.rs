@@ -27,6 +27,7 @@ impl Edges {
     /// 002, and the corners of a bin are sorted by the upper vertex.
     pub(crate) fn of(points: &[[f64; 3]], vertices: &[u32]) -> Self {
         let is_finite = |point: &[f64; 3]| point.iter().all(|c| c.is_finite());
+        // Nearly every mesh is finite. One pass here saves three look-ups for each facet.
         let all_are_finite = points.iter().all(is_finite);
         let is_busy = |corners: &[u32]| {
             let is_finite = |&vertex: &u32| is_finite(&points[vertex as usize]);
@@ -69,6 +70,7 @@ impl Edges {
                 start += same.len();
             }
         }
+        // Crowded edges are few, so a sorted list takes less than a flag for each corner.
         edges.crowded_corners = edges.crowded.iter().flatten().copied().collect();
         edges.crowded_corners.sort_unstable();
         edges

@@ -68,6 +68,7 @@ pub(crate) fn is_flat_between([a, b, c]: [Vec3; 3]) -> bool {
     let (to_b, to_c) = (sub(b, a), sub(c, a));
     let across = cross(to_b, to_c);
     // Squares are compared, because roots cost time.
+    // The sine of the angle at the first corner is within the rounding of the products.
     dot(across, across) <= (4.0 * f64::EPSILON).powi(2) * dot(to_b, to_b) * dot(to_c, to_c)
 }
 

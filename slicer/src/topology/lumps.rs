@@ -29,6 +29,7 @@ pub(crate) fn voids(around: &[Option<u32>]) -> Vec<bool> {
             way.push(at);
             match around[at] {
                 Some(outer) => at = outer as usize,
+                // The loop below turns this over: an outermost shell is not a void.
                 None => break true,
             }
         };
@@ -47,12 +48,14 @@ pub(crate) fn lumps(shells: &[ShellReport]) -> Vec<Lump> {
     let mut lumps: Vec<Lump> =
         outer.map(|(outer, _)| Lump { outer, voids: Vec::new(), mass: None }).collect();
     for (number, void) in closed().filter(|(_, shell)| shell.is_void) {
+        // Lumps are in the order of their outer shells.
         if let Some(Ok(at)) =
             void.within.map(|outer| lumps.binary_search_by_key(&outer, |lump| lump.outer))
         {
             lumps[at].voids.push(number);
         }
     }
+    // Whichever way its facets face, an outer shell adds and a void removes.
     let signed = |shell: u32, sign: f64| {
         let mass = shells[shell as usize].mass.as_deref().copied()?;
         Some(mass.times(sign * mass.volume_mm3.signum()))

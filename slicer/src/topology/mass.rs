@@ -39,7 +39,9 @@ impl Moments {
         self.zeroth += six;
         self.first = along(self.first, sum, six);
         for (k, second) in self.second.iter_mut().enumerate() {
+            // The first three are the squares, the others xy, yz and zx.
             let (i, j) = (k % 3, (k + k / 3) % 3);
+            // The integral of x_i x_j over a tetrahedron with a corner at the origin, times 120.
             *second += six * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j]);
         }
     }
@@ -52,6 +54,7 @@ impl Moments {
         let centre = scale(self.first, per);
         let about_centre = |k: usize| {
             let (i, j) = (k % 3, (k + k / 3) % 3);
+            // Steiner's theorem leads from this point to the center of mass.
             self.second[k] / 120.0 - volume * centre[i] * centre[j]
         };
         let [xx, yy, zz, xy, yz, zx]: [f64; 6] = std::array::from_fn(about_centre);
@@ -78,6 +81,7 @@ impl Mass {
     pub fn together(masses: impl IntoIterator<Item = Self> + Clone) -> Option<Self> {
         let volume_mm3: f64 = masses.clone().into_iter().map(|mass| mass.volume_mm3).sum();
         let mut centre_mm = [0.0; 3];
+        // If volumes cancel, numbers are not finite here, and dropped at the end.
         for mass in masses.clone() {
             centre_mm = along(centre_mm, mass.centre_mm, mass.volume_mm3 / volume_mm3);
         }

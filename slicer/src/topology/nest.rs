@@ -211,6 +211,7 @@ impl<'a> Rays<'a> {
         let start =
             |(number, ray): (usize, &Ray)| GeomWithData::new([ray.start[1], ray.start[2]], number);
         let starts = RTree::bulk_load(self.rays.iter().enumerate().map(start).collect());
+        // The whole first pass is needed: only then is it known where a ray leaves its own shell.
         self.meet(&starts, |ray, meeting| {
             if ray.shell == meeting.shell {
                 ray.start[0] = ray.start[0].max(meeting.depth_mm);
@@ -235,11 +236,13 @@ impl<'a> Rays<'a> {
             let corners = self.table.facet(facet).map(|point| self.seen(point));
             let least = |k: usize| corners.iter().map(|c| c[k]).fold(f64::INFINITY, f64::min);
             let most = |k: usize| corners.iter().map(|c| c[k]).fold(f64::NEG_INFINITY, f64::max);
+            // Shells are few and facets many, so the rays are in the tree.
             let shadow = AABB::from_corners([least(1), least(2)], [most(1), most(2)]);
             for start in starts.locate_in_envelope(shadow) {
                 let Some((depth_mm, rises)) = met(&corners, self.rays[start.data].start) else {
                     continue;
                 };
+                // Against the axis, coordinates are mirrored, so facets seem to face the other way.
                 let is_exit = (rises == self.faces_outward(facet, shell)) == (self.sign > 0.0);
                 each(&mut self.rays[start.data], Hit { depth_mm, shell, is_exit });
             }

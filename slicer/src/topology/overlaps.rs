@@ -52,6 +52,7 @@ impl ShellOverlap {
                 facets[shell as usize].push(rounded(table.facet(facet)));
             }
         }
+        // The slicer counts the pixels that bodies share, so each shell becomes a body.
         let piece = |&shell: &u32| {
             let facets = Facets::Memory(Arc::new(std::mem::take(&mut facets[shell as usize])));
             Piece { role: Role::Solid, ..Piece::new(facets) }
@@ -60,6 +61,7 @@ impl ShellOverlap {
         let part = Part::new("shells", pieces, String::new()).with(Vec::new(), true);
         let boxes = candidates.iter().map(|&shell| check.shells[shell as usize].box_mm);
         let [low, high] = boxes.reduce(joined).expect("there are some");
+        // A flat box must not divide by zero.
         let [x, y, z] = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(1e-6));
         let options = SliceOptions {
             dpi: Dpi::new(25.4 * ROWS / x.max(y)).unwrap_or(SliceOptions::default().dpi),
@@ -100,6 +102,7 @@ fn candidates(check: &MeshCheck) -> BTreeSet<u32> {
     let mut found = BTreeSet::new();
     for (place, &a) in order.iter().enumerate() {
         let end = box_mm(a)[1][0];
+        // A sweep along x: later shells begin after this one's end.
         for &b in order[place + 1..].iter().take_while(|&&b| box_mm(b)[0][0] < end) {
             let [low, high] = shared(box_mm(a), box_mm(b));
             let overlap = (0..3).all(|axis| low[axis] < high[axis]);

@@ -141,6 +141,7 @@ impl Welder {
         let is_same = |&known: &u32| bits(&points[known as usize]) == bits(&point);
         let hash = hasher.hash_one(bits(&point));
         let place = &mut recent[hash as usize % RECENT];
+        // An equal point of an earlier body is another vertex.
         if (*first..NONE).contains(place) && is_same(place) {
             return *place;
         }
@@ -157,6 +158,7 @@ impl Welder {
 
 /// A closed mesh has slightly more than half as many vertices as facets.
 fn usual_vertices(facets: usize) -> usize {
+    // Euler's formula for a sphere: V - E + F = 2, and three sides a facet give E = 3/2 F.
     facets / 2 + 2
 }
 

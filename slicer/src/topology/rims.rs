@@ -48,6 +48,7 @@ impl RimLoop {
                     Some(corner) => follow(table, corner, from, &mut take),
                     None => (vec![(rims[first], other)], false),
                 };
+                // `ahead` begins with this rim.
                 behind.retain(|(corner, _)| *corner != rims[first]);
                 ahead = reversed(table, behind).into_iter().chain(ahead).collect();
             }
@@ -92,6 +93,7 @@ fn without_repeats(way: Vec<(u32, u32)>) -> Vec<Vec<(u32, u32)>> {
     for (corner, from) in way {
         if let Some(&place) = places.get(&from) {
             let closed = left.split_off(place);
+            // The rest of the path may visit these vertices again, in a loop of its own.
             closed.iter().for_each(|(_, from)| _ = places.remove(from));
             loops.push(closed);
         }

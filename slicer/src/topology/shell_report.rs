@@ -59,6 +59,7 @@ pub(crate) fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> 
     let facets = || (0..table.facet_count() as u32).map(|facet| (shells.of(facet), facet));
     let in_shells = facets().filter(|(shell, _)| (*shell as usize) < shells.count());
     let crowded = crowded_by_shell(table, shells);
+    // A stamp for each vertex, so that no set is cleared between shells.
     let mut last_shell_at = vec![u32::MAX; table.points().len()];
     let mut body_ends = table.bodies().map(|facets| facets.end).enumerate().peekable();
     let groups = match shells.count() {
@@ -110,6 +111,7 @@ struct Tally<'a> {
 
 impl<'a> Tally<'a> {
     fn new(table: &'a CornerTable, shells: &'a Shells, shell: u32, first: u32) -> Self {
+        // Near the shell, sums lose few digits when they cancel.
         let about = table.point(3 * first);
         Self {
             table,
@@ -150,6 +152,7 @@ impl<'a> Tally<'a> {
     fn report(self, body: u32, crowded: u32) -> ShellReport {
         let is_one_sided = self.shells.one_sided().binary_search(&self.shell).is_ok();
         let is_closed = self.open_sides == 0 && !is_one_sided;
+        // An edge between neighbors has two of the other sides.
         let shared = (3 * self.facets - self.open_sides) / 2;
         ShellReport {
             body,

@@ -121,6 +121,7 @@ impl Sheets {
                     self.is_turned[other] = turns;
                     waiting.push(other as u32);
                 } else {
+                    // Two ways through the sheet lead to opposite sides of this facet.
                     is_one_sided |= self.is_turned[other] != turns;
                 }
             }

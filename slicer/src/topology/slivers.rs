@@ -103,9 +103,11 @@ impl Flips<'_> {
     /// Returns true if an edge leads from a corner's vertex to another vertex.
     fn is_edge(&self, corner: u32, to: u32) -> bool {
         let ways: [fn(u32) -> u32; 2] = [next, previous];
+        // Both ways around, as the first may end at the rim of the mesh.
         ways.into_iter().any(|way| {
             // Around the vertex, from facet to facet.
             let mut at = corner;
+            // Beyond the limit the answer is yes, so that nothing is flipped.
             for _ in 0..MAX_AROUND {
                 let ends = [next(at), previous(at)];
                 if ends.iter().any(|&end| self.vertices[end as usize] == to) {

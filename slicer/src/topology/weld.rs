@@ -102,6 +102,7 @@ impl Cells {
     /// Returns the key of a cell some cells away. Far from the origin, where steps of floating
     /// point are wider than cells, it is the same key.
     fn key_beside(&self, point: Vec3, steps: Vec3) -> [u64; 3] {
+        // Adding 0 gives -0 the bits of 0.
         [0, 1, 2].map(|axis| ((point[axis] / self.side).floor() + steps[axis] + 0.0).to_bits())
     }
 

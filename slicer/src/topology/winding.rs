@@ -23,6 +23,7 @@ pub(crate) fn wound_twice(
 ) -> Option<(u32, Vec3)> {
     let count = table.facet_count();
     let most = (MOST_FACETS / count.max(1)).max(1);
+    // Each place takes a pass over all facets.
     let some: Vec<u32> =
         facets.iter().copied().step_by(facets.len().div_ceil(most).max(1)).collect();
     let beside = |facet: u32| -> Option<Vec3> {
@@ -33,12 +34,14 @@ pub(crate) fn wound_twice(
             let others =
                 (0..count as u32).filter(|&other| !table.is_idle(other) && solid(facet, other));
             let turns = others.map(|other| angle(table.facet(other), *place)).sum::<f64>() / TAU;
+            // A whole sphere is 4π, two turns. Half a winding is far more than rounding.
             !(-0.5..=1.5).contains(&(turns / 2.0))
         };
         let places = [-off_mm, off_mm].map(|off| add(middle, scale(normal, off)));
         places.into_iter().find(is_wrong)
     };
     let found = some.into_par_iter().filter_map(|facet| beside(facet).map(|at| (facet, at)));
+    // The least facet, so that threads have no effect.
     found.min_by_key(|(facet, _)| *facet)
 }
 

@@ -25,6 +25,7 @@ const JOINED_MM: f64 = 1e-3;
 pub(crate) fn closed(mut links: Vec<Link>) -> Option<Vec<Link>> {
     let end = |link: &Link, k: usize| link.curve.place(link.range[k]);
     let meet = |a: Vec3, b: Vec3| distance(a, b) <= JOINED_MM;
+    // Only the second piece shows at which end the first one must stop.
     if let [first, second, ..] = &mut links[..] {
         let touches = |p: Vec3| meet(p, end(second, 0)) || meet(p, end(second, 1));
         if !touches(end(first, 1)) {
@@ -92,6 +93,8 @@ impl Chain {
                 t = low + (t - low).rem_euclid(period);
             }
             let part = (t - from) / (to - from);
+            // A foot outside the piece's range is on another part of its curve: the ends are
+            // nearest.
             let parts = [part, 0.0, 1.0].into_iter().filter(|part| (0.0..=1.0).contains(part));
             let all = parts.map(|part| {
                 let t = f64::from(k) + part;

@@ -105,6 +105,7 @@ impl Curve {
             _ => {
                 let [start, end] = self.domain()?;
                 let apart = distance(self.at(start)[0], self.at(end)[0]);
+                // The ends decide: the reader does not use the flag of closed curves.
                 (apart < 1e-6).then_some(end - start)
             }
         }
@@ -133,10 +134,12 @@ impl Curve {
             }
             Self::Ellipse { axes, radii: [a, b] } => {
                 let [x, y, _] = axes.local(p);
+                // Exact on a circle. On an ellipse it is a start.
                 let t = (y / b).atan2(x / a);
                 if a == b { t } else { self.nearer(p, t) }
             }
             Self::Hyperbola { axes, half_axes } => {
+                // y alone determines a point of the branch, so it gives a start near the foot.
                 self.nearer(p, (axes.local(p)[1] / half_axes[1]).asinh())
             }
             Self::Parabola { axes, focal } => self.nearer(p, axes.local(p)[1] / (2.0 * focal)),
@@ -168,6 +171,7 @@ impl Curve {
         let (mut t, mut best) = (start, (distance(self.at(start)[0], p), start));
         for _ in 0..MAX_STEPS {
             let [at, slope] = self.at(t);
+            // Gauss-Newton: the foot on the tangent, without second derivatives.
             let step = dot(sub(p, at), slope) / dot(slope, slope);
             let next = clamp(t + step);
             if !next.is_finite() || (next - t).abs() <= 1e-15 * t.abs().max(1.0) {
@@ -209,6 +213,7 @@ impl Curve {
         breaks.push(to);
         let mut points = vec![self.place(from)];
         for pair in breaks.windows(2) {
+            // 2^16 pieces at most, if the curve is not finite and never becomes straight.
             self.bend([pair[0], pair[1]], chord_mm, 16, &mut points);
         }
         points
@@ -230,6 +235,7 @@ impl Curve {
     /// much.
     fn bend(&self, [a, b]: [f64; 2], chord_mm: f64, depth: usize, points: &mut Vec<Vec3>) {
         let (p, q) = (self.place(a), self.place(b));
+        // An S-shaped piece may have its middle on the chord, but not its quarters.
         let straight = |part: f64| {
             let x = self.place(a + (b - a) * part);
             let d = sub(q, p);
@@ -264,6 +270,7 @@ pub(crate) fn edge_range(curve: &Curve, start: Vec3, end: Vec3, forward: bool) -
             to = if forward { from + way } else { from - way };
         }
     } else if is_loop && let Some([low, high]) = curve.domain() {
+        // Both ends project to one parameter, so an open curve would lose its whole length.
         [from, to] = if forward { [low, high] } else { [high, low] };
     }
     [from, to]

@@ -33,12 +33,14 @@ impl Surface {
                 Self::Cylinder { axes, radius: radius + outwards_mm }
             }
             Self::Sphere { axes, radius } => Self::Sphere { axes, radius: radius + outwards_mm },
+            // A wider tube would intersect itself and have parts that the basis lacks.
             Self::Torus { axes, major, minor, part: TorusPart::Whole }
                 if minor + outwards_mm <= major =>
             {
                 Self::Torus { axes, major, minor: minor + outwards_mm, part: TorusPart::Whole }
             }
             Self::Cone { axes, radius, slope } => {
+                // The slope is the tangent of the half angle, and sqrt(1 + tan²) = 1 / cos.
                 let radius = radius + outwards_mm * (1.0 + slope * slope).sqrt();
                 Self::Cone { axes, radius, slope }
             }
@@ -68,6 +70,7 @@ pub(super) fn at(basis: &Surface, by_mm: f64, uv: [f64; 2]) -> Jet {
     let slope = |axis: usize| -> Vec3 {
         let sides = [-1.0, 1.0].map(|by| normal(basis, moved(axis, by)));
         let [Some(low), Some(high)] = sides else { return [0.0; 3] };
+        // The derivative of S + d n is S' + d n'; n' is a central difference.
         scale(sub(high, low), by_mm / (2.0 * steps[axis]))
     };
     let beside = || {

@@ -20,6 +20,7 @@ impl Surface {
             points.iter().map(apart).fold(0.0, f64::max)
         };
         let off_mm = off(&self);
+        // Points where both parts meet must not decide, so the other one has to be clearly nearer.
         if off_mm > SAME_MM && off(&other) < CLEARLY_NEARER * off_mm { other } else { self }
     }
 

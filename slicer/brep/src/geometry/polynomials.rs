@@ -60,6 +60,7 @@ impl PolynomialBasis {
             pieces.push(KnotInterval { first: span - knots.degree(), middle, scale: 1.0 / half });
             coefficients.extend(polynomials(knots, span, middle, half));
         }
+        // As many parts as pieces: between even knots, a part leads straight to its piece.
         let parts_per_unit = count as f64 / (breaks[count] - breaks[0]);
         if pieces.iter().any(|piece| !piece.scale.is_finite()) {
             return None;
@@ -158,6 +159,7 @@ pub(super) fn horner<const C: usize>(powers: &[[f64; C]], t: f64) -> ([f64; C], 
     }
     for power in &powers[2..] {
         for c in 0..C {
+            // Horner's scheme of the derivative takes the value before this power is added.
             slopes[c] = slopes[c] * t + values[c];
             values[c] = values[c] * t + power[c];
         }
@@ -174,6 +176,7 @@ fn polynomials(knots: &Knots, span: usize, middle: f64, half: f64) -> Vec<f64> {
         let mut next = vec![vec![0.0; degree + 1]; degree + 1];
         for (r, function) in functions.iter().enumerate() {
             let (low, high) = (k[span + r + 1 - degree], k[span + r + 1]);
+            // The factors of Cox and de Boor's recursion, with the parameter as middle + half t.
             let slope = half / (high - low);
             let falling = [(high - middle) / (high - low), -slope];
             let rising = [(middle - low) / (high - low), slope];

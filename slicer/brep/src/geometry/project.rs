@@ -29,6 +29,8 @@ impl Surface {
             Self::Revolution { axes, curve } => {
                 let [x, y, z] = axes.local(p);
                 let mut samples = curve.samples();
+                // The profile need not lie in a plane through the axis, so the point is turned to
+                // eight angles about it.
                 let around = (0..8).map(|k| f64::from(k) * TAU / 8.0);
                 samples.extend(around.map(|turn| {
                     let (sin, cos) = turn.sin_cos();
@@ -75,6 +77,7 @@ impl Surface {
             Self::Cone { axes, radius, slope } => {
                 let q = axes.local(p);
                 let off = q[0].hypot(q[1]) - radius;
+                // The foot on the profile, a line with the direction (slope, 1).
                 let v = (q[2] + slope * off) / (1.0 + slope * slope);
                 [azimuth(q), v]
             }
@@ -106,6 +109,7 @@ impl Surface {
         }
         let mut seeds: Vec<_> = self.seeds(p).into_iter().map(|uv| self.seed(p, uv)).collect();
         if seeds.len() > MOST_SEEDS {
+            // A spline may have thousands of seeds: selecting is linear, sorting is not.
             seeds.select_nth_unstable_by(MOST_SEEDS, |a, b| a.0.total_cmp(&b.0));
             seeds.truncate(MOST_SEEDS);
         }
@@ -154,12 +158,14 @@ impl Surface {
             let jet = self.at(uv);
             let d = sub(p, jet.point);
             let apart = length(d);
+            // Away from the surface a step may lead off before it leads nearer.
             if apart >= best.0 * (1.0 - 1e-9) && best.0 < SAME_MM {
                 break;
             }
             if apart < best.0 {
                 best = (apart, uv);
             }
+            // The normal equations of the step, by Cramer's rule.
             let (a, b, c) = (dot(jet.du, jet.du), dot(jet.du, jet.dv), dot(jet.dv, jet.dv));
             let (e, f) = (dot(d, jet.du), dot(d, jet.dv));
             let det = a * c - b * b;

@@ -70,6 +70,8 @@ impl Knots {
     /// Returns parameters between which the spline bends little.
     pub(super) fn samples(&self) -> Vec<f64> {
         let breaks = self.breaks();
+        // A spline of few pieces gets more samples in each, so that a search has a start near every
+        // bend.
         let parts = (2 * self.degree).min(6).max(24 / breaks.len());
         let within = |pair: &[f64]| {
             let [a, b] = [pair[0], pair[1]];
@@ -82,6 +84,7 @@ impl Knots {
     pub(super) fn span(&self, t: f64) -> usize {
         let [start, end] = self.domain();
         if t >= end {
+            // Pieces are half-open; the last one also has its end.
             self.knots.partition_point(|&knot| knot < end) - 1
         } else {
             self.knots.partition_point(|&knot| knot <= t.max(start)) - 1
@@ -100,6 +103,8 @@ impl Knots {
                 // The derivatives follow from the basis of one degree less.
                 let mut left = 0.0;
                 for r in 0..degree {
+                    // *The NURBS Book*, equation 2.7. The span is not empty, and each width
+                    // includes it.
                     let width = k[span + r + 1] - k[span + r + 1 - degree];
                     let part = degree as f64 * values[r] / width;
                     slopes[r] = left - part;
@@ -138,6 +143,7 @@ pub(super) fn divided(p: &Weighted) -> Vec3 {
 }
 
 pub(super) fn divided_slope(p: Vec3, w: f64, slope: &Weighted) -> Vec3 {
+    // The quotient rule for A / w, whose value is p.
     [0, 1, 2].map(|k| (slope[k] - slope[3] * p[k]) / w)
 }
 

@@ -43,6 +43,7 @@ impl Strips {
             4 => self.along_v::<5>(uv, jets),
             5 => self.along_v::<6>(uv, jets),
             6 => self.along_v::<7>(uv, jets),
+            // `PolynomialBasis::new` refuses degrees above 7.
             _ => self.along_v::<8>(uv, jets),
         }
     }
@@ -100,6 +101,7 @@ fn plain(sums: &[Weighted; 3]) -> Jet {
 /// Divides by the weight, with derivatives by the quotient rule.
 #[inline(always)]
 fn divided(sums: &[Weighted; 3]) -> Jet {
+    // One division instead of nine.
     let per_weight = 1.0 / sums[0][3];
     let point = position(sums[0]).map(|x| x * per_weight);
     let slope = |d: Weighted| [0, 1, 2].map(|k| (d[k] - d[3] * point[k]) * per_weight);

@@ -130,6 +130,7 @@ impl Surface {
     /// Evaluates many parameters at once.
     pub(crate) fn evaluate(&self, uv: &[[f64; 2]], jets: &mut [Jet]) {
         match self {
+            // Without periods, parameters need no copy.
             Self::Spline(spline) if spline.periods == [None; 2] => spline.evaluate(uv, jets),
             Self::Spline(spline) => {
                 let uv: Vec<_> = uv.iter().map(|&uv| spline.inside(uv)).collect();
@@ -166,6 +167,7 @@ impl Surface {
             Self::Sphere { .. } => [round, Some([-FRAC_PI_2, FRAC_PI_2])],
             Self::Torus { part: TorusPart::Whole, .. } => [round, round],
             Self::Torus { major, minor, part, .. } => {
+                // Here the tube meets the axis: major + minor cos v = 0.
                 let meet = (-major / minor).acos();
                 let outside = [-meet, meet];
                 let is_apple = *part == TorusPart::Apple;
@@ -226,6 +228,8 @@ impl Surface {
     pub(crate) fn control_box(&self) -> Option<[Vec3; 2]> {
         let Self::Spline(spline) = self else { return None };
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        // Weights are positive, as the reader checks, so the surface is in the hull of these
+        // points.
         for p in &spline.points {
             for k in 0..3 {
                 bounds[0][k] = bounds[0][k].min(p[k] / p[3]);

@@ -32,6 +32,7 @@ impl SurfaceCurve {
         let [dx, dy, _] = scale(curve.at(inner)[1], to - from);
         let [by_x, by_y] = self.scale;
         let jet = self.surface.at([x * by_x, y * by_y]);
+        // The chain rule: S_u u' + S_v v'.
         [jet.point, along(scale(jet.du, dx * by_x), jet.dv, dy * by_y)]
     }
 
@@ -46,6 +47,7 @@ impl SurfaceCurve {
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let Link { curve, range: [from, to] } = &self.link;
         let inner = curve.breaks().unwrap_or_default().into_iter();
+        // A line in parameters may be a whole circle or a helix in space.
         let parts = (0..=PARTS).map(|k| k as f64 / PARTS as f64);
         let inner = inner.map(|t| (t - from) / (to - from));
         let mut breaks: Vec<f64> =

@@ -33,6 +33,7 @@ impl<'a> EdgeCurve<'a> {
     /// the tolerance.
     pub(super) fn part(&self, p: Vec3) -> Option<f64> {
         // A test of the box avoids most of the slow projections.
+        // The box is around a polyline, which is itself within the tolerance of the curve.
         let near = 2.0 * self.tolerance_mm;
         if (0..3).any(|k| p[k] < self.low[k] - near || p[k] > self.high[k] + near) {
             return None;

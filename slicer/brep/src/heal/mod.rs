@@ -29,6 +29,8 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
             tolerance_mm,
             widest_mm: HashMap::new(),
         };
+        // In this order: edges pair up by their vertices, and a long edge fits short ones only once
+        // it is cut.
         healing.join_vertices();
         healing.settle();
         healing.cut_edges();
@@ -66,6 +68,7 @@ impl Healing<'_> {
         self.loops().flatten().for_each(|(edge, _)| *uses.entry(*edge).or_default() += 1);
         let mut open: Vec<usize> =
             uses.into_iter().filter(|(_, uses)| *uses == 1).map(|(edge, _)| edge).collect();
+        // Hash maps have no order, and results must not depend on it.
         open.sort_unstable();
         open
     }
@@ -101,6 +104,7 @@ impl Healing<'_> {
     /// Splits open edges at the ends of other open edges on them.
     fn cut_edges(&mut self) {
         let mut ends: Vec<usize> = self.loose();
+        // Sorted along x, so that each edge examines only the vertices near it.
         ends.sort_by(|&a, &b| self.vertices[a][0].total_cmp(&self.vertices[b][0]));
         let mut pieces: HashMap<usize, Vec<usize>> = HashMap::new();
         for edge in self.open() {
@@ -189,6 +193,7 @@ impl Healing<'_> {
         let span = EdgeCurve::new(edge, self.range(edge), self.tolerance_mm);
         let [from, to] = self.range(other);
         let (mut parts, mut widest) = (Vec::new(), 0.0f64);
+        // The ends are common vertices already.
         for k in 1..SAMPLES {
             let at = other.curve.place(from + (to - from) * k as f64 / SAMPLES as f64);
             parts.push(span.part(at)?);

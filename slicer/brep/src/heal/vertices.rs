@@ -20,6 +20,7 @@ impl Healing<'_> {
         for vertex in self.loose() {
             let place = self.vertices[vertex];
             let cell = place.map(|x| (x / self.tolerance_mm).floor() as i64);
+            // Cells are as wide as the tolerance, so a vertex within it is in one of 27 cells.
             let around = (0..27).map(|k| {
                 [0, 1, 2].map(|axis| cell[axis].saturating_add(k / 3i64.pow(axis as u32) % 3 - 1))
             });
@@ -96,6 +97,7 @@ impl Healing<'_> {
             self.loops().flatten().filter(|edge| is_tiny(edge)).map(|(edge, _)| *edge).collect();
         for around in self.faces.iter_mut().flat_map(|face| &mut face.loops) {
             if let Loop::Edges(edges) = around
+                // A loop of tiny edges alone would become empty.
                 && edges.iter().any(|(edge, _)| !tiny.contains(edge))
             {
                 edges.retain(|(edge, _)| !tiny.contains(edge));

@@ -74,6 +74,8 @@ impl<'a> Assembly<'a> {
     fn place(&mut self, group: usize, within: Within<'a>) -> Result<(), StepError> {
         let group = &self.shapes.groups[group];
         self.visits += group.len();
+        // An assembly within itself has no end, and small files can name parts of parts by the
+        // billion.
         if within.level > MAX_LEVELS || self.visits > MAX_PARTS {
             return Err(StepError::Endless { most: MAX_PARTS });
         }

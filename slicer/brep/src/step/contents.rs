@@ -210,6 +210,7 @@ impl Contents {
                         if closed.iter().any(|name| entities.find(shell, name).is_some()) {
                             self.surfaces.push(within.body(vec![shell], within.place, "")?);
                         } else {
+                            // Only together may the open shells of a shape bound a body.
                             open.push(shell);
                         }
                     }
@@ -238,6 +239,7 @@ impl Contents {
     /// product may refer to it: one of them may carry properties.
     fn is_new(&mut self, item: u64, kind: Kind, within: &PlacedShape) -> bool {
         let Place { axes, scale } = within.place;
+        // Exact bits are enough: the same way through the file gives the same numbers.
         let mut bits = [scale.to_bits(); 13];
         let numbers = axes.directions.as_flattened().iter().chain(&axes.origin);
         bits.iter_mut().zip(numbers).for_each(|(bits, number)| *bits = number.to_bits());
@@ -263,6 +265,7 @@ fn replicated(
     within: &PlacedShape,
 ) -> Result<PlacedBody, StepError> {
     let (mut solid, mut place) = (item, within.place);
+    // A replica may be a replica of itself.
     for _ in 0..MAX_NESTED {
         let Some(replica) = entities.find(solid, "SOLID_REPLICA") else {
             return match Kind::of(entities, solid)? {

@@ -144,6 +144,7 @@ impl Entities {
 
     /// Returns all records.
     pub(crate) fn every(&self) -> impl Iterator<Item = Item<'_>> {
+        // The numbers are the map's keys.
         self.ids.iter().flat_map(|&id| self.map[&id].iter().map(move |record| Item { id, record }))
     }
 }
@@ -190,6 +191,7 @@ impl<'a> Item<'a> {
 
     /// Returns an integer from 0 to a million.
     pub(crate) fn count(&self, k: usize) -> Result<usize, StepError> {
+        // A greater count is damage, and lists of that length would take all memory.
         let whole = |x: f64| (0.0..=1e6).contains(&x).then_some(x as usize);
         self.as_a(k, |value| value.number().and_then(whole))
     }
@@ -308,6 +310,7 @@ impl EntityReader<'_> {
         loop {
             let value = match self.next()? {
                 Token::Sign(b')') => return Ok(values),
+                // An omitted value is written as `$`, so commas only separate.
                 Token::Sign(b',') => continue,
                 Token::Sign(b'(') => Value::List(self.values(depth + 1)?),
                 Token::Word(_) => {

@@ -74,6 +74,7 @@ impl StepModel {
     pub fn read_healed(bytes: &[u8], heal_mm: f64) -> Result<Self, BrepError> {
         let mut model = topology::model(&entities::Entities::read(bytes)?)?;
         let healed = if heal_mm > 0.0 { heal(&mut model, heal_mm) } else { Vec::new() };
+        // After healing, more loops share edges that show their directions.
         let reversed = reverse_contrary(&mut model);
         Ok(Self { model, healed, reversed })
     }
@@ -127,6 +128,7 @@ impl Kernel for StepModel {
             let ends = places().fold([f64::MAX, f64::MIN], |[a, b], p| [a.min(p[k]), b.max(p[k])]);
             ends[1] - ends[0]
         };
+        // Without vertices, sides are below zero.
         (0..3).map(side).fold(0.0, f64::max)
     }
 

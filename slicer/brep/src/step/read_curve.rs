@@ -90,6 +90,7 @@ impl GeometryReader<'_> {
             .map(|&id| Ok(weighted(self.point(id)?, 1.0)))
             .collect::<Result<_, _>>()?;
         let count = points.len();
+        // Degree 1: a knot at each point, and both ends twice.
         let knots = (0..count + 2).map(|k| k.clamp(1, count) as f64).collect();
         let knots = Knots::new(1, knots, count);
         let knots = knots.ok_or(StepError::Numbers { id: item.id, what: "curve" })?;
@@ -171,6 +172,7 @@ impl GeometryReader<'_> {
             let id = all.find(|id| self.entities.find(*id, "CARTESIAN_POINT").is_some());
             id.map(|id| self.point(id)).transpose()
         };
+        // Points first: unlike parameters, they do not depend on the unit of angles.
         if let (Some(start), Some(end)) = (point(2)?, point(3)?) {
             let range = edge_range(&curve, start, end, forward);
             return Ok(Link { curve, range });
@@ -193,6 +195,7 @@ impl GeometryReader<'_> {
     pub(super) fn parameter(&self, id: u64, curve: &Curve) -> Result<f64, StepError> {
         match curve {
             Curve::Line { .. } => {
+                // The file's parameter counts vectors; ours counts millimeters.
                 let line = self.entities.get(id, "LINE")?;
                 self.length(self.entities.get(line.reference(2)?, "VECTOR")?, 2)
             }

@@ -119,6 +119,7 @@ fn bounded(line: &Curve, surface: &Surface, scale: [f64; 2], [first, last]: [Vec
                 (distance(line.at(t)[0], at), t)
             })
             .collect();
+        // The line may pass several copies of the point, one in each period.
         let nearest = feet.iter().map(|foot| foot.0).fold(f64::INFINITY, f64::min);
         feet.into_iter().filter(|foot| foot.0 <= nearest + 1e-6).map(|foot| foot.1).collect()
     };

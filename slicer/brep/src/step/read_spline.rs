@@ -135,6 +135,8 @@ impl<'a> SplineRecords<'a> {
                 let times = given.numbers(first + multiplicities)?;
                 let values = given.numbers(first + values)?;
                 let most = (count + degree + 1) as f64;
+                // Checked before knots are repeated, as damaged multiplicities could take all
+                // memory.
                 if times.len() != values.len() || times.iter().sum::<f64>() > most {
                     return Ok(None);
                 }
@@ -142,12 +144,14 @@ impl<'a> SplineRecords<'a> {
                 values.into_iter().zip(times).flat_map(repeat).collect()
             }
             "UNIFORM_CURVE" | "UNIFORM_SURFACE" => {
+                // No knot is repeated, so the domain begins at 0 after as many knots as the degree.
                 (0..count + degree + 1).map(|k| k as f64 - degree as f64).collect()
             }
             // Quasi-uniform knots, or the knots of one or several Bézier pieces.
             kind => {
                 let pieces =
                     if kind.starts_with("BEZIER") { (count - 1) / degree } else { count - degree };
+                // Bézier pieces only share their ends, which takes a knot of full multiplicity.
                 let times = if kind.starts_with("BEZIER") { degree } else { 1 };
                 let mut knots = vec![0.0; degree + 1];
                 for k in 1..pieces {

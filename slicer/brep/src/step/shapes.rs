@@ -105,6 +105,7 @@ impl<'a> Shapes<'a> {
 
     fn read_groups(&mut self, products: &Products) {
         let mut same: HashMap<u64, Vec<u64>> = HashMap::new();
+        // Shapes of a product share coordinates, unless a transformation relates them.
         let mut moved = HashSet::new();
         let mut relate = |[a, b]: [u64; 2]| {
             same.entry(a).or_default().push(b);

@@ -51,6 +51,7 @@ impl<'a> Tokens<'a> {
             b'*' => Token::Derived,
             b'#' => Token::Reference(self.number_from(self.at)?),
             b'\'' => Token::Text(self.text(start)?),
+            // A binary value, which no geometry uses.
             b'"' => Token::Text(self.until(b'"', start)?),
             b'.' if self.peek_is(|b| b.is_ascii_alphabetic()) => {
                 Token::Enumeration(self.until(b'.', start)?)

@@ -18,6 +18,7 @@ pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
     let placed = placed(entities)?;
     let mut model = BrepModel { notices: placed.notices, ..BrepModel::default() };
     for body in placed.bodies {
+        // Reports name one unit: the first body's.
         if model.unit.is_empty() {
             model.unit.clone_from(&body.units.name);
             model.uncertainty_mm = body.units.uncertainty_mm;
@@ -52,6 +53,7 @@ impl<'a> BodyReader<'a> {
         model: &'a mut BrepModel,
     ) -> Self {
         let geometry = GeometryReader { entities, units, place: body.place.axes, is_flat: false };
+        // A body that is placed twice has edges of its own in each place.
         let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
         Self { entities, geometry, model, vertices, edges, sides }
     }
@@ -66,6 +68,7 @@ impl<'a> BodyReader<'a> {
             "MANIFOLD_SOLID_BREP" | "FACETED_BREP" => self.shell(item.reference(1)?, true),
             "BREP_WITH_VOIDS" => {
                 self.shell(item.reference(1)?, true)?;
+                // Voids are oriented shells: their own flag turns them inward.
                 item.references(2)?.into_iter().try_for_each(|shell| self.shell(shell, true))
             }
             "CURVE_BOUNDED_SURFACE" => self.bounded_surface(item),
@@ -81,6 +84,7 @@ impl<'a> BodyReader<'a> {
                 let mut faces = item.references(1)?.into_iter();
                 faces.try_for_each(|face| self.face(face, outwards))
             }
+            // ISO 10303-42 forbids an oriented shell of an oriented shell, which might be a cycle.
             "ORIENTED_CLOSED_SHELL" | "ORIENTED_OPEN_SHELL"
                 if !self.is_oriented(item.reference(2)?) =>
             {
@@ -218,6 +222,7 @@ impl<'a> BodyReader<'a> {
     }
 
     fn side(&mut self, id: u64, a: usize, b: usize) -> Result<(usize, bool), StepError> {
+        // Sorted, so that both polygons at a side find the same edge.
         let ends = [a.min(b), a.max(b)];
         if let Some(&edge) = self.sides.get(&ends) {
             return Ok((edge, a < b));

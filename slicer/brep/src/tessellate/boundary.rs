@@ -73,6 +73,7 @@ impl FaceOutline<'_, '_> {
     /// outer loop, makes it from the surface's whole domain.
     fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
         let areas: Vec<f64> = closed.iter().map(|hole| area(&hole.nodes)).collect();
+        // A hole is smaller than the loop around it.
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
         let sense = if self.face.along_normal { 1.0 } else { -1.0 };
         match largest {
@@ -262,6 +263,7 @@ fn gap(spans: &[[f64; 2]], low: f64, period: f64) -> Option<f64> {
         .collect();
     parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let Some(first) = parts.first().copied() else { return Some(low) };
+    // A span across the end of the period covers its start too.
     let mut end = parts.iter().map(|part| part[1] - period).fold(f64::MIN, f64::max);
     let mut longest = (0.0, low);
     for [a, b] in parts.into_iter().chain([first.map(|t| t + period)]) {
@@ -290,6 +292,7 @@ fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let crosses = |(a, b): &(&Node, &Node)| {
         let ([ax, ay], [bx, by]) = (a.uv, b.uv);
+        // Half-open sides keep the count right for a ray through a corner.
         (ay > p[1]) != (by > p[1]) && p[0] < ax + (p[1] - ay) / (by - ay) * (bx - ax)
     };
     polygon.iter().zip(next).filter(crosses).count() % 2 == 1

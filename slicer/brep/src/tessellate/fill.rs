@@ -97,6 +97,7 @@ fn crossed(
     let triangles = ears(outer, rings);
     let (turned, around) =
         (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
+    // Loops that are this far off overlap at most in a strip as wide, along their whole length.
     if turned > off_mm * around {
         return Err(Fault::Crossing);
     }
@@ -242,6 +243,7 @@ impl FaceTriangulation<'_> {
     /// Adds corners at the corners of cells, away from the polygons.
     fn add_grid(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
         let counts = self.scale.count.map(|count| count.ceil().min(1000.0) as usize);
+        // A plane needs no inner corners, and a single row of cells has none.
         if matches!(self.surface, Surface::Plane(_)) || counts.contains(&1) {
             return Ok(());
         }
@@ -261,6 +263,7 @@ impl FaceTriangulation<'_> {
 
     /// Halves edges until all triangles are near the surface.
     fn refine(&mut self, points: &FacePoints) -> Result<Option<Fault>, Fault> {
+        // Facets begin at the points of edges, which may be off the surface.
         for corner in &mut self.corners {
             if let Some(point) = corner.point {
                 corner.place = points.get(point);
@@ -367,6 +370,8 @@ impl FaceTriangulation<'_> {
                 continue;
             }
             let ends = ordered(edge.from().fix(), edge.to().fix());
+            // Both sides of a cut are on the face, so an edge that is followed twice separates
+            // nothing.
             let is_crossed = edge.is_constraint_edge()
                 && self.borders.get(&ends).is_none_or(|times| times % 2 == 1);
             let inside = from != is_crossed;

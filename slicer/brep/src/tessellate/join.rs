@@ -98,6 +98,7 @@ impl<'a> Joining<'a> {
             }
         }
         tries.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Short lines seldom cross anything, and each test passes over all loops.
         let mut tries = tries.into_iter().take(TRIES);
         let found =
             tries.find(|&(_, i, k, shift)| !self.is_crossed([from[i].uv, plus(to[k].uv, shift)]));
@@ -108,6 +109,7 @@ impl<'a> Joining<'a> {
     fn lengths(&self) -> [f64; 2] {
         let nodes = self.loops.iter().flat_map(|around| &around.nodes);
         let mut most = [1e-12_f64; 2];
+        // A sample is enough, as the lengths only rank lines.
         for node in nodes.step_by(16) {
             let jet = self.surface.at(node.uv);
             for (most, slope) in most.iter_mut().zip([jet.du, jet.dv]) {
@@ -219,6 +221,7 @@ impl<'a> Joining<'a> {
         let most: usize = joined.map(count).sum();
         let (mut at, mut shift) = (start, [0.0; 2]);
         let mut polygon = Vec::new();
+        // Each node is passed once. A longer walk would repeat itself.
         for _ in 0..most {
             polygon.push(moved(nodes(at.0)[at.1], shift));
             if let Some((cut, is_first)) = self.cut_at(at) {

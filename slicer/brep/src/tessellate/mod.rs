@@ -127,6 +127,7 @@ fn with_chords(
     let cells: Vec<f64> = outlines.iter().map(Outline::cells).collect();
     let all: f64 = cells.iter().sum();
     let largest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
+    // Refused before the work begins, which grows with the number of cells.
     if let Some(largest) = largest.filter(|_| all > MAX_CELLS) {
         let entity = model.faces[largest].entity;
         return Err(BrepError::Fine { cells: all, entity, of_face: cells[largest] });

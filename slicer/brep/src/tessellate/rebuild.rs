@@ -84,6 +84,7 @@ fn settled(
             let normal =
                 unit(to).filter(|_| length(to) > 1e-9).or_else(|| unit(cross(jet.du, jet.dv)));
             let Some(normal) = normal else { continue };
+            // Least squares over all planes: the step x solves Σ n nᵀ x = Σ n (n · to).
             for (k, row) in sums.iter_mut().enumerate() {
                 *row = add(*row, scale(normal, normal[k]));
             }

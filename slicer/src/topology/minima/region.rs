@@ -89,6 +89,7 @@ pub(super) fn section_area(field: &Field<'_>, region: &[u32], up: Vec3) -> f64 {
         // one.
         let segment = match is_low {
             [false, false] => [crossing(corner, before), crossing(corner, after)],
+            // The facet on a region's edge is cut at its other two sides.
             [true, false] => [crossing(before, corner), crossing(before, after)],
             _ => continue,
         };

@@ -30,6 +30,7 @@ pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) ->
             *depth = top - birth;
         }
     }
+    // The first is `DEEP`, which is not a minimum.
     depths.split_off(1)
 }
 
@@ -91,6 +92,7 @@ impl<'a> Sweep<'a> {
         let mut component = self.of_vertex[vertex as usize];
         for beside in field.beside(vertex) {
             let other = match self.of_vertex[beside as usize] {
+                // A lower vertex without a component belongs to one that is followed no further.
                 NONE if field.height(beside) < height => DEEP,
                 NONE => continue,
                 _ if field.height(beside) > height => continue,
@@ -133,5 +135,6 @@ impl<'a> Sweep<'a> {
 /// Returns bits in the order of finite heights; both zeros are the same height.
 fn rank(height: f64) -> u64 {
     let bits = (height + 0.0).to_bits();
+    // Bits rise with positive numbers and fall with negative ones.
     if bits >> 63 == 0 { bits | 1 << 63 } else { !bits }
 }

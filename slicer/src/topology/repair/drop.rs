@@ -115,6 +115,7 @@ impl GroupEdges {
         let mut groups_at: HashMap<u32, (Vec<usize>, bool)> = HashMap::new();
         for (number, edges) in of_group.iter().enumerate() {
             for &edge in edges {
+                // An edge that is not crowded has only the group's two facets.
                 let facets = facets_at.get(&Some(edge)).copied().unwrap_or(2);
                 let start = || (Vec::new(), facets % 2 == 1);
                 let (at, is_odd) = groups_at.entry(edge).or_insert_with(start);

@@ -35,6 +35,7 @@ pub(super) fn closing(table: &CornerTable, loops: &[RimLoop], close: f64) -> Vec
         let vertices: Vec<u32> = rims.vertices.iter().rev().copied().collect();
         let Some(facets) = least_area(table.points(), &vertices, &edges) else { continue };
         for [a, b, c] in facets {
+            // Facets in a later hole must not repeat these edges.
             edges.extend([edge(a, b), edge(b, c), edge(c, a)]);
             added.push([a, b, c]);
         }
@@ -86,6 +87,7 @@ fn least_area(
     };
     // For the first and last vertex of each piece of the loop: its cost, and where to cut it.
     let mut best = vec![vec![(Cost::default(), 0); count]; count];
+    // Short pieces first, as longer ones consist of them.
     for reach in 2..count {
         for first in 0..count - reach {
             let last = first + reach;

@@ -125,10 +125,12 @@ impl Work {
         let (table, moved) = CornerTable::of_facets(&self.facets)?.welded(options.weld);
         for corner in moved {
             let facet = facet_of(corner) as usize;
+            // Points come from facets of 32 bits, so the cast is exact.
             self.facets[facet][corner as usize % 3] = table.point(corner).map(|c| c as f32);
             self.origins[facet].is_moved = true;
         }
         let dropped = drop::dropped(&table, options.close);
+        // After each change the table is made again: it describes other facets.
         if !dropped.is_empty() {
             self.drop(&dropped)?;
             return Ok(true);
@@ -186,6 +188,7 @@ impl Work {
 
     fn turn(&mut self, facet: u32) {
         self.facets[facet as usize].swap(1, 2);
+        // A facet that is turned twice is as the file has it.
         self.origins[facet as usize].is_turned ^= true;
     }
 

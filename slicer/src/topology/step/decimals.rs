@@ -17,6 +17,7 @@ pub(super) fn unit_mm(points: &[Vec3]) -> f64 {
     };
     let fitting = UNITS_MM.map(|unit_mm| (fitting(unit_mm), unit_mm));
     let most = fitting.iter().map(|(count, _)| *count).max();
+    // Of units that fit equally, the first is the most usual.
     fitting.iter().find(|(count, _)| Some(*count) == most).map_or(1.0, |(_, unit_mm)| *unit_mm)
 }
 

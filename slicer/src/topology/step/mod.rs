@@ -127,6 +127,7 @@ impl StepSolids {
         check_solid(&check)?;
         check_apart(&table, &shells, &check.lumps)?;
         let mut faces = FlatFaces::new(&table);
+        // A polygon must not pass a vertex twice, so a face whose loops touch becomes facets.
         faces.split_where(|faces, facets| outlines(&table, facets, faces).is_none());
         let dropped = Dropped::new(&table, &faces);
         let shell_of = |face: u32| shells.of(faces.facets(face)[0]) as usize;
@@ -298,6 +299,7 @@ fn normal(table: &CornerTable, facets: &[u32]) -> Vec3 {
         cross(sub(b, a), sub(c, a))
     };
     // Facets of a clean mesh have an area.
+    // The sum counts facets by their areas, as large ones show the plane best.
     unit(facets.iter().map(of_facet).fold([0.0; 3], add)).unwrap_or([0.0, 0.0, 1.0])
 }
 

@@ -20,6 +20,7 @@ pub(super) fn outlines(
     let sides = corners.filter(|&corner| faces.is_side(table, corner));
     let mut ways: Vec<[u32; 2]> = sides.map(|corner| table.edge_ends(corner)).collect();
     ways.sort_unstable();
+    // Two ways lead on from a vertex where loops touch.
     if ways.windows(2).any(|pair| pair[0][0] == pair[1][0]) {
         return None;
     }
@@ -49,6 +50,7 @@ pub(super) fn outer_first(table: &CornerTable, normal: Vec3, outlines: &mut [Vec
             let sides = outline.windows(2).map(|side| [0, 1].map(|k| sub(point(side[k]), first)));
             sides.map(|[a, b]| dot(normal, cross(a, b))).sum::<f64>()
         };
+        // Holes run clockwise, so their areas are below zero.
         outlines.sort_by_cached_key(|outline| std::cmp::Reverse(ordered(area(outline))));
     }
 }
@@ -56,6 +58,7 @@ pub(super) fn outer_first(table: &CornerTable, normal: Vec3, outlines: &mut [Vec
 /// Returns bits in the order of numbers.
 fn ordered(number: f64) -> i64 {
     let bits = number.to_bits() as i64;
+    // As in `f64::total_cmp`: the bits of negative numbers fall as the numbers rise.
     bits ^ ((bits >> 63) as u64 >> 1) as i64
 }
 
