@@ -11,6 +11,7 @@ use lamp_machine::MachineLimit;
 use lamp_offset::CompensateError;
 use lamp_slicer::SliceError;
 use lamp_stack::StackError;
+use lamp_supports::CheckError;
 
 /// Why a stage cannot begin, or ends early: the cause, and the places where it occurred.
 #[derive(Debug)]
@@ -105,6 +106,7 @@ of_work!(
     DitherError,
     CompensateError,
     EditError,
+    CheckError,
     MachineLimit,
     std::io::Error,
 );

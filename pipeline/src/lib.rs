@@ -7,6 +7,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod check;
 pub mod compensate;
 pub mod dither;
 pub mod documents;
@@ -21,6 +22,7 @@ pub mod size;
 pub mod slice;
 pub mod solid;
 pub mod step;
+pub mod support;
 pub mod watcher;
 pub mod words;
 

@@ -6,6 +6,7 @@ pub(crate) mod heights;
 pub(crate) mod lamp_option;
 pub(crate) mod options;
 pub(crate) mod options_file;
+pub(crate) mod parsed;
 pub(crate) mod planning_options;
 pub(crate) mod platform_options;
 pub(crate) mod slicing;

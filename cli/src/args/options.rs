@@ -54,7 +54,8 @@ pub(crate) struct Common {
 const THREAD_BYTES: u64 = 8 << 20;
 
 impl Common {
-    /// Returns options of a command that runs as a part of another one.
+    /// Returns options of a command that reports nothing.
+    #[cfg(test)]
     pub(crate) fn quiet() -> Self {
         Self { quiet: true, verbose: false, threads: None, no_sync: false, options: None }
     }

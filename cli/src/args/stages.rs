@@ -1,19 +1,23 @@
 //! Options of the stages from layers to layers.
 
+use std::num::{NonZeroU8, NonZeroU32};
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use lamp_fix::FixMethod;
 use lamp_grayscale::DitherMethod;
 use lamp_grayscale::resin::{Dose, QuantityError};
+use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::compensate::{CompensateSettings, FiringShrinkage};
 use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
+use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
 use lamp_stack::{Length, LengthError, Op};
+use lamp_supports::{FindingGroup, SupportOptions};
 
 use crate::args::lamp_option::LampOption;
-use crate::args::options::{one_of_described, parse_distance};
+use crate::args::options::{one_of_described, parse_distance, parse_thickness};
 
 /// How rows are corrected.
 #[derive(Args, Clone)]
@@ -86,6 +90,105 @@ pub(crate) struct DitherStageArgs {
     method: DitherMethod,
 }
 
+/// What a check looks for.
+#[derive(Args, Clone)]
+pub(crate) struct CheckStageArgs {
+    /// Kinds of findings to report
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    #[arg(value_parser = one_of_described::<FindingGroup>(&[
+        "White that rests on nothing",
+        "White that rests on little",
+        "Black without a way out",
+        "White far from the white below",
+        "Centres of gravity off their base",
+        "Stray rows, white at the border, empty layers",
+    ]))]
+    only: Vec<FindingGroup>,
+
+    /// Side of the square that a finding must hold, in pixels
+    #[arg(long, value_name = "PIXELS", default_value = "3")]
+    speck: NonZeroU32,
+
+    /// Share of white that must rest on white
+    #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
+    least_support: f64,
+
+    /// How far white may reach beyond the white below [default: as far as a layer is thick: 45
+    /// degrees]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    max_overhang: Option<Length>,
+
+    /// How wide a way out must be to drain a pocket: narrower ways are found, too, by placing a ball
+    /// of this size everywhere; takes several times longer [default: a pixel and a layer]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
+    drain: Option<Length>,
+
+    /// Level from which a gray pixel is white
+    #[arg(long, value_name = "LEVEL", default_value = "1")]
+    threshold: NonZeroU8,
+
+    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
+    ///
+    /// Its defaults hold where no other resolution, thickness or margin is given
+    #[arg(long, value_name = "M", default_value = "alpha")]
+    machine: PathBuf,
+}
+
+/// The heading of options that choose supports.
+const CHOICE: &str = "Choice of supports";
+
+/// How islands are held.
+#[derive(Args, Clone)]
+pub(crate) struct SupportStageArgs {
+    /// Radius of supports
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    radius: Length,
+
+    /// Largest angle of a support to the vertical
+    #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
+    #[arg(help_heading = CHOICE)]
+    max_tilt: Degrees,
+
+    /// Greatest length of a support
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().max_length)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    max_length: Length,
+
+    /// Least distance of a contact to edges where the surface turns by more than 30 degrees
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().edge_clearance)]
+    #[arg(value_parser = parse_distance, help_heading = CHOICE)]
+    edge_clearance: Length,
+
+    /// Largest curvature of the surface around a contact: 1/mm is a radius of 1 mm
+    #[arg(long, value_name = "CURVATURE", help_heading = CHOICE)]
+    #[arg(default_value_t = Curvature(SupportOptions::default().max_curvature))]
+    max_curvature: Curvature,
+
+    /// Widest piece of an island that one support holds; wider islands are divided
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().hold)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    hold: Length,
+
+    /// Directions to try
+    #[arg(long, value_name = "N", default_value_t = 400, help_heading = CHOICE)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    candidates: u32,
+
+    /// Supports to list for each place: the one that is drawn, and alternatives
+    #[arg(long, value_name = "N", default_value_t = 3, help_heading = CHOICE)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..))]
+    keep: u16,
+
+    /// Side of the square that an island must hold, in pixels
+    #[arg(long, value_name = "PIXELS", default_value = "3")]
+    speck: NonZeroU32,
+
+    /// Level from which a gray pixel is white
+    #[arg(long, value_name = "LEVEL", default_value = "1")]
+    threshold: NonZeroU8,
+}
+
 /// The changes.
 #[derive(Args, Clone)]
 #[command(group = ArgGroup::new("what").required(true).args(["edits", "union", "intersect", "difference", "xor"]))]
@@ -138,6 +241,31 @@ impl From<&DitherStageArgs> for DitherSettings {
     }
 }
 
+impl From<CheckStageArgs> for CheckSettings {
+    fn from(args: CheckStageArgs) -> Self {
+        let CheckStageArgs { only, speck, least_support, max_overhang, drain, threshold, machine } =
+            args;
+        Self { only, speck, least_support, max_overhang, drain, threshold, machine }
+    }
+}
+
+impl From<SupportStageArgs> for SupportSettings {
+    fn from(args: SupportStageArgs) -> Self {
+        Self {
+            radius: args.radius,
+            max_tilt: args.max_tilt,
+            max_length: args.max_length,
+            edge_clearance: args.edge_clearance,
+            max_curvature: args.max_curvature,
+            hold: args.hold,
+            candidates: NonZeroU32::new(args.candidates).expect("its range is above zero"),
+            keep: args.keep,
+            speck: args.speck,
+            threshold: args.threshold,
+        }
+    }
+}
+
 impl From<&EditStageArgs> for EditSettings {
     fn from(args: &EditStageArgs) -> Self {
         let EditStageArgs { edits, union, intersect, difference, xor } = args;
@@ -169,4 +297,16 @@ fn parse_offset(text: &str) -> Result<Length, String> {
 
 fn parse_dose(text: &str) -> Result<Dose, String> {
     text.parse().map_err(|error: QuantityError| error.to_string())
+}
+
+/// Parses a share: `25%` or `0.25`.
+fn parse_percent(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix('%') {
+        Some(percent) => (percent, 100.0),
+        None => (text, 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(number) if (0.0..=unit).contains(&number) => Ok(number / unit),
+        _ => Err(format!("`{text}` is not a share: write 25% or 0.25")),
+    }
 }

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
-use lamp_stack::{Destination, Format, IndexedStack, PrivateFile, write_stack};
+use lamp_stack::{Destination, Format, IndexedStack, Page, PrivateFile, write_stack};
 use lamp_view::{
     Address, Ticket, Token, ViewedStack, Viewer, licences, of_records, of_report, serve,
 };
 
-use super::check;
 use crate::args::options::{Common, parse_memory};
 use crate::args::slicing::SlicingArgs;
 use crate::exit::Exit;
@@ -186,7 +186,12 @@ fn find(
     let headers = stack.headers();
     progress.expect(headers.len() as u64);
     let pages = (0..headers.len()).map(|position| Ok(stack.page(position)?));
-    let found = check::found_in_pages(pages, || progress.one_done())?;
+    let decode = |page: Page| {
+        let layer = page.decode()?;
+        progress.one_done();
+        Ok::<_, Exit>(layer)
+    };
+    let (_, found) = CheckSettings::default().find(pages, decode, None)?;
     of_records(&found, headers).map_err(|why| Exit::Failed(anyhow!(why)))
 }
 

@@ -7,6 +7,7 @@ use lamp_machine::Machine;
 use lamp_pipeline::documents::is_file;
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::Counts;
+use lamp_pipeline::support;
 use lamp_pipeline::watcher::KeptRemarks;
 use lamp_pipeline::{Error, RangeFindings, Stage, named};
 use lamp_stack::{Page, Pages, PassingLayer, map_in_order};
@@ -15,9 +16,6 @@ use crate::commands::support::SupportArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::terminal::progress::Progress;
-
-/// Changes when `support` makes other bytes from the same options, stack and part.
-pub(super) const SUPPORT_CODE: u32 = 3;
 
 /// A stage that works on a whole stack.
 #[derive(Clone)]
@@ -47,7 +45,7 @@ impl Call for After {
 
     fn code(&self) -> (&'static str, u32) {
         match self {
-            Self::Support(_) => ("support", SUPPORT_CODE),
+            Self::Support(_) => ("support", support::CODE),
             Self::Layers(stage) => stage.code(),
         }
     }

@@ -6,18 +6,16 @@ use std::path::{Path, PathBuf};
 
 use lamp_batch::{Call, WriteLayers};
 use lamp_build::TILE_CODE;
+use lamp_pipeline::check::{self, CheckSettings};
 use lamp_pipeline::watcher::KeptRemarks;
-use lamp_supports::FindingRecord;
+use lamp_stack::{Page, Pages, StackError};
+use lamp_supports::{CheckError, FindingRecord};
 use serde::{Deserialize, Serialize};
 
 use super::parse::{parse_check, parse_tile};
-use crate::commands::check::CheckArgs;
 use crate::commands::tile::{Build, TileArgs};
 use crate::exit::Exit;
 use crate::terminal::progress::Progress;
-
-/// Changes when other findings come from the same options and stack.
-const CHECK_CODE: u32 = 1;
 
 /// How a build is laid out: the options of `lamp tile`.
 #[derive(Clone)]
@@ -74,7 +72,7 @@ impl Call for Tiling {
 }
 
 /// The findings to look for in a stack: the options of `lamp check`.
-pub(crate) struct Checking(CheckArgs);
+pub(crate) struct Checking(CheckSettings);
 
 /// Findings of a check.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -110,7 +108,18 @@ impl Checking {
     /// Returns an error if the stack cannot be read.
     pub(crate) fn run(&self, stack: &Path) -> Result<CheckFindings, Exit> {
         let mut found = CheckFindings::default();
-        for record in self.0.found_in(stack)? {
+        let name = stack.display().to_string();
+        let failed = |error: StackError| Exit::Failed(error.into()).at(name.clone());
+        let pages = Pages::open(stack).map_err(failed)?.map(|page| page.map_err(failed));
+        let decode = |page: Page| page.decode().map_err(failed);
+        let (_, records) = self.0.find(pages, decode, None).map_err(|error: Exit| {
+            // Errors of pages have their place.
+            match error.cause::<CheckError>() {
+                Some(_) => error.at(name.clone()),
+                None => error,
+            }
+        })?;
+        for record in records {
             if !record.is_note() {
                 *found.kinds.entry(record.name().to_owned()).or_default() += 1;
             }
@@ -127,10 +136,10 @@ impl Call for Checking {
     }
 
     fn input_files(&self) -> Result<Vec<PathBuf>, lamp_pipeline::Error> {
-        Ok(self.0.input_file().into_iter().cloned().collect())
+        Ok(self.0.machine_file().into_iter().cloned().collect())
     }
 
     fn code(&self) -> (&'static str, u32) {
-        ("check", CHECK_CODE)
+        ("check", check::CODE)
     }
 }

@@ -9,10 +9,9 @@ use std::path::Path;
 
 use lamp_batch::{JOIN_CODE, PACK_CODE};
 use lamp_build::TILE_CODE;
-use lamp_pipeline::{compensate, dither, edit, fix, slice};
+use lamp_pipeline::{compensate, dither, edit, fix, slice, support};
 use lamp_stack::digest_of;
 
-use super::after;
 use super::tests::{Bench, COARSE, GRAY};
 
 const GOLDENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/stages/goldens.txt");
@@ -87,7 +86,7 @@ fn a_stage_whose_bytes_change_has_another_number() {
         ("dither", dither::CODE),
         ("compensate", compensate::CODE),
         ("edit", edit::CODE),
-        ("support", after::SUPPORT_CODE),
+        ("support", support::CODE),
         ("join", JOIN_CODE),
         ("pack", PACK_CODE),
         ("tile", TILE_CODE),

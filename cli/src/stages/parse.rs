@@ -9,6 +9,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use lamp_batch::{StageError, Stages};
 use lamp_machine::Machine;
 
+use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating};
 use lamp_pipeline::documents::is_file;
 use lamp_pipeline::edit::{EditSettings, Editing};
@@ -184,11 +185,11 @@ pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, 
 }
 
 /// Reads the options of `check`, without stacks.
-pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckArgs, String> {
-    let mut args: CheckArgs = Reader::new("check", &with_name("check", options), folder)?.read();
-    let machine = args.machine_mut();
-    *machine = of_machine(machine, folder);
-    Ok(args)
+pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
+    let args: CheckArgs = Reader::new("check", &with_name("check", options), folder)?.read();
+    let mut settings = CheckSettings::clone(&args.settings);
+    settings.set_folder(folder);
+    Ok(settings)
 }
 
 fn with_name(name: &str, options: &[String]) -> Vec<String> {

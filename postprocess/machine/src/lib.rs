@@ -154,4 +154,9 @@ impl Recoating {
         let per_second = self.travel.mm() / self.seconds / self.gap.mm();
         self.viscosity_cp.map(|centipoise| centipoise / 1000.0 * per_second)
     }
+
+    /// Returns the [shear stress](Self::shear_pa) for the greatest viscosity, in pascals.
+    pub fn greatest_shear_pa(&self) -> f64 {
+        self.shear_pa()[1]
+    }
 }

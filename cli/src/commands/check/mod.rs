@@ -4,32 +4,30 @@ mod pictures;
 mod report;
 
 use std::collections::BTreeSet;
-use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, FromArgMatches};
-use lamp_machine::{Machine, Recoating};
+use clap::Args;
+use lamp_machine::Machine;
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
-use lamp_stack::{Layer, Length, MemorySize, Page};
+use lamp_stack::{Layer, Page};
 use lamp_supports::{
-    CheckError, CheckOptions, Disagreements, FindingGroup, FindingRecord, Findings, IslandMinimum,
-    LoneMinimum,
+    CheckError, Disagreements, FindingGroup, FindingRecord, Findings, IslandMinimum, LoneMinimum,
 };
-use serde::Serialize;
 
-use crate::args::options::{Common, one_of_described, parse_distance, parse_layers, parse_memory};
+use crate::args::options::{Common, parse_layers, parse_memory};
+use crate::args::parsed::Parsed;
 use crate::args::slicing::SlicingArgs;
+use crate::args::stages::CheckStageArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::output::endings::parse_report;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
-use lamp_pipeline::documents::{canonical_word, document, is_file};
+use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::solid::at_part;
-use lamp_pipeline::words::{list, optional, path, text, words_of};
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
 pub(super) use pictures::draw;
@@ -43,7 +41,7 @@ use report::write_report;
 /// and empty layers; the worst come first. A part is sliced on the way, by the options of `slice`;
 /// its mesh then says where islands must be, too. Effects of rounding to pixels, and islands that
 /// never hold a square of --speck pixels, are only in the report.
-#[derive(Args, Clone, Serialize)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   lamp check build.tif
@@ -52,95 +50,42 @@ Examples:
   lamp check night/*.tif --only islands,pockets --report check.json
 
 Exit status: 0 if the work is done, whatever was found; 3 with --strict if something was.")]
-#[serde(rename_all = "kebab-case")]
 pub(crate) struct CheckArgs {
     /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts, each
     /// checked on its own
     #[arg(value_name = "STACK|PART", default_value = "-")]
-    #[serde(skip)]
     inputs: Vec<PathBuf>,
 
-    /// Kinds of findings to report
-    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
-    #[arg(value_parser = one_of_described::<FindingGroup>(&[
-        "White that rests on nothing",
-        "White that rests on little",
-        "Black without a way out",
-        "White far from the white below",
-        "Centres of gravity off their base",
-        "Stray rows, white at the border, empty layers",
-    ]))]
-    #[serde(with = "list")]
-    only: Vec<FindingGroup>,
-
-    /// Side of the square that a finding must hold, in pixels
-    #[arg(long, value_name = "PIXELS", default_value = "3")]
-    #[serde(with = "text")]
-    speck: NonZeroU32,
-
-    /// Share of white that must rest on white
-    #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
-    #[serde(with = "text")]
-    least_support: f64,
-
-    /// How far white may reach beyond the white below [default: as far as a layer is thick: 45
-    /// degrees]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
-    #[serde(with = "optional")]
-    max_overhang: Option<Length>,
-
-    /// How wide a way out must be to drain a pocket: narrower ways are found, too, by placing a ball
-    /// of this size everywhere; takes several times longer [default: a pixel and a layer]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
-    #[serde(with = "optional")]
-    drain: Option<Length>,
-
-    /// Level from which a gray pixel is white
-    #[arg(long, value_name = "LEVEL", default_value = "1")]
-    #[serde(with = "text")]
-    threshold: NonZeroU8,
-
-    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
-    ///
-    /// Its defaults hold where no other resolution, thickness or margin is given
-    #[arg(long, value_name = "M", default_value = "alpha")]
-    #[serde(with = "path")]
-    machine: PathBuf,
+    #[command(flatten)]
+    pub(crate) settings: Parsed<CheckStageArgs, CheckSettings>,
 
     /// Write all findings as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Write pictures of the worst findings into a new folder: findings in red, other white without
     /// white below in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
-    #[serde(skip)]
     evidence: Option<PathBuf>,
 
     /// Replace a folder of pictures that an earlier run wrote
     #[arg(long)]
-    #[serde(skip)]
     force: bool,
 
     /// End with status 3 if there are findings, or if pages of a folder may be missing
     #[arg(long)]
-    #[serde(skip)]
     strict: bool,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended. The first of them
     /// stands on the platform
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
-    #[serde(skip)]
     layers: Option<Range<u32>>,
 
     /// Memory for the table of crossings of a part
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
-    #[serde(skip)]
     memory: Option<u64>,
 
     #[command(flatten)]
-    #[serde(skip)]
     slicing: SlicingArgs,
 }
 
@@ -151,7 +96,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
-    let machine: Machine = document(&args.machine)?;
+    let machine: Machine = args.settings.machine()?;
     let slicing = SliceSettings::try_from(&args.slicing)?;
     check_slicing(&slicing, &args.inputs, Some(&machine))?;
     let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
@@ -177,48 +122,6 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     found.filter(|_| args.strict).map_or(Ok(()), |found| Err(Exit::Findings(found)))
 }
 
-/// Returns the findings of `lamp check` with its usual options, and its words on each. The blade is
-/// the blade of `machine`, or the usual one.
-fn found_by_default<T: MemorySize + Send>(
-    layers: impl Iterator<Item = Result<T, Exit>>,
-    decode: impl Fn(T) -> Result<Layer, Exit> + Sync,
-    machine: Option<&Machine>,
-) -> Result<(Findings, Vec<FindingRecord>), Exit> {
-    let command = CheckArgs::augment_args(clap::Command::new("check").no_binary_name(true));
-    let matches = command.get_matches_from([""; 0]);
-    let args = CheckArgs::from_arg_matches(&matches).expect("no option is required");
-    let findings = lamp_supports::check(layers, decode, &args.options())?;
-    let usual = document(&args.machine)?;
-    let records = args.records(&findings, &Disagreements::default(), machine.unwrap_or(&usual));
-    Ok((findings, records))
-}
-
-/// Finds in layers what [`found_by_default`] does.
-pub(super) fn found(
-    layers: impl Iterator<Item = Result<Layer, Exit>>,
-    machine: Option<&Machine>,
-) -> Result<(Findings, Vec<FindingRecord>), Exit> {
-    found_by_default(layers, Ok, machine)
-}
-
-/// Returns what `lamp check` finds in the pages of a stack without further options.
-pub(super) fn found_in_pages(
-    pages: impl Iterator<Item = Result<Page, Exit>>,
-    done: impl Fn() + Sync,
-) -> Result<Vec<FindingRecord>, Exit> {
-    let decode = |page: Page| {
-        let layer = page.decode()?;
-        done();
-        Ok::<_, Exit>(layer)
-    };
-    found_by_default(pages, decode, None).map(|(_, records)| records)
-}
-
-/// Returns the shear stress of a blade on what it passes, for the greatest viscosity, in pascals.
-pub(super) fn greatest_shear_pa(recoating: Option<&Recoating>) -> Option<f64> {
-    recoating.map(|recoating| recoating.shear_pa()[1])
-}
-
 impl CheckArgs {
     /// Finds what there is in an input.
     fn checked(
@@ -233,58 +136,14 @@ impl CheckArgs {
         let minima = self.minima(&input)?;
         let findings = self.check(&mut input, common)?;
         let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
-        let records = self.records(&findings, &disagreements, machine);
+        let records = self.settings.records(&findings, &disagreements, machine);
         Ok(CheckedInput { name: input_name(path), input, findings, records })
-    }
-
-    /// Returns the file that the machine is from, if it is not built in.
-    pub(crate) fn input_file(&self) -> Option<&PathBuf> {
-        Some(&self.machine).filter(|path| is_file::<Machine>(path))
-    }
-
-    /// Returns the machine, to be changed.
-    pub(crate) fn machine_mut(&mut self) -> &mut PathBuf {
-        &mut self.machine
-    }
-
-    /// Returns what there is in a stack, the worst first.
-    pub(crate) fn found_in(&self, stack: &Path) -> Result<Vec<FindingRecord>, Exit> {
-        Ok(self.checked(stack, &document(&self.machine)?, &Common::quiet())?.records)
-    }
-
-    /// Returns the records of findings that are asked for.
-    fn records(
-        &self,
-        findings: &Findings,
-        disagreements: &Disagreements,
-        machine: &Machine,
-    ) -> Vec<FindingRecord> {
-        let shear_pa = greatest_shear_pa(machine.recoating.as_ref());
-        let mut records = lamp_supports::records(findings, disagreements, shear_pa);
-        records.retain(|record| self.tells(record.group()));
-        records
-    }
-
-    /// Returns the options that matter to findings as one text.
-    pub(crate) fn canonical(&self) -> String {
-        let machine = canonical_word::<Machine>(&self.machine).into();
-        format!("check{}", words_of(&Self { machine, ..self.clone() }))
-    }
-
-    fn options(&self) -> CheckOptions {
-        CheckOptions {
-            threshold: self.threshold,
-            speck: self.speck,
-            least_support: self.least_support,
-            max_overhang: self.max_overhang,
-            drain: self.drain,
-        }
     }
 
     /// Checks a stack, or the layers of a part.
     fn check(&self, input: &mut Input, common: &Common) -> Result<Findings, Exit> {
         let progress = Progress::new("check", common, true);
-        let options = self.options();
+        let options = self.settings.options();
         let found = match input {
             Input::Stack(stack) => {
                 let name = input_name(&stack.path);
@@ -330,7 +189,7 @@ impl CheckArgs {
     /// Returns the minima of a part's mesh, if islands are reported.
     fn minima(&self, input: &Input) -> Result<Vec<IslandMinimum>, Exit> {
         let Input::Part(part) = input else { return Ok(Vec::new()) };
-        if !self.tells(FindingGroup::Islands) || part.model.is_cut() {
+        if !self.settings.reports(FindingGroup::Islands) || part.model.is_cut() {
             return Ok(Vec::new());
         }
         let solid = &part.settings.solid;
@@ -352,7 +211,7 @@ impl CheckArgs {
             Input::Part(part) if !part.model.is_cut() => part.settings.cut(),
             _ => return Ok(Disagreements::default()),
         };
-        if !self.tells(FindingGroup::Islands) {
+        if !self.settings.reports(FindingGroup::Islands) {
             return Ok(Disagreements::default());
         }
         let mut found = findings.compare_minima(minima, cut);
@@ -374,11 +233,6 @@ impl CheckArgs {
         })?;
         found.minima.retain(|minimum| !joined.contains(&(minimum.layer, minimum.pixel)));
         Ok(found)
-    }
-
-    /// Returns whether findings of a group are printed.
-    fn tells(&self, group: FindingGroup) -> bool {
-        self.only.is_empty() || self.only.contains(&group)
     }
 }
 
@@ -452,16 +306,4 @@ fn printed(name: &str, findings: &Findings, records: &[FindingRecord], all: bool
         }
     }
     text
-}
-
-/// Parses a share: `25%` or `0.25`.
-fn parse_percent(text: &str) -> Result<f64, String> {
-    let (number, unit) = match text.strip_suffix('%') {
-        Some(percent) => (percent, 100.0),
-        None => (text, 1.0),
-    };
-    match number.trim().parse::<f64>() {
-        Ok(number) if (0.0..=unit).contains(&number) => Ok(number / unit),
-        _ => Err(format!("`{text}` is not a share: write 25% or 0.25")),
-    }
 }

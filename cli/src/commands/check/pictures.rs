@@ -94,7 +94,8 @@ impl CheckArgs {
     ) -> Result<(), Exit> {
         let mut below: Option<Mask> = None;
         let mut take = |position: u32, layer: Option<Layer>| {
-            let mask = layer.map(|layer| layer.image.into_image().into_mask(self.threshold));
+            let mask =
+                layer.map(|layer| layer.image.into_image().into_mask(self.settings.threshold));
             if let Some(mask) = mask.as_ref().filter(|_| is_wanted(position)) {
                 each(position, below.as_ref(), mask)?;
             }

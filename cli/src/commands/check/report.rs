@@ -7,7 +7,7 @@ use lamp_supports::{FindingRecord, IslandRecord, Scale};
 use serde::Serialize;
 use serde_json::json;
 
-use super::{CheckedInput, greatest_shear_pa};
+use super::CheckedInput;
 use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 
@@ -36,7 +36,7 @@ pub(super) fn write_report(
     let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
         checked.records.iter().map(move |finding| OfInput { finding, input })
     });
-    let shear_pa = greatest_shear_pa(recoating);
+    let shear_pa = recoating.map(Recoating::greatest_shear_pa);
     let specks = checked.iter().enumerate().flat_map(|(input, checked)| {
         let scale = Scale::new(&checked.findings);
         let specks = checked.findings.specks.list.iter();

@@ -4,13 +4,13 @@ use std::cell::RefCell;
 
 use lamp_build::{BuildTime, PixelSize};
 use lamp_machine::Machine;
+use lamp_pipeline::check::CheckSettings;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
 use lamp_supports::{CheckError, FindingRecord, Findings};
 use serde_json::{Value, json};
 
 use super::measure::{LayerNumbers, new_pixels};
 use super::pictures::{Picture, of_finding, of_layer};
-use crate::commands::check;
 use crate::exit::Exit;
 use crate::output::stack_facts::StackFacts;
 use crate::terminal::progress::Progress;
@@ -58,7 +58,7 @@ impl StackReport {
         headers[1..].iter().for_each(|header| totals.add(header));
         let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
         let mut layers = measured(stack, &numbers, &sheet, progress);
-        let found = match check::found(&mut layers, machine) {
+        let found = match CheckSettings::default().find(&mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             Err(error) => match error.cause::<CheckError>() {
                 Some(why) => Err(why.to_string()),

@@ -3,9 +3,7 @@
 mod plan_file;
 mod report;
 mod solid;
-mod units;
 
-use std::num::{NonZeroU8, NonZeroU32};
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow};
@@ -16,17 +14,17 @@ use lamp_pipeline::RecordedSlicing;
 use lamp_pipeline::documents::document;
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::name_of_all;
-use lamp_pipeline::words::{text, words_of};
-use lamp_stack::{CompensateRecord, Length, Page, PageInfo};
+use lamp_pipeline::support::SupportSettings;
+use lamp_stack::{CompensateRecord, Page, PageInfo};
 use lamp_supports::{
-    CheckError, CheckOptions, Findings, IslandPlan, Support, SupportError, SupportOptions, Surface,
-    plan_supports,
+    CheckError, Findings, IslandPlan, Support, SupportError, Surface, plan_supports,
 };
-use serde::Serialize;
 use serde_json::Value;
 
-use crate::args::options::{Common, Output, parse_distance, parse_thickness};
+use crate::args::options::{Common, Output};
+use crate::args::parsed::Parsed;
 use crate::args::solid::part_file;
+use crate::args::stages::SupportStageArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::output::endings::{parse_report, parse_toml};
@@ -39,10 +37,6 @@ use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
 use plan_file::plan_text;
 use report::SupportReport;
-use units::{Curvature, Degrees};
-
-/// The heading of options that choose supports.
-const CHOICE: &str = "Choice of supports";
 
 /// Hold floating islands with the shortest supports to the part
 ///
@@ -51,7 +45,7 @@ const CHOICE: &str = "Choice of supports";
 /// that meets the part where it is smooth, even and away from creases, and that can be built.
 /// Islands without such a way are left, and reported. The plan is a list of edits: delete or
 /// exchange supports in it, and let lamp edit draw it.
-#[derive(Args, Serialize, Clone)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   lamp support blade.tif --part blade.stl -o supported.tif
@@ -60,103 +54,41 @@ Examples:
   lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
 
 Exit status: 0 if the work is done; 3 with --strict if islands are left.")]
-#[serde(rename_all = "kebab-case")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
-    #[serde(skip)]
     pub(crate) stack: PathBuf,
 
     /// The part that the stack was sliced from; repeat it for several parts, as they were given to
     /// slice
     #[arg(long, value_name = "PART", required = true, value_parser = part_file())]
-    #[serde(skip)]
     pub(crate) part: Vec<PartFile>,
 
     /// Write the supports as a list of edits, with alternatives, for people to change
     #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
-    #[serde(skip)]
     plan: Option<PathBuf>,
 
     /// Write the supports as an STL
     #[arg(long, value_name = "FILE.stl", value_parser = solid::parse_stl)]
-    #[serde(skip)]
     stl: Option<PathBuf>,
 
     /// Write islands and supports as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Give up with status 3 if islands are left, or if pages of a folder may be missing: no stack
     /// is written, and the next stage of a pipe fails, too
     #[arg(long)]
-    #[serde(skip)]
     strict: bool,
 
-    /// Radius of supports
-    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
-    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
-    #[serde(with = "text")]
-    radius: Length,
-
-    /// Largest angle of a support to the vertical
-    #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
-    #[arg(help_heading = CHOICE)]
-    #[serde(with = "text")]
-    max_tilt: Degrees,
-
-    /// Greatest length of a support
-    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().max_length)]
-    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
-    #[serde(with = "text")]
-    max_length: Length,
-
-    /// Least distance of a contact to edges where the surface turns by more than 30 degrees
-    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().edge_clearance)]
-    #[arg(value_parser = parse_distance, help_heading = CHOICE)]
-    #[serde(with = "text")]
-    edge_clearance: Length,
-
-    /// Largest curvature of the surface around a contact: 1/mm is a radius of 1 mm
-    #[arg(long, value_name = "CURVATURE", help_heading = CHOICE)]
-    #[arg(default_value_t = Curvature(SupportOptions::default().max_curvature))]
-    #[serde(with = "text")]
-    max_curvature: Curvature,
-
-    /// Widest piece of an island that one support holds; wider islands are divided
-    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().hold)]
-    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
-    #[serde(with = "text")]
-    hold: Length,
-
-    /// Directions to try
-    #[arg(long, value_name = "N", default_value_t = 400, help_heading = CHOICE)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    candidates: u32,
-
-    /// Supports to list for each place: the one that is drawn, and alternatives
-    #[arg(long, value_name = "N", default_value_t = 3, help_heading = CHOICE)]
-    #[arg(value_parser = clap::value_parser!(u16).range(1..))]
-    keep: u16,
-
-    /// Side of the square that an island must hold, in pixels
-    #[arg(long, value_name = "PIXELS", default_value = "3")]
-    #[serde(with = "text")]
-    speck: NonZeroU32,
-
-    /// Level from which a gray pixel is white
-    #[arg(long, value_name = "LEVEL", default_value = "1")]
-    #[serde(with = "text")]
-    threshold: NonZeroU8,
+    #[command(flatten)]
+    settings: Parsed<SupportStageArgs, SupportSettings>,
 
     /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
     #[arg(long, value_name = "M", default_value = "alpha")]
-    #[serde(skip)]
     pub(crate) machine: PathBuf,
 
     #[command(flatten)]
-    #[serde(skip)]
     output: Output,
 }
 
@@ -182,7 +114,7 @@ impl SupportArgs {
         let surface = self.surface(&first, &name, progress)?;
         let found = self.check(stack, progress)?;
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
-        let plans = plan_supports(layers, &found, &surface, &self.options());
+        let plans = plan_supports(layers, &found, &surface, &self.settings.options());
         let plans = plans.map_err(|error| match error.cause::<SupportError>() {
             Some(_) => error.at(name),
             None => error,
@@ -213,7 +145,7 @@ impl SupportArgs {
 
     /// Returns the options that matter to bytes as one text. The machine only decides forces.
     pub(crate) fn canonical(&self) -> String {
-        format!("support{}", words_of(self))
+        self.settings.canonical()
     }
 
     fn check_files(&self) -> Result<(), Exit> {
@@ -226,20 +158,6 @@ impl SupportArgs {
             check_beside(beside, &self.output.output, inputs())?;
         }
         Ok(())
-    }
-
-    fn options(&self) -> SupportOptions {
-        SupportOptions {
-            candidates: NonZeroU32::new(self.candidates).expect("it is in a range above zero"),
-            max_tilt: self.max_tilt.0,
-            edge_clearance: self.edge_clearance,
-            max_curvature: self.max_curvature.0,
-            max_length: self.max_length,
-            keep: self.keep.into(),
-            radius: self.radius,
-            hold: self.hold,
-            threshold: self.threshold,
-        }
     }
 
     /// Opens the part, where it lay when it was sliced. `first` is the stack's first page.
@@ -259,11 +177,7 @@ impl SupportArgs {
 
     /// Finds the islands.
     fn check(&self, stack: &mut KeptStack, progress: &Progress) -> Result<Findings, Exit> {
-        let options = CheckOptions {
-            threshold: self.threshold,
-            speck: self.speck,
-            ..CheckOptions::default()
-        };
+        let options = self.settings.check_options();
         let name = input_name(&self.stack);
         let failed = |error| failed_at(name.clone(), error);
         let pages = stack.pages(true)?.map(|page| page.map_err(failed));

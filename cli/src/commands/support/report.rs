@@ -8,7 +8,6 @@ use lamp_stack::to_nm;
 use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Scale, Support};
 use serde_json::{Map, Value, json};
 
-use crate::commands::check::greatest_shear_pa;
 use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 use crate::terminal::progress::Progress;
@@ -32,7 +31,7 @@ impl<'a> SupportReport<'a> {
         recoating: Option<&Recoating>,
     ) -> Self {
         let unlisted = found.islands.left_out;
-        let shear_pa = greatest_shear_pa(recoating);
+        let shear_pa = recoating.map(Recoating::greatest_shear_pa);
         Self { plans, unlisted, scale: Scale::new(found), shear_pa }
     }
 

@@ -8,7 +8,7 @@
 mod edge_curve;
 mod vertices;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use self::edge_curve::EdgeCurve;
 use crate::geometry::edge_range;
@@ -27,7 +27,7 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
             edges: &mut model.edges,
             vertices: &mut model.vertices,
             tolerance_mm,
-            widest_mm: HashMap::new(),
+            widest_mm: BTreeMap::new(),
         };
         // In this order: edges pair up by their vertices, and a long edge fits short ones only once
         // it is cut.
@@ -51,7 +51,8 @@ struct Healing<'a> {
     vertices: &'a mut [Vec3],
     tolerance_mm: f64,
     /// The gap closed at each edge that was joined or whose ends were joined, in millimeters.
-    widest_mm: HashMap<usize, f64>,
+    /// In order, so that sums over the edges at a vertex have the same last bits in each run.
+    widest_mm: BTreeMap<usize, f64>,
 }
 
 impl Healing<'_> {

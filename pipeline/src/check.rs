@@ -1,0 +1,131 @@
+//! What a check looks for in a stack.
+
+use std::num::{NonZeroU8, NonZeroU32};
+use std::path::{Path, PathBuf};
+
+use lamp_machine::Machine;
+use lamp_stack::{Layer, Length, MemorySize};
+use lamp_supports::{
+    CheckError, CheckOptions, Disagreements, FindingGroup, FindingRecord, Findings,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::documents::{canonical_word, document, is_file};
+use crate::error::Error;
+use crate::words::{list, optional, path, text, words_of};
+
+/// Changes when other findings come of the same settings and stack.
+pub const CODE: u32 = 1;
+
+/// What to look for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct CheckSettings {
+    /// Groups of findings; none means all.
+    #[serde(with = "list")]
+    pub only: Vec<FindingGroup>,
+    /// Side of the square that a finding must hold, in pixels.
+    #[serde(with = "text")]
+    pub speck: NonZeroU32,
+    /// Share of white that must rest on white.
+    #[serde(with = "text")]
+    pub least_support: f64,
+    /// How far white may reach beyond the white below; `None` is as far as a layer is thick.
+    #[serde(with = "optional")]
+    pub max_overhang: Option<Length>,
+    /// How wide a way out must be to drain a pocket; `None` is a pixel and a layer.
+    #[serde(with = "optional")]
+    pub drain: Option<Length>,
+    /// Level from which a gray pixel is white.
+    #[serde(with = "text")]
+    pub threshold: NonZeroU8,
+    /// The machine whose blade drags on what floats: a built-in one or a file.
+    #[serde(with = "path")]
+    pub machine: PathBuf,
+}
+
+impl Default for CheckSettings {
+    fn default() -> Self {
+        let CheckOptions { threshold, speck, least_support, max_overhang, drain } =
+            CheckOptions::default();
+        let (only, machine) = (Vec::new(), PathBuf::from("alpha"));
+        Self { only, speck, least_support, max_overhang, drain, threshold, machine }
+    }
+}
+
+impl CheckSettings {
+    /// Returns the settings that matter to findings as one text, defaults filled in. A machine's
+    /// file goes without its name.
+    pub fn canonical(&self) -> String {
+        let machine = canonical_word::<Machine>(&self.machine).into();
+        format!("check{}", words_of(&Self { machine, ..self.clone() }))
+    }
+
+    /// Returns the file that the machine is from, unless it is built in.
+    pub fn machine_file(&self) -> Option<&PathBuf> {
+        Some(&self.machine).filter(|path| is_file::<Machine>(path))
+    }
+
+    /// Reads the machine.
+    ///
+    /// # Errors
+    /// Returns an error if its file cannot be read, or holds no machine.
+    pub fn machine(&self) -> Result<Machine, Error> {
+        document(&self.machine)
+    }
+
+    /// Returns the options of the search for findings.
+    pub fn options(&self) -> CheckOptions {
+        CheckOptions {
+            threshold: self.threshold,
+            speck: self.speck,
+            least_support: self.least_support,
+            max_overhang: self.max_overhang,
+            drain: self.drain,
+        }
+    }
+
+    /// Returns whether findings of a group are reported.
+    pub fn reports(&self, group: FindingGroup) -> bool {
+        self.only.is_empty() || self.only.contains(&group)
+    }
+
+    /// Returns the records of findings that are asked for, the worst first.
+    pub fn records(
+        &self,
+        findings: &Findings,
+        disagreements: &Disagreements,
+        machine: &Machine,
+    ) -> Vec<FindingRecord> {
+        let shear_pa = machine.recoating.as_ref().map(|recoating| recoating.greatest_shear_pa());
+        let mut records = lamp_supports::records(findings, disagreements, shear_pa);
+        records.retain(|record| self.reports(record.group()));
+        records
+    }
+
+    /// Finds what there is in layers, and returns the records that are asked for with it. The blade
+    /// is the blade of `machine`, or else of the settings' machine.
+    ///
+    /// # Errors
+    /// Returns the first error of the layers, or an error if they cannot be checked.
+    pub fn find<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
+        &self,
+        layers: impl Iterator<Item = Result<T, E>>,
+        decode: impl Fn(T) -> Result<Layer, E> + Sync,
+        machine: Option<&Machine>,
+    ) -> Result<(Findings, Vec<FindingRecord>), E> {
+        let findings = lamp_supports::check(layers, decode, &self.options())?;
+        let records = match machine {
+            Some(machine) => self.records(&findings, &Disagreements::default(), machine),
+            None => self.records(&findings, &Disagreements::default(), &self.machine()?),
+        };
+        Ok((findings, records))
+    }
+
+    /// Puts the machine's file into a folder, unless its path is absolute.
+    pub fn set_folder(&mut self, folder: &Path) {
+        if let Some(file) = self.machine_file() {
+            self.machine = folder.join(file);
+        }
+    }
+}

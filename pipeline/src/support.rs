@@ -1,0 +1,155 @@
+//! How islands are held by supports.
+
+use std::fmt;
+use std::num::{NonZeroU8, NonZeroU32};
+use std::str::FromStr;
+
+use lamp_stack::Length;
+use lamp_supports::{CheckOptions, SupportOptions};
+use serde::{Deserialize, Serialize};
+
+use crate::words::{text, words_of};
+
+/// Changes when other bytes come of the same settings, stack and part.
+pub const CODE: u32 = 3;
+
+/// How islands are held.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct SupportSettings {
+    /// Radius of supports.
+    #[serde(with = "text")]
+    pub radius: Length,
+    /// Largest angle of a support to the vertical.
+    #[serde(with = "text")]
+    pub max_tilt: Degrees,
+    /// Greatest length of a support.
+    #[serde(with = "text")]
+    pub max_length: Length,
+    /// Least distance of a contact to edges where the surface turns by more than 30 degrees.
+    #[serde(with = "text")]
+    pub edge_clearance: Length,
+    /// Largest curvature of the surface around a contact.
+    #[serde(with = "text")]
+    pub max_curvature: Curvature,
+    /// Widest piece of an island that one support holds.
+    #[serde(with = "text")]
+    pub hold: Length,
+    /// Directions to try.
+    pub candidates: NonZeroU32,
+    /// Supports to list for each place, at least one.
+    pub keep: u16,
+    /// Side of the square that an island must hold, in pixels.
+    #[serde(with = "text")]
+    pub speck: NonZeroU32,
+    /// Level from which a gray pixel is white.
+    #[serde(with = "text")]
+    pub threshold: NonZeroU8,
+}
+
+impl Default for SupportSettings {
+    fn default() -> Self {
+        let options = SupportOptions::default();
+        Self {
+            radius: options.radius,
+            max_tilt: Degrees(options.max_tilt),
+            max_length: options.max_length,
+            edge_clearance: options.edge_clearance,
+            max_curvature: Curvature(options.max_curvature),
+            hold: options.hold,
+            candidates: options.candidates,
+            keep: options.keep.try_into().unwrap_or(u16::MAX),
+            speck: CheckOptions::default().speck,
+            threshold: options.threshold,
+        }
+    }
+}
+
+impl SupportSettings {
+    /// Returns the settings as one text, defaults filled in.
+    pub fn canonical(&self) -> String {
+        format!("support{}", words_of(self))
+    }
+
+    /// Returns the options of the search for supports.
+    pub fn options(&self) -> SupportOptions {
+        SupportOptions {
+            candidates: self.candidates,
+            max_tilt: self.max_tilt.0,
+            edge_clearance: self.edge_clearance,
+            max_curvature: self.max_curvature.0,
+            max_length: self.max_length,
+            keep: self.keep.into(),
+            radius: self.radius,
+            hold: self.hold,
+            threshold: self.threshold,
+        }
+    }
+
+    /// Returns the options of the search for islands.
+    pub fn check_options(&self) -> CheckOptions {
+        CheckOptions { threshold: self.threshold, speck: self.speck, ..CheckOptions::default() }
+    }
+}
+
+/// An angle of a support.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Degrees(pub f64);
+
+impl fmt::Display for Degrees {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}deg", self.0)
+    }
+}
+
+impl FromStr for Degrees {
+    type Err = String;
+
+    /// Parses `45deg` or `45`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim_end_matches("deg").trim_end().parse() {
+            Ok(degrees) if (0.0..=80.0).contains(&degrees) => Ok(Self(degrees)),
+            _ => Err(format!("`{text}` is no tilt: write an angle from 0deg to 80deg")),
+        }
+    }
+}
+
+/// A curvature in 1/mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curvature(pub f64);
+
+impl fmt::Display for Curvature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/mm", self.0)
+    }
+}
+
+impl FromStr for Curvature {
+    type Err = String;
+
+    /// Parses `1/mm`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.strip_suffix("/mm").and_then(|number| number.trim_end().parse().ok()) {
+            Some(number) if (0.0..f64::INFINITY).contains(&number) => Ok(Self(number)),
+            _ => Err(format!("`{text}` is no curvature: write 1/mm for a radius of 1 mm")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_and_curvatures_have_units() {
+        assert_eq!("45deg".parse(), Ok(Degrees(45.0)));
+        assert_eq!("0".parse(), Ok(Degrees(0.0)));
+        assert_eq!("0.5/mm".parse(), Ok(Curvature(0.5)));
+        for wrong in ["", "nan", "-1deg", "90", "45rad"] {
+            assert!(wrong.parse::<Degrees>().is_err(), "{wrong}");
+        }
+        for wrong in ["", "1", "nan/mm", "-1/mm", "inf/mm", "1/in"] {
+            assert!(wrong.parse::<Curvature>().is_err(), "{wrong}");
+        }
+    }
+}
