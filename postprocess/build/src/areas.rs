@@ -34,6 +34,7 @@ impl Areas {
         let mut part_px = vec![0; parts];
         for (part, image) in images {
             part_px[*part] = match image {
+                // A mask counts as it is: `white_of` would copy it.
                 Image::Mask(mask) => mask.white_pixels(),
                 Image::Gray(_) => white_of(image).white_pixels(),
             };
@@ -65,6 +66,7 @@ pub struct CuredPixels {
 
 impl Default for CuredPixels {
     fn default() -> Self {
+        // No derived default: `None` is an unknown volume, and no layers have volume 0.
         Self { pixels: 0, pixel_um: Some(0.0) }
     }
 }
@@ -84,6 +86,7 @@ impl CuredPixels {
 
     /// Returns their volume in cubic millimeters, if all thicknesses are known.
     pub fn volume_mm3(&self, dpi: Dpi) -> Option<f64> {
+        // Thicknesses are in micrometers, areas in square millimeters.
         Some(self.pixel_um? * dpi.pitch().mm().powi(2) / 1000.0)
     }
 }

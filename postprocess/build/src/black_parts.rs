@@ -24,6 +24,7 @@ pub(super) fn unless_black<E: From<TileError>>(
             Some(Ok(made))
         }
         Some(Err(error)) => {
+            // After an error the rest is unread, so nobody knows whether a part is black in it.
             ended = true;
             Some(Err(error))
         }

@@ -31,6 +31,8 @@ impl Layout {
     pub(super) fn page(&self, step: &LayerSet, is_first: bool) -> Result<PageInfo, TileError> {
         let here: Vec<PartLayer<'_>> = self.layers_of(step).collect();
         let infos = || here.iter().map(|(_, _, layer)| &layer.info);
+        // One open contour is open whatever other pages leave unsaid; a page that says nothing
+        // leaves the rest unknown.
         let closed = infos().map(|info| info.closed).reduce(|a, b| match (a, b) {
             (Some(false), _) | (_, Some(false)) => Some(false),
             (Some(true), Some(true)) => Some(true),
@@ -93,7 +95,10 @@ impl Layout {
     fn row_on_build(&self, at: &CopyPlacement, row: u32, open: bool) -> Option<u32> {
         let frame = self.parts[at.part].frame();
         let row = u32::try_from(i64::from(row) - frame.top).ok()?;
+        // Contours break off between rows, and there is one place between rows more than rows.
         let last = frame.height.checked_sub(if open { 0 } else { 1 })?;
+        // Mirroring is left to right and keeps rows: of the turns along rows only the half turn
+        // reverses them.
         let upside_down = at.turn == Orientation::new(2, at.turn.is_mirrored());
         (row <= last).then(|| at.top + if upside_down { last - row } else { row })
     }
@@ -146,6 +151,7 @@ impl Layout {
     /// Returns the number of layers if all stacks state theirs. They start together, so the longest
     /// stack gives the number.
     fn layer_count(&self) -> Option<u32> {
+        // Resampled layers follow from the heights of all pages, which a first page does not state.
         if self.resampled {
             return None;
         }
@@ -181,6 +187,8 @@ fn exposure(step: &LayerSet, here: &[PartLayer<'_>]) -> Result<Option<f64>, Tile
     let known = here.iter().filter_map(|(_, part, layer)| Some((part, layer.info.exposure_ms?)));
     let mut known = known.peekable();
     let Some(&(first, first_ms)) = known.peek() else { return Ok(None) };
+    // All copies of a layer are exposed at once. Compared exactly: pages state times as decimals,
+    // which read the same.
     match known.find(|&(_, ms)| ms != first_ms) {
         None => Ok(Some(first_ms)),
         Some((part, ms)) => {
@@ -217,6 +225,7 @@ fn unique_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     for name in names {
         let numbered = (2..).map(|number| format!("{name}-{number}"));
         let mut candidates = std::iter::once(name.to_owned()).chain(numbered);
+        // Numbers do not end, so a name is always found.
         unique.extend(candidates.find(|name| !unique.contains(name)));
     }
     unique

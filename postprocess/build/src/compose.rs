@@ -48,6 +48,7 @@ pub(super) fn compose(
         let row = match mesh {
             Some(mesh) => {
                 walls.clear();
+                // Rows of a mask begin black, so their transitions lead to white and black in turn.
                 let levels = [255, 0].into_iter().cycle();
                 let change = |(&column, level)| LevelChange { column, level };
                 walls.extend(mesh.row(index).iter().zip(levels).map(change));
@@ -97,6 +98,7 @@ pub(super) fn merge_rows(
 fn check_runs(images: &[PlacedImage]) -> Result<(), ComposeError> {
     let runs =
         images.iter().map(|placed| placed.at.len().saturating_mul(placed.image.change_count() + 1));
+    // Known before a row is merged: copies times runs could outgrow the memory first.
     let runs = runs.fold(0, usize::saturating_add);
     if runs > MAX_RUNS { Err(ComposeError::TooManyRuns) } else { Ok(()) }
 }
@@ -174,6 +176,7 @@ fn for_each_row(
     height: u32,
     mut each: impl FnMut(u32, &[CopyRow]) -> Result<(), ComposeError>,
 ) -> Result<(), ComposeError> {
+    // A layout file lists copies in any order; the heap yields them by their first row.
     let mut waiting = BinaryHeap::new();
     for (image, placed) in images.iter().enumerate() {
         waiting.extend(placed.borrow().at.iter().map(|&(left, top)| Reverse((top, left, image))));
@@ -186,7 +189,9 @@ fn for_each_row(
         });
         while let Some(&Reverse((_, left, image))) = waiting.peek().filter(|at| at.0.0 == index) {
             waiting.pop();
+            // An image without rows would still be asked for its row 0.
             if images[image].borrow().image.height() > 0 {
+                // Sorted by left columns, so that most rows append without a merge.
                 let place = met.partition_point(|met| met.left <= left);
                 met.insert(place, CopyRow { image, left, row: 0 });
             }

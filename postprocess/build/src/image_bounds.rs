@@ -44,6 +44,7 @@ impl ImageBounds {
 
     /// Returns true if a point in pixels is on the image.
     pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        // Places count from the center of the first pixel, half a pixel inside the edge.
         let on = |place: f64, size: u32| (-0.5..=f64::from(size) - 0.5).contains(&place);
         on(x, self.width) && on(y, self.height)
     }
@@ -66,9 +67,12 @@ impl ImageBounds {
         let [mut x0, mut y1] = self.origin_mm;
         let [mut width, mut height] = [self.width, self.height].map(|side| f64::from(side) * pitch);
         if turn.is_mirrored() {
+            // In the mirror x = 0 the right edge becomes the left one.
             x0 = -(x0 + width);
         }
         for _ in 0..turn.quarters() {
+            // A quarter counterclockwise takes (x, y) to (-y, x): the top becomes the left edge,
+            // and the right edge the top.
             (x0, y1) = (-y1, x0 + width);
             (width, height) = (height, width);
         }

@@ -186,6 +186,8 @@ impl LayoutFile {
 
     /// Returns the layout as JSON, with a line for each copy.
     pub fn to_json(&self) -> String {
+        // A copy a line reads and compares well; the pretty form of serde_json takes a line for
+        // each key.
         let line = |copy| serde_json::to_string(copy).expect("texts and numbers are JSON");
         let copies: Vec<_> = self.copies.iter().map(|copy| format!("    {}", line(copy))).collect();
         let area =
@@ -234,6 +236,7 @@ impl LayoutFile {
 impl Layout {
     /// Returns the layout as a file, which gives the same layout again.
     pub fn to_file(&self) -> LayoutFile {
+        // Whole nanometers hide the rounding of pitches. Zero is added to turn -0.0 into 0.0.
         let nm = |mm: f64| (mm * 1e6).round() / 1e6 + 0.0;
         let Size { width, height } = self.area;
         let pitch = self.dpi.pitch().mm();
@@ -263,7 +266,10 @@ impl CopyEntry {
         let (margin_left, margin_top) = margins(part, turn);
         let image = part.image();
         let (_, height) = turn.size(image.width, image.height);
+        // `from_json` limits lengths to 1e10 mm, so they are far below 2^63 pixels at any
+        // resolution.
         let left = (self.x_mm / pitch).round() as i64;
+        // Files count from the lower edge, images from the upper one.
         let bottom = ((area.height.mm() - self.y_mm) / pitch).round() as i64;
         let top = bottom - i64::from(height);
         RequestedPlacement { part: index, turn, left: left + margin_left, top: top + margin_top }
@@ -308,6 +314,7 @@ fn check_number(is_right: bool, value: f64, place: impl Fn() -> String) -> Resul
 /// Returns the part of a name, or the one whose label it is.
 fn part_called(parts: &[PartStack], name: &str) -> Option<usize> {
     let by_name = parts.iter().position(|part| part.name() == name);
+    // A whole name goes first, since it may be the label of another part.
     by_name.or_else(|| (0..parts.len()).find(|&part| label(parts, part) == name))
 }
 

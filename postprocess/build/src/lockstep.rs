@@ -76,6 +76,7 @@ fn bytes_of(
     mesh_bytes: usize,
 ) -> usize {
     let bytes = copies.zip(layers).map(|(copies, layer)| {
+        // The oriented layer once more, and its runs for each copy.
         layer.as_ref().map_or(0, |layer| layer.bytes().saturating_mul(copies + 1))
     });
     bytes.fold(mesh_bytes, usize::saturating_add)
@@ -165,6 +166,7 @@ where
         let Some(first) = self.stacks.first().and_then(bottom) else { return Ok(()) };
         let first_name = self.stacks[0].name.clone();
         for stack in &mut self.stacks[1..] {
+            // A stack without heights fails later, in `known_span`, which names the layer.
             let Some(z) = bottom(stack) else { continue };
             if self.options.settle {
                 stack.up = first - z;
@@ -181,6 +183,7 @@ where
     fn check_heights(&self, leader: usize) -> Result<(), TileError> {
         let build = self.stacks[leader].span();
         let all = self.stacks.iter().filter(|stack| stack.next.is_some());
+        // Stacks that state no heights at all are joined by their order.
         if build.is_none() && all.clone().all(|stack| stack.span().is_none()) {
             return Ok(());
         }
@@ -226,6 +229,8 @@ where
         if layers.iter().all(Option::is_none) {
             return Ok(None);
         }
+        // `layer_at` leaves layers in place, since a thick one holds several tops. The first stack
+        // gives each of its layers once.
         if self.stacks[0].next.is_some() {
             self.stacks[0].advance()?;
         }
@@ -249,6 +254,7 @@ where
         while self.next.is_some() {
             let [bottom, top] = self.known_span()?;
             if top >= height - TOLERANCE_UM {
+                // The next layer is above the height where a stack begins higher or has a gap.
                 return Ok(self.next.clone().filter(|_| bottom < height - TOLERANCE_UM));
             }
             self.advance()?;

@@ -89,6 +89,7 @@ impl PartStack {
     /// the outline's size, at another place.
     pub(super) fn of_turned(&self, outline: &Mask, origin_mm: [f64; 2], name: String) -> Self {
         let image = PixelSize { width: outline.width(), height: outline.height() };
+        // Black outlines are refused where they are found, and turning only widens them.
         let frame = extents(outline).expect("an outline has a pixel");
         Self {
             name,
@@ -156,6 +157,7 @@ impl PartStack {
     pub(super) fn silhouette(&self, turn: Orientation) -> Mask {
         let outline = self.outline.as_ref().and_then(|outline| outline.oriented(turn));
         let PixelSize { width, height } = self.size(turn);
+        // A turned outline may have too many runs; all of the frame covers it.
         outline.unwrap_or_else(|| Mask::black(width, height).inverted())
     }
 
@@ -179,6 +181,7 @@ impl PartStack {
     /// Returns an error if the layer is not within the extents that were found.
     pub(super) fn framed(&self, layer: &Layer) -> Result<Image, TileError> {
         self.check(layer)?;
+        // The extents are from an earlier read of the file, which may have changed since.
         if self.is_fit && !is_within(&layer.image, self.frame) {
             return Err(TileError::Changed { name: self.name.clone(), layer: layer.info.name() });
         }
@@ -204,6 +207,7 @@ pub(super) fn white_of(image: &Image) -> Mask {
     for changes in gray.rows() {
         row.clear();
         for &LevelChange { column, level } in changes {
+            // Changes between two gray levels are no transitions.
             if (level > 0) != (row.len() % 2 == 1) {
                 row.push(column);
             }
@@ -217,6 +221,7 @@ pub(super) fn white_of(image: &Image) -> Mask {
 fn extents<C: Change>(image: &RunImage<C>) -> Option<Frame> {
     let white = (0..).zip(image.rows()).filter(|(_, row)| !row.is_empty());
     let mut white = white.map(|(y, row): (u32, &[C])| {
+        // A row that ends white has no last transition: it goes up to the image's edge.
         let is_black = C::last_pixel(row) == C::Pixel::default();
         (y, row[0].column(), if is_black { row[row.len() - 1].column() } else { image.width() })
     });

@@ -21,6 +21,7 @@ impl PixelSize {
 
     /// Returns the size with `by` pixels more on every side.
     pub(crate) fn grown(self, by: u32) -> Self {
+        // Sides are at most 2^26 pixels, and so are reaches of moats: sums stay below 2^32.
         Self { width: self.width + 2 * by, height: self.height + 2 * by }
     }
 }

@@ -72,6 +72,7 @@ pub fn tile<E: From<TileError> + Send>(
                 Ok(layout) => (None, Some(layout)),
                 Err(error) => (Some(Err(error.into())), None),
             },
+            // An error, or the end of a stack without layers, passes on as it is.
             _ => (layers.next(), None),
         };
         let build =
@@ -190,6 +191,8 @@ impl Layout {
         let meshed = layout.clone();
         let BuildWanted { images, areas } = wanted;
         let base_layers = mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
+        // If nobody looks at the mesh, only loose pieces need it: they follow from all layers
+        // below.
         let made = mesh.as_ref().filter(|mesh| images || areas || mesh.tells_loose());
         let mut kept = made.map(|mesh| KeptMesh::new(mesh, &layout));
         let (mut is_first, mut known) = (true, Vec::new());
@@ -202,6 +205,7 @@ impl Layout {
                 };
                 let is_below = step.index < meshed.first;
                 match meshed.meshed_step(step, kept.as_mut(), is_below) {
+                    // A layer below the range has only shaped the mesh of the layers above it.
                     Ok(_) if is_below => {}
                     Ok(made) => {
                         let mesh_px = kept.as_mut().filter(|_| areas).map_or(0, KeptMesh::pixels);
@@ -234,6 +238,7 @@ impl Layout {
             layers.map(|made| made.map(|(layer, found, of_layer)| (layer, (found, of_layer))));
         on_base(unless_black(layers, names), mesh).map(move |made| {
             let (layer, (found, of_layer)) = made?;
+            // Reported here, layer by layer: the closure above runs on several threads.
             found.into_iter().for_each(&mut told);
             if areas {
                 told(BuildFinding::Areas(of_layer.of_layer(&layer)));
@@ -314,6 +319,7 @@ impl Layout {
             for at in self.placements.iter().filter(|at| at.part == *part) {
                 corners.entry(at.turn).or_default().push((at.left, at.top));
             }
+            // In a fixed order, since a hash map's differs from run to run.
             for orientation in Orientation::ALL {
                 if let Some(at) = corners.remove(&orientation) {
                     placed.push(PlacedImage { image: image.oriented(orientation)?, at });

@@ -75,6 +75,7 @@ fn swaths(machine: &Machine, image: PixelSize, dpi: Dpi) -> Option<SwathTime> {
     let strips = machine.strips.as_ref()?;
     let count = Swaths::new(strips.mirrors, strips.overlap, image.width).ok()?.count();
     let length_mm = f64::from(image.height) * dpi.pitch().mm();
+    // There is at least one swath, also for an image without columns.
     let steps_s = f64::from(count - 1) * times.swath_step_s.unwrap_or(0.0);
     let seconds = f64::from(count) * length_mm / times.swath_speed_mm_per_s? + steps_s;
     Some(SwathTime { count, length_mm, seconds })

@@ -37,9 +37,11 @@ pub(crate) fn on_base<E>(
             next += 1;
             return Some(Ok((layer, (Vec::new(), areas))));
         }
+        // The image of the base is freed once the parts begin.
         (next, whole) = (count, None);
         let layer = layers.next()?;
         Some(layer.map(|(mut layer, told)| {
+            // Pages of other programs may have any number, up to the last u32.
             layer.info.index = layer.info.index.saturating_add(count);
             (layer, told)
         }))
@@ -57,6 +59,7 @@ pub(crate) fn base_page(first: &mut PageInfo, index: u32, count: u32) -> PageInf
     }
     PageInfo {
         index,
+        // The differences of decimals are rounded to the whole nanometers that pages have.
         z_um: z_um.map(|um| Length::from_um(um).to_whole_nm().um()),
         thickness_um: first.thickness_um,
         origin_mm: first.origin_mm,

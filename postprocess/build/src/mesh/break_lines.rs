@@ -37,6 +37,8 @@ impl BreakLines {
             let sides = [part.right - part.left, part.bottom - part.top];
             sides.map(|side| u64::from(side / pitch.max(width + 1)) + 1).iter().sum::<u64>()
         };
+        // Counted before any is made: each line is compared with all parts, and each band with all
+        // lines.
         if parts.iter().map(of_part).sum::<u64>() > MAX_LINES {
             return None;
         }
@@ -57,10 +59,12 @@ impl BreakLines {
 /// Returns the vertical lines.
 fn upright(parts: &[Rect], [columns, rows]: [u32; 2], width: u32, pitch: u32) -> Vec<Rect> {
     let mut lines = Vec::new();
+    // Closer lines would join.
     let pitch = pitch.max(width + 1);
     for part in parts {
         let middle = part.left + (part.right - part.left) / 2;
         let half = (part.right - part.left) / 2;
+        // Whole pitches on both sides keep one line in the middle.
         let aside = half / pitch * pitch;
         for place in (0..=2 * aside).step_by(pitch as usize) {
             let left = (middle + place).saturating_sub(aside + width / 2);
@@ -90,6 +94,7 @@ fn bands(lines: &[Rect], height: u32) -> Vec<(u32, Vec<u32>)> {
     let mut first = 0;
     let mut bands = Vec::new();
     for end in ends.into_iter().filter(|&end| end > 0) {
+        // Bands end wherever a line does, so a line covers a band wholly or not at all.
         let met = lines.iter().filter(|line| line.top <= first && end <= line.bottom);
         let mut runs: Vec<[u32; 2]> = met.map(|line| [line.left, line.right]).collect();
         runs.sort_unstable();

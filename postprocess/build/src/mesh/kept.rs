@@ -62,6 +62,8 @@ impl KeptMesh {
         let followed = |part| self.followed(mesh, layout, part, images);
         let followed = (0..layout.parts.len()).map(followed).collect::<Option<Vec<_>>>()?;
         let changed = self.cut_moats(mesh, layout, followed)?;
+        // The same walls give the same pieces: the hanging ones lie on themselves, and loose ones
+        // touch none of these.
         if !changed && let Some(hanging) = &self.hanging {
             return Some(hanging.clone());
         }
@@ -124,6 +126,7 @@ impl KeptMesh {
             let moat = Image::Mask(mesh.moat(&followed));
             self.followed[part] = followed;
             let moats = layout.placed_images(&[(part, moat)])?;
+            // Stays empty while no moat changes, so such layers cost nothing.
             changed.resize(layout.pixels.height as usize, false);
             for (before, now) in self.moats[part].iter().zip(&moats) {
                 mark_changed(before, now, mesh.reach(), &mut changed);
@@ -150,6 +153,7 @@ impl KeptMesh {
         Some(match mesh.moat {
             Moat::Rising => match image() {
                 Some(white) => white.combined(Op::Union, before)?,
+                // Where a part ends, its moat stays: no mesh stands on faces that look up.
                 None => before.clone(),
             },
             Moat::Layer => image().unwrap_or_else(|| Mask::black(before.width(), before.height())),
@@ -171,6 +175,7 @@ impl KeptMesh {
         merge_rows(&moats, grown, is_changed, |index, transitions| {
             moat.clear();
             place_row(transitions, grown.width, -i64::from(reach), build.width, &mut moat);
+            // Only rows on the build are wanted, so `index` is `reach` and more.
             let index = index - reach;
             cut(mesh.standing.row(index), &moat, build.width, &mut row);
             rows[index as usize] = row.as_slice().into();
@@ -181,6 +186,7 @@ impl KeptMesh {
 /// Returns the pieces of walls that are not small and hang on something.
 fn hanging_pieces(cut: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging {
     match holds {
+        // Every piece has a pixel, so none would be left out.
         Holds::All | Holds::AllBut([]) if least <= 1 => {
             Hanging { kept: cut.clone(), pixels: None, loose: Vec::new() }
         }

@@ -46,9 +46,13 @@ impl Cells {
                 // Each row of holes is shifted by half a cell against the next. Corners of one row
                 // reach between the corners of the other, so a line may cross holes of two rows.
                 let row_pitch = 0.5 * SQRT_3 * pitch;
+                // Neighboring centers form equilateral triangles, so rows of them are √3/2 pitches
+                // apart.
                 let row = (y / row_pitch).floor();
                 let hole = |row: f64| {
                     let away = (y - (row + 0.5) * row_pitch).abs();
+                    // A hexagon with inner radius r has corners 2 r / √3 from its center. From the
+                    // upper one, half its width grows by √3 for each unit of height, up to r.
                     let corner = 2.0 / SQRT_3 * reach;
                     let half = ((corner - away) * SQRT_3).clamp(0.0, reach);
                     let is_even = row.rem_euclid(2.0) < 0.5;
@@ -93,6 +97,8 @@ impl Lattice {
                     for &column in transitions {
                         toggle(left.saturating_add(column), width, out);
                     }
+                    // A row that ends white turns black at the image's edge. If the next copy
+                    // begins white, the two transitions cancel.
                     if transitions.len() % 2 == 1 {
                         toggle(left.saturating_add(image.width()), width, out);
                     }

@@ -151,6 +151,8 @@ impl MeshOptions {
                 if pitch < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
                     return Err(TileError::NoCells { cell, wall });
                 }
+                // A hole has two edges. Hexagons of two rows interlock in a third of the rows at
+                // most, for which the half below has room, too.
                 let runs = 2.0 * f64::from(build.width) / pitch;
                 (Lattice::Cells(Cells::new(shape, pitch, thickness)), runs)
             }

@@ -43,6 +43,7 @@ impl MeshRows {
 
     /// Returns the rows, to be replaced.
     pub(super) fn rows_mut(&mut self) -> &mut [Arc<[u32]>] {
+        // Only the list of rows is copied, not their transitions.
         Arc::make_mut(&mut self.rows).as_mut_slice()
     }
 }

@@ -57,6 +57,7 @@ impl Layout {
         let pixels = |length: Length| length.pixels(self.dpi).max(0.0);
         let clearance = pixels(options.clearance);
         let longest = self.pixels.width.max(self.pixels.height);
+        // A wider moat leaves no mesh. The limit also keeps pixels within u32 below.
         if clearance > f64::from(longest) {
             return Err(TileError::WideMoat { clearance: options.clearance, area_mm: self.area });
         }
@@ -192,6 +193,8 @@ fn cut(mut wall: &[u32], free: &[u32], width: u32, out: &mut Vec<u32>) {
         if is_wall {
             toggle(start, width, out);
         }
+        // A wall's transition at `end` itself counts as hidden: white after it begins at `end`
+        // anyway.
         let hidden = before + count_below(&wall[before..], end + 1);
         is_wall ^= (hidden - before) % 2 == 1;
         wall = &wall[hidden..];

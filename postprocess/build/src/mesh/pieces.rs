@@ -108,6 +108,7 @@ impl Pieces {
             labels.resize(start + row.len() / 2, NONE);
             let (before, of_row) = labels.split_at_mut(start);
             let of_above = &before[start - above.len() / 2..];
+            // Most rows of walls repeat the row above, and need neither search nor union.
             if in_step(above, row) {
                 of_row.copy_from_slice(of_above);
             } else {
@@ -149,11 +150,14 @@ impl Pieces {
 /// and with no other run.
 fn in_step(a: &[u32], b: &[u32]) -> bool {
     let follows = |(a, b): (&[u32], &[u32])| a[0].max(b[0]) < a[1].min(b[1]);
+    // Windows are runs and gaps in turn. A column that both gaps share separates a run from the
+    // other row's next.
     a.len() == b.len() && a.windows(2).zip(b.windows(2)).all(follows)
 }
 
 /// Calls `met` with the numbers of the runs of two rows that share a column.
 fn for_each_overlap(a: &[u32], b: &[u32], mut met: impl FnMut(usize, usize)) {
+    // Rows of mesh end black, so the width does not matter.
     let [mut a, mut b] = [a, b].map(|row| white_runs(row, u32::MAX).enumerate().peekable());
     while let (Some(&(i, (from_a, to_a))), Some(&(j, (from_b, to_b)))) = (a.peek(), b.peek()) {
         if from_a.max(from_b) < to_a.min(to_b) {

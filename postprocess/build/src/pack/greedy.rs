@@ -35,9 +35,11 @@ pub(super) fn place(
         std::cmp::Reverse(u64::from(width) * u64::from(height))
     };
     let mut parts: Vec<usize> = (0..wanted.len()).collect();
+    // Small parts still find room between large ones, but not the other way round.
     parts.sort_by_key(area);
     for part in parts {
         for _ in 0..wanted[part] {
+            // Places only fill up, so no later copy of this part finds one.
             if !free.place(&ways[part], order) {
                 break;
             }
@@ -45,6 +47,7 @@ pub(super) fn place(
     }
     let mut placements = free.placements;
     centre(layout, &mut placements);
+    // Copies are numbered in this order, so that numbers follow places.
     placements.sort_by_key(|at| (at.part, at.top, at.left));
     placements
 }
@@ -155,6 +158,7 @@ impl TakenPlaces {
             if column < self.columns {
                 return Some((column, self.first as i32));
             }
+            // A full row stays full: no place is given back.
             self.first += 1;
         }
         None

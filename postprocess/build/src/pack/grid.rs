@@ -17,6 +17,7 @@ pub(super) fn grid(
     else {
         return Vec::new();
     };
+    // Sides of up to 2^26 pixels hold more tiny parts than a u32 counts.
     let copies = columns.saturating_mul(rows).min(wanted);
     let columns = columns.min(copies);
     let lefts = positions(area.width, part.width, gap, columns);
@@ -29,6 +30,7 @@ pub(super) fn grid(
 
 /// Returns the number of parts that fit along a side, or `None` if not one does.
 fn most(area: u32, part: u32, gap: u32) -> Option<u32> {
+    // A part without pixels and a gap of 0 must not divide by zero.
     Some(area.checked_sub(part)? / (part + gap).max(1) + 1)
 }
 

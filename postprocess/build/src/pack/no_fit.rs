@@ -212,6 +212,7 @@ impl NoFitRegion {
 
     fn of_boxes(moving: PixelSize, placed: PixelSize, gap: u32) -> Self {
         let [width, height] = [moving.width, moving.height].map(|side| (side + gap) as i32);
+        // Boxes of widths w and W overlap at displacements d with -w < d < W.
         let run: Rc<[CellRun]> = Rc::new([(1 - width, (placed.width + gap) as i32)]);
         let rows = height - 1 + (placed.height + gap) as i32;
         Self::new(height - 1, vec![run; rows as usize])
@@ -224,6 +225,7 @@ impl NoFitRegion {
         let ends = |rows: &[Vec<CellRun>]| {
             rows.iter().filter_map(|runs| Some(runs.last()?.1)).max().unwrap_or(0)
         };
+        // Rounded up at both ends, since runs exclude their last column.
         let up = |fine: i32| fine.div_euclid(every) + i32::from(fine.rem_euclid(every) > 0);
         let [left, right] = [-ends(&moving.rows) - margin, ends(&placed.grown) + 1].map(up);
         let top = (moving.rows.len() as i32 - 1 + margin) / every;
@@ -237,6 +239,8 @@ impl NoFitRegion {
             for (own, others) in moving.rows.iter().skip((-above).max(0) as usize).zip(others) {
                 for &(start, end) in own {
                     for &(from, to) in others {
+                        // [s, e) moved by d meets [f, t) where s + d < t and e + d > f: from
+                        // f - e + 1 up to, but without, t - s.
                         let run = [from - margin - end + 1, to - margin - start].map(up);
                         if run[0] < run[1] {
                             changes[(run[0] - left) as usize] += 1;

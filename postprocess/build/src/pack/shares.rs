@@ -95,6 +95,9 @@ impl Order {
     fn grow(&mut self) {
         let whole: u128 = self.shares.iter().map(|&share| u128::from(share)).sum();
         let next = self.parts.len() as u128 + 1;
+        // With d = 2k - 2 for k parts, Tijdeman's bound is 1 - 1/d: a part is due if it lags by 1/d
+        // and more, and the first to reach the bound is next. Multiplied by d, all numbers are
+        // whole.
         let d = 2 * (self.shares.len() as u128 - 1);
         let of = |part: usize| (u128::from(self.shares[part]), u128::from(self.counts[part]));
         let is_due = |part: &usize| {

@@ -77,6 +77,7 @@ impl Composer {
     /// recipe was made for, or if they make no build.
     pub fn open(recipe: &Path) -> Result<Self, RecipeError> {
         let mut text = String::new();
+        // One byte more shows that a file is too large.
         let read = File::open(recipe)?.take(MAX_BYTES + 1).read_to_string(&mut text)?;
         if read as u64 > MAX_BYTES {
             return Err(RecipeError::TooLarge { max: MAX_BYTES });
@@ -92,6 +93,7 @@ impl Composer {
     pub fn new(recipe: &Recipe, folder: &Path) -> Result<Self, RecipeError> {
         let layers = recipe.layers();
         let moat = recipe.mesh.as_ref().map(|mesh| mesh.moat);
+        // The outline of a range is the range's own. A rising moat follows all layers below, too.
         let from_bottom = moat.is_some_and(|moat| moat != Moat::Outline);
         let outline = moat == Some(Moat::Outline);
         let (mut files, mut parts) = (Vec::new(), Vec::new());
@@ -122,6 +124,7 @@ impl Composer {
             return Err(RecipeError::NoLayer { layer, first, last });
         };
         let counted = layout.mesh.as_ref().map_or(0, |mesh| mesh.base_layers);
+        // As in `on_base`: only a build from the lowest layer has a base, but all count with it.
         let base = if lowest == 0 { counted } else { 0 };
         let of_parts = steps[below..].iter().map(|step| step.set.index.saturating_add(counted));
         let rising = layout.parts.iter().map(|part| {
@@ -158,6 +161,7 @@ impl Composer {
     /// # Errors
     /// Returns an error if there is no such layer, or if a stack cannot be read or has changed.
     pub fn layer(&mut self, index: u32) -> Result<Layer, RecipeError> {
+        // `Lockstep` numbers layers upward, so the indices are sorted.
         let position = self.indices.binary_search(&index).map_err(|_| self.no_layer(index))?;
         let planned = self.planned(position)?;
         let mut layer = self.canvas.drawn(planned)?;
@@ -249,6 +253,7 @@ impl Composer {
         let Some(kept) = &mut self.kept else { return Ok(None) };
         let rows = kept.at(mesh, layout, followed, loose);
         let rows = rows.ok_or_else(|| layout.too_many_runs(set))?;
+        // A start without a piece would leave a floating piece in: the recipe is of another mesh.
         if let Some(&[row, column]) = loose.iter().find(|start| !kept.loose().contains(start)) {
             return Err(RecipeError::NoPiece { layer: set.index, row, column });
         }
@@ -274,6 +279,7 @@ impl Composer {
             Moat::Rising => {
                 let (files, steps) = (&self.files, &self.steps);
                 let lower = |below: usize| -> Result<Option<Mask>, RecipeError> {
+                    // The layer itself is decoded already.
                     if below == step {
                         return Ok(white.clone());
                     }
@@ -297,6 +303,7 @@ impl Canvas {
         match planned {
             Planned::Base(info) => {
                 let whole = || mesh.map_or_else(|| Mask::black(0, 0), BuildMesh::whole);
+                // The base is one image: the first thread that needs it draws it for all.
                 let image = self.whole.get_or_init(whole).clone();
                 Ok(Layer { info: *info, dpi: Some(self.layout.dpi), image: image.into() })
             }
@@ -317,6 +324,7 @@ impl Layout {
         for (index, at) in recipe.copies.iter().enumerate() {
             let size = layout.parts[at.part].size(at.turn);
             let is_within = |start: u32, length: u32, side: u32| {
+                // A recipe may have any u32, so the sum may overflow.
                 start.checked_add(length).is_some_and(|end| end <= side)
             };
             let CopyPlacement { left, top, .. } = *at;

@@ -131,6 +131,7 @@ impl RecipeForm {
         let wrong = |place: &str, why: &str| {
             Err(RecipeError::Value { place: place.to_owned(), why: why.to_owned() })
         };
+        // A recipe without parts is refused as well: its part 0 has no copy.
         for part in 0..self.parts.len().max(1) {
             if !self.copies.iter().any(|copy| copy.part == part) {
                 return wrong("copies", "a part has no copy");
@@ -151,6 +152,8 @@ impl RecipeForm {
 
     /// Returns the digest of all values but itself: `blake3:` and 64 hexadecimal digits.
     pub(super) fn digest(&self) -> String {
+        // Fields are written in their order here, and defaults not at all, so equal recipes give
+        // equal bytes.
         let all = serde_json::to_vec(&Self { digest: String::new(), ..self.clone() });
         let digest = digest_of(&all.expect("texts and numbers are JSON")[..]);
         digest.expect("it is in memory")
@@ -223,6 +226,7 @@ impl MeshForm {
         if [clearance, break_width, break_pitch].iter().any(|length| length.um() < 0.0) {
             return Err(wrong("clearance", "lengths are not below zero"));
         }
+        // JSON has no NaN, so a comparison finds every wrong number.
         if least_piece_mm2 < 0.0 || base_layers >= MAX_BASE_LAYERS {
             return Err(wrong(
                 "base_layers",

@@ -180,6 +180,7 @@ impl Recipe {
     pub fn from_json(text: &str) -> Result<Self, RecipeError> {
         let json =
             |error: serde_json::Error| RecipeError::Json { problem: one_line(&error.to_string()) };
+        // Read alone first: another version may have keys that the form refuses.
         let version: form::Version = serde_json::from_str(text).map_err(json)?;
         if version.schema != SCHEMA {
             return Err(RecipeError::Schema { found: version.schema, known: SCHEMA });

@@ -27,6 +27,8 @@ impl PartFile {
     pub(super) fn open(part: &RecipePart, folder: &Path) -> Result<Self, RecipeError> {
         let path = folder.join(&part.file);
         let name = path.display().to_string();
+        // The digest is of the opened file, from which pages are read later: its name may get
+        // another file.
         let digest = |file: File| Ok((digest_of(&file)?, file));
         // Opening a pipe could wait for ever.
         let is_file = fs::metadata(&path).map(|metadata| metadata.is_file());
@@ -105,6 +107,7 @@ impl PartFile {
         let layer = |header: &PageHeader| Layer {
             info: PageInfo { stack: None, ..header.info.clone() },
             dpi: header.dpi,
+            // Heights alone decide which pages go together, so nothing is decoded.
             image: LayerImage::from(Mask::black(0, 0)),
         };
         let layers: Vec<Layer> =
@@ -120,6 +123,7 @@ impl PartFile {
     /// Reads a layer by its page, without the page's description of the stack.
     pub(super) fn layer(&self, page: usize) -> Result<Layer, RecipeError> {
         let mut layer = self.stack.layer(page).map_err(|source| self.failed(source))?;
+        // `Layout::page` takes the part's description then, whichever layer comes first.
         layer.info.stack = None;
         Ok(layer)
     }

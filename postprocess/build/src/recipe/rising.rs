@@ -45,6 +45,7 @@ impl Rising {
                 risen = white.combined(Op::Union, &risen).ok_or(RisingError::TooManyRuns)?;
             }
             done += 1;
+            // Marks have no gaps: every way up begins at or below the last one.
             if done == (self.marks.len() + 1) * EVERY {
                 self.marks.push(risen.clone());
             }

@@ -25,6 +25,7 @@ impl Swaths {
     ) -> Box<dyn Iterator<Item = Image> + 'a> {
         assert_eq!(image.width(), self.width);
         assert!(swaths.end <= self.count());
+        // Without shared columns no level is divided, and a mask stays a mask.
         if self.seam == Seam::Gray && self.overlap > 0 && self.count() > 1 {
             return Box::new(self.ramped(image, swaths).into_iter().map(Image::Gray));
         }
@@ -47,6 +48,7 @@ impl Swaths {
         layer: u32,
         swaths: Range<u32>,
     ) -> Vec<SwathRows<C>> {
+        // A quarter more than an even share: swaths with more changes grow, which is rare.
         let room = image.change_count() / self.count() as usize / 4 * 5;
         let rows = || SwathRows::new(self.mirrors, image.height() as usize, room);
         let mut cut: Vec<_> = swaths.clone().map(|_| rows()).collect();
@@ -139,6 +141,8 @@ impl<C: Change> SwathRows<C> {
         let mut shown = &row[at..end];
         if pixel != black {
             match shown.split_first() {
+                // A change in the first column takes the place of the pixel that goes on from the
+                // left.
                 Some((&first, rest)) if first.column() == taken.start => {
                     pixel = first.after(pixel);
                     shown = rest;
@@ -150,6 +154,7 @@ impl<C: Change> SwathRows<C> {
             self.changes.push(C::new(taken.start - left, pixel));
         }
         self.changes.extend(shown.iter().map(|&change| change.moved(change.column() - left)));
+        // White up to the last mirror ends with the image, without a change.
         if C::last_pixel(&row[..end]) != black && taken.end - left < self.width {
             self.changes.push(C::new(taken.end - left, black));
         }

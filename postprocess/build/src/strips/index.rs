@@ -65,6 +65,7 @@ impl StripLine {
 
 /// Returns the name of a strip's file.
 pub(super) fn file_name(swath: u32) -> String {
+    // Up to `MAX_STRIPS`, names sort as the strips lie.
     format!("strip_{swath:03}.tif")
 }
 
@@ -97,6 +98,7 @@ impl StripIndex {
     /// Reads the index of a folder.
     pub(super) fn read(folder: &Path) -> Result<Self, StripsError> {
         let mut text = String::new();
+        // A longer index is cut off, and then it is no JSON.
         let read = File::open(folder.join(INDEX))
             .and_then(|file| file.take(MAX_INDEX_BYTES).read_to_string(&mut text));
         read.map_err(|error| StripsError::In {
@@ -112,6 +114,7 @@ impl StripIndex {
     fn check_no_more(&self, folder: &Path) -> Result<(), StripsError> {
         for entry in fs::read_dir(folder).map_err(StackError::Io)? {
             let file = entry.map_err(StackError::Io)?.file_name().to_string_lossy().into_owned();
+            // A strip left by another build would pass for one of this build.
             let is_strip = file.starts_with("strip_") && file.ends_with(".tif");
             if is_strip && self.strips.iter().all(|strip| strip.file != file) {
                 return Err(StripsError::More { file: one_line(&file) });

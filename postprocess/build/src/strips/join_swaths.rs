@@ -43,6 +43,7 @@ impl Swaths {
             for (swath, k) in swaths.iter().zip(0..) {
                 self.steps_of(swath.row(row), k, &mut steps);
             }
+            // Steps of one column add up, so their order does not matter.
             steps.sort_unstable_by_key(|step| step.0);
             let changes = self.changes(&steps, row as usize)?;
             layer.push_row(&changes).expect("changes in order within the width");
@@ -75,6 +76,8 @@ impl Swaths {
             level += group.iter().map(|step| step.1).sum::<i32>();
             // From the layer's end on all is black.
             let most = if column < self.width { 255 } else { 0 };
+            // Without a step at the layer's end light goes on beyond it, and only a later step
+            // shows this.
             if column > self.width && before != 0 || !(0..=most).contains(&level) {
                 let column = column.min(self.width);
                 return Err(JoinSwathsError::TooMuch { row, column });

@@ -90,6 +90,7 @@ impl Swaths {
     /// # Errors
     /// Returns an error if they share half of their columns or more.
     pub fn new(mirrors: u32, overlap: u32, width: u32) -> Result<Self, SwathsError> {
+        // In u64, as a command may ask for any u32.
         if u64::from(overlap) * 2 < u64::from(mirrors) {
             Ok(Self { mirrors, overlap, seam: Seam::default(), width })
         } else {
@@ -105,12 +106,14 @@ impl Swaths {
 
     /// Returns the number of swaths: at least one.
     pub fn count(&self) -> u32 {
+        // The first swath covers its mirrors, each further one adds a step.
         1 + self.width.saturating_sub(self.mirrors).div_ceil(self.step())
     }
 
     /// Returns the columns of a layer that a swath exposes. The last may have mirrors beyond them,
     /// which stay black.
     pub fn columns(&self, swath: u32) -> Range<u32> {
+        // The mirrors of the last swath may reach beyond the greatest u32.
         let start = u64::from(swath) * u64::from(self.step());
         let within = |column: u64| column.min(self.width.into()) as u32;
         within(start)..within(start + u64::from(self.mirrors))
@@ -171,6 +174,7 @@ impl Swaths {
     fn command(&self, swath: u32) -> String {
         let Self { mirrors, overlap, seam, .. } = self;
         let command = format!("{COMMAND} {swath} --mirrors {mirrors} --overlap {overlap}");
+        // Swaths that share nothing have no seam.
         if *overlap > 0 { format!("{command} --seam {seam}") } else { command }
     }
 }

@@ -108,6 +108,7 @@ impl Iterator for StripReader {
 impl StripReader {
     /// Checks that pages belong to one layer, and returns them together.
     fn layer_pages(&mut self, pages: Vec<Option<Page>>) -> Result<Option<LayerPages>, StripsError> {
+        // `StripIndex::parse` compared the strips with `Swaths::count`, which is at least one.
         let of_first = pages[0].as_ref().map(|page| page.info().clone());
         for (page, swath) in pages.iter().zip(0..) {
             let info = page.as_ref().map(Page::info);
@@ -116,6 +117,7 @@ impl StripReader {
                 return Err(StripsError::Unlike { file, difference });
             }
         }
+        // At the common end of all strips none is left to count.
         self.left = self.left.saturating_sub(1);
         let pages: Option<Vec<Page>> = pages.into_iter().collect();
         Ok(pages.map(|pages| LayerPages { pages, swaths: self.swaths, height: self.height }))
@@ -142,6 +144,7 @@ impl StripReader {
         if let Err(difference) = check_number(info, swath) {
             return Some(difference);
         }
+        // Only first pages describe the stack.
         let digest = info.stack.as_ref().map(|stack| stack.digest.clone())?;
         let first = self.digest.get_or_insert_with(|| digest.clone());
         (*first != digest).then_some(StripDifference::Input)
@@ -182,9 +185,12 @@ impl LayerPages {
         });
         let decoded: Vec<_> = decoded.collect::<Result<_, _>>()?;
         let (mut pages, images): (Vec<_>, Vec<Image>) = decoded.into_iter().unzip();
+        // The first strip's page keeps the origin of the build.
         let (mut info, dpi) = pages.swap_remove(0);
         let unlike = |source| StripsError::Join { layer: info.name(), source };
         let gray = self.swaths.join(&images).map_err(unlike)?;
+        // All threads join layers at once, so memory for the strips goes back before a mask is
+        // made.
         drop(images);
         if gray.height() != self.height {
             return Err(unlike(JoinSwathsError::Unlike));
@@ -198,6 +204,7 @@ impl LayerPages {
         };
         if let Some(stack) = &mut info.stack {
             let of_strip = format!("{COMMAND} 0 ");
+            // The build's page lacked this command: without it the build comes back byte for byte.
             stack.commands.retain(|command| !command.starts_with(&of_strip));
         }
         Ok(Layer { info, dpi, image: image.into() })

@@ -30,6 +30,7 @@ const A_LAYER: u32 = 0x6A09_E667;
 #[inline]
 pub(super) fn tooth(overlap: u32, row: u32, layer: u32) -> u32 {
     let place = row.wrapping_mul(A_ROW).wrapping_add(layer.wrapping_mul(A_LAYER));
+    // The place is a fraction in 2^-32, below 1, so the product is below `overlap` + 1.
     ((u64::from(place) * (u64::from(overlap) + 1)) >> 32) as u32
 }
 

@@ -49,6 +49,7 @@ impl StripWriter {
         seam: Seam,
         format: Format,
     ) -> Result<Self, StripsError> {
+        // Wrong options are refused before the first layer, which brings the width.
         Swaths::new(mirrors, overlap, 0)?;
         if mirrors > MAX_SIDE {
             return Err(StripsError::Mirrors { mirrors, max: MAX_SIDE });

@@ -60,6 +60,7 @@ impl FromStr for FreeTurns {
         let steps = degrees.map(|degrees| 90.0 / degrees);
         let is_whole = |steps: &f64| {
             let whole = steps.round();
+            // Not every part of 90 is a decimal: 12.857142857142858deg is a seventh.
             (1.0..=f64::from(MOST)).contains(&whole) && (steps - whole).abs() < 1e-6
         };
         let steps = steps.filter(is_whole).ok_or_else(|| FreeTurnsError(text.to_owned()))?;

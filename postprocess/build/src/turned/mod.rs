@@ -68,7 +68,9 @@ impl TurnedPlan {
     ) -> Result<Self, TileError> {
         assert_eq!(parts.len(), centres_mm.len(), "a centre for each part");
         let pack = Pack { turns: Turns::Quarters, ..pack };
+        // Without new stacks first: only more copies are worth the slicing.
         let plain = Layout::packed(parts.to_vec(), counts, area, gap, pack);
+        // Turns add nothing if there is no angle, or if every count is reached without them.
         let is_plain = |layout: &Layout| {
             let counted = |part: usize| {
                 let usual = (parts.len() > 1 && !pack.shares).then_some(1);
@@ -103,6 +105,7 @@ impl TurnedPlan {
         }
         let kept: Vec<usize> =
             (0..slicings.len()).filter(|&stack| layout.copies_of(stack) > 0).collect();
+        // `kept` is a filtered range, so it is sorted.
         let number = |stack: usize| kept.binary_search(&stack).expect("it has a copy");
         let renumbered = |at: &CopyPlacement| CopyPlacement { part: number(at.part), ..*at };
         layout.placements = layout.placements.iter().map(renumbered).collect();
@@ -180,6 +183,8 @@ impl PartStack {
         let pixels = [side(corner[0], right), side(corner[1], bottom)];
         let frame = self.frame();
         let whole = outline::turned(outline, [frame.left, frame.top], &turn, pixels);
+        // Half a pixel short of the whole number, so that rounding up gives it whatever the last
+        // digits.
         let length = |pixels: u32| Length::from_mm(nm((f64::from(pixels) - 0.5) * pitch));
         let size = Size { width: length(pixels[0]), height: length(pixels[1]) };
         let part = self.of_turned(&whole, corner_mm, name_of(self.name(), degrees));

@@ -22,6 +22,7 @@ pub(super) struct ImageTurn {
 impl ImageTurn {
     /// Creates the turn by an angle in degrees, counterclockwise, which leaves a point where it is.
     pub(super) fn about([u, v]: [f64; 2], degrees: f64) -> Self {
+        // Right angles are taken off first, so their sine and cosine are exactly 0 and 1.
         let quarters = (degrees / 90.0).round();
         let (mut sin, mut cos) = (degrees - 90.0 * quarters).to_radians().sin_cos();
         for _ in 0..quarters.rem_euclid(4.0) as u32 {
@@ -61,6 +62,7 @@ impl ImageTurn {
             (self.sin, self.cos * down, [top, bottom]),
         ];
         for (slope, start, [least, most]) in limits {
+            // Exactly zero at right angles, and then a divisor.
             if slope == 0.0 {
                 if start < least || start > most {
                     return None;
@@ -108,6 +110,7 @@ pub(super) fn turned(
                 let Some([from, to]) = turn.across(around, f64::from(line) + 0.5) else { continue };
                 let run = pixels(from, to, width);
                 match rows[line as usize].last_mut() {
+                    // Most runs meet the last one; joined at once, the lists stay short.
                     Some(last) if run.start <= last.1 && run.end >= last.0 => {
                         *last = (last.0.min(run.start), last.1.max(run.end));
                     }

@@ -22,6 +22,7 @@ impl Room {
     pub(super) fn best(self, lattice: &Lattice) -> Fit {
         let [ux, uy] = lattice.along;
         let [vx, vy] = lattice.across;
+        // Along a row, lines in the first vector's direction are det / uy apart.
         let wide = ((i64::from(uy) * i64::from(vx) - i64::from(ux) * i64::from(vy)) / i64::from(uy))
             as i32;
         let lines = self.0[0] / wide.max(1) + self.0[1] / uy + 1;
@@ -70,6 +71,8 @@ impl Room {
         let [right, bottom] = self.0;
         origins.into_iter().flatten().flat_map(move |origin| {
             let [x, y, _] = origin;
+            // In i64: a product of two sides in cells exceeds an i32. On line l the cross product
+            // with the first vector is l det; over a rectangle it is greatest and least at corners.
             let both = i64::from(uy) * i64::from(vx) - i64::from(ux) * i64::from(vy);
             let place = |[left, top]: Shift| {
                 i64::from(uy) * i64::from(left - x) - i64::from(ux) * i64::from(top - y)
@@ -95,5 +98,6 @@ impl Room {
 
 /// Returns the first and the last multiple of a step within a range.
 fn multiples([from, to]: [i32; 2], step: i32) -> [i32; 2] {
+    // The floor of the negative is a ceiling.
     [-(-from).div_euclid(step), to.div_euclid(step)]
 }

@@ -45,6 +45,7 @@ impl Lattice {
     fn cells_of_two(&self) -> i64 {
         let [[ux, uy], [vx, vy]] = [self.along, self.across].map(|side| side.map(i64::from));
         let both = uy * vx - ux * vy;
+        // Of two, so that a copy's share of a pair is no half cell.
         if self.partner.is_some() { both } else { 2 * both }
     }
 }
@@ -83,6 +84,7 @@ pub(super) fn place(
     let runs = (outline.change_count() / (2 * height.max(1) as usize)).max(1) as u32;
     let cell = width.max(height).div_ceil((CLOSE_CELLS / runs).max(1)).max(1);
     let times = (width.max(height) / cell).div_ceil(SEARCH_CELLS).max(1);
+    // Taken out of the map until the end, since both are borrowed at once.
     let mut of_cells = |cell: u32| {
         let known = regions.remove(&cell);
         known.unwrap_or_else(|| NoFitRegions::in_cells(layout, gap, cell))
@@ -104,6 +106,7 @@ pub(super) fn place(
             fits.extend(lattices.iter().map(|lattice| (room.best(lattice), *lattice, view)));
         }
     }
+    // Of equal counts, the denser lattice leaves more room at the edges.
     fits.sort_by_key(|(fit, lattice, _)| (std::cmp::Reverse(fit.copies), lattice.cells_of_two()));
     // The same lattice in other vectors gives nothing new.
     fits.dedup_by_key(|(fit, lattice, _)| (fit.copies, lattice.cells_of_two()));

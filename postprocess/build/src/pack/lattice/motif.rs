@@ -61,6 +61,8 @@ impl Motif {
     pub(super) fn region(&self, partner: Option<Shift>) -> NoFitRegion {
         let mut all = vec![(&*self.own, [0, 0])];
         if let (Some(turned), Some([x, y])) = (&self.turned, partner) {
+            // The half turn of a pair at v is at v + p. It meets a copy at 0 where `moving` holds
+            // that place.
             all.push((&turned.own, [0, 0]));
             all.push((&turned.moving, [-x, -y]));
             all.push((&turned.placed, [x, y]));
@@ -99,12 +101,17 @@ impl Lattice {
         let wide =
             |[x, y]: Shift| i64::from(x) * i64::from(uy) + i64::from(y) * i64::from(ux.abs());
         let both = i64::from(uy) * i64::from(vx) - i64::from(ux) * i64::from(vy);
+        // As `Room::ranges` counts: the first vector leads down, and the second to the right of it.
         if uy <= 0 || both <= 0 {
             return false;
         }
+        // On line l the cross product with the first vector is l det, and over the region at most
+        // `wide`.
         let most = reaches.map(wide).into_iter().max().unwrap_or(0) / both;
         let down = reaches.map(|reach| reach[1]).into_iter().max().unwrap_or(0);
         (0..=most as i32).all(|l| {
+            // A point and its opposite are one pair of copies, so half of the line through 0 is
+            // enough.
             let first = if l == 0 { 1 } else { (-down - l * vy).div_euclid(uy) };
             let last = (down - l * vy).div_euclid(uy);
             (first..=last).all(|k| !holds([k * ux + l * vx, k * uy + l * vy]))

@@ -33,6 +33,7 @@ pub(super) fn lattices(motif: &Motif) -> Vec<Lattice> {
     }
     found.sort_by_key(|lattice| (lattice.cells_of_two(), *lattice));
     found.dedup();
+    // A slanted lattice may be denser and still fit the area worse, so some of each kind are kept.
     let kinds = [[true, true], [true, false], [false, false]];
     let of_kind = |kind| found.iter().filter(move |lattice| kind_of(lattice) == kind).take(KEPT);
     kinds.into_iter().flat_map(of_kind).copied().collect()
@@ -92,6 +93,8 @@ fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -
     let step = (2 * high / ACROSSES).max(1);
     let mut best: Option<(i64, Lattice)> = None;
     let mut runs: Vec<CellRun> = Vec::new();
+    // Multiples of the first vector added to the second change nothing, so rows below `uy` are
+    // enough.
     for y in (0..uy.min(below)).step_by(step as usize) {
         runs.clear();
         for k in (-high - y).div_euclid(uy)..=(high - y).div_euclid(uy) {
@@ -100,6 +103,7 @@ fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -
         }
         runs.sort_unstable();
         let aside = i64::from(ux) * i64::from(y);
+        // No lattice takes less area than its white cells: uy x - ux y >= white.
         let mut x = ((white + aside) / i64::from(uy)) as i32;
         for &(from, to) in &runs {
             if from > x {
@@ -139,6 +143,7 @@ fn closer(motif: &Motif, mut lattice: Lattice, cost: impl Fn(&Lattice) -> i64) -
             .iter()
             .map(|change| lattice.moved(change, by))
             .find(|moved| cost(moved) < most && motif.allows(moved));
+        // A cost is a whole number and falls with each move, so this ends.
         match cheaper {
             Some(cheaper) => lattice = cheaper,
             None if by == 1 => return lattice,

@@ -62,6 +62,7 @@ impl<'a> Board<'a> {
         self.copies.extend_from_slice(copies);
         for (copy, &Copy { part, way, at }) in copies.iter().enumerate() {
             let mut ways = std::iter::once(&way).chain(&self.ways.of_part[part]);
+            // The area may have become lower than this way is high.
             let way = *ways.find(|way| self.holds(**way)).unwrap_or(&way);
             let last = self.last(way);
             let at = [0, 1].map(|axis| at[axis].clamp(0, last[axis]));
@@ -106,6 +107,7 @@ impl<'a> Board<'a> {
 
     /// Returns the depths of all copies, added up.
     pub(super) fn overlap(&self) -> u64 {
+        // Each pair stands twice in the table.
         self.depths.iter().map(|&depth| u64::from(depth)).sum::<u64>() / 2
     }
 
@@ -133,6 +135,7 @@ impl<'a> Board<'a> {
             }
         }
         let mut best = Spot { cost: f32::INFINITY, way: own.way, at: own.at };
+        // The present place, too; `descended` finds its cost.
         spots.push(Spot { cost: 0.0, way: own.way, at: own.at });
         for spot in &spots {
             let found = self.descended(copy, spot);
@@ -147,6 +150,7 @@ impl<'a> Board<'a> {
     /// Compares places all over the area, some cells apart.
     fn scan(&mut self, copy: usize, way: usize, random: &mut Random, spots: &mut Vec<Spot>) {
         let last = self.last(way);
+        // At random, so that places between the points of one grid are on another.
         let start = last.map(|last| random.below(STEP.min(last + 1) as usize) as i32);
         let grid = [0, 1].map(|axis| (last[axis] - start[axis]) / STEP + 1);
         let columns = grid[0] as usize;
@@ -159,6 +163,7 @@ impl<'a> Board<'a> {
                 if spots.len() >= SPOTS && cost >= spots[spots.len() - 1].cost {
                     continue;
                 }
+                // Strict toward the left and above only: of equal neighbors, one is a spot.
                 let is_least = column.checked_sub(1).is_none_or(|left| cost < line[left])
                     && line.get(column + 1).is_none_or(|right| cost <= *right)
                     && above.is_none_or(|above| cost < above[column])
@@ -198,6 +203,7 @@ impl<'a> Board<'a> {
                 for (sum, depth) in sums.iter_mut().zip(depths) {
                     *sum += weight * f32::from(*depth);
                 }
+                // A row has its cost, about eight additions, however short it is.
                 self.work += depths.len() as u64 + 8;
             }
         }

@@ -40,6 +40,7 @@ impl DepthMap {
         let distances = distances(region, left, [columns, rows]);
         let size = [columns, rows].map(|side| side.div_ceil(STEP as usize));
         let mut depths = Vec::with_capacity(size[0] * size[1] * (STEP * STEP) as usize);
+        // Each grid of places meets one phase, and reads its rows in sequence.
         for phase in 0..(STEP * STEP) as usize {
             let [x, y] = [phase % STEP as usize, phase / STEP as usize];
             for row in 0..size[1] {
@@ -59,6 +60,8 @@ impl DepthMap {
         Self {
             first: last.map(|end| -end),
             size: self.size,
+            // The opposites of a phase form a phase, with rows and columns reversed: all of the
+            // list turns.
             depths: self.depths.iter().rev().copied().collect(),
         }
     }
@@ -116,6 +119,8 @@ fn distances(region: &NoFitRegion, left: i32, [columns, rows]: [usize; 2]) -> Ve
             all[(row + 1) * wide + 1..][run.0 as usize..run.1 as usize].fill(u16::MAX);
         }
     }
+    // A chamfer distance: 7/5 is nearly √2. The first pass brings distances from above and the
+    // left, the second from below and the right. `u16::MAX` is not known yet, and saturates.
     let mut lower = |at: usize, near: [usize; 2], aslant: [usize; 2]| {
         if all[at] > 0 {
             let near = near.map(|near| all[near].saturating_add(5));

@@ -42,6 +42,7 @@ pub(super) fn shorten(
     let ways = Ways::new(layout, gap, ways);
     let left = placements.iter().map(|at| at.left).min().unwrap_or(0);
     let top = placements.iter().map(|at| at.top).min().unwrap_or(0);
+    // To the nearest cell; the search begins by separating copies that overlap then.
     let cells = |pixels: u32| ((pixels + ways.cell / 2) / ways.cell) as i32;
     let copy = |at: &CopyPlacement| {
         let (part, way) = ways.of(layout, at);

@@ -16,6 +16,8 @@ impl Random {
 
     /// Returns a number below another, which is not 0.
     pub(super) fn below(&mut self, end: usize) -> usize {
+        // The high half of the product, as by Lemire (2019) but without rejection: the bias, below
+        // end/2^64, does not matter here.
         ((u128::from(self.next()) * end as u128) >> 64) as usize
     }
 

@@ -43,6 +43,7 @@ pub(super) fn lowest(
     let cells = cells(area.width) * cells(bottom(ways, copies));
     let work = MOST_WORK.min(WORK_OF_COPY * copies.len() as u64).min(WORK_OF_CELL * cells);
     let mut board = Board::new(ways, [area.width, area.height], copies);
+    // A fixed seed gives the same layout on every run.
     let mut random = Random(1);
     // Rounded to cells, copies overlap a little.
     if !separate(&mut board, &mut random, work) {
@@ -115,6 +116,7 @@ impl Search<'_> {
     /// places.
     fn swapped(&mut self) -> Vec<Copy> {
         let [one, other] = [0, 1].map(|_| self.random.below(self.kept.len()));
+        // The list is sorted by overlap: the lesser of two random numbers prefers its front.
         let mut copies = self.kept[one.min(other)].1.clone();
         let [one, other] = [0, 1].map(|_| self.random.below(copies.len()));
         (copies[one].at, copies[other].at) = (copies[other].at, copies[one].at);

@@ -26,6 +26,7 @@ pub(super) fn separate(board: &mut Board, random: &mut Random, most_work: u64) -
             }
             let overlap = board.overlap();
             if overlap < least {
+                // Ever smaller gains would never end: only 2 % and more renew the patience.
                 if overlap * 50 < least * 49 {
                     idle = 0;
                 }

@@ -21,6 +21,7 @@ pub(super) fn up(layout: &Layout, gap: u32, ways: &Ways, copies: &[Copy]) -> Vec
     let copies = copies.iter().map(|copy| Copy { at: copy.at.map(|cell| cell * times), ..*copy });
     let mut slide = Slide { layout, ways, regions, gap, copies: copies.collect() };
     slide.copies.sort_by_key(|copy| (copy.at[1], copy.at[0]));
+    // Every step leads up, or left in its row, so the passes end.
     while slide.pass() {}
     let placement = |copy: &Copy| {
         let ((part, turn), [left, top]) =
@@ -63,11 +64,13 @@ impl Slide<'_> {
         let [own_size, other_size] = [own.way, other.way].map(|way| {
             self.ways.size(way).map(|side| ((side + self.gap) / self.ways.fine + 2) as i32)
         });
+        // Most pairs are far apart, which their boxes show; two cells more allow for rounding.
         if (0..2).any(|axis| by[axis] >= other_size[axis] || -by[axis] >= own_size[axis]) {
             return false;
         }
         let [one, two] = [own.way, other.way].map(|way| self.ways.way(way));
         let (layout, back) = (self.layout, by.map(|cells| -cells));
+        // As in `Ways::new`: the lower way is the one that moves, and either of two equal ones.
         own.way <= other.way && self.regions.meet(layout, [one, two], by)
             || other.way <= own.way && self.regions.meet(layout, [two, one], back)
     }

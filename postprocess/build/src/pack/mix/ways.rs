@@ -85,6 +85,7 @@ impl Ways {
             };
             all().find(|&(_, way)| is_alike(self.way(way)))
         };
+        // Of ways with equal outlines, `distinct` keeps one.
         same.or_else(alike).expect("it was made of them")
     }
 }
@@ -98,6 +99,7 @@ fn cells(layout: &Layout, all: &[(Way, PixelSize)]) -> (u32, u32) {
         outline.change_count() / (2 * outline.height().max(1) as usize)
     });
     let cells = f64::from(CELLS) / runs.max().unwrap_or(0).max(1) as f64;
+    // Outlines n cells long have (2 n)² depths for each two of w ways: n <= √(most / 4) / w.
     let cells = cells.min((MOST_DEPTHS / 4.0).sqrt() / all.len().max(1) as f64).max(1.0);
     let least = (f64::from(sides.max().unwrap_or(1)) / cells).ceil().max(1.0) as u32;
     let divided = (least..).find_map(|cell| match cell {
