@@ -31,6 +31,8 @@ impl Cone {
     /// Returns the least and the greatest coordinate of an axis.
     pub(super) fn reach_mm(&self, axis: usize) -> [f64; 2] {
         let along = self.direction[axis];
+        // A flat end is a disc across the axis, which reaches r √(1 - d²) along a coordinate whose
+        // share of the direction is d.
         let across = (1.0 - along * along).max(0.0).sqrt();
         let ends = [self.from_mm[axis], self.from_mm[axis] + self.length_mm * along];
         let reach = |sign: f64, k: usize| ends[k] + sign * self.radii_mm[k] * across;
@@ -84,6 +86,8 @@ impl Cone {
             let run = [from.max(low), to.min(high)];
             (run[0] < run[1]).then_some(run)
         };
+        // The row is parallel to a side of the cone, and the equation linear. Coefficient a has no
+        // unit.
         if a.abs() < 1e-12 {
             return match b {
                 0.0 => (c < 0.0).then(|| within([low, high]))?,
@@ -92,6 +96,7 @@ impl Cone {
             };
         }
         let square = b * b - a * c;
+        // Without two roots the sign is the same everywhere, and it is a's.
         if square <= 0.0 {
             return (a < 0.0).then(|| within([low, high]))?;
         }
@@ -100,6 +105,8 @@ impl Cone {
         if a > 0.0 {
             within(ends)
         } else {
+            // Below zero on both sides of the roots: one is the cone, the other its image beyond
+            // the tip, which the planes of the ends cut off.
             within([low, ends[1]]).or_else(|| within([ends[0], high]))
         }
     }

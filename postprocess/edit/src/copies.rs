@@ -61,6 +61,7 @@ impl BuildCopy {
         }
         let origin_mm = part.part_origin_mm.ok_or_else(|| wrong(LayerProblem::NoPartOrigin))?;
         let [width, height] = part.part_pixels;
+        // A page may list any numbers: their sums must not overflow, nor rows take hours.
         let far = part.copies.iter().flatten().any(|place| place.abs() > MAX_OFFSET);
         if far || u64::from(height.max(width).max(1)) * part.copies.len() as u64 > MAX_ROWS {
             return Err(wrong(LayerProblem::FarCopies));
@@ -71,6 +72,7 @@ impl BuildCopy {
             .iter()
             .map(|turn| turn.parse().map_err(|error| wrong(LayerProblem::CopyTurn(error))))
             .collect::<Result<Vec<_>, _>>()?;
+        // Builds list turns only if a copy is turned.
         let turns = turns.into_iter().chain(std::iter::repeat(Orientation::default()));
         let copy = |((index, [left, top]), turn): ((u32, [i64; 2]), Orientation)| Self {
             part: lain,
@@ -119,6 +121,7 @@ pub(super) fn composed<'a>(
     place: &ImageBounds,
     mask: impl Fn(usize) -> &'a Mask,
 ) -> Option<Mask> {
+    // An edit of the whole image needs no union.
     if let [copy] = copies
         && copy.is_whole(place)
     {

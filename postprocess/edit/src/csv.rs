@@ -26,6 +26,7 @@ impl CsvRow {
 /// Returns an error if quotes do not pair, cells are separated by anything but commas, or a row has
 /// another number of cells than the first.
 pub(super) fn csv_rows(text: &str) -> Result<Vec<CsvRow>, ListProblem> {
+    // Spreadsheets put this mark before UTF-8.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader = CsvReader { rest: text.chars().peekable(), line: 1 };
     let mut rows = Vec::new();
@@ -35,6 +36,7 @@ pub(super) fn csv_rows(text: &str) -> Result<Vec<CsvRow>, ListProblem> {
     while rows.pop_if(|row| row.is_blank()).is_some() {}
     let Some(first) = rows.first() else { return Err(ListProblem::Empty) };
     let count = first.cells.len();
+    // Where the comma is the decimal sign, spreadsheets separate cells by semicolons.
     if let [only] = &first.cells[..]
         && only.contains([';', '\t'])
     {
@@ -63,6 +65,8 @@ impl CsvReader<'_> {
             match self.rest.next() {
                 Some(',') => {}
                 end => {
+                    // RFC 4180 (2.1) ends rows with CR LF, editors end them with LF, and old files
+                    // have CR.
                     if end == Some('\r') {
                         self.rest.next_if_eq(&'\n');
                     }
@@ -77,6 +81,7 @@ impl CsvReader<'_> {
     fn cell(&mut self) -> Result<String, ListProblem> {
         let plain = self.until_end();
         if self.rest.next_if_eq(&'"').is_none() {
+            // RFC 4180 (2.4) keeps blanks. People type them for looks, and a label would show them.
             return Ok(plain.trim().to_owned());
         }
         let quoted = plain.trim().is_empty().then(|| self.quoted());
@@ -106,6 +111,7 @@ impl CsvReader<'_> {
                 None => return Err(ListProblem::OpenQuote { line }),
                 Some('"') if self.rest.next_if_eq(&'"').is_none() => return Ok(text),
                 Some(letter) => {
+                    // Of CR LF only LF counts, or the line would count twice.
                     let is_end =
                         letter == '\n' || letter == '\r' && self.rest.peek() != Some(&'\n');
                     self.line += usize::from(is_end);

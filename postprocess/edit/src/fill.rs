@@ -96,6 +96,7 @@ impl RunSet {
     /// Returns the image, or `None` if it has more runs than an image can hold.
     pub(super) fn into_mask(mut self) -> Option<Mask> {
         self.unite();
+        // Each run has two transitions.
         if self.runs.len() > MAX_RUNS / 2 {
             return None;
         }
@@ -125,6 +126,7 @@ fn cross(a: Point, b: Point, height: u32, out: &mut Vec<OutlineCrossing>) {
     let ([top, bottom], winding) = if a[1] <= b[1] { ([a, b], 1) } else { ([b, a], -1) };
     let first = top[1].ceil().max(0.0);
     let end = bottom[1].ceil().min(height.into());
+    // Of a level line no row is between the ends, so its infinite slope is never used.
     let slope = (bottom[0] - top[0]) / (bottom[1] - top[1]);
     let mut row = first;
     while row < end {

@@ -55,11 +55,15 @@ impl Edits {
         let file: EditFile = serde_path_to_error::deserialize(file).map_err(|error| {
             let key = key_of(error.path());
             let inner = error.into_inner();
+            // serde says field where TOML says key.
             let problem = one_line(inner.message()).replace(" field ", " key ");
             EditError::Key { line: line_of(text, inner.span()), key, problem }
         })?;
+        // Read again without the schema: the first page has the list as it was written, without
+        // defaults.
         let table: toml::Table = toml::from_str(text).map_err(syntax)?;
         let told = table.get("edit").and_then(|list| list.as_array()).ok_or(EditError::NoEdits)?;
+        // No key takes a date, so the schema has refused dates by now.
         let told =
             told.iter().map(|edit| serde_json::to_value(edit).expect("TOML is JSON, dates apart"));
         let edits = Self { told: told.collect(), list: file.edit, serials: Vec::new() };
@@ -181,6 +185,7 @@ impl Edit {
         if self.copies.numbers().is_some_and(BTreeSet::is_empty) {
             return Some(EditProblem::NoCopyChosen);
         }
+        // Outside the copies, an intersection would blacken the build.
         if !self.copies.is_none() && self.op == Some(Op::Intersect) {
             return Some(EditProblem::IntersectInCopies);
         }
@@ -204,13 +209,16 @@ impl Edit {
     fn pattern_problem(&self) -> Option<EditProblem> {
         let lies = self.cylinder.is_some_and(|cylinder| cylinder.along != CylinderAxis::Z);
         let is_solid = lies || self.strut.is_some() || self.cone.is_some() || self.sphere.is_some();
+        // Each count is limited, but their product may overflow.
         let count = self.repeat.iter().map(Repeat::count).try_fold(1u64, u64::checked_mul);
         if count.is_none_or(|count| count > MAX_REPEATS) {
             return Some(EditProblem::ManyRepeats);
         }
+        // Upright shapes are the same in all layers, so no motion can raise or tilt them.
         if !is_solid && !self.repeat.iter().all(Repeat::is_level) {
             return Some(EditProblem::RepeatUp);
         }
+        // Pixels turn by right angles only.
         if self.picture.is_some() && !self.repeat.iter().all(Repeat::is_of_quarters) {
             return Some(EditProblem::RepeatPicture);
         }

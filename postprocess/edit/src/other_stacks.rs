@@ -51,6 +51,7 @@ impl<E: From<EditError>> AlignedStack<E> {
         self.current = self.layers.next().transpose()?.map(Arc::new);
         let Some(layer) = &self.current else { return Ok(()) };
         let place = ImageBounds::of(layer);
+        // The plan has one frame for all layers, from the first.
         if *self.place.get_or_insert(place) != place {
             let layer = format!("{}: {}", self.name, layer.info.name());
             return Err(EditError::Unlike { layer }.into());
@@ -101,6 +102,7 @@ impl<E: From<EditError>> AlignedStack<E> {
     /// Returns an error if it does not say its height.
     pub(super) fn below(&self, first: &PageInfo) -> Result<Option<String>, E> {
         let bottom = first.z_um.filter(|_| first.thickness_um.is_some());
+        // Layers come from the bottom, so no later one lies lower.
         let Some(layer) = &self.current else { return Ok(None) };
         let [_, end] = self.span(&layer.info, bottom.is_some())?;
         let is_below = end <= bottom.unwrap_or(first.index.into());
@@ -115,8 +117,10 @@ impl<E: From<EditError>> AlignedStack<E> {
                 let start = z + self.up.um();
                 Ok([start, start + thickness])
             }
+            // A height and a number cannot be compared, whichever of the stacks has which.
             (Some(_), Some(_)) => Err(self.unlike(info, LayerProblem::HeightUnlikeEdited)),
             _ if by_height => Err(self.unlike(info, LayerProblem::NoHeightUnlikeEdited)),
+            // Layers that are joined by number have no height to move by a length.
             _ if self.up != Length::default() => {
                 Err(self.unlike(info, LayerProblem::NoHeightToMove))
             }
@@ -131,5 +135,6 @@ impl<E: From<EditError>> AlignedStack<E> {
 
 /// Returns the height of a layer's middle, if its page says it.
 pub(super) fn middle(info: &PageInfo) -> Option<Length> {
+    // Unlike the bottom, the middle is far from the border of two layers, where rounding decides.
     Some(Length::from_um(info.z_um? + info.thickness_um? / 2.0))
 }

@@ -72,6 +72,7 @@ impl Axis {
             Self::Named(AxisName::Z) => [0.0, 0.0, 1.0],
             Self::Direction(direction) => direction,
         };
+        // Squares may underflow to 0 or overflow, and then the direction is lost.
         let length = direction.iter().map(|part| part * part).sum::<f64>().sqrt();
         (length > 0.0 && length.is_finite()).then(|| direction.map(|part| part / length))
     }
@@ -99,6 +100,7 @@ impl TryFrom<RepeatTable> for Repeat {
             // The last of a whole circle would lie on the first.
             (None, None) => 360.0 / f64::from(count),
             (Some(angle), None) if angle.abs() == 360.0 => angle / f64::from(count),
+            // The only repeat of one does not turn, but 0 times an infinite angle would be NaN.
             (Some(angle), None) => angle / f64::from(count.max(2) - 1),
         };
         let widest = angle.or(angle_step).unwrap_or(0.0);
@@ -147,6 +149,7 @@ impl Repeat {
 /// Returns the motions from a shape to each of its repeats, itself first. Each pattern repeats the
 /// shapes that the patterns before it make.
 pub(super) fn motions(repeats: &[Repeat]) -> Vec<Motion> {
+    // `Edit::check` limits the product of all counts.
     let mut motions = vec![Motion::NONE];
     for repeat in repeats {
         let steps = (0..repeat.count).map(|k| repeat.motion(k));
@@ -173,6 +176,7 @@ impl Motion {
     fn about(centre_um: [f64; 3], axis: [f64; 3], degrees: f64) -> Self {
         let [sin, cos] = sin_cos(degrees);
         let [x, y, z] = axis;
+        // I + sin K + (1 - cos) K², where K² = a aᵀ - I for an axis a of length 1.
         let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
         let entry = |i: usize, j: usize| {
             let unit = f64::from(u8::from(i == j));
@@ -217,6 +221,7 @@ impl Motion {
     /// Returns the quarters that it turns about z, if it turns by quarters.
     pub(super) fn quarters(&self) -> u32 {
         let quarters = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+        // Equality is safe: `sin_cos` makes quarter turns exact, and so are their products.
         let found = quarters.iter().position(|to| *to == self.turned([1.0, 0.0]));
         found.expect("pictures turn by quarters") as u32
     }
@@ -231,6 +236,7 @@ impl Motion {
 fn sin_cos(degrees: f64) -> [f64; 2] {
     let degrees = degrees.rem_euclid(360.0);
     if degrees % 90.0 == 0.0 {
+        // Just below 0, `rem_euclid` rounds to 360, which is the fourth quarter.
         return [[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]][(degrees / 90.0) as usize % 4];
     }
     let (sin, cos) = degrees.to_radians().sin_cos();

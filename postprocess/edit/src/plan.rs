@@ -128,6 +128,7 @@ impl EditPlan {
                     PlannedEdit::of(edit, number, &place, &info, &files)?
                 }
             };
+            // Later edits work on the page and in the place that earlier ones leave.
             step.follow(&mut info)?;
             if let PlannedEdit::Frame { place: after, .. }
             | PlannedEdit::Turn { place: after, .. } = step
@@ -148,11 +149,14 @@ impl EditPlan {
         mut layer: PassingLayer,
         others: &[Option<Arc<Layer>>],
     ) -> Result<(PassingLayer, Vec<usize>), EditError> {
+        // The planned pixels are right in this rectangle only.
         if ImageBounds::of_passing(&layer) != self.place {
             return Err(EditError::Unlike { layer: layer.info().name() });
         }
         let (mut others, mut done) = (others.iter(), Vec::new());
         for (k, step) in self.steps.iter().enumerate() {
+            // There is a layer, or none, for each edit that names a stack, even if it is not for
+            // this layer.
             let other =
                 if matches!(step, PlannedEdit::Other { .. }) { others.next() } else { None };
             let other = other.and_then(Option::as_deref);
@@ -196,6 +200,8 @@ impl PlannedEdit {
             return Ok(turned(Orientation::new(degrees / 90, false)));
         }
         if let Some(mirror) = edit.mirror {
+            // Orientations mirror left to right; with a half turn, top and bottom change places
+            // instead.
             return Ok(turned(Orientation::new(if mirror == Mirror::X { 0 } else { 2 }, true)));
         }
         if let Some(pad) = edit.pad {
@@ -263,6 +269,8 @@ impl PlannedEdit {
             Self::Other { op, frame, .. } => match other {
                 Some(other) => {
                     let shown = other.image.framed(*frame);
+                    // Pixels that the frame cuts off would be missing from the result, and nobody
+                    // would notice.
                     if matches!(op, Op::Union | Op::Xor) && lit(&shown) < lit(&other.image) {
                         return Err(LayerProblem::BesideImage.of_layer(info));
                     }

@@ -17,6 +17,7 @@ const MAX_LENGTH: Length = Length::from_um(1e7);
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Edit {
+    // With a function of its own, serde needs the default even for an `Option`.
     #[serde(default, deserialize_with = "op")]
     pub(super) op: Option<Op>,
     #[serde(default, deserialize_with = "some_span")]
@@ -217,6 +218,8 @@ pub(super) struct Label {
 impl Label {
     /// Returns the name of the list's file without its folder.
     pub(super) fn list_name(&self) -> Option<Cow<'_, str>> {
+        // Folders differ from machine to machine; the digest next to the name says which file it
+        // was.
         Some(self.list.as_ref()?.file_name().unwrap_or_default().to_string_lossy())
     }
 }
@@ -289,6 +292,7 @@ fn length<E: serde::de::Error>(text: &str) -> Result<Length, E> {
 
 /// Reads a list of lengths.
 pub(super) fn lengths_of<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Length>, D::Error> {
+    // As texts, since a length without its unit is refused.
     Vec::<String>::deserialize(from)?.iter().map(|text| length(text)).collect()
 }
 
@@ -339,6 +343,7 @@ fn distances<'de, D: Deserializer<'de>>(from: D) -> Result<[Length; 2], D::Error
     let distances: [Length; 2] = lengths(from)?;
     match distances.iter().find(|length| length.um() < 0.0) {
         Some(length) => Err(D::Error::custom(format!("{length} is below zero"))),
+        // One end may be a tip; two are no cone.
         None if distances == [Length::default(); 2] => {
             Err(D::Error::custom("one of them must be above zero"))
         }
@@ -357,6 +362,7 @@ fn distance<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
 
 fn size<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Error> {
     let length = distance(from)?;
+    // Exactly zero is the last case: `distance` refuses all below.
     if length.um() == 0.0 { Err(D::Error::custom("it must be above zero")) } else { Ok(length) }
 }
 

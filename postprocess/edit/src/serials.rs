@@ -177,6 +177,7 @@ impl SerialList {
     /// same copy.
     pub(super) fn read(file: &LabelList, column: Option<&str>) -> Result<Self, ListProblem> {
         let table = csv_rows(&file.text)?;
+        // `csv_rows` returns at least one row.
         let header = &table[0];
         let copy = header.cells.iter().position(|cell| cell.eq_ignore_ascii_case(COPY));
         let serial = serial_column(header, column, copy)?;
@@ -258,6 +259,7 @@ fn check_serial(line: usize, text: &str) -> Result<(), ListProblem> {
     if text.trim().is_empty() {
         return Err(ListProblem::EmptyCell { line });
     }
+    // The font of labels is a subset that has these letters.
     match text.chars().find(|letter| !(' '..='~').contains(letter)) {
         Some(letter) => Err(ListProblem::Letter { line, letter }),
         None => Ok(()),
@@ -269,6 +271,7 @@ fn copy_number(line: usize, cell: &str) -> Result<u32, ListProblem> {
         let cell = lamp_stack::one_line(cell);
         ListProblem::CopyNumber { line, cell }
     };
+    // `of` looks for numbers from count + 1 on, which saturates at the last u32.
     cell.parse().ok().filter(|&number| (1..u32::MAX).contains(&number)).ok_or_else(wrong)
 }
 

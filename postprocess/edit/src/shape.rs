@@ -114,6 +114,7 @@ impl EditShape {
         let height = height(info)?;
         let part = copies.first().map_or(place, |copy| &copy.part);
         let mut runs = RunSet::new(part.width, part.height);
+        // All copies show the same section, so it is drawn once, in the part's own image.
         let met = solids.iter().filter(|solid| solid.reaches(height));
         met.for_each(|solid| solid.draw(height, part, grid, &mut runs));
         let mask = runs.into_mask();
@@ -144,6 +145,7 @@ fn draw(edit: &Edit, motion: &Motion, grid: PixelMap, runs: &mut RunSet) {
 fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec<Point> {
     let [from, to] = [from, to].map(|end| end.map(Length::mm));
     let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    // The line's direction turned by a quarter, (-dy, dx), times this is half a width long.
     let half = width.mm() / 2.0 / dx.hypot(dy);
     let corner =
         |end: [f64; 2], side: f64| grid.to_pixels([end[0] - side * dy, end[1] + side * dx]);
@@ -190,15 +192,18 @@ fn letters<'a>(
     let size = grid.length(label.height);
     let places: Vec<_> =
         motions.iter().flat_map(|motion| label.at.iter().map(move |at| (motion, *at))).collect();
+    // Numbers go on from copy to copy, with one for each place.
     let before = i64::from(*index) * places.len() as i64;
     for (place, ((motion, at), k)) in places.iter().zip(before..).enumerate() {
         let n = i64::from(label.start) + k * i64::from(label.step);
         let text = numbered(&label.text, n, serial(place))?;
+        // The unit of outlines is a capital's height, so the tolerance is in it, too.
         let mut lines = outlines(&text, label.align, label.turn, TOLERANCE / size)
             .map_err(EditProblem::Letter)?;
         let [x, y] = grid.to_pixels(motion.of_level(*at).map(Length::mm));
         for point in lines.iter_mut().flatten() {
             let [right, up] = motion.turned(*point);
+            // Outlines count up, and rows down.
             *point = [x + size * right, y - size * up];
         }
         // A serial number that is cut off would read as another one.

@@ -48,9 +48,11 @@ impl Solid {
         let ends = between.expect("one that lies has ends");
         let [from, to] = ends.map(|end| match along {
             CylinderAxis::X => [end, across, z],
+            // A cylinder along z is upright, and never gets here.
             _ => [across, end, z],
         });
         let [from, to] = [from, to].map(|end| motion.of(end));
+        // Only a cylinder along x or y has rectangles as sections; a strut may point anywhere.
         if motion.shift().is_none() {
             let strut = Strut::new(from, to, diameter);
             return strut.map(Self::Strut).ok_or(EditProblem::NoLength);
@@ -100,6 +102,8 @@ impl Solid {
                 .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
                 let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];
+                // The section of a sphere at height h has radius √(r² - h²). At its very top, which
+                // `reaches` includes, rounding may make the difference negative.
                 let half = (radius * radius - off * off).max(0.0).sqrt();
                 let centre = grid.to_pixels([x, y].map(|at| at.mm()));
                 runs.add_disc(centre, grid.length(Length::from_um(half)));
@@ -123,6 +127,7 @@ pub(super) fn rectangle(
 fn section(cylinder: Cylinder, height: Length) -> Rectangle {
     let [across, z] = cylinder.at.map(Length::um);
     let [radius, off] = [cylinder.diameter.um() / 2.0, height.um() - z];
+    // Half the chord at this height.
     let half = (radius * radius - off * off).max(0.0).sqrt();
     let across = [across - half, across + half].map(Length::from_um);
     let between = cylinder.between.expect("one that lies has ends");
