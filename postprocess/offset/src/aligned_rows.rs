@@ -33,6 +33,7 @@ impl<'a> AlignedRows<'a> {
     /// Makes `out` the runs of a row. Returns false if they do not run along those around them.
     pub(super) fn row(&mut self, row: u32, out: &mut Vec<AlignedRun>) -> bool {
         out.clear();
+        // The inner disc is the larger, so its rows are enough for both.
         let reach = self.discs[1].halves().len();
         let runs = self.sources.row(row.into());
         if reach > MAX_REACH {
@@ -61,9 +62,11 @@ impl<'a> AlignedRows<'a> {
         let mut hull = (i32::MAX, i32::MIN);
         for (end, rows) in ends.iter_mut().zip(&self.rows) {
             let [a, b] = rows.map(|row| row[run]);
+            // A disc is symmetric, so the rows above and below count alike.
             *end = (a.0.max(b.0), a.1.min(b.1));
             hull = (hull.0.min(a.0).min(b.0), hull.1.max(a.1).max(b.1));
         }
+        // The end of another run might cut this one, too.
         if hull.0 < std::mem::replace(before, hull.1) {
             return None;
         }

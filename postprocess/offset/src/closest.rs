@@ -68,6 +68,7 @@ impl Turn {
         let [a, b] = [before.along, after.along];
         let sine = a[0] * b[1] - a[1] * b[0];
         let goes_on = a[0] * b[0] + a[1] * b[1] > 0.0;
+        // At the distance `reach`, two sides are this far apart.
         if goes_on && sine.abs() * reach < MAX_SLACK {
             Self::Smooth(sine.abs())
         } else {
@@ -78,6 +79,7 @@ impl Turn {
     /// By how much the sides are longer, so that no pixel lies between them.
     fn slack(self, reach: f64) -> f64 {
         match self {
+            // Half of the wedge for each side, and a little for rounding.
             Self::Smooth(sine) => SLACK + 0.51 * sine * reach.max(BEYOND),
             Self::Corner => SLACK,
         }
@@ -106,6 +108,7 @@ impl Side {
     fn measure(&self, map: &mut EdgeMap, measured: Measured, slack: [f64; 2]) {
         let Measured { is_right, reach } = measured;
         let [x, y] = self.along;
+        // Rows count down, so the right of (x, y) is (-y, x).
         let inwards = if is_right { [-y, x] } else { [y, -x] };
         let ends = [-slack[0], self.length + slack[1]];
         let corners = [(ends[0], -BEYOND), (ends[1], -BEYOND), (ends[0], reach), (ends[1], reach)];
@@ -121,6 +124,7 @@ impl Side {
             map.for_each_near(row, columns, &mut place, |column, near, level| {
                 let right = f64::from(column) + 0.5 - self.start[0];
                 let distance = right * inwards[0] + down * inwards[1];
+                // Compared as it is stored: in f64, a tie with the side before could look nearer.
                 if (distance as f32).abs() < near.distance.abs() {
                     let by = self.by[0] + slope * (right * x + down * y);
                     *near = Near { distance: distance as f32, by: by as f32 };

@@ -177,6 +177,7 @@ fn record_of(
 ) -> CompensateRecord {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
     let mut page = before.unwrap_or_default();
+    // A later pass for the shrinkage alone keeps the distance of the first.
     if !widths.are_zero() || page.inwards_um.is_none() {
         page.inwards_um = Some(widths.range().map(|by| nm(by * dpi.pitch().um())));
     }
@@ -245,6 +246,7 @@ fn move_edges(
         return Err(CompensateProblem::TooFar { pixels: furthest, max: MAX_MOVE });
     }
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
+    // A wall that is left so wide had its middle this deep before.
     let depth = most + min_feature / 2.0;
     if most > 0.0 && min_feature > 0.0 && depth > MAX_DEPTH {
         // Edges are to blame only if they would still move too far with walls of two pixels.
@@ -267,6 +269,8 @@ fn move_edges(
     let gray = match &*layer.image {
         Image::Mask(mask) if least < 0.0 => {
             moved.cut_off = is_near_border(mask, -least);
+            // Only one distance for all places may be below zero (`Widths`), so `least` is that
+            // distance.
             offset(mask, least)
         }
         Image::Mask(mask) => shrunk(mask),
@@ -279,6 +283,7 @@ fn move_edges(
     };
     let image = match &*layer.image {
         Image::Mask(_) if options.one_bit => Image::Mask(gray.at_least(128)),
+        // Edges that moved by whole pixels leave no gray, and the layer stays 1-bit.
         Image::Mask(_) => gray.to_mask().map_or_else(|| Image::Gray(gray), Image::Mask),
         Image::Gray(_) => Image::Gray(gray),
     };
@@ -298,6 +303,7 @@ fn is_near_border(mask: &Mask, by: f64) -> bool {
         [first, .., last] if transitions.len() % 2 == 0 => {
             *first < by || width - last < by || row < by || height - 1 - row < by
         }
+        // A row that ends white touches the border.
         _ => true,
     })
 }

@@ -29,6 +29,7 @@ pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
     let [before, after] = [before, after].map(|mask| Components::of(RowRuns::white(mask)));
     let mut left = vec![0; before.first.len()];
     for (run, row, (start, _)) in after.runs() {
+        // Counted at its first run. No pixel was added, so all of it was one component before.
         if after.first[run] as usize == run {
             left[before.at(start, row)] += 1;
         }
@@ -88,6 +89,7 @@ fn goes_on(gray: &GrayMask, mut row: u32, columns: &Range<u32>, step: i32) -> bo
     while let Some(next) = row.checked_add_signed(step).filter(|&next| next < gray.height()) {
         let touches =
             |part: &(Range<u32>, u8)| part.0.start <= columns.end && columns.start <= part.0.end;
+        // Only the first part that touches is followed: if it leads nowhere, the components decide.
         let Some((part, brightest)) = parts(gray, next).find(touches) else { return false };
         if brightest >= 128 {
             return true;
@@ -128,6 +130,7 @@ pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
 /// Makes white all black that is not connected to the top left pixel.
 pub fn without_holes(mask: &Mask) -> Mask {
     let black = Components::of(RowRuns::white(&mask.inverted()));
+    // Images come with a black frame, so the first black run holds the top left pixel.
     let outside = black.first.first().copied();
     let outside = black.rows.filtered(|run| Some(black.first[run]) == outside);
     outside.mask(mask.width()).inverted()

@@ -37,6 +37,7 @@ pub(super) fn for_each(rows: &RowRuns, mut show: impl FnMut(&Contour)) {
     let mut contour = Contour { start: (0, 0), moves: Vec::new() };
     for row in 0..rows.height() {
         for (run, &(start, _)) in rows.row(row).iter().enumerate() {
+            // Every contour passes a left end, so all are found from there.
             let first = rows.index(row, run);
             if seen[first] {
                 continue;
@@ -83,6 +84,7 @@ fn step(rows: &RowRuns, at: Passed, moves: &mut Vec<(Direction, u32)>) -> Passed
 /// Goes on at the upper corner of a left end: left along the row above, or right.
 fn past_left(row: i64, run: usize, runs: &[Run], above: &[Run]) -> (Passed, Direction, i32) {
     let (start, end) = runs[run];
+    // One column less, since a run above that ends at `start` touches at a corner.
     let other = first_past(above, |other| other.1, start - 1, run);
     match above.get(other) {
         Some(&(from, _)) if from < start => match run.checked_sub(1).map(|left| runs[left].1) {

@@ -241,6 +241,7 @@ impl EdgeMap {
                 Some(first) => {
                     let levels = &self.levels[first as usize..][..(end - start) as usize];
                     for (column, level) in (start..).zip(levels) {
+                        // For 255 outside, this is 255 - level.
                         push(column, level ^ level_outside);
                     }
                 }
@@ -285,6 +286,8 @@ impl Cut {
         // As exact as distances are.
         let slant = f64::from(normal[0].abs().min(normal[1].abs()) as f32);
         let steep = (1.0 - slant * slant).sqrt();
+        // A corner of height h along the normal (s, c) has area h² / (2 s c). Past the corner, the
+        // area grows by h / c.
         let corner = if slant > 0.0 { 0.5 / (steep * slant) } else { 0.0 };
         Self { slant, reach: (steep + slant) / 2.0, corner, growth: 1.0 / steep }
     }

@@ -110,6 +110,7 @@ impl Erosion {
                 if from.max(start) < to.min(end) {
                     self.spare.push((from.max(start), to.min(end)));
                 }
+                // This run between sources may hold the next run, too.
                 if to > end {
                     break;
                 }
@@ -158,11 +159,14 @@ impl Disc {
     /// image of `height` rows needs them.
     pub(super) fn below(square: u64, height: u32) -> Self {
         let rows = (0..u64::from(height) + 1).take_while(|away| away * away < square);
+        // Squared distances are whole numbers, so the greatest below `square` is `square` - 1. The
+        // limit keeps sums with a column within an i32.
         let half = |away: u64| (square - 1 - away * away).isqrt().min(BEYOND as u64 / 2) as i32;
         let halves: Vec<i32> = rows.map(half).collect();
         let count = halves.len() as u32;
         let strides = std::iter::successors(Some(1), |away| Some(away * 2));
         let mut order: Vec<u32> = (0..count.min(1)).collect();
+        // Rows at very different distances first: close rows cut nearly alike.
         order.extend(strides.take_while(|&away| away < count));
         order.extend((1..count).filter(|away| !away.is_power_of_two()));
         Self { halves, order }

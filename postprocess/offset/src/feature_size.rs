@@ -266,6 +266,8 @@ impl Bands {
                 }
                 let [across, along] = [at[0] - x, at[1] - y];
                 let depth = across * right + along * down;
+                // A disc that touches the place and passes through a point p at this depth has
+                // diameter |p|² / depth.
                 if depth > ROUGHNESS {
                     *size = size.min((across * across + along * along) / depth);
                 }

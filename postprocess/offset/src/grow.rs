@@ -39,6 +39,7 @@ impl Reach {
     pub(super) fn below(square: u64, height: u32) -> Self {
         let square = square.max(1);
         let disc = Disc::below(square, height);
+        // Not rounded, because rounded circles may cross more than once.
         let squares = (0..disc.halves().len() as u64).map(|away| square - 1 - away * away);
         Self { exact: squares.map(|square| (square as f64).sqrt()).collect(), disc }
     }
@@ -51,6 +52,8 @@ impl Reach {
     /// Returns the runs of rows `0..height` of an image of `width` columns that lie in a disc
     /// around a pixel of `runs`, whose first row is row `top` of the image.
     pub(super) fn grown(&self, runs: &RowRuns, top: i32, width: i32, height: i32) -> RowRuns {
+        // A band also reads all rows that discs reach above and below it: in a high one they are
+        // few.
         let band = BAND.max(4 * self.rows());
         let starts: Vec<i32> = (0..height).step_by(band as usize).collect();
         let bands = starts.into_par_iter().map(|start| {
@@ -130,6 +133,7 @@ impl Reach {
     fn is_farther(&self, lower: &Arc, upper: &Arc, row: i32) -> bool {
         match (self.reached(lower, row), self.reached(upper, row)) {
             (Some(lower), Some(upper)) => lower < upper,
+            // Where the upper arc reaches nothing, any reach is farther.
             (lower, _) => lower.is_some(),
         }
     }
@@ -143,6 +147,7 @@ impl Reach {
         if self.is_farther(lower, upper, low) {
             return low;
         }
+        // Once farther, the lower arc stays so, and halving finds the row.
         while high - low > 1 {
             let middle = low.midpoint(high);
             if self.is_farther(lower, upper, middle) { high = middle } else { low = middle }
@@ -185,6 +190,7 @@ impl SheetEnds {
         let rows = rows.start.max(first_row - reach.rows())..rows.end.min(past);
         let Self { starts, ends, arcs } = self;
         farthest(reach, sheet.iter().map(|run| run.0), first_row, &rows, arcs, starts);
+        // Negative, so that the least column is the farthest on this side as well.
         farthest(reach, sheet.iter().map(|run| -run.1), first_row, &rows, arcs, ends);
         rows.start
     }
@@ -269,6 +275,7 @@ fn sheets(runs: &RowRuns, rows: Range<i32>) -> Sheets {
         }
         above = row;
     }
+    // A counting sort: sizes become the places where sheets begin.
     let mut next = 0;
     for size in &mut sizes {
         next += std::mem::replace(&mut size.1, next);
@@ -291,6 +298,7 @@ fn for_each_pair(upper: &[Run], lower: &[Run], mut met: impl FnMut(usize, usize)
     };
     let [mut i, mut j] = [0, 0];
     while let (Some(a), Some(b)) = (upper.get(i), lower.get(j)) {
+        // Runs of a row are apart, so if any other run shares columns, a neighbor does.
         let is_alone = |shared: bool| {
             shared
                 && !shares(upper.get(i + 1), Some(b))

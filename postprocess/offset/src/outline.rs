@@ -122,6 +122,7 @@ struct Arc {
 impl Arc {
     fn new(part: &StraightPart, start: &Joint, end: &Joint) -> Self {
         let outwards = [part.along[1], -part.along[0]];
+        // An arc that turns by an angle θ rises about θ / 8 of its length above its chord.
         let length = dot(minus(end.before, start.after), part.along);
         // Each joint turns by half the angle of the parts on both sides of it.
         let rise = (start.turn + end.turn) / 2.0 * length / 8.0;
@@ -141,6 +142,7 @@ impl Arc {
     fn above(&self, place: f64) -> f64 {
         // The chords take this much of the arc's area away.
         let chords = f64::from(self.chords());
+        // The mean of 1 - p² over -1 to 1 is 2/3, so about its mean line the parabola is 1/3 - p².
         self.rise * (1.0 / 3.0 - place * place + 2.0 / 3.0 / (chords * chords))
     }
 

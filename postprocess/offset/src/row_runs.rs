@@ -94,6 +94,7 @@ impl RowRuns {
 
     /// Returns the place in its row of the run that holds a point, searched from a place on.
     pub(super) fn place(&self, column: f64, row: i64, from: usize) -> Option<usize> {
+        // The cast would round -0.5 to column 0.
         if column < 0.0 {
             return None;
         }
@@ -135,6 +136,7 @@ impl RowRuns {
         for row in 0..self.height() {
             transitions.clear();
             for &(start, end) in self.row(row) {
+                // Runs that touch are one run of a mask.
                 match transitions.last() {
                     Some(&last) if last == start as u32 => _ = transitions.pop(),
                     _ => transitions.push(start as u32),
@@ -155,6 +157,7 @@ pub(super) fn first_past<T>(
     column: i32,
     from: usize,
 ) -> usize {
+    // From row to row, places change little: steps cost less than halving.
     let mut place = from.min(runs.len());
     while place > 0 && end(&runs[place - 1]) > column {
         place -= 1;
@@ -185,6 +188,7 @@ pub(super) fn subtract(runs: &[Run], others: &[Run], out: &mut Vec<Run>) {
         while others.get(next).is_some_and(|other| other.1 <= start) {
             next += 1;
         }
+        // Apart from `next`, as one of the others may also cut the next run.
         let mut over = next;
         while let Some(&(from, to)) = others.get(over).filter(|other| other.0 < end) {
             if start < from {

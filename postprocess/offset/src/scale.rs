@@ -20,6 +20,8 @@ impl AxisScale {
     /// Returns the first pixel of the larger image whose center, when it is fired, is past the
     /// near edge of pixel `before`. Increases strictly, as pixels only become larger.
     pub(super) fn first_past(&self, before: u32) -> u64 {
+        // In the fired part, pixel k has its center at (k + 1/2) `left`: solved for `before`, and
+        // rounded up.
         (f64::from(before) / self.left - 0.5).ceil().max(0.0) as u64
     }
 

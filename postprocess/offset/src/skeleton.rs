@@ -251,6 +251,8 @@ fn is_simple(around: &[u32; 8], left: &[bool]) -> bool {
         DEEP => false,
         index => !left[(index - FIRST) as usize],
     };
+    // Yokoi's number for 8-connected white: the sum of b0 - b0 b1 b2 over the sides, with b = 1 for
+    // black and b1, b2 the next two neighbors.
     let number = (0..8)
         .step_by(2)
         .filter(|&side| is_black(side) && !(is_black(side + 1) && is_black(side + 2)));

@@ -85,10 +85,12 @@ impl Moments {
     /// Returns the middle, (along, across), and the slope of the line of least squares.
     fn line(&self) -> ([f64; 2], f64) {
         let count = self.count as f64;
+        // The sum of squares stays below 2^62 and the count below 2^21: products need 128 bits.
         let spread =
             i128::from(self.count) * i128::from(self.along_squared) - i128::from(self.along).pow(2);
         let joint = i128::from(self.count) * i128::from(self.along_across)
             - i128::from(self.along) * i128::from(self.across);
+        // Twice, because `along` counts half-pixels. A single tread has no slope.
         let slope = if spread > 0 { 2.0 * joint as f64 / spread as f64 } else { 0.0 };
         ([self.along as f64 / count / 2.0, self.across as f64 / count], slope)
     }
@@ -106,6 +108,7 @@ impl OpenPart {
     fn take(&mut self, direction: Direction, length: u32) -> u32 {
         let is_first = direction == self.first;
         if !is_first {
+            // A digital line goes in two directions only, at a right angle.
             let is_across = direction.0 * self.first.0 + direction.1 * self.first.1 == 0;
             if !is_across || self.second.is_some_and(|second| second != direction) {
                 return 0;
@@ -133,6 +136,8 @@ impl OpenPart {
         if x + y > MAX_LENGTH {
             return false;
         }
+        // A corner just beyond the line, at -1 or `width`, makes it steeper or flatter, so that it
+        // lies on its border. One farther away is on no digital line with the others.
         let place = self.a * x - self.b * y - self.low;
         let width = self.a + self.b;
         if place == -1 {
@@ -144,6 +149,7 @@ impl OpenPart {
             self.least[0] = self.least[1];
             self.greatest[1] = [x, y];
             (self.a, self.b) = (y - self.greatest[0][1], x - self.greatest[0][0]);
+            // This corner has the greatest value, low + a + b - 1.
             self.low = self.a * x - self.b * y - self.a - self.b + 1;
         } else if (0..width).contains(&place) {
             if place == 0 {

@@ -52,6 +52,7 @@ fn beyond(region: &Mask, dark: &Image, bright: &Image, disc: &Disc) -> Option<Ma
     if region.change_count() == 0 {
         return Some(region.clone());
     }
+    // Masks need one erosion by each color, gray images one by each level.
     if let (Image::Mask(dark), Image::Mask(bright)) = (dark, bright) {
         let no_white = far_from(dark, SourceColour::White, region, disc);
         return no_white.combined(Op::Union, &far_from(bright, SourceColour::Black, region, disc));
@@ -73,6 +74,7 @@ fn beyond(region: &Mask, dark: &Image, bright: &Image, disc: &Disc) -> Option<Ma
 
 /// Returns the pixels above a level that some pixel exceeds.
 fn brighter_than(gray: &GrayMask, level: u8) -> Mask {
+    // The darker of two levels is 254 at most, so this does not saturate.
     gray.at_least(level.saturating_add(1))
 }
 

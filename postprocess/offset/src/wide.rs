@@ -64,6 +64,7 @@ fn has_end(edge: &EdgeMap, must_stay: impl Fn(&EdgePixel) -> bool) -> bool {
 fn deepens(edge: &EdgeMap, runs: &[EdgeRun], run: usize) -> bool {
     let EdgeRun { columns: (start, end), first: Some(first) } = runs[run] else { return true };
     let depths = (first..first + (end - start) as u32).map(|index| edge.depth(index));
+    // Strictly, as pixels of equal depth are both the deepest.
     if runs.get(run + 1).is_some_and(|next| next.columns.0 == end) {
         depths.is_sorted_by(|a, b| a < b)
     } else if run > 0 && runs[run - 1].columns.1 == start {

@@ -36,6 +36,7 @@ impl Widths {
         let mut points = Vec::new();
         let mut push = |size: f64| points.push([size, width(size).max(0.0)]);
         sizes.first().into_iter().for_each(|&size| push(size));
+        // Equal sizes would make `at` divide by zero.
         for pair in sizes.windows(2).filter(|pair| pair[0] < pair[1]) {
             let share = |line: u32| f64::from(line) / f64::from(LINES);
             (1..=LINES).for_each(|line| push(pair[0] + share(line) * (pair[1] - pair[0])));
