@@ -95,6 +95,7 @@ impl BandKinds {
     }
 
     pub(super) fn insert(&mut self, kind: BandKind) {
+        // Six kinds fit the bits of a byte; a ninth would overflow this shift.
         self.0 |= 1 << kind as u8;
     }
 

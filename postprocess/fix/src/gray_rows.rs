@@ -43,6 +43,7 @@ fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mu
     let is_new = |column: u32, direction: usize| {
         had.exposed.binary_search(&column).map_or(true, |which| which % 2 != direction)
     };
+    // A new run may be narrower than both edges of the good row: each gets half of it.
     let half = (run.end - run.start) / 2;
     let left_depth = if is_new(run.start, 0) { left.depth.min(half) } else { 0 };
     let right_depth = if is_new(run.end, 1) { right.depth.min(half) } else { 0 };
@@ -56,6 +57,7 @@ fn white_run(had: &GrayRow<'_>, beside: &GrayRow<'_>, run: Range<u32>, runs: &mu
             continue;
         }
         for (column, length, level) in with_columns(beside.levels, column..column + length) {
+            // The good row's own edge levels would draw a second edge within this run.
             let known = level > 0 && inside.start <= column && column + length <= inside.end;
             runs.push((length, if known { level } else { 255 }));
         }

@@ -134,6 +134,7 @@ fn events(
     for (which, crossing) in expected.iter().enumerate() {
         let partner = nearest(row.len(), |i| row[i].into(), crossing.column).filter(|&i| {
             let distance = (f64::from(row[i]) - crossing.column).abs();
+            // Nearest both ways; otherwise two lines could claim one crossing.
             nearest_expected[i] == Some(which) && distance <= NEAR + crossing.slack
         });
         match partner {
@@ -217,6 +218,7 @@ fn off(crossings: &[bool], pixels: &[[u32; 2]]) -> u32 {
 /// Returns at which events the cheapest row crosses, by dynamic programming over the row's
 /// color (Viterbi's algorithm).
 fn cheapest(events: &[RowEvent], pixels: &[[u32; 2]]) -> Vec<bool> {
+    // Two of these and the pixels of a row add up without overflow.
     const NEVER: u32 = u32::MAX / 4;
     let mut cost = [pixels[0][0], NEVER];
     // For each event and the color after it: whether the cheapest way there crosses.
@@ -233,6 +235,7 @@ fn cheapest(events: &[RowEvent], pixels: &[[u32; 2]]) -> Vec<bool> {
         cost = next;
         crosses.push(how);
     }
+    // Every row ends black (002 section 2.4.1), so the way back begins at that color.
     let mut colour = 0;
     let mut way = vec![false; events.len()];
     for (crossing, how) in way.iter_mut().zip(&crosses).rev() {

@@ -116,6 +116,8 @@ pub(super) fn trace(
     let (above, below) = (above.count() as u32, below.count() as u32);
     let rows = band.start - above..band.end + below;
     let parity = |row: u32| mask.row(row).len() % 2;
+    // A contour lost alone changes the parity. Two lost at once keep it: only the page's open rows
+    // show them, or else the band's ends stand for these.
     let is_break = |row: u32| {
         band.start <= row
             && row <= band.end
@@ -148,6 +150,8 @@ pub(super) fn trace(
             let at = new.partition_point(|&other| other < column);
             let room = |other: Option<&u32>| other.map_or(width, |o| f64::from(o.abs_diff(column)));
             let room = room(at.checked_sub(1).and_then(|at| new.get(at))).min(room(new.get(at)));
+            // A guess is as doubtful as its possible error is large against the way to the next
+            // crossing.
             confidence = confidence.min(room.max(8.0) / (room.max(8.0) + slack));
             if new.get(at) == Some(&column) {
                 new.remove(at);
@@ -249,6 +253,7 @@ impl<'a> Lines<'a> {
         // The side with more rows shows better where contours are going.
         let depth = |side: &[(f64, usize)]| side.iter().map(|s| s.1).max().unwrap_or(0).max(1);
         let share = depth(&above) as f64 / (depth(&above) + depth(&below)) as f64;
+        // Contours do not cross, so predicted columns keep their order.
         let moved = |columns: Vec<f64>, slopes: &[(f64, usize)], rows: f64| -> Vec<f64> {
             let moved = columns.iter().zip(slopes).map(|(column, slope)| column + rows * slope.0);
             let mut last = 0.0_f64;
@@ -266,6 +271,7 @@ impl<'a> Lines<'a> {
         let joined: Vec<(usize, usize)> = joined.collect();
         let mut misfits: Vec<f64> = joined.iter().map(|&(i, j)| (a[i] - b[j]).abs()).collect();
         misfits.sort_by(f64::total_cmp);
+        // The median: one contour with a corner at the break says nothing about the others.
         let misfit = misfits.get(misfits.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
         for (below_break, broken) in [false, true].into_iter().zip(&aligned.broken) {
             let (places, at, slopes) =
@@ -300,6 +306,7 @@ impl<'a> Lines<'a> {
     /// Joins the loose ends in pairs at the least cost.
     fn join(&self) -> Option<Vec<Missing>> {
         let count = self.loose.len();
+        // An odd end has no partner. Eight ends pair in 7 x 5 x 3 = 105 ways, ten would in 945.
         if count == 0 || count % 2 == 1 || count > MAX_ENDS {
             return None;
         }
@@ -339,6 +346,8 @@ impl<'a> Lines<'a> {
                 let straight = (a.point.1 - b.point.1).abs();
                 straight.min((a.predict(middle) - b.predict(middle)).abs())
             }
+            // Two ends on one side of their breaks: the missing side leads from the first to where
+            // the contour ends, at the second.
             (false, false) => (a.predict(b.point.0) - b.point.1).abs() + 2.0 * BREAKING,
             (true, true) => (b.predict(a.point.0) - a.point.1).abs() + 2.0 * BREAKING,
             (true, false) if a.row == b.row => {
@@ -346,12 +355,14 @@ impl<'a> Lines<'a> {
             }
             (true, false) => ONE_SIDED,
         };
+        // A contour that goes on through the gap has its white on the same side at both ends.
         let turned = (a.is_below != b.is_below)
             == (a.direction.is_some() && b.direction.is_some() && a.direction != b.direction);
         let turned = if turned && a.is_below != b.is_below { 50.0 } else { 0.0 };
         let sides = |line: &Line| -> Option<bool> {
             let rows = [a.point.0 as u32, b.point.0 as u32];
             let [upper, lower] = [line.at(rows[0])? - a.point.1, line.at(rows[1])? - b.point.1];
+            // A line on opposite sides of the two ends would cross the missing piece.
             Some(upper * lower < 0.0)
         };
         let crosses =

@@ -48,6 +48,7 @@ impl MemorySize for Window {
 pub(super) fn windows<E>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
 ) -> impl Iterator<Item = Result<Window, E>> {
+    // After the end this is polled once more for each layer that still waits in `above`.
     let mut layers = layers.map(|layer| layer.map(Arc::new)).fuse();
     let mut below: VecDeque<Arc<PassingLayer>> = VecDeque::new();
     let mut above: VecDeque<Arc<PassingLayer>> = VecDeque::new();
@@ -64,6 +65,7 @@ pub(super) fn windows<E>(
             match layers.next() {
                 Some(Ok(layer)) => above.push_back(layer),
                 other => {
+                    // Layers before the error go first: it waits until `above` is empty.
                     error = other.and_then(Result::err);
                     break;
                 }
@@ -113,6 +115,7 @@ pub(super) fn decode_unsettled<E: Send>(
     // How many layers have passed since the last that is to be looked at.
     let mut since = usize::MAX;
     let needed = std::iter::from_fn(move || {
+        // One left `coming` since it was filled, so no more than `reach` layers wait in it.
         let wanted = reach + 1 - coming.len();
         coming.extend(layers.by_ref().take(wanted).map(|layer| {
             let is_needed = layer.as_ref().is_ok_and(|layer| !is_settled(layer));
