@@ -79,7 +79,10 @@ impl Catalogued for Machine {
         if let Some(recoating) = &self.recoating {
             let [least, most] = recoating.viscosity_cp;
             let above_zero = [recoating.travel.um(), recoating.gap.um(), recoating.seconds, least];
+            // TOML has `nan` and `inf`: NaN fails the first comparison, infinity the second check.
             let possible = |number: f64| number > 0.0 && number.is_finite();
+            // The least viscosity is among the numbers above; the greatest needs only its order and
+            // an end.
             if !(above_zero.into_iter().all(possible) && least <= most && most.is_finite()) {
                 return Err(MachineError::Recoating);
             }
@@ -89,6 +92,8 @@ impl Catalogued for Machine {
             times.check(self.strips.is_some())?;
         }
         match &self.strips {
+            // A swath needs a column of its own between its two seams: a seam joins two swaths,
+            // never three.
             Some(strips) if strips.overlap >= strips.mirrors.div_ceil(2) => {
                 Err(MachineError::Strips)
             }
@@ -101,6 +106,7 @@ impl Machine {
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(dpi) = self.defaults.dpi {
             let dpi = Dpi::new(dpi).ok_or(MachineError::NoResolution)?;
+            // A default outside the machine's own range would fail every command that uses it.
             self.check_dpi(dpi, "a stack")?;
         }
         if let Some(thickness) = self.defaults.thickness {
@@ -126,6 +132,7 @@ pub(super) fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<L
 }
 
 fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+    // An owned string, because TOML text with escapes cannot be borrowed.
     String::deserialize(from)?.parse().map_err(de::Error::custom)
 }
 

@@ -151,6 +151,7 @@ impl Recoating {
     /// greatest viscosity: viscosity times speed divided by the gap, as for a Newtonian liquid
     /// whose speed falls evenly across the gap (002 section 4.2.2).
     pub fn shear_pa(&self) -> [f64; 2] {
+        // The shear rate is speed over gap; millimeters cancel. A centipoise is 1/1000 Pa s.
         let per_second = self.travel.mm() / self.seconds / self.gap.mm();
         self.viscosity_cp.map(|centipoise| centipoise / 1000.0 * per_second)
     }

@@ -122,6 +122,7 @@ impl Machine {
     pub fn check_thickness(&self, thickness: Length, what: &str) -> Result<(), MachineLimit> {
         match self.thickness {
             Some(ThicknessRange { least, most, .. })
+                // The lower limit gets the slack as well: `fits` takes the shorter length first.
                 if !(fits(least, thickness) && fits(thickness, most)) =>
             {
                 let (what, machine) = (what.to_owned(), self.name.clone());
@@ -150,6 +151,8 @@ impl Machine {
     /// Returns an error if it does not.
     pub fn check_footprint(&self, footprint: Size, what: &str) -> Result<(), MachineLimit> {
         let Size { width, height } = footprint;
+        // A part may lie turned on a build area that is no square. An area to fill lies as the
+        // machine has it, so `check_area` turns nothing.
         let turned = Size { width: height, height: width };
         if self.check_area(footprint).or(self.check_area(turned)).is_ok() {
             return Ok(());

@@ -26,6 +26,7 @@ pub struct Times {
 impl Times {
     pub(super) fn check(&self, has_strips: bool) -> Result<(), MachineError> {
         let Self { recoat_s, expose_s, swath_speed_mm_per_s: speed, swath_step_s, .. } = self;
+        // NaN lies in no range, so `nan` is refused, too. The error's message repeats the bounds.
         let possible = |number: f64| (1e-3..=1e6).contains(&number);
         if ![recoat_s, expose_s, speed, swath_step_s].into_iter().flatten().all(|&n| possible(n)) {
             return Err(MachineError::Times);
