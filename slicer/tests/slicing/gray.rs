@@ -172,9 +172,9 @@ fn referee(
                 let depth =
                     depth.map(|(depth, tie)| [depth + top - plane, tie].map(|mm| mm * 1000.0));
                 let expected = match (inside, depth) {
-                    (false, _) => [0, 0],
-                    (true, None) => [255, 255],
-                    (true, Some([um, tie_um])) => [of_um(um - tie_um), of_um(um + tie_um)],
+                    (false, _) => 0..=0,
+                    (true, None) => 255..=255,
+                    (true, Some([um, tie_um])) => of_um(um - tie_um)..=of_um(um + tie_um),
                 };
                 if !expected.contains(&level) {
                     let place = format!("layer {}, {column}, {row}", layer.info.index);
