@@ -3,7 +3,7 @@
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::{Path, PathBuf};
 
-use lamp_machine::Machine;
+use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Layer, Length, MemorySize};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, FindingGroup, FindingRecord, Findings,
@@ -22,7 +22,7 @@ pub const CODE: u32 = 1;
 #[serde(default, rename_all = "kebab-case")]
 pub struct CheckSettings {
     /// Groups of findings; none means all.
-    #[serde(with = "list")]
+    #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
     pub only: Vec<FindingGroup>,
     /// Side of the square that a finding must hold, in pixels.
     #[serde(with = "text")]
@@ -31,10 +31,10 @@ pub struct CheckSettings {
     #[serde(with = "text")]
     pub least_support: f64,
     /// How far white may reach beyond the white below; `None` is as far as a layer is thick.
-    #[serde(with = "optional")]
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub max_overhang: Option<Length>,
     /// How wide a way out must be to drain a pocket; `None` is a pixel and a layer.
-    #[serde(with = "optional")]
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     pub drain: Option<Length>,
     /// Level from which a gray pixel is white.
     #[serde(with = "text")]
@@ -97,7 +97,7 @@ impl CheckSettings {
         disagreements: &Disagreements,
         machine: &Machine,
     ) -> Vec<FindingRecord> {
-        let shear_pa = machine.recoating.as_ref().map(|recoating| recoating.greatest_shear_pa());
+        let shear_pa = machine.recoating.as_ref().map(Recoating::greatest_shear_pa);
         let mut records = lamp_supports::records(findings, disagreements, shear_pa);
         records.retain(|record| self.reports(record.group()));
         records
@@ -127,5 +127,40 @@ impl CheckSettings {
         if let Some(file) = self.machine_file() {
             self.machine = folder.join(file);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::de::DeserializeOwned;
+
+    use super::*;
+    use crate::support::SupportSettings;
+    use crate::tile::TileSettings;
+
+    fn read_back<T: Serialize + DeserializeOwned>(settings: &T) -> T {
+        serde_json::from_str(&serde_json::to_string(settings).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn settings_are_read_back_as_they_are_written() {
+        let check = CheckSettings {
+            only: vec![FindingGroup::Islands, FindingGroup::Pockets],
+            drain: Some(Length::from_um(500.0)),
+            ..CheckSettings::default()
+        };
+        assert_eq!(read_back(&check), check);
+        assert_eq!(read_back(&CheckSettings::default()), CheckSettings::default());
+        let support = SupportSettings { keep: 7, ..SupportSettings::default() };
+        assert_eq!(read_back(&support), support);
+        let mut tile = TileSettings {
+            turns: Some("15deg".parse().unwrap()),
+            copies: Some(3),
+            machine: Some("beta".into()),
+            ..TileSettings::default()
+        };
+        tile.mesh.base_layers = Some(0);
+        assert_eq!(read_back(&tile), tile);
+        assert_eq!(read_back(&TileSettings::default()), TileSettings::default());
     }
 }

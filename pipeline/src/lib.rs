@@ -23,6 +23,7 @@ pub mod slice;
 pub mod solid;
 pub mod step;
 pub mod support;
+pub mod tile;
 pub mod watcher;
 pub mod words;
 

@@ -177,7 +177,7 @@ pub mod path {
 pub mod optional_path {
     use std::path::PathBuf;
 
-    use super::{Serializer, path};
+    use super::{Deserializer, Serializer, path};
 
     /// Writes it.
     ///
@@ -188,5 +188,13 @@ pub mod optional_path {
             Some(path) => path::serialize(path, to),
             None => to.serialize_none(),
         }
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Returns an error if there is no text.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<PathBuf>, D::Error> {
+        path::deserialize(from).map(Some)
     }
 }

@@ -13,3 +13,4 @@ pub(crate) mod slicing;
 pub(crate) mod solid;
 pub(crate) mod stages;
 pub(crate) mod target_arg;
+pub(crate) mod tile;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, Args, Command};
-use lamp_build::{FreeTurns, Moat, PackBy, Turns};
+use lamp_build::{Moat, PackBy};
 use lamp_pipeline::tile::{MeshSettings, TileSettings, TileTurns};
 use lamp_stack::{Length, Size};
 
@@ -201,6 +201,8 @@ impl TypedValueParser for TurnsParser {
 
 #[cfg(test)]
 mod tests {
+    use lamp_build::Turns;
+
     use super::*;
 
     #[test]

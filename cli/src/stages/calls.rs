@@ -59,11 +59,11 @@ impl Tiling {
 impl Call for Tiling {
     /// Returns the options as one text. The number of copies belongs to the stacks.
     fn canonical(&self) -> String {
-        self.0.canonical()
+        self.0.settings.canonical()
     }
 
     fn input_files(&self) -> Result<Vec<PathBuf>, lamp_pipeline::Error> {
-        Ok(self.0.clone().files_mut().map(|path| path.clone()).collect())
+        Ok(self.0.settings.clone().files_mut().map(|path| path.clone()).collect())
     }
 
     fn code(&self) -> (&'static str, u32) {

@@ -180,7 +180,7 @@ impl<'a> Reader<'a> {
 /// Reads the options of `tile`, without stacks.
 pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, String> {
     let mut args: TileArgs = Reader::new("tile", &with_name("tile", options), folder)?.read();
-    args.files_mut().for_each(|path| *path = folder.join(&*path));
+    args.settings.files_mut().for_each(|path| *path = folder.join(&*path));
     Ok(args)
 }
 

@@ -12,28 +12,28 @@ impl TileArgs {
     /// Checks, before the work, what can be checked.
     pub(super) fn check(&self) -> Result<(), Exit> {
         let counted = self.stacks.iter().any(|stack| stack.copies.is_some());
-        if self.copies.is_some() && (counted || self.stacks.len() > 1) {
+        if self.settings.copies.is_some() && (counted || self.stacks.len() > 1) {
             return Err(Exit::usage(
                 "--copies is for one stack without a count: write blade.tif:120 core.tif:40",
             ));
         }
-        if self.layout.is_some() && counted {
+        if self.settings.layout.is_some() && counted {
             return Err(Exit::usage("--layout gives the number of copies: leave out the counts"));
         }
-        if self.shares && self.stacks.len() < 2 {
+        if self.settings.shares && self.stacks.len() < 2 {
             return Err(Exit::usage(
                 "--shares is for several stacks: of one, as many copies as fit are placed anyway",
             ));
         }
         self.check_plan()?;
-        self.mesh.check()?;
+        self.settings.mesh.check()?;
         let inputs = || {
             self.stacks
                 .iter()
                 .map(|stack| &stack.path)
-                .chain(&self.layout)
-                .chain(&self.machine)
-                .chain(self.mesh.file())
+                .chain(&self.settings.layout)
+                .chain(&self.settings.machine)
+                .chain(self.settings.mesh.file())
         };
         let output = self.output().map(|output| output.output);
         let main = output.as_ref().or(self.strips.folder()).or(self.recipe.as_ref());
@@ -47,7 +47,12 @@ impl TileArgs {
         }
         self.check_recipe(output.as_ref().or(self.strips.folder()), inputs())?;
         self.layout_picture.as_deref().map(plots::check_name).transpose()?;
-        let read = self.layout.iter().chain(&self.machine).chain(self.mesh.file());
+        let read = self
+            .settings
+            .layout
+            .iter()
+            .chain(&self.settings.machine)
+            .chain(self.settings.mesh.file());
         check_not_input(main, read)
     }
 

@@ -10,7 +10,6 @@ mod report;
 mod stacks;
 mod strips;
 mod time;
-mod turns_arg;
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -18,14 +17,14 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use clap::Args;
-use lamp_build::{BuildFinding, BuildWanted, HeightOptions, Layout, PackBy, PartStack, Recipe};
+use lamp_build::{BuildFinding, BuildWanted, Layout, PartStack, Recipe};
 use lamp_machine::Machine;
-use lamp_pipeline::documents::{document, document_and_word, is_file, recorded_name};
-use lamp_pipeline::words::{optional, optional_path, text, words_of};
-use lamp_stack::{Length, Size};
-use serde::Serialize;
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::tile::TileSettings;
 
-use crate::args::options::{Common, Output, one_of_described, parse_distance, parse_layers};
+use crate::args::options::{Common, Output, parse_layers};
+use crate::args::parsed::Parsed;
+use crate::args::tile::TileStageArgs;
 use crate::exit::Exit;
 use crate::output::endings::parse_report;
 use crate::streams::Layers;
@@ -33,12 +32,11 @@ use crate::streams::{progress, unless_found, write_file};
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
 use found::{NoMesh, StrayTotals, describe_stray, within_height};
-use mesh::MeshArgs;
+use mesh::template;
 use placing::read_layout;
 use report::BuildTotals;
 use stacks::{InputStack, StackArg};
 use strips::StripArgs;
-use turns_arg::{TurnsArg, TurnsParser};
 
 /// Lay out copies of parts on a build area, in a mesh
 ///
@@ -50,7 +48,7 @@ use turns_arg::{TurnsArg, TurnsParser};
 /// lines cut through the mesh; the first layers are mesh alone. Pieces of mesh that would float or
 /// are small are left out. The default dimensions of the mesh are
 /// LAMP's own. --mesh none leaves the area black.
-#[derive(Args, Clone, Serialize)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   slice blade.stl | fix | dither | tile > build.tif
@@ -65,152 +63,71 @@ Examples:
   tile blade.tif --machine beta --recipe build.json
   tile blade.tif --machine mine.toml --report report.json -o build.tif
   tile blade.tif --machine mine.toml --time")]
-#[serde(rename_all = "kebab-case")]
 pub(crate) struct TileArgs {
     /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
     /// for standard input [default count: as many as fit of one stack, one each of several]
     #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
-    #[serde(skip)]
     stacks: Vec<StackArg>,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
-    #[serde(skip)]
     layers: Option<Range<u32>>,
 
-    /// Machine: alpha, beta or a file (see lamp machine). A build beyond its area, height,
-    /// resolution or layer thickness is refused
-    #[arg(long, value_name = "M")]
-    #[serde(with = "optional_path")]
-    machine: Option<PathBuf>,
-
-    /// Build area, for example 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]
-    #[arg(long, value_name = "WxH")]
-    #[serde(with = "optional")]
-    area: Option<Size>,
-
-    /// Number of copies of a single stack [default: as many as fit]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    copies: Option<u32>,
-
-    /// Take the counts of several stacks for shares: blade.tif:3 core.tif:1 places as many as fit,
-    /// three blades for each core, to within one copy
-    #[arg(long)]
-    shares: bool,
-
-    /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
-    /// --mesh none]. With --layout, nearer copies cause a warning
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
-    #[serde(with = "optional")]
-    gap: Option<Length>,
-
-    /// Smallest distance of copies to the area's edges
-    #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
-    #[arg(default_value = "0mm")]
-    #[serde(with = "text")]
-    edge_gap: Length,
-
-    /// Place parts by the extent of what is white in any layer, not by their whole images. Stacks
-    /// are read twice; standard input is kept in a temporary file
-    #[arg(long)]
-    fit: bool,
-
-    /// Shape by which copies are kept apart; outline implies --fit
-    #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
-        "The boxes around the parts",
-        "The parts' outlines, one after another or, of one part, on a lattice, if boxes place fewer",
-    ]))]
-    #[serde(with = "text")]
-    pack: PackBy,
-
-    /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
-    /// outline]. An angle below 90deg makes a plan, which packs by outlines
-    #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
-    #[serde(with = "optional")]
-    turns: Option<TurnsArg>,
-
-    /// Place copies as this file says, instead of packing them
-    #[arg(long, value_name = "FILE.json")]
-    #[arg(conflicts_with_all = ["copies", "shares", "edge_gap", "pack", "turns"])]
-    #[serde(with = "optional_path")]
-    layout: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) settings: Parsed<TileStageArgs, TileSettings>,
 
     /// Write the copies' positions, for --layout
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[serde(skip)]
     layout_out: Option<PathBuf>,
 
     /// Draw the numbered copies on the build area, as SVG or PNG
     #[arg(long, value_name = "FILE")]
-    #[serde(skip)]
     layout_picture: Option<PathBuf>,
 
     /// Write all that decides the build's pages but its parts' stacks, for lamp compose, which makes
     /// any of them. Without -o, the build itself is not written
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[serde(skip)]
     recipe: Option<PathBuf>,
 
     /// Write areas and volumes of each copy and layer, and how long the build takes, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    #[serde(skip)]
     report: Option<PathBuf>,
 
     /// Print how long the build takes on the machine, as far as its file says ([times] and
     /// [recoating]). Without -o, the build itself is not written
     #[arg(long)]
-    #[serde(skip)]
     time: bool,
-
-    /// Count heights from each stack's first layer, so that all parts stand on the platform
-    #[arg(long)]
-    settle: bool,
-
-    /// Accept layers that do not match: the build has the heights of the first stack, and takes
-    /// from each other stack the layer at the top of its own
-    #[arg(long)]
-    resample: bool,
 
     /// Give up with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
     /// folder may be missing: no build is written
     #[arg(long)]
-    #[serde(skip)]
     strict: bool,
 
     #[command(flatten)]
-    #[serde(flatten)]
-    mesh: MeshArgs,
-
-    #[command(flatten)]
-    #[serde(skip)]
     strips: StripArgs,
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
     /// folder), or - for standard output [default: -, or nowhere with --strips,
     /// --recipe or --time]
     #[arg(short, long, value_name = "OUT")]
-    #[serde(skip)]
     output: Option<PathBuf>,
 
     /// Write classic TIFFs (at most 4 GiB) instead of BigTIFFs
     #[arg(long)]
-    #[serde(skip)]
     classic: bool,
 
     /// Write gray pages as PackBits, for readers without Deflate: several times the size
     #[arg(long)]
-    #[serde(skip)]
     packbits: bool,
 
     /// Replace folders that an earlier run wrote, once the new ones are complete
     #[arg(long)]
-    #[serde(skip)]
     force: bool,
 }
 
 pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
     args.check()?;
-    if let Some(turns) = args.free_turns() {
+    if let Some(turns) = args.settings.free_turns() {
         // Standard output takes a script, for which no stage waits.
         return args.plan(turns, &Progress::new("tile", common, true));
     }
@@ -219,7 +136,7 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         Some(output) => progress("tile", common, output),
         None => Progress::new("tile", common, true),
     };
-    let machine = args.machine()?;
+    let machine = args.settings.machine()?;
     let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;
     let Build { layers, layout, stray_rows, no_mesh, recipe, totals } = built;
@@ -254,29 +171,10 @@ pub(crate) struct Build {
 }
 
 impl TileArgs {
-    /// Returns the files that options name, without the stacks, to be changed.
-    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
-        let machine = self.machine.iter_mut().filter(|path| is_file::<Machine>(path));
-        machine.chain(&mut self.layout).chain(self.mesh.file_mut())
-    }
-
-    /// Returns the options as one text, the same for all that mean the same; files without their
-    /// folders, and no stacks.
-    pub(crate) fn canonical(&self) -> String {
-        let mut options = self.clone();
-        if let Some(machine) = &mut options.machine {
-            *machine = recorded_name::<Machine>(machine).into();
-        }
-        for file in options.files_mut() {
-            *file = file.file_name().unwrap_or_default().into();
-        }
-        format!("tile{}", words_of(&options))
-    }
-
     /// Checks, before there are stacks, what can be checked of the number of copies of each.
     pub(crate) fn check_for(&self, copies: &[Option<u32>]) -> Result<(), Exit> {
-        self.machine()?;
-        if let Some(turns) = self.free_turns() {
+        self.settings.machine()?;
+        if let Some(turns) = self.settings.free_turns() {
             return Err(Exit::usage(format!(
                 "--turns {turns} takes stacks that are yet to be sliced: run lamp tile by hand for it"
             )));
@@ -295,35 +193,26 @@ impl TileArgs {
         stacks: &[(PathBuf, Option<u32>)],
         progress: &Progress,
     ) -> Result<Build, Exit> {
-        self.of(stacks.iter().cloned()).build(self.machine()?, progress)
-    }
-
-    /// Reads the machine, if one is given.
-    fn machine(&self) -> Result<Option<Machine>, Exit> {
-        let machine: Option<Machine> = self.machine.as_deref().map(document).transpose()?;
-        if let Some((machine, area)) = machine.as_ref().zip(self.area) {
-            machine.check_area(area).map_err(Exit::wrong_options)?;
-        }
-        Ok(machine)
+        self.of(stacks.iter().cloned()).build(self.settings.machine()?, progress)
     }
 
     /// Lays the copies out, and returns the layers of the build.
     fn build(&self, machine: Option<Machine>, progress: &Progress) -> Result<Build, Exit> {
-        let mesh = self.mesh.options()?;
-        let file = self.layout.as_deref().map(read_layout).transpose()?;
-        let from_bottom = self.mesh.needs_layers_below();
+        let mesh = self.settings.mesh.options(template)?;
+        let file = self.settings.layout.as_deref().map(read_layout).transpose()?;
+        let from_bottom = self.settings.mesh.needs_layers_below();
         let mut stacks =
             InputStack::open_all(&self.stacks, &self.layers, from_bottom, machine.as_ref())?;
-        let outlines = self.fit || self.pack == PackBy::Outlines || self.mesh.needs_outlines();
+        let outlines = self.settings.needs_outlines();
         let parts = stacks.iter_mut().map(|stack| stack.part(outlines));
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
         let placed = self.placed(parts, file.as_ref(), machine.as_ref(), mesh.as_ref())?;
-        let placed = match &self.machine {
+        let placed = match &self.settings.machine {
             Some(machine) => placed.for_machine(&document_and_word::<Machine>(machine)?.1),
             None => placed,
         };
         self.tell_places(&placed, progress)?;
-        let heights = HeightOptions { settle: self.settle, resample: self.resample };
+        let heights = self.settings.heights();
         let recipe = self.recipe_of(&placed, heights, mesh.as_ref())?;
         let recipe = recipe.map(|recipe| Rc::new(RefCell::new(recipe)));
         let layout = placed.clone();

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use lamp_build::{Layout, LayoutFile, MeshOptions, Pack, PackBy, PartStack, TileOptions, Turns};
+use lamp_build::{Layout, LayoutFile, MeshOptions, PartStack};
 use lamp_machine::Machine;
-use lamp_stack::{Length, Size};
+use lamp_stack::Size;
 
 use crate::catalogue::read_text;
 use crate::exit::Exit;
@@ -15,7 +15,6 @@ use lamp_plots as plots;
 
 use super::TileArgs;
 use super::found::left_over;
-use super::turns_arg::TurnsArg;
 
 impl TileArgs {
     /// Places the copies.
@@ -26,37 +25,25 @@ impl TileArgs {
         machine: Option<&Machine>,
         mesh: Option<&MeshOptions>,
     ) -> Result<Layout, Exit> {
-        let area = self.area_of(file, machine);
+        let area = self.settings.area_of(file, machine);
         match file {
-            Some(file) => place(file, parts, area, self.layout.as_deref()),
+            Some(file) => place(file, parts, area, self.settings.layout.as_deref()),
             None => {
-                let gap = self.gap_of(mesh);
-                Ok(Layout::packed(parts, &self.counts(), area, gap, self.packing())?)
+                let gap = self.settings.gap_of(mesh);
+                Ok(Layout::packed(parts, &self.counts(), area, gap, self.settings.packing())?)
             }
         }
     }
 
-    /// Returns the build area.
-    pub(super) fn area_of(&self, file: Option<&LayoutFile>, machine: Option<&Machine>) -> Size {
-        let machine_area = machine.map(|machine| machine.area.value);
-        let file_area = file.and_then(LayoutFile::area);
-        self.area.or(machine_area).or(file_area).unwrap_or(TileOptions::default().area)
-    }
-
-    /// Returns the least distance between copies that are packed.
-    pub(super) fn gap_of(&self, mesh: Option<&MeshOptions>) -> Length {
-        self.gap.or(mesh.map(MeshOptions::gap)).unwrap_or(TileOptions::default().gap)
-    }
-
     /// Reports copies that found no place, and copies that stand nearer than was asked for.
     pub(super) fn tell_places(&self, layout: &Layout, progress: &Progress) -> Result<(), Exit> {
-        if self.layout.is_none() {
+        if self.settings.layout.is_none() {
             let placed = layout.parts().iter().enumerate();
             let placed =
                 placed.map(|(part, stack)| (stack.name().to_owned(), layout.copies_of(part)));
             self.tell_left_over(&placed.collect::<Vec<_>>(), progress)?;
         }
-        if let (Some(_), Some(gap)) = (&self.layout, self.gap)
+        if let (Some(_), Some(gap)) = (&self.settings.layout, self.settings.gap)
             && let near = layout.nearer_than(gap)
             && let [[one, other], more @ ..] = near.as_slice()
         {
@@ -76,7 +63,7 @@ impl TileArgs {
         placed: &[(String, usize)],
         progress: &Progress,
     ) -> Result<(), Exit> {
-        let text = if self.shares { None } else { left_over(placed, &self.counts()) };
+        let text = if self.settings.shares { None } else { left_over(placed, &self.counts()) };
         match text {
             Some(text) if self.strict => Err(Exit::Findings(text)),
             Some(text) => {
@@ -88,20 +75,7 @@ impl TileArgs {
     }
 
     pub(super) fn counts(&self) -> Vec<Option<u32>> {
-        self.stacks.iter().map(|stack| stack.copies.or(self.copies)).collect()
-    }
-
-    pub(super) fn packing(&self) -> Pack {
-        let usual = match self.pack {
-            PackBy::Boxes => Turns::None,
-            PackBy::Outlines => Turns::Quarters,
-        };
-        let turns = match self.turns {
-            Some(TurnsArg::Images(turns)) => turns,
-            Some(TurnsArg::Free(_)) => Turns::Quarters,
-            None => usual,
-        };
-        Pack { by: self.pack, turns, edge_gap: self.edge_gap, shares: self.shares }
+        self.stacks.iter().map(|stack| stack.copies.or(self.settings.copies)).collect()
     }
 
     /// Writes the layout as a file and as a picture, if wanted.

@@ -64,7 +64,7 @@ impl TileArgs {
         let parts = self.stacks.iter().map(|stack| part_of(&stack.path, path));
         let parts = parts.collect::<Result<Vec<_>, _>>()?;
         let recipe = Recipe::new(layout, parts, heights, mesh, self.layers.clone());
-        Ok(Some(match &self.machine {
+        Ok(Some(match &self.settings.machine {
             Some(machine) => recipe.for_machine(&document_and_word::<Machine>(machine)?.1),
             None => recipe,
         }))

@@ -10,8 +10,8 @@ use lamp_build::{FreeTurns, Pack, PackBy, PartStack, PlannedStack, TurnedPlan};
 use lamp_stack::{Length, file_word, quoted};
 
 use super::TileArgs;
+use super::mesh::template;
 use super::stacks::InputStack;
-use super::turns_arg::TurnsArg;
 use crate::Lamp;
 use crate::args::arguments::words_in_effect;
 use crate::exit::Exit;
@@ -21,17 +21,9 @@ use sliced_from::SlicedFrom;
 use words::kept;
 
 impl TileArgs {
-    /// Returns the turns of a plan, if one is asked for.
-    pub(super) fn free_turns(&self) -> Option<FreeTurns> {
-        match self.turns? {
-            TurnsArg::Free(turns) => Some(turns),
-            TurnsArg::Images(_) => None,
-        }
-    }
-
     /// Checks, before the work, what a plan needs.
     pub(super) fn check_plan(&self) -> Result<(), Exit> {
-        let Some(turns) = self.free_turns() else { return Ok(()) };
+        let Some(turns) = self.settings.free_turns() else { return Ok(()) };
         if self.layout_out.is_none() {
             return Err(Exit::usage(format!(
                 "--turns {turns} takes stacks that are yet to be sliced: give --layout-out for where \
@@ -50,8 +42,8 @@ impl TileArgs {
     /// Prints the commands that make a build whose copies lie at any of some angles, and writes the
     /// layout that they need.
     pub(super) fn plan(&self, turns: FreeTurns, progress: &Progress) -> Result<(), Exit> {
-        let machine = self.machine()?;
-        let mesh = self.mesh.options()?;
+        let machine = self.settings.machine()?;
+        let mesh = self.settings.mesh.options(template)?;
         let mut stacks = InputStack::open_all(&self.stacks, &self.layers, false, machine.as_ref())?;
         let parts = stacks.iter_mut().map(|stack| stack.part(true));
         let parts = parts.collect::<Result<Vec<PartStack>, _>>()?;
@@ -59,8 +51,9 @@ impl TileArgs {
         let from = from.map(|((stack, input), part)| SlicedFrom::new(&stack.path, input, part));
         let from = from.collect::<Result<Vec<_>, _>>()?;
         let centres: Vec<[f64; 2]> = from.iter().map(SlicedFrom::centre_mm).collect();
-        let (area, gap) = (self.area_of(None, machine.as_ref()), self.gap_of(mesh.as_ref()));
-        let pack = Pack { by: PackBy::Outlines, ..self.packing() };
+        let (area, gap) =
+            (self.settings.area_of(None, machine.as_ref()), self.settings.gap_of(mesh.as_ref()));
+        let pack = Pack { by: PackBy::Outlines, ..self.settings.packing() };
         let plan = TurnedPlan::new(&parts, &centres, &self.counts(), area, gap, pack, turns)?;
         self.tell_plan(&plan, turns, progress)?;
         for from in &from {
