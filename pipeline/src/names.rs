@@ -94,7 +94,8 @@ mod tests {
             let mut stack = StackInfo { part: stem(Path::new(name)), ..StackInfo::default() };
             let parts = vec![PartFile { path: name.into(), placement: None }];
             let settings = SliceSettings::default();
-            SlicingRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
+            SlicingRecord { parts, name: None, settings, fallback: None, machine: None }
+                .write(&mut stack);
             stack
         };
         for name in ["t.stl", "my part.stl", "it's@1,2.stl", "-x.stl"] {

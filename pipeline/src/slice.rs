@@ -38,6 +38,8 @@ pub const CODE: u32 = 7;
 pub struct SliceStage {
     /// The part's files, which share one coordinate system.
     pub parts: Vec<PartFile>,
+    /// The part's name in the stack; `None` is its file's.
+    pub name: Option<String>,
     /// The settings.
     pub settings: SliceSettings,
     /// A machine whose limits hold: a built-in one's name, or a file.
@@ -88,8 +90,8 @@ pub struct Slicing<'a> {
 /// Text that slicing writes on pages besides their images.
 pub struct PageWords {
     record: SlicingRecord,
-    /// The part's name, if it is not its file's.
-    part_name: Option<String>,
+    /// The name that stands for the part's while the stack is stored.
+    stored_name: Option<String>,
     exposure: Option<Exposure>,
 }
 
@@ -107,7 +109,7 @@ impl PageWords {
             let numbers = serde_json::to_value(material).expect("a material is texts and numbers");
             stack.other.insert("material".to_owned(), numbers);
         }
-        if let Some(name) = &self.part_name {
+        if let Some(name) = self.record.name.as_ref().or(self.stored_name.as_ref()) {
             stack.part.clone_from(name);
         }
     }
@@ -132,7 +134,7 @@ impl SliceSettings {
         settings.exposure.name(exposure.as_ref());
         settings.solid.name();
         settings.solid.step.reader.kernel = settings.solid.step.reader.kernel.of_images();
-        let record = SlicingRecord { parts, settings, fallback: None, machine: None };
+        let record = SlicingRecord { parts, name: None, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
         let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;
         let uniform = self.uniform_thickness();
@@ -146,7 +148,7 @@ impl SliceSettings {
         }
         let slices = Slices::new(model, &options)?;
         check_memory(&slices)?;
-        Ok((slices, PageWords { record, part_name: None, exposure }))
+        Ok((slices, PageWords { record, stored_name: None, exposure }))
     }
 
     /// Returns the gray of layers at these heights, by the resin of an exposure.
@@ -274,7 +276,8 @@ impl SliceStage {
         let bridged = Bridged::new(slices, fallback, settings, self.layers.clone(), watcher)?;
         pages.record.fallback = bridged.word();
         pages.record.machine = machine_word;
-        pages.part_name = name.map(|name| stem(Path::new(name)));
+        pages.record.name.clone_from(&self.name);
+        pages.stored_name = name.map(|name| stem(Path::new(name)));
         Ok(Slicing {
             stage: self,
             part,

@@ -302,6 +302,9 @@ pub struct SlicingRecord {
     /// The part's files without their folders, and where they stand.
     #[serde(with = "parts")]
     pub parts: Vec<PartFile>,
+    /// The part's name, if it was given one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The settings; files are words with digests.
     #[serde(flatten)]
     pub settings: SliceSettings,
@@ -329,13 +332,14 @@ impl SlicingRecord {
     pub fn write(&self, stack: &mut StackInfo) {
         let record = serde_json::to_value(self).expect("a record is texts and flags");
         stack.other.insert(Self::KEY.to_owned(), record);
-        let Self { parts, settings, fallback, machine } = self;
+        let Self { parts, name, settings, fallback, machine } = self;
         #[derive(Serialize)]
         struct Rest<'a> {
+            name: &'a Option<String>,
             fallback: &'a Option<String>,
             machine: &'a Option<String>,
         }
-        let rest = words_of(&Rest { fallback, machine });
+        let rest = words_of(&Rest { name, fallback, machine });
         stack.commands.push(settings.command(parts) + &rest);
     }
 
@@ -401,8 +405,13 @@ mod tests {
             for fallback in [None, Some("b c.stl".to_owned())] {
                 let settings = settings.clone();
                 let more = fallback.as_ref().map_or("", |_| " --fallback 'b c.stl'");
-                let record =
-                    SlicingRecord { parts: parts.clone(), settings, fallback, machine: None };
+                let record = SlicingRecord {
+                    parts: parts.clone(),
+                    name: None,
+                    settings,
+                    fallback,
+                    machine: None,
+                };
                 let mut stack = StackInfo::default();
                 record.write(&mut stack);
                 assert_eq!(stack.commands, [format!("{command}{more}")]);
@@ -415,7 +424,8 @@ mod tests {
     fn a_record_with_a_setting_that_is_not_known_is_none() {
         let mut stack = StackInfo::default();
         let (settings, parts) = (SliceSettings::default(), vec!["a.stl".parse().unwrap()]);
-        SlicingRecord { parts, settings, fallback: None, machine: None }.write(&mut stack);
+        SlicingRecord { parts, name: None, settings, fallback: None, machine: None }
+            .write(&mut stack);
         assert!(SlicingRecord::of(&stack).is_some());
         stack.other[SlicingRecord::KEY]["color"] = "red".into();
         assert_eq!(SlicingRecord::of(&stack), None);

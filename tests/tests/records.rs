@@ -4,7 +4,7 @@
 use std::fs;
 use std::process::Command;
 
-use lamp_fixtures::{Plate, cavity_staircase};
+use lamp_fixtures::{Plate, Sample, cavity_staircase};
 use lamp_tests::{Ran, Scratch, bin, tilted_ball};
 
 /// Runs a line in a shell, with the binaries before all others on its path.
@@ -20,6 +20,28 @@ fn shell(scratch: &Scratch, line: &str) -> Ran {
 
 fn commands(scratch: &Scratch, stack: &str) -> Vec<String> {
     scratch.layers(stack)[0].info.stack.as_ref().unwrap().commands.clone()
+}
+
+/// Returns the part's name in a stack.
+fn part(scratch: &Scratch, stack: &str) -> String {
+    scratch.layers(stack)[0].info.stack.as_ref().unwrap().part.clone()
+}
+
+#[test]
+fn a_part_has_the_name_that_it_is_given() {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 5_000);
+    let line = "cat tower.stl | slice - --dpi 100 --thickness 1mm --name 'Blade 7' -o a.tif";
+    shell(&scratch, line).succeeds();
+    assert_eq!(part(&scratch, "a.tif"), "Blade 7");
+    let [command] = &commands(&scratch, "a.tif")[..] else { panic!("one command made it") };
+    assert!(command.ends_with(" --name 'Blade 7'"), "{command}");
+    // The name changes no image, and the record that has it is read again.
+    scratch.run("slice tower.stl --dpi 100 --thickness 1mm -o b.tif").succeeds();
+    scratch.run("lamp compare a.tif b.tif").succeeds();
+    scratch.run("lamp support a.tif --part tower.stl -o c.tif").succeeds();
+    assert_eq!(part(&scratch, "c.tif"), "Blade 7");
+    scratch.run("slice tower.stl --name= -o d.tif").is_wrong_usage(&["--name"]);
 }
 
 /// Names of files that shells and options would take for something else.

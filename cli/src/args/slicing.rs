@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use lamp_pipeline::heights::HeightSettings;
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::placement::Numbers;
@@ -104,6 +105,11 @@ pub(crate) struct SliceStageArgs {
     #[arg(value_name = "PART", required = true, value_parser = part_file())]
     parts: Vec<PartFile>,
 
+    /// Name of the part in its stack and in all that is made of it [default: the file's, without
+    /// its ending]
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    name: Option<String>,
+
     #[command(flatten)]
     options: SlicingArgs,
 
@@ -176,6 +182,7 @@ impl TryFrom<&SliceStageArgs> for SliceStage {
     fn try_from(args: &SliceStageArgs) -> Result<Self, Exit> {
         Ok(Self {
             parts: args.parts.clone(),
+            name: args.name.clone(),
             settings: (&args.options).try_into()?,
             machine: args.machine.clone(),
             layers: args.layers.clone(),

@@ -34,7 +34,7 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 17] = [
+const REFUSED: [(&str, &str); 18] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
@@ -51,6 +51,7 @@ const REFUSED: [(&str, &str); 17] = [
     ("time", "leave out --time: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
     ("layout_picture", "leave out --layout-picture: run lamp tile by hand for the picture"),
+    ("name", "leave out --name: results have the part's name in the night file"),
     ("part", "leave out --part: the part is the one that the stages are for"),
 ];
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use lamp_build::{PartStack, TurnedSlicing};
 use lamp_pipeline::part_file::{PartFile, names_of};
+use lamp_pipeline::words::option;
 use lamp_pipeline::{SliceSettings, SlicingRecord};
 use lamp_stack::{digest_of, digest_of_digests, file_word, quoted};
 
@@ -18,6 +19,8 @@ pub(super) struct SlicedFrom {
     settings: SliceSettings,
     /// The part's files, with their placements.
     files: Vec<PartFile>,
+    /// The part's name, if it was given one.
+    name: Option<String>,
     /// The part's files as the stack records them, if they were not found.
     pub(super) missing: Option<String>,
     /// The stages that changed pages since.
@@ -55,12 +58,12 @@ impl SlicedFrom {
         }
         let folders = [path.parent().unwrap_or(Path::new("")), Path::new("")];
         record.find_exposure(&folders).map_err(|error| error.at(part.name()))?;
-        let SlicingRecord { parts: recorded, settings, .. } = record;
+        let SlicingRecord { parts: recorded, name, settings, .. } = record;
         let found = folders.iter().find_map(|folder| files_in(folder, &recorded, &stack.digest));
         let missing = found.is_none().then(|| names_of(&recorded));
         let files = found.unwrap_or(recorded);
         let ReadLayers { stages, range } = input.read_layers().clone();
-        Ok(Self { settings, files, missing, stages, layers: range })
+        Ok(Self { settings, files, name, missing, stages, layers: range })
     }
 
     /// Returns the place about which the part turns, in the coordinates of its images.
@@ -75,7 +78,8 @@ impl SlicedFrom {
         let slice = self.settings.clone().turned(slicing).command(&self.files);
         let Range { start, end } = self.layers;
         let layers = if all_layers { format!(" --layers {start}..{end}") } else { String::new() };
-        format!("{slice}{layers} -o {}", quoted(&file_word(out)))
+        let name = self.name.as_ref().map(|name| option("name", name)).unwrap_or_default();
+        format!("{slice}{name}{layers} -o {}", quoted(&file_word(out)))
     }
 }
 
