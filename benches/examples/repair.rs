@@ -9,7 +9,6 @@
 //! cargo run --release -p lamp-benches --example repair
 //! ```
 
-use std::convert::Infallible;
 use std::error::Error;
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
@@ -19,6 +18,7 @@ use lamp_benches::sliced::{Layers, broken, mask, slice};
 use lamp_fix::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_fixtures::{Defect, Sample, build};
 use lamp_slicer::{Fill, SliceOptions};
+use lamp_stack::StackError;
 
 const PARTS: [(Sample, usize); 5] = [
     (Sample::Blade, 24_000),
@@ -56,8 +56,8 @@ const UNRESTRAINED: FixOptions = FixOptions {
 };
 
 fn fixed(layers: Layers, options: FixOptions) -> Layers {
-    let Ok(fixed) = fix(layers.into_iter().map(Ok::<_, Infallible>), options, |_| ()).collect();
-    fixed
+    let fixed = fix(layers.into_iter().map(Ok::<_, StackError>), options, |_| ());
+    fixed.map(|layer| layer?.decode()).collect::<Result<_, _>>().unwrap()
 }
 
 const HEADING: &str = "\
@@ -170,7 +170,7 @@ const MAX_CONFIDENCE: [f64; 4] = [0.35, 0.7, 0.95, 1.01];
 /// Adds the bands of up to 15 rows to their classes of confidence.
 fn by_confidence(clean: &Layers, stray: &Layers, trust: &mut [Bands; MAX_CONFIDENCE.len()]) {
     let options = FixOptions { max_width: Some(15), ..UNRESTRAINED };
-    let layers = stray.iter().cloned().map(Ok::<_, Infallible>);
+    let layers = stray.iter().cloned().map(Ok::<_, StackError>);
     let first = clean[0].info.index;
     let fixed = fix(layers, options, |fixed| {
         let clean = &clean[(fixed.before.info.index - first) as usize];

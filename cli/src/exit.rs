@@ -193,12 +193,12 @@ failures!(
     LampError,
 );
 
-/// Distinguishes failures to write from stacks without layers; errors of the layers pass through as
-/// they are.
+/// Distinguishes failures to write from stacks without layers and from pages that stages cannot
+/// decode; errors of the layers pass through as they are.
 impl From<StackError> for Exit {
     fn from(error: StackError) -> Self {
         match error {
-            StackError::NoLayers => Self::Failed(error.into()),
+            StackError::NoLayers | StackError::InFile { .. } => Self::Failed(error.into()),
             error => Self::Output(error.into()),
         }
     }

@@ -172,19 +172,12 @@ pub(crate) fn read_passing(
     let pages = pages_of_input(open_pages(&input.stack)?, input, progress);
     let path = input.stack.clone();
     Ok(map_in_order(pages, move |(page, stack): (Page, _)| {
-        let layer = PassingLayer::of_page(page);
-        let mut layer = layer.map_err(|error| failed_at(input_name(&path), error))?;
+        let name = input_name(&path);
+        let layer = PassingLayer::of_page(page, &name);
+        let mut layer = layer.map_err(|error| failed_at(name, error))?;
         layer.info_mut().stack = stack;
         Ok(layer)
     }))
-}
-
-/// Returns what decodes layers of an input that did not need it before.
-pub(crate) fn decoding(
-    input: &Input,
-) -> impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync + use<> {
-    let path = input.stack.clone();
-    move |layer| layer.decode().map_err(|error| failed_at(input_name(&path), error))
 }
 
 fn pages_of_input(
@@ -281,41 +274,30 @@ pub(crate) fn in_range<P>(
     })
 }
 
-/// Writes layers where `output` says, counting them in `report`.
+/// Writes layers where `output` says, undecoded if it can take them as they are, counting them in
+/// `progress`.
 pub(crate) fn write_layers(
-    layers: impl Iterator<Item = Result<Layer, Exit>>,
+    layers: impl Iterator<Item = Result<impl Into<PassingLayer>, Exit>>,
     output: &Output,
     progress: &Progress,
 ) -> Result<(), Exit> {
+    let layers = layers.map(|layer| layer.map(Into::into));
+    let decode = |layer: PassingLayer| Ok(layer.decode()?);
     if is_packed_name(&output.output) {
+        let layers = map_in_order(layers, decode);
         return write_packed_layers(layers, output, PackLevel::default(), progress);
     }
     let to = destination(output)?;
-    let counted = layers.inspect(|_| progress.layer_done());
-    let coded = counted.map(|layer| {
-        let layer = layer?;
-        let image = if output.packbits { layer.image.as_packbits() } else { layer.image };
-        Ok(Layer { image, ..layer })
-    });
-    let written = write_stack(coded, to, format(output.classic));
-    written_to(&output.output, written, progress)
-}
-
-/// Writes layers that pass where `output` says, undecoded if it can take them as they are, counting
-/// them.
-pub(crate) fn write_passing(
-    layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
-    decode: impl Fn(PassingLayer) -> Result<Layer, Exit> + Sync,
-    output: &Output,
-    progress: &Progress,
-) -> Result<(), Exit> {
-    // Other outputs code images in their own way.
-    if output.packbits || is_packed_name(&output.output) {
-        return write_layers(map_in_order(layers, decode), output, progress);
-    }
-    let to = destination(output)?;
-    let counted = layers.inspect(|_| progress.layer_done());
-    let written = write_stack(counted, to, format(output.classic));
+    let (counted, format) = (layers.inspect(|_| progress.layer_done()), format(output.classic));
+    let written = if output.packbits {
+        let coded = map_in_order(counted, |layer| {
+            let layer: Layer = decode(layer)?;
+            Ok(Layer { image: layer.image.as_packbits(), ..layer })
+        });
+        write_stack(coded, to, format)
+    } else {
+        write_stack(counted, to, format)
+    };
     written_to(&output.output, written, progress)
 }
 

@@ -7,9 +7,7 @@ use lamp_stack::{PassingLayer, is_stack_name, map_in_order};
 
 use crate::args::options::{Input, Output};
 use crate::exit::Exit;
-use crate::streams::{
-    decoding, format, input_name, is_stream, new_folder, read_passing, write_passing,
-};
+use crate::streams::{format, input_name, is_stream, new_folder, read_passing, write_layers};
 use crate::terminal::progress::Progress;
 
 /// Layers in order, coded or not.
@@ -17,7 +15,7 @@ pub(crate) type PassingLayers = Box<dyn Iterator<Item = Result<PassingLayer, Exi
 
 /// Reads the wanted layers of a stack, undecoded where they can pass, or the layers of the build
 /// that a folder of strips makes.
-pub(crate) fn read_passing_or_strips(
+pub(crate) fn read_stack_or_strips(
     input: &Input,
     progress: &Progress,
 ) -> Result<PassingLayers, Exit> {
@@ -46,7 +44,7 @@ pub(crate) fn read_passing_or_strips(
 
 /// Writes layers as a stack, or as strips if the input was a folder of them. `form` changes how
 /// they were cut.
-pub(crate) fn write_passing_or_strips(
+pub(crate) fn write_stack_or_strips(
     layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
     input: &Input,
     form: impl FnOnce(StripForm) -> StripForm,
@@ -54,9 +52,9 @@ pub(crate) fn write_passing_or_strips(
     progress: &Progress,
 ) -> Result<(), Exit> {
     if !is_strips(&input.stack) {
-        return write_passing(layers, decoding(input), output, progress);
+        return write_layers(layers, output, progress);
     }
-    let layers = map_in_order(layers, decoding(input));
+    let layers = map_in_order(layers, |layer: PassingLayer| Ok::<_, Exit>(layer.decode()?));
     let cut_as = StripForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;
     let StripForm { mirrors, overlap, seam } = form(cut_as);
     let to = &output.output;

@@ -1,7 +1,7 @@
 //! The dithering stage: gray layers to dots.
 
 use lamp_stack::{
-    DitherRecord, GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, map_in_order,
+    DitherRecord, GrayMask, Image, Layer, MAX_RUNS, Mask, PassingLayer, StackError, map_in_order,
 };
 use thiserror::Error;
 
@@ -52,28 +52,17 @@ pub enum DitherError {
 }
 
 /// Turns gray layers into masks, and records the method in their pages. Masks pass
-/// unchanged. A layer's dots depend on its image and its index only.
+/// unchanged, and are not decoded. A layer's dots depend on its image and its index only.
 ///
 /// # Errors
-/// Returns the errors of `layers` and of [`dither_image`].
-pub fn dither<E: From<DitherError> + Send>(
-    layers: impl Iterator<Item = Result<Layer, E>>,
+/// Returns the errors of `layers`, of decoding them and of [`dither_image`].
+pub fn dither<E: From<DitherError> + From<StackError> + Send>(
+    layers: impl Iterator<Item = Result<impl Into<PassingLayer>, E>>,
     method: DitherMethod,
-) -> impl Iterator<Item = Result<Layer, E>> {
-    map_in_order(layers, move |layer| Ok(dither_layer(layer, method)?))
-}
-
-/// Turns gray layers into masks as [`dither`] does. Only these are decoded, by `decode`.
-///
-/// # Errors
-/// Returns the errors of `layers`, of `decode` and of [`dither_image`].
-pub fn dither_passing<E: From<DitherError> + Send>(
-    layers: impl Iterator<Item = Result<PassingLayer, E>>,
-    method: DitherMethod,
-    decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,
 ) -> impl Iterator<Item = Result<PassingLayer, E>> {
+    let layers = layers.map(|layer| layer.map(Into::into));
     map_in_order(layers, move |layer: PassingLayer| {
-        Ok(if layer.is_gray() { dither_layer(decode(layer)?, method)?.into() } else { layer })
+        Ok(if layer.is_gray() { dither_layer(layer.decode()?, method)?.into() } else { layer })
     })
 }
 

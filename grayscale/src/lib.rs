@@ -49,7 +49,7 @@ mod void_and_cluster;
 
 pub use column_dose::{ColumnDose, Fades, ResinDepths};
 pub use cured::{CuredLine, LineRun, PixelLine, SolidHeights, add_below, excess};
-pub use dither::{DitherError, DitherMethod, dither, dither_image, dither_passing};
+pub use dither::{DitherError, DitherMethod, dither, dither_image};
 pub use homogeneity::{EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
 pub use outline::{OutlinePiece, shared_height};
 pub use summed::SummedLine;

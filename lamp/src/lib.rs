@@ -72,6 +72,7 @@
 //!     assert_eq!((band.first_row, band.pixels, band.gap.clone()), (1, 3, Some(5..6)));
 //! });
 //! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
+//! let fixed = fixed.map(|layer| Ok::<_, lamp::Error>(layer?.decode()?));
 //! let mut build = tile(fixed, options);
 //! let Image::Mask(build) = build.next().unwrap()?.image.into_image() else { unreachable!() };
 //! assert_eq!((build.width(), build.height()), (20, 10));

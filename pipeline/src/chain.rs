@@ -116,17 +116,14 @@ impl Working<'_> {
         range: Range<u32>,
         is_end: [bool; 2],
     ) -> Result<Layers<'b>, Error> {
-        let decode = |layer: PassingLayer| Ok(layer.decode()?);
         Ok(match self {
-            Self::Fix(fixing) => Box::new(fixing.layers(layers, decode, range, |_| ())),
+            Self::Fix(fixing) => Box::new(fixing.layers(layers, range, |_| ())),
             Self::Compensate(compensating) => {
-                let decoded = layers.map(move |layer| decode(layer?));
+                let decoded = layers.map(|layer| Ok(layer?.decode()?));
                 let moved = compensating.layers::<Error>(decoded, range);
                 Box::new(moved.map(|layer| layer.map(PassingLayer::from)))
             }
-            Self::Dither(settings, watcher) => {
-                Box::new(settings.layers(layers, decode, &**watcher))
-            }
+            Self::Dither(settings, watcher) => Box::new(settings.layers(layers, &**watcher)),
             Self::Edit(editing, remarks) => {
                 let noting = |pages: Pages, path: &Path| {
                     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

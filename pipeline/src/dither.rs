@@ -1,7 +1,7 @@
 //! The stage that turns gray layers into dots.
 
 use lamp_grayscale::{DitherError, DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
-use lamp_stack::{Dpi, Layer, Length, PassingLayer};
+use lamp_stack::{Dpi, Length, PassingLayer, StackError};
 use serde::{Deserialize, Serialize};
 
 use crate::watcher::{Remark, Watcher};
@@ -26,10 +26,9 @@ impl DitherSettings {
     }
 
     /// Returns the layers as dots, and warns once if they may cure unevenly. Masks are not decoded.
-    pub fn layers<'a, E: From<DitherError> + Send + 'a>(
+    pub fn layers<'a, E: From<DitherError> + From<StackError> + Send + 'a>(
         &self,
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
-        decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync + 'a,
         watcher: &'a dyn Watcher,
     ) -> impl Iterator<Item = Result<PassingLayer, E>> + 'a {
         let mut has_warned = self.method == DitherMethod::Threshold;
@@ -42,7 +41,7 @@ impl DitherSettings {
                 watcher.remark(Remark::note(line));
             }
         });
-        lamp_grayscale::dither_passing(layers, self.method, decode)
+        lamp_grayscale::dither(layers, self.method)
     }
 }
 

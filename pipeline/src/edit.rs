@@ -6,7 +6,7 @@ use std::io::{self, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use lamp_edit::{EditError, Edits, LabelList, OtherLayers, OtherPicture, edit_passing};
+use lamp_edit::{EditError, Edits, LabelList, OtherLayers, OtherPicture};
 use lamp_stack::{
     Layer, Limits, Op, Page, PageInfo, Pages, PassingLayer, StackError, digest_of, map_in_order,
 };
@@ -154,7 +154,7 @@ impl Editing {
                 done.iter().for_each(|&edit| self.counts.borrow_mut()[edit] += 1);
             }
         };
-        Ok(edit_passing(layers, edits.clone(), others, pictures?, count))
+        Ok(lamp_edit::edit(layers, edits.clone(), others, pictures?, count))
     }
 
     /// Returns the edits, from 1, that were made in no layer so far.

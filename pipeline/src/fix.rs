@@ -4,7 +4,7 @@ use std::cell::{Ref, RefCell};
 use std::ops::Range;
 
 use lamp_fix::{FixMethod, FixOptions, Fixed};
-use lamp_stack::{Layer, PassingLayer};
+use lamp_stack::{PassingLayer, StackError};
 use serde::{Deserialize, Serialize};
 
 use crate::fix_report::FixReport;
@@ -69,14 +69,13 @@ impl Fixing {
     /// Returns the corrected layers. Layers whose pages say that all rows are good are decoded only
     /// where they lie next to others. Findings in layers of `counted` are reported, and shown to
     /// `see`.
-    pub fn layers<'a, E: Send + 'a>(
+    pub fn layers<'a, E: From<StackError> + Send + 'a>(
         &'a self,
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
-        decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync + 'a,
         counted: Range<u32>,
         mut see: impl FnMut(&Fixed<'_>) + 'a,
     ) -> impl Iterator<Item = Result<PassingLayer, E>> + 'a {
-        lamp_fix::fix_passing(layers, self.options, decode, move |fixed| {
+        lamp_fix::fix(layers, self.options, move |fixed| {
             if counted.contains(&fixed.before.info.index) {
                 see(fixed);
                 self.report.borrow_mut().add(fixed);

@@ -127,7 +127,7 @@ pub enum StackError {
         /// The sentence of that stage.
         reason: String,
     },
-    /// A file of a folder cannot be read.
+    /// A file of a folder, or a page of a stack that was named, cannot be read.
     #[error("{file}")]
     InFile {
         /// The file's name.

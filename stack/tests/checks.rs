@@ -237,7 +237,7 @@ fn a_stage_that_gives_up_says_why_to_the_next() {
 fn passed(bytes: &[u8]) -> Result<Vec<u8>, StackError> {
     let mut pages = PageWriter::new(Vec::new(), Format::Big);
     for page in Pages::from_stream(Cursor::new(bytes.to_vec()))? {
-        pages.push(PassingLayer::of_page(page?)?.into())?;
+        pages.push(PassingLayer::of_page(page?, "a.tif")?.into())?;
     }
     pages.finish()
 }

@@ -125,7 +125,8 @@ fn part_layers(
     let fixed = fix(layers, FixOptions::default(), move |fixed| {
         progress.say(&format!("{} had stray rows", fixed.before.info.name()));
     });
-    Ok(lamp_grayscale::dither(fixed, DitherMethod::default()))
+    let dots = lamp_grayscale::dither(fixed, DitherMethod::default());
+    Ok(dots.map(|layer| Ok(layer?.decode()?)))
 }
 
 /// All four stages, on a black build area.

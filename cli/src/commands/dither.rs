@@ -7,8 +7,8 @@ use lamp_pipeline::dither::DitherSettings;
 use crate::args::options::{Common, Input, Output};
 use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;
-use crate::streams::{decoding, progress};
-use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
+use crate::streams::progress;
+use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
@@ -40,10 +40,10 @@ pub(crate) struct DitherArgs {
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
-    let layers = read_passing_or_strips(&args.input, &progress)?;
+    let layers = read_stack_or_strips(&args.input, &progress)?;
     let settings = DitherSettings::from(&args.settings);
-    let dots = settings.layers(layers, decoding(&args.input), &progress);
+    let dots = settings.layers(layers, &progress);
     // Dots on ramps would be dots of each side alone.
     let by_comb = |form| StripForm { seam: Seam::Comb, ..form };
-    write_passing_or_strips(dots, &args.input, by_comb, &args.output, &progress)
+    write_stack_or_strips(dots, &args.input, by_comb, &args.output, &progress)
 }

@@ -8,7 +8,7 @@ use crate::args::options::{Common, Input, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
 use crate::streams::{
-    check_not_input, decoding, input_name, is_stream, progress, read_passing, write_passing,
+    check_not_input, input_name, is_stream, progress, read_passing, write_layers,
 };
 use crate::terminal::stack_notes::noting;
 
@@ -68,8 +68,9 @@ pub(crate) fn run(args: &EditArgs, common: &Common) -> Result<(), Exit> {
     let is_whole = [args.input.layers.is_none(); 2];
     let layers = read_passing(&args.input, &progress)?;
     let edited = editing.layers(layers, 0..u32::MAX, is_whole, &noting)?;
-    let written = write_passing(edited, decoding(&args.input), &args.output, &progress);
-    written.map_err(|error| match error {
+    write_layers(edited, &args.output, &progress).map_err(|error| match error {
+        // A page that cannot be decoded names its stack.
+        error if matches!(error.cause(), Some(EditError::Page(_))) => error,
         Exit::Failed(error) if error.is::<EditError>() => {
             Exit::Failed(error).at(input_name(&args.input.stack))
         }

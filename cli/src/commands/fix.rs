@@ -14,8 +14,8 @@ use crate::exit::Exit;
 use crate::output::band_pictures::BandPictures;
 use crate::output::endings::parse_report;
 use crate::output::json_report::JsonReport;
-use crate::streams::{check_beside, decoding, progress, unless_found};
-use crate::strip_folder::{read_passing_or_strips, write_passing_or_strips};
+use crate::streams::{check_beside, progress, unless_found};
+use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 use crate::terminal::stack_notes::doubts;
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
@@ -74,8 +74,8 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
-    let layers = read_passing_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
-    let fixed = fixing.layers(layers, decoding(&args.input), 0..u32::MAX, |fixed| {
+    let layers = read_stack_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
+    let fixed = fixing.layers(layers, 0..u32::MAX, |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
         }
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         left.filter(|_| args.strict).map(Exit::Findings)
     };
     let fixed = unless_found(fixed, finding);
-    let written = write_passing_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
+    let written = write_stack_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }

@@ -452,6 +452,10 @@ fn stack(error: &StackError) -> Option<String> {
         StackError::NotOurs | StackError::NotReplaceable { .. } => {
             "choose another name, or remove the folder yourself"
         }
+        // It is in a box, so that it is no cause of its own.
+        StackError::InFile { source, .. } if matches!(**source, StackError::Check { .. }) => {
+            return stack(source);
+        }
         // It is transparent, so that it is no cause of its own.
         StackError::Io(error) => return input_output(error),
         _ => return None,

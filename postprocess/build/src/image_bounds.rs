@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Frame, Layer, Length, Orientation, PageInfo, PassingLayer};
+use lamp_stack::{Dpi, Frame, Length, Orientation, PageInfo};
 
 /// The rectangle that a stack's images cover in the part's coordinates.
 ///
@@ -20,18 +20,9 @@ pub struct ImageBounds {
 }
 
 impl ImageBounds {
-    /// Returns the bounds of a layer. If its page does not state them, the lower left
-    /// corner is 0, 0.
-    pub fn of(layer: &Layer) -> Self {
-        Self::of_image(&layer.info, layer.dpi, [layer.image.width(), layer.image.height()])
-    }
-
-    /// Returns the bounds of a layer that need not be decoded.
-    pub fn of_passing(layer: &PassingLayer) -> Self {
-        Self::of_image(layer.info(), layer.dpi(), layer.size())
-    }
-
-    fn of_image(info: &PageInfo, dpi: Option<Dpi>, [width, height]: [u32; 2]) -> Self {
+    /// Returns the bounds of an image of that many columns and rows. If its page does not state
+    /// them, the lower left corner is 0, 0.
+    pub fn of(info: &PageInfo, dpi: Option<Dpi>, [width, height]: [u32; 2]) -> Self {
         let height_mm = dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
         let origin_mm = info.origin_mm.unwrap_or([0.0, height_mm]);
         Self { origin_mm, dpi, width, height }

@@ -51,7 +51,8 @@ fn edited(
         layers: Box::new(layers.into_iter().map(Ok)) as Box<dyn Iterator<Item = _>>,
         may_reach_beyond: [false; 2],
     });
-    edit(layers.into_iter().map(Ok), edits, others.collect(), vec![], |_, _| {}).collect()
+    let edited = edit(layers.into_iter().map(Ok), edits, others.collect(), vec![], |_, _| {});
+    edited.map(|layer| layer.and_then(|layer| Ok(layer.decode()?))).collect()
 }
 
 fn mask(layer: &Layer) -> &Mask {
@@ -67,7 +68,8 @@ fn stamped(layers: Vec<Layer>, list: &str, pages: Vec<Layer>) -> Result<Vec<Laye
     let (name, digest) = ("art/logo.png".to_owned(), "blake3:00".to_owned());
     let pictures = vec![OtherPicture { name, digest, pages }];
     let edits = Edits::from_toml(list)?;
-    edit(layers.into_iter().map(Ok), edits, vec![], pictures, |_, _| {}).collect()
+    let edited = edit(layers.into_iter().map(Ok), edits, vec![], pictures, |_, _| {});
+    edited.map(|layer| layer.and_then(|layer| Ok(layer.decode()?))).collect()
 }
 
 /// Quarters of a millimeter, so that many edges lie on centers.

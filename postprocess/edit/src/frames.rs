@@ -34,7 +34,7 @@ pub(super) fn frame_of(
     name: &str,
 ) -> Result<Frame, EditProblem> {
     let stack = name.to_owned();
-    let from = ImageBounds::of(other);
+    let from = ImageBounds::of(&other.info, other.dpi, [other.image.width(), other.image.height()]);
     if from.dpi != place.dpi {
         let (found, edited) = (from.dpi, place.dpi);
         return Err(EditProblem::OtherResolution { stack, found, edited });

@@ -46,7 +46,8 @@ use plan::EditPlan;
 /// layer's page and the indices of the edits that were made in it.
 ///
 /// Shapes and stacks lie in the part's coordinates. A pixel is in a shape if its center
-/// is, a layer in a range of heights if its middle is.
+/// is, a layer in a range of heights if its middle is. Only layers whose image an edit changes are
+/// decoded.
 ///
 /// ```
 /// use lamp_edit::{EditError, Edits, edit};
@@ -63,13 +64,13 @@ use plan::EditPlan;
 ///
 /// let layers = std::iter::once(Ok::<_, EditError>(layer));
 /// let mut edited = edit(layers, Edits::from_toml(list)?, vec![], vec![], |_, _| {});
-/// let Image::Mask(mask) = edited.next().unwrap()?.image.into_image() else { unreachable!() };
+/// let Image::Mask(mask) = edited.next().unwrap()?.decode()?.image.into_image() else { unreachable!() };
 /// assert_eq!((mask.row(2), mask.row(3)), (&[0][..], &[0, 2, 5][..]));
 /// # Ok::<(), EditError>(())
 /// ```
 ///
 /// # Errors
-/// A layer comes with an error if it cannot be read, differs in size or place from the
+/// A layer comes with an error if it cannot be read or decoded, differs in size or place from the
 /// first, or does not allow an edit. An error at the end says that a stack that was
 /// added over all heights has layers above the last.
 ///
@@ -77,27 +78,7 @@ use plan::EditPlan;
 /// Panics if there are fewer `others` or `pictures` than the edits name, or if a label's list was
 /// not [read](Edits::with_lists).
 pub fn edit<E: From<EditError> + Send>(
-    layers: impl Iterator<Item = Result<Layer, E>>,
-    edits: Edits,
-    others: Vec<OtherLayers<E>>,
-    pictures: Vec<OtherPicture<E>>,
-    done: impl FnMut(&PageInfo, &[usize]),
-) -> impl Iterator<Item = Result<Layer, E>> {
-    let passing = layers.map(|layer| layer.map(PassingLayer::from));
-    edit_passing(passing, edits, others, pictures, done)
-        .map(|layer| Ok(layer?.decode().map_err(EditError::from)?))
-}
-
-/// Makes a list of edits as [`edit`] does, and decodes only layers whose image an edit changes.
-///
-/// # Errors
-/// A layer comes with the errors of [`edit`], or with one if it cannot be decoded and must be.
-///
-/// # Panics
-/// Panics if there are fewer `others` or `pictures` than the edits name, or if a label's list was
-/// not [read](Edits::with_lists).
-pub fn edit_passing<E: From<EditError> + Send>(
-    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+    layers: impl Iterator<Item = Result<impl Into<PassingLayer>, E>>,
     edits: Edits,
     others: Vec<OtherLayers<E>>,
     mut pictures: Vec<OtherPicture<E>>,
@@ -108,7 +89,7 @@ pub fn edit_passing<E: From<EditError> + Send>(
     let mut layers = layers.fuse();
     let read = std::iter::from_fn(move || {
         let layer = match layers.next() {
-            Some(Ok(layer)) => layer,
+            Some(Ok(layer)) => layer.into(),
             Some(Err(error)) => return Some(Err(error)),
             None => return beside.left_over().err().map(Err),
         };

@@ -41,7 +41,7 @@ fn edited(before: &Mask, list: &str) -> Result<Vec<Mask>, EditError> {
     let pictures = edits.pictures().map(picture).collect();
     let layers = (0..8).map(|k| Ok(layer(k, before.clone())));
     let edited = edit(layers, edits, vec![], pictures, |_, _| {});
-    edited.map(|layer| Ok(mask(&layer?).clone())).collect()
+    edited.map(|layer| Ok(mask(&layer?.decode()?).clone())).collect()
 }
 
 fn lengths(mm: &[f64]) -> String {
@@ -242,10 +242,9 @@ fn labels_of_a_pattern_go_on_counting() {
         let (name, digest) = ("a.csv".to_owned(), "blake3:00".to_owned());
         let file = LabelList { name, digest, text: text.to_owned() };
         let edits = Edits::from_toml(&list).unwrap().with_lists(vec![file]).unwrap();
-        let layers = std::iter::once(Ok(layer(0, black())));
-        let layers: Result<Vec<Layer>, EditError> =
-            edit(layers, edits, vec![], vec![], |_, _| {}).collect();
-        layers
+        let layers = std::iter::once(Ok::<_, EditError>(layer(0, black())));
+        let edited = edit(layers, edits, vec![], vec![], |_, _| {});
+        edited.map(|layer| layer?.decode().map_err(EditError::from)).collect::<Result<Vec<_>, _>>()
     };
     assert_eq!(mask(&read("3\n4\n5\n6\n7\n8\n").unwrap()[0]), &expected[0]);
     let error = read("3\n4\n5\n").unwrap_err().to_string();
@@ -273,7 +272,7 @@ fn ten_thousand_holes_are_as_many_as_one_a_hundred_times_a_hundred() {
         let edits = Edits::from_toml(&list).unwrap();
         let layers = std::iter::once(Ok::<_, EditError>(layer.clone()));
         let edited = edit(layers, edits, vec![], vec![], |_, _| {}).next().unwrap().unwrap();
-        mask(&edited).white_pixels()
+        mask(&edited.decode().unwrap()).white_pixels()
     };
     let one = 1_000_000 - left("{ count = 1, step = [\"1mm\", \"1mm\"] }");
     let row = "{ count = 100, step = [\"10mm\", \"0mm\"] }";

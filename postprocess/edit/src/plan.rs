@@ -93,7 +93,7 @@ impl EditPlan {
         pictures: &mut [OtherPicture<E>],
     ) -> Result<Self, E> {
         let mut plan = Self {
-            place: ImageBounds::of_passing(first),
+            place: ImageBounds::of(first.info(), first.dpi(), first.size()),
             steps: Vec::new(),
             command: String::new(),
         };
@@ -150,7 +150,7 @@ impl EditPlan {
         others: &[Option<Arc<Layer>>],
     ) -> Result<(PassingLayer, Vec<usize>), EditError> {
         // The planned pixels are right in this rectangle only.
-        if ImageBounds::of_passing(&layer) != self.place {
+        if ImageBounds::of(layer.info(), layer.dpi(), layer.size()) != self.place {
             return Err(EditError::Unlike { layer: layer.info().name() });
         }
         let (mut others, mut done) = (others.iter(), Vec::new());

@@ -64,11 +64,11 @@ fn layer(index: u32, mask: Mask) -> Layer {
     Layer { info, dpi: None, image: mask.into() }
 }
 
-fn fixed(layers: Vec<Layer>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
+fn fixed(layers: Vec<impl Into<PassingLayer>>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
     let mut found = Vec::new();
-    let layers = layers.into_iter().map(Ok::<_, ()>);
+    let layers = layers.into_iter().map(Ok::<_, StackError>);
     let fixed = fix(layers, options, |fixed| found.extend_from_slice(fixed.bands));
-    (fixed.map(Result::unwrap).collect::<Vec<_>>(), found)
+    (fixed.map(|layer| layer.unwrap().decode().unwrap()).collect(), found)
 }
 
 fn fixed_mask(mask: &Mask, options: FixOptions) -> (Mask, Vec<Band>) {
@@ -504,7 +504,7 @@ fn passing(layers: &[Layer]) -> Vec<PassingLayer> {
     let mut pages = PageWriter::new(Vec::new(), Format::Big);
     layers.iter().for_each(|layer| pages.push(EncodedPage::new(layer)).unwrap());
     let pages = Pages::from_stream(Cursor::new(pages.finish().unwrap())).unwrap();
-    pages.map(|page| PassingLayer::of_page(page.unwrap()).unwrap()).collect()
+    pages.map(|page| PassingLayer::of_page(page.unwrap(), "").unwrap()).collect()
 }
 
 proptest! {
@@ -514,11 +514,7 @@ proptest! {
     ) {
         let options = FixOptions { use_neighbours, min_confidence: 0.0, ..FixOptions::default() };
         let (expected, bands) = fixed(layers.clone(), options);
-        let mut found = Vec::new();
-        let decode = |layer: PassingLayer| Ok::<_, ()>(layer.decode().unwrap());
-        let passed = passing(&layers).into_iter().map(Ok);
-        let passed = fix_passing(passed, options, decode, |fixed| found.extend_from_slice(fixed.bands));
-        let passed: Vec<_> = passed.map(|layer| decode(layer.unwrap()).unwrap()).collect();
+        let (passed, found) = fixed(passing(&layers), options);
         prop_assert_eq!(passed, expected);
         prop_assert_eq!(found, bands);
     }

@@ -26,8 +26,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lamp_stack::{
-    FixRecord, FixedBand, GrayMask, Image, Layer, Mask, MaskBuilder, PassingLayer, map_in_order,
-    white_in_row,
+    FixRecord, FixedBand, GrayMask, Image, Layer, Mask, MaskBuilder, PassingLayer, StackError,
+    map_in_order, white_in_row,
 };
 
 pub use band::{Band, BandKind, BandKinds, BandOutcome};
@@ -113,7 +113,8 @@ pub struct Fixed<'a> {
 /// Corrects the stray rows of each layer and calls `report` for each layer that has some.
 ///
 /// The page of a changed layer lists the corrections under `fix` and no longer lists the
-/// corrected rows as stray. All other layers pass unchanged.
+/// corrected rows as stray. All other layers pass unchanged. Layers whose pages say that all rows are
+/// good are decoded only where they lie next to others.
 ///
 /// In gray layers the exposed pixels, whatever their level, are corrected as in a mask. Levels
 /// along a rebuilt edge come from a good row next to it.
@@ -124,52 +125,31 @@ pub struct Fixed<'a> {
 ///
 /// ```
 /// use lamp_fix::{BandOutcome, FixOptions, fix};
-/// use lamp_stack::{Image, Layer, Mask, PageInfo};
+/// use lamp_stack::{Image, Layer, Mask, PageInfo, StackError};
 ///
 /// // Row 1 missed its second crossing and is white up to the image's edge.
 /// let stray = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5])?;
 /// let layer = Layer { info: PageInfo::default(), dpi: None, image: stray.into() };
-/// let layers = std::iter::once(Ok::<_, std::io::Error>(layer));
+/// let layers = std::iter::once(Ok::<_, StackError>(layer));
 ///
 /// let mut fixed = fix(layers, FixOptions::default(), |fixed| {
 ///     assert_eq!(fixed.bands[0].first_row, 1);
 ///     assert_eq!(fixed.bands[0].outcome, BandOutcome::Corrected);
 /// });
-/// let Image::Mask(mask) = fixed.next().unwrap()?.image.into_image() else { unreachable!() };
+/// let Image::Mask(mask) = fixed.next().unwrap()?.decode()?.image.into_image() else { unreachable!() };
 /// assert_eq!(mask.row(1), [2, 5]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn fix<E: Send>(
-    layers: impl Iterator<Item = Result<Layer, E>>,
-    options: FixOptions,
-    report: impl FnMut(&Fixed<'_>),
-) -> impl Iterator<Item = Result<Layer, E>> {
-    let decoded = layers.map(|layer| layer.map(PassingLayer::from));
-    fix_decoded(decoded, options, report)
-        .map(|layer| Ok(layer?.decode().expect("decoded layers stay decoded")))
-}
-
-/// Corrects stray rows as [`fix`] does. Layers whose pages say that all rows are good are decoded,
-/// by `decode`, only where they lie next to others.
 ///
 /// # Errors
-/// Returns the errors of `layers` and of `decode`.
-pub fn fix_passing<E: Send>(
-    layers: impl Iterator<Item = Result<PassingLayer, E>>,
-    options: FixOptions,
-    decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,
-    report: impl FnMut(&Fixed<'_>),
-) -> impl Iterator<Item = Result<PassingLayer, E>> {
-    fix_decoded(decode_unsettled(layers, decode), options, report)
-}
-
-/// Corrects the stray rows of the layers that are decoded.
-fn fix_decoded<E: Send>(
-    layers: impl Iterator<Item = Result<PassingLayer, E>>,
+/// Returns the errors of `layers` and of decoding them.
+pub fn fix<E: From<StackError> + Send>(
+    layers: impl Iterator<Item = Result<impl Into<PassingLayer>, E>>,
     options: FixOptions,
     mut report: impl FnMut(&Fixed<'_>),
 ) -> impl Iterator<Item = Result<PassingLayer, E>> {
-    let fixed = map_in_order(windows(layers), move |window| {
+    let layers = layers.map(|layer| layer.map(Into::into));
+    let fixed = map_in_order(windows(decode_unsettled(layers)), move |window| {
         let (layer, bands) = match window.layer.as_decoded() {
             Some(layer) => fix_layer(layer, &window.neighbours(), &options),
             None => (None, Vec::new()),

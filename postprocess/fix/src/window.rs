@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lamp_stack::{Layer, MemorySize, PassingLayer, map_in_order};
+use lamp_stack::{Layer, MemorySize, PassingLayer, StackError, map_in_order};
 
 /// How many layers below and above a layer [`fix`](super::fix) looks at, at most.
 ///
@@ -105,9 +105,8 @@ pub(super) fn is_settled(layer: &PassingLayer) -> bool {
 }
 
 /// Decodes the layers that are to be looked at, and the layers below and above them.
-pub(super) fn decode_unsettled<E: Send>(
+pub(super) fn decode_unsettled<E: From<StackError> + Send>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
-    decode: impl Fn(PassingLayer) -> Result<Layer, E> + Sync,
 ) -> impl Iterator<Item = Result<PassingLayer, E>> {
     let reach = FIX_REACH as usize;
     let mut layers = layers.fuse();
@@ -127,6 +126,6 @@ pub(super) fn decode_unsettled<E: Send>(
         Some(layer.map(|layer| (layer, is_looked_at)))
     });
     map_in_order(needed, move |(layer, is_looked_at)| {
-        Ok(if is_looked_at { decode(layer)?.into() } else { layer })
+        Ok(if is_looked_at { layer.decode()?.into() } else { layer })
     })
 }

@@ -8,14 +8,13 @@
 //! cargo test --release -p lamp-fix --test fins -- --ignored --nocapture
 //! ```
 
-use std::convert::Infallible;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Facet, Mesh, SplitMix};
 use lamp_slicer::{GridRule, Part, Shading, SliceOptions, Slices};
-use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, white_in_row};
+use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, StackError, white_in_row};
 
 /// A pixel at 300 dpi, in mm.
 const PIXEL_MM: f64 = 25.4 / 300.0;
@@ -191,9 +190,9 @@ fn sliced(mesh: &Mesh, options: &SliceOptions) -> (Vec<Layer>, GridRule) {
 }
 
 fn fixed(layers: &[Layer]) -> Vec<Layer> {
-    let layers = layers.iter().cloned().map(Ok::<_, Infallible>);
-    let Ok(fixed) = fix(layers, FixOptions::default(), |_| ()).collect();
-    fixed
+    let layers = layers.iter().cloned().map(Ok::<_, StackError>);
+    let fixed = fix(layers, FixOptions::default(), |_| ());
+    fixed.map(|layer| layer?.decode()).collect::<Result<_, _>>().unwrap()
 }
 
 fn differing(a: &[u32], b: &[u32]) -> Vec<u32> {

@@ -22,8 +22,8 @@ pub enum Destination {
     Stream(Box<dyn Write>),
 }
 
-/// Writes layers, or [layers that pass](crate::PassingLayer), as a stack, encoding them on all
-/// threads.
+/// Writes layers, [decoded](crate::Layer) or [not](crate::PassingLayer), as a stack, encoding them
+/// on all threads.
 ///
 /// # Errors
 /// Returns the first error among the layers, or an error if writing fails. No file then

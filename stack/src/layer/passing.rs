@@ -1,4 +1,4 @@
-//! Defines layers that pass from one stack to another, decoded only where their image is needed.
+//! Defines layers whose pages are decoded only where their image is needed.
 
 use crate::codec::tiff::{EncodedPage, Page, PassedCode};
 use crate::error::StackError;
@@ -9,7 +9,8 @@ use crate::layer::page_info::PageInfo;
 use crate::length::Dpi;
 use crate::ordered::MemorySize;
 
-/// A layer on its way to another stack: decoded, or as its page has it.
+/// A layer on its way to another stack: decoded, or as its page has it. Stages take either, so that
+/// a caller with whole layers hands them over as they are.
 ///
 /// A page passes as it is if its code is the one that its check was made of, as stages write it: then
 /// its image is that, too. Any other page is decoded, and its image is checked.
@@ -25,7 +26,7 @@ use crate::ordered::MemorySize;
 /// let layers = std::iter::once(Ok::<_, StackError>(layer));
 /// write_stack(layers, Destination::File(from.clone()), Format::Big)?;
 ///
-/// let pages = Pages::open(&from)?.map(|page| PassingLayer::of_page(page?));
+/// let pages = Pages::open(&from)?.map(|page| PassingLayer::of_page(page?, "a.tif"));
 /// write_stack(pages, Destination::File(to.clone()), Format::Big)?;
 /// assert_eq!(std::fs::read(from)?, std::fs::read(to)?);
 /// # Ok(())
@@ -37,18 +38,19 @@ pub struct PassingLayer(State);
 #[derive(Clone, Debug)]
 enum State {
     Decoded(Box<Layer>),
-    /// The page's code is the one that was written.
-    Coded(Box<Page>, PassedCode),
+    /// The page's code is the one that was written. The text names the page's stack.
+    Coded(Box<Page>, PassedCode, Box<str>),
 }
 
 impl PassingLayer {
-    /// Creates a layer from a page, which is decoded if it cannot pass as it is.
+    /// Creates a layer from a page, which is decoded if it cannot pass as it is. `stack` is the name
+    /// for the errors of decoding it later.
     ///
     /// # Errors
     /// Returns the errors of [`Page::decode`], of pages that are decoded.
-    pub fn of_page(page: Page) -> Result<Self, StackError> {
+    pub fn of_page(page: Page, stack: &str) -> Result<Self, StackError> {
         Ok(Self(match page.passed() {
-            Some(passed) => State::Coded(Box::new(page), passed),
+            Some(passed) => State::Coded(Box::new(page), passed, stack.into()),
             None => State::Decoded(Box::new(page.decode()?)),
         }))
     }
@@ -57,7 +59,7 @@ impl PassingLayer {
     pub fn info(&self) -> &PageInfo {
         match &self.0 {
             State::Decoded(layer) => &layer.info,
-            State::Coded(page, _) => page.info(),
+            State::Coded(page, ..) => page.info(),
         }
     }
 
@@ -65,7 +67,7 @@ impl PassingLayer {
     pub fn info_mut(&mut self) -> &mut PageInfo {
         match &mut self.0 {
             State::Decoded(layer) => &mut layer.info,
-            State::Coded(page, _) => page.info_mut(),
+            State::Coded(page, ..) => page.info_mut(),
         }
     }
 
@@ -73,7 +75,7 @@ impl PassingLayer {
     pub fn dpi(&self) -> Option<Dpi> {
         match &self.0 {
             State::Decoded(layer) => layer.dpi,
-            State::Coded(page, _) => page.dpi(),
+            State::Coded(page, ..) => page.dpi(),
         }
     }
 
@@ -81,7 +83,7 @@ impl PassingLayer {
     pub fn size(&self) -> [u32; 2] {
         match &self.0 {
             State::Decoded(layer) => [layer.image.width(), layer.image.height()],
-            State::Coded(page, _) => page.size(),
+            State::Coded(page, ..) => page.size(),
         }
     }
 
@@ -89,7 +91,7 @@ impl PassingLayer {
     pub fn is_gray(&self) -> bool {
         match &self.0 {
             State::Decoded(layer) => matches!(*layer.image, Image::Gray(_)),
-            State::Coded(page, _) => page.is_gray(),
+            State::Coded(page, ..) => page.is_gray(),
         }
     }
 
@@ -97,7 +99,7 @@ impl PassingLayer {
     pub fn rows_end_black(&self) -> bool {
         match &self.0 {
             State::Decoded(layer) => rows_that_end_white(&layer.image) == 0,
-            State::Coded(_, passed) => passed.code.ends_white == 0,
+            State::Coded(_, passed, _) => passed.code.ends_white == 0,
         }
     }
 
@@ -112,11 +114,15 @@ impl PassingLayer {
     /// Decodes the layer.
     ///
     /// # Errors
-    /// Returns the errors of [`Page::decode`], unless it is decoded already.
+    /// Returns the errors of [`Page::decode`], in the stack that was named, unless the layer is
+    /// decoded already.
     pub fn decode(self) -> Result<Layer, StackError> {
         match self.0 {
             State::Decoded(layer) => Ok(*layer),
-            State::Coded(page, _) => page.decode(),
+            State::Coded(page, _, file) => page.decode().map_err(|source| StackError::InFile {
+                file: file.into(),
+                source: Box::new(source),
+            }),
         }
     }
 }
@@ -131,7 +137,7 @@ impl From<PassingLayer> for EncodedPage {
     fn from(layer: PassingLayer) -> Self {
         match layer.0 {
             State::Decoded(layer) => Self::new(&layer),
-            State::Coded(page, passed) => Self::passed(*page, passed),
+            State::Coded(page, passed, _) => Self::passed(*page, passed),
         }
     }
 }
@@ -140,7 +146,7 @@ impl MemorySize for PassingLayer {
     fn bytes(&self) -> usize {
         match &self.0 {
             State::Decoded(layer) => layer.bytes(),
-            State::Coded(page, _) => page.bytes(),
+            State::Coded(page, ..) => page.bytes(),
         }
     }
 }

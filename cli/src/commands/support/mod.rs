@@ -139,7 +139,10 @@ impl SupportArgs {
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
         Ok(match supports(&plans).next() {
             None => Box::new(layers),
-            Some(_) => Box::new(edit(layers, Edits::from_toml(&plan)?, vec![], vec![], |_, _| {})),
+            Some(_) => {
+                let edited = edit(layers, Edits::from_toml(&plan)?, vec![], vec![], |_, _| {});
+                Box::new(edited.map(|layer| Ok(layer?.decode()?)))
+            }
         })
     }
 

@@ -159,7 +159,8 @@ impl Swaths {
         if start > 0 {
             let height = layer.image.height();
             let frame = Frame { left: start.into(), top: 0, width: self.mirrors, height };
-            frame_page(&mut info, frame, &ImageBounds::of(layer).framed(frame));
+            let bounds = ImageBounds::of(&info, layer.dpi, [layer.image.width(), height]);
+            frame_page(&mut info, frame, &bounds.framed(frame));
         }
         let bits = if matches!(*layer.image, Image::Mask(_)) { 1 } else { 8 };
         let columns = [start, end];
