@@ -21,7 +21,7 @@ use lamp_stack::{Frame, Length, Orientation, Size, one_line};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::layout::RequestedPlacement;
+use super::placed::RequestedPlacement;
 use super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 
 /// A layout as a file has it.

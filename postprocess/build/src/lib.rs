@@ -28,6 +28,7 @@ mod pack;
 mod page_frame;
 mod part_stack;
 mod pixel_size;
+mod placed;
 mod recipe;
 mod strips;
 #[cfg(test)]

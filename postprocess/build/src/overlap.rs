@@ -4,14 +4,14 @@ use std::collections::HashMap;
 
 use lamp_stack::{Frame, Length, Mask, white_runs};
 
-use super::{CopyName, CopyPlacement, Layout, pack};
+use super::{CopyName, CopyPlacement, Layout};
 use lamp_offset::offset_one_bit;
 
 impl Layout {
     /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.
     pub fn nearer_than(&self, gap: Length) -> Vec<[CopyName; 2]> {
         let silhouettes = self.silhouettes();
-        let margin = pack::pixels_across(gap, self);
+        let margin = self.pixels_across(gap);
         let grown: HashMap<_, Mask> =
             silhouettes.iter().map(|(key, mask)| (*key, grown_by(mask, margin))).collect();
         let numbers: Vec<u32> = self.numbers().collect();

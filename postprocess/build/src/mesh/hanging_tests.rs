@@ -4,7 +4,7 @@ use lamp_stack::{Image, Layer, Length, Mask, Op};
 use proptest::prelude::*;
 
 use super::super::testing::{layer, mask_of};
-use super::super::{Layout, PartStack};
+use super::super::{Layout, PartStack, TileError};
 use super::mesh_tests::{AREA, blobs, built, drawn_alone, free, layout, mask, mesh, pixels, place};
 use super::{CellShape, MeshOptions, Moat};
 
@@ -101,7 +101,7 @@ proptest! {
         let [a, b] = places.map(|(x, y, turn, mirror)| (0, x, y, 90 * turn, mirror));
         let copies = [a, (b.0, b.1 + 30, b.2, b.3, b.4)];
         let Some(layout) = layout(&images[..1], &copies, "70x60mm") else { return Ok(()) };
-        let outline = PartStack::of_outline("p0", layers_of(&images).into_iter().map(Ok::<_, super::TileError>));
+        let outline = PartStack::of_outline("p0", layers_of(&images).into_iter().map(Ok::<_, TileError>));
         let whole = layout.parts[0].frame();
         let mut layout = layout;
         layout.parts[0] = outline.unwrap().unwrap().on(whole);

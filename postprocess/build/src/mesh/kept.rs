@@ -4,10 +4,10 @@ use lamp_stack::{Image, Mask, Op, place_row};
 
 use super::super::compose::{PlacedImage, merge_rows};
 use super::super::part_stack::white_of;
-use super::super::{Layout, PixelSize};
-use super::mesh_rows::MeshRows;
+use super::super::{Layout, PartStack, PixelSize};
+use super::mesh_rows::{MeshRows, cut};
 use super::pieces::{Hanging, Holds, hanging};
-use super::{BuildMesh, Moat, cut};
+use super::{BuildMesh, Moat};
 
 /// The mesh of the layer that was made last.
 pub(crate) struct KeptMesh {
@@ -29,7 +29,7 @@ pub(crate) struct KeptMesh {
 impl KeptMesh {
     /// Starts with a mesh around parts that are black.
     pub(crate) fn new(mesh: &BuildMesh, layout: &Layout) -> Self {
-        let black = |part: &super::PartStack| {
+        let black = |part: &PartStack| {
             let frame = part.frame();
             Mask::black(frame.width, frame.height)
         };

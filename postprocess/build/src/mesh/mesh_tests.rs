@@ -6,7 +6,7 @@ use lamp_stack::{GrayMask, Image, Layer, Length, Mask, MaskBuilder, Size, StackI
 use proptest::prelude::*;
 
 use super::super::testing::{layer, mask_of};
-use super::super::{HeightOptions, LayoutFile, Pack, PartStack, Turns};
+use super::super::{HeightOptions, Layout, LayoutFile, Pack, PartStack, TileError, Turns};
 use super::*;
 
 /// Millimeters, which are pixels here.

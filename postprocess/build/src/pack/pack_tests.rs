@@ -151,7 +151,7 @@ fn outlines_in_cells_are_no_nearer() {
     let grown = layout.silhouettes();
     for (k, one) in layout.placements().iter().enumerate() {
         for other in &layout.placements()[..k] {
-            let edge = |at: &super::CopyPlacement| {
+            let edge = |at: &CopyPlacement| {
                 let mask = &grown[&(at.part, at.turn)];
                 let rows = (0..mask.height()).filter(|&row| !mask.row(row).is_empty());
                 rows.flat_map(|row| {

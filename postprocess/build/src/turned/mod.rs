@@ -9,7 +9,7 @@ mod outline;
 
 use lamp_stack::{Length, Size};
 
-use super::pack::{self, Pack, Turns};
+use super::pack::{Pack, Turns, pack_turned};
 use super::{CopyPlacement, Layout, PartStack, TileError};
 use outline::ImageTurn;
 
@@ -97,8 +97,8 @@ impl TurnedPlan {
             }
         }
         let mut layout = Layout::empty(all, area)?;
-        let gap_pixels = pack::pixels_across(gap, &layout);
-        match pack::pack_turned(&layout, counts, gap_pixels, pack, &stacks) {
+        let gap_pixels = layout.pixels_across(gap);
+        match pack_turned(&layout, counts, gap_pixels, pack, &stacks) {
             Ok(placements) if placements.len() > plain_copies => layout.placements = placements,
             Err(error) if plain.is_err() => return Err(error),
             _ => return Ok(Self::of_plain(plain?)),
