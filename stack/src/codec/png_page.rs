@@ -10,7 +10,7 @@ use crate::error::{PageFault, UnsupportedFeature};
 use crate::image::Image;
 use crate::image::gray::GrayMask;
 use crate::image::mask::Mask;
-use crate::layer::check::Line;
+use crate::layer::check::PageLine;
 use crate::layer::page_info::PageInfo;
 use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
@@ -30,7 +30,7 @@ pub(crate) struct Header {
     pub(crate) height: u32,
     pub(crate) gray: bool,
     pub(crate) dpi: Option<Dpi>,
-    pub(crate) line: Option<Line>,
+    pub(crate) line: Option<PageLine>,
 }
 
 impl From<png::DecodingError> for PictureFault {
@@ -54,7 +54,7 @@ pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFaul
             return Err(PictureFault::Rectangular(sides));
         }
     }
-    let mut line = description(info).and_then(|text| Line::parse(text.as_bytes()));
+    let mut line = description(info).and_then(|text| PageLine::parse(text.as_bytes()));
     Ok(Header {
         width: info.width,
         height: info.height,

@@ -14,7 +14,7 @@ use crate::files::temporary::FolderBeside;
 use crate::image::Image;
 use crate::image::gray::gray_runs;
 use crate::layer::Layer;
-use crate::layer::check::{Chain, OpenLine};
+use crate::layer::check::{CheckChain, OpenLine};
 use crate::length::Dpi;
 use crate::ordered::map_in_order;
 
@@ -46,7 +46,7 @@ where
 /// # Errors
 /// Returns an error if the image has no pixels.
 pub fn png_of_layer(layer: &Layer) -> Result<Vec<u8>, StackError> {
-    Ok(PngPage::new(layer)?.bytes(&mut Chain::default(), true))
+    Ok(PngPage::new(layer)?.bytes(&mut CheckChain::default(), true))
 }
 
 /// A layer encoded as a PNG without its line, which depends on the pages before it.
@@ -75,7 +75,7 @@ impl PageFile for PngPage {
     }
 
     /// Returns the PNG with its line in a chunk after the header.
-    fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
+    fn bytes(&self, chain: &mut CheckChain, is_last: bool) -> Vec<u8> {
         let line = chain.close(&self.line, is_last);
         let body = [b"tEXt", DESCRIPTION.as_bytes(), &[0], line.as_bytes()].concat();
         // The length counts the data alone, the CRC covers the type, too (PNG, section 5.3).
@@ -183,9 +183,9 @@ fn write_picture(
 /// Encodes a PNG, and returns the failure of its writer as it is.
 fn noting_failures<W: Write>(
     out: W,
-    encode: impl FnOnce(&mut Noting<W>) -> Result<(), EncodingError>,
+    encode: impl FnOnce(&mut ErrorKeepingWriter<W>) -> Result<(), EncodingError>,
 ) -> io::Result<()> {
-    let mut out = Noting { out, failed: None };
+    let mut out = ErrorKeepingWriter { out, failed: None };
     let written = encode(&mut out);
     written.map_err(io::Error::from).and_then(|()| out.flush()).map_err(|error| match out.failed {
         Some(kind) => io::Error::new(kind, error.to_string()),
@@ -222,12 +222,12 @@ fn line(layer: &Layer) -> OpenLine {
 }
 
 /// A writer that keeps the I/O error, which the encoder's own errors do not contain.
-struct Noting<W> {
+struct ErrorKeepingWriter<W> {
     out: W,
     failed: Option<io::ErrorKind>,
 }
 
-impl<W: Write> Write for Noting<W> {
+impl<W: Write> Write for ErrorKeepingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.out.write(bytes).inspect_err(|error| self.failed = Some(error.kind()))
     }
@@ -241,7 +241,7 @@ impl<W: Write> Write for Noting<W> {
 mod tests {
     use super::*;
     use crate::codec::png_page;
-    use crate::layer::check::Line;
+    use crate::layer::check::PageLine;
     use crate::{Limits, Mask, PageInfo, StackInfo};
 
     fn layer(dpi: f64, part: &str) -> Layer {
@@ -259,7 +259,7 @@ mod tests {
     }
 
     fn line_of_file(layer: &Layer) -> String {
-        Chain::default().close(&line(layer), true)
+        CheckChain::default().close(&line(layer), true)
     }
 
     #[test]
@@ -267,7 +267,7 @@ mod tests {
         let layer = layer(1500.0, "Лопатка 葉 🔥 é");
         let line = line_of_file(&layer);
         assert!(line.is_ascii());
-        assert_eq!(Line::parse(line.as_bytes()).unwrap().info, layer.info);
+        assert_eq!(PageLine::parse(line.as_bytes()).unwrap().info, layer.info);
     }
 
     #[test]

@@ -38,14 +38,14 @@ pub struct IndexedStack {
     headers: Vec<PageHeader>,
     end: Option<StackError>,
     notes: Vec<StackNote>,
-    source: Source,
+    source: IndexedSource,
 }
 
 #[derive(Debug)]
-enum Source {
+enum IndexedSource {
     File(Box<FileSource>),
     /// The files of a folder.
-    Folder(Vec<(PathBuf, Stamp)>),
+    Folder(Vec<(PathBuf, FileStamp)>),
 }
 
 #[derive(Debug)]
@@ -53,7 +53,7 @@ struct FileSource {
     reader: Mutex<PageReader>,
     /// The same file, to look at while another thread reads.
     file: File,
-    stamp: Stamp,
+    stamp: FileStamp,
     /// Where the reader finds the pages.
     places: Vec<u64>,
 }
@@ -73,10 +73,10 @@ impl IndexedStack {
                     PagePlace::Offset(_) => None,
                 });
                 let stamped = files.map(|file| {
-                    let stamp = Stamp::of(&fs::metadata(&file)?);
+                    let stamp = FileStamp::of(&fs::metadata(&file)?);
                     Ok((file, stamp))
                 });
-                Ok(Source::Folder(stamped.collect::<Result<_, StackError>>()?))
+                Ok(IndexedSource::Folder(stamped.collect::<Result<_, StackError>>()?))
             });
         }
         Self::from_file(File::open(path)?)
@@ -87,7 +87,7 @@ impl IndexedStack {
     /// # Errors
     /// Returns an error if not even the first page can be read.
     pub fn from_file(file: File) -> Result<Self, StackError> {
-        let stamp = Stamp::of(&file.metadata()?);
+        let stamp = FileStamp::of(&file.metadata()?);
         // The file may have been read before it came here.
         (&file).rewind()?;
         Self::read(Pages::from_file(file.try_clone()?)?, |places| {
@@ -99,13 +99,13 @@ impl IndexedStack {
             (&file).rewind()?;
             let reader = Mutex::new(PageReader::from_file(file.try_clone()?)?);
             let places = places.collect();
-            Ok(Source::File(Box::new(FileSource { reader, file, stamp, places })))
+            Ok(IndexedSource::File(Box::new(FileSource { reader, file, stamp, places })))
         })
     }
 
     fn read(
         pages: Pages,
-        source: impl FnOnce(Vec<PagePlace>) -> Result<Source, StackError>,
+        source: impl FnOnce(Vec<PagePlace>) -> Result<IndexedSource, StackError>,
     ) -> Result<Self, StackError> {
         let mut pages = pages.without_images();
         let (mut headers, mut places, mut end) = (Vec::new(), Vec::new(), None);
@@ -162,14 +162,14 @@ impl IndexedStack {
         let before = position.checked_sub(1).map(|before| self.headers[before].info.index);
         let number = position as u32;
         match &self.source {
-            Source::File(source) => {
+            IndexedSource::File(source) => {
                 source.stamp.check(&source.file.metadata()?)?;
                 // A reader that panicked is sent to an offset, too.
                 let mut reader = source.reader.lock().unwrap_or_else(PoisonError::into_inner);
                 reader.number_from(number, before);
                 reader.at_place(source.places[position])?.ok_or(StackError::Changed)
             }
-            Source::Folder(files) => {
+            IndexedSource::Folder(files) => {
                 let (path, stamp) = &files[position];
                 let file = File::open(path)?;
                 // The open file counts: its name may be another file's by now.
@@ -193,12 +193,12 @@ impl IndexedStack {
 
 /// The facts that show whether a file was written to.
 #[derive(Debug, PartialEq)]
-struct Stamp {
+struct FileStamp {
     bytes: u64,
     modified: Option<SystemTime>,
 }
 
-impl Stamp {
+impl FileStamp {
     fn of(file: &Metadata) -> Self {
         Self { bytes: file.len(), modified: file.modified().ok() }
     }

@@ -89,7 +89,7 @@ where
     F: Fn(&Path, StackNote) + Send + Sync + 'static,
 {
     let stack = survey(&stacks)?;
-    let pages = Joined::new(stacks, stack, Arc::new(listener));
+    let pages = JoinedPages::new(stacks, stack, Arc::new(listener));
     Ok(map_in_order(pages, |(page, origin): (Page, PageOrigin)| {
         let mut layer = page.decode().map_err(|source| in_stack(&origin.path, source))?;
         layer.info.stack = origin.stack;
@@ -157,7 +157,7 @@ fn facts(layer: &Layer) -> [(&'static str, String); 5] {
 }
 
 /// The pages of the stacks, one stack after the other.
-pub(crate) struct Joined {
+pub(crate) struct JoinedPages {
     stacks: std::vec::IntoIter<PathBuf>,
     /// Whether pages are read with their images.
     images: bool,
@@ -178,7 +178,7 @@ pub(crate) struct PageOrigin {
     pub(crate) stack: Option<StackInfo>,
 }
 
-impl Joined {
+impl JoinedPages {
     /// Starts with the first page, which carries `stack`.
     pub(crate) fn new(
         stacks: Vec<PathBuf>,
@@ -229,7 +229,7 @@ impl Joined {
     }
 }
 
-impl Iterator for Joined {
+impl Iterator for JoinedPages {
     type Item = Result<(Page, PageOrigin), JoinError>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -4,7 +4,7 @@ use std::io;
 
 use crate::error::StackError;
 use crate::files::temporary::FolderBeside;
-use crate::layer::check::Chain;
+use crate::layer::check::CheckChain;
 
 /// An encoded page that becomes a file of its own.
 pub(crate) trait PageFile {
@@ -12,19 +12,19 @@ pub(crate) trait PageFile {
     fn name(&self) -> String;
 
     /// Returns the file's bytes. The page is one of several that `chain` runs through.
-    fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8>;
+    fn bytes(&self, chain: &mut CheckChain, is_last: bool) -> Vec<u8>;
 }
 
 /// A folder of pages that is being written. One page is held back, because the last one says so.
 pub(crate) struct PageFolder<P> {
     folder: FolderBeside,
-    chain: Chain,
+    chain: CheckChain,
     held: Option<P>,
 }
 
 impl<P: PageFile> PageFolder<P> {
     pub(crate) fn new(folder: FolderBeside) -> Self {
-        Self { folder, chain: Chain::default(), held: None }
+        Self { folder, chain: CheckChain::default(), held: None }
     }
 
     /// Adds a page.

@@ -45,16 +45,16 @@ impl PageFiles {
                 Some(_) if entry.path().metadata().is_ok_and(|it| !it.is_file()) => {
                     return Err(StackError::NoFile { name: one_line(&name) });
                 }
-                Some(format) => pages.push(Picture::new(entry.path(), name, format)),
+                Some(format) => pages.push(PictureFile::new(entry.path(), name, format)),
             }
         }
-        let is_usual = |page: &Picture| matches!(page.format, "TIFF" | "PNG");
+        let is_usual = |page: &PictureFile| matches!(page.format, "TIFF" | "PNG");
         // Next to TIFF and PNG pages, pictures in other formats are previews and the like.
         if pages.iter().any(is_usual) {
             pictures.extend(pages.extract_if(.., |page| !is_usual(page)).map(|page| page.name));
         }
         read_fractions(&mut pages);
-        pages.sort_by(Picture::order);
+        pages.sort_by(PictureFile::order);
         let forms = keep_numbered(&mut pages, &mut pictures)?;
         if let Some(pair) = pages.windows(2).find(|pair| pair[0].format != pair[1].format) {
             let mut formats = [pair[0].format, pair[1].format];
@@ -88,7 +88,7 @@ fn page_format(file: &Path) -> Option<&'static str> {
 }
 
 /// A picture in a folder.
-struct Picture {
+struct PictureFile {
     path: PathBuf,
     name: String,
     format: &'static str,
@@ -131,7 +131,7 @@ impl Number {
     }
 }
 
-impl Picture {
+impl PictureFile {
     fn new(path: PathBuf, name: String, format: &'static str) -> Self {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let (mut texts, mut numbers) = (vec![String::new()], Vec::<Number>::new());
@@ -179,8 +179,8 @@ impl Picture {
 
 /// Joins numbers with their fractions, unless the digits after the points count on as whole
 /// numbers do: in `1.9` and `1.10`, a fraction would not need its zero.
-fn read_fractions(pages: &mut [Picture]) {
-    let points = |page: &Picture| {
+fn read_fractions(pages: &mut [PictureFile]) {
+    let points = |page: &PictureFile| {
         let next = |&i: &usize| page.point(i + 1);
         std::iter::successors(page.point(0), next).collect::<Vec<_>>()
     };
@@ -200,8 +200,8 @@ fn read_fractions(pages: &mut [Picture]) {
 }
 
 /// Returns the pages of the form that most names have: they differ in numbers alone.
-fn largest_form(pages: &[Picture]) -> Vec<&Picture> {
-    let mut forms: BTreeMap<&[String], Vec<&Picture>> = BTreeMap::new();
+fn largest_form(pages: &[PictureFile]) -> Vec<&PictureFile> {
+    let mut forms: BTreeMap<&[String], Vec<&PictureFile>> = BTreeMap::new();
     for page in pages {
         forms.entry(&page.texts).or_default().push(page);
     }
@@ -213,10 +213,10 @@ fn largest_form(pages: &[Picture]) -> Vec<&Picture> {
 /// have none, and pictures with another form of name and another size. Returns a doubt if names of
 /// several forms remain.
 fn keep_numbered(
-    pages: &mut Vec<Picture>,
+    pages: &mut Vec<PictureFile>,
     others: &mut Vec<String>,
 ) -> Result<Option<StackNote>, StackError> {
-    let has_number = |page: &Picture| !page.numbers.is_empty();
+    let has_number = |page: &PictureFile| !page.numbers.is_empty();
     let numbered = pages.iter().filter(|page| has_number(page)).count();
     if numbered == 0 {
         return Ok(None);
@@ -224,7 +224,7 @@ fn keep_numbered(
     if 2 * numbered >= pages.len() {
         others.extend(pages.extract_if(.., |page| !has_number(page)).map(|page| page.name));
     }
-    let is_twice = |pair: &&[Picture]| {
+    let is_twice = |pair: &&[PictureFile]| {
         has_number(&pair[0]) && pair[0].order(&pair[1]).is_eq() && pair[0].format == pair[1].format
     };
     // In order, pages of one number are neighbors.
@@ -236,16 +236,17 @@ fn keep_numbered(
         return Ok(None);
     }
     let texts = form[0].texts.clone();
-    let of_form = |page: &Picture| page.texts == texts;
+    let of_form = |page: &PictureFile| page.texts == texts;
     if form.len() > 1 {
         let size = form[0].size();
         // A picture that cannot be read stays, for reading it says why.
-        let is_other = |page: &mut Picture| {
+        let is_other = |page: &mut PictureFile| {
             !of_form(page) && size.zip(page.size()).is_some_and(|(form, size)| form != size)
         };
-        let other: Vec<Picture> = pages.extract_if(.., is_other).collect();
+        let other: Vec<PictureFile> = pages.extract_if(.., is_other).collect();
         others.extend(other.into_iter().map(|page| page.name));
-        let (form, rest): (Vec<&Picture>, Vec<_>) = pages.iter().partition(|page| of_form(page));
+        let (form, rest): (Vec<&PictureFile>, Vec<_>) =
+            pages.iter().partition(|page| of_form(page));
         refuse_copies(&form, &rest)?;
     }
     let mut forms: BTreeMap<&[String], &str> = BTreeMap::new();
@@ -257,10 +258,10 @@ fn keep_numbered(
 }
 
 /// Refuses a picture that is a copy of a page by its name, as `5 (1).png` is of `5.png`.
-fn refuse_copies(form: &[&Picture], others: &[&Picture]) -> Result<(), StackError> {
+fn refuse_copies(form: &[&PictureFile], others: &[&PictureFile]) -> Result<(), StackError> {
     let Some((position, _)) = page_numbers(form) else { return Ok(()) };
     for other in others {
-        let is_original = |page: &&&Picture| {
+        let is_original = |page: &&&PictureFile| {
             let numbers = page.numbers[..=position].iter();
             other.numbers.len() > position
                 && page.texts[..=position] == other.texts[..=position]
@@ -279,7 +280,7 @@ fn refuse_copies(form: &[&Picture], others: &[&Picture]) -> Result<(), StackErro
 
 /// Returns which number in names of one form counts the pages, and its values: one that increases
 /// in equal steps, or else one that increases, or else the last one.
-fn page_numbers(form: &[&Picture]) -> Option<(usize, Vec<f64>)> {
+fn page_numbers(form: &[&PictureFile]) -> Option<(usize, Vec<f64>)> {
     let values = |position: usize| {
         let values = form.iter().map(|page| page.numbers[position].value());
         Some((position, values.collect::<Option<Vec<f64>>>()?))
@@ -306,7 +307,7 @@ fn is_step(pair: &[f64], step: f64) -> bool {
 }
 
 /// Returns where the numbers of pages do not run on in their usual step.
-fn gaps(form: &[&Picture]) -> Vec<PageGap> {
+fn gaps(form: &[&PictureFile]) -> Vec<PageGap> {
     let Some((position, values)) = page_numbers(form) else { return Vec::new() };
     let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.retain(|step| *step > 0.0);
@@ -336,7 +337,7 @@ fn gaps(form: &[&Picture]) -> Vec<PageGap> {
 }
 
 /// Returns the name of a page with another number, written alike.
-fn name_with(page: &Picture, position: usize, value: f64, decimals: usize) -> String {
+fn name_with(page: &PictureFile, position: usize, value: f64, decimals: usize) -> String {
     let point = usize::from(decimals > 0);
     let width = page.numbers[position].whole.len() + point + decimals;
     let mut name = page.texts[0].clone();

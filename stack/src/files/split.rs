@@ -76,7 +76,7 @@ where
     E: From<StackError> + From<SplitError> + Send,
 {
     let mut folder = Folder { temporary: folder, format, open: None };
-    let mut plan = Plan { cuts, stack: None, first: 0, last: None, file: 0..0 };
+    let mut plan = FileAssignment { cuts, stack: None, first: 0, last: None, file: 0..0 };
     let placed = layers.map(|layer| {
         let mut layer = layer?;
         let starts_file = plan.place(&mut layer)?;
@@ -94,7 +94,7 @@ where
 }
 
 /// Assigns layers to files.
-struct Plan<'a> {
+struct FileAssignment<'a> {
     cuts: &'a SplitPoints,
     /// The metadata of the whole stack, from its first layer.
     stack: Option<StackInfo>,
@@ -104,7 +104,7 @@ struct Plan<'a> {
     file: Range<u32>,
 }
 
-impl Plan<'_> {
+impl FileAssignment<'_> {
     /// Returns whether a layer is the first of its file, and if so gives it the file's metadata.
     fn place(&mut self, layer: &mut Layer) -> Result<bool, SplitError> {
         let index = layer.info.index;

@@ -42,7 +42,7 @@ impl WhiteBox {
 /// ```
 pub fn largest_boxes(mask: &Mask, most: usize) -> (Vec<WhiteBox>, u64) {
     let mut largest = Largest { most, boxes: Vec::new(), count: 0 };
-    let mut above = Live::default();
+    let mut above = LiveComponents::default();
     for (row, transitions) in (0..).zip(mask.rows()) {
         // A black row below a black row begins and ends nothing.
         if !transitions.is_empty() || !above.boxes.is_empty() {
@@ -56,13 +56,13 @@ pub fn largest_boxes(mask: &Mask, most: usize) -> (Vec<WhiteBox>, u64) {
 
 /// The components that a row has part of.
 #[derive(Default)]
-struct Live {
+struct LiveComponents {
     boxes: Vec<WhiteBox>,
     /// The row's runs, each with its component.
     runs: Vec<(Range<u32>, u32)>,
 }
 
-impl Live {
+impl LiveComponents {
     /// Returns the components of the next row; components that end go to `largest`.
     fn next(self, row: u32, transitions: &[u32], width: u32, largest: &mut Largest) -> Self {
         let Self { mut boxes, runs: above } = self;
@@ -90,7 +90,12 @@ impl Live {
 }
 
 /// Joins the boxes of each set, of which those from `old` on are the runs of the row.
-fn joined(boxes: Vec<WhiteBox>, parents: &mut [u32], old: usize, largest: &mut Largest) -> Live {
+fn joined(
+    boxes: Vec<WhiteBox>,
+    parents: &mut [u32],
+    old: usize,
+    largest: &mut Largest,
+) -> LiveComponents {
     let mut sets: Vec<Option<WhiteBox>> = vec![None; boxes.len()];
     let mut columns = Vec::with_capacity(boxes.len() - old);
     for (member, each) in boxes.into_iter().enumerate() {
@@ -102,7 +107,7 @@ fn joined(boxes: Vec<WhiteBox>, parents: &mut [u32], old: usize, largest: &mut L
             set => *set = Some(each),
         }
     }
-    let mut live = Live::default();
+    let mut live = LiveComponents::default();
     let mut numbers = vec![u32::MAX; sets.len()];
     for (run, columns) in (old..).zip(columns) {
         let set = root(parents, run as u32) as usize;

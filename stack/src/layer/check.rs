@@ -284,12 +284,12 @@ impl OpenLine {
 
 /// The checks of all texts so far.
 #[derive(Debug, Default)]
-pub(crate) struct Chain {
+pub(crate) struct CheckChain {
     texts: Hasher,
     pages: u32,
 }
 
-impl Chain {
+impl CheckChain {
     /// Completes the line of the next page.
     pub(crate) fn close(&mut self, line: &OpenLine, is_last: bool) -> String {
         let mut line = line.0.clone();
@@ -315,7 +315,7 @@ impl Chain {
 
 /// A page's line as it was read: its content, and its check if it has one.
 #[derive(Clone, Debug)]
-pub(crate) struct Line {
+pub(crate) struct PageLine {
     pub(crate) info: PageInfo,
     pub(crate) check: Option<LineCheck>,
 }
@@ -328,7 +328,7 @@ pub(crate) struct LineCheck {
     text: Vec<u8>,
 }
 
-impl Line {
+impl PageLine {
     /// Returns the facts of a page without a line: its number.
     pub(crate) fn without(page: u32) -> Self {
         Self { info: PageInfo { index: page, ..PageInfo::default() }, check: None }
@@ -372,7 +372,7 @@ fn covered(line: &[u8]) -> Option<(&[u8], u32)> {
 /// Checks the texts of pages, in order.
 #[derive(Debug, Default)]
 pub(crate) struct ChainReader {
-    chain: Chain,
+    chain: CheckChain,
     state: ChainState,
     /// The layers around the first gap.
     gap: Option<[u32; 2]>,

@@ -114,10 +114,10 @@ pub(crate) fn short_number<S: Serializer>(number: &Option<f64>, to: S) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layer::check::Line;
+    use crate::layer::check::PageLine;
 
     fn parse(line: &str) -> Option<PageInfo> {
-        Line::parse(line.as_bytes()).map(|line| line.info)
+        PageLine::parse(line.as_bytes()).map(|line| line.info)
     }
 
     #[test]

@@ -33,10 +33,10 @@ use crate::ordered::MemorySize;
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct PassingLayer(State);
+pub struct PassingLayer(PassingState);
 
 #[derive(Clone, Debug)]
-enum State {
+enum PassingState {
     Decoded(Box<Layer>),
     /// The page's code is the one that was written. The text names the page's stack.
     Coded(Box<Page>, PassedCode, Box<str>),
@@ -50,64 +50,64 @@ impl PassingLayer {
     /// Returns the errors of [`Page::decode`], of pages that are decoded.
     pub fn of_page(page: Page, stack: &str) -> Result<Self, StackError> {
         Ok(Self(match page.passed() {
-            Some(passed) => State::Coded(Box::new(page), passed, stack.into()),
-            None => State::Decoded(Box::new(page.decode()?)),
+            Some(passed) => PassingState::Coded(Box::new(page), passed, stack.into()),
+            None => PassingState::Decoded(Box::new(page.decode()?)),
         }))
     }
 
     /// Returns the content of the page's JSON line.
     pub fn info(&self) -> &PageInfo {
         match &self.0 {
-            State::Decoded(layer) => &layer.info,
-            State::Coded(page, ..) => page.info(),
+            PassingState::Decoded(layer) => &layer.info,
+            PassingState::Coded(page, ..) => page.info(),
         }
     }
 
     /// Returns the content of the page's JSON line, to be changed.
     pub fn info_mut(&mut self) -> &mut PageInfo {
         match &mut self.0 {
-            State::Decoded(layer) => &mut layer.info,
-            State::Coded(page, ..) => page.info_mut(),
+            PassingState::Decoded(layer) => &mut layer.info,
+            PassingState::Coded(page, ..) => page.info_mut(),
         }
     }
 
     /// Returns the resolution, if the page states one in inches or centimeters.
     pub fn dpi(&self) -> Option<Dpi> {
         match &self.0 {
-            State::Decoded(layer) => layer.dpi,
-            State::Coded(page, ..) => page.dpi(),
+            PassingState::Decoded(layer) => layer.dpi,
+            PassingState::Coded(page, ..) => page.dpi(),
         }
     }
 
     /// Returns the image's width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         match &self.0 {
-            State::Decoded(layer) => [layer.image.width(), layer.image.height()],
-            State::Coded(page, ..) => page.size(),
+            PassingState::Decoded(layer) => [layer.image.width(), layer.image.height()],
+            PassingState::Coded(page, ..) => page.size(),
         }
     }
 
     /// Returns whether the image is gray, not a mask.
     pub fn is_gray(&self) -> bool {
         match &self.0 {
-            State::Decoded(layer) => matches!(*layer.image, Image::Gray(_)),
-            State::Coded(page, ..) => page.is_gray(),
+            PassingState::Decoded(layer) => matches!(*layer.image, Image::Gray(_)),
+            PassingState::Coded(page, ..) => page.is_gray(),
         }
     }
 
     /// Returns whether the last pixel of every row is black.
     pub fn rows_end_black(&self) -> bool {
         match &self.0 {
-            State::Decoded(layer) => rows_that_end_white(&layer.image) == 0,
-            State::Coded(_, passed, _) => passed.code.ends_white == 0,
+            PassingState::Decoded(layer) => rows_that_end_white(&layer.image) == 0,
+            PassingState::Coded(_, passed, _) => passed.code.ends_white == 0,
         }
     }
 
     /// Returns the layer, if it is decoded.
     pub fn as_decoded(&self) -> Option<&Layer> {
         match &self.0 {
-            State::Decoded(layer) => Some(layer),
-            State::Coded(..) => None,
+            PassingState::Decoded(layer) => Some(layer),
+            PassingState::Coded(..) => None,
         }
     }
 
@@ -118,8 +118,8 @@ impl PassingLayer {
     /// decoded already.
     pub fn decode(self) -> Result<Layer, StackError> {
         match self.0 {
-            State::Decoded(layer) => Ok(*layer),
-            State::Coded(page, _, file) => page.decode().map_err(|source| StackError::InFile {
+            PassingState::Decoded(layer) => Ok(*layer),
+            PassingState::Coded(page, _, file) => page.decode().map_err(|source| StackError::InFile {
                 file: file.into(),
                 source: Box::new(source),
             }),
@@ -129,15 +129,15 @@ impl PassingLayer {
 
 impl From<Layer> for PassingLayer {
     fn from(layer: Layer) -> Self {
-        Self(State::Decoded(Box::new(layer)))
+        Self(PassingState::Decoded(Box::new(layer)))
     }
 }
 
 impl From<PassingLayer> for EncodedPage {
     fn from(layer: PassingLayer) -> Self {
         match layer.0 {
-            State::Decoded(layer) => Self::new(&layer),
-            State::Coded(page, passed, _) => Self::passed(*page, passed),
+            PassingState::Decoded(layer) => Self::new(&layer),
+            PassingState::Coded(page, passed, _) => Self::passed(*page, passed),
         }
     }
 }
@@ -145,8 +145,8 @@ impl From<PassingLayer> for EncodedPage {
 impl MemorySize for PassingLayer {
     fn bytes(&self) -> usize {
         match &self.0 {
-            State::Decoded(layer) => layer.bytes(),
-            State::Coded(page, ..) => page.bytes(),
+            PassingState::Decoded(layer) => layer.bytes(),
+            PassingState::Coded(page, ..) => page.bytes(),
         }
     }
 }

@@ -18,7 +18,7 @@ pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
         return None;
     }
     let mut bits = BitReader::new(data);
-    let mut reader = RunReader { runs: Vec::new(), left: bytes };
+    let mut reader = RunDecoder { runs: Vec::new(), left: bytes };
     loop {
         let is_last = bits.take(1)? == 1;
         // BTYPE (RFC 1951, section 3.2.3). Stored blocks are left to a decoder of bytes.
@@ -37,13 +37,13 @@ pub(crate) fn runs(stream: &[u8], bytes: u64) -> Option<Vec<(u32, u8)>> {
     }
 }
 
-struct RunReader {
+struct RunDecoder {
     runs: Vec<(u32, u8)>,
     /// The number of bytes that are still wanted.
     left: u64,
 }
 
-impl RunReader {
+impl RunDecoder {
     /// Reads a block, or as much of it as is wanted. Returns whether it is all of it.
     fn read_block(
         &mut self,

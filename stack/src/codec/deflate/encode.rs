@@ -83,7 +83,7 @@ impl ByteRuns<'_> {
 
 /// A run as it is written: bytes, then copies of the last.
 #[derive(Clone, Copy)]
-struct Copies {
+struct CopiedRun {
     longest: u32,
     /// The length of a last copy that is shorter than the longest, or zero.
     last: u16,
@@ -91,7 +91,7 @@ struct Copies {
     bytes: u8,
 }
 
-impl Copies {
+impl CopiedRun {
     #[inline]
     fn of(length: u32) -> Self {
         // Runs of no bytes were left out, so this does not wrap.
@@ -122,7 +122,7 @@ impl Block {
     /// Adds a run. Counts of so many fit in 32 bits.
     #[inline]
     fn push(&mut self, length: u32, byte: u8) {
-        let copies = Copies::of(length);
+        let copies = CopiedRun::of(length);
         let of_byte = &mut self.bytes[usize::from(byte)];
         *of_byte = of_byte.wrapping_add(copies.bytes.into());
         let of_last = &mut self.last[usize::from(copies.last)];
@@ -180,7 +180,7 @@ fn put_runs(out: &mut BitWriter, runs: &[(u32, u8)], code: impl Fn(usize) -> Bit
         code(symbol.into()).then(more).then(zero)
     });
     for &(length, byte) in runs {
-        let copies = Copies::of(length);
+        let copies = CopiedRun::of(length);
         let first = bytes[usize::from(copies.bytes.wrapping_sub(1))][usize::from(byte)];
         let last = last[usize::from(copies.last)];
         let others = u64::from(first.count.wrapping_add(last.count));

@@ -35,7 +35,7 @@ pub(crate) fn decode_rows(
     max_runs: usize,
     mask: &mut Mask,
 ) -> Result<(), G4Error> {
-    let mut bits = BitReader::new(strip);
+    let mut bits = CodeWordReader::new(strip);
     let (mut above, mut row) = (CodedRow::black(width), CodedRow::black(width));
     let mut index = 0;
     while index < height {
@@ -62,7 +62,7 @@ pub(crate) fn decode_rows(
 
 /// Decodes one row against the row above it, with the names of [`encode_row`](super::encode).
 pub(super) fn decode_row(
-    bits: &mut BitReader<'_>,
+    bits: &mut CodeWordReader<'_>,
     above: &CodedRow,
     row: &mut CodedRow,
     width: u32,
@@ -84,7 +84,7 @@ pub(super) fn decode_row(
             continue;
         }
         match bits.mode()? {
-            Mode::Vertical(shift) => {
+            CodingMode::Vertical(shift) => {
                 let a1 = above.at(j).checked_add_signed(shift).ok_or(G4Fault::OutsideRow)?;
                 if a1 < a0 || a1 > width {
                     return Err(G4Fault::OutsideRow);
@@ -95,12 +95,12 @@ pub(super) fn decode_row(
                 // b1 must now change to the other color, and the one before it may be right of a0.
                 j = if j > 0 { j - 1 } else { j + 1 };
             }
-            Mode::Pass => {
+            CodingMode::Pass => {
                 // a0 moves below b2, and the color stays.
                 a0 = above.at(j + 1);
                 j += 2;
             }
-            Mode::Horizontal => {
+            CodingMode::Horizontal => {
                 for colour in [white, !white] {
                     a0 += bits.run(colour, width - a0)?;
                     row.toggle(a0, width);
@@ -123,7 +123,7 @@ pub(super) fn decode_row(
 /// returns their number; the last may be the end of the row.
 #[inline]
 fn take_verticals(
-    bits: &mut BitReader<'_>,
+    bits: &mut CodeWordReader<'_>,
     above: &CodedRow,
     j: usize,
     a0: u32,
@@ -162,7 +162,7 @@ fn take_verticals(
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
+enum CodingMode {
     Pass,
     Horizontal,
     Vertical(i32),
@@ -171,7 +171,7 @@ enum Mode {
 /// The value and length of the code word that some bits start with; the length is 0 if they
 /// start with none.
 #[derive(Clone, Copy)]
-struct Entry<T> {
+struct CodeTableEntry<T> {
     value: T,
     len: u8,
 }
@@ -182,18 +182,18 @@ const MODE_BITS: u32 = 7;
 const RUN_BITS: u32 = 13;
 
 /// Stores `value` at every index that begins with `code`.
-fn enter<T: Copy>(table: &mut [Entry<T>], index_bits: u32, code: Code, value: T) {
+fn enter<T: Copy>(table: &mut [CodeTableEntry<T>], index_bits: u32, code: Code, value: T) {
     let spare = index_bits - code.len;
     let first = (code.bits << spare) as usize;
-    table[first..first + (1 << spare)].fill(Entry { value, len: code.len as u8 });
+    table[first..first + (1 << spare)].fill(CodeTableEntry { value, len: code.len as u8 });
 }
 
-static MODES: LazyLock<Vec<Entry<Mode>>> = LazyLock::new(|| {
-    let mut table = vec![Entry { value: Mode::Pass, len: 0 }; 1 << MODE_BITS];
-    enter(&mut table, MODE_BITS, PASS, Mode::Pass);
-    enter(&mut table, MODE_BITS, HORIZONTAL, Mode::Horizontal);
+static MODES: LazyLock<Vec<CodeTableEntry<CodingMode>>> = LazyLock::new(|| {
+    let mut table = vec![CodeTableEntry { value: CodingMode::Pass, len: 0 }; 1 << MODE_BITS];
+    enter(&mut table, MODE_BITS, PASS, CodingMode::Pass);
+    enter(&mut table, MODE_BITS, HORIZONTAL, CodingMode::Horizontal);
     for (code, shift) in VERTICAL.into_iter().zip(-3..) {
-        enter(&mut table, MODE_BITS, code, Mode::Vertical(shift));
+        enter(&mut table, MODE_BITS, code, CodingMode::Vertical(shift));
     }
     table
 });
@@ -231,7 +231,7 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
         while usize::from(found.count) < AT_ONCE {
             let rest = bits << end & ((1 << VERTICALS_BITS) - 1);
             let entry = MODES[rest >> (VERTICALS_BITS - MODE_BITS)];
-            let Mode::Vertical(shift) = entry.value else { break };
+            let CodingMode::Vertical(shift) = entry.value else { break };
             end += u32::from(entry.len);
             if entry.len == 0 || end > VERTICALS_BITS {
                 break;
@@ -244,9 +244,9 @@ static VERTICALS: LazyLock<Vec<Verticals>> = LazyLock::new(|| {
 });
 
 /// The run-length codes of both colors, 0 first.
-static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
+static RUNS: LazyLock<[Vec<CodeTableEntry<u16>>; 2]> = LazyLock::new(|| {
     let table = |terminating: &[Code], make_up: &[Code]| {
-        let mut table = vec![Entry { value: 0, len: 0 }; 1 << RUN_BITS];
+        let mut table = vec![CodeTableEntry { value: 0, len: 0 }; 1 << RUN_BITS];
         let make_up = make_up.iter().chain(&MAKE_UP_LONG).zip((64..).step_by(64));
         for (&code, run) in terminating.iter().zip(0..).chain(make_up) {
             enter(&mut table, RUN_BITS, code, run);
@@ -257,18 +257,18 @@ static RUNS: LazyLock<[Vec<Entry<u16>>; 2]> = LazyLock::new(|| {
 });
 
 /// A reader of a strip's code words.
-pub(super) struct BitReader<'a> {
+pub(super) struct CodeWordReader<'a> {
     rest: &'a [u8],
     /// The buffered bits, left-aligned.
     pending: u64,
     /// The number of buffered bits; negative after bits past the end were taken.
     count: i32,
-    modes: &'static [Entry<Mode>],
+    modes: &'static [CodeTableEntry<CodingMode>],
     verticals: &'static [Verticals],
-    runs: &'static [Vec<Entry<u16>>; 2],
+    runs: &'static [Vec<CodeTableEntry<u16>>; 2],
 }
 
-impl<'a> BitReader<'a> {
+impl<'a> CodeWordReader<'a> {
     pub(super) fn new(strip: &'a [u8]) -> Self {
         Self {
             rest: strip,
@@ -340,7 +340,7 @@ impl<'a> BitReader<'a> {
     }
 
     #[inline]
-    fn mode(&mut self) -> Result<Mode, G4Fault> {
+    fn mode(&mut self) -> Result<CodingMode, G4Fault> {
         let entry = self.modes[self.peek(MODE_BITS)];
         if entry.len == 0 {
             return Err(self.no_code());

@@ -15,7 +15,7 @@ use crate::image::mask::Mask;
 /// Source: ITU-T Recommendation T.6, sections 2.2.1 to 2.2.5.
 pub fn encode(mask: &Mask) -> Vec<u8> {
     // A transition takes some four bits, a black row one.
-    let mut bits = BitWriter::new(mask.change_count() / 2 + mask.height() as usize / 8 + 16);
+    let mut bits = CodeWordWriter::new(mask.change_count() / 2 + mask.height() as usize / 8 + 16);
     let mut reference: &[u32] = &[];
     for row in mask.rows() {
         // a1 and b1 are both at the width: one vertical code.
@@ -34,7 +34,7 @@ pub fn encode(mask: &Mask) -> Vec<u8> {
 /// Encodes one row against the row above it, with the names of T.6: a0 is the current
 /// position, a1 and a2 are the next transitions of this row, b1 is the first transition of
 /// the reference row right of a0 to the opposite color, and b2 the one after it.
-fn encode_row(bits: &mut BitWriter, reference: &[u32], row: &[u32], width: u32) {
+fn encode_row(bits: &mut CodeWordWriter, reference: &[u32], row: &[u32], width: u32) {
     let four_verticals = &*FOUR_VERTICALS;
     let at = |transitions: &[u32], i: usize| transitions.get(i).copied().unwrap_or(width);
     // The first a0 is an imaginary pixel left of the row: at 0, but not past
@@ -154,7 +154,7 @@ fn terminating(length: u32, white: bool) -> Code {
 }
 
 /// A writer of bits, most significant first.
-struct BitWriter {
+struct CodeWordWriter {
     /// The whole bytes, up to `end`, and room for more.
     out: Vec<u8>,
     end: usize,
@@ -163,7 +163,7 @@ struct BitWriter {
     count: u32,
 }
 
-impl BitWriter {
+impl CodeWordWriter {
     fn new(capacity: usize) -> Self {
         Self { out: vec![0; capacity.max(8)], end: 0, pending: 0, count: 0 }
     }

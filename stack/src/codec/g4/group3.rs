@@ -2,7 +2,7 @@
 
 use super::coded_row::CodedRow;
 use super::codes::EOL;
-use super::decode::{BitReader, decode_row};
+use super::decode::{CodeWordReader, decode_row};
 use super::{G4Error, G4Fault};
 use crate::image::mask::Mask;
 
@@ -36,7 +36,7 @@ pub(crate) fn decode_group3_rows(
     max_runs: usize,
     mask: &mut Mask,
 ) -> Result<(), G4Error> {
-    let mut rows = Group3Rows { bits: BitReader::new(strip), kind, ends_of_line: false };
+    let mut rows = Group3Rows { bits: CodeWordReader::new(strip), kind, ends_of_line: false };
     let (mut above, mut row) = (CodedRow::black(width), CodedRow::black(width));
     for index in 0..height {
         let failed = |fault| G4Error { row: index, fault };
@@ -55,7 +55,7 @@ pub(crate) fn decode_group3_rows(
 }
 
 struct Group3Rows<'a> {
-    bits: BitReader<'a>,
+    bits: CodeWordReader<'a>,
     kind: Group3,
     /// True if an end of line preceded the last row.
     ends_of_line: bool,

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::blocks::Packer;
 use super::frame::{FRAME, FramePage, IndexEntry, KEY_FRAME, cost, head_of, part};
-use super::image::{CodedImage, Shape, encode};
+use super::image::{CodedImage, ImageFacts, encode};
 use super::streams::Streams;
 use super::write::PackLevel;
 use super::{FRAME_BYTES, FRAME_COST, KEY_LAYERS, MOST_ROWS};
 use crate::error::{PageFault, StackError};
 use crate::image::Image;
 use crate::layer::Layer;
-use crate::layer::check::{Chain, OpenLine};
+use crate::layer::check::{CheckChain, OpenLine};
 use crate::ordered::MemorySize;
 
 /// A layer, and the one below if its image may be coded against that.
@@ -55,7 +55,7 @@ fn is_alike(image: &Image, other: &Image) -> bool {
 /// A coded layer whose frame is not known yet.
 pub(super) struct CodedLayer {
     is_key: bool,
-    shape: Shape,
+    shape: ImageFacts,
     line: OpenLine,
     streams: Streams,
 }
@@ -65,7 +65,7 @@ impl CodedLayer {
         let Layer { info, dpi, image } = &*pair.layer;
         let below = pair.below.as_ref().map(|below| &*below.image);
         let CodedImage { mode, streams } = encode(image, below);
-        let shape = Shape {
+        let shape = ImageFacts {
             mode,
             gray: matches!(**image, Image::Gray(_)),
             size: [image.width(), image.height()],
@@ -115,14 +115,14 @@ impl OpenFrame {
 /// Gathers layers into frames. The last layer's line says that it is the last.
 pub(super) struct Frames<I> {
     layers: I,
-    chain: Chain,
+    chain: CheckChain,
     /// The layer that starts the next frame.
     held: Option<CodedLayer>,
 }
 
 impl<I> Frames<I> {
     pub(super) fn new(layers: I) -> Self {
-        Self { layers, chain: Chain::default(), held: None }
+        Self { layers, chain: CheckChain::default(), held: None }
     }
 }
 

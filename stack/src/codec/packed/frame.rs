@@ -1,7 +1,7 @@
 //! Frames, the index behind them, and the other parts of a packed file.
 
 use super::blocks::{self, Packer};
-use super::image::{Mode, Shape};
+use super::image::{ImageFacts, Mode};
 use super::numbers;
 use super::streams::Streams;
 use super::{FRAME_COST, KEY_LAYERS, MOST_ROWS};
@@ -94,7 +94,7 @@ pub(super) fn part(
 /// A page of a frame: its line and the facts of its image.
 #[derive(Clone, Debug)]
 pub(super) struct FramePage {
-    pub(super) shape: Shape,
+    pub(super) shape: ImageFacts,
     pub(super) line: Vec<u8>,
 }
 
@@ -157,7 +157,7 @@ pub(super) fn pages_of(
         }
         let changes = numbers::take_u32(&mut rest)?;
         let length = numbers::take_u32(&mut rest)?;
-        let shape = Shape { mode, gray: flags & GRAY != 0, size, changes };
+        let shape = ImageFacts { mode, gray: flags & GRAY != 0, size, changes };
         let is_size = size.iter().all(|side| (1..=limits.side).contains(side));
         let is_short = u64::from(length) <= limits.field_bytes;
         if !is_size || size[1] > MOST_ROWS || changes as usize > limits.runs || !is_short {
@@ -179,7 +179,7 @@ pub(super) fn pages_of(
 }
 
 /// Returns the changes and rows of images together.
-pub(super) fn cost<'a>(shapes: impl Iterator<Item = &'a Shape>) -> u64 {
+pub(super) fn cost<'a>(shapes: impl Iterator<Item = &'a ImageFacts>) -> u64 {
     shapes.map(|shape| u64::from(shape.changes) + u64::from(shape.size[1])).sum()
 }
 

@@ -128,7 +128,7 @@ fn encode_gray(image: &Split, below: Option<&Image>) -> CodedImage {
 
 /// The facts of an image before it is decoded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct ImageFacts {
     pub(super) mode: Mode,
     pub(super) gray: bool,
     pub(super) size: [u32; 2],
@@ -136,13 +136,13 @@ pub(super) struct Shape {
     pub(super) changes: u32,
 }
 
-impl From<Shape> for PackedShape {
-    fn from(Shape { gray, size, .. }: Shape) -> Self {
+impl From<ImageFacts> for PackedShape {
+    fn from(ImageFacts { gray, size, .. }: ImageFacts) -> Self {
         Self { size, gray }
     }
 }
 
-impl Shape {
+impl ImageFacts {
     /// Returns whether an image may be coded against another.
     pub(super) fn is_like(&self, image: &Image) -> bool {
         self.size == [image.width(), image.height()] && self.gray == matches!(image, Image::Gray(_))
@@ -151,7 +151,7 @@ impl Shape {
 
 /// Decodes an image and its strip, if it was kept. Returns `None` if it is damaged.
 pub(super) fn decode(
-    shape: &Shape,
+    shape: &ImageFacts,
     below: Option<&Image>,
     from: &mut Cursor<'_>,
 ) -> Option<(Image, Option<Vec<u8>>)> {

@@ -7,14 +7,14 @@ use std::sync::Arc;
 
 use super::blocks::Packer;
 use super::frame::{FramePage, IndexEntry, KEY_FRAME, START_BYTES, head_of, part};
-use super::read::{Frame, Unpacker};
-use super::write::{PackLevel, Sink};
-use crate::codec::tiff::{Format, Page, Source};
+use super::read::{PackFrame, Unpacker};
+use super::write::{PackLevel, PackedSink};
+use crate::codec::tiff::{ByteSource, Format, Page};
 use crate::error::{PageFault, StackError};
 use crate::files::input::Pages;
-use crate::files::join::{JoinError, Joined, in_stack, survey};
+use crate::files::join::{JoinError, JoinedPages, in_stack, survey};
 use crate::files::output::Destination;
-use crate::layer::check::{Chain, OpenLine};
+use crate::layer::check::{CheckChain, OpenLine};
 use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::Limits;
 
@@ -35,8 +35,8 @@ pub fn join_packed(
 ) -> Result<(), JoinError> {
     // Two readers go side by side: one has the texts, the other the images as they are packed.
     let mut pages =
-        Joined::new(stacks.to_vec(), survey(stacks)?, Arc::new(|_, _| {})).without_images();
-    let mut joined = Frames::new(to, format, level)?;
+        JoinedPages::new(stacks.to_vec(), survey(stacks)?, Arc::new(|_, _| {})).without_images();
+    let mut joined = FrameRewriter::new(to, format, level)?;
     for path in stacks {
         let failed = |source| in_stack(path, source);
         let mut frames = RawFrames::open(path).map_err(failed)?;
@@ -69,7 +69,7 @@ pub fn copy_packed(
 ) -> Result<(), StackError> {
     let mut frames = RawFrames::open(stack)?;
     let mut pages = Pages::open(stack)?.without_images();
-    let mut copied = Frames::new(to, frames.unpacker.format(), level)?;
+    let mut copied = FrameRewriter::new(to, frames.unpacker.format(), level)?;
     while let Some(frame) = frames.next()? {
         let line = |_| {
             // Fewer pages than the frames have: the file was written to between both readings.
@@ -92,13 +92,13 @@ fn line_of(page: &Page, info: &PageInfo) -> Result<OpenLine, StackError> {
 /// The frames of a packed file, as they are.
 struct RawFrames {
     unpacker: Unpacker,
-    source: Source,
+    source: ByteSource,
 }
 
 impl RawFrames {
     fn open(path: &Path) -> Result<Self, StackError> {
         let file = BufReader::with_capacity(1 << 18, File::open(path)?);
-        let mut source = Source::File { file, position: 0 };
+        let mut source = ByteSource::File { file, position: 0 };
         let start = source.read_up_to(0, START_BYTES)?;
         match start.split_last() {
             Some((&format, signature)) if *signature == super::SIGNATURE => {
@@ -108,27 +108,32 @@ impl RawFrames {
         }
     }
 
-    fn next(&mut self) -> Result<Option<Frame>, StackError> {
+    fn next(&mut self) -> Result<Option<PackFrame>, StackError> {
         let frame = self.unpacker.read_frame(&mut self.source, &Limits::default(), true)?;
         // Nothing decodes these images, so their check alone finds damage.
-        frame.map(Frame::checked).transpose()
+        frame.map(PackFrame::checked).transpose()
     }
 }
 
 /// Writes frames with new lines. It holds one back, because the last page says so.
-struct Frames {
-    sink: Sink,
-    chain: Chain,
+struct FrameRewriter {
+    sink: PackedSink,
+    chain: CheckChain,
     level: PackLevel,
-    held: Option<(Frame, Vec<OpenLine>)>,
+    held: Option<(PackFrame, Vec<OpenLine>)>,
 }
 
-impl Frames {
+impl FrameRewriter {
     fn new(to: Destination, format: Format, level: PackLevel) -> Result<Self, StackError> {
-        Ok(Self { sink: Sink::new(to, format)?, chain: Chain::default(), level, held: None })
+        Ok(Self {
+            sink: PackedSink::new(to, format)?,
+            chain: CheckChain::default(),
+            level,
+            held: None,
+        })
     }
 
-    fn push(&mut self, frame: Frame, lines: Vec<OpenLine>) -> Result<(), StackError> {
+    fn push(&mut self, frame: PackFrame, lines: Vec<OpenLine>) -> Result<(), StackError> {
         match self.held.replace((frame, lines)) {
             Some(before) => self.write(before, false),
             None => Ok(()),
@@ -143,7 +148,7 @@ impl Frames {
 
     fn write(
         &mut self,
-        (frame, lines): (Frame, Vec<OpenLine>),
+        (frame, lines): (PackFrame, Vec<OpenLine>),
         ends_stack: bool,
     ) -> Result<(), StackError> {
         let count = lines.len();

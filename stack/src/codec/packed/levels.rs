@@ -38,7 +38,7 @@ pub(super) fn encode(image: &Split, below: Option<&Split>, out: &mut Streams) {
         };
         let (at, of) = reference
             .map_or((&[][..], &[][..]), |(like, row)| (like.columns.row(row), like.of_row(row)));
-        let nearest = Nearest { at, of, counts_agree: at.len() == columns.len(), j: 0 };
+        let nearest = NearestLevels { at, of, counts_agree: at.len() == columns.len(), j: 0 };
         // Modulo 256, so that each distance is a byte.
         out.levels
             .extend(nearest.of_all(columns).zip(levels).map(|(near, l)| l.wrapping_sub(near)));
@@ -64,7 +64,7 @@ pub(super) fn decode(
                 (&at[..], &of[..])
             }
         };
-        let nearest = Nearest { at, of, counts_agree: at.len() == columns.len(), j: 0 };
+        let nearest = NearestLevels { at, of, counts_agree: at.len() == columns.len(), j: 0 };
         made.clear();
         made.extend(nearest.of_all(columns).zip(residuals).zip(columns).map(
             |((near, &residual), &column)| LevelChange {
@@ -79,14 +79,14 @@ pub(super) fn decode(
 }
 
 /// Finds levels of a reference row for the columns of a row, from the left.
-struct Nearest<'a> {
+struct NearestLevels<'a> {
     at: &'a [u32],
     of: &'a [u8],
     counts_agree: bool,
     j: usize,
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> NearestLevels<'a> {
     /// Returns for each column the level of its change in the reference row: the one of its number,
     /// or the nearest where their counts differ. Without any, 0.
     fn of_all(mut self, columns: &'a [u32]) -> impl Iterator<Item = u8> + 'a {

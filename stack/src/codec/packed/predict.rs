@@ -82,7 +82,7 @@ fn last_four_of(changes: &[u32], from: usize) -> Four<u32> {
 
 /// Where four transitions are expected: behind the row's last, at the width.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
+pub(super) struct PredictedPlaces {
     places: Four<u32>,
     /// How far their edges have moved from the reference row's transitions, in 1/256 pixel.
     by: Four<i32>,
@@ -111,7 +111,7 @@ pub(super) fn padded(four: Four<u32>, left: usize, width: u32) -> Four<u32> {
     std::array::from_fn(|k| four[k] & there[k] | width & !there[k])
 }
 
-impl Expected {
+impl PredictedPlaces {
     /// Returns 0, or -1 where an edge is left of its expected place: residuals that are turned by
     /// it are more often 1 than -1.
     #[inline]
@@ -205,7 +205,7 @@ impl Predictor {
 
     /// Returns where the transitions from `j` are expected, or `None` behind the last of a row.
     #[inline(always)]
-    pub(super) fn expect(&self, like: &Like<'_>, j: usize, width: u32) -> Option<Expected> {
+    pub(super) fn expect(&self, like: &Like<'_>, j: usize, width: u32) -> Option<PredictedPlaces> {
         let left = like.count.checked_sub(j)?;
         let shifts: &Four<i32> = self.shifts.get(j..)?.first_chunk()?;
         let from = like.start + j;
@@ -225,12 +225,12 @@ impl Predictor {
         let places = std::array::from_fn(|k| {
             here[k].wrapping_add_signed(by[k].wrapping_add(PIXEL / 2) >> 8)
         });
-        Some(Expected { places: padded(places, left, width), by })
+        Some(PredictedPlaces { places: padded(places, left, width), by })
     }
 
     /// Learns from transitions that are at most a pixel from their expected places.
     #[inline(always)]
-    pub(super) fn learn(&mut self, j: usize, expected: &Expected, residuals: Four<i32>) {
+    pub(super) fn learn(&mut self, j: usize, expected: &PredictedPlaces, residuals: Four<i32>) {
         let shifts: Option<&mut Four<i32>> = self.shifts[j..].first_chunk_mut();
         let rates: Option<&mut Four<i32>> = self.rates[j..].first_chunk_mut();
         let (Some(shifts), Some(rates)) = (shifts, rates) else { return };
@@ -246,7 +246,7 @@ impl Predictor {
 
     /// Learns from the first of these transitions.
     #[inline]
-    pub(super) fn learn_one(&mut self, j: usize, expected: &Expected, residual: i32) {
+    pub(super) fn learn_one(&mut self, j: usize, expected: &PredictedPlaces, residual: i32) {
         let missed = expected.missed(0, residual);
         let step = missed.wrapping_mul(self.rates[j]).wrapping_add(8) >> 4;
         self.shifts[j] = self.shifts[j].wrapping_add(step);

@@ -10,11 +10,11 @@ use super::frame::{
     END, FRAME, FramePage, INDEX, IndexEntry, KEY_FRAME, NOTICE, PartHeader, START_BYTES, cost,
     entries_of, most_bytes, pages_of, streams_of,
 };
-use super::image::{Shape, decode};
-use crate::codec::tiff::{Format, Page, Source};
+use super::image::{ImageFacts, decode};
+use crate::codec::tiff::{ByteSource, Format, Page};
 use crate::error::{PageFault, StackError};
 use crate::image::Image;
-use crate::layer::check::Line;
+use crate::layer::check::PageLine;
 use crate::limits::Limits;
 use crate::text::one_line;
 
@@ -36,7 +36,7 @@ pub(crate) struct Unpacker {
     /// The frames before it, from the stack's first.
     frames: Vec<IndexEntry>,
     /// The frame read behind the decoded frames.
-    ahead: Option<Result<Option<Frame>, StackError>>,
+    ahead: Option<Result<Option<PackFrame>, StackError>>,
     /// The last image of the frames that were decoded.
     below: Option<Arc<Image>>,
     /// Pages that are decoded, and the number of the first.
@@ -48,10 +48,10 @@ pub(crate) struct Unpacker {
 
 /// A frame whose images are still packed.
 #[derive(Debug)]
-pub(super) struct Frame {
+pub(super) struct PackFrame {
     header: PartHeader,
     first_page: u32,
-    pages: Vec<(FramePage, Line)>,
+    pages: Vec<(FramePage, PageLine)>,
     images: Vec<u8>,
 }
 
@@ -80,7 +80,7 @@ impl Unpacker {
     /// Returns the next page, or `None` behind the last. Without `images`, it cannot be decoded.
     pub(crate) fn next(
         &mut self,
-        source: &mut Source,
+        source: &mut ByteSource,
         limits: &Limits,
         images: bool,
     ) -> Result<Option<Page>, StackError> {
@@ -95,7 +95,7 @@ impl Unpacker {
     pub(crate) fn page(
         &mut self,
         number: u32,
-        source: &mut Source,
+        source: &mut ByteSource,
         limits: &Limits,
     ) -> Result<Option<Page>, StackError> {
         if !self.by_number {
@@ -146,11 +146,11 @@ impl Unpacker {
     /// Decodes the next frames, as many as together take little memory.
     fn read_ahead(
         &mut self,
-        source: &mut Source,
+        source: &mut ByteSource,
         limits: &Limits,
         images: bool,
     ) -> Result<(), StackError> {
-        let mut frames: Vec<Frame> = Vec::new();
+        let mut frames: Vec<PackFrame> = Vec::new();
         let mut room = TOGETHER_COST;
         // The frames behind a key frame are for one thread.
         let mut threads = if self.by_number { 1 } else { rayon::current_num_threads() };
@@ -193,8 +193,8 @@ impl Unpacker {
     }
 
     /// Decodes frames on all threads, those behind a key frame one after the other.
-    fn decode(&mut self, frames: Vec<Frame>, limits: &Limits) {
-        let mut groups: Vec<(Option<Arc<Image>>, Vec<Frame>)> = Vec::new();
+    fn decode(&mut self, frames: Vec<PackFrame>, limits: &Limits) {
+        let mut groups: Vec<(Option<Arc<Image>>, Vec<PackFrame>)> = Vec::new();
         for frame in frames {
             match groups.last_mut() {
                 Some((_, group)) if frame.header.kind != KEY_FRAME => group.push(frame),
@@ -227,10 +227,10 @@ impl Unpacker {
     /// Reads the next frame, or `None` at the index.
     pub(super) fn read_frame(
         &mut self,
-        source: &mut Source,
+        source: &mut ByteSource,
         limits: &Limits,
         images: bool,
-    ) -> Result<Option<Frame>, StackError> {
+    ) -> Result<Option<PackFrame>, StackError> {
         let (header, head) = self.read_part(source, self.offset, limits)?;
         let damaged = |what| malformed(self.pages, what);
         match header.kind {
@@ -284,7 +284,7 @@ impl Unpacker {
             .into_iter()
             .zip(numbers)
             .map(|(page, number)| {
-                let line = Line::parse(&page.line).unwrap_or_else(|| Line::without(number));
+                let line = PageLine::parse(&page.line).unwrap_or_else(|| PageLine::without(number));
                 (page, line)
             })
             .collect();
@@ -296,13 +296,13 @@ impl Unpacker {
             let bytes = header.part_bytes();
             self.frames.push(IndexEntry { is_key, pages: header.count, bytes });
         }
-        Ok(Some(Frame { header, first_page, pages, images: packed }))
+        Ok(Some(PackFrame { header, first_page, pages, images: packed }))
     }
 
     /// Reads the header and the packed head of a part.
     fn read_part(
         &self,
-        source: &mut Source,
+        source: &mut ByteSource,
         offset: u64,
         limits: &Limits,
     ) -> Result<(PartHeader, Vec<u8>), StackError> {
@@ -328,7 +328,11 @@ impl Unpacker {
     }
 
     /// Returns the frames of a file: from its index, or if it has none, by going through them.
-    fn index(&self, source: &mut Source, limits: &Limits) -> Result<Vec<IndexEntry>, StackError> {
+    fn index(
+        &self,
+        source: &mut ByteSource,
+        limits: &Limits,
+    ) -> Result<Vec<IndexEntry>, StackError> {
         if let Some(entries) = self.stored_index(source, limits)? {
             return Ok(entries);
         }
@@ -351,7 +355,7 @@ impl Unpacker {
     /// Returns the index at the end of a file, if it is there.
     fn stored_index(
         &self,
-        source: &mut Source,
+        source: &mut ByteSource,
         limits: &Limits,
     ) -> Result<Option<Vec<IndexEntry>>, StackError> {
         let Some(end) = source.length()?.and_then(|length| length.checked_sub(8)) else {
@@ -383,7 +387,7 @@ fn malformed(page: u32, part: &'static str) -> StackError {
     StackError::Malformed { page, fault: PageFault::Packed(part) }
 }
 
-impl Frame {
+impl PackFrame {
     pub(super) fn page_count(&self) -> usize {
         self.pages.len()
     }
@@ -397,7 +401,7 @@ impl Frame {
     }
 
     /// Returns its kind, the shapes of its images, and these as they are packed.
-    pub(super) fn into_parts(self) -> (u8, Vec<Shape>, Vec<u8>) {
+    pub(super) fn into_parts(self) -> (u8, Vec<ImageFacts>, Vec<u8>) {
         let shapes = self.pages.into_iter().map(|(page, _)| page.shape).collect();
         (self.header.kind, shapes, self.images)
     }

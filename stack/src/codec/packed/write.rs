@@ -82,7 +82,7 @@ pub fn write_packed<E>(
 where
     E: From<StackError> + Display + Send,
 {
-    let mut sink = Sink::new(to, format)?;
+    let mut sink = PackedSink::new(to, format)?;
     let coded = map_in_order(pairs(layers), |pair: Pair| Ok(CodedLayer::new(&pair)));
     for frame in map_in_order(Frames::new(coded), |frame: OpenFrame| Ok(frame.pack(level))) {
         match frame {
@@ -97,13 +97,13 @@ where
 }
 
 /// The file or stream that is being written.
-pub(super) struct Sink {
+pub(super) struct PackedSink {
     out: BufWriter<Box<dyn Write>>,
     temporary: Option<FileBeside>,
     entries: Vec<IndexEntry>,
 }
 
-impl Sink {
+impl PackedSink {
     pub(super) fn new(to: Destination, format: Format) -> Result<Self, StackError> {
         let (out, temporary): (Box<dyn Write>, _) = match to {
             Destination::Stream(out) => (out, None),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::layout::Layout;
+use super::layout::PageLayout;
 use super::page::Page;
 use super::tags::{
     BITS_PER_SAMPLE, BLACK_IS_ZERO, BYTE, COMPRESSION, DEFLATE, DOUBLE, FILL_ORDER, FLOAT, IFD,
@@ -17,7 +17,7 @@ use super::tags::{
 use crate::codec::compression::Compression;
 use crate::error::{PageFault, StackError, UnsupportedFeature, malformed};
 use crate::image::orientation::Orientation;
-use crate::layer::check::{CheckFault, Line};
+use crate::layer::check::{CheckFault, PageLine};
 use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
 
@@ -134,8 +134,8 @@ impl Fields {
         text.split(|&byte| byte == 0).next()
     }
 
-    fn line(&self) -> Line {
-        self.description().and_then(Line::parse).unwrap_or_else(|| Line::without(self.page))
+    fn line(&self) -> PageLine {
+        self.description().and_then(PageLine::parse).unwrap_or_else(|| PageLine::without(self.page))
     }
 
     /// Returns the page without the data of its strips or tiles.
@@ -159,7 +159,7 @@ impl Fields {
         if orientation.is_across() && width > self.limits.rows_from_columns {
             return Err(malformed(self.page, PageFault::TooWideToTurn(width)));
         }
-        let Line { info, check } = self.line();
+        let PageLine { info, check } = self.line();
         // Other programs use these fields, and would see another image than the checked one.
         if check.is_some() && !self.is_as_we_write() {
             let (layer, fault) = (info.index, CheckFault::Directory);
@@ -238,22 +238,22 @@ impl Fields {
         }
     }
 
-    fn layout(&self, width: u32, height: u32) -> Result<Layout, StackError> {
+    fn layout(&self, width: u32, height: u32) -> Result<PageLayout, StackError> {
         if self.values.contains_key(&TILE_WIDTH) {
             let tile = (self.side(TILE_WIDTH)?, self.side(TILE_LENGTH)?);
-            return Ok(Layout::tiles(width, height, tile));
+            return Ok(PageLayout::tiles(width, height, tile));
         }
         // Zero rows stand for all of them, as 2^32 - 1 does.
         let rows = match self.number_or(ROWS_PER_STRIP, 0)? {
             0 => height,
             rows => rows.min(height.into()) as u32,
         };
-        Ok(Layout::strips(width, height, rows))
+        Ok(PageLayout::strips(width, height, rows))
     }
 
     /// Returns the offset and length in bytes of each strip or tile. The length is 0 where the
     /// directory does not state it.
-    pub(super) fn places(&self, layout: &Layout) -> Result<Vec<(u64, u64)>, StackError> {
+    pub(super) fn places(&self, layout: &PageLayout) -> Result<Vec<(u64, u64)>, StackError> {
         // Some writers list tiles under the tags of strips, which libtiff reads as one.
         let tags = match layout.tiled && self.values.contains_key(&TILE_OFFSETS) {
             true => (TILE_OFFSETS, TILE_BYTE_COUNTS),

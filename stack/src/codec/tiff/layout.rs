@@ -7,7 +7,7 @@ use crate::limits::Limits;
 
 /// The division of a page into strips or tiles, in row order. A strip has the page's width.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Layout {
+pub(super) struct PageLayout {
     pub(super) tiled: bool,
     /// A piece's width; tiles may extend beyond the page's right side.
     pub(super) width: u32,
@@ -18,7 +18,7 @@ pub(super) struct Layout {
     pub(super) page_height: u32,
 }
 
-impl Layout {
+impl PageLayout {
     pub(super) fn strips(page_width: u32, page_height: u32, rows: u32) -> Self {
         Self { tiled: false, width: page_width, rows, across: 1, page_height }
     }

@@ -26,5 +26,5 @@ mod write;
 pub(crate) use page::{PackedShape, PassedCode};
 pub use page::{Page, PageHeader};
 pub use read::PageReader;
-pub(crate) use source::Source;
+pub(crate) use source::ByteSource;
 pub use write::{EncodedPage, Format, PageWriter};

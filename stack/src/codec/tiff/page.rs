@@ -8,7 +8,7 @@ use crate::codec::compression::Compression;
 use crate::codec::g4::{self, G4Error, Group3};
 use crate::codec::picture_page;
 use crate::codec::png_page::{self, Header};
-use crate::codec::tiff::layout::Layout;
+use crate::codec::tiff::layout::PageLayout;
 use crate::codec::tiff::tiles::join_tiles;
 use crate::codec::tiff::unpack::{PieceShape, UnpackError, unpack};
 use crate::error::{PageFault, StackError, malformed};
@@ -18,7 +18,7 @@ use crate::image::mask::Mask;
 use crate::image::orientation::Orientation;
 use crate::image::runs::{Change, RunImage};
 use crate::layer::check::{
-    ChainReader, CheckFault, CodeCheck, ImageCheck, Line, LineCheck, image_crc,
+    ChainReader, CheckFault, CodeCheck, ImageCheck, LineCheck, PageLine, image_crc,
 };
 use crate::layer::page_info::PageInfo;
 use crate::layer::{Layer, LayerImage, Strip};
@@ -42,7 +42,7 @@ pub struct Page {
     pub(super) compression: Compression,
     /// True if pixels are stored as differences from the left neighbor.
     pub(super) differences: bool,
-    pub(super) layout: Layout,
+    pub(super) layout: PageLayout,
     /// The strips or tiles, row by row. One without bytes has pixels of zero.
     pub(super) pieces: Vec<Vec<u8>>,
     /// The number of bytes of all strips or tiles.
@@ -120,7 +120,7 @@ impl Page {
         file: Vec<u8>,
     ) -> Self {
         let Header { width, height, gray, dpi, line } = header;
-        let Line { info, check } = line.unwrap_or_else(|| Line::without(number));
+        let PageLine { info, check } = line.unwrap_or_else(|| PageLine::without(number));
         Self {
             number,
             limits,
@@ -133,7 +133,7 @@ impl Page {
             orientation: Orientation::default(),
             compression,
             differences: false,
-            layout: Layout::strips(width, height, height),
+            layout: PageLayout::strips(width, height, height),
             data_bytes: file.len() as u64,
             pieces: vec![file],
             image: None,
@@ -145,13 +145,13 @@ impl Page {
         number: u32,
         limits: Limits,
         shape: &PackedShape,
-        line: Line,
+        line: PageLine,
         data_bytes: u64,
         image: Option<Arc<Image>>,
         strip: Option<Vec<u8>>,
     ) -> Self {
         let [width, height] = shape.size;
-        let Line { info, check } = line;
+        let PageLine { info, check } = line;
         let dpi = check.as_ref().and_then(|check| check.page.as_ref()?.dpi).and_then(Dpi::new);
         Self {
             number,
@@ -165,7 +165,7 @@ impl Page {
             orientation: Orientation::default(),
             compression: Compression::Packed,
             differences: false,
-            layout: Layout::strips(width, height, height),
+            layout: PageLayout::strips(width, height, height),
             data_bytes,
             pieces: strip.into_iter().collect(),
             image,

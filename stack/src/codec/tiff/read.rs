@@ -6,12 +6,12 @@ use std::io::{BufReader, Read};
 
 use super::fields::{Fields, KNOWN, number};
 use super::page::Page;
-use super::source::Source;
+use super::source::ByteSource;
 use super::tags::{
     BYTE, FILL_ORDER, LONG, MASK, NEW_SUBFILE_TYPE, OLD_REDUCED, REDUCED, SHORT, SUB_IFDS,
     SUBFILE_TYPE, type_size,
 };
-use super::write::{Format, Notice};
+use super::write::{AbortNotice, Format};
 use crate::codec::compression::Compression;
 use crate::codec::packed::{self, Unpacker};
 use crate::codec::picture_format::PictureFormat;
@@ -27,7 +27,7 @@ use crate::text::one_line;
 /// PNG or another picture file is a single page.
 #[derive(Debug)]
 pub struct PageReader {
-    source: Source,
+    source: ByteSource,
     limits: Limits,
     kind: FileKind,
     /// Whether the data of images is read, too.
@@ -47,7 +47,7 @@ pub struct PageReader {
 }
 
 /// Returns the error of an input that starts with these bytes and is no stack.
-fn not_tiff(start: Vec<u8>, mut source: Source) -> StackError {
+fn not_tiff(start: Vec<u8>, mut source: ByteSource) -> StackError {
     let size = source.length().ok().flatten();
     // The bytes only help to name the format, so a failure here does not count.
     let more = source.read_up_to(start.len() as u64, (FORMAT_BYTES - start.len()) as u64);
@@ -64,7 +64,7 @@ impl PageReader {
     /// Returns an error if the stream is empty or does not start as a TIFF or a picture.
     pub fn from_stream(stream: impl Read + Send + 'static) -> Result<Self, StackError> {
         let stream = BufReader::with_capacity(1 << 18, Box::new(stream) as Box<dyn Read + Send>);
-        Self::new(Source::Stream { stream, position: 0 })
+        Self::new(ByteSource::Stream { stream, position: 0 })
     }
 
     /// Reads from a file.
@@ -72,7 +72,7 @@ impl PageReader {
     /// # Errors
     /// Returns an error if the file is empty or does not start as a TIFF or a picture.
     pub fn from_file(file: File) -> Result<Self, StackError> {
-        Self::new(Source::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
+        Self::new(ByteSource::File { file: BufReader::with_capacity(1 << 18, file), position: 0 })
     }
 
     /// Replaces the default limits of the reader.
@@ -80,7 +80,7 @@ impl PageReader {
         Self { limits: limits.within_images(), ..self }
     }
 
-    fn new(mut source: Source) -> Result<Self, StackError> {
+    fn new(mut source: ByteSource) -> Result<Self, StackError> {
         let mut start = source.read_up_to(0, 8)?;
         if start.is_empty() {
             return Err(StackError::Empty);
@@ -253,7 +253,7 @@ impl PageReader {
     }
 
     /// Counts the images that are no layers: the image of a directory, or the images below it.
-    fn is_beside(&mut self, entries: &[Entry]) -> bool {
+    fn is_beside(&mut self, entries: &[DirectoryEntry]) -> bool {
         let value = |tag| {
             let entry = entries.iter().find(|entry| entry.tag == tag)?;
             let is_number = matches!(entry.kind, BYTE | SHORT | LONG) && entry.count == 1;
@@ -286,7 +286,7 @@ impl PageReader {
     }
 
     /// Reads the directory's entries and the link to the next directory.
-    fn read_directory(&mut self) -> Result<(Vec<Entry>, u64), StackError> {
+    fn read_directory(&mut self) -> Result<(Vec<DirectoryEntry>, u64), StackError> {
         let (count_size, entry_size, word) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
         let count = number(&self.read(self.next, count_size)?, self.little_endian);
         if count > self.limits.directory_entries {
@@ -296,7 +296,7 @@ impl PageReader {
         let (entries, link) = bytes.split_at((count * entry_size) as usize);
         let entries = entries
             .chunks_exact(entry_size as usize)
-            .map(|entry| Entry {
+            .map(|entry| DirectoryEntry {
                 tag: number(&entry[..2], self.little_endian) as u16,
                 kind: number(&entry[2..4], self.little_endian) as u16,
                 count: number(&entry[4..4 + word as usize], self.little_endian),
@@ -308,7 +308,7 @@ impl PageReader {
 
     /// Reads the values of the known fields, in the order of their offsets, because a stream
     /// cannot go back.
-    fn read_values(&mut self, entries: &[Entry]) -> Result<Fields, StackError> {
+    fn read_values(&mut self, entries: &[DirectoryEntry]) -> Result<Fields, StackError> {
         let mut fields = Fields {
             page: self.number,
             little_endian: self.little_endian,
@@ -318,7 +318,7 @@ impl PageReader {
         let mut distant = Vec::new();
         let mut seen = BTreeSet::new();
         // Of several entries of one tag, the first counts, as in libtiff.
-        let first = |entry: &&Entry| KNOWN.contains(&entry.tag) && seen.insert(entry.tag);
+        let first = |entry: &&DirectoryEntry| KNOWN.contains(&entry.tag) && seen.insert(entry.tag);
         for entry in entries.iter().filter(first) {
             let length = entry.count.saturating_mul(type_size(entry.kind));
             if length > self.limits.field_bytes {
@@ -523,11 +523,11 @@ fn given_up(text: &[u8]) -> Option<String> {
     if !text.starts_with(b"{\"gave_up\":") {
         return None;
     }
-    let Notice { gave_up } = serde_json::from_slice(text).ok()?;
+    let AbortNotice { gave_up } = serde_json::from_slice(text).ok()?;
     Some(one_line(&gave_up))
 }
 
-struct Entry {
+struct DirectoryEntry {
     tag: u16,
     kind: u16,
     count: u64,

@@ -5,12 +5,12 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// A source of bytes.
-pub(crate) enum Source {
+pub(crate) enum ByteSource {
     Stream { stream: BufReader<Box<dyn Read + Send>>, position: u64 },
     File { file: BufReader<File>, position: u64 },
 }
 
-impl fmt::Debug for Source {
+impl fmt::Debug for ByteSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Stream { .. } => "Stream",
@@ -19,7 +19,7 @@ impl fmt::Debug for Source {
     }
 }
 
-impl Source {
+impl ByteSource {
     /// Returns whether bytes at `offset` can still be read: a stream only goes forward.
     pub(crate) fn reaches(&self, offset: u64) -> bool {
         match self {

@@ -20,7 +20,7 @@ use crate::files::durable::close;
 use crate::files::page_folder::PageFile;
 use crate::image::Image;
 use crate::layer::Layer;
-use crate::layer::check::{Chain, CodeCheck, OpenLine};
+use crate::layer::check::{CheckChain, CodeCheck, OpenLine};
 
 /// The variant of TIFF to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -124,7 +124,7 @@ impl EncodedPage {
     }
 
     /// Returns the fields of the directory, in the order of their tags.
-    fn fields(&self, description: &str, format: Format, data: u64) -> Vec<Field> {
+    fn fields(&self, description: &str, format: Format, data: u64) -> Vec<DirectoryField> {
         let short = |tag, value: u64| (tag, SHORT, 1, (value as u16).to_le_bytes().to_vec());
         let long = |tag, value: u32| (tag, LONG, 1, value.to_le_bytes().to_vec());
         let word = |tag, value: u64| match format {
@@ -177,16 +177,16 @@ impl From<Layer> for EncodedPage {
 }
 
 /// A field of a directory: its tag, type, number of values, and values.
-type Field = (u16, u16, u64, Vec<u8>);
+type DirectoryField = (u16, u16, u64, Vec<u8>);
 
-fn text_field(text: &str) -> Field {
+fn text_field(text: &str) -> DirectoryField {
     let text = [text.as_bytes(), &[0]].concat();
     (IMAGE_DESCRIPTION, ASCII, text.len() as u64, text)
 }
 
 impl Format {
     /// Returns a directory at offset `start` and the texts after it, padded to 8 bytes.
-    fn directory(self, fields: Vec<Field>, start: u64, link: u64) -> Vec<u8> {
+    fn directory(self, fields: Vec<DirectoryField>, start: u64, link: u64) -> Vec<u8> {
         let word = self.word_size();
         let count_size = if self == Self::Big { 8 } else { 2 };
         let size = count_size + fields.len() * (4 + 2 * word) + word;
@@ -217,7 +217,7 @@ impl Format {
 /// The text of the page that a stage writes when it gives up: it has no image.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Notice {
+pub(super) struct AbortNotice {
     pub(super) gave_up: String,
 }
 
@@ -228,7 +228,7 @@ pub struct PageWriter<W> {
     out: W,
     format: Format,
     offset: u64,
-    chain: Chain,
+    chain: CheckChain,
     held: Option<EncodedPage>,
 }
 
@@ -246,7 +246,7 @@ impl PageWriter<BufWriter<File>> {
 impl<W: Write> PageWriter<W> {
     /// Creates a writer of a stack to `out`, which should be buffered.
     pub fn new(out: W, format: Format) -> Self {
-        Self { out, format, offset: 0, chain: Chain::default(), held: None }
+        Self { out, format, offset: 0, chain: CheckChain::default(), held: None }
     }
 
     /// Adds a page.
@@ -283,7 +283,7 @@ impl<W: Write> PageWriter<W> {
         self.start()?;
         // Through several stages, the first reason goes on alone.
         let first = reason.rsplit(GAVE_UP).next().unwrap_or(reason);
-        let notice = Notice { gave_up: first.to_owned() };
+        let notice = AbortNotice { gave_up: first.to_owned() };
         let text = serde_json::to_string(&notice).expect("a text is valid JSON");
         let directory = |link| self.format.directory(vec![text_field(&text)], self.offset, link);
         let end = self.offset + directory(0).len() as u64;
@@ -318,7 +318,7 @@ impl PageFile for (EncodedPage, Format) {
         format!("layer_{:05}.tif", self.0.index)
     }
 
-    fn bytes(&self, chain: &mut Chain, is_last: bool) -> Vec<u8> {
+    fn bytes(&self, chain: &mut CheckChain, is_last: bool) -> Vec<u8> {
         let (page, format) = self;
         let header = format.header();
         let description = chain.close(&page.line, is_last);

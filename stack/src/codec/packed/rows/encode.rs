@@ -2,7 +2,7 @@
 
 use super::Reference;
 use crate::codec::packed::numbers;
-use crate::codec::packed::predict::{Expected, Four, Like, Predictor, four_of, padded};
+use crate::codec::packed::predict::{Four, Like, PredictedPlaces, Predictor, four_of, padded};
 use crate::codec::packed::streams::Streams;
 use crate::codec::packed::tokens::{
     ANY, END, FARTHEST, FOUR_ZEROS, INSERT, MOST_ZEROS, ONE, PASS, TOGETHER, ZEROS,
@@ -148,7 +148,7 @@ impl<'a> RowEncoder<'a> {
     /// Codes the next transition, or one that only either row has. Returns whether it ends the
     /// row.
     #[inline(never)]
-    fn one(&mut self, columns: Four<u32>, expected: Option<Expected>) -> bool {
+    fn one(&mut self, columns: Four<u32>, expected: Option<PredictedPlaces>) -> bool {
         let (step, count) = (self.step, self.predictor.count());
         let column = columns[0];
         let place = |k| expected.map_or(self.width, |expected| expected.place(k));
@@ -174,7 +174,7 @@ impl<'a> RowEncoder<'a> {
         }
     }
 
-    fn put_residual(&mut self, expected: &Expected, column: u32) {
+    fn put_residual(&mut self, expected: &PredictedPlaces, column: u32) {
         let residual = expected.residual(0, column);
         self.predictor.learn_one(self.j, expected, residual);
         if residual.abs() <= FARTHEST {
