@@ -3,8 +3,8 @@
 use lamp_stack::Length;
 
 use crate::error::HeightsError;
-use crate::known::Known;
-use crate::search::{Budget, Climb, Grid, HeightSearch, Heights};
+use crate::known::KnownLayers;
+use crate::search::{Budget, Climb, HeightSearch, Heights, StepGrid};
 use crate::swept_layer::SweptLayer;
 use crate::table::HeightTable;
 
@@ -39,13 +39,13 @@ impl HeightSearch<'_> {
         if least > max {
             return Err(HeightsError::Budget { least, budget: max });
         }
-        let mut known = Known::new();
+        let mut known = KnownLayers::new();
         let (bound, climb) = self.smallest_bound(&grid, budget, &mut known);
         Ok((bound, self.placed(&grid, climb, &known, bound, Some(budget))))
     }
 
     /// Returns the cost of the layers if no error is too large.
-    fn least_cost(&self, grid: &Grid<'_>, budget: Budget<'_>) -> f64 {
+    fn least_cost(&self, grid: &StepGrid<'_>, budget: Budget<'_>) -> f64 {
         let (mut step, mut cost) = (0, 0.0);
         while step < grid.end() {
             let choices = self.thicknesses.choices(step, grid.ends());
@@ -66,9 +66,9 @@ impl HeightSearch<'_> {
     /// Finds the smallest bound whose layers are within the budget, and these.
     fn smallest_bound(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         budget: Budget<'_>,
-        known: &mut Known,
+        known: &mut KnownLayers,
     ) -> (f64, Climb) {
         let (mut low, mut found) = self.guessed_bound(grid, budget, known);
         let mut within = |bound| self.climb(grid, bound, Some(budget), known);
@@ -109,9 +109,9 @@ impl HeightSearch<'_> {
     /// within the budget with its layers, if they were found.
     fn guessed_bound(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         budget: Budget<'_>,
-        known: &mut Known,
+        known: &mut KnownLayers,
     ) -> (f64, Option<(f64, Climb)>) {
         let (mut low, mut found) = (0.0, None);
         let Some(table) = &grid.table else { return (low, found) };
@@ -133,10 +133,10 @@ impl HeightSearch<'_> {
     /// Guesses the smallest bound within the budget: infinite if no bound is.
     fn guess_bound(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         table: &HeightTable,
         budget: Budget<'_>,
-        known: &Known,
+        known: &KnownLayers,
     ) -> f64 {
         let within = |bound| self.guess(grid, table, bound, budget, known);
         if within(0.0).is_some() {

@@ -8,7 +8,7 @@
 use lamp_slicer::PlacedFacet;
 use rayon::prelude::*;
 
-use crate::profile::{Profile, ProfileChange, Surface};
+use crate::profile::{ChangeProfile, ProfileChange, SurfacePiece};
 
 /// The number of chunks of facets that are worked on at once. It does not follow the
 /// threads, so that sums do not depend on them.
@@ -20,19 +20,19 @@ const CLOSED: f64 = 1e-9;
 
 /// Sums over facets between a layer's bottom and its tops.
 #[derive(Debug)]
-pub(crate) struct Facets {
+pub(crate) struct FacetSums {
     /// The changes from the bottom to each top.
     pub(crate) changes: Vec<ProfileChange>,
     bottom: Contours,
 }
 
-impl Facets {
+impl FacetSums {
     /// Sums facets up, with tops above the bottom in micrometers, rising. Returns nothing if
     /// there are no facets.
     pub(crate) fn sum(facets: &[(PlacedFacet, u32)], bottom_um: f64, tops: &[f64]) -> Option<Self> {
         let [x, y, _] = facets.first()?.0[0];
         let of_chunk = |chunk: &[(PlacedFacet, u32)]| {
-            let (mut profile, mut bottom) = (Profile::new(tops), Contours::default());
+            let (mut profile, mut bottom) = (ChangeProfile::new(tops), Contours::default());
             for (facet, _) in chunk {
                 // From a corner nearby, so that areas do not drown in rounding.
                 let facet =
@@ -65,7 +65,7 @@ impl Facets {
 }
 
 /// Adds the part of a facet that is above the bottom, at height 0.
-fn add_facet(facet: &PlacedFacet, profile: &mut Profile<'_>) {
+fn add_facet(facet: &PlacedFacet, profile: &mut ChangeProfile<'_>) {
     let mut heights = facet.map(|corner| corner[2]);
     heights.sort_unstable_by(f64::total_cmp);
     let [low, middle, high] = heights;
@@ -77,7 +77,7 @@ fn add_facet(facet: &PlacedFacet, profile: &mut Profile<'_>) {
     let mut add = |heights: [f64; 2], extent: f64, density| {
         let [lost, gained] = if area > 0.0 { [heights, [0.0; 2]] } else { [[0.0; 2], heights] };
         let section = -area.signum();
-        profile.add(Surface { heights, extent, density, section, lost, gained });
+        profile.add(SurfacePiece { heights, extent, density, section, lost, gained });
     };
     let whole = area.abs();
     if low == high {

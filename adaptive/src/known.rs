@@ -7,10 +7,10 @@ use crate::swept_layer::SweptLayer;
 use crate::table::HeightTable;
 
 /// The step below some layers, and for each thickness in steps, rising, the layer.
-pub(crate) type Known = BTreeMap<usize, Vec<(usize, SweptLayer)>>;
+pub(crate) type KnownLayers = BTreeMap<usize, Vec<(usize, SweptLayer)>>;
 
 /// Keeps layers from one step; of two lists from the same step, the longer.
-pub(crate) fn know(known: &mut Known, step: usize, layers: Vec<(usize, SweptLayer)>) {
+pub(crate) fn know(known: &mut KnownLayers, step: usize, layers: Vec<(usize, SweptLayer)>) {
     match known.entry(step) {
         Entry::Occupied(mut before) if before.get().len() < layers.len() => {
             before.insert(layers);
@@ -26,7 +26,7 @@ pub(crate) fn know(known: &mut Known, step: usize, layers: Vec<(usize, SweptLaye
 /// over known layers with the same top from the nearest step.
 pub(crate) fn guessed(
     table: &HeightTable,
-    known: &Known,
+    known: &KnownLayers,
     step: usize,
     thicknesses: &[usize],
 ) -> Vec<SweptLayer> {

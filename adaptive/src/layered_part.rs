@@ -10,12 +10,12 @@ use rayon::prelude::*;
 
 use crate::closed::EdgeSum;
 use crate::error::HeightsError;
-use crate::facets::Facets;
+use crate::facets::FacetSums;
 use crate::overlaps::{OverlapRows, Overlaps};
-use crate::profile::{Profile, ProfileChange};
+use crate::profile::{ChangeProfile, ProfileChange};
 use crate::row_cuts::{CutRows, RowCuts};
 use crate::sweep::{RowsAdd, Sweep};
-use crate::swept_layer::{Section, SweptLayer, SweptLayers};
+use crate::swept_layer::{SweptLayer, SweptLayers, SweptSection};
 
 /// The number of stripes of rows that are worked on at once. It does not follow
 /// the threads, so that sums do not depend on them.
@@ -164,7 +164,7 @@ impl LayeredPart {
             self.all(&facets, [bottom_um, last_um], &planes);
         let steepest = steepest(&facets, bottom_um, tops_um);
         let layer = |k: usize| {
-            let section = Section { plane_um: planes[k], bottom_area, change: changes[k] };
+            let section = SweptSection { plane_um: planes[k], bottom_area, change: changes[k] };
             let layer = section.swept(bottom_um, tops_um[k] - bottom_um);
             SweptLayer { steepest: steepest[k], rows_left_out, ..layer }
         };
@@ -178,8 +178,8 @@ impl LayeredPart {
     /// how rows differ from them. Where the mesh has a gap, rows alone count.
     fn all(&self, facets: &[(PlacedFacet, u32)], z_um: [f64; 2], planes: &[f64]) -> Rise {
         let stripes = self.stripes(facets);
-        let closed =
-            Facets::sum(facets, z_um[0], planes).filter(super::facets::Facets::bottom_is_closed);
+        let closed = FacetSums::sum(facets, z_um[0], planes)
+            .filter(super::facets::FacetSums::bottom_is_closed);
         if let Some(sum) = closed {
             let mut rise = self.rows(&stripes, z_um, planes, RowsAdd::Differences);
             if rise.rows_left_out == 0 {
@@ -239,7 +239,7 @@ impl LayeredPart {
         planes: &[f64],
         adds: RowsAdd,
     ) -> Rise {
-        let (mut profile, mut sweep) = (Profile::new(planes), self.sweep(adds));
+        let (mut profile, mut sweep) = (ChangeProfile::new(planes), self.sweep(adds));
         let mut of_rows = CutRows::new(cuts, first, rows);
         let mut rows_left_out = 0;
         for row in 0..rows {

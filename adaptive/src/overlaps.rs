@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::layered_part::{LayeredPart, Rise};
 use crate::row_cuts::{CutRows, RowCuts};
 use crate::sweep::RowsAdd;
-use crate::swept_layer::{Section, SweptLayer};
+use crate::swept_layer::{SweptLayer, SweptSection};
 use crate::table::HeightTable;
 
 /// A slab is at least so many layers high.
@@ -128,7 +128,7 @@ impl OverlapRows {
 
 /// A facet's line in a row, from its long to one of its short edges.
 #[derive(Clone, Copy, Debug, Default)]
-struct Line {
+struct RowLine {
     ends: [[f64; 2]; 2],
     is_flipped: bool,
     body: u32,
@@ -138,7 +138,7 @@ struct Line {
 #[derive(Debug)]
 struct SlabLines {
     slab: usize,
-    by_row: Grouped<Line>,
+    by_row: Grouped<RowLine>,
 }
 
 /// The differences of layers from the sums of single facets.
@@ -168,13 +168,14 @@ impl<'a> Overlaps<'a> {
         let told: Vec<_> = table.sections(bottom, thicknesses).collect();
         let planes: Vec<f64> = told.iter().map(|(_, section, _)| section.plane_um).collect();
         let rise = self.differences(bottom_um, &planes);
-        let layer = |(k, (thickness_um, mut section, steepest)): (usize, (f64, Section, f64))| {
-            if let Some(rise) = &rise {
-                section.bottom_area += rise.bottom_area;
-                section.change.add(rise.changes[k]);
-            }
-            SweptLayer { steepest, ..section.swept(bottom_um, thickness_um) }
-        };
+        let layer =
+            |(k, (thickness_um, mut section, steepest)): (usize, (f64, SweptSection, f64))| {
+                if let Some(rise) = &rise {
+                    section.bottom_area += rise.bottom_area;
+                    section.change.add(rise.changes[k]);
+                }
+                SweptLayer { steepest, ..section.swept(bottom_um, thickness_um) }
+            };
         told.into_iter().enumerate().map(layer).collect()
     }
 
@@ -215,7 +216,7 @@ impl<'a> Overlaps<'a> {
     }
 
     /// Returns the lines in the rows of a slab.
-    fn lines(&self, slab: usize) -> Grouped<Line> {
+    fn lines(&self, slab: usize) -> Grouped<RowLine> {
         let (part, rows) = (self.part, &self.rows.slabs[slab]);
         let heights = self.rows.heights(part, slab);
         let mut lines = Vec::new();
@@ -227,7 +228,7 @@ impl<'a> Overlaps<'a> {
             let rows = (first..).zip(&rows[first..]);
             for (place, row) in rows.take_while(|(_, row)| row.row < met.end) {
                 facet.for_each_row(row.row..row.row + 1, |_, ends| {
-                    lines.push((place, Line { ends, is_flipped, body }));
+                    lines.push((place, RowLine { ends, is_flipped, body }));
                 });
             }
         }

@@ -1,7 +1,7 @@
 //! Places as many layers as were found where they err least together.
 
 use crate::criterion::Criterion;
-use crate::known::Known;
+use crate::known::KnownLayers;
 use crate::search::Heights;
 use crate::swept_layer::SweptLayer;
 use crate::table::HeightTable;
@@ -13,7 +13,7 @@ const MAX_WAYS: usize = 50_000_000;
 
 /// The cost of layers: how many are past the bound, and the volume that they lose and gain, in
 /// cubic millimeters.
-type Cost = (u32, f64);
+type PlacementCost = (u32, f64);
 
 /// All ways to place layers between whole steps.
 pub(crate) struct LayerPlacement<'a> {
@@ -23,13 +23,13 @@ pub(crate) struct LayerPlacement<'a> {
     pub(crate) ends: &'a [usize],
     pub(crate) bound: f64,
     /// Layers that are known better than from the table.
-    pub(crate) known: &'a Known,
+    pub(crate) known: &'a KnownLayers,
 }
 
 /// A layer that may be taken.
-struct Way {
+struct LayerChoice {
     steps: usize,
-    cost: Cost,
+    cost: PlacementCost,
 }
 
 impl LayerPlacement<'_> {
@@ -39,7 +39,11 @@ impl LayerPlacement<'_> {
     /// Each layer is to end above the found end of the layer before, and no higher than its own
     /// found end. Where thicker layers are worse, no other ways are of use: the layers found reach
     /// as high as so many can, and from lower down it takes more to the end.
-    pub(crate) fn least_error(&self, tops: &[usize], worthwhile: Cost) -> Option<Vec<usize>> {
+    pub(crate) fn least_error(
+        &self,
+        tops: &[usize],
+        worthwhile: PlacementCost,
+    ) -> Option<Vec<usize>> {
         let end = *tops.last()?;
         // Dynamic programming looks at every end with every thickness.
         if end.saturating_mul(self.thicknesses.steps().count()) > MAX_WAYS {
@@ -60,12 +64,12 @@ impl LayerPlacement<'_> {
             layers_below.get(top) == Some(&layers) && top >= least(layers)
         };
         // The least cost up to each step, and the thickness of the layer below it.
-        let mut best: Vec<Option<(Cost, usize)>> = vec![None; end + 1];
+        let mut best: Vec<Option<(PlacementCost, usize)>> = vec![None; end + 1];
         best[0] = Some(((0, 0.0), 0));
         for step in 0..end {
             let Some((so_far, _)) = best[step] else { continue };
             let layers = layers_below[step] + 1;
-            for Way { steps, cost } in self.ways(step, |top| may_end(top, layers)) {
+            for LayerChoice { steps, cost } in self.ways(step, |top| may_end(top, layers)) {
                 let top = step + steps;
                 // Pairs compare by layers past the bound first: no gain of volume makes up for one.
                 let cost = (so_far.0 + cost.0, so_far.1 + cost.1);
@@ -94,19 +98,19 @@ impl LayerPlacement<'_> {
 
     /// Returns the layers that the search may take from a step and that may end where they do: the
     /// layers within the bound, or the thinnest if no layer is.
-    fn ways(&self, step: usize, may_end: impl Fn(usize) -> bool) -> Vec<Way> {
+    fn ways(&self, step: usize, may_end: impl Fn(usize) -> bool) -> Vec<LayerChoice> {
         let choices = self.thicknesses.choices(step, self.ends);
         let known = self.known.get(&step);
         let of = |(&steps, layer): (&usize, SweptLayer)| {
             let layer = known.and_then(|known| known_of(known, steps)).unwrap_or(layer);
             let past = u32::from(self.criterion.measure(&layer) > self.bound);
-            Way { steps, cost: (past, layer.lost_mm3 + layer.gained_mm3) }
+            LayerChoice { steps, cost: (past, layer.lost_mm3 + layer.gained_mm3) }
         };
         let ends = |steps: &usize| may_end(step + steps);
         let Some(last) = choices.iter().rposition(ends) else { return Vec::new() };
         let layers = choices.iter().zip(self.table.layers(step, &choices[..=last]));
-        let mut ways: Vec<Way> = layers.filter(|(steps, _)| ends(steps)).map(of).collect();
-        let is_thinnest_of_all = |way: &Way| {
+        let mut ways: Vec<LayerChoice> = layers.filter(|(steps, _)| ends(steps)).map(of).collect();
+        let is_thinnest_of_all = |way: &LayerChoice| {
             let layers = || choices.iter().zip(self.table.layers(step, &choices));
             way.steps == choices[0] && layers().all(|layer| of(layer).cost.0 > 0)
         };
@@ -127,7 +131,7 @@ fn known_of(known: &[(usize, SweptLayer)], steps: usize) -> Option<SweptLayer> {
 }
 
 /// Returns how many layers are past a bound, and the volume lost and gained.
-pub(crate) fn cost_of(heights: &Heights, criterion: &dyn Criterion, bound: f64) -> Cost {
+pub(crate) fn cost_of(heights: &Heights, criterion: &dyn Criterion, bound: f64) -> PlacementCost {
     let past = heights.layers.iter().filter(|layer| criterion.measure(layer) > bound).count();
     let [lost, gained, _] = heights.volumes_mm3();
     (past as u32, lost + gained)

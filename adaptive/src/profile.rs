@@ -42,7 +42,7 @@ const LEVEL_UM: f64 = 1e-4;
 /// A piece of surface. Between its ends, what it changes once tops are past it goes evenly
 /// from one value to the other.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Surface {
+pub(crate) struct SurfacePiece {
     pub(crate) heights: [f64; 2],
     /// The area that it covers, seen from above, in square millimeters.
     pub(crate) extent: f64,
@@ -62,7 +62,7 @@ pub(crate) const EVEN: [f64; 2] = [1.0; 2];
 /// A polynomial's coefficients, from the first power of its argument on.
 type Cubic = [f64; 3];
 
-impl Surface {
+impl SurfacePiece {
     fn rising(self) -> Self {
         if self.heights[0] <= self.heights[1] {
             return self;
@@ -108,7 +108,7 @@ type Polynomial = [f64; 4];
 struct Polynomials([Polynomial; 3]);
 
 impl Polynomials {
-    fn of(surface: &Surface) -> Self {
+    fn of(surface: &SurfacePiece) -> Self {
         let [low, high] = surface.heights;
         let slope = 1.0 / (high - low);
         let start = -low * slope;
@@ -140,7 +140,7 @@ impl Polynomials {
 
 /// Changes by top, over many surfaces.
 #[derive(Debug)]
-pub(crate) struct Profile<'a> {
+pub(crate) struct ChangeProfile<'a> {
     /// Tops above the layer's bottom, in micrometers, rising.
     tops: &'a [f64],
     /// About how many tops lie in a micrometer.
@@ -155,7 +155,7 @@ pub(crate) struct Profile<'a> {
     pub(crate) unavoidable: f64,
 }
 
-impl<'a> Profile<'a> {
+impl<'a> ChangeProfile<'a> {
     pub(crate) fn new(tops: &'a [f64]) -> Self {
         let span = tops[tops.len() - 1] - tops[0];
         Self {
@@ -174,7 +174,7 @@ impl<'a> Profile<'a> {
         count_at_or_below(self.tops, height, (height - self.tops[0]) * self.per_um)
     }
 
-    pub(crate) fn add(&mut self, surface: Surface) {
+    pub(crate) fn add(&mut self, surface: SurfacePiece) {
         let surface = surface.rising();
         let [low, high] = surface.heights;
         if high - low <= LEVEL_UM {
@@ -228,8 +228,8 @@ mod tests {
     #[test]
     fn polynomials_are_the_tops_one_by_one() {
         let tops: Vec<f64> = (25..=100).map(f64::from).collect();
-        let mut profile = Profile::new(&tops);
-        let surface = |heights, section: f64, density| Surface {
+        let mut profile = ChangeProfile::new(&tops);
+        let surface = |heights, section: f64, density| SurfacePiece {
             heights,
             extent: section.abs(),
             density,
@@ -249,7 +249,7 @@ mod tests {
         surfaces.iter().for_each(|&surface| profile.add(surface));
         for (k, change) in profile.changes().iter().enumerate() {
             let mut expected = ProfileChange::default();
-            for surface in surfaces.map(Surface::rising) {
+            for surface in surfaces.map(SurfacePiece::rising) {
                 let [low, high] = surface.heights;
                 let passed = if tops[k] <= low || (low == high && tops[k] <= low + 1.0) {
                     0.0
@@ -271,8 +271,8 @@ mod tests {
     #[test]
     fn a_flat_surface_counts_above_its_height() {
         let tops = [10.0, 20.0, 30.0];
-        let mut profile = Profile::new(&tops);
-        profile.add(Surface {
+        let mut profile = ChangeProfile::new(&tops);
+        profile.add(SurfacePiece {
             heights: [20.0; 2],
             extent: 2.0,
             density: EVEN,

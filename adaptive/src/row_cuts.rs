@@ -4,13 +4,13 @@ use lamp_slicer::Turn;
 use lamp_slicer::scan::RowFacet;
 use lamp_stack::Grouped;
 
-use crate::sweep::{Slope, Toggle};
+use crate::sweep::{SlopeLine, Toggle};
 
 /// The lines of facets between two heights, as rows see them.
 #[derive(Debug, Default)]
 pub(crate) struct RowCuts {
     pub(crate) toggles: Vec<Toggle>,
-    pub(crate) slopes: Vec<Slope>,
+    pub(crate) slopes: Vec<SlopeLine>,
 }
 
 impl RowCuts {
@@ -59,7 +59,7 @@ impl RowCuts {
             let (left, right) = if low[0] < high[0] { (low, high) } else { (high, low) };
             let turn = Turn::new(body, if start[0] < end[0] { 1 } else { -1 });
             let heights = [left[1] - bottom, right[1] - bottom];
-            self.slopes.push(Slope { row, x: [left[0], right[0]], heights, turn });
+            self.slopes.push(SlopeLine { row, x: [left[0], right[0]], heights, turn });
         }
     }
 }
@@ -67,14 +67,14 @@ impl RowCuts {
 /// The lines that rows see, row by row.
 pub(crate) struct CutRows {
     toggles: Grouped<Toggle>,
-    slopes: Grouped<Slope>,
+    slopes: Grouped<SlopeLine>,
 }
 
 impl CutRows {
     /// Groups the cuts of some rows, from the first on.
     pub(crate) fn new(cuts: &RowCuts, first: u32, rows: usize) -> Self {
         let toggle = |toggle: &Toggle| ((toggle.row - first) as usize, *toggle);
-        let slope = |slope: &Slope| ((slope.row - first) as usize, *slope);
+        let slope = |slope: &SlopeLine| ((slope.row - first) as usize, *slope);
         Self {
             toggles: Grouped::new(rows, || cuts.toggles.iter().map(toggle)),
             slopes: Grouped::new(rows, || cuts.slopes.iter().map(slope)),
@@ -82,7 +82,7 @@ impl CutRows {
     }
 
     /// Returns the lines that a row sees, sorted from the left; `row` counts from the first.
-    pub(crate) fn sorted_row(&mut self, row: usize) -> (&[Toggle], &[Slope]) {
+    pub(crate) fn sorted_row(&mut self, row: usize) -> (&[Toggle], &[SlopeLine]) {
         let (toggles, slopes) = (self.toggles.group_mut(row), self.slopes.group_mut(row));
         toggles.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
         slopes.sort_unstable_by(|a, b| a.x[0].total_cmp(&b.x[0]));

@@ -7,7 +7,7 @@ use lamp_stack::Length;
 
 use crate::criterion::Criterion;
 use crate::error::HeightsError;
-use crate::known::{Known, guessed, know};
+use crate::known::{KnownLayers, guessed, know};
 use crate::layered_part::LayeredPart;
 use crate::overlaps::Overlaps;
 use crate::placement::{LayerPlacement, cost_of};
@@ -116,7 +116,7 @@ impl Budget<'_> {
 const NEAR: f64 = 0.6;
 
 /// Where layers may end: whole steps above the part's bottom.
-pub(crate) struct Grid<'a> {
+pub(crate) struct StepGrid<'a> {
     bottom_um: f64,
     step_um: f64,
     /// Where layers are to end; the last is the part's top.
@@ -127,7 +127,7 @@ pub(crate) struct Grid<'a> {
     overlaps: Option<Overlaps<'a>>,
 }
 
-impl Grid<'_> {
+impl StepGrid<'_> {
     pub(crate) fn at(&self, step: usize) -> f64 {
         self.bottom_um + step as f64 * self.step_um
     }
@@ -167,14 +167,14 @@ impl HeightSearch<'_> {
     /// Returns an error if there would be too many layers.
     pub fn heights(&self, bound: f64) -> Result<Heights, HeightsError> {
         let grid = self.grid()?;
-        let mut known = Known::new();
+        let mut known = KnownLayers::new();
         let climb = self.climb(&grid, bound, None, &mut known);
         let climb = climb.expect("layers that cost nothing are within any budget");
         Ok(self.placed(&grid, climb, &known, bound, None))
     }
 
     /// Returns the steps where layers may end, and the table of the facets.
-    pub(crate) fn grid(&self) -> Result<Grid<'_>, HeightsError> {
+    pub(crate) fn grid(&self) -> Result<StepGrid<'_>, HeightsError> {
         let [bottom_um, top_um] = self.part.heights_um();
         let step_um = self.thicknesses.step().um();
         let end = ((top_um - bottom_um) / step_um).round().max(1.0);
@@ -184,7 +184,7 @@ impl HeightSearch<'_> {
         let end = end as usize;
         let table = HeightTable::new(self.part, step_um, end + self.thicknesses.steps().end());
         let overlaps = self.part.overlaps(*self.thicknesses.steps().end() as f64 * step_um);
-        Ok(Grid { bottom_um, step_um, ends: self.ends(end), table, overlaps })
+        Ok(StepGrid { bottom_um, step_um, ends: self.ends(end), table, overlaps })
     }
 
     /// Finds the layers from the bottom up: each is the thickest within the bound. With a
@@ -193,10 +193,10 @@ impl HeightSearch<'_> {
     /// are known then.
     pub(crate) fn climb(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         bound: f64,
         budget: Option<Budget<'_>>,
-        known: &mut Known,
+        known: &mut KnownLayers,
     ) -> Option<Climb> {
         let (mut step, mut spent, mut layers, mut ended) = (0, 0.0, Vec::new(), Vec::new());
         let mut last_um = f64::INFINITY;
@@ -222,11 +222,11 @@ impl HeightSearch<'_> {
     /// Finds the layers from the bottom up by facets alone and known layers nearby.
     pub(crate) fn guess(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         table: &HeightTable,
         bound: f64,
         budget: Budget<'_>,
-        known: &Known,
+        known: &KnownLayers,
     ) -> Option<Vec<SweptLayer>> {
         let (mut step, mut spent, mut layers) = (0, 0.0, Vec::new());
         while step < grid.end() {
@@ -246,9 +246,9 @@ impl HeightSearch<'_> {
     /// Returns as many layers as were found from the bottom up, where they err least.
     pub(crate) fn placed(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         climb: Climb,
-        known: &Known,
+        known: &KnownLayers,
         bound: f64,
         budget: Option<Budget<'_>>,
     ) -> Heights {
@@ -276,7 +276,7 @@ impl HeightSearch<'_> {
     /// within the bound. The thickness of the layer before hints at how many these are.
     fn layers(
         &self,
-        grid: &Grid<'_>,
+        grid: &StepGrid<'_>,
         bottom: usize,
         choices: &[usize],
         last_um: f64,

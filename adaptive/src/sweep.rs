@@ -6,12 +6,12 @@
 //! along x or z.
 //!
 //! Most columns pass one facet at most. There, facets alone give the volume lost and gained,
-//! without rows ([`Facets`](crate::facets::Facets)). So rows need only add how other columns differ
+//! without rows ([`FacetSums`](crate::facets::FacetSums)). So rows need only add how other columns differ
 //! from that.
 
 use lamp_slicer::{FillRule, Position, Turn};
 
-use crate::profile::{EVEN, Profile, Surface};
+use crate::profile::{ChangeProfile, EVEN, SurfacePiece};
 
 /// A point where the part's surface crosses the layer's bottom in a row.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,7 +25,7 @@ pub(crate) struct Toggle {
 /// A facet's line along a row: its two ends, the left one first, with their heights
 /// in micrometers above the layer's bottom.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Slope {
+pub(crate) struct SlopeLine {
     pub(crate) row: u32,
     pub(crate) x: [f64; 2],
     pub(crate) heights: [f64; 2],
@@ -33,7 +33,7 @@ pub(crate) struct Slope {
     pub(crate) turn: Turn,
 }
 
-impl Slope {
+impl SlopeLine {
     #[inline]
     fn height(&self, x: f64) -> f64 {
         let [a, b] = self.x;
@@ -60,7 +60,7 @@ pub(crate) struct Sweep<'a> {
     pitch_mm: f64,
     adds: RowsAdd,
     ends: Vec<f64>,
-    open: Vec<Slope>,
+    open: Vec<SlopeLine>,
 }
 
 /// How often columns are split where surfaces pass through each other, at most.
@@ -76,8 +76,8 @@ impl<'a> Sweep<'a> {
     pub(crate) fn add(
         &mut self,
         toggles: &[Toggle],
-        slopes: &[Slope],
-        profile: &mut Profile<'_>,
+        slopes: &[SlopeLine],
+        profile: &mut ChangeProfile<'_>,
     ) -> bool {
         if toggles.is_empty() && slopes.is_empty() {
             return true;
@@ -111,7 +111,7 @@ impl<'a> Sweep<'a> {
     fn columns(
         &mut self,
         toggles: &[Toggle],
-        slopes: &[Slope],
+        slopes: &[SlopeLine],
         mut each: impl FnMut(&mut Self, [f64; 2], &Position<'a>, i32),
     ) {
         self.ends.clear();
@@ -147,7 +147,7 @@ impl<'a> Sweep<'a> {
     pub(crate) fn untold(
         &mut self,
         toggles: &[Toggle],
-        slopes: &[Slope],
+        slopes: &[SlopeLine],
         reach_um: f64,
         mut untold: impl FnMut([f64; 2]),
     ) {
@@ -173,7 +173,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// Returns true if facets give a line completely that has no other line above or below it.
-    fn is_told(&self, slope: Slope, position: &Position<'_>) -> bool {
+    fn is_told(&self, slope: SlopeLine, position: &Position<'_>) -> bool {
         self.adds == RowsAdd::Differences && tells(slope.turn, &mut position.clone())
     }
 
@@ -184,7 +184,7 @@ impl<'a> Sweep<'a> {
         columns: [f64; 2],
         position: &Position<'_>,
         splits: u32,
-        profile: &mut Profile<'_>,
+        profile: &mut ChangeProfile<'_>,
     ) {
         let [a, b] = columns;
         let middle = 0.5 * (a + b);
@@ -205,7 +205,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// Adds columns over lines that are sorted from below.
-    fn pass(&self, columns: [f64; 2], position: &Position<'_>, profile: &mut Profile<'_>) {
+    fn pass(&self, columns: [f64; 2], position: &Position<'_>, profile: &mut ChangeProfile<'_>) {
         let extent = (columns[1] - columns[0]) * self.pitch_mm;
         let mut position = position.clone();
         let mut inside = position.is_inside();
@@ -216,22 +216,22 @@ impl<'a> Sweep<'a> {
         for slope in &self.open {
             position.cross(slope.turn);
             let heights = columns.map(|x| slope.height(x));
-            let mut seen = Change::default();
+            let mut seen = SectionChange::default();
             if position.is_inside() != inside {
                 let before = unlike.map(|unlike| -unlike);
                 unlike = [heights[0] - unlike[0], heights[1] - unlike[1]];
                 let sign = if inside { 1.0 } else { -1.0 };
                 within = [within[0] + sign * heights[0], within[1] + sign * heights[1]];
                 let [lost, gained] = if inside { [unlike, before] } else { [before, unlike] };
-                seen = Change { section: -sign, lost, gained };
+                seen = SectionChange { section: -sign, lost, gained };
                 inside = !inside;
             }
             if self.adds == RowsAdd::Differences {
-                seen = seen.without(Change::of_one(slope.turn, heights));
+                seen = seen.without(SectionChange::of_one(slope.turn, heights));
             }
-            if seen != Change::default() {
-                let Change { section, lost, gained } = seen;
-                profile.add(Surface { heights, extent, density: EVEN, section, lost, gained });
+            if seen != SectionChange::default() {
+                let SectionChange { section, lost, gained } = seen;
+                profile.add(SurfacePiece { heights, extent, density: EVEN, section, lost, gained });
             }
         }
         profile.add_unavoidable(extent, within, inside);
@@ -249,13 +249,13 @@ fn tells(turn: Turn, position: &mut Position<'_>) -> bool {
 /// The change by a line once the top is past it: of the section and, at its two ends, of the
 /// heights lost and gained.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Change {
+struct SectionChange {
     section: f64,
     lost: [f64; 2],
     gained: [f64; 2],
 }
 
-impl Change {
+impl SectionChange {
     /// Returns the change by a line that no other is above or below.
     fn of_one(turn: Turn, heights: [f64; 2]) -> Self {
         match turn.winding() {
@@ -293,12 +293,12 @@ mod tests {
         Toggle { row: 0, x, turn: Turn::new(0, winding) }
     }
 
-    fn slope(x: [f64; 2], heights: [f64; 2], winding: i32) -> Slope {
-        Slope { row: 0, x, heights, turn: Turn::new(0, winding) }
+    fn slope(x: [f64; 2], heights: [f64; 2], winding: i32) -> SlopeLine {
+        SlopeLine { row: 0, x, heights, turn: Turn::new(0, winding) }
     }
 
-    fn changes(fill: Fill, toggles: &[Toggle], slopes: &[Slope]) -> Vec<ProfileChange> {
-        let mut profile = Profile::new(&[10.0, 20.0, 40.0]);
+    fn changes(fill: Fill, toggles: &[Toggle], slopes: &[SlopeLine]) -> Vec<ProfileChange> {
+        let mut profile = ChangeProfile::new(&[10.0, 20.0, 40.0]);
         Sweep::new(&fill.into(), 1.0, RowsAdd::All).add(toggles, slopes, &mut profile);
         profile.changes()
     }

@@ -31,7 +31,7 @@ pub struct SweptLayer {
 
 /// A section above a layer's bottom, and how the part changes up to it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Section {
+pub(crate) struct SweptSection {
     /// Its height above the layer's bottom, in micrometers.
     pub(crate) plane_um: f64,
     /// The area of the section at the bottom, in square millimeters.
@@ -39,7 +39,7 @@ pub(crate) struct Section {
     pub(crate) change: ProfileChange,
 }
 
-impl Section {
+impl SweptSection {
     /// Returns the layer that is this section, swept down from the layer's top. Above the section,
     /// where the part has ended, all of the layer is too much.
     pub(crate) fn swept(&self, bottom_um: f64, thickness_um: f64) -> SweptLayer {

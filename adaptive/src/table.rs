@@ -11,7 +11,7 @@ use crate::facets::area_from_above;
 use crate::layered_part::{LayeredPart, cosine_to_vertical};
 use crate::profile::ProfileChange;
 use crate::range_max::RangeMax;
-use crate::swept_layer::{Section, SweptLayer};
+use crate::swept_layer::{SweptLayer, SweptSection};
 
 /// Areas seen from above that differ by no more than this share of all are the same.
 const CLOSED: f64 = 1e-9;
@@ -42,7 +42,7 @@ impl Facing {
 
 /// A step, and the faces that lie level at its lower end.
 #[derive(Clone, Copy, Debug, Default)]
-struct Step {
+struct HeightStep {
     up: Facing,
     down: Facing,
     level_up: f64,
@@ -55,7 +55,7 @@ struct Step {
     facets: i32,
 }
 
-impl Step {
+impl HeightStep {
     fn facing(&mut self, up: bool) -> &mut Facing {
         if up { &mut self.up } else { &mut self.down }
     }
@@ -67,7 +67,7 @@ pub(crate) struct HeightTable {
     bottom_um: f64,
     top_um: f64,
     step_um: f64,
-    steps: Vec<Step>,
+    steps: Vec<HeightStep>,
 }
 
 /// A table while facets are added.
@@ -80,7 +80,7 @@ impl HeightTable {
     /// Sums a part's facets up. Returns nothing if these do not enclose it.
     pub(crate) fn new(part: &LayeredPart, step_um: f64, count: usize) -> Option<Self> {
         let [bottom_um, top_um] = part.heights_um();
-        let steps = vec![Step::default(); count + 1];
+        let steps = vec![HeightStep::default(); count + 1];
         let table = Self { bottom_um, top_um, step_um, steps };
         let mut filling = Filling { table, steepest: RangeMax::new(count + 1) };
         let (mut sum, mut all) = (0.0, 0.0);
@@ -123,7 +123,7 @@ impl HeightTable {
         &'a self,
         bottom: usize,
         thicknesses: &'a [usize],
-    ) -> impl Iterator<Item = (f64, Section, f64)> + 'a {
+    ) -> impl Iterator<Item = (f64, SweptSection, f64)> + 'a {
         let bottom_um = self.at(bottom);
         let bottom_area = self.steps[bottom].area;
         let (mut up, mut down, mut steepest) = (Facing::default(), Facing::default(), 0.0f64);
@@ -149,7 +149,7 @@ impl HeightTable {
             let plane_um = top_um.min(self.top_um.max(bottom_um)) - bottom_um;
             let (lost, gained) = (up.moment, down.moment);
             let change = ProfileChange { area: down.area - up.area, lost, gained };
-            (top_um - bottom_um, Section { plane_um, bottom_area, change }, steepest)
+            (top_um - bottom_um, SweptSection { plane_um, bottom_area, change }, steepest)
         })
     }
 }

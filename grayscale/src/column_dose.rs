@@ -51,13 +51,13 @@ pub struct Fades {
 /// [`go_down`]: Self::go_down
 #[derive(Clone, Debug)]
 pub struct ColumnDose<'a> {
-    exposures: Exposures,
+    exposures: CriticalDoses,
     resin: &'a ResinDepths,
 }
 
 /// The critical doses of each level that are left. Most columns are white alone.
 #[derive(Clone, Debug, Default)]
-struct Exposures {
+struct CriticalDoses {
     white: f64,
     gray: Vec<(u8, f64)>,
 }
@@ -78,12 +78,12 @@ impl ResinDepths {
 impl<'a> ColumnDose<'a> {
     /// Creates a column without exposures.
     pub fn dark(resin: &'a ResinDepths) -> Self {
-        Self { exposures: Exposures::default(), resin }
+        Self { exposures: CriticalDoses::default(), resin }
     }
 
     /// Adds an exposure of one gray level, which brings `share` critical doses to this height.
     pub fn expose(&mut self, level: u8, share: f64) {
-        let Exposures { white, gray } = &mut self.exposures;
+        let CriticalDoses { white, gray } = &mut self.exposures;
         if level == 255 {
             *white += share;
             return;
@@ -101,7 +101,7 @@ impl<'a> ColumnDose<'a> {
 
     /// Returns how deep the column is cured below this height, down to the depth of `fades` at most.
     pub fn cured_depth_um(&self, fades: &Fades) -> f64 {
-        let Exposures { white, gray } = &self.exposures;
+        let CriticalDoses { white, gray } = &self.exposures;
         let most_um = fades.depth_um;
         if (*white == 0.0 && gray.is_empty()) || self.sum(|_| 1.0) < 1.0 {
             return 0.0;
@@ -131,7 +131,7 @@ impl<'a> ColumnDose<'a> {
             let left = share * fades.left[usize::from(level)];
             if left < NOTHING { 0.0 } else { left }
         };
-        let Exposures { white, gray } = &mut self.exposures;
+        let CriticalDoses { white, gray } = &mut self.exposures;
         *white = faded(255, *white);
         gray.iter_mut().for_each(|(level, share)| *share = faded(*level, *share));
         gray.retain(|(_, share)| *share > 0.0);
@@ -139,7 +139,7 @@ impl<'a> ColumnDose<'a> {
 
     /// Returns the sum of all exposures, each multiplied with the factor of its level.
     fn sum(&self, factor: impl Fn(u8) -> f64) -> f64 {
-        let Exposures { white, gray } = &self.exposures;
+        let CriticalDoses { white, gray } = &self.exposures;
         let gray = gray.iter().map(|&(level, share)| share * factor(level));
         white * factor(255) + gray.sum::<f64>()
     }

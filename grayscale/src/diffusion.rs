@@ -16,7 +16,7 @@ use crate::dots::{Dots, TooManyRuns};
 const WHITE: i32 = 255 * 16;
 
 /// How errors are passed on.
-pub(crate) struct Diffusion {
+pub(crate) struct ErrorDiffusion {
     /// The sixteenths of a pixel's error that the next pixel gets.
     ahead: i32,
     /// The sixteenths for the pixels below the one before and below the next. The rest of the error
@@ -32,14 +32,14 @@ pub(crate) struct Diffusion {
 /// The strength with which thresholds differ as the mask's do.
 const ALL: i32 = 16;
 
-pub(crate) static FLOYD_STEINBERG: Diffusion =
-    Diffusion { ahead: 7, below: [3, 1], strength: ALL, turns: false };
+pub(crate) static FLOYD_STEINBERG: ErrorDiffusion =
+    ErrorDiffusion { ahead: 7, below: [3, 1], strength: ALL, turns: false };
 
 /// Thresholds differ just enough to make other dots in each layer.
-pub(crate) static SIERRA_LITE: Diffusion =
-    Diffusion { ahead: 8, below: [4, 0], strength: 1, turns: true };
+pub(crate) static SIERRA_LITE: ErrorDiffusion =
+    ErrorDiffusion { ahead: 8, below: [4, 0], strength: 1, turns: true };
 
-impl Diffusion {
+impl ErrorDiffusion {
     /// Dithers from the top row down. Errors that fall on black and white are dropped, so that
     /// no dot appears where there is no gray.
     ///

@@ -32,14 +32,14 @@ const STEPS: [i64; 6] = [32_000, 24_000, 16_000, 8_000, 4_000, 2_000];
 const FIRST: usize = PLACES / 10;
 
 /// Points on a torus and the energy that they make.
-struct Field {
+struct EnergyField {
     /// The energy that a point adds around it: columns, rows, energy.
     kernel: Vec<(usize, usize, i64)>,
     energy: Vec<i64>,
     points: Vec<bool>,
 }
 
-impl Field {
+impl EnergyField {
     fn new() -> Self {
         Self { kernel: kernel(), energy: vec![0; PLACES], points: vec![false; PLACES] }
     }
@@ -95,8 +95,8 @@ fn kernel() -> Vec<(usize, usize, i64)> {
 
 /// Returns random points, moved from clusters into voids until a moved point comes from
 /// the largest void.
-fn first_points() -> Field {
-    let mut field = Field::new();
+fn first_points() -> EnergyField {
+    let mut field = EnergyField::new();
     let mut random = 1u64;
     let mut count = 0;
     while count < FIRST {

@@ -14,9 +14,9 @@ pub(super) struct LinePoint {
 }
 
 /// The numbers of the curve `(d + d' x) (ln E - ln(c + c' x))`: `c`, `c'`, `d`, `d'`.
-pub(super) type Numbers = [f64; 4];
+pub(super) type CurveCoefficients = [f64; 4];
 
-/// The positions in [`Numbers`] where the lines of the critical dose and of the penetration depth
+/// The positions in [`CurveCoefficients`] where the lines of the critical dose and of the penetration depth
 /// begin.
 pub(super) const CRITICAL_DOSE: usize = 0;
 pub(super) const PENETRATION_DEPTH: usize = 2;
@@ -24,7 +24,7 @@ pub(super) const PENETRATION_DEPTH: usize = 2;
 /// The curve that fits points best, and how precisely they determine its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CurveLinesFit {
-    pub(super) numbers: Numbers,
+    pub(super) numbers: CurveCoefficients,
     /// The numbers' covariance, times the square of Student's t.
     spread: [[f64; 4]; 4],
     /// The share of the depths' scatter that the curve explains.
@@ -76,7 +76,11 @@ impl CurveLinesFit {
 }
 
 /// Returns the depth, and its derivatives over the numbers.
-fn at(&[c, c_rise, d, d_rise]: &Numbers, x: f64, log_dose: f64) -> (f64, Numbers) {
+fn at(
+    &[c, c_rise, d, d_rise]: &CurveCoefficients,
+    x: f64,
+    log_dose: f64,
+) -> (f64, CurveCoefficients) {
     let (critical, penetration) = (c + c_rise * x, d + d_rise * x);
     let folds = log_dose - critical.ln();
     // d/dc of (d + d' x)(ln E - ln(c + c' x)).
@@ -85,7 +89,7 @@ fn at(&[c, c_rise, d, d_rise]: &Numbers, x: f64, log_dose: f64) -> (f64, Numbers
 }
 
 /// Returns the sum of squared residuals, infinite where a critical dose is not above zero.
-fn squares(numbers: &Numbers, points: &[LinePoint]) -> f64 {
+fn squares(numbers: &CurveCoefficients, points: &[LinePoint]) -> f64 {
     let residual = |p: &LinePoint| p.depth - at(numbers, p.x, p.log_dose).0;
     let sum: f64 = points.iter().map(|point| residual(point).powi(2)).sum();
     if sum.is_finite() { sum } else { f64::INFINITY }
@@ -93,7 +97,11 @@ fn squares(numbers: &Numbers, points: &[LinePoint]) -> f64 {
 
 /// Returns the normal equations: the products of the derivatives with each other and with the
 /// residuals. A number that is not free keeps its value by a one on the diagonal.
-fn normal(numbers: &Numbers, points: &[LinePoint], free: [bool; 4]) -> ([[f64; 4]; 4], [f64; 4]) {
+fn normal(
+    numbers: &CurveCoefficients,
+    points: &[LinePoint],
+    free: [bool; 4],
+) -> ([[f64; 4]; 4], [f64; 4]) {
     let mut matrix =
         std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j && !free[i]))));
     let mut vector = [0.0; 4];
@@ -110,12 +118,16 @@ fn normal(numbers: &Numbers, points: &[LinePoint], free: [bool; 4]) -> ([[f64; 4
 }
 
 /// Improves numbers until no step helps.
-fn fitted(numbers: Numbers, points: &[LinePoint], free: [bool; 4]) -> Option<Numbers> {
+fn fitted(
+    numbers: CurveCoefficients,
+    points: &[LinePoint],
+    free: [bool; 4],
+) -> Option<CurveCoefficients> {
     least_squares::fitted(
         numbers,
         |numbers| squares(numbers, points),
         |numbers| normal(numbers, points, free),
-        |numbers, step: Numbers| std::array::from_fn(|i| numbers[i] + step[i]),
+        |numbers, step: CurveCoefficients| std::array::from_fn(|i| numbers[i] + step[i]),
     )
 }
 
@@ -125,7 +137,7 @@ mod tests {
 
     const ALL: [bool; 4] = [true; 4];
 
-    fn points(numbers: Numbers, errors: &[f64]) -> Vec<LinePoint> {
+    fn points(numbers: CurveCoefficients, errors: &[f64]) -> Vec<LinePoint> {
         let doses = [400.0, 800.0, 1600.0_f64];
         let point = |i: usize| {
             let (x, log_dose) = ([0.2, 0.6, 1.0][i % 3], doses[i / 3 % 3].ln());

@@ -1,7 +1,7 @@
 //! Fits a hinge, zero up to an onset and a line from there, to points by least squares.
 
 use super::FitError;
-use super::hinge_piece::{Piece, pieces};
+use super::hinge_piece::{HingePiece, pieces};
 use super::regression::LineFit;
 use super::student_t::t_95;
 
@@ -17,7 +17,7 @@ pub(super) struct HingeFit {
     /// The share of the scatter of y that the hinge explains.
     pub(super) r2: f64,
     /// Onsets between the same two points, and how far from the least squares those lie.
-    pieces: Vec<Piece>,
+    pieces: Vec<HingePiece>,
     limit: f64,
 }
 
@@ -38,15 +38,15 @@ impl HingeFit {
         // the largest, none is lost to rounding.
         let scaled = points.iter().map(|&(x, y)| (x / x_size, y / y_size)).collect();
         let fit = Self::of_scaled(scaled).map_err(|wrong| match wrong {
-            Wrong::Early(onset) => match line.rising(unit) {
+            HingeFailure::Early(onset) => match line.rising(unit) {
                 Ok(_) => FitError::NoCriticalDose(onset * x_size),
                 Err(error) => error,
             },
-            Wrong::Late => FitError::LastDoseAlone,
-            Wrong::Flat { .. } if line.slope < -line.slope_half() => {
+            HingeFailure::Late => FitError::LastDoseAlone,
+            HingeFailure::Flat { .. } if line.slope < -line.slope_half() => {
                 FitError::Falls { slope: line.slope, unit }
             }
-            Wrong::Flat { slope, half } => {
+            HingeFailure::Flat { slope, half } => {
                 let times = y_size / x_size;
                 FitError::Scatters { slope: slope * times, half: half * times, unit }
             }
@@ -54,21 +54,21 @@ impl HingeFit {
         Ok(fit.times(x_size, y_size))
     }
 
-    fn of_scaled(points: Vec<(f64, f64)>) -> Result<Self, Wrong> {
+    fn of_scaled(points: Vec<(f64, f64)>) -> Result<Self, HingeFailure> {
         let free = (points.len() - 2) as f64;
         let all: f64 = points.iter().map(|point| point.1 * point.1).sum();
         let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len() as f64;
         let scatter: f64 = points.iter().map(|point| (point.1 - mean).powi(2)).sum();
         let pieces = pieces(points);
-        let best = pieces.iter().filter_map(Piece::best);
+        let best = pieces.iter().filter_map(HingePiece::best);
         let best = best.min_by(|a, b| a.squares.total_cmp(&b.squares));
-        let Some(best) = best else { return Err(Wrong::Flat { slope: 0.0, half: 0.0 }) };
+        let Some(best) = best else { return Err(HingeFailure::Flat { slope: 0.0, half: 0.0 }) };
         // Student's t for one number: squares exceed the least ones by t² times the variance,
         // squares / free.
         let excess = t_95(free as usize).powi(2) / free;
         let limit = best.squares * (1.0 + excess);
         if best.onset <= 0.0 {
-            return Err(Wrong::Early(best.onset));
+            return Err(HingeFailure::Early(best.onset));
         }
         let mut fit = Self {
             onset: [best.onset; 3],
@@ -82,18 +82,18 @@ impl HingeFit {
         if all <= limit || !fit.slope[0].is_finite() {
             let half = fit.slope[2] - best.slope;
             let half = if half.is_finite() { half.max(best.slope) } else { best.slope };
-            return Err(Wrong::Flat { slope: best.slope, half });
+            return Err(HingeFailure::Flat { slope: best.slope, half });
         }
         // From the last but one x on, any onset fits as well: the slope makes up for it.
         if fit.pieces.last().is_some_and(|last| best.onset >= last.from) {
-            return Err(Wrong::Late);
+            return Err(HingeFailure::Late);
         }
         fit.onset = fit.range(best.onset, |piece| piece.onsets(limit));
         Ok(fit)
     }
 
     /// Returns a value, and the least and the greatest one of all pieces.
-    fn range(&self, value: f64, of: impl Fn(&Piece) -> Option<[f64; 2]>) -> [f64; 3] {
+    fn range(&self, value: f64, of: impl Fn(&HingePiece) -> Option<[f64; 2]>) -> [f64; 3] {
         self.pieces
             .iter()
             .filter_map(of)
@@ -119,7 +119,7 @@ impl HingeFit {
 }
 
 /// Why there is no hinge.
-enum Wrong {
+enum HingeFailure {
     /// The line begins at no x above zero.
     Early(f64),
     /// Only points of the highest x rise.

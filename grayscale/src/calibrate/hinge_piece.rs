@@ -3,7 +3,7 @@
 /// Onsets between two neighboring x. All points from the upper one on are on the line, which their
 /// sums determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Piece {
+pub(super) struct HingePiece {
     /// The lowest onset; ranges use only onsets of zero or more.
     pub(super) from: f64,
     /// The highest onset.
@@ -20,16 +20,16 @@ pub(super) struct Piece {
 }
 
 /// The best hinge of a piece.
-pub(super) struct Best {
+pub(super) struct BestHinge {
     pub(super) onset: f64,
     pub(super) slope: f64,
     pub(super) squares: f64,
 }
 
 /// Returns the pieces of points, from the lowest onset.
-pub(super) fn pieces(mut points: Vec<(f64, f64)>) -> Vec<Piece> {
+pub(super) fn pieces(mut points: Vec<(f64, f64)>) -> Vec<HingePiece> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut pieces: Vec<Piece> = Vec::new();
+    let mut pieces: Vec<HingePiece> = Vec::new();
     let (mut count, mut mean_x, mut mean_y) = (0.0, 0.0, 0.0);
     let (mut xx, mut xy, mut yy): (f64, f64, f64) = (0.0, 0.0, 0.0);
     let groups: Vec<&[(f64, f64)]> = points.chunk_by(|a, b| a.0 == b.0).collect();
@@ -50,13 +50,13 @@ pub(super) fn pieces(mut points: Vec<(f64, f64)>) -> Vec<Piece> {
         let from = index.checked_sub(1).map_or(f64::NEG_INFINITY, |below| groups[below][0].0);
         let to = group[0].0;
         let left = (yy - explained).max(0.0) + before[index];
-        pieces.push(Piece { from, to, count, mean_x, mean_y, xx, xy, left });
+        pieces.push(HingePiece { from, to, count, mean_x, mean_y, xx, xy, left });
     }
     pieces.reverse();
     pieces
 }
 
-impl Piece {
+impl HingePiece {
     /// Returns the slope of the line that fits best, without regard to the onset.
     fn line(&self) -> f64 {
         if self.xx > 0.0 { self.xy / self.xx } else { 0.0 }
@@ -81,16 +81,16 @@ impl Piece {
     }
 
     /// Returns the best hinge, if one rises.
-    pub(super) fn best(&self) -> Option<Best> {
+    pub(super) fn best(&self) -> Option<BestHinge> {
         let line = self.line();
         let crossing = self.mean_x - self.mean_y / line;
         if line > 0.0 && self.from <= crossing && crossing <= self.to {
-            return Some(Best { onset: crossing, slope: line, squares: self.left });
+            return Some(BestHinge { onset: crossing, slope: line, squares: self.left });
         }
         let ends = [self.from, self.to].into_iter().filter(|end| end.is_finite());
         let hinge = |onset| {
             let (slope, more) = self.best_at_reach(self.reach(onset));
-            Best { onset, slope, squares: self.left + more }
+            BestHinge { onset, slope, squares: self.left + more }
         };
         let rising = ends.map(hinge).filter(|best| best.slope > 0.0);
         rising.min_by(|a, b| a.squares.total_cmp(&b.squares))

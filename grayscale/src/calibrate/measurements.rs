@@ -134,17 +134,17 @@ pub fn depth_points(
             let wanted = "a gray level from 0 (black) to 1 (white)";
             GrayLevel::new(level).ok_or_else(|| gray.impossible(row, wanted))
         })?;
-        let Some(of_row) = depth.length_or_blank(row)? else { return Ok(Read::Blank) };
+        let Some(of_row) = depth.length_or_blank(row)? else { return Ok(RowContent::Blank) };
         // A film that did not cure has no depth on the curve, which begins at E_c.
         if of_row.um() <= 0.0 {
-            return Ok(Read::Nothing);
+            return Ok(RowContent::Nothing);
         }
         let point = DepthPoint { gray, dose, depth: of_row };
         // Fits take the logarithm of the dose that arrives, and black has none.
         if !Dose::PLAUSIBLE.contains(&point.arriving()) {
             return Err(depth.impossible(row, "what so dark a gray level cures"));
         }
-        Ok(Read::Point(point))
+        Ok(RowContent::Point(point))
     })
 }
 
@@ -166,9 +166,9 @@ pub fn lamp_points(table: &CsvTable) -> Result<Measured<LampPoint>, DataError> {
         let lamp = Intensity::from_mw_per_cm2(light);
         let dose = DoseColumn::find(table, Some(lamp))?.of(row)?;
         Ok(match depth.length_or_blank(row)? {
-            None => Read::Blank,
-            Some(depth) if depth.um() <= 0.0 => Read::Nothing,
-            Some(depth) => Read::Point(LampPoint {
+            None => RowContent::Blank,
+            Some(depth) if depth.um() <= 0.0 => RowContent::Nothing,
+            Some(depth) => RowContent::Point(LampPoint {
                 lamp,
                 film: DepthPoint { gray: GrayLevel::WHITE, dose, depth },
             }),
@@ -200,18 +200,18 @@ pub fn width_points(
         if !LENGTHS.contains(&side.um()) {
             return Err(size.impossible(row, "a size from 0.001 um to 1 m"));
         }
-        let Some(of_row) = width.length_or_blank(row)? else { return Ok(Read::Blank) };
+        let Some(of_row) = width.length_or_blank(row)? else { return Ok(RowContent::Blank) };
         if is_side && of_row.um() <= 0.0 {
-            return Ok(Read::Nothing);
+            return Ok(RowContent::Nothing);
         }
         // 002 eq. 60: both edges moved.
         let width = if is_side { cure_width_of_square(of_row, side) } else { of_row };
-        Ok(Read::Point(WidthPoint { feature_size: side.to_whole_nm(), dose, width }))
+        Ok(RowContent::Point(WidthPoint { feature_size: side.to_whole_nm(), dose, width }))
     })
 }
 
 /// The content of a row.
-enum Read<T> {
+enum RowContent<T> {
     Point(T),
     Nothing,
     Blank,
@@ -219,14 +219,14 @@ enum Read<T> {
 
 fn measured<T>(
     table: &CsvTable,
-    read: impl Fn(&TableRow) -> Result<Read<T>, DataError>,
+    read: impl Fn(&TableRow) -> Result<RowContent<T>, DataError>,
 ) -> Result<Measured<T>, DataError> {
     let mut measured = Measured { points: Vec::new(), none: 0, blank: 0 };
     for row in table.rows() {
         match read(row)? {
-            Read::Point(point) => measured.points.push(point),
-            Read::Nothing => measured.none += 1,
-            Read::Blank => measured.blank += 1,
+            RowContent::Point(point) => measured.points.push(point),
+            RowContent::Nothing => measured.none += 1,
+            RowContent::Blank => measured.blank += 1,
         }
     }
     if measured.points.len() + measured.none == 0 {
