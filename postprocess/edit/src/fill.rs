@@ -3,7 +3,7 @@
 use lamp_stack::{MAX_RUNS, Mask, MaskBuilder};
 
 /// A point as column and row, as a [`PixelMap`](super::pixel_map::PixelMap) returns it.
-pub(super) type Point = [f64; 2];
+pub(super) type PixelPoint = [f64; 2];
 
 /// White pixels of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,7 +49,7 @@ impl RunSet {
     ///
     /// As in slicing, a point on a row of pixel centers counts as below it. So shapes that
     /// share a point or an edge leave no gap between them and share no pixel.
-    pub(super) fn add_polygons(&mut self, lines: &[Vec<Point>]) {
+    pub(super) fn add_polygons(&mut self, lines: &[Vec<PixelPoint>]) {
         let mut crossings = Vec::new();
         for line in lines {
             let next = line.iter().cycle().skip(1);
@@ -70,7 +70,7 @@ impl RunSet {
     }
 
     /// Adds the pixels nearer to a point than `radius`.
-    pub(super) fn add_disc(&mut self, [x, y]: Point, radius: f64) {
+    pub(super) fn add_disc(&mut self, [x, y]: PixelPoint, radius: f64) {
         let end = (y + radius).floor() + 1.0;
         for row in (y - radius).ceil() as u32..(end as u32).min(self.height) {
             let square = radius * radius - (f64::from(row) - y).powi(2);
@@ -122,7 +122,7 @@ struct OutlineCrossing {
     winding: i32,
 }
 
-fn cross(a: Point, b: Point, height: u32, out: &mut Vec<OutlineCrossing>) {
+fn cross(a: PixelPoint, b: PixelPoint, height: u32, out: &mut Vec<OutlineCrossing>) {
     let ([top, bottom], winding) = if a[1] <= b[1] { ([a, b], 1) } else { ([b, a], -1) };
     let first = top[1].ceil().max(0.0);
     let end = bottom[1].ceil().min(height.into());
@@ -141,20 +141,20 @@ mod tests {
 
     use super::*;
 
-    fn polygons(lines: &[Vec<Point>], width: u32, height: u32) -> Mask {
+    fn polygons(lines: &[Vec<PixelPoint>], width: u32, height: u32) -> Mask {
         let mut runs = RunSet::new(width, height);
         runs.add_polygons(lines);
         runs.into_mask().unwrap()
     }
 
-    fn disc(centre: Point, radius: f64, width: u32, height: u32) -> Mask {
+    fn disc(centre: PixelPoint, radius: f64, width: u32, height: u32) -> Mask {
         let mut runs = RunSet::new(width, height);
         runs.add_disc(centre, radius);
         runs.into_mask().unwrap()
     }
 
     /// How often lines wind about a pixel's center, by its definition.
-    fn winding(lines: &[Vec<Point>], x: f64, y: f64) -> i32 {
+    fn winding(lines: &[Vec<PixelPoint>], x: f64, y: f64) -> i32 {
         let mut winding = 0;
         for line in lines {
             for (a, b) in line.iter().zip(line.iter().cycle().skip(1)) {
@@ -182,7 +182,7 @@ mod tests {
             lines in prop::collection::vec(
                 prop::collection::vec((-5.0..25.0, -5.0..20.0), 3..8), 1..4),
         ) {
-            let lines: Vec<Vec<Point>> =
+            let lines: Vec<Vec<PixelPoint>> =
                 lines.into_iter().map(|line| line.into_iter().map(|(x, y)| [x, y]).collect()).collect();
             let mask = polygons(&lines, 20, 15);
             for (column, row) in (0..15).flat_map(|row| (0..20).map(move |column| (column, row))) {

@@ -7,7 +7,7 @@ use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, GlyphId, MetadataProvider};
 
 use super::edit_error::EditProblem;
-use super::fill::Point;
+use super::fill::PixelPoint;
 
 const FONT: &[u8] = include_bytes!("../../../fonts/roboto-subset.ttf");
 
@@ -32,7 +32,7 @@ pub(super) fn outlines(
     align: Align,
     turn: Orientation,
     tolerance: f64,
-) -> Result<Vec<Vec<Point>>, char> {
+) -> Result<Vec<Vec<PixelPoint>>, char> {
     let font = FontRef::new(FONT).expect("the font that comes with the program is one");
     // Places in units of the font, as whole numbers.
     let (size, location) = (Size::unscaled(), LocationRef::default());
@@ -61,8 +61,9 @@ pub(super) fn outlines(
         Align::Center => -pen.x / 2.0,
         Align::Right => -pen.x,
     };
-    let placed =
-        |line: Vec<Point>| line.into_iter().map(|[x, y]| turned([x + shift, y], turn)).collect();
+    let placed = |line: Vec<PixelPoint>| {
+        line.into_iter().map(|[x, y]| turned([x + shift, y], turn)).collect()
+    };
     Ok(pen.lines.into_iter().map(placed).collect())
 }
 
@@ -71,14 +72,14 @@ fn glyph(font: &FontRef<'_>, letter: char) -> Option<GlyphId> {
 }
 
 /// Turns a point about the origin, with y up.
-pub(super) fn turned([x, y]: Point, turn: Orientation) -> Point {
+pub(super) fn turned([x, y]: PixelPoint, turn: Orientation) -> PixelPoint {
     let start = if turn.is_mirrored() { [-x, y] } else { [x, y] };
     (0..turn.quarters()).fold(start, |[x, y], _| [-y, x])
 }
 
 /// Draws a font's curves as straight lines.
 struct Pen {
-    lines: Vec<Vec<Point>>,
+    lines: Vec<Vec<PixelPoint>>,
     /// The start of the letter.
     x: f64,
     /// The distance to move the letter to the right, in units of the font.
@@ -88,21 +89,21 @@ struct Pen {
 }
 
 impl Pen {
-    fn point(&self, x: f32, y: f32) -> Point {
+    fn point(&self, x: f32, y: f32) -> PixelPoint {
         [self.x + f64::from(x + self.shift) * self.scale, f64::from(y) * self.scale]
     }
 
-    fn last(&self) -> Point {
+    fn last(&self) -> PixelPoint {
         *self.lines.last().and_then(|line| line.last()).expect("a curve starts somewhere")
     }
 
-    fn draw_to(&mut self, point: Point) {
+    fn draw_to(&mut self, point: PixelPoint) {
         self.lines.last_mut().expect("a curve starts somewhere").push(point);
     }
 
     /// Draws a curve whose second derivative is at most `bend`. The chord of an `n`th of
     /// it is off by at most `bend / (8 n^2)`.
-    fn draw(&mut self, bend: f64, at: impl Fn(f64) -> Point) {
+    fn draw(&mut self, bend: f64, at: impl Fn(f64) -> PixelPoint) {
         let pieces = (bend / (8.0 * self.tolerance)).sqrt().ceil().clamp(1.0, 1000.0) as u32;
         for piece in 1..=pieces {
             self.draw_to(at(f64::from(piece) / f64::from(pieces)));
@@ -135,7 +136,7 @@ impl OutlinePen for Pen {
         let (a, b) = (self.last(), self.point(x1, y1));
         let (c, d) = (self.point(x2, y2), self.point(x, y));
         // The second derivative lies between six times these two differences.
-        let second = |a: Point, b: Point, c: Point| {
+        let second = |a: PixelPoint, b: PixelPoint, c: PixelPoint| {
             (a[0] - 2.0 * b[0] + c[0]).hypot(a[1] - 2.0 * b[1] + c[1])
         };
         let bend = 6.0 * second(a, b, c).max(second(b, c, d));
@@ -230,8 +231,8 @@ mod tests {
 
     fn drawn(text: &str, align: Align, turn: &str) -> Vec<String> {
         let lines = outlines(text, align, turn.parse().unwrap(), 0.01).unwrap();
-        let pixel = |[x, y]: Point| [10.0 + 10.0 * x - 0.5, 12.0 - 10.0 * y - 0.5];
-        let lines: Vec<Vec<Point>> =
+        let pixel = |[x, y]: PixelPoint| [10.0 + 10.0 * x - 0.5, 12.0 - 10.0 * y - 0.5];
+        let lines: Vec<Vec<PixelPoint>> =
             lines.into_iter().map(|line| line.into_iter().map(pixel).collect()).collect();
         let mut runs = RunSet::new(20, 14);
         runs.add_polygons(&lines);

@@ -17,12 +17,12 @@ pub(super) const MAX_REPEATS: u64 = 100_000;
 #[serde(try_from = "RepeatTable")]
 pub(super) struct Repeat {
     count: u32,
-    way: Way,
+    way: RepeatWay,
 }
 
 /// The way from a repeat to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+enum RepeatWay {
     Step([Length; 3]),
     /// About an axis of length 1 through a point, counterclockwise as seen from its tip.
     Turn {
@@ -41,7 +41,7 @@ struct RepeatTable {
     step: Option<[Length; 3]>,
     #[serde(default, deserialize_with = "some_point")]
     centre: Option<[Length; 3]>,
-    axis: Option<Axis>,
+    axis: Option<PatternAxis>,
     /// From the first to the last, in degrees.
     angle: Option<f64>,
     /// From each to the next, in degrees.
@@ -50,7 +50,7 @@ struct RepeatTable {
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "write \"x\", \"y\", \"z\" or a direction [x, y, z]")]
-enum Axis {
+enum PatternAxis {
     Named(AxisName),
     Direction([f64; 3]),
 }
@@ -63,7 +63,7 @@ enum AxisName {
     Z,
 }
 
-impl Axis {
+impl PatternAxis {
     /// Returns its direction, of length 1.
     fn direction(self) -> Option<[f64; 3]> {
         let direction = match self {
@@ -88,11 +88,13 @@ impl TryFrom<RepeatTable> for Repeat {
         }
         let has_turn = axis.is_some() || angle.is_some() || angle_step.is_some();
         let centre = match (step, centre) {
-            (Some(step), None) if !has_turn => return Ok(Self { count, way: Way::Step(step) }),
+            (Some(step), None) if !has_turn => {
+                return Ok(Self { count, way: RepeatWay::Step(step) });
+            }
             (None, Some(centre)) => centre,
             _ => return Err("write step, or centre with axis, angle or angle_step".to_owned()),
         };
-        let axis = axis.unwrap_or(Axis::Named(AxisName::Z));
+        let axis = axis.unwrap_or(PatternAxis::Named(AxisName::Z));
         let axis = axis.direction().ok_or("the axis has no direction")?;
         let degrees = match (angle, angle_step) {
             (Some(_), Some(_)) => return Err("write one of angle and angle_step".to_owned()),
@@ -107,7 +109,7 @@ impl TryFrom<RepeatTable> for Repeat {
         if !widest.is_finite() || widest.abs() > 360.0 {
             return Err(format!("{widest} degrees are more than a circle"));
         }
-        Ok(Self { count, way: Way::Turn { centre, axis, degrees } })
+        Ok(Self { count, way: RepeatWay::Turn { centre, axis, degrees } })
     }
 }
 
@@ -120,26 +122,26 @@ impl Repeat {
     /// Returns true if it keeps heights, and upright shapes upright.
     pub(super) fn is_level(&self) -> bool {
         match self.way {
-            Way::Step([_, _, up]) => up == Length::default(),
-            Way::Turn { axis: [x, y, _], .. } => x == 0.0 && y == 0.0,
+            RepeatWay::Step([_, _, up]) => up == Length::default(),
+            RepeatWay::Turn { axis: [x, y, _], .. } => x == 0.0 && y == 0.0,
         }
     }
 
     /// Returns true if it turns shapes by quarters only.
     pub(super) fn is_of_quarters(&self) -> bool {
         match self.way {
-            Way::Step(_) => true,
-            Way::Turn { degrees, .. } => degrees % 90.0 == 0.0,
+            RepeatWay::Step(_) => true,
+            RepeatWay::Turn { degrees, .. } => degrees % 90.0 == 0.0,
         }
     }
 
     /// Returns the motion from the first to the `k`th.
     fn motion(&self, k: u32) -> Motion {
         match self.way {
-            Way::Step(step) => {
+            RepeatWay::Step(step) => {
                 Motion { by_um: step.map(|part| f64::from(k) * part.um()), ..Motion::NONE }
             }
-            Way::Turn { centre, axis, degrees } => {
+            RepeatWay::Turn { centre, axis, degrees } => {
                 Motion::about(centre.map(Length::um), axis, f64::from(k) * degrees)
             }
         }

@@ -7,7 +7,7 @@ use super::edit_error::{EditError, EditProblem};
 use super::letters::{Align, turned};
 use super::pattern::Motion;
 use super::pixel_map::PixelMap;
-use super::schema::Picture;
+use super::schema::PictureShape;
 
 /// Edges this near to a pixel's center, in pixels, are on it: rounding must not make one
 /// pixel of a picture two columns wide, and its neighbor none.
@@ -51,7 +51,7 @@ impl<E: From<EditError>> OtherPicture<E> {
 /// Returns an error if the picture reaches outside the image, or has more runs there than
 /// an image can hold.
 pub(super) fn stamped(
-    keys: &Picture,
+    keys: &PictureShape,
     picture: &Mask,
     part: &ImageBounds,
     grid: PixelMap,

@@ -18,7 +18,7 @@ use super::list::Edits;
 use super::other_stacks::{AlignedStack, middle};
 use super::page_changes::turn_page;
 use super::pictures::OtherPicture;
-use super::schema::{Edit, Label, LengthRange, Mirror};
+use super::schema::{Edit, Label, LengthRange, MirrorAxis};
 use super::shape::{EditShape, FromFiles};
 
 /// The edits of a list in the pixels of one stack.
@@ -202,7 +202,7 @@ impl PlannedEdit {
         if let Some(mirror) = edit.mirror {
             // Orientations mirror left to right; with a half turn, top and bottom change places
             // instead.
-            return Ok(turned(Orientation::new(if mirror == Mirror::X { 0 } else { 2 }, true)));
+            return Ok(turned(Orientation::new(if mirror == MirrorAxis::X { 0 } else { 2 }, true)));
         }
         if let Some(pad) = edit.pad {
             return framed(padded(pad, place)?);

@@ -32,17 +32,17 @@ pub(super) struct Edit {
     #[serde(rename = "box")]
     pub(super) block: Option<Rectangle>,
     pub(super) cylinder: Option<Cylinder>,
-    pub(super) line: Option<StraightLine>,
+    pub(super) line: Option<LineShape>,
     pub(super) polygon: Option<Polygon>,
     pub(super) strut: Option<StrutEnds>,
     pub(super) cone: Option<ConeEnds>,
     pub(super) sphere: Option<Sphere>,
     pub(super) label: Option<Label>,
-    pub(super) picture: Option<Picture>,
+    pub(super) picture: Option<PictureShape>,
     pub(super) stack: Option<OtherStack>,
     pub(super) crop: Option<Rectangle>,
     pub(super) pad: Option<Pad>,
-    pub(super) mirror: Option<Mirror>,
+    pub(super) mirror: Option<MirrorAxis>,
     pub(super) rotate: Option<u32>,
 }
 
@@ -182,7 +182,7 @@ pub(super) struct Polygon {
 /// A straight line with square ends.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct StraightLine {
+pub(super) struct LineShape {
     #[serde(deserialize_with = "lengths")]
     pub(super) from: [Length; 2],
     #[serde(deserialize_with = "lengths")]
@@ -227,7 +227,7 @@ impl Label {
 /// A picture whose white pixels are the shape.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Picture {
+pub(super) struct PictureShape {
     pub(super) file: PathBuf,
     /// The places of the lower edge's left end, middle or right end, by `align`.
     #[serde(deserialize_with = "places")]
@@ -241,7 +241,7 @@ pub(super) struct Picture {
     pub(super) turn: Orientation,
 }
 
-impl Picture {
+impl PictureShape {
     /// Returns the file's name without its folder.
     pub(super) fn name(&self) -> Cow<'_, str> {
         self.file.file_name().unwrap_or_default().to_string_lossy()
@@ -273,7 +273,7 @@ pub(super) struct Pad {
 /// The axis along which sides change places: left and right, or top and bottom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Mirror {
+pub(super) enum MirrorAxis {
     X,
     Y,
 }

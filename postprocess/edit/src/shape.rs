@@ -7,13 +7,13 @@ use lamp_stack::{Length, Mask, PageInfo};
 
 use super::copies::{BuildCopy, composed};
 use super::edit_error::{EditError, EditProblem, LayerProblem};
-use super::fill::{Point, RunSet};
+use super::fill::{PixelPoint, RunSet};
 use super::letters::{numbered, outlines};
 use super::other_stacks::middle;
 use super::pattern::{Motion, Repeat, motions};
 use super::pictures::stamped;
 use super::pixel_map::PixelMap;
-use super::schema::{Cylinder, Edit, Label, StraightLine};
+use super::schema::{Cylinder, Edit, Label, LineShape};
 use super::serials::SerialList;
 use super::solid::{Solid, rectangle};
 
@@ -134,15 +134,15 @@ fn draw(edit: &Edit, motion: &Motion, grid: PixelMap, runs: &mut RunSet) {
         runs.add_disc(corner(at), grid.length(diameter) / 2.0);
     } else if let Some(polygon) = &edit.polygon {
         runs.add_polygons(&[polygon.points.iter().copied().map(corner).collect()]);
-    } else if let Some(StraightLine { from, to, width }) = edit.line {
+    } else if let Some(LineShape { from, to, width }) = edit.line {
         let [from, to] = [from, to].map(|end| motion.of_level(end));
-        runs.add_polygons(&[stroke(StraightLine { from, to, width }, grid)]);
+        runs.add_polygons(&[stroke(LineShape { from, to, width }, grid)]);
     } else if let Some(block) = edit.block {
         runs.add_polygons(&[rectangle(block, grid, motion)]);
     }
 }
 
-fn stroke(StraightLine { from, to, width }: StraightLine, grid: PixelMap) -> Vec<Point> {
+fn stroke(LineShape { from, to, width }: LineShape, grid: PixelMap) -> Vec<PixelPoint> {
     let [from, to] = [from, to].map(|end| end.map(Length::mm));
     let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
     // The line's direction turned by a quarter, (-dy, dx), times this is half a width long.

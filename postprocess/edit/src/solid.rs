@@ -5,7 +5,7 @@ use lamp_stack::{Length, Strut};
 
 use super::cone::Cone;
 use super::edit_error::EditProblem;
-use super::fill::{Point, RunSet};
+use super::fill::{PixelPoint, RunSet};
 use super::pattern::Motion;
 use super::pixel_map::PixelMap;
 use super::schema::{ConeEnds, Cylinder, CylinderAxis, Edit, Rectangle, Sphere, StrutEnds};
@@ -117,7 +117,7 @@ pub(super) fn rectangle(
     Rectangle { x, y }: Rectangle,
     grid: PixelMap,
     motion: &Motion,
-) -> Vec<Point> {
+) -> Vec<PixelPoint> {
     let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
     let corner = |corner| grid.to_pixels(motion.of_level(corner).map(Length::mm));
     corners.into_iter().map(corner).collect()

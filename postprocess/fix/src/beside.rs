@@ -36,7 +36,7 @@ pub(super) struct Beside<'a> {
 
 /// The crossings that a row misses.
 #[derive(Clone, Debug)]
-pub(super) struct Shown {
+pub(super) struct MissedCrossings {
     /// The least and the greatest column that what layers show allows, and the likeliest.
     pub(super) missing: Vec<[f64; 3]>,
     pub(super) confidence: f64,
@@ -52,7 +52,7 @@ struct Whole {
 
 impl Beside<'_> {
     /// Returns which crossings a row of a band misses. `None` if the other layers do not show it.
-    pub(super) fn show(&self, row: u32, band: &Range<u32>) -> Option<Shown> {
+    pub(super) fn show(&self, row: u32, band: &Range<u32>) -> Option<MissedCrossings> {
         let mine: Vec<f64> = self.mask.row(row).iter().map(|&column| column.into()).collect();
         // A layer that has more crossings may have features that this one has not, so they count
         // only if layers on both sides have them and none has fewer.
@@ -83,7 +83,7 @@ impl Beside<'_> {
             return guess;
         }
         let doubt = guess.as_ref().map_or(0.0, |guess| guess.confidence);
-        let fits = |which: usize, shown: &Shown| {
+        let fits = |which: usize, shown: &MissedCrossings| {
             let had = self.mask.row(band.start + which as u32);
             guess.as_ref().is_some_and(|guess| shown.fits(had, &guess.rows[which]))
         };
@@ -118,7 +118,7 @@ impl Beside<'_> {
 impl Beside<'_> {
     /// Leads what is shown above and below on through the rows in between that no layer shows, if
     /// all of them have as many crossings.
-    fn fill(&self, band: &Range<u32>, shown: &mut [Option<Shown>]) {
+    fn fill(&self, band: &Range<u32>, shown: &mut [Option<MissedCrossings>]) {
         let mut end = 0;
         while let Some(start) = (end..shown.len()).find(|&at| shown[at].is_none()) {
             end = (start..shown.len()).find(|&at| shown[at].is_some()).unwrap_or(shown.len());
@@ -139,7 +139,7 @@ impl Beside<'_> {
                 let missing = pairs
                     .map(|(a, b)| [a[0].min(b[0]), a[1].max(b[1]), a[2] + share * (b[2] - a[2])]);
                 let confidence = above.confidence.min(to.confidence).min(BY_ONE);
-                *shown = Some(Shown { missing: missing.collect(), confidence });
+                *shown = Some(MissedCrossings { missing: missing.collect(), confidence });
             }
         }
     }
@@ -158,7 +158,7 @@ pub(super) fn added_columns(
     added.map(|&column| column..column + 1).reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))
 }
 
-impl Shown {
+impl MissedCrossings {
     /// Returns whether layers on both sides show the same.
     pub(super) fn is_sure(&self) -> bool {
         self.confidence >= BETWEEN
@@ -235,7 +235,7 @@ fn is_open_near(layer: &Layer, rows: &Range<u32>) -> bool {
 
 /// Returns the crossings missing from a row between two that are alike, if it has all others
 /// where they lie in between.
-fn between(mine: &[f64], below: &Whole, above: &Whole) -> Option<Shown> {
+fn between(mine: &[f64], below: &Whole, above: &Whole) -> Option<MissedCrossings> {
     let away = [below.away, above.away];
     let expected = interpolated(&below.columns, &above.columns, away);
     let partners = inject(mine, &expected, f64::INFINITY)?;
@@ -258,7 +258,7 @@ fn between(mine: &[f64], below: &Whole, above: &Whole) -> Option<Shown> {
         let margin = if bend < 1.0 { 0.5 } else { NEAR + bend };
         [below.min(above) - margin, below.max(above) + margin, expected[which]]
     });
-    Some(Shown { missing: missing.collect(), confidence: BETWEEN })
+    Some(MissedCrossings { missing: missing.collect(), confidence: BETWEEN })
 }
 
 /// Returns the crossings of a row between two.
@@ -268,7 +268,7 @@ fn interpolated(below: &[f64], above: &[f64], [under, over]: [usize; 2]) -> Vec<
 }
 
 /// Returns what the nearer of two layers shows.
-fn nearer(mine: &[f64], sides: &[Option<Whole>; 2]) -> Option<Shown> {
+fn nearer(mine: &[f64], sides: &[Option<Whole>; 2]) -> Option<MissedCrossings> {
     match sides {
         [Some(below), Some(above)] if below.away == above.away => None,
         [Some(below), Some(above)] if below.away > above.away => by_one(mine, above),
@@ -279,7 +279,7 @@ fn nearer(mine: &[f64], sides: &[Option<Whole>; 2]) -> Option<Shown> {
 
 /// Returns what one layer shows, moved by as much as the crossings beside differ. `None` if they
 /// differ so much that a crossing may be another one.
-fn by_one(mine: &[f64], other: &Whole) -> Option<Shown> {
+fn by_one(mine: &[f64], other: &Whole) -> Option<MissedCrossings> {
     let offset = |at: usize| mine[at] - other.columns[other.partners[at]];
     let slack = BEND * (0..mine.len()).map(|at| offset(at).abs()).fold(0.0, f64::max);
     let mut confidence = BY_ONE;
@@ -299,7 +299,7 @@ fn by_one(mine: &[f64], other: &Whole) -> Option<Shown> {
         confidence = confidence.min(BY_ONE / (1.0 + 0.5 * slack / room));
         missing.push([column - NEAR - slack, column + NEAR + slack, column]);
     }
-    Some(Shown { missing, confidence })
+    Some(MissedCrossings { missing, confidence })
 }
 
 /// Returns the indices below `count` that are not among increasing ones.

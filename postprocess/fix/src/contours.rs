@@ -19,7 +19,7 @@ const MIN_LIKELY_WIDTH: f64 = 8.0;
 
 /// A crossing that a row of the band should have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Expected {
+pub(super) struct ExpectedCrossing {
     /// The column, counted as transitions are, not rounded.
     pub(super) column: f64,
     /// The error that the column may have, in pixels.
@@ -45,7 +45,7 @@ pub(super) struct LineId {
 #[derive(Debug, Default)]
 pub(super) struct Outlook {
     /// The crossings, from the left.
-    pub(super) crossings: Vec<Expected>,
+    pub(super) crossings: Vec<ExpectedCrossing>,
     /// Columns whose color in this row is unknown, as a contour ends or begins there in the
     /// band: from the left, without overlap.
     pub(super) unknown: Vec<Range<f64>>,
@@ -53,13 +53,13 @@ pub(super) struct Outlook {
 
 /// The contours that cross a band or end in it.
 #[derive(Debug)]
-pub(super) struct Contours {
+pub(super) struct BandContours {
     /// The band and the good rows around it.
     rows: Range<u32>,
     band: Range<u32>,
     /// The number of good rows next to it, on the side that has fewer.
     pub(super) good_rows: usize,
-    contours: Vec<Contour>,
+    contours: Vec<BandContour>,
 }
 
 /// The columns at which a line is known to cross the rows.
@@ -69,7 +69,7 @@ type KnownColumns = Vec<Option<f64>>;
 type Guess = (f64, f64);
 
 #[derive(Debug)]
-struct Contour {
+struct BandContour {
     course: ContourPath,
     /// The crossings of its one or two lines with each row of the band.
     guesses: Vec<Vec<Guess>>,
@@ -84,7 +84,7 @@ enum ContourPath {
     Closing { sides: [KnownColumns; 2], from_above: bool },
 }
 
-impl Contours {
+impl BandContours {
     /// Follows the contours around a band, through rows that are good. Returns `None` if no good
     /// row is next to the band.
     pub(super) fn around(
@@ -164,7 +164,7 @@ impl Contours {
     }
 
     fn push(&mut self, course: ContourPath) {
-        self.contours.push(Contour { course, guesses: Vec::new() });
+        self.contours.push(BandContour { course, guesses: Vec::new() });
     }
 
     /// Records that a row of the band crosses a line, for the next [`guess`](Self::guess).
@@ -181,7 +181,7 @@ impl Contours {
     pub(super) fn guess(&mut self) {
         let [start, end] =
             [self.band.start, self.band.end].map(|row| (row - self.rows.start) as usize);
-        for Contour { course, guesses } in &mut self.contours {
+        for BandContour { course, guesses } in &mut self.contours {
             *guesses = match course {
                 ContourPath::Through(knots) => vec![through(knots, start..end)],
                 ContourPath::Closing { sides, from_above } => {
@@ -196,7 +196,7 @@ impl Contours {
     pub(super) fn outlook(&self, row: u32) -> Outlook {
         let at = (row - self.band.start) as usize;
         let mut outlook = Outlook::default();
-        for (contour, Contour { course, guesses }) in self.contours.iter().enumerate() {
+        for (contour, BandContour { course, guesses }) in self.contours.iter().enumerate() {
             let through = matches!(course, ContourPath::Through(_));
             let min_width = match &guesses[..] {
                 [left, right] => right[at].0 - left[at].0 - left[at].1 - right[at].1,
@@ -206,7 +206,7 @@ impl Contours {
                 let (column, slack) = guesses[at];
                 let side = LineId { contour, right: line == 1 };
                 let likely = min_width > MIN_LIKELY_WIDTH;
-                outlook.crossings.push(Expected {
+                outlook.crossings.push(ExpectedCrossing {
                     column,
                     slack,
                     side,

@@ -8,7 +8,7 @@ use super::FixOptions;
 use super::band::{BandKind, BandKinds};
 use super::beside::Beside;
 use super::combine::{difference, majority, white_in_both};
-use super::contours::{Contours, DEPTH};
+use super::contours::{BandContours, DEPTH};
 use super::mend::{DROP, mend};
 
 /// Pixels from which on a run counts as a sliver, or as wrong for lack of two crossings:
@@ -185,7 +185,7 @@ impl Scene<'_> {
     /// Marks the rows of a band that are stray although they end black.
     fn check_pairs(&self, strays: &mut Strays, band: &Range<u32>) {
         let is_good = |row: u32| !band.contains(&row) && strays.is_good(row);
-        let Some(contours) = Contours::around(self.mask, band.clone(), is_good) else { return };
+        let Some(contours) = BandContours::around(self.mask, band.clone(), is_good) else { return };
         let mended =
             |row: u32| mend(self.mask.row(row), &contours.outlook(row), self.mask.width(), DROP);
         let lacks_some = |row: &u32| {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::contours::{Expected, LineId, Outlook};
+use super::contours::{ExpectedCrossing, LineId, Outlook};
 
 /// The cost, in wrong pixels, of adding a crossing that must be there. Above zero, so that a row
 /// that is right stays as it is.
@@ -30,7 +30,7 @@ pub(super) struct Mended {
     /// The expected lines that the row had crossed, and the columns.
     pub(super) found: Vec<(LineId, u32)>,
     /// The crossings that were added.
-    pub(super) added: Vec<Expected>,
+    pub(super) added: Vec<ExpectedCrossing>,
     /// The number of crossings that were dropped.
     pub(super) dropped: usize,
     /// The number of likely crossings, of contours that end somewhere in the band but hardly
@@ -161,10 +161,10 @@ fn events(
 }
 
 /// Returns an expected crossing as one that the row lacks.
-fn missing_at(which: usize, crossing: &Expected, width: u32) -> RowEvent {
+fn missing_at(which: usize, crossing: &ExpectedCrossing, width: u32) -> RowEvent {
     let price = match crossing {
-        Expected { may_be_missed: false, .. } => ADD_CROSSED,
-        Expected { through: true, .. } => ADD,
+        ExpectedCrossing { may_be_missed: false, .. } => ADD_CROSSED,
+        ExpectedCrossing { through: true, .. } => ADD,
         _ => ADD_CLOSING,
     };
     let column = crossing.column.round().clamp(0.0, f64::from(width - 1)) as u32;

@@ -60,14 +60,14 @@ pub(super) fn hermite(
 }
 
 /// A polynomial of second degree in the distance from the row of its first point.
-struct Polynomial {
+struct Quadratic {
     from: f64,
     value: f64,
     slope: f64,
     bend: f64,
 }
 
-impl Polynomial {
+impl Quadratic {
     fn at(&self, row: f64) -> f64 {
         let d = row - self.from;
         self.value + d * (self.slope + d * self.bend)
@@ -80,7 +80,7 @@ impl Polynomial {
 
 /// Fits a polynomial of degree 1 or 2 by least squares: the normal equations by Cramer's rule.
 /// There must be more points than the degree, in different rows.
-fn fit(points: &[(f64, f64)], degree: usize) -> Polynomial {
+fn fit(points: &[(f64, f64)], degree: usize) -> Quadratic {
     let from = points[0].0;
     // Sums of powers of the rows, and of columns times these powers.
     let (mut s, mut v) = ([0.0; 5], [0.0; 3]);
@@ -94,7 +94,7 @@ fn fit(points: &[(f64, f64)], degree: usize) -> Polynomial {
         let determinant = s[0] * s[2] - s[1] * s[1];
         let value = (v[0] * s[2] - v[1] * s[1]) / determinant;
         let slope = (s[0] * v[1] - s[1] * v[0]) / determinant;
-        return Polynomial { from, value, slope, bend: 0.0 };
+        return Quadratic { from, value, slope, bend: 0.0 };
     }
     let columns = [[s[0], s[1], s[2]], [s[1], s[2], s[3]], [s[2], s[3], s[4]]];
     let [value, slope, bend] = std::array::from_fn(|which| {
@@ -102,7 +102,7 @@ fn fit(points: &[(f64, f64)], degree: usize) -> Polynomial {
         replaced[which] = v;
         determinant(&replaced) / determinant(&columns)
     });
-    Polynomial { from, value, slope, bend }
+    Quadratic { from, value, slope, bend }
 }
 
 fn determinant([a, b, c]: &[[f64; 3]; 3]) -> f64 {

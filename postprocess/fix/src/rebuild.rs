@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use lamp_stack::{Image, Mask};
 
-use super::contours::{Contours, Expected, LineId, Outlook};
+use super::contours::{BandContours, ExpectedCrossing, LineId, Outlook};
 use super::mend::{DROP, DROP_ENDED, Mended, mend};
 
 /// The corrected rows of a band; the default corrects nothing.
@@ -42,10 +42,10 @@ pub(super) fn rebuild(
     open_rows: Option<&[u32]>,
     neighbours: Option<[&Image; 2]>,
 ) -> Option<Correction> {
-    let mut contours = Contours::around(mask, band.clone(), is_good)?;
+    let mut contours = BandContours::around(mask, band.clone(), is_good)?;
     let stretch = |row: u32| open_rows.map(|open| open.partition_point(|&open| open <= row));
     let mut crossed: BTreeSet<(usize, LineId)> = BTreeSet::new();
-    let mend_row = |contours: &Contours, crossed: &BTreeSet<_>, row: u32| {
+    let mend_row = |contours: &BandContours, crossed: &BTreeSet<_>, row: u32| {
         let mut outlook = contours.outlook(row);
         for crossing in &mut outlook.crossings {
             let is_crossed = |stretch| crossed.contains(&(stretch, crossing.side));
@@ -85,7 +85,10 @@ pub(super) fn rebuild(
 }
 
 /// Returns the columns from the first to the last added crossing.
-fn columns_of<'a>(added: impl Iterator<Item = &'a Expected>, width: u32) -> Option<Range<u32>> {
+fn columns_of<'a>(
+    added: impl Iterator<Item = &'a ExpectedCrossing>,
+    width: u32,
+) -> Option<Range<u32>> {
     let column = |at: f64| at.round().clamp(0.0, f64::from(width - 1)) as u32;
     added
         .map(|crossing| column(crossing.column)..column(crossing.column) + 1)

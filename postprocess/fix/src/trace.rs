@@ -27,12 +27,12 @@ const MAX_ENDS: usize = 8;
 const MAX_SLOPE: f64 = 20.0;
 /// A contour in consecutive rows.
 #[derive(Clone, Debug)]
-struct Line {
+struct ContourTrace {
     first: u32,
     columns: Vec<f64>,
 }
 
-impl Line {
+impl ContourTrace {
     fn end(&self) -> u32 {
         self.first + self.columns.len() as u32
     }
@@ -90,7 +90,7 @@ struct Missing {
 struct Lines<'a> {
     mask: &'a Mask,
     rows: Range<u32>,
-    lines: Vec<Line>,
+    lines: Vec<ContourTrace>,
     /// The line that each crossing of each row lies on.
     on: Vec<Vec<usize>>,
     /// The line that each line continues, or itself.
@@ -214,7 +214,7 @@ impl<'a> Lines<'a> {
             }
             let begun = |(line, column): (Option<usize>, f64)| {
                 line.unwrap_or_else(|| {
-                    all.lines.push(Line { first: row, columns: vec![column] });
+                    all.lines.push(ContourTrace { first: row, columns: vec![column] });
                     all.lines.len() - 1
                 })
             };
@@ -241,7 +241,7 @@ impl<'a> Lines<'a> {
 
     /// Joins the lines above a break with the lines below, and notes the ends that are loose.
     fn cross(&mut self, row: u32) {
-        let end = |line: &Line, row: u32, down: bool| {
+        let end = |line: &ContourTrace, row: u32, down: bool| {
             let points = line.points(row, down);
             (slope(&points).clamp(-MAX_SLOPE, MAX_SLOPE), points.len())
         };
@@ -359,7 +359,7 @@ impl<'a> Lines<'a> {
         let turned = (a.is_below != b.is_below)
             == (a.direction.is_some() && b.direction.is_some() && a.direction != b.direction);
         let turned = if turned && a.is_below != b.is_below { 50.0 } else { 0.0 };
-        let sides = |line: &Line| -> Option<bool> {
+        let sides = |line: &ContourTrace| -> Option<bool> {
             let rows = [a.point.0 as u32, b.point.0 as u32];
             let [upper, lower] = [line.at(rows[0])? - a.point.1, line.at(rows[1])? - b.point.1];
             // A line on opposite sides of the two ends would cross the missing piece.

@@ -24,12 +24,12 @@ fn has_room<'a>(layers: impl ExactSizeIterator<Item = &'a Arc<PassingLayer>>) ->
 
 /// A layer with the layers below and above it, the nearest first, if these are present and show the
 /// same place. They are decoded where the layer's rows may be stray.
-pub(super) struct Window {
+pub(super) struct LayerWindow {
     pub(super) layer: Arc<PassingLayer>,
     beside: [Vec<Arc<PassingLayer>>; 2],
 }
 
-impl Window {
+impl LayerWindow {
     /// Returns the layers below and above, the nearest first.
     pub(super) fn neighbours(&self) -> [Vec<&Layer>; 2] {
         self.beside
@@ -38,7 +38,7 @@ impl Window {
     }
 }
 
-impl MemorySize for Window {
+impl MemorySize for LayerWindow {
     fn bytes(&self) -> usize {
         self.layer.bytes()
     }
@@ -47,7 +47,7 @@ impl MemorySize for Window {
 /// Puts each layer between its neighbors. Ends after the first error.
 pub(super) fn windows<E>(
     layers: impl Iterator<Item = Result<PassingLayer, E>>,
-) -> impl Iterator<Item = Result<Window, E>> {
+) -> impl Iterator<Item = Result<LayerWindow, E>> {
     // After the end this is polled once more for each layer that still waits in `above`.
     let mut layers = layers.map(|layer| layer.map(Arc::new)).fuse();
     let mut below: VecDeque<Arc<PassingLayer>> = VecDeque::new();
@@ -76,7 +76,7 @@ pub(super) fn windows<E>(
             below.pop_back();
         }
         below.push_front(layer.clone());
-        Some(Ok(Window { layer, beside }))
+        Some(Ok(LayerWindow { layer, beside }))
     })
 }
 

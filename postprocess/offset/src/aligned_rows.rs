@@ -4,7 +4,7 @@
 //! If each row that a disc reaches has as many runs as the row at its center, and no run comes
 //! near another one's neighbor, each end of a run is cut only by the same end in the other rows.
 
-use super::erode::{Disc, Sources};
+use super::erode::{Disc, DistanceSources};
 use super::row_runs::Run;
 
 /// The greatest number of rows on each side: larger discs take the general path.
@@ -13,7 +13,7 @@ const MAX_REACH: usize = 16;
 /// The rows around a row.
 #[derive(Debug)]
 pub(super) struct AlignedRows<'a> {
-    sources: &'a Sources,
+    sources: &'a DistanceSources,
     discs: [&'a Disc; 2],
     width: i32,
     /// The rows above and below by their distance, from the row itself on.
@@ -26,7 +26,7 @@ type AlignedRun = [Run; 2];
 
 impl<'a> AlignedRows<'a> {
     /// Sets up for an outer and an inner disc, of which the inner one is the larger.
-    pub(super) fn new(sources: &'a Sources, discs: [&'a Disc; 2], width: u32) -> Self {
+    pub(super) fn new(sources: &'a DistanceSources, discs: [&'a Disc; 2], width: u32) -> Self {
         Self { sources, discs, width: width as i32, rows: Vec::new() }
     }
 

@@ -4,7 +4,7 @@
 //! the wedge between its two sides: both are filled row by row (closest point transform, Mauch
 //! 2000). So each pixel near an edge is visited about once, however far edges move.
 
-use super::edge_map::{Cut, EdgeMap, Near};
+use super::edge_map::{Cut, EdgeMap, NearestPlace};
 use super::outline::Outline;
 
 /// How far beyond the outline pixels may lie, in pixels: their color and the mean line disagree
@@ -19,7 +19,7 @@ const SLACK: f64 = 1e-6;
 
 /// Which pixels are measured, and how far from outlines.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Measured {
+pub(super) struct MeasuredPixels {
     /// Whether the measured pixels lie on the right of outlines.
     pub(super) is_right: bool,
     /// The greatest distance in pixels.
@@ -32,7 +32,7 @@ pub(super) fn measure(
     map: &mut EdgeMap,
     outlines: &[Outline],
     by: impl Fn(usize, usize) -> f64,
-    measured: Measured,
+    measured: MeasuredPixels,
 ) {
     for (of, outline) in outlines.iter().enumerate() {
         let count = outline.len();
@@ -42,12 +42,12 @@ pub(super) fn measure(
         };
         let Some(last) = count.checked_sub(1) else { continue };
         let (mut before, mut here) = (side(last), side(0));
-        let mut turned = Turn::between(&before, &here, measured.reach);
+        let mut turned = CornerTurn::between(&before, &here, measured.reach);
         for corner in 0..count {
             let next = side((corner + 1) % count);
-            let turns = Turn::between(&here, &next, measured.reach);
+            let turns = CornerTurn::between(&here, &next, measured.reach);
             here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured.reach)));
-            if turned == Turn::Corner {
+            if turned == CornerTurn::Corner {
                 measure_corner(map, &before, &here, measured);
             }
             (before, here, turned) = (here, next, turns);
@@ -57,13 +57,13 @@ pub(super) fn measure(
 
 /// How an outline turns from a side to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Turn {
+enum CornerTurn {
     /// By so little, of this sine, that both sides may stand for the wedge between them.
     Smooth(f64),
     Corner,
 }
 
-impl Turn {
+impl CornerTurn {
     fn between(before: &Side, after: &Side, reach: f64) -> Self {
         let [a, b] = [before.along, after.along];
         let sine = a[0] * b[1] - a[1] * b[0];
@@ -105,16 +105,16 @@ impl Side {
 
     /// Measures the pixels straight above the side.
     /// At its ends there is room for turns.
-    fn measure(&self, map: &mut EdgeMap, measured: Measured, slack: [f64; 2]) {
-        let Measured { is_right, reach } = measured;
+    fn measure(&self, map: &mut EdgeMap, measured: MeasuredPixels, slack: [f64; 2]) {
+        let MeasuredPixels { is_right, reach } = measured;
         let [x, y] = self.along;
         // Rows count down, so the right of (x, y) is (-y, x).
         let inwards = if is_right { [-y, x] } else { [y, -x] };
         let ends = [-slack[0], self.length + slack[1]];
         let corners = [(ends[0], -BEYOND), (ends[1], -BEYOND), (ends[0], reach), (ends[1], reach)];
         let rows = corners.map(|(along, away)| self.start[1] + along * y + away * inwards[1]);
-        let along = Strip::new([x, y], ends);
-        let across = Strip::new(inwards, [-BEYOND, reach]);
+        let along = PixelStrip::new([x, y], ends);
+        let across = PixelStrip::new(inwards, [-BEYOND, reach]);
         let slope = (self.by[1] - self.by[0]) / self.length;
         let cut = Cut::new(inwards);
         let mut place = 0;
@@ -127,7 +127,7 @@ impl Side {
                 // Compared as it is stored: in f64, a tie with the side before could look nearer.
                 if (distance as f32).abs() < near.distance.abs() {
                     let by = self.by[0] + slope * (right * x + down * y);
-                    *near = Near { distance: distance as f32, by: by as f32 };
+                    *near = NearestPlace { distance: distance as f32, by: by as f32 };
                     *level = cut.level(*near);
                 }
             });
@@ -140,14 +140,14 @@ fn measure_corner(
     map: &mut EdgeMap,
     before: &Side,
     after: &Side,
-    Measured { is_right, reach }: Measured,
+    MeasuredPixels { is_right, reach }: MeasuredPixels,
 ) {
     let turn = before.along[0] * after.along[1] - before.along[1] * after.along[0];
     // A wedge beyond a corner that juts out of the measured pixels holds few of them.
     let juts_out = (turn > 0.0) == is_right;
     let (radius, sign) = if juts_out { (BEYOND, -1.0) } else { (reach, 1.0) };
-    let past_before = Strip::new(before.along, [-SLACK, f64::INFINITY]);
-    let short_of_after = Strip::new(after.along, [f64::NEG_INFINITY, SLACK]);
+    let past_before = PixelStrip::new(before.along, [-SLACK, f64::INFINITY]);
+    let short_of_after = PixelStrip::new(after.along, [f64::NEG_INFINITY, SLACK]);
     let [x, y] = after.start;
     let mut place = 0;
     for row in rows_between([y - radius, y + radius, y, y], map.height()) {
@@ -160,7 +160,7 @@ fn measure_corner(
             let distance = right.hypot(down);
             // Straight above a side, the side knows better on which side of it a pixel is.
             if distance + 4.0 * SLACK < f64::from(near.distance.abs()) {
-                *near = Near { distance: (sign * distance) as f32, by: after.by[0] as f32 };
+                *near = NearestPlace { distance: (sign * distance) as f32, by: after.by[0] as f32 };
                 *level = Cut::new([right / distance, down / distance]).level(*near);
             }
         });
@@ -176,7 +176,7 @@ fn rows_between(places: [f64; 4], height: u32) -> std::ops::Range<u32> {
 }
 
 /// The pixels between two parallel lines, by rows.
-struct Strip {
+struct PixelStrip {
     /// The two places where the lines cross row zero.
     at_zero: [f64; 2],
     /// By how much both go on in each row.
@@ -186,7 +186,7 @@ struct Strip {
 /// The least slope of a line across rows: one along a row crosses it far beyond all images.
 const LEAST_SLOPE: f64 = 1e-12;
 
-impl Strip {
+impl PixelStrip {
     /// Takes the places whose products with a direction lie between two bounds.
     fn new([right, down]: [f64; 2], bounds: [f64; 2]) -> Self {
         let slope = if right.abs() < LEAST_SLOPE { LEAST_SLOPE } else { right };

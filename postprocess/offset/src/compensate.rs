@@ -6,7 +6,7 @@ use lamp_stack::{
 use thiserror::Error;
 
 use super::components::{self, Loss};
-use super::scale::{AxisScale, scaled};
+use super::scale::{Enlargement, scaled};
 use super::walls::ThinWall;
 use super::widths::Widths;
 use super::{offset, shrink};
@@ -203,8 +203,8 @@ fn enlarge(layer: &mut Layer, shrinkage: Shrinkage) -> Result<bool, CompensatePr
     if layer.info.stack.as_ref().is_some_and(StackInfo::is_build) {
         return Err(CompensateProblem::Tiled);
     }
-    let columns = AxisScale::new(layer.image.width(), shrinkage.x);
-    let rows = AxisScale::new(layer.image.height(), shrinkage.y);
+    let columns = Enlargement::new(layer.image.width(), shrinkage.x);
+    let rows = Enlargement::new(layer.image.height(), shrinkage.y);
     let width = columns.after().next_multiple_of(WIDTH_UNIT);
     if width.max(rows.after()) > MAX_SIDE.into() {
         return Err(CompensateProblem::TooLarge);

@@ -26,7 +26,7 @@ pub struct Loss {
 /// Returns the components that vanish or break apart, from the top. All pixels that are white
 /// `after` must be white `before`.
 pub(super) fn losses(before: &Mask, after: &Mask) -> Vec<Loss> {
-    let [before, after] = [before, after].map(|mask| Components::of(RowRuns::white(mask)));
+    let [before, after] = [before, after].map(|mask| ComponentRuns::of(RowRuns::white(mask)));
     let mut left = vec![0; before.first.len()];
     for (run, row, (start, _)) in after.runs() {
         // Counted at its first run. No pixel was added, so all of it was one component before.
@@ -61,7 +61,7 @@ pub(super) fn without_specks(gray: GrayMask) -> GrayMask {
     if (0..gray.height()).all(|row| are_bright(&gray, row)) {
         return gray;
     }
-    let components = Components::of(RowRuns::white(&gray.at_least(1)));
+    let components = ComponentRuns::of(RowRuns::white(&gray.at_least(1)));
     let mut is_bright = vec![false; components.first.len()];
     for (row, bright) in (0..).zip(gray.at_least(128).rows()) {
         for start in bright.iter().step_by(2) {
@@ -129,7 +129,7 @@ pub(super) fn lower(a: &GrayMask, b: &GrayMask) -> GrayMask {
 
 /// Makes white all black that is not connected to the top left pixel.
 pub fn without_holes(mask: &Mask) -> Mask {
-    let black = Components::of(RowRuns::white(&mask.inverted()));
+    let black = ComponentRuns::of(RowRuns::white(&mask.inverted()));
     // Images come with a black frame, so the first black run holds the top left pixel.
     let outside = black.first.first().copied();
     let outside = black.rows.filtered(|run| Some(black.first[run]) == outside);
@@ -137,7 +137,7 @@ pub fn without_holes(mask: &Mask) -> Mask {
 }
 
 /// The runs of a shape by connected component.
-pub(super) struct Components {
+pub(super) struct ComponentRuns {
     rows: RowRuns,
     /// The first run of its component, for each run.
     first: Vec<u32>,
@@ -145,7 +145,7 @@ pub(super) struct Components {
     touching: usize,
 }
 
-impl Components {
+impl ComponentRuns {
     pub(super) fn of(rows: RowRuns) -> Self {
         let mut first: Vec<u32> = (0..rows.all().len() as u32).collect();
         let mut touching = 0;

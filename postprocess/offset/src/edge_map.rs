@@ -4,8 +4,8 @@
 use lamp_stack::{GrayMask, LevelChange};
 
 use super::aligned_rows::AlignedRows;
-use super::closest::{Measured, measure};
-use super::erode::{Disc, Erosion, SourceColour, Sources, at_least, more_than};
+use super::closest::{MeasuredPixels, measure};
+use super::erode::{Disc, DistanceSources, Erosion, SourceColour, at_least, more_than};
 use super::outline::Outline;
 use super::row_runs::{RowRuns, Run, first_past, subtract};
 
@@ -22,7 +22,7 @@ pub(super) struct Edges<'a> {
 
 /// The nearest place of an edge, as seen from a pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Near {
+pub(super) struct NearestPlace {
     /// The distance of the pixel's middle in pixels, below zero beyond the edge.
     pub(super) distance: f32,
     /// The distance that the edge moves there.
@@ -64,7 +64,7 @@ pub(super) struct EdgeMap {
     runs: Vec<EdgeRun>,
     near_count: u32,
     /// The nearest edge of each pixel near one.
-    near: Vec<Near>,
+    near: Vec<NearestPlace>,
     /// The level of each of these pixels after the edge has moved.
     pub(super) levels: Vec<u8>,
 }
@@ -73,7 +73,7 @@ impl EdgeMap {
     /// Moves the edges of a region, in which no pixel is a source. Pixels at least `depth` further
     /// inside are deep inside. If `all`, the map has all pixels of level zero, too.
     pub(super) fn new(
-        sources: &Sources,
+        sources: &DistanceSources,
         region: &RowRuns,
         width: u32,
         edges: Edges<'_>,
@@ -87,15 +87,15 @@ impl EdgeMap {
         let mut map = Self::runs(sources, region, width, &discs);
         let is_right = sources.colour() == SourceColour::Black;
         let by = |of: usize, corner: usize| edges.by.map_or(most, |by| by[of][corner]);
-        map.near = vec![Near::FAR; map.near_count()];
+        map.near = vec![NearestPlace::FAR; map.near_count()];
         map.levels = vec![255; map.near_count()];
-        measure(&mut map, edges.outlines, by, Measured { is_right, reach: reach + STAIR });
+        measure(&mut map, edges.outlines, by, MeasuredPixels { is_right, reach: reach + STAIR });
         map
     }
 
     /// Finds the pixels outside of the first disc around each source. Of these, the pixels outside
     /// of the second disc become runs deep inside.
-    fn runs(sources: &Sources, region: &RowRuns, width: u32, discs: &[Disc; 2]) -> Self {
+    fn runs(sources: &DistanceSources, region: &RowRuns, width: u32, discs: &[Disc; 2]) -> Self {
         let mut map = Self { ends: vec![0], ..Self::default() };
         let [mut outer, mut inner] = [Erosion::default(), Erosion::default()];
         let mut along = AlignedRows::new(sources, [&discs[0], &discs[1]], width);
@@ -139,7 +139,7 @@ impl EdgeMap {
         row: u32,
         (start, end): Run,
         place: &mut usize,
-        mut look: impl FnMut(i32, &mut Near, &mut u8),
+        mut look: impl FnMut(i32, &mut NearestPlace, &mut u8),
     ) {
         if start >= end {
             return;
@@ -168,7 +168,7 @@ impl EdgeMap {
     }
 
     /// Returns the nearest edge of a pixel.
-    pub(super) fn near(&self, index: u32) -> Near {
+    pub(super) fn near(&self, index: u32) -> NearestPlace {
         self.near[index as usize]
     }
 
@@ -262,7 +262,7 @@ pub(super) fn near_pixels<'a>(
     })
 }
 
-impl Near {
+impl NearestPlace {
     /// Farther from all edges than is measured.
     const FAR: Self = Self { distance: f32::MAX, by: 0.0 };
 }
@@ -294,7 +294,7 @@ impl Cut {
 
     /// Returns the level of a pixel after the edge has moved: the share of its area that is
     /// inside.
-    pub(super) fn level(&self, near: Near) -> u8 {
+    pub(super) fn level(&self, near: NearestPlace) -> u8 {
         let distance = f64::from(near.distance) - f64::from(near.by);
         // No branches here, as the next pixel takes another one.
         let cut_off = (self.reach - distance.abs()).max(0.0);

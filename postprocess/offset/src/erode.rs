@@ -22,13 +22,13 @@ pub(super) enum SourceColour {
 
 /// The pixels that distances are measured from, center to center.
 #[derive(Debug)]
-pub(super) struct Sources {
+pub(super) struct DistanceSources {
     colour: SourceColour,
     /// The runs of the other color. If black ones, they continue past the image's edges.
     between: RowRuns,
 }
 
-impl Sources {
+impl DistanceSources {
     pub(super) fn new(mask: &Mask, colour: SourceColour) -> Self {
         let white = RowRuns::white(mask);
         match colour {

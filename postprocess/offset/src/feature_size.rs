@@ -38,7 +38,7 @@ pub(super) struct MovedOutlines {
 
 /// Finds how far each place of outlines moves: as `widths` say for the size of its feature.
 pub(super) fn moved(white: &RowRuns, outlines: &[Outline], widths: &Widths) -> MovedOutlines {
-    let places: Vec<Vec<Place>> = outlines.iter().map(places).collect();
+    let places: Vec<Vec<SidePiece>> = outlines.iter().map(places).collect();
     let bands = Bands::new(&places, white.height());
     let mut moved = MovedOutlines {
         outlines: Vec::new(),
@@ -60,7 +60,7 @@ pub(super) fn moved(white: &RowRuns, outlines: &[Outline], widths: &Widths) -> M
 
 /// A short piece of a side of an outline.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct SidePiece {
     start: [f64; 2],
     /// The middle, where the size is taken.
     middle: [f64; 2],
@@ -74,7 +74,7 @@ struct Place {
 }
 
 /// Returns the places of an outline.
-fn places(outline: &Outline) -> Vec<Place> {
+fn places(outline: &Outline) -> Vec<SidePiece> {
     let count = outline.len();
     let along = |of: usize| {
         let [a, b] = [outline[of % count], outline[(of + 1) % count]];
@@ -93,7 +93,7 @@ fn places(outline: &Outline) -> Vec<Place> {
         // An odd number, as the disc is largest at the middle of a side.
         let count = f64::from((side / STEP).ceil() as u32 | 1);
         let at = |share: f64| [x + share * right, y + share * down];
-        places.extend((0..count as u32).map(|step| Place {
+        places.extend((0..count as u32).map(|step| SidePiece {
             start: at(f64::from(step) / count),
             middle: at((f64::from(step) + 0.5) / count),
             inwards: [-down / side, right / side],
@@ -105,7 +105,7 @@ fn places(outline: &Outline) -> Vec<Place> {
     places
 }
 
-impl Place {
+impl SidePiece {
     /// Returns how far the white goes on from the place along its normal, up to `most` pixels.
     fn across(&self, white: &RowRuns, most: f64) -> f64 {
         let straight = across(white, self.middle, self.inwards, most);
@@ -154,10 +154,10 @@ fn across(white: &RowRuns, [x, y]: [f64; 2], [right, down]: [f64; 2], most: f64)
 /// Returns the places of an outline at which the size is found; others take the size of their
 /// neighbors. A side that cuts a corner by a pixel or two has no direction of its own, and of short
 /// sides of a curve one in each step is enough.
-fn known(places: &[Place]) -> Vec<bool> {
+fn known(places: &[SidePiece]) -> Vec<bool> {
     let are_short = places.iter().all(|place| place.length < SHORT);
     let mut since = STEP;
-    let is_known = |place: &Place| {
+    let is_known = |place: &SidePiece| {
         since += place.length;
         let is_known =
             are_short || (place.length >= SHORT && (since >= STEP / 2.0 || place.is_at_turn));
@@ -168,9 +168,9 @@ fn known(places: &[Place]) -> Vec<bool> {
 }
 
 /// Returns the sizes of the feature at the places of an outline, up to `most` pixels.
-fn sizes(white: &RowRuns, places: &[Place], bands: &Bands, most: f64) -> Vec<f64> {
+fn sizes(white: &RowRuns, places: &[SidePiece], bands: &Bands, most: f64) -> Vec<f64> {
     let is_known = known(places);
-    let size = |(place, is_known): (&Place, &bool)| {
+    let size = |(place, is_known): (&SidePiece, &bool)| {
         if !is_known {
             return (most, 0.0);
         }
@@ -198,7 +198,7 @@ fn carried(mut sizes: Vec<f64>, across: &[f64]) -> Vec<f64> {
 
 /// Returns distances that change slowly along an outline: halfway between the greatest slow ones
 /// that are nowhere greater and the least that are nowhere less.
-fn steadied(by: Vec<f64>, places: &[Place]) -> Vec<f64> {
+fn steadied(by: Vec<f64>, places: &[SidePiece]) -> Vec<f64> {
     let (mut low, mut high) = (by.clone(), by);
     let count = places.len();
     let mut pass = |from: usize, to: usize| {
@@ -213,7 +213,7 @@ fn steadied(by: Vec<f64>, places: &[Place]) -> Vec<f64> {
 
 /// Returns the corners of an outline with the distances there, and more corners where the distance
 /// changes along a side.
-fn corners(places: &[Place], by: &[f64]) -> (Outline, Vec<f64>) {
+fn corners(places: &[SidePiece], by: &[f64]) -> (Outline, Vec<f64>) {
     let count = places.len();
     let (mut outline, mut at_corners) = (Outline::new(), Vec::new());
     for of in 0..count {
@@ -236,7 +236,7 @@ struct Bands {
 }
 
 impl Bands {
-    fn new(places: &[Vec<Place>], height: u32) -> Self {
+    fn new(places: &[Vec<SidePiece>], height: u32) -> Self {
         let mut bands = vec![Vec::new(); (f64::from(height) / BAND) as usize + 1];
         for place in places.iter().flatten() {
             let band = Self::band(place.middle[1], bands.len());
@@ -252,7 +252,7 @@ impl Bands {
 
     /// Returns the diameter of the largest disc inside the shape that touches a place, up to
     /// `most` pixels.
-    fn disc(&self, place: &Place, most: f64) -> f64 {
+    fn disc(&self, place: &SidePiece, most: f64) -> f64 {
         let [x, y] = place.middle;
         let [right, down] = place.inwards;
         let mut size = most;

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::erode::{Disc, Erosion, Sources};
+use super::erode::{Disc, DistanceSources, Erosion};
 use super::row_runs::{RowRuns, Run, join_runs, subtract};
 
 /// The fewest rows that are grown at a time.
@@ -90,7 +90,7 @@ impl Reach {
         rows: Range<i32>,
     ) -> RowRuns {
         let first = of.start + top;
-        let sources = Sources::white_rows(of.map(|row| runs.row(row as u32)));
+        let sources = DistanceSources::white_rows(of.map(|row| runs.row(row as u32)));
         let (mut left, mut row_runs) = (Erosion::default(), Vec::new());
         let mut grown = RowRuns::new();
         for row in rows {
@@ -318,7 +318,7 @@ mod tests {
     use lamp_stack::Mask;
     use proptest::prelude::*;
 
-    use super::super::erode::{Disc, SourceColour, Sources, at_least};
+    use super::super::erode::{Disc, DistanceSources, SourceColour, at_least};
     use super::super::offset_tests::{drawn, masks};
     use super::super::{offset_one_bit, region};
     use super::*;
@@ -327,7 +327,7 @@ mod tests {
     fn referee(mask: &Mask, inwards: f64) -> Mask {
         let colour = if inwards < 0.0 { SourceColour::White } else { SourceColour::Black };
         let disc = Disc::below(at_least(inwards.abs() + 0.5), mask.height());
-        let left = Sources::new(mask, colour).erode_all(&disc, &region(mask, colour));
+        let left = DistanceSources::new(mask, colour).erode_all(&disc, &region(mask, colour));
         let left = left.mask(mask.width());
         if inwards < 0.0 { left.inverted() } else { left }
     }

@@ -39,7 +39,7 @@ mod widths;
 use lamp_stack::{GrayMask, Mask};
 
 use edge_map::{EdgeMap, Edges};
-use erode::{SourceColour, Sources};
+use erode::{DistanceSources, SourceColour};
 use feature_size::MovedOutlines;
 use grow::Reach;
 use row_runs::RowRuns;
@@ -76,7 +76,7 @@ pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
     let outlines = outline::outlines(&RowRuns::white(mask));
     let by = inwards.abs().min(MAX_OFFSET);
     let edges = Edges { outlines: &outlines, by: None, range: [by, by] };
-    let sources = Sources::new(mask, colour);
+    let sources = DistanceSources::new(mask, colour);
     let edge = EdgeMap::new(&sources, &region(mask, colour), mask.width(), edges, 1.0, false);
     edge.gray(mask.width(), level_outside)
 }
@@ -109,7 +109,7 @@ pub fn shrink(mask: &Mask, widths: &Widths, min_feature: f64) -> (GrayMask, Vec<
         }
         None => Edges { outlines: &outlines, by: None, range: widths.range() },
     };
-    let sources = Sources::new(mask, SourceColour::Black);
+    let sources = DistanceSources::new(mask, SourceColour::Black);
     if min_feature <= 0.0 {
         let edge = EdgeMap::new(&sources, &white, mask.width(), edges, 1.0, false);
         return (edge.gray(mask.width(), 0), Vec::new());

@@ -38,10 +38,10 @@ pub(super) fn outlines(rows: &RowRuns) -> Vec<Outline> {
 /// Returns the outline of the parts of a contour.
 fn joined(parts: &[StraightPart]) -> Outline {
     let count = parts.len();
-    let joint = |of: usize| Joint::new(parts, of);
-    let joints: Vec<Joint> = (0..count).map(joint).collect();
-    let arcs: Vec<Arc> = (0..count)
-        .map(|of| Arc::new(&parts[of], &joints[(of + count - 1) % count], &joints[of]))
+    let joint = |of: usize| ContourJoint::new(parts, of);
+    let joints: Vec<ContourJoint> = (0..count).map(joint).collect();
+    let arcs: Vec<ParabolicArc> = (0..count)
+        .map(|of| ParabolicArc::new(&parts[of], &joints[(of + count - 1) % count], &joints[of]))
         .collect();
     let mut outline = Outline::with_capacity(2 * count);
     let mut push = |point: [f64; 2]| {
@@ -53,7 +53,7 @@ fn joined(parts: &[StraightPart]) -> Outline {
         let before = &joints[(of + count - 1) % count];
         arcs[of].between(before.after, joints[of].before, &mut push);
         let next = &arcs[(of + 1) % count];
-        let Joint { before, after, is_smooth, .. } = joints[of];
+        let ContourJoint { before, after, is_smooth, .. } = joints[of];
         if is_smooth {
             let [a, b] = [arcs[of].at_end(), next.at_end()];
             push([before[0] + (a[0] + b[0]) / 2.0, before[1] + (a[1] + b[1]) / 2.0]);
@@ -70,7 +70,7 @@ fn joined(parts: &[StraightPart]) -> Outline {
 
 /// Where a part of a contour ends and the next begins.
 #[derive(Clone, Copy, Debug)]
-struct Joint {
+struct ContourJoint {
     /// The end of the part before.
     before: [f64; 2],
     /// The start of the part after.
@@ -81,7 +81,7 @@ struct Joint {
     is_smooth: bool,
 }
 
-impl Joint {
+impl ContourJoint {
     /// Joins part `of` of a contour and the next.
     fn new(parts: &[StraightPart], of: usize) -> Self {
         let [a, b] = [&parts[of], &parts[(of + 1) % parts.len()]];
@@ -112,15 +112,15 @@ impl Joint {
 }
 
 /// The arc that a part of a smooth edge is taken for: a parabola with the area of its mean line.
-struct Arc {
+struct ParabolicArc {
     /// Away from white.
     outwards: [f64; 2],
     /// The rise of its middle above its chord, in pixels; zero if it is straight.
     rise: f64,
 }
 
-impl Arc {
-    fn new(part: &StraightPart, start: &Joint, end: &Joint) -> Self {
+impl ParabolicArc {
+    fn new(part: &StraightPart, start: &ContourJoint, end: &ContourJoint) -> Self {
         let outwards = [part.along[1], -part.along[0]];
         // An arc that turns by an angle θ rises about θ / 8 of its length above its chord.
         let length = dot(minus(end.before, start.after), part.along);

@@ -4,14 +4,14 @@ use lamp_stack::{Change, GrayMask, Image, MaskBuilder, RunImage};
 
 /// The enlargement along one side of an image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AxisScale {
+pub(super) struct Enlargement {
     /// The share of a length that is left after firing.
     left: f64,
     /// The pixels before.
     before: u32,
 }
 
-impl AxisScale {
+impl Enlargement {
     /// Sets up for a side of `before` pixels that firing shrinks by a share, from 0 to less than 1.
     pub(super) fn new(before: u32, shrinkage: f64) -> Self {
         Self { left: 1.0 - shrinkage, before }
@@ -33,7 +33,12 @@ impl AxisScale {
 
 /// Enlarges an image so that the fired part has the image's size. Each pixel takes the color of
 /// the pixel that its center lies in after firing.
-pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width: u32) -> Image {
+pub(super) fn scaled(
+    image: &Image,
+    columns: &Enlargement,
+    rows: &Enlargement,
+    width: u32,
+) -> Image {
     const APART: &str = "columns move apart";
     match image {
         Image::Mask(mask) => {
@@ -52,8 +57,8 @@ pub(super) fn scaled(image: &Image, columns: &AxisScale, rows: &AxisScale, width
 /// Gives the rows of an enlarged image.
 fn scale_rows<C: Change>(
     before: &RunImage<C>,
-    columns: &AxisScale,
-    rows: &AxisScale,
+    columns: &Enlargement,
+    rows: &Enlargement,
     width: u32,
     mut push: impl FnMut(&[C]),
 ) {
@@ -80,8 +85,8 @@ mod tests {
     use super::*;
 
     fn made_larger(mask: &Mask, shrinkage: [f64; 2]) -> Image {
-        let columns = AxisScale::new(mask.width(), shrinkage[0]);
-        let rows = AxisScale::new(mask.height(), shrinkage[1]);
+        let columns = Enlargement::new(mask.width(), shrinkage[0]);
+        let rows = Enlargement::new(mask.height(), shrinkage[1]);
         let width = columns.after() as u32 + 5;
         scaled(&Image::Mask(mask.clone()), &columns, &rows, width)
     }
@@ -110,7 +115,7 @@ mod tests {
         gray.push_runs([(3, 0), (7, 40), (20, 255), (10, 3)]).unwrap();
         gray.push_runs([(30, 9)]).unwrap();
         let mask = Mask::new(40, vec![0, 1, 3], vec![3, 0, 30]).unwrap();
-        let [columns, rows] = [40, 2].map(|side| AxisScale::new(side, 0.1));
+        let [columns, rows] = [40, 2].map(|side| Enlargement::new(side, 0.1));
         let Image::Gray(larger) = scaled(&Image::Gray(gray), &columns, &rows, 64) else {
             unreachable!("gray images stay gray")
         };

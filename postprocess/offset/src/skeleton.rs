@@ -302,7 +302,7 @@ mod tests {
     use proptest::test_runner::TestRunner;
 
     use super::super::edge_map::Edges;
-    use super::super::erode::{SourceColour, Sources};
+    use super::super::erode::{DistanceSources, SourceColour};
     use super::super::offset_tests::{drawn, masks};
     use super::super::outline::outlines;
     use super::super::row_runs::RowRuns;
@@ -313,7 +313,7 @@ mod tests {
         let white = RowRuns::white(mask);
         let outlines = outlines(&white);
         let edges = Edges { outlines: &outlines, by: None, range: [by, by] };
-        let sources = Sources::new(mask, SourceColour::Black);
+        let sources = DistanceSources::new(mask, SourceColour::Black);
         let edge = EdgeMap::new(&sources, &white, mask.width(), edges, depth, true);
         let must_stay = |pixel: &_| is_deepest(&edge, pixel) && stays_at_end(&edge, pixel);
         [is_wide(&edge, must_stay), Cores::by_thinning(&edge, by + depth).cores.is_empty()]

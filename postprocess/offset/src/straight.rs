@@ -58,13 +58,13 @@ struct OpenPart {
     /// The first and last corners where `a x - b y` is least, and where it is greatest.
     least: [[i64; 2]; 2],
     greatest: [[i64; 2]; 2],
-    treads: Moments,
-    risers: Moments,
+    treads: LineMoments,
+    risers: LineMoments,
 }
 
 /// Sums over the middles of treads, or of risers: half-pixels along, pixels across.
 #[derive(Clone, Copy, Default)]
-struct Moments {
+struct LineMoments {
     count: i64,
     along: i64,
     across: i64,
@@ -72,7 +72,7 @@ struct Moments {
     along_across: i64,
 }
 
-impl Moments {
+impl LineMoments {
     fn add(&mut self, at: [i64; 2]) {
         let half = 2 * at[0] + 1;
         self.count += 1;
@@ -99,7 +99,7 @@ impl Moments {
 impl OpenPart {
     fn new(start: (i32, i32), first: Direction) -> Self {
         let [least, greatest] = [[[0; 2]; 2]; 2];
-        let [treads, risers] = [Moments::default(); 2];
+        let [treads, risers] = [LineMoments::default(); 2];
         let (at, a, b, low) = ([0; 2], 0, 1, 0);
         Self { start, first, second: None, at, a, b, low, least, greatest, treads, risers }
     }

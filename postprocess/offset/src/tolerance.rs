@@ -2,7 +2,7 @@
 
 use lamp_stack::{Difference, GrayMask, Image, Mask, Op};
 
-use super::erode::{Disc, SourceColour, Sources, more_than};
+use super::erode::{Disc, DistanceSources, SourceColour, more_than};
 use super::row_runs::RowRuns;
 
 /// Returns the part of the difference of two images that is farther than `distance` pixels from
@@ -80,7 +80,7 @@ fn brighter_than(gray: &GrayMask, level: u8) -> Mask {
 
 /// Returns the pixels of a region that no pixel of a color is near to.
 fn far_from(mask: &Mask, colour: SourceColour, region: &Mask, disc: &Disc) -> Mask {
-    let far = Sources::new(mask, colour).erode_all(disc, &RowRuns::white(region));
+    let far = DistanceSources::new(mask, colour).erode_all(disc, &RowRuns::white(region));
     far.mask(region.width())
 }
 

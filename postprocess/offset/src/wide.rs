@@ -7,7 +7,7 @@
 //! Pixels near an edge are connected with the black nearby, so each hole of the pixels deep inside
 //! has a hole of the shape, and equal numbers of holes are enough.
 
-use super::components::Components;
+use super::components::ComponentRuns;
 use super::edge_map::{EdgeMap, EdgePixel, EdgeRun, near_pixels};
 use super::row_runs::{RowRuns, first_past};
 
@@ -39,7 +39,7 @@ fn is_connected_alike(edge: &EdgeMap) -> bool {
         shape.push(&row_shape);
         deep.push(&row_deep);
     }
-    let [shape, deep] = [shape, deep].map(Components::of);
+    let [shape, deep] = [shape, deep].map(ComponentRuns::of);
     let mut deep_parts = vec![0; shape.run_count()];
     deep.firsts().for_each(|run| deep_parts[shape.first(around[run])] += 1);
     shape.firsts().all(|run| deep_parts[run] == 1) && shape.holes() == deep.holes()
@@ -49,8 +49,11 @@ fn is_connected_alike(edge: &EdgeMap) -> bool {
 fn has_end(edge: &EdgeMap, must_stay: impl Fn(&EdgePixel) -> bool) -> bool {
     (0..edge.height()).any(|row| {
         let runs = edge.row(row.into());
-        let [mut above, mut below] =
-            [-1, 1].map(|step| Cursor { edge, runs: edge.row(i64::from(row) + step), place: 0 });
+        let [mut above, mut below] = [-1, 1].map(|step| EdgeCursor {
+            edge,
+            runs: edge.row(i64::from(row) + step),
+            place: 0,
+        });
         let others = (0..runs.len()).filter(|&run| !deepens(edge, runs, run)).map(|run| &runs[run]);
         near_pixels(row, others).any(|pixel| {
             let own = edge.depth(pixel.index);
@@ -75,13 +78,13 @@ fn deepens(edge: &EdgeMap, runs: &[EdgeRun], run: usize) -> bool {
 }
 
 /// A place in a row of an edge map, which pixels pass from the left.
-struct Cursor<'a> {
+struct EdgeCursor<'a> {
     edge: &'a EdgeMap,
     runs: &'a [EdgeRun],
     place: usize,
 }
 
-impl Cursor<'_> {
+impl EdgeCursor<'_> {
     /// Returns the depth of a pixel: zero if it is black, the greatest deep inside.
     fn depth(&mut self, column: i32) -> u32 {
         self.place = first_past(self.runs, |run| run.columns.1, column, self.place);
