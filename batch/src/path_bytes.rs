@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Written {
+enum PathForm {
     Text(String),
     Bytes(Vec<u8>),
 }
@@ -28,9 +28,9 @@ pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::
 /// # Errors
 /// Returns an error if it is neither, or no path of this system.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
-    match Written::deserialize(deserializer)? {
-        Written::Text(text) => Ok(text.into()),
-        Written::Bytes(bytes) => of_bytes(bytes).ok_or_else(|| Error::custom("no path")),
+    match PathForm::deserialize(deserializer)? {
+        PathForm::Text(text) => Ok(text.into()),
+        PathForm::Bytes(bytes) => of_bytes(bytes).ok_or_else(|| Error::custom("no path")),
     }
 }
 

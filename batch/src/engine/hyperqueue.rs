@@ -21,7 +21,7 @@ const CRASH_LIMIT: u32 = 5;
 pub(super) struct HyperQueue;
 
 #[derive(Serialize)]
-struct JobFile {
+struct HyperQueueJob {
     name: &'static str,
     task: Vec<JobTask>,
 }
@@ -62,7 +62,7 @@ fn job_file(round: &[RoundTask], store: &Store) -> String {
         }
     };
     let task = round.iter().enumerate().map(entry).collect();
-    toml::to_string(&JobFile { name: "lamp", task }).expect("job files are tables of texts")
+    toml::to_string(&HyperQueueJob { name: "lamp", task }).expect("job files are tables of texts")
 }
 
 impl Scheduler for HyperQueue {

@@ -21,7 +21,7 @@ pub struct Local {
 
 /// Threads and memory of a running task.
 #[derive(Clone, Copy)]
-struct Share {
+struct ResourceShare {
     threads: usize,
     memory: u64,
 }
@@ -34,7 +34,7 @@ impl Local {
         tell: &mut dyn FnMut(&Attempt),
     ) -> Result<(), EngineError> {
         let (sender, ends): (Sender<(Key, End)>, Receiver<_>) = channel();
-        let mut running: HashMap<Key, Share> = HashMap::new();
+        let mut running: HashMap<Key, ResourceShare> = HashMap::new();
         loop {
             let ready = ledger.ready();
             for (at, &key) in ready.iter().enumerate() {
@@ -54,7 +54,7 @@ impl Local {
                 command.args(["--parent", &std::process::id().to_string()]);
                 start(command, key, sender.clone()).map_err(EngineError::Start)?;
                 ledger.start(key);
-                running.insert(key, Share { threads, memory });
+                running.insert(key, ResourceShare { threads, memory });
             }
             if running.is_empty() {
                 return Ok(());
@@ -68,7 +68,12 @@ impl Local {
 
     /// Returns the number of threads of the next task, if there is room for it: its share of the
     /// free threads, given the number of tasks that are ready.
-    fn threads(&self, running: &HashMap<Key, Share>, memory: u64, ready: usize) -> Option<usize> {
+    fn threads(
+        &self,
+        running: &HashMap<Key, ResourceShare>,
+        memory: u64,
+        ready: usize,
+    ) -> Option<usize> {
         let taken: usize = running.values().map(|share| share.threads).sum();
         let held: u64 = running.values().map(|share| share.memory).sum();
         let free = self.jobs.saturating_sub(taken);
@@ -92,10 +97,10 @@ mod tests {
         assert_eq!(local.threads(&running, 1000, 1), Some(8), "a large task runs alone");
         assert_eq!(local.threads(&running, 10, 3), Some(2));
         assert_eq!(local.threads(&running, 10, 100), Some(1));
-        running.insert(keys[0], Share { threads: 7, memory: 60 });
+        running.insert(keys[0], ResourceShare { threads: 7, memory: 60 });
         assert_eq!(local.threads(&running, 40, 1), Some(1));
         assert_eq!(local.threads(&running, 41, 1), None);
-        running.insert(keys[1], Share { threads: 1, memory: 0 });
+        running.insert(keys[1], ResourceShare { threads: 1, memory: 0 });
         assert_eq!(local.threads(&running, 0, 1), None);
     }
 }

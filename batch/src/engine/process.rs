@@ -32,15 +32,15 @@ impl Launcher {
 }
 
 /// The children of this process that run now, and whether they are being ended.
-struct Running {
+struct RunningChildren {
     children: BTreeSet<u32>,
     is_ending: bool,
 }
 
-static RUNNING: Mutex<Running> =
-    Mutex::new(Running { children: BTreeSet::new(), is_ending: false });
+static RUNNING: Mutex<RunningChildren> =
+    Mutex::new(RunningChildren { children: BTreeSet::new(), is_ending: false });
 
-fn running() -> MutexGuard<'static, Running> {
+fn running() -> MutexGuard<'static, RunningChildren> {
     // The set is valid even if a thread panicked while it held the lock.
     RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -13,7 +13,7 @@ use super::{
     twice,
 };
 
-type Value<'a> = Spanned<DeValue<'a>>;
+type TomlValue<'a> = Spanned<DeValue<'a>>;
 type Read<T> = Result<T, NightError>;
 
 /// The keys of a part; defaults take all except the first two.
@@ -152,7 +152,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn table<'v>(&self, value: &'v Value<'_>) -> Read<&'v DeTable<'v>> {
+    fn table<'v>(&self, value: &'v TomlValue<'_>) -> Read<&'v DeTable<'v>> {
         match value.get_ref() {
             DeValue::Table(table) => Ok(table),
             _ => Err(self.at(value, "this is a table: write its name in brackets, as [defaults]")),
@@ -160,7 +160,7 @@ impl Reader<'_> {
     }
 
     /// Returns the tables of a list such as `[[part]]`.
-    fn tables<'v>(&self, table: &'v DeTable<'_>, key: &str) -> Read<Vec<&'v Value<'v>>> {
+    fn tables<'v>(&self, table: &'v DeTable<'_>, key: &str) -> Read<Vec<&'v TomlValue<'v>>> {
         match table.get(key) {
             None => Ok(Vec::new()),
             Some(value) => match value.get_ref() {
@@ -172,7 +172,7 @@ impl Reader<'_> {
         }
     }
 
-    fn text<'v>(&self, value: &'v Value<'_>) -> Read<&'v str> {
+    fn text<'v>(&self, value: &'v TomlValue<'_>) -> Read<&'v str> {
         match value.get_ref() {
             DeValue::String(text) if !text.trim().is_empty() => Ok(text.as_ref()),
             DeValue::String(_) => {
@@ -182,7 +182,7 @@ impl Reader<'_> {
         }
     }
 
-    fn list<'v>(&self, value: &'v Value<'_>) -> Read<Vec<&'v Value<'v>>> {
+    fn list<'v>(&self, value: &'v TomlValue<'_>) -> Read<Vec<&'v TomlValue<'v>>> {
         match value.get_ref() {
             DeValue::Array(values) => Ok(values.iter().collect()),
             DeValue::String(_) => Ok(vec![value]),
@@ -191,7 +191,7 @@ impl Reader<'_> {
     }
 
     /// Reads the words of a command.
-    fn command(&self, value: &Value<'_>, before: &[&str]) -> Read<Stage> {
+    fn command(&self, value: &TomlValue<'_>, before: &[&str]) -> Read<Stage> {
         let open = |quote: char| self.at(value, format!("the quote {quote} is not closed"));
         let words = words(self.text(value)?).map_err(open)?;
         let before = before.iter().map(|&word| word.to_owned());
@@ -232,7 +232,7 @@ impl Reader<'_> {
         Ok(read)
     }
 
-    fn count(&self, value: &Value<'_>) -> Read<u32> {
+    fn count(&self, value: &TomlValue<'_>) -> Read<u32> {
         let number = match value.get_ref() {
             DeValue::Integer(number) => number.to_string().parse().ok(),
             _ => None,
@@ -242,7 +242,7 @@ impl Reader<'_> {
     }
 
     /// Reads a name of a part or a build.
-    fn name(&self, value: &Value<'_>) -> Read<String> {
+    fn name(&self, value: &TomlValue<'_>) -> Read<String> {
         let name = self.text(value)?;
         match bad_name(name) {
             Some(problem) => Err(self.at(value, problem)),
@@ -251,7 +251,7 @@ impl Reader<'_> {
     }
 
     /// Reads a `[[part]]`: adds its files, or changes their earlier settings.
-    fn part(&self, value: &Value<'_>, drafts: &mut Drafts) -> Read<()> {
+    fn part(&self, value: &TomlValue<'_>, drafts: &mut Drafts) -> Read<()> {
         let table = self.table(value)?;
         let read = self.part_table(table, &PART_KEYS)?;
         let Some(file) = table.get("file") else {
@@ -279,7 +279,7 @@ impl Reader<'_> {
 
     /// Returns the file that a text names, or the files that match a pattern and the folders that
     /// cannot be read, each with the reason.
-    fn files(&self, value: &Value<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
+    fn files(&self, value: &TomlValue<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
         let name = self.text(value)?;
         let path = self.folder.join(name);
         if path.exists() || !name.contains(['*', '?', '[']) {
@@ -305,7 +305,7 @@ impl Reader<'_> {
         Ok(files.chain(closed.into_iter().map(fault)).collect())
     }
 
-    fn build(&self, value: &Value<'_>, parts: &[Part]) -> Read<Build> {
+    fn build(&self, value: &TomlValue<'_>, parts: &[Part]) -> Read<Build> {
         let table = self.table(value)?;
         self.check_keys(table, &["name", "parts", "machine", "tile"], "a build has no key")?;
         let name = table
@@ -348,7 +348,7 @@ impl Reader<'_> {
     }
 
     /// Reads `blade:20`.
-    fn copies(&self, value: &Value<'_>, parts: &[Part]) -> Read<(String, Option<u32>)> {
+    fn copies(&self, value: &TomlValue<'_>, parts: &[Part]) -> Read<(String, Option<u32>)> {
         let text = self.text(value)?;
         let (name, count) = match text.rsplit_once(':') {
             Some((name, count)) => {
@@ -373,7 +373,7 @@ impl Reader<'_> {
         Ok(Some((folder, self.place(value.span().start))))
     }
 
-    fn output(&self, value: Option<&Value<'_>>, path: &Path) -> Read<NightOutput> {
+    fn output(&self, value: Option<&TomlValue<'_>>, path: &Path) -> Read<NightOutput> {
         let stem = path.file_stem().unwrap_or("night".as_ref());
         let mut output = NightOutput { folder: self.folder.join(stem), format: NightFormat::Lamp };
         if output.folder == path {

@@ -9,14 +9,14 @@ use super::CellShape;
 #[derive(Clone, Debug)]
 pub(crate) enum Lattice {
     /// Walls around cells.
-    Cells(Cells),
+    Cells(LatticeCells),
     /// An image that is repeated.
     Image(Mask),
 }
 
 /// Holes between walls, in rows that repeat.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Cells {
+pub(crate) struct LatticeCells {
     shape: CellShape,
     /// The distance between the centers of neighboring holes.
     pitch: f64,
@@ -26,7 +26,7 @@ pub(crate) struct Cells {
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
-impl Cells {
+impl LatticeCells {
     /// Creates cells whose centers are `pitch` apart, with walls between them.
     pub(crate) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
         Self { shape, pitch, reach: 0.5 * (pitch - wall) }
@@ -172,7 +172,7 @@ mod tests {
     fn walls_are_half_way_between_the_middles_of_cells() {
         for (pitch, wall) in [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)] {
             for shape in CellShape::ALL {
-                let mask = drawn(&Lattice::Cells(Cells::new(shape, pitch, wall)), 150, 110);
+                let mask = drawn(&Lattice::Cells(LatticeCells::new(shape, pitch, wall)), 150, 110);
                 for row in 0..110 {
                     for column in 0..150 {
                         let place = [f64::from(column) + 0.5, f64::from(row) + 0.5];
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn an_image_repeats() {
-        let image = drawn(&Lattice::Cells(Cells::new(CellShape::Square, 5.0, 2.0)), 7, 5);
+        let image = drawn(&Lattice::Cells(LatticeCells::new(CellShape::Square, 5.0, 2.0)), 7, 5);
         let mask = drawn(&Lattice::Image(image.clone()), 33, 23);
         for row in 0..23 {
             for column in 0..33 {

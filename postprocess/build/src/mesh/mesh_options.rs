@@ -3,7 +3,7 @@
 use lamp_stack::{Dpi, Length, MAX_RUNS, Mask, quoted};
 
 use super::super::{PixelSize, TileError};
-use super::lattice::{Cells, Lattice};
+use super::lattice::{Lattice, LatticeCells};
 
 /// The least width of mesh between two copies, unless a smaller gap is given.
 const MIN_MESH_WIDTH: Length = Length::from_um(2000.0);
@@ -154,7 +154,7 @@ impl MeshOptions {
                 // A hole has two edges. Hexagons of two rows interlock in a third of the rows at
                 // most, for which the half below has room, too.
                 let runs = 2.0 * f64::from(build.width) / pitch;
-                (Lattice::Cells(Cells::new(shape, pitch, thickness)), runs)
+                (Lattice::Cells(LatticeCells::new(shape, pitch, thickness)), runs)
             }
             MeshPattern::Image { name, image } => {
                 if image.width() == 0 || image.height() == 0 {

@@ -38,7 +38,7 @@ pub(super) fn hanging(mesh: &MeshRows, holds: Holds<'_>, least: u64) -> Hanging 
         Holds::All | Holds::AllBut(_) => None,
     };
     let pieces = Pieces::of(mesh, below);
-    let is_loose = |piece: &Piece| match holds {
+    let is_loose = |piece: &MeshPiece| match holds {
         Holds::All => false,
         Holds::Below(_) => !piece.hangs,
         Holds::AllBut(loose) => loose.binary_search(&piece.start).is_ok(),
@@ -83,11 +83,11 @@ struct Pieces {
     /// The label that stands for the piece of each label.
     roots: Vec<u32>,
     /// The data of each piece, by the label that stands for it.
-    all: Vec<Piece>,
+    all: Vec<MeshPiece>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Piece {
+struct MeshPiece {
     /// Its first row, and the first column in it.
     start: [u32; 2],
     pixels: u64,
@@ -100,7 +100,7 @@ const NONE: u32 = u32::MAX;
 impl Pieces {
     fn of(mesh: &MeshRows, below: Option<&MeshRows>) -> Self {
         let mut labels: Vec<u32> = Vec::with_capacity(mesh.change_count() / 2);
-        let (mut roots, mut all): (Vec<u32>, Vec<Piece>) = (Vec::new(), Vec::new());
+        let (mut roots, mut all): (Vec<u32>, Vec<MeshPiece>) = (Vec::new(), Vec::new());
         let mut above: &[u32] = &[];
         for index in 0..mesh.height() {
             let row = mesh.row(index);
@@ -123,7 +123,7 @@ impl Pieces {
                 if *label == NONE {
                     *label = roots.len() as u32;
                     roots.push(*label);
-                    all.push(Piece { start: [index, run[0]], ..Piece::default() });
+                    all.push(MeshPiece { start: [index, run[0]], ..MeshPiece::default() });
                 }
                 all[*label as usize].pixels += u64::from(run[1] - run[0]);
             }
@@ -137,7 +137,7 @@ impl Pieces {
             roots[label as usize] = of;
             if of != label {
                 // The root is the lowest label, so its start is the first of the piece.
-                let Piece { pixels, hangs, .. } = all[label as usize];
+                let MeshPiece { pixels, hangs, .. } = all[label as usize];
                 all[of as usize].pixels += pixels;
                 all[of as usize].hangs |= hangs;
             }

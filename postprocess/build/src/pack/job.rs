@@ -10,7 +10,7 @@ use super::no_fit::NoFitRegions;
 use super::{MAX_COPIES, Pack, PackBy, Turns, Way, grid, lattice, mix, shares};
 
 /// Copies to be placed on an area.
-pub(super) struct Job<'a> {
+pub(super) struct PackingJob<'a> {
     /// The area without its edges, and the stacks.
     layout: &'a Layout,
     /// The pixels between copies.
@@ -36,7 +36,7 @@ enum Strategy {
     Lattice(usize),
 }
 
-impl<'a> Job<'a> {
+impl<'a> PackingJob<'a> {
     pub(super) fn new(layout: &'a Layout, gap: u32, how: Pack) -> Self {
         let [boxes, outlines] =
             [PackBy::Boxes, PackBy::Outlines].map(|by| NoFitRegions::new(layout, gap, by));

@@ -13,7 +13,7 @@ use super::super::mesh::{BuildMesh, KeptMesh, MeshRows, base_page};
 use super::super::part_stack::white_of;
 use super::super::tile::MeshedStep;
 use super::super::{CopyPlacement, Layout, Moat, PartStack, TileError};
-use super::part_file::PartFile;
+use super::part_file::PartStackFile;
 use super::rising::{Rising, RisingError};
 use super::schedule::{Scheduled, schedule};
 use super::{LoosePieces, Recipe, RecipeError};
@@ -32,7 +32,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// [`Recipe`] has an example.
 pub struct Composer {
     canvas: Arc<Canvas>,
-    files: Vec<PartFile>,
+    files: Vec<PartStackFile>,
     /// All layers of the parts that the build depends on, from the lowest.
     steps: Vec<Scheduled>,
     /// The number of these that lie below the build.
@@ -55,12 +55,12 @@ struct Canvas {
 }
 
 /// A layer that is to be drawn.
-enum Planned {
+enum LayerDrawing {
     Base(Box<PageInfo>),
     Parts(Box<MeshedStep>),
 }
 
-impl MemorySize for Planned {
+impl MemorySize for LayerDrawing {
     fn bytes(&self) -> usize {
         match self {
             Self::Base(_) => 0,
@@ -98,7 +98,7 @@ impl Composer {
         let outline = moat == Some(Moat::Outline);
         let (mut files, mut parts) = (Vec::new(), Vec::new());
         for part in &recipe.form.parts {
-            let mut file = PartFile::open(part, folder)?;
+            let mut file = PartStackFile::open(part, folder)?;
             parts.push(file.part(part, layers.as_ref(), from_bottom, outline)?);
             files.push(file);
         }
@@ -114,7 +114,7 @@ impl Composer {
 
     fn of(
         layout: Layout,
-        files: Vec<PartFile>,
+        files: Vec<PartStackFile>,
         steps: Vec<Scheduled>,
         loose: Vec<LoosePieces>,
     ) -> Result<Self, RecipeError> {
@@ -210,13 +210,13 @@ impl Composer {
     }
 
     /// Finds all that a layer is drawn of, by its position in the build.
-    fn planned(&mut self, position: usize) -> Result<Planned, RecipeError> {
+    fn planned(&mut self, position: usize) -> Result<LayerDrawing, RecipeError> {
         match position.checked_sub(self.base as usize) {
-            Some(above) => Ok(Planned::Parts(Box::new(self.step(self.below + above)?))),
+            Some(above) => Ok(LayerDrawing::Parts(Box::new(self.step(self.below + above)?))),
             None => {
                 let mut first = self.canvas.layout.page(&self.steps[self.below].set, false)?;
                 let page = base_page(&mut first, position as u32, self.base);
-                Ok(Planned::Base(Box::new(page)))
+                Ok(LayerDrawing::Base(Box::new(page)))
             }
         }
     }
@@ -298,16 +298,16 @@ impl Composer {
 }
 
 impl Canvas {
-    fn drawn(&self, planned: Planned) -> Result<Layer, TileError> {
+    fn drawn(&self, planned: LayerDrawing) -> Result<Layer, TileError> {
         let mesh = self.layout.mesh.as_ref();
         match planned {
-            Planned::Base(info) => {
+            LayerDrawing::Base(info) => {
                 let whole = || mesh.map_or_else(|| Mask::black(0, 0), BuildMesh::whole);
                 // The base is one image: the first thread that needs it draws it for all.
                 let image = self.whole.get_or_init(whole).clone();
                 Ok(Layer { info: *info, dpi: Some(self.layout.dpi), image: image.into() })
             }
-            Planned::Parts(step) => {
+            LayerDrawing::Parts(step) => {
                 let mut layer = self.layout.layer(&step, true)?;
                 let base = mesh.map_or(0, |mesh| mesh.base_layers);
                 layer.info.index = layer.info.index.saturating_add(base);

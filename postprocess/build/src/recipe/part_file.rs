@@ -14,7 +14,7 @@ use super::{RecipeError, RecipePart};
 
 /// The stack of a part, whose pages are read in any order.
 #[derive(Debug)]
-pub(super) struct PartFile {
+pub(super) struct PartStackFile {
     /// Its name for messages.
     name: String,
     stack: IndexedStack,
@@ -22,7 +22,7 @@ pub(super) struct PartFile {
     pages: Range<usize>,
 }
 
-impl PartFile {
+impl PartStackFile {
     /// Opens the stack, if it is the one that the recipe is for.
     pub(super) fn open(part: &RecipePart, folder: &Path) -> Result<Self, RecipeError> {
         let path = folder.join(&part.file);

@@ -2,7 +2,7 @@
 
 use super::super::lockstep::{LayerSet, Lockstep};
 use super::super::{HeightOptions, Layout, TileError};
-use super::part_file::PartFile;
+use super::part_file::PartStackFile;
 
 /// A layer of a build as the pages of its parts' stacks have it.
 pub(super) struct Scheduled {
@@ -17,7 +17,7 @@ pub(super) struct Scheduled {
 /// # Errors
 /// Returns an error if the heights do not match.
 pub(super) fn schedule(
-    files: &[PartFile],
+    files: &[PartStackFile],
     layout: &Layout,
     heights: HeightOptions,
 ) -> Result<Vec<Scheduled>, TileError> {
@@ -27,7 +27,8 @@ pub(super) fn schedule(
     let sets = Lockstep::new(stacks, heights, 0);
     let scheduled = sets.map(|set| {
         let set = set?;
-        let page = |(file, layer): (&PartFile, &Option<_>)| Some(file.page_of(layer.as_deref()?));
+        let page =
+            |(file, layer): (&PartStackFile, &Option<_>)| Some(file.page_of(layer.as_deref()?));
         let pages = files.iter().zip(&set.layers).map(page).collect();
         Ok(Scheduled { set, pages })
     });

@@ -1,10 +1,10 @@
 //! Counts the copies of a lattice that an area holds.
 
-use super::{Lattice, Shift};
+use super::{CopyLattice, Shift};
 
 /// The last column and row at which a copy may begin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Room(pub(super) Shift);
+pub(super) struct LastStart(pub(super) Shift);
 
 /// How many copies an area holds, if a lattice begins at a cell.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +17,9 @@ pub(super) struct Fit {
 const STARTS: i32 = 24;
 const STARTS_OF_LINES: i32 = 4096;
 
-impl Room {
+impl LastStart {
     /// Returns the place of a lattice at which the area holds most of its copies, of those tried.
-    pub(super) fn best(self, lattice: &Lattice) -> Fit {
+    pub(super) fn best(self, lattice: &CopyLattice) -> Fit {
         let [ux, uy] = lattice.along;
         let [vx, vy] = lattice.across;
         // Along a row, lines in the first vector's direction are det / uy apart.
@@ -42,14 +42,14 @@ impl Room {
             .expect("starts are tried")
     }
 
-    fn count(self, lattice: &Lattice, start: Shift) -> usize {
+    fn count(self, lattice: &CopyLattice, start: Shift) -> usize {
         self.ranges(lattice, start).map(|(_, _, [first, last])| (last - first + 1) as usize).sum()
     }
 
     /// Returns the cells at which copies begin, and whether they are turned by half.
     pub(super) fn shifts(
         self,
-        lattice: &Lattice,
+        lattice: &CopyLattice,
         start: Shift,
     ) -> impl Iterator<Item = (Shift, bool)> {
         let ([ux, uy], [vx, vy]) = (lattice.along, lattice.across);
@@ -63,7 +63,7 @@ impl Room {
     /// multiples of the first that lie on the area.
     fn ranges(
         self,
-        lattice: &Lattice,
+        lattice: &CopyLattice,
         [x, y]: Shift,
     ) -> impl Iterator<Item = ([i32; 3], i32, [i32; 2])> {
         let ([ux, uy], [vx, vy]) = (lattice.along, lattice.across);

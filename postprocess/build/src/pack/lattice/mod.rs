@@ -16,7 +16,7 @@ use lamp_stack::Orientation;
 use super::super::{CopyPlacement, Layout, PixelSize};
 use super::no_fit::NoFitRegions;
 use super::{MAX_COPIES, Turns, Way, greedy};
-use area::{Fit, Room};
+use area::{Fit, LastStart};
 use motif::Motif;
 
 /// A displacement in cells: right and down.
@@ -24,7 +24,7 @@ type Shift = [i32; 2];
 
 /// Where copies stand: at all sums of whole multiples of two vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Lattice {
+struct CopyLattice {
     /// The vector that is steep: it leads at least as far down as aside.
     along: Shift,
     /// A vector to the right of it.
@@ -33,7 +33,7 @@ struct Lattice {
     partner: Option<Shift>,
 }
 
-impl Lattice {
+impl CopyLattice {
     /// Returns it in cells of which so many make one.
     fn times(&self, times: i32) -> Self {
         let of = |shift: Shift| shift.map(|cells| cells * times);
@@ -90,12 +90,12 @@ pub(super) fn place(
         known.unwrap_or_else(|| NoFitRegions::in_cells(layout, gap, cell))
     };
     let [mut coarse, mut fine] = [cell * times, cell].map(&mut of_cells);
-    let mut fits: Vec<(Fit, Lattice, View)> = Vec::new();
+    let mut fits: Vec<(Fit, CopyLattice, View)> = Vec::new();
     for transposed in [false, true] {
         let [coarse, fine] = [&mut coarse, &mut fine]
             .map(|regions| Motif::new(layout, regions, stack, transposed, turns >= Turns::Half));
         let found = search::lattices(&coarse).into_iter().map(|found| found.times(times as i32));
-        let lattices: Vec<Lattice> =
+        let lattices: Vec<CopyLattice> =
             found.flat_map(|found| search::closer_ways(&fine, found)).collect();
         for turned in [false, true] {
             if turned && turns < Turns::Quarters {
@@ -128,7 +128,7 @@ pub(super) fn place(
 
 impl View {
     /// Returns where copies may begin, in the lattice's own frame.
-    fn room(self, layout: &Layout, cell: u32) -> Option<Room> {
+    fn room(self, layout: &Layout, cell: u32) -> Option<LastStart> {
         let (area, part) =
             (layout.pixels(), layout.parts()[self.stack].size(Orientation::default()));
         let area = if self.turned { [area.height, area.width] } else { [area.width, area.height] };
@@ -136,11 +136,11 @@ impl View {
         let across = area[0].checked_sub(width)? / cell;
         let down = area[1].checked_sub(height)? / cell;
         let [across, down] = [across as i32, down as i32];
-        Some(if self.transposed { Room([down, across]) } else { Room([across, down]) })
+        Some(if self.transposed { LastStart([down, across]) } else { LastStart([across, down]) })
     }
 
     /// Returns where a copy at a cell of the lattice's frame stands on the area.
-    fn placement(self, at: Shift, is_partner: bool, room: Room, cell: u32) -> CopyPlacement {
+    fn placement(self, at: Shift, is_partner: bool, room: LastStart, cell: u32) -> CopyPlacement {
         let swapped = |[x, y]: Shift| if self.transposed { [y, x] } else { [x, y] };
         let ([x, y], [last, _]) = (swapped(at), swapped(room.0));
         // A quarter counterclockwise brings the right edge to the top.

@@ -6,7 +6,7 @@ use lamp_stack::Orientation;
 
 use super::super::super::Layout;
 use super::super::no_fit::{NoFitRegion, NoFitRegions};
-use super::{Lattice, Shift};
+use super::{CopyLattice, Shift};
 
 /// The no-fit regions of a copy and its half turn.
 pub(super) struct Motif {
@@ -71,7 +71,7 @@ impl Motif {
     }
 
     /// Whether no two copies of a lattice are too near.
-    pub(super) fn allows(&self, lattice: &Lattice) -> bool {
+    pub(super) fn allows(&self, lattice: &CopyLattice) -> bool {
         let Some(([x, y], turned)) = lattice.partner.zip(self.turned.as_ref()) else {
             return lattice.is_clear([self.own.reach], |at| self.own.holds(at));
         };
@@ -90,7 +90,7 @@ impl Motif {
     }
 }
 
-impl Lattice {
+impl CopyLattice {
     /// Whether a region that reaches so far holds none of its points on one side of the first.
     pub(super) fn is_clear<const N: usize>(
         &self,

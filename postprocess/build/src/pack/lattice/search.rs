@@ -6,7 +6,7 @@
 
 use super::super::no_fit::{CellRun, NoFitRegion};
 use super::motif::Motif;
-use super::{Lattice, Shift};
+use super::{CopyLattice, Shift};
 
 /// The steps along a region's height in which places of the half turn, the first and the
 /// second vector are tried.
@@ -17,14 +17,14 @@ const ACROSSES: i32 = 96;
 const KEPT: usize = 16;
 
 /// Returns dense lattices, the densest first.
-pub(super) fn lattices(motif: &Motif) -> Vec<Lattice> {
+pub(super) fn lattices(motif: &Motif) -> Vec<CopyLattice> {
     let partners = motif.turned().map(|region| border(region, PARTNERS)).unwrap_or_default();
     let mut found = Vec::new();
     for partner in std::iter::once(None).chain(partners.into_iter().map(Some)) {
         let region = motif.region(partner);
         let white = motif.white * if partner.is_some() { 2 } else { 1 };
         for along in alongs(&region) {
-            let lattice = Lattice { along, across: [0, 0], partner };
+            let lattice = CopyLattice { along, across: [0, 0], partner };
             found.extend(with_across(&region, lattice, white, i32::MAX));
             if along[0] == 0 {
                 found.extend(with_across(&region, lattice, white, 1));
@@ -40,7 +40,7 @@ pub(super) fn lattices(motif: &Motif) -> Vec<Lattice> {
 }
 
 /// Whether the first vector is upright, and whether the second is level, too.
-fn kind_of(lattice: &Lattice) -> [bool; 2] {
+fn kind_of(lattice: &CopyLattice) -> [bool; 2] {
     let upright = lattice.along[0] == 0;
     [upright, upright && lattice.across[1] == 0]
 }
@@ -87,11 +87,16 @@ fn is_row(region: &NoFitRegion, [x, y]: Shift) -> bool {
 
 /// Completes a lattice by the second vector that takes the least area, of the vectors that lead
 /// less than `below` cells down.
-fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -> Option<Lattice> {
+fn with_across(
+    region: &NoFitRegion,
+    lattice: CopyLattice,
+    white: i64,
+    below: i32,
+) -> Option<CopyLattice> {
     let [ux, uy] = lattice.along;
     let [_, high] = region.reach;
     let step = (2 * high / ACROSSES).max(1);
-    let mut best: Option<(i64, Lattice)> = None;
+    let mut best: Option<(i64, CopyLattice)> = None;
     let mut runs: Vec<CellRun> = Vec::new();
     // Multiples of the first vector added to the second change nothing, so rows below `uy` are
     // enough.
@@ -111,7 +116,7 @@ fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -
             }
             x = x.max(to);
         }
-        let lattice = Lattice { across: [x, y], ..lattice };
+        let lattice = CopyLattice { across: [x, y], ..lattice };
         let cells = i64::from(uy) * i64::from(x) - aside;
         if best.is_none_or(|(least, _)| cells < least)
             && lattice.is_clear([region.reach], |at| region.holds(at))
@@ -124,8 +129,8 @@ fn with_across(region: &NoFitRegion, lattice: Lattice, white: i64, below: i32) -
 
 /// Returns a lattice moved closer: as dense as it gets and, if it is of rectangles, once more as
 /// near to squares, as the area holds a whole number of either side.
-pub(super) fn closer_ways(motif: &Motif, lattice: Lattice) -> Vec<Lattice> {
-    let mut ways = vec![closer(motif, lattice, Lattice::cells_of_two)];
+pub(super) fn closer_ways(motif: &Motif, lattice: CopyLattice) -> Vec<CopyLattice> {
+    let mut ways = vec![closer(motif, lattice, CopyLattice::cells_of_two)];
     if kind_of(&lattice) == [true, true] {
         let squares = |side: i32| i64::from(side) * i64::from(side);
         ways.push(closer(motif, lattice, |at| squares(at.along[1]) + squares(at.across[0])));
@@ -134,7 +139,11 @@ pub(super) fn closer_ways(motif: &Motif, lattice: Lattice) -> Vec<Lattice> {
 }
 
 /// Moves the vectors of a lattice, and its half turn, as long as its cost shrinks.
-fn closer(motif: &Motif, mut lattice: Lattice, cost: impl Fn(&Lattice) -> i64) -> Lattice {
+fn closer(
+    motif: &Motif,
+    mut lattice: CopyLattice,
+    cost: impl Fn(&CopyLattice) -> i64,
+) -> CopyLattice {
     let moves = moves(kind_of(&lattice), lattice.partner.is_some());
     let mut by = (lattice.along[1] / 32).max(1);
     loop {
@@ -177,7 +186,7 @@ fn moves([upright, level]: [bool; 2], pair: bool) -> Vec<[i32; 6]> {
     all
 }
 
-impl Lattice {
+impl CopyLattice {
     fn moved(&self, change: &[i32; 6], by: i32) -> Self {
         let moved = |[x, y]: Shift, k: usize| [x + by * change[k], y + by * change[k + 1]];
         Self {

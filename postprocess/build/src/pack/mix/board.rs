@@ -6,7 +6,7 @@ use super::ways::Ways;
 
 /// A copy: of which part, how it lies, and the cell where it begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Copy {
+pub(super) struct PlacedCopy {
     pub(super) part: usize,
     pub(super) way: usize,
     pub(super) at: [i32; 2],
@@ -17,7 +17,7 @@ pub(super) struct Board<'a> {
     pub(super) ways: &'a Ways,
     /// The width and height in pixels.
     pub(super) area: [u32; 2],
-    pub(super) copies: Vec<Copy>,
+    pub(super) copies: Vec<PlacedCopy>,
     /// The depth of each two copies, and how much it counts.
     pub(super) depths: Vec<u16>,
     pub(super) weights: Vec<f32>,
@@ -41,7 +41,7 @@ const REACH: i32 = 4 * STEP;
 const MOST_WEIGHT: f32 = 1e20;
 
 impl<'a> Board<'a> {
-    pub(super) fn new(ways: &'a Ways, area: [u32; 2], copies: &[Copy]) -> Self {
+    pub(super) fn new(ways: &'a Ways, area: [u32; 2], copies: &[PlacedCopy]) -> Self {
         let pairs = copies.len() * copies.len();
         let mut board = Self {
             ways,
@@ -57,16 +57,16 @@ impl<'a> Board<'a> {
     }
 
     /// Puts all copies elsewhere, on the area.
-    pub(super) fn set(&mut self, copies: &[Copy]) {
+    pub(super) fn set(&mut self, copies: &[PlacedCopy]) {
         self.copies.clear();
         self.copies.extend_from_slice(copies);
-        for (copy, &Copy { part, way, at }) in copies.iter().enumerate() {
+        for (copy, &PlacedCopy { part, way, at }) in copies.iter().enumerate() {
             let mut ways = std::iter::once(&way).chain(&self.ways.of_part[part]);
             // The area may have become lower than this way is high.
             let way = *ways.find(|way| self.holds(**way)).unwrap_or(&way);
             let last = self.last(way);
             let at = [0, 1].map(|axis| at[axis].clamp(0, last[axis]));
-            self.copies[copy] = Copy { part, way, at };
+            self.copies[copy] = PlacedCopy { part, way, at };
         }
         for copy in 0..copies.len() {
             self.update(copy);
@@ -143,7 +143,7 @@ impl<'a> Board<'a> {
                 best = found;
             }
         }
-        self.copies[copy] = Copy { way: best.way, at: best.at, ..own };
+        self.copies[copy] = PlacedCopy { way: best.way, at: best.at, ..own };
         self.update(copy);
     }
 

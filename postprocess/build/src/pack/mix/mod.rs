@@ -19,7 +19,7 @@ mod ways;
 
 use super::super::{CopyPlacement, Layout};
 use super::Way;
-use board::Copy;
+use board::PlacedCopy;
 use ways::Ways;
 
 /// More copies than these stay as they are.
@@ -46,9 +46,9 @@ pub(super) fn shorten(
     let cells = |pixels: u32| ((pixels + ways.cell / 2) / ways.cell) as i32;
     let copy = |at: &CopyPlacement| {
         let (part, way) = ways.of(layout, at);
-        Copy { part, way, at: [cells(at.left - left), cells(at.top - top)] }
+        PlacedCopy { part, way, at: [cells(at.left - left), cells(at.top - top)] }
     };
-    let copies: Vec<Copy> = placements.iter().map(copy).collect();
+    let copies: Vec<PlacedCopy> = placements.iter().map(copy).collect();
     let Some(found) = search::lowest(layout, &ways, &copies, enough) else { return placements };
     let shorter = slide::up(layout, gap, &ways, &found);
     if height(layout, &shorter) < height(layout, &placements) { shorter } else { placements }

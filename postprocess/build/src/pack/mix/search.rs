@@ -1,7 +1,7 @@
 //! Makes the area lower, and the copies keep apart.
 
 use super::super::super::Layout;
-use super::board::{Board, Copy};
+use super::board::{Board, PlacedCopy};
 use super::random::Random;
 use super::separate::separate;
 use super::ways::Ways;
@@ -18,16 +18,16 @@ const EXPLORING: u64 = 7;
 const KEPT: usize = 10;
 
 /// A search for a low layout.
-struct Search<'a> {
+struct LayoutSearch<'a> {
     board: Board<'a>,
     random: Random,
     work: u64,
-    best: Vec<Copy>,
+    best: Vec<PlacedCopy>,
     /// The height of the best, and by how much the next try is lower, in pixels.
     height: u32,
     step: u32,
     /// Layouts that overlap, with how much.
-    kept: Vec<(u64, Vec<Copy>)>,
+    kept: Vec<(u64, Vec<PlacedCopy>)>,
 }
 
 /// Returns copies as close to the top as the search finds, or as is enough, or nothing if it never
@@ -35,9 +35,9 @@ struct Search<'a> {
 pub(super) fn lowest(
     layout: &Layout,
     ways: &Ways,
-    copies: &[Copy],
+    copies: &[PlacedCopy],
     enough: u32,
-) -> Option<Vec<Copy>> {
+) -> Option<Vec<PlacedCopy>> {
     let area = layout.pixels();
     let cells = |pixels: u32| u64::from(pixels.div_ceil(ways.cell));
     let cells = cells(area.width) * cells(bottom(ways, copies));
@@ -52,7 +52,7 @@ pub(super) fn lowest(
     let best = board.copies.clone();
     let height = bottom(ways, &best);
     let step = (height / 50).max(ways.cell);
-    let mut search = Search { board, random, work, best, height, step, kept: Vec::new() };
+    let mut search = LayoutSearch { board, random, work, best, height, step, kept: Vec::new() };
     let least = search.least_height().max(enough.saturating_sub(ways.cell));
     while search.board.work < work && search.height >= least + ways.cell {
         search.step = search.step.min(search.height - least);
@@ -62,16 +62,16 @@ pub(super) fn lowest(
 }
 
 /// Returns the row below all copies.
-fn bottom(ways: &Ways, copies: &[Copy]) -> u32 {
-    let end = |copy: &Copy| copy.at[1] as u32 * ways.cell + ways.size(copy.way)[1];
+fn bottom(ways: &Ways, copies: &[PlacedCopy]) -> u32 {
+    let end = |copy: &PlacedCopy| copy.at[1] as u32 * ways.cell + ways.size(copy.way)[1];
     copies.iter().map(end).max().unwrap_or(0)
 }
 
-impl Search<'_> {
+impl LayoutSearch<'_> {
     /// Returns the height below which a copy does not fit in any way.
     fn least_height(&self) -> u32 {
         let ways = self.board.ways;
-        let least = |copy: &Copy| {
+        let least = |copy: &PlacedCopy| {
             let heights = ways.of_part[copy.part].iter().map(|&way| ways.size(way)[1]);
             heights.min().unwrap_or(0)
         };
@@ -101,20 +101,20 @@ impl Search<'_> {
     }
 
     /// Returns the best with the copies below some row moved up by the step.
-    fn pushed_up(&mut self) -> Vec<Copy> {
+    fn pushed_up(&mut self) -> Vec<PlacedCopy> {
         let cell = self.board.ways.cell;
         let from = self.random.below((self.height / cell).max(1) as usize) as i32;
         let by = (self.step / cell) as i32;
-        let moved = |copy: &Copy| {
+        let moved = |copy: &PlacedCopy| {
             let [x, y] = copy.at;
-            Copy { at: [x, if y > from { y - by } else { y }], ..*copy }
+            PlacedCopy { at: [x, if y > from { y - by } else { y }], ..*copy }
         };
         self.best.iter().map(moved).collect()
     }
 
     /// Returns a kept layout, rather one that overlaps little, in which two copies have changed
     /// places.
-    fn swapped(&mut self) -> Vec<Copy> {
+    fn swapped(&mut self) -> Vec<PlacedCopy> {
         let [one, other] = [0, 1].map(|_| self.random.below(self.kept.len()));
         // The list is sorted by overlap: the lesser of two random numbers prefers its front.
         let mut copies = self.kept[one.min(other)].1.clone();

@@ -1,6 +1,6 @@
 //! Parts copies that overlap, by guided local search.
 
-use super::board::{Board, Copy};
+use super::board::{Board, PlacedCopy};
 use super::random::Random;
 
 /// Tries without an improvement before the best is taken up again, and how often.
@@ -12,7 +12,7 @@ const STRIKES: u32 = 3;
 pub(super) fn separate(board: &mut Board, random: &mut Random, most_work: u64) -> bool {
     board.weights.fill(1.0);
     let mut least = board.overlap();
-    let mut best: Vec<Copy> = board.copies.clone();
+    let mut best: Vec<PlacedCopy> = board.copies.clone();
     let mut order: Vec<usize> = (0..board.copies.len()).collect();
     for _ in 0..STRIKES {
         let before = least;

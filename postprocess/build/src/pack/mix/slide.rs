@@ -2,7 +2,7 @@
 
 use super::super::super::{CopyPlacement, Layout};
 use super::super::no_fit::NoFitRegions;
-use super::board::Copy;
+use super::board::PlacedCopy;
 use super::ways::Ways;
 
 /// Copies at fine cells.
@@ -11,19 +11,25 @@ struct Slide<'a> {
     ways: &'a Ways,
     regions: NoFitRegions,
     gap: u32,
-    copies: Vec<Copy>,
+    copies: Vec<PlacedCopy>,
 }
 
 /// Moves copies as close to the top and the left as possible, and returns their places.
-pub(super) fn up(layout: &Layout, gap: u32, ways: &Ways, copies: &[Copy]) -> Vec<CopyPlacement> {
+pub(super) fn up(
+    layout: &Layout,
+    gap: u32,
+    ways: &Ways,
+    copies: &[PlacedCopy],
+) -> Vec<CopyPlacement> {
     let regions = NoFitRegions::in_cells(layout, gap, ways.fine);
     let times = (ways.cell / ways.fine) as i32;
-    let copies = copies.iter().map(|copy| Copy { at: copy.at.map(|cell| cell * times), ..*copy });
+    let copies =
+        copies.iter().map(|copy| PlacedCopy { at: copy.at.map(|cell| cell * times), ..*copy });
     let mut slide = Slide { layout, ways, regions, gap, copies: copies.collect() };
     slide.copies.sort_by_key(|copy| (copy.at[1], copy.at[0]));
     // Every step leads up, or left in its row, so the passes end.
     while slide.pass() {}
-    let placement = |copy: &Copy| {
+    let placement = |copy: &PlacedCopy| {
         let ((part, turn), [left, top]) =
             (ways.way(copy.way), copy.at.map(|cell| cell as u32 * ways.fine));
         CopyPlacement { part, turn, left, top }
@@ -51,14 +57,14 @@ impl Slide<'_> {
     }
 
     fn is_free(&mut self, copy: usize, at: [i32; 2]) -> bool {
-        let own = Copy { at, ..self.copies[copy] };
+        let own = PlacedCopy { at, ..self.copies[copy] };
         let last = (self.layout.pixels().width - self.ways.size(own.way)[0]) / self.ways.fine;
         let is_on = at[1] >= 0 && (0..=last as i32).contains(&at[0]);
         is_on && (0..self.copies.len()).all(|other| other == copy || !self.meet(&own, other))
     }
 
     /// Whether two copies are too near, by the regions that the depths were found from.
-    fn meet(&mut self, own: &Copy, other: usize) -> bool {
+    fn meet(&mut self, own: &PlacedCopy, other: usize) -> bool {
         let other = self.copies[other];
         let by = [0, 1].map(|axis| own.at[axis] - other.at[axis]);
         let [own_size, other_size] = [own.way, other.way].map(|way| {
