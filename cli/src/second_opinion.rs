@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lamp_slicer::brep::{BodyPair, Comparison, Measure, Measured, Prepared};
+use lamp_slicer::brep::{BodyMeasure, BodyPair, Comparison, MeasurePair, Prepared};
 use lamp_slicer::{OpenOptions, body_name};
 use serde_json::{Value, json};
 
@@ -46,12 +46,12 @@ pub(crate) fn fields(second: &Comparison) -> Value {
     })
 }
 
-fn measured_fields(measured: &Measured) -> Value {
+fn measured_fields(measured: &MeasurePair) -> Value {
     let (what, z_mm) = match measured.what {
-        Measure::Least(axis) => (format!("least_{}_mm", AXES[axis]), None),
-        Measure::Greatest(axis) => (format!("greatest_{}_mm", AXES[axis]), None),
-        Measure::Volume => ("volume_mm3".to_owned(), None),
-        Measure::Section { z_mm } => ("section_mm2".to_owned(), Some(z_mm)),
+        BodyMeasure::Least(axis) => (format!("least_{}_mm", AXES[axis]), None),
+        BodyMeasure::Greatest(axis) => (format!("greatest_{}_mm", AXES[axis]), None),
+        BodyMeasure::Volume => ("volume_mm3".to_owned(), None),
+        BodyMeasure::Section { z_mm } => ("section_mm2".to_owned(), Some(z_mm)),
     };
     let [first, second] = measured.values;
     let allowed = measured.allowed;
@@ -72,12 +72,12 @@ fn difference_lines(second: &Comparison) -> Vec<String> {
 pub(crate) fn text(second: &Comparison) -> String {
     let differences = difference_lines(second);
     if differences.is_empty() {
-        let percent = |is_kind: fn(&Measure) -> bool| 100.0 * second.most_apart(is_kind);
+        let percent = |is_kind: fn(&BodyMeasure) -> bool| 100.0 * second.most_apart(is_kind);
         return format!(
             "second:     {} agrees: volumes within {:.4} %, sections within {:.4} %\n",
             second.kernels[1],
-            percent(|what| matches!(what, Measure::Volume)),
-            percent(|what| matches!(what, Measure::Section { .. })),
+            percent(|what| matches!(what, BodyMeasure::Volume)),
+            percent(|what| matches!(what, BodyMeasure::Section { .. })),
         );
     }
     differences.iter().map(|line| format!("differs:    {line}\n")).collect()

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lamp_slicer::brep::{Finding, Prepared};
+use lamp_slicer::brep::{BrepFinding, Prepared};
 use lamp_slicer::{KernelName, OpenOptions, SliceError, step_bytes};
 use lamp_stack::{Dpi, Length, open_ending};
 use serde::{Deserialize, Serialize};
@@ -127,10 +127,10 @@ pub fn notes(prepared: &Prepared) -> Vec<String> {
 }
 
 /// Returns a line for each kind of finding, about the worst of that kind.
-fn findings(findings: &[Finding]) -> Vec<String> {
-    let mut kinds: Vec<(&Finding, usize)> = Vec::new();
+fn findings(findings: &[BrepFinding]) -> Vec<String> {
+    let mut kinds: Vec<(&BrepFinding, usize)> = Vec::new();
     for finding in findings {
-        let same = |(other, _): &&mut (&Finding, usize)| {
+        let same = |(other, _): &&mut (&BrepFinding, usize)| {
             discriminant(&other.fault) == discriminant(&finding.fault)
         };
         match kinds.iter_mut().find(same) {
@@ -143,7 +143,7 @@ fn findings(findings: &[Finding]) -> Vec<String> {
             None => kinds.push((finding, 1)),
         }
     }
-    let line = |(worst, count): (&Finding, usize)| {
+    let line = |(worst, count): (&BrepFinding, usize)| {
         let more = match count {
             1 => String::new(),
             count if worst.fault.off_mm() == 0.0 => format!(", as are {} others", count - 1),

@@ -6,7 +6,7 @@ use lamp_stack::FileFormat;
 use zip::ZipArchive;
 
 use crate::error::SliceError;
-use crate::part_file::PartFile;
+use crate::part_file::OpenPartFile;
 use crate::three_mf::ThreeMfError;
 
 /// Names in archives of programs, in lowercase, and the programs' formats.
@@ -25,7 +25,7 @@ const PARTS: [&str; 5] = [".stl", ".step", ".stp", ".obj", ".3mf"];
 
 /// Returns the reason why a package cannot be read as 3MF. For a package without a model, the
 /// reason names its actual format.
-pub(crate) fn not_three_mf(file: &PartFile, error: ThreeMfError) -> SliceError {
+pub(crate) fn not_three_mf(file: &OpenPartFile, error: ThreeMfError) -> SliceError {
     let ThreeMfError::NoModel(_) = error else { return Box::new(error).into() };
     let Ok(archive) = ZipArchive::new(BufReader::new(file.reader())) else {
         return Box::new(error).into();

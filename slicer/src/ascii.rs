@@ -4,22 +4,22 @@ use std::io::{self, Read};
 
 use crate::error::{AsciiFault, SliceError};
 use crate::facet::Facet;
-use crate::number::{NumberFault, Numbers};
+use crate::number::{NumberFault, NumberFormat};
 use crate::read_note::ReadNote;
 use crate::words::Words;
 
 /// The facets of a text, and notes on skipped parts.
-pub(crate) type Facets = (Vec<Facet>, Vec<ReadNote>);
+pub(crate) type ReadFacets = (Vec<Facet>, Vec<ReadNote>);
 
 /// Reads the facets of all solids of an ASCII file, which `open` opens.
 ///
 /// # Errors
 /// Returns an error if it ends within a facet, has other words in one, or cannot be read.
-pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<Facets, SliceError> {
-    match AsciiReader::new(open(), Numbers::default())?.read() {
+pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<ReadFacets, SliceError> {
+    match AsciiReader::new(open(), NumberFormat::default())?.read() {
         // Only all numbers together show the meaning of commas.
         Err(SliceError::Ascii { fault: AsciiFault::Comma, .. }) => {
-            AsciiReader::new(open(), Numbers::with_commas())?.read()
+            AsciiReader::new(open(), NumberFormat::with_commas())?.read()
         }
         read => read,
     }
@@ -82,7 +82,7 @@ fn is_comment(word: &[u8]) -> bool {
 
 struct AsciiReader<R> {
     words: Words<R>,
-    numbers: Numbers,
+    numbers: NumberFormat,
     facets: Vec<Facet>,
     notes: Vec<ReadNote>,
     /// Whether a solid has begun and not ended.
@@ -90,12 +90,12 @@ struct AsciiReader<R> {
 }
 
 impl<R: Read> AsciiReader<R> {
-    fn new(text: R, numbers: Numbers) -> io::Result<Self> {
+    fn new(text: R, numbers: NumberFormat) -> io::Result<Self> {
         let (facets, notes) = (Vec::new(), Vec::new());
         Ok(Self { words: Words::new(text)?, numbers, facets, notes, is_in_solid: false })
     }
 
-    fn read(mut self) -> Result<Facets, SliceError> {
+    fn read(mut self) -> Result<ReadFacets, SliceError> {
         while self.words.advance()? {
             match Keyword::of(self.words.word()) {
                 Some(Keyword::Facet) => self.facet()?,
@@ -315,7 +315,7 @@ mod tests {
 
     const FACET: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.5, -2.0]];
 
-    fn read_text(text: &str) -> Result<Facets, String> {
+    fn read_text(text: &str) -> Result<ReadFacets, String> {
         read(|| text.as_bytes()).map_err(|error| error.to_string())
     }
 

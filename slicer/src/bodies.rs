@@ -36,7 +36,7 @@ pub enum Join {
 
 /// The role of a body in its object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Role {
+pub(crate) enum BodyRole {
     /// It is inside.
     #[default]
     Solid,
@@ -50,14 +50,14 @@ pub(crate) struct BodyRule {
     pub(crate) file: usize,
     /// The number of its object in the file.
     pub(crate) object: usize,
-    pub(crate) role: Role,
+    pub(crate) role: BodyRole,
     pub(crate) join: Join,
 }
 
 impl BodyRule {
     /// Returns true if it only removes material.
     pub(crate) fn is_cutter(&self) -> bool {
-        self.role == Role::Negative || self.join != Join::Unite
+        self.role == BodyRole::Negative || self.join != Join::Unite
     }
 }
 
@@ -183,10 +183,11 @@ impl FillRule {
             let mut others = rules.clone().map(|(_, rule)| rule);
             others.any(|rule| {
                 let is_there = (rule.file, rule.object) == (of.file, of.object);
-                rule.role == Role::Negative && is_there
+                rule.role == BodyRole::Negative && is_there
             })
         };
-        let solids = rules.clone().filter(|(_, rule)| rule.role == Role::Solid && !is_cut(rule));
+        let solids =
+            rules.clone().filter(|(_, rule)| rule.role == BodyRole::Solid && !is_cut(rule));
         let of = |join: Join| solids.clone().filter(move |(_, rule)| rule.join == join);
         if of(Join::Subtract).next().is_some() {
             return false;

@@ -220,7 +220,7 @@ mod tests {
     use crate::part::Part;
     use crate::placement::Placement;
     use crate::planes::{PLANE_TOLERANCE, PlaneRule};
-    use crate::survey::Survey;
+    use crate::survey::FacetSurvey;
 
     /// Facets all over 10 mm, a few of which span the full height.
     fn scattered() -> PlacedPart {
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn every_slab_has_its_facets_once() {
         let model = scattered();
-        let survey = Survey::of(&model).unwrap();
+        let survey = FacetSurvey::of(&model).unwrap();
         let thickness = Length::from_um(50.0);
         let part_um = [0.0, 10_000.0];
         let planes = Planes::uniform(part_um, thickness, PlaneRule::Top, PLANE_TOLERANCE).unwrap();

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use lamp_brep::{BodyFault, BrepError, Difference, Finding};
+use lamp_brep::{BodyFault, BrepError, BrepFinding, KernelDifference};
 use lamp_stack::{FileFormat, Length, one_line};
 use thiserror::Error;
 
@@ -248,7 +248,7 @@ pub enum SliceError {
         /// Its first fault.
         fault: BodyFault,
         /// The first finding about a face, which may be the reason.
-        finding: Option<Finding>,
+        finding: Option<BrepFinding>,
         /// The number of further faults.
         more: usize,
     },
@@ -261,7 +261,7 @@ pub enum SliceError {
         /// The first body that differs.
         body: String,
         /// Its first difference.
-        difference: Difference,
+        difference: KernelDifference,
         /// The number of further differences.
         more: usize,
     },

@@ -11,7 +11,7 @@ use crate::fill::Fill;
 use crate::part::Part;
 use crate::placed_part::PlacedPart;
 use crate::placement::Placement;
-use crate::survey::Survey;
+use crate::survey::FacetSurvey;
 
 /// A placed part, whose facets between two heights are found without examining the other facets. It
 /// takes about 49 bytes per facet.
@@ -52,7 +52,7 @@ const MAX_BINS: f64 = 65_536.0;
 
 impl HeightBins {
     /// Creates bins twice as high as the mean facet, so that most facets meet one or two.
-    fn new(survey: &Survey) -> Self {
+    fn new(survey: &FacetSurvey) -> Self {
         let (start_um, end_um) = (survey.min[2], survey.max[2]);
         let height_um = 2.0 * survey.mean_height_um();
         let count = if height_um > 0.0 { (end_um - start_um) / height_um } else { 1.0 };
@@ -91,7 +91,7 @@ impl FacetIndex {
     }
 
     fn of(model: PlacedPart) -> Result<Self, SliceError> {
-        let survey = Survey::of(&model)?;
+        let survey = FacetSurvey::of(&model)?;
         survey.check_extent(&model)?;
         let bins = HeightBins::new(&survey);
         let (mut facets, mut from_below) = (KeyCounts::new(bins.count), KeyCounts::new(bins.count));

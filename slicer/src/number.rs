@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 /// The number format of a text.
 #[derive(Debug, Default)]
-pub(crate) struct Numbers {
+pub(crate) struct NumberFormat {
     /// Whether commas are decimal points, as in some locales.
     pub(crate) has_commas: bool,
     /// Whether no comma can separate thousands.
@@ -19,7 +19,7 @@ pub(crate) enum NumberFault {
     Comma,
 }
 
-impl Numbers {
+impl NumberFormat {
     /// Returns the numbers of a text with decimal commas.
     pub(crate) fn with_commas() -> Self {
         Self { has_commas: true, is_decimal: false }
@@ -79,17 +79,17 @@ mod tests {
             ("3.5,", 3.5),
             ("4;", 4.0),
         ] {
-            assert_eq!(Numbers::default().parse(word.as_bytes()), Ok(number), "{word}");
+            assert_eq!(NumberFormat::default().parse(word.as_bytes()), Ok(number), "{word}");
         }
         for word in ["", "x", "1.2.3", "1,2,3", "1,2.3", "1.2,3", "--1", "\u{e9}", "1e", ","] {
-            let number = Numbers::default().parse::<f32>(word.as_bytes());
+            let number = NumberFormat::default().parse::<f32>(word.as_bytes());
             assert_eq!(number, Err(NumberFault::NoNumber), "{word}");
         }
     }
 
     #[test]
     fn commas_are_points_only_if_they_must_be() {
-        assert_eq!(Numbers::default().parse::<f32>(b"0,5"), Err(NumberFault::Comma));
+        assert_eq!(NumberFormat::default().parse::<f32>(b"0,5"), Err(NumberFault::Comma));
         for (words, is_ambiguous) in [
             (&["1,500", "12,250", "3"][..], true),
             (&["1,500", "0,250"], false),
@@ -97,13 +97,13 @@ mod tests {
             (&["1,500", "1,5"], false),
             (&["1,500e0", "1234,250"], false),
         ] {
-            let mut numbers = Numbers::with_commas();
+            let mut numbers = NumberFormat::with_commas();
             for word in words {
                 let number: f64 = numbers.parse(word.as_bytes()).unwrap();
                 assert_eq!(number, word.replace(',', ".").parse::<f64>().unwrap());
             }
             assert_eq!(numbers.is_ambiguous(), is_ambiguous, "{words:?}");
         }
-        assert!(Numbers::with_commas().parse::<f32>(b"1.5").is_err());
+        assert!(NumberFormat::with_commas().parse::<f32>(b"1.5").is_err());
     }
 }

@@ -4,7 +4,7 @@ use std::io::{self, Read};
 
 use crate::decimal_mesh::DecimalMesh;
 use crate::error::{ObjFault, SliceError};
-use crate::number::{NumberFault, Numbers};
+use crate::number::{NumberFault, NumberFormat};
 use crate::piece::Piece;
 use crate::read_note::ReadNote;
 use crate::words::Words;
@@ -52,10 +52,10 @@ const PASSED_OVER: [&[u8]; 30] = [
 ///
 /// Returns an error if a vertex, a face or the file cannot be read.
 pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<(Piece, Vec<ReadNote>), SliceError> {
-    match ObjReader::new(open(), Numbers::default())?.read() {
+    match ObjReader::new(open(), NumberFormat::default())?.read() {
         // Only all numbers together show the meaning of commas.
         Err(SliceError::Obj { fault: ObjFault::Comma, .. }) => {
-            ObjReader::new(open(), Numbers::with_commas())?.read()
+            ObjReader::new(open(), NumberFormat::with_commas())?.read()
         }
         read => read,
     }
@@ -63,14 +63,14 @@ pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<(Piece, Vec<ReadNote
 
 struct ObjReader<R> {
     words: Words<R>,
-    numbers: Numbers,
+    numbers: NumberFormat,
     mesh: ObjMesh,
     notes: Vec<ReadNote>,
     few_corners: u64,
 }
 
 impl<R: Read> ObjReader<R> {
-    fn new(text: R, numbers: Numbers) -> io::Result<Self> {
+    fn new(text: R, numbers: NumberFormat) -> io::Result<Self> {
         let (mesh, notes) = (ObjMesh::default(), Vec::new());
         Ok(Self { words: Words::new(text)?, numbers, mesh, notes, few_corners: 0 })
     }

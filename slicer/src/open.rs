@@ -17,7 +17,7 @@ use crate::ascii;
 use crate::error::SliceError;
 use crate::obj;
 use crate::part::Part;
-use crate::part_file::PartFile;
+use crate::part_file::OpenPartFile;
 use crate::piece::{Facets, Piece};
 use crate::stl;
 use crate::three_mf::{self, Contents, looks_packaged};
@@ -102,7 +102,7 @@ impl Part {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         // The extension of a compressed file is not part of the name.
         let name = name.strip_suffix(".stl").unwrap_or(&name);
-        Self::from_file(name, PartFile::new(file, path)?, options)
+        Self::from_file(name, OpenPartFile::new(file, path)?, options)
     }
 
     /// Reads a part from a stream, such as standard input, through a temporary file.
@@ -114,10 +114,14 @@ impl Part {
         stream: impl Read,
         options: &OpenOptions,
     ) -> Result<Self, SliceError> {
-        Self::from_file(name, PartFile::of_stream(stream)?, options)
+        Self::from_file(name, OpenPartFile::of_stream(stream)?, options)
     }
 
-    fn from_file(name: &str, file: PartFile, options: &OpenOptions) -> Result<Self, SliceError> {
+    fn from_file(
+        name: &str,
+        file: OpenPartFile,
+        options: &OpenOptions,
+    ) -> Result<Self, SliceError> {
         let digest = file.digest().to_owned();
         let file = Arc::new(file);
         let contents = match contents(&file, options) {
@@ -151,7 +155,7 @@ impl Part {
 }
 
 /// Reads the contents of a file.
-fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, SliceError> {
+fn contents(file: &Arc<OpenPartFile>, options: &OpenOptions) -> Result<Contents, SliceError> {
     let start = file.start(FORMAT_BYTES as u64)?;
     if start.is_empty() {
         return Err(SliceError::EmptyFile);
@@ -166,7 +170,7 @@ fn contents(file: &Arc<PartFile>, options: &OpenOptions) -> Result<Contents, Sli
 }
 
 fn unpacked(
-    file: &Arc<PartFile>,
+    file: &Arc<OpenPartFile>,
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {

@@ -25,7 +25,7 @@ const CLOCK_STEP: Duration = Duration::from_secs(2);
 
 /// An open file of a part, and its state when it was opened.
 #[derive(Debug)]
-pub(crate) struct PartFile {
+pub(crate) struct OpenPartFile {
     file: File,
     /// Its path and state; `None` for a temporary file, which nobody else can open.
     shared: Option<(PathBuf, FileState)>,
@@ -35,7 +35,7 @@ pub(crate) struct PartFile {
     seen: Vec<FileBlock>,
 }
 
-impl PartFile {
+impl OpenPartFile {
     /// Takes an open file, and reads it once for its digest.
     ///
     /// # Errors

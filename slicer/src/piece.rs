@@ -7,10 +7,10 @@ use std::sync::Arc;
 use lamp_brep::Prepared;
 
 use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
-use crate::bodies::{BodyRule, Join, Role};
+use crate::bodies::{BodyRole, BodyRule, Join};
 use crate::facet::{Facet, Units, rounded};
 use crate::file_blocks::{BLOCK_FACETS, FileBlock};
-use crate::part_file::PartFile;
+use crate::part_file::OpenPartFile;
 use crate::placement::Placement;
 
 /// Facets of surfaces are fewer and cost more, and every thread should have some.
@@ -34,7 +34,7 @@ pub(crate) struct Piece {
     pub(crate) placement: Placement,
     /// The number of its object in the file. It adds to the object's volume, or subtracts from it.
     pub(crate) object: usize,
-    pub(crate) role: Role,
+    pub(crate) role: BodyRole,
     /// How its file joins the other files.
     pub(crate) join: Join,
 }
@@ -50,7 +50,7 @@ impl Piece {
             offset: [0.0; 3],
             placement,
             object: 0,
-            role: Role::default(),
+            role: BodyRole::default(),
             join: Join::default(),
         }
     }
@@ -108,7 +108,7 @@ impl Piece {
 #[derive(Clone, Debug)]
 pub(crate) enum Facets {
     Binary {
-        file: Arc<PartFile>,
+        file: Arc<OpenPartFile>,
         count: usize,
     },
     Memory(Arc<Vec<Facet>>),

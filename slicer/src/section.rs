@@ -13,7 +13,7 @@ use crate::part::Part;
 use crate::placed_part::PlacedPart;
 use crate::placement::Placement;
 use crate::planes::{PLANE_TOLERANCE, Planes};
-use crate::survey::Survey;
+use crate::survey::FacetSurvey;
 
 /// Options of a single section.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ fn rows(model: Part, options: &SectionOptions) -> Result<Vec<Inside>, SliceError
 /// A placed part, about to be cut by one plane.
 pub(crate) struct CutPart {
     model: PlacedPart,
-    survey: Survey,
+    survey: FacetSurvey,
     grid: PixelGrid,
     planes: Planes,
     pub(crate) rule: FillRule,
@@ -81,7 +81,7 @@ pub(crate) struct CutPart {
 impl CutPart {
     pub(crate) fn new(model: Part, options: &SectionOptions) -> Result<Self, SliceError> {
         let model = PlacedPart::new(model, &options.placement, options.units);
-        let survey = Survey::of(&model)?;
+        let survey = FacetSurvey::of(&model)?;
         survey.check_extent(&model)?;
         // One column is enough: crossings keep their x, and only rows are counted.
         let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;

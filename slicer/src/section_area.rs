@@ -41,14 +41,14 @@ pub fn section_area(
 
 /// A segment of the section, downward.
 #[derive(Clone, Copy)]
-struct Side {
+struct SectionSegment {
     /// Its ends, in parts of rows.
     rows: [i64; 2],
     x_mm: [f64; 2],
     turn: Turn,
 }
 
-impl Side {
+impl SectionSegment {
     fn x_at(&self, row: i64) -> f64 {
         let [from, to] = self.rows;
         let share = (row - from) as f64 / (to - from) as f64;
@@ -70,7 +70,7 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
             let down = a.0 < b.0;
             let [from, to] = if down { [a, b] } else { [b, a] };
             let turn = Turn::new(body, if down != is_reversed { 1 } else { -1 });
-            sides.push(Side { rows: [from.0, to.0], x_mm: [from.1, to.1], turn });
+            sides.push(SectionSegment { rows: [from.0, to.0], x_mm: [from.1, to.1], turn });
         }
     })?;
     sides.sort_by(|a, b| {
@@ -79,7 +79,7 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
         by_ends.then(a.x_mm.partial_cmp(&b.x_mm).expect("coordinates are numbers"))
     });
     let mut position = Position::outside(&cut.rule);
-    let (mut open, mut next) = (Vec::<Side>::new(), 0);
+    let (mut open, mut next) = (Vec::<SectionSegment>::new(), 0);
     let row = |row: u32| {
         let [from, to] = [row, row + 1].map(|row| i64::from(row) * PARTS);
         open.retain(|side| side.rows[1] > from);
@@ -96,7 +96,7 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
         for lines in lines.windows(2) {
             let lines = lines[0]..lines[1];
             let across = open.iter().filter(|s| s.rows[0] <= lines.start && lines.end <= s.rows[1]);
-            let across: Vec<&Side> = across.collect();
+            let across: Vec<&SectionSegment> = across.collect();
             cut_between(&across, lines, from, &mut position, &mut found);
         }
         found
@@ -107,13 +107,14 @@ fn trapezoids(model: Part, options: &SectionOptions) -> Result<Vec<Vec<Trapezoid
 /// Adds the trapezoids between two lines that all `sides` cross. Where sides cross each other,
 /// halves the distance between the lines down to one fraction of a row.
 fn cut_between(
-    sides: &[&Side],
+    sides: &[&SectionSegment],
     lines: Range<i64>,
     row_start: i64,
     position: &mut Position<'_>,
     found: &mut Vec<Trapezoid>,
 ) {
-    let ends = |side: &&Side| ([lines.start, lines.end].map(|line| side.x_at(line)), side.turn);
+    let ends =
+        |side: &&SectionSegment| ([lines.start, lines.end].map(|line| side.x_at(line)), side.turn);
     let mut cut: Vec<([f64; 2], Turn)> = sides.iter().map(ends).collect();
     cut.sort_by(|([a, b], s), ([c, d], t)| (a + b).total_cmp(&(c + d)).then(s.cmp(t)));
     // Sides that end in one point differ there by rounding.

@@ -23,7 +23,7 @@ use crate::part::Part;
 use crate::placed_part::PlacedPart;
 use crate::placement::Placement;
 use crate::planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule, Planes};
-use crate::survey::Survey;
+use crate::survey::FacetSurvey;
 use crate::table::{CutImage, CutLayer, FacetSource, OpenRows, Table, open_rows};
 use crate::trace::{StrayBand, Trace, Tracer};
 
@@ -138,7 +138,7 @@ const CHOSEN_AT_ONCE: usize = 64;
 #[derive(Debug)]
 pub struct Slices {
     model: PlacedPart,
-    survey: Survey,
+    survey: FacetSurvey,
     grid: PixelGrid,
     planes: Planes,
     rule: FillRule,
@@ -187,7 +187,7 @@ impl Slices {
             return Err(SliceError::GrayPlane);
         }
         let model = PlacedPart::new(model, &options.placement, options.units);
-        let survey = Survey::of(&model)?;
+        let survey = FacetSurvey::of(&model)?;
         survey.check_extent(&model)?;
         // After the survey, so that polishing changes neither the layers nor the size of images.
         let model = if options.polish { model } else { model.on_facets() };
@@ -314,7 +314,7 @@ impl Slices {
         let mut table = Table::default();
         // A single layer cannot become smaller, so it has no limit.
         let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
-        let Made { mut layer, depths, .. } =
+        let MadeLayer { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
         if let (Some(light), Some(depths)) = (self.shading.print_through(), depths) {
             let mut columns = Columns::new(index);
@@ -448,7 +448,7 @@ impl Slices {
         let made: Vec<_> = batch.clone().into_par_iter().map(layer).collect();
         let mut new_depths = Vec::new();
         // One after another: rounded sums depend on the order.
-        for (index, Made { layer, depths, shared, doubts }) in batch.zip(made) {
+        for (index, MadeLayer { layer, depths, shared, doubts }) in batch.zip(made) {
             // Layers around the wanted ones only give light, or have undersides.
             if self.wanted.contains(&index) {
                 let pitch_mm = self.grid.dpi.pitch().mm();
@@ -496,7 +496,7 @@ impl Slices {
         table: &Table,
         cutter: Cutter<'_>,
         open_rows: &OpenRows,
-    ) -> Made {
+    ) -> MadeLayer {
         let CutLayer { image, stray_rows, closed, shared, mut doubts } =
             table.layer(layer, cutter, self.model.surfaces(), &self.shading);
         let (image, depths) = match image {
@@ -513,7 +513,7 @@ impl Slices {
             doubts.white_px = mask.white_pixels();
         }
         let layer = Layer { info, dpi: Some(self.grid.dpi), image: image.into() };
-        Made { layer, depths, shared, doubts }
+        MadeLayer { layer, depths, shared, doubts }
     }
 
     /// Returns the number of layers to make into images at once: enough for all threads, but
@@ -580,7 +580,7 @@ impl Iterator for Slices {
 }
 
 /// A layer, its depths if its levels are not chosen yet, and the other findings about it.
-struct Made {
+struct MadeLayer {
     layer: Layer,
     depths: Option<DepthRows>,
     shared: SharedCounts,
@@ -632,7 +632,7 @@ impl<'a> MetBlocks<'a> {
     /// Finds the blocks that some layers meet from `reach_um` below their planes up to the planes.
     fn of(
         model: &'a PlacedPart,
-        survey: &Survey,
+        survey: &FacetSurvey,
         layers: &Range<usize>,
         planes: &Planes,
         reach_um: f64,

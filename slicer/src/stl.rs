@@ -10,7 +10,7 @@ use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, binary_facets, declared_count
 use crate::error::SliceError;
 use crate::facet::Facet;
 use crate::part::Part;
-use crate::part_file::PartFile;
+use crate::part_file::OpenPartFile;
 use crate::piece::Facets;
 use crate::read_note::ReadNote;
 
@@ -35,7 +35,7 @@ const UNKNOWN_COUNT: u32 = i32::MAX as u32;
 /// # Errors
 /// Returns an error if the file is not an STL, contradicts itself, was cut off or cannot be read.
 pub(crate) fn open(
-    file: &Arc<PartFile>,
+    file: &Arc<OpenPartFile>,
     start: &[u8],
 ) -> Result<(Facets, Vec<ReadNote>), SliceError> {
     let size = file.size();
@@ -91,7 +91,7 @@ fn byte_of(facet: u64) -> u64 {
 
 /// Counts of the file's records that could be facets.
 #[derive(Default)]
-struct Tally {
+struct RecordTally {
     records: u64,
     plausible: u64,
     facets: u64,
@@ -101,8 +101,8 @@ struct Tally {
     edges: u64,
 }
 
-fn tally(file: &PartFile, records: Range<u64>) -> io::Result<Tally> {
-    let mut tally = Tally::default();
+fn tally(file: &OpenPartFile, records: Range<u64>) -> io::Result<RecordTally> {
+    let mut tally = RecordTally::default();
     file.for_each_record(byte_of(records.start)..byte_of(records.end), |record| {
         tally.records += 1;
         tally.plausible += u64::from(is_plausible(record));

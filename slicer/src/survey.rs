@@ -23,7 +23,7 @@ const TOUCHING: [f64; 3] = [0.001, 0.001, 1.0];
 
 /// A part's box and blocks: x and y in millimeters, z in micrometers.
 #[derive(Debug)]
-pub(crate) struct Survey {
+pub(crate) struct FacetSurvey {
     pub(crate) min: [f64; 3],
     pub(crate) max: [f64; 3],
     blocks: Vec<BlockSurvey>,
@@ -118,7 +118,7 @@ fn not_finite(model: &PlacedPart, block: usize) -> io::Result<SliceError> {
     Ok(SliceError::NotFinite { file: piece.file, facet: found.unwrap_or(facet) })
 }
 
-impl Survey {
+impl FacetSurvey {
     /// Examines every facet once, on all threads.
     ///
     /// # Errors
@@ -324,7 +324,9 @@ mod tests {
                     Part::open(&path, &OpenOptions::default()).unwrap(),
                     Part::from_facets("part", facets.clone()),
                 ]
-                .map(|part| Survey::of(&PlacedPart::new(part, &placement, Units::Inches)).unwrap());
+                .map(|part| {
+                    FacetSurvey::of(&PlacedPart::new(part, &placement, Units::Inches)).unwrap()
+                });
                 assert_eq!((opened.min, opened.max), (held.min, held.max));
                 assert_eq!(opened.blocks.len(), held.blocks.len());
                 for (opened, held) in opened.blocks.iter().zip(&held.blocks) {
@@ -341,7 +343,7 @@ mod tests {
             fs::write(&path, &stl).unwrap();
             let part = Part::open(&path, &OpenOptions::default()).unwrap();
             let part = PlacedPart::new(part, &Placement::default(), Units::default());
-            let error = Survey::of(&part).unwrap_err();
+            let error = FacetSurvey::of(&part).unwrap_err();
             assert!(matches!(error, SliceError::NotFinite { facet: 5, .. }), "{error}");
         }
     }

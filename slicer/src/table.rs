@@ -15,7 +15,7 @@ use crate::bodies::{LayerDoubts, Position, SharedCounts, SharedPixels};
 use crate::closure::{EndSum, RowSums};
 use crate::crossing::{BodyCrossing, Crossing, RowCrossing, RowSegment};
 use crate::cutter::Cutter;
-use crate::exact::{ExactCut, PlacedSurfaces, Polished, Tally, settle};
+use crate::exact::{ExactCut, PlacedSurfaces, Polished, SolverTally, settle};
 use crate::facet::PlacedFacet;
 use crate::fill::Fill;
 use crate::gray::{DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader};
@@ -47,7 +47,7 @@ pub(crate) struct Table {
     /// Each worker's share of each layer. Lists keep their memory from slab to slab.
     shares: Vec<Vec<LayerShare>>,
     /// The result of polishing the crossings of these layers.
-    tally: Tally,
+    tally: SolverTally,
 }
 
 /// A layer's pixels.
@@ -105,7 +105,7 @@ impl Table {
         self.shares.resize_with(rayon::current_num_threads(), Vec::new);
         let budget = CrossingLimit { used: AtomicUsize::new(0), max, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
-        self.tally = Tally::default();
+        self.tally = SolverTally::default();
         let tally = &self.tally;
         let has_surfaces = (0..facets.pieces()).any(|piece| facets.surfaces(piece).is_some());
         // Crossings are settled on surfaces one by one, so segments cannot stand for them.

@@ -19,7 +19,7 @@ use crate::cutter::Cutter;
 use crate::facet::Facet;
 use crate::piece::Piece;
 use crate::placed_part::PlacedPart;
-use crate::survey::Survey;
+use crate::survey::FacetSurvey;
 
 /// Neighboring rows of a layer that do not balance.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -112,7 +112,7 @@ type KnownEdges = BTreeMap<(usize, u64, EdgeName), usize>;
 /// Examines a mesh a second time.
 pub(crate) struct Tracer<'a> {
     pub(crate) model: &'a PlacedPart,
-    pub(crate) survey: &'a Survey,
+    pub(crate) survey: &'a FacetSurvey,
     pub(crate) cutter: Cutter<'a>,
     /// The approximate memory limit of one pass, in bytes.
     pub(crate) memory: usize,

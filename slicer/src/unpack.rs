@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 
 use crate::error::SliceError;
-use crate::part_file::PartFile;
+use crate::part_file::OpenPartFile;
 
 /// Meshes shrink by a factor of up to 20 when compressed; bytes that shrink more than this limit
 /// are not a mesh, and would fill the disk.
@@ -27,7 +27,7 @@ pub(crate) fn most_unpacked(packed: u64) -> u64 {
 ///
 /// # Errors
 /// Returns an error if it is damaged, contains more than a mesh would, or the disk is full.
-pub(crate) fn unpack(file: &PartFile) -> Result<PartFile, SliceError> {
+pub(crate) fn unpack(file: &OpenPartFile) -> Result<OpenPartFile, SliceError> {
     let most = most_unpacked(file.size());
     // One byte more than allowed shows that there is too much. A gzip file may have several members
     // (RFC 1952, section 2.2).

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use crate::error::SliceError;
 use crate::facet::{Facet, PlacedFacet};
 use crate::placed_part::PlacedPart;
-use crate::survey::Survey;
+use crate::survey::FacetSurvey;
 
 /// The factor for a damaged vertex outside the rest, and the factor for a part larger than any
 /// machine.
@@ -42,7 +42,7 @@ const STEPS: usize = 1 << (32 - STEP_BITS);
 ///
 /// # Errors
 /// Returns an error that names the first such vertex, or an error if the part cannot be read.
-pub(crate) fn check(part: &PlacedPart, survey: &Survey) -> Result<(), SliceError> {
+pub(crate) fn check(part: &PlacedPart, survey: &FacetSurvey) -> Result<(), SliceError> {
     let samples = samples(part)?;
     let middle =
         std::array::from_fn(|axis| median(samples.iter().map(|point| point[axis]).collect()));
@@ -55,7 +55,7 @@ pub(crate) fn check(part: &PlacedPart, survey: &Survey) -> Result<(), SliceError
     if reach < far * middle_half_mm {
         return Ok(());
     }
-    let counts = Counts::of(part, middle)?;
+    let counts = FacetCounts::of(part, middle)?;
     let facets = part.model.facet_count();
     let is_rest =
         |&step: &usize| counts.reaching[step] <= facets / REACHED && counts.outside[step] <= 1;
@@ -125,12 +125,12 @@ fn distance_of(step: usize) -> f64 {
 
 /// The numbers of facets beyond each step: facets that reach there, and facets with all corners
 /// there.
-struct Counts {
+struct FacetCounts {
     reaching: Vec<usize>,
     outside: Vec<usize>,
 }
 
-impl Counts {
+impl FacetCounts {
     fn of(part: &PlacedPart, middle: Point) -> io::Result<Self> {
         let none = || [vec![0; STEPS], vec![0; STEPS]];
         let blocks = (0..part.model.block_count()).into_par_iter();
@@ -200,7 +200,7 @@ mod tests {
         let [here, there] = [Placement::default(), tilted].map(|placement| {
             let part = Part::from_facets("part", facets.to_vec());
             let part = PlacedPart::new(part, &placement, Units::Millimetres);
-            match check(&part, &Survey::of(&part).unwrap()) {
+            match check(&part, &FacetSurvey::of(&part).unwrap()) {
                 Ok(()) => None,
                 Err(SliceError::WildVertex { facet, corner, .. }) => Some((facet, corner)),
                 Err(error) => panic!("{error}"),

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use lamp_brep::{Kernel, StepModel, Tessellation};
+use lamp_brep::{KernelModel, StepModel, Tessellation};
 use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, step};
 use lamp_slicer::exact::{FacetPoint, PlacedSurfaces, RowContact, polish};
 
@@ -23,9 +23,9 @@ fn at(rows: &[[f64; 4]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// Reads a STEP text with each kernel.
-fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
-    let own: Arc<dyn Kernel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
-    let meshed = |kernel: Arc<dyn Kernel>| {
+fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn KernelModel>, Tessellation)> {
+    let own: Arc<dyn KernelModel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
+    let meshed = |kernel: Arc<dyn KernelModel>| {
         let mesh = kernel.tessellate(chord_mm).unwrap();
         (kernel, mesh)
     };

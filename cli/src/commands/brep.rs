@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
-use lamp_slicer::brep::{Attempt, Body, BodyReport, Comparison, Prepared};
+use lamp_slicer::brep::{Body, BodyReport, Comparison, PreparationAttempt, Prepared};
 use lamp_slicer::{SliceError, body_name, read_step};
 use lamp_stack::{Dpi, one_line};
 use serde_json::{Map, Value, json};
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
 }
 
 fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value {
-    let attempt = |attempt: &Attempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
+    let attempt = |attempt: &PreparationAttempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
     let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
     let mut answer = json!({
         "part": name,

@@ -1,7 +1,7 @@
 //! Estimates the number of facets of a model before it is tessellated.
 
 use lamp_brep::vector::{Vec3, length};
-use lamp_brep::{BrepError, Jet, Kernel};
+use lamp_brep::{BrepError, Jet, KernelModel};
 
 /// The number of samples of a face along u and along v.
 const STEPS: usize = 16;
@@ -10,7 +10,7 @@ const MAX_MM: f64 = 1e6;
 
 /// Returns the estimated number of facets, from how much faces bend within their ranges.
 pub(super) fn facets(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     ranges: &[[[f64; 2]; 2]],
     chord_mm: f64,
 ) -> Result<f64, BrepError> {
@@ -32,7 +32,7 @@ pub(super) fn facets(
 }
 
 /// Returns points spread over a face's range, row after row.
-fn grid(kernel: &dyn Kernel, face: u32, range: &[[f64; 2]; 2]) -> Vec<Vec3> {
+fn grid(kernel: &dyn KernelModel, face: u32, range: &[[f64; 2]; 2]) -> Vec<Vec3> {
     let at = |axis: usize, k: usize| {
         let [low, high] = range[axis];
         low + (high - low) * k as f64 / STEPS as f64

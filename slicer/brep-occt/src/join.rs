@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::calls::{Chain, Mesh, Node};
 use crate::refine::Patch;
-use lamp_brep::{BrepError, Facet, Fault, Finding, Kernel, MAX_FACETS, Tessellation};
+use lamp_brep::{BrepError, BrepFacet, BrepFinding, Fault, KernelModel, MAX_FACETS, Tessellation};
 
 /// A missing index.
 const NONE: u32 = u32::MAX;
@@ -19,7 +19,7 @@ const FAR: f64 = 4.0;
 
 /// Returns the facets, with shared points along edges.
 pub(super) fn joined(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &Mesh,
     chord_mm: f64,
 ) -> Result<Tessellation, BrepError> {
@@ -43,7 +43,7 @@ pub(super) fn joined(
             let [a, b, c] = corners;
             let is_tip = a == b || b == c || c == a;
             let list = if is_tip { &mut joined.tips } else { &mut joined.facets };
-            list.push(Facet { corners, uv, face: patch.face });
+            list.push(BrepFacet { corners, uv, face: patch.face });
         }
     }
     let faults = mesh.faults().iter().map(|bad| (bad.face, fault(bad.status)));
@@ -53,7 +53,7 @@ pub(super) fn joined(
         [edges, facets].into_iter().flatten().map(move |fault| (face, fault))
     };
     let faults = faults.chain(off.into_iter().flat_map(of_face));
-    let finding = |(face, fault)| Finding { face, entity: kernel.face(face).entity, fault };
+    let finding = |(face, fault)| BrepFinding { face, entity: kernel.face(face).entity, fault };
     joined.findings = faults.map(finding).collect();
     joined.findings.sort_by_key(|finding| finding.face);
     Ok(joined)

@@ -15,7 +15,8 @@ mod refine;
 use std::sync::Arc;
 
 use lamp_brep::{
-    Body, BrepError, FaceInfo, Jet, Kernel, MAX_FACETS, OpenedModel, Tessellation, check_syntax,
+    Body, BrepError, FaceInfo, Jet, KernelModel, MAX_FACETS, OpenedModel, Tessellation,
+    check_syntax,
 };
 
 /// A STEP file in memory, read by OpenCASCADE.
@@ -117,7 +118,7 @@ fn info(face: &calls::Face) -> FaceInfo {
     }
 }
 
-impl Kernel for OcctModel {
+impl KernelModel for OcctModel {
     fn bodies(&self) -> &[Body] {
         &self.bodies
     }

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use crate::calls::Node;
 use lamp_brep::vector::{Vec3, cross, dot, length, sub, unit};
-use lamp_brep::{Jet, Kernel};
+use lamp_brep::{Jet, KernelModel};
 
 /// Each round halves an edge once: after the last round, edges are a thousandth as long.
 const MAX_ROUNDS: usize = 10;
@@ -30,7 +30,7 @@ pub(super) struct Patch {
 impl Patch {
     /// Halves edges between facets until the surface is within the chord. Returns the
     /// remaining distance in millimeters.
-    pub(super) fn refine(&mut self, kernel: &dyn Kernel, chord_mm: f64) -> f64 {
+    pub(super) fn refine(&mut self, kernel: &dyn KernelModel, chord_mm: f64) -> f64 {
         let most = self.triangles.len() * (1 + MORE[0]) + MORE[1];
         for _ in 0..MAX_ROUNDS {
             let sides = Sides::new(&self.triangles);
@@ -51,7 +51,7 @@ impl Patch {
     fn far_halves(
         &mut self,
         sides: &Sides,
-        kernel: &dyn Kernel,
+        kernel: &dyn KernelModel,
         chord_mm: f64,
     ) -> Vec<Option<u32>> {
         let middle = |[a, b]: [u32; 2]| {
@@ -77,7 +77,7 @@ impl Patch {
     }
 
     /// Returns the greatest distance of the surface from the middles of facets.
-    fn off_mm(&self, kernel: &dyn Kernel) -> f64 {
+    fn off_mm(&self, kernel: &dyn KernelModel) -> f64 {
         let middle = |triangle: &[u32; 3]| {
             let uv = triangle.map(|node| self.nodes[node as usize].uv);
             [0, 1].map(|k| uv.iter().map(|uv| uv[k]).sum::<f64>() / 3.0)
@@ -89,7 +89,7 @@ impl Patch {
     }
 
     /// Returns the greatest distance of the nodes on edges from the surface.
-    pub(super) fn edges_off_mm(&self, kernel: &dyn Kernel) -> f64 {
+    pub(super) fn edges_off_mm(&self, kernel: &dyn KernelModel) -> f64 {
         let nodes = &self.nodes[..self.count];
         let at: Vec<[f64; 2]> = nodes.iter().map(|node| node.uv).collect();
         let jets = self.evaluated(kernel, &at);
@@ -97,7 +97,7 @@ impl Patch {
         pairs.map(|(node, jet)| length(sub(node.point, jet.point))).fold(0.0, f64::max)
     }
 
-    fn evaluated(&self, kernel: &dyn Kernel, at: &[[f64; 2]]) -> Vec<Jet> {
+    fn evaluated(&self, kernel: &dyn KernelModel, at: &[[f64; 2]]) -> Vec<Jet> {
         let mut jets = vec![Jet::default(); at.len()];
         kernel.evaluate(self.face, at, &mut jets);
         jets

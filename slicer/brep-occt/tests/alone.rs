@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use lamp_brep::{BodyFault, BrepError, FaceInfo, Jet, Kernel, StepModel, check};
+use lamp_brep::{BodyFault, BrepError, FaceInfo, Jet, KernelModel, StepModel, check};
 use lamp_brep_occt::OcctModel;
 use lamp_fixtures::{StepSample, StepUnit, step};
 

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use crate::body_report::{BodyFault, BodyReport};
-use crate::kernel::{Facet, Tessellation};
+use crate::kernel::{BrepFacet, Tessellation};
 use crate::prepare::Prepared;
 use crate::validate::VOLUMES_APART;
 use crate::vector::{Vec3, distance};
@@ -44,14 +44,14 @@ pub struct BodyPair {
     /// The first reason of each kernel not to slice it.
     pub faults: [Option<BodyFault>; 2],
     /// The measures compared: box, volume and five sections.
-    pub measures: Vec<Measured>,
+    pub measures: Vec<MeasurePair>,
 }
 
 /// A measure of a body by both kernels, in millimeters or their squares or cubes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
+pub struct MeasurePair {
     /// The measure.
-    pub what: Measure,
+    pub what: BodyMeasure,
     /// The values.
     pub values: [f64; 2],
     /// The greatest difference that the chord explains, or 0.1 % of a volume and 0.2 % of a
@@ -61,7 +61,7 @@ pub struct Measured {
 
 /// A measure of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Measure {
+pub enum BodyMeasure {
     /// The least coordinate along an axis, 0 to 2.
     Least(usize),
     /// The greatest coordinate along an axis, 0 to 2.
@@ -78,7 +78,7 @@ pub enum Measure {
 /// A difference between two kernels' readings of a body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Difference {
+pub enum KernelDifference {
     /// Only one kernel reads it.
     #[error("only {0} reads it")]
     Only(&'static str),
@@ -97,13 +97,13 @@ pub enum Difference {
     )]
     Apart {
         /// The measure.
-        measured: Measured,
+        measured: MeasurePair,
         /// The kernels.
         kernels: [&'static str; 2],
     },
 }
 
-impl fmt::Display for Measure {
+impl fmt::Display for BodyMeasure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Least(axis) => write!(f, "its least {}", ["x", "y", "z"][*axis]),
@@ -114,7 +114,7 @@ impl fmt::Display for Measure {
     }
 }
 
-impl Measured {
+impl MeasurePair {
     /// Returns true if the values differ by more than is allowed.
     pub fn is_apart(&self) -> bool {
         // `NaN` must be apart.
@@ -125,9 +125,9 @@ impl Measured {
     /// Returns one of the values with its unit.
     fn text(&self, kernel: usize) -> String {
         let unit = match self.what {
-            Measure::Least(_) | Measure::Greatest(_) => "mm",
-            Measure::Volume => "mm³",
-            Measure::Section { .. } => "mm²",
+            BodyMeasure::Least(_) | BodyMeasure::Greatest(_) => "mm",
+            BodyMeasure::Volume => "mm³",
+            BodyMeasure::Section { .. } => "mm²",
         };
         format!("{:.3} {unit}", self.values[kernel])
     }
@@ -161,32 +161,33 @@ impl Comparison {
     }
 
     /// Returns the differences and their bodies.
-    pub fn differences(&self) -> Vec<(&NamedBody, Difference)> {
+    pub fn differences(&self) -> Vec<(&NamedBody, KernelDifference)> {
         let mut found = Vec::new();
         for (kernel, bodies) in self.kernels.into_iter().zip(&self.only) {
-            found.extend(bodies.iter().map(|body| (body, Difference::Only(kernel))));
+            found.extend(bodies.iter().map(|body| (body, KernelDifference::Only(kernel))));
         }
         for pair in &self.pairs {
             let body = &pair.bodies[0];
             for (kernel, fault) in self.kernels.into_iter().zip(&pair.faults) {
                 let refused =
-                    |fault: &BodyFault| Difference::Refused { kernel, fault: fault.clone() };
+                    |fault: &BodyFault| KernelDifference::Refused { kernel, fault: fault.clone() };
                 found.extend(fault.iter().map(|fault| (body, refused(fault))));
             }
             let apart = pair.measures.iter().filter(|measured| measured.is_apart());
             let kernels = self.kernels;
-            let apart = apart.map(|&measured| Difference::Apart { measured, kernels });
+            let apart = apart.map(|&measured| KernelDifference::Apart { measured, kernels });
             found.extend(apart.map(|difference| (body, difference)));
         }
         found
     }
 
     /// Returns the greatest difference of a kind of measure, as a share of the value.
-    pub fn most_apart(&self, is_kind: impl Fn(&Measure) -> bool) -> f64 {
+    pub fn most_apart(&self, is_kind: impl Fn(&BodyMeasure) -> bool) -> f64 {
         let measures = self.pairs.iter().flat_map(|pair| &pair.measures);
         let of_kind = measures.filter(|measured| is_kind(&measured.what));
         // A coordinate may be zero, and must not divide.
-        let share = |Measured { values: [a, b], .. }: &Measured| (a - b).abs() / b.abs().max(1e-9);
+        let share =
+            |MeasurePair { values: [a, b], .. }: &MeasurePair| (a - b).abs() / b.abs().max(1e-9);
         of_kind.map(share).fold(0.0, f64::max)
     }
 }
@@ -219,7 +220,7 @@ fn pair_up(reports: [&[BodyReport]; 2]) -> (Vec<[usize; 2]>, [Vec<usize>; 2]) {
 struct ReadBody<'a> {
     report: &'a BodyReport,
     mesh: &'a Tessellation,
-    facets: &'a [Facet],
+    facets: &'a [BrepFacet],
 }
 
 impl<'a> ReadBody<'a> {
@@ -264,23 +265,23 @@ fn segment(corners: &[Vec3; 3], z_mm: f64) -> Option<[[f64; 2]; 2]> {
 }
 
 /// Returns the measures of a body by both kernels.
-fn measures(bodies: &[ReadBody<'_>; 2]) -> Vec<Measured> {
+fn measures(bodies: &[ReadBody<'_>; 2]) -> Vec<MeasurePair> {
     let reports = [bodies[0].report, bodies[1].report];
     let chords = bodies.each_ref().map(|body| body.mesh.chord_mm);
     let chord_mm = f64::max(chords[0], chords[1]);
-    let side = |end: usize, axis: usize| Measured {
-        what: if end == 0 { Measure::Least(axis) } else { Measure::Greatest(axis) },
+    let side = |end: usize, axis: usize| MeasurePair {
+        what: if end == 0 { BodyMeasure::Least(axis) } else { BodyMeasure::Greatest(axis) },
         values: reports.map(|report| report.box_mm[end][axis]),
         // Facets may lie on either side of their surface, by a chord in each reading.
         allowed: chords[0] + chords[1],
     };
     let sides = (0..2).flat_map(|end| (0..3).map(move |axis| (end, axis)));
-    let mut measures: Vec<Measured> = sides.map(|(end, axis)| side(end, axis)).collect();
+    let mut measures: Vec<MeasurePair> = sides.map(|(end, axis)| side(end, axis)).collect();
     // The volumes of the surfaces hardly depend on either kernel's choice of facets.
     let volumes = reports.map(|report| report.exact_volume_mm3);
     let area_mm2 = f64::max(reports[0].area_mm2, reports[1].area_mm2);
-    measures.push(Measured {
-        what: Measure::Volume,
+    measures.push(MeasurePair {
+        what: BodyMeasure::Volume,
         values: volumes,
         allowed: f64::max(VOLUMES_APART * volumes[0].abs(), chord_mm * area_mm2),
     });
@@ -295,8 +296,8 @@ fn measures(bodies: &[ReadBody<'_>; 2]) -> Vec<Measured> {
         });
         let by_chord = chord_mm * f64::max(ours[1], theirs[1]);
         let allowed = [SECTIONS_APART * ours[0].abs(), by_chord, steps[0], steps[1]];
-        Measured {
-            what: Measure::Section { z_mm },
+        MeasurePair {
+            what: BodyMeasure::Section { z_mm },
             values: [ours[0], theirs[0]],
             allowed: allowed.into_iter().fold(0.0, f64::max),
         }
@@ -334,7 +335,7 @@ mod tests {
         assert_eq!(comparison.differences(), []);
         let partner = |pair: &BodyPair| pair.bodies[1].index;
         assert_eq!(comparison.pairs.iter().map(partner).collect::<Vec<_>>(), [1, 2, 0]);
-        assert!(comparison.most_apart(|what| *what == Measure::Volume) < 1e-4);
+        assert!(comparison.most_apart(|what| *what == BodyMeasure::Volume) < 1e-4);
         // A section of the box is exact.
         let [.., section] = comparison.pairs[0].measures[..] else { panic!("there are measures") };
         assert!(section.values.iter().all(|area| (area - 200.0).abs() < 1e-9), "{section:?}");

@@ -19,7 +19,7 @@ pub struct Jet {
 /// A model read by a kernel: placed bodies, in millimeters.
 ///
 /// Faces are numbered across all bodies. Each has a surface with the same number.
-pub trait Kernel: Send + Sync {
+pub trait KernelModel: Send + Sync {
     /// Returns the bodies in the file's order. A body placed twice appears twice.
     fn bodies(&self) -> &[Body];
 
@@ -103,7 +103,7 @@ pub struct FaceInfo {
 
 /// A triangle of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facet {
+pub struct BrepFacet {
     /// The indices of its corners, counterclockwise seen from outside.
     pub corners: [u32; 3],
     /// The corners' parameters on the face's surface. A point on a seam or at a pole
@@ -113,7 +113,7 @@ pub struct Facet {
     pub face: u32,
 }
 
-impl Facet {
+impl BrepFacet {
     /// Turns the facet over.
     pub(crate) fn turn_over(&mut self) {
         self.corners.swap(1, 2);
@@ -127,34 +127,34 @@ pub struct Tessellation {
     /// All points, in millimeters. Neighboring faces share the points of their edge.
     pub points: Vec<[f64; 3]>,
     /// The facets, by body and face.
-    pub facets: Vec<Facet>,
+    pub facets: Vec<BrepFacet>,
     /// Triangles with two corners at one pole, by face. They have no area in space, but
     /// they cover parameters of the face, which volume integrals need.
-    pub tips: Vec<Facet>,
+    pub tips: Vec<BrepFacet>,
     /// The faults found in faces.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<BrepFinding>,
     /// The greatest distance of facets from their surfaces, in millimeters.
     pub chord_mm: f64,
 }
 
 impl Tessellation {
     /// Returns a facet's corners.
-    pub fn corners(&self, facet: &Facet) -> [[f64; 3]; 3] {
+    pub fn corners(&self, facet: &BrepFacet) -> [[f64; 3]; 3] {
         facet.corners.map(|corner| self.points[corner as usize])
     }
 
     /// Returns the facets of a range of faces.
-    pub fn of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
+    pub fn of_faces(&self, faces: &std::ops::Range<u32>) -> &[BrepFacet] {
         of_faces(&self.facets, faces)
     }
 
     /// Returns the tips of a range of faces.
-    pub(crate) fn tips_of_faces(&self, faces: &std::ops::Range<u32>) -> &[Facet] {
+    pub(crate) fn tips_of_faces(&self, faces: &std::ops::Range<u32>) -> &[BrepFacet] {
         of_faces(&self.tips, faces)
     }
 }
 
-fn of_faces<'a>(facets: &'a [Facet], faces: &std::ops::Range<u32>) -> &'a [Facet] {
+fn of_faces<'a>(facets: &'a [BrepFacet], faces: &std::ops::Range<u32>) -> &'a [BrepFacet] {
     // Facets are sorted by face, so two binary searches find a body's.
     let start = facets.partition_point(|facet| facet.face < faces.start);
     let end = facets.partition_point(|facet| facet.face < faces.end);
@@ -163,7 +163,7 @@ fn of_faces<'a>(facets: &'a [Facet], faces: &std::ops::Range<u32>) -> &'a [Facet
 
 /// A fault and its face.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct BrepFinding {
     /// The index of the face.
     pub face: u32,
     /// The entity's number in the file.

@@ -1,6 +1,6 @@
 //! Reads B-rep models (STEP) and tessellates them into closed facets on exact surfaces.
 //!
-//! A [`Kernel`] holds a model and evaluates its surfaces. Its facets share the points of
+//! A [`KernelModel`] holds a model and evaluates its surfaces. Its facets share the points of
 //! their edges, so they close. [`check`] validates them: a body with faults must not be
 //! sliced.
 //!
@@ -10,7 +10,7 @@
 //! The crate `lamp-brep-occt` has a kernel on OpenCASCADE.
 //!
 //! ```
-//! use lamp_brep::{Jet, Kernel, StepModel, check};
+//! use lamp_brep::{Jet, KernelModel, StepModel, check};
 //! use lamp_fixtures::{StepSample, StepUnit, step};
 //!
 //! // A sphere of radius 15 mm that stands on z = 0, in inches.
@@ -55,11 +55,11 @@ pub mod vector;
 mod volume;
 
 pub use body_report::{BodyFault, BodyReport};
-pub use compare::{BodyPair, Comparison, Difference, Measure, Measured, NamedBody};
+pub use compare::{BodyMeasure, BodyPair, Comparison, KernelDifference, MeasurePair, NamedBody};
 pub use error::BrepError;
-pub use kernel::{Body, FaceInfo, Facet, Fault, Finding, Jet, Kernel, Tessellation};
+pub use kernel::{Body, BrepFacet, BrepFinding, FaceInfo, Fault, Jet, KernelModel, Tessellation};
 pub use notice::{Matter, Notice};
-pub use prepare::{Attempt, OpenedModel, Prepared, ReadFn, prepare};
+pub use prepare::{OpenedModel, PreparationAttempt, Prepared, ReadFn, prepare};
 pub use step::{StepError, StepModel, check_syntax, read_step};
 pub use tessellate::MAX_FACETS;
 pub use validate::check;

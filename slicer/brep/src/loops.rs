@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use crate::kernel::{Fault, Finding};
+use crate::kernel::{BrepFinding, Fault};
 use crate::model::{BrepModel, Loop};
 use crate::orient::{neighbours, pieces};
 
@@ -16,7 +16,7 @@ type LoopPlace = (usize, usize);
 /// Reverses loops on closed surfaces that follow edges in the same direction as their neighbors.
 /// Returns a finding for each changed face. Of loops that run against each other, the smaller
 /// number is wrong; if the numbers are equal, all stay.
-pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<Finding> {
+pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<BrepFinding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
         let faces = body.faces.start as usize..body.faces.end as usize;
@@ -34,7 +34,7 @@ pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<Finding> {
             }
         }
         contrary.dedup_by_key(|(face, _)| *face);
-        findings.extend(contrary.into_iter().map(|(face, _)| Finding {
+        findings.extend(contrary.into_iter().map(|(face, _)| BrepFinding {
             face: face as u32,
             entity: model.faces[face].entity,
             fault: Fault::Contrary,

@@ -1,9 +1,9 @@
 //! Measures facets: their sides, boxes and areas.
 
-use crate::kernel::{Facet, Tessellation};
+use crate::kernel::{BrepFacet, Tessellation};
 use crate::vector::{Vec3, cross, sub};
 
-pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
+pub(crate) fn bounds(mesh: &Tessellation, facets: &[BrepFacet]) -> [Vec3; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for corner in facets.iter().flat_map(|facet| mesh.corners(facet)) {
         for k in 0..3 {
@@ -15,13 +15,13 @@ pub(crate) fn bounds(mesh: &Tessellation, facets: &[Facet]) -> [Vec3; 2] {
 }
 
 /// Returns the facet's normal; its length is twice the facet's area.
-pub(crate) fn doubled(mesh: &Tessellation, facet: &Facet) -> Vec3 {
+pub(crate) fn doubled(mesh: &Tessellation, facet: &BrepFacet) -> Vec3 {
     let [a, b, c] = mesh.corners(facet);
     cross(sub(b, a), sub(c, a))
 }
 
 /// Returns a facet's edges, as pairs of points.
-pub(crate) fn sides(facet: &Facet) -> [[u32; 2]; 3] {
+pub(crate) fn sides(facet: &BrepFacet) -> [[u32; 2]; 3] {
     let [a, b, c] = facet.corners;
     [[a, b], [b, c], [c, a]]
 }

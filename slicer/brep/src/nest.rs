@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use crate::body_report::{BodyFault, BodyReport};
-use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
-use crate::rays::{Hit, RayPoint, SHARES, hits, seen_mm2};
+use crate::kernel::{Body, BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
+use crate::rays::{RayHit, RayPoint, SHARES, hits, seen_mm2};
 use crate::volume::facet_volume;
 
 /// The greatest accepted overlap of faces, as a multiple of the chord, and of the distance of edges
@@ -15,7 +15,7 @@ const LOOSE_EDGES: f64 = 2.0;
 /// Turns over shells whose faces point into the body: an outermost shell must point outward, a
 /// shell inside it into its void, and so on. Returns whether any shell was turned over.
 pub(crate) fn turn_shells(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &mut Tessellation,
     reports: &[BodyReport],
 ) -> bool {
@@ -44,7 +44,7 @@ pub(crate) fn turn_shells(
 }
 
 /// Returns, for each shell, whether it points the wrong way.
-fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize) -> Vec<bool> {
+fn turned(mesh: &Tessellation, facets: &[BrepFacet], shells: &[usize], count: usize) -> Vec<bool> {
     let mut volumes = vec![0.0; count];
     let mut widest = vec![(0.0, 0); count];
     // Near the body, products stay small and lose few digits when their sum cancels.
@@ -59,7 +59,7 @@ fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize)
     }
     let best = widest.iter().map(|(_, facet)| RayPoint { facet: *facet, shares: SHARES[0] });
     let rays: Vec<RayPoint> = best.collect();
-    let is_wrong = |(shell, hits): (usize, Vec<Hit>)| {
+    let is_wrong = |(shell, hits): (usize, Vec<RayHit>)| {
         let own = hits.iter().position(|hit| hit.facet == rays[shell].facet).unwrap_or(0);
         let others = hits[..own].iter().filter(|hit| shells[hit.facet] != shell);
         // An odd number of surfaces before the point puts this shell within another one.
@@ -71,7 +71,7 @@ fn turned(mesh: &Tessellation, facets: &[Facet], shells: &[usize], count: usize)
 }
 
 /// Numbers the shell of each facet: facets that share a point.
-fn shells(facets: &[Facet]) -> Vec<usize> {
+fn shells(facets: &[BrepFacet]) -> Vec<usize> {
     let mut parents: HashMap<u32, u32> = HashMap::new();
     fn root(parents: &mut HashMap<u32, u32>, mut point: u32) -> u32 {
         loop {
@@ -92,7 +92,7 @@ fn shells(facets: &[Facet]) -> Vec<usize> {
         parents.insert(c, a);
     }
     let mut numbers: HashMap<u32, usize> = HashMap::new();
-    let of_facet = |facet: &Facet| {
+    let of_facet = |facet: &BrepFacet| {
         let root = root(&mut parents, facet.corners[0]);
         let next = numbers.len();
         *numbers.entry(root).or_insert(next)
@@ -101,7 +101,7 @@ fn shells(facets: &[Facet]) -> Vec<usize> {
 }
 
 fn turn(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &mut Tessellation,
     body: &Body,
     shells: &[usize],
@@ -118,12 +118,12 @@ fn turn(
     faces.dedup_by_key(|(face, _)| *face);
     // Facets are sorted by face, so these faces are sorted too.
     let is_in =
-        |facet: &&mut Facet| faces.binary_search_by_key(&facet.face, |(face, _)| *face).is_ok();
-    mesh.tips.iter_mut().filter(is_in).for_each(Facet::turn_over);
+        |facet: &&mut BrepFacet| faces.binary_search_by_key(&facet.face, |(face, _)| *face).is_ok();
+    mesh.tips.iter_mut().filter(is_in).for_each(BrepFacet::turn_over);
     // A stable sort: the finding names the shell's first face.
     faces.sort_by_key(|(_, shell)| *shell);
     faces.dedup_by_key(|(_, shell)| *shell);
-    let finding = |(face, _): (u32, usize)| Finding {
+    let finding = |(face, _): (u32, usize)| BrepFinding {
         face,
         entity: kernel.face(face).entity,
         fault: Fault::Shell,
@@ -133,9 +133,9 @@ fn turn(
 
 /// Returns a fault if a ray through one of the faces does not enter and leave the body alternately.
 pub(crate) fn crossed(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &Tessellation,
-    facets: &[Facet],
+    facets: &[BrepFacet],
 ) -> Option<BodyFault> {
     let loose_mm = LOOSE * mesh.chord_mm + LOOSE_EDGES * off_mm(mesh, facets);
     let mut left = samples(mesh, facets);
@@ -159,14 +159,14 @@ pub(crate) fn crossed(
 }
 
 /// Returns the distance of edges or facets of a body from their surfaces, if it exceeds the limit.
-fn off_mm(mesh: &Tessellation, facets: &[Facet]) -> f64 {
+fn off_mm(mesh: &Tessellation, facets: &[BrepFacet]) -> f64 {
     let (Some(first), Some(last)) = (facets.first(), facets.last()) else { return 0.0 };
     let of_body = mesh.findings.iter().filter(|it| (first.face..=last.face).contains(&it.face));
     of_body.map(|finding| finding.fault.off_mm()).fold(0.0, f64::max)
 }
 
 /// Returns, for each face, the facet that the rays see best, and other facets spread over it.
-fn samples(mesh: &Tessellation, facets: &[Facet]) -> Vec<usize> {
+fn samples(mesh: &Tessellation, facets: &[BrepFacet]) -> Vec<usize> {
     let mut samples = Vec::new();
     let mut start = 0;
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
@@ -188,13 +188,13 @@ const SAMPLES: usize = 8;
 const LEAST_SEEN: f64 = 0.05;
 
 /// Returns the change after a hit in the number of times that a ray is inside the body.
-fn wound(hit: &Hit) -> i32 {
+fn wound(hit: &RayHit) -> i32 {
     if hit.cosine < 0.0 { 1 } else { -1 }
 }
 
 /// Returns the first hit after which, for more than a given length, a ray is inside the body twice
 /// or a negative number of times.
-fn wrong(hits: &[Hit], loose_mm: f64) -> Option<Hit> {
+fn wrong(hits: &[RayHit], loose_mm: f64) -> Option<RayHit> {
     let mut inside = 0;
     hits.windows(2).find_map(|pair| {
         inside += wound(&pair[0]);

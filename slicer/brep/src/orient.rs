@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::body_report::BodyReport;
-use crate::kernel::{Body, Facet, Fault, Finding, Kernel, Tessellation};
+use crate::kernel::{Body, BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
 use crate::measure::{bounds, doubled, sides};
 use crate::vector::{length, middle};
 use crate::volume::facet_volume;
@@ -30,7 +30,7 @@ pub(crate) struct Turned {
 /// ways stays: if its loop runs the wrong way, it is not inside out, but on the wrong side of the
 /// loop.
 pub(crate) fn turn_over(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &mut Tessellation,
     reports: &[BodyReport],
 ) -> Turned {
@@ -58,12 +58,12 @@ pub(crate) fn turn_over(
     all
 }
 
-fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[bool]) {
-    let is_turned = |facet: &&mut Facet| {
+fn turn(kernel: &dyn KernelModel, mesh: &mut Tessellation, body: &Body, turned: &[bool]) {
+    let is_turned = |facet: &&mut BrepFacet| {
         body.faces.contains(&facet.face) && turned[(facet.face - body.faces.start) as usize]
     };
-    mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned).for_each(Facet::turn_over);
-    let finding = |face: u32, fault| Finding { face, entity: kernel.face(face).entity, fault };
+    mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned).for_each(BrepFacet::turn_over);
+    let finding = |face: u32, fault| BrepFinding { face, entity: kernel.face(face).entity, fault };
     if turned.iter().all(|&turned| turned) {
         mesh.findings.push(finding(body.faces.start, Fault::InsideOut));
     } else {
@@ -76,7 +76,7 @@ fn turn(kernel: &dyn Kernel, mesh: &mut Tessellation, body: &Body, turned: &[boo
 fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     let facets = mesh.of_faces(&body.faces);
     let count = body.faces.len();
-    let index = |facet: &Facet| (facet.face - body.faces.start) as usize;
+    let index = |facet: &BrepFacet| (facet.face - body.faces.start) as usize;
     let mut areas = vec![0.0; count];
     facets.iter().for_each(|facet| areas[index(facet)] += length(doubled(mesh, facet)));
     let pieces = pieces(&neighbours(uses(facets, index).values(), count));
@@ -96,7 +96,7 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
     // A body without volume has no sign to decide by.
     let [low, high] = bounds(mesh, facets);
     let about = middle(low, high);
-    let signed = |facet: &Facet| {
+    let signed = |facet: &BrepFacet| {
         let volume = facet_volume(mesh, std::slice::from_ref(facet), about);
         if turned[index(facet)] { -volume } else { volume }
     };
@@ -108,8 +108,8 @@ fn inverted(mesh: &Tessellation, body: &Body) -> Vec<bool> {
 
 /// Returns, for each edge of facets, the faces that follow it, and their directions.
 fn uses(
-    facets: &[Facet],
-    index: impl Fn(&Facet) -> usize,
+    facets: &[BrepFacet],
+    index: impl Fn(&BrepFacet) -> usize,
 ) -> HashMap<[u32; 2], Vec<(usize, bool)>> {
     let mut uses: HashMap<[u32; 2], Vec<(usize, bool)>> = HashMap::new();
     for facet in facets {

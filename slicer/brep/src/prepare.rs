@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::body_report::{BodyFault, BodyReport};
 use crate::error::BrepError;
-use crate::kernel::{Kernel, Tessellation};
+use crate::kernel::{KernelModel, Tessellation};
 use crate::nest::turn_shells;
 use crate::orient::turn_over;
 use crate::validate::check;
@@ -20,7 +20,7 @@ pub type ReadFn = fn(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepErro
 /// A file read by a kernel.
 pub struct OpenedModel {
     /// The model.
-    pub kernel: Arc<dyn Kernel>,
+    pub kernel: Arc<dyn KernelModel>,
     /// Whether healing changed anything.
     pub is_changed: bool,
 }
@@ -28,13 +28,13 @@ pub struct OpenedModel {
 /// A prepared model. It may be sliced if its reports have no faults.
 pub struct Prepared {
     /// The model.
-    pub kernel: Arc<dyn Kernel>,
+    pub kernel: Arc<dyn KernelModel>,
     /// Its facets; their findings include all repairs.
     pub mesh: Arc<Tessellation>,
     /// The report of [`check`](crate::check) on each body.
     pub reports: Vec<BodyReport>,
     /// The rejected attempts, in order.
-    pub tries: Vec<Attempt>,
+    pub tries: Vec<PreparationAttempt>,
     /// The distance within which edges were joined, in millimeters; 0 without healing.
     pub heal_mm: f64,
     /// The greatest distance of facets from their surfaces, in millimeters.
@@ -43,7 +43,7 @@ pub struct Prepared {
 
 /// An attempt that failed, or was worse than another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Attempt {
+pub struct PreparationAttempt {
     /// As in [`Prepared`].
     pub heal_mm: f64,
     /// As in [`Prepared`].
@@ -87,7 +87,7 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
     }
     let opened = caught("reading the file", || read(bytes, 0.0))?;
     let own_mm = opened.kernel.uncertainty_mm().unwrap_or(USUAL_MM);
-    let mut search = Search::new(bytes, read, chord_mm);
+    let mut search = Attempts::new(bytes, read, chord_mm);
     search.begin(opened.kernel);
     search.measure();
     let most_mm = f64::max(chord_mm, MOST_MM.min(MOST_PART * search.longest_mm));
@@ -102,23 +102,23 @@ pub fn prepare(bytes: &[u8], read: ReadFn, chord_mm: f64) -> Result<Prepared, Br
 }
 
 /// The attempts made.
-struct Search<'a> {
+struct Attempts<'a> {
     bytes: &'a [u8],
     read: ReadFn,
     /// The requested chord.
     chord_mm: f64,
     /// All attempts, in order.
-    tries: Vec<Attempt>,
+    tries: Vec<PreparationAttempt>,
     /// The best attempt and its index, or the first attempt's error if no attempt gave facets.
     best: Result<(usize, Prepared), BrepError>,
     /// Of the models without facets because edges bound only one face, the model with the fewest
     /// such edges: its index among the attempts, the number of edges, and the model.
-    open: Option<(usize, usize, Arc<dyn Kernel>)>,
+    open: Option<(usize, usize, Arc<dyn KernelModel>)>,
     /// The longest side of the box of the model's vertices, in millimeters.
     longest_mm: f64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> Attempts<'a> {
     fn new(bytes: &'a [u8], read: ReadFn, chord_mm: f64) -> Self {
         // A placeholder: `begin` or `settle_open` replaces it.
         let none = Err(BrepError::Chord { chord_mm });
@@ -126,13 +126,13 @@ impl<'a> Search<'a> {
     }
 
     /// Tries the file as it is.
-    fn begin(&mut self, kernel: Arc<dyn Kernel>) {
+    fn begin(&mut self, kernel: Arc<dyn KernelModel>) {
         self.longest_mm = kernel.longest_mm();
         if self.is_open(&kernel, 0.0) {
             return;
         }
         let first = facets(kernel, 0.0, self.chord_mm);
-        self.tries.push(Attempt::of(&first, 0.0, self.chord_mm));
+        self.tries.push(PreparationAttempt::of(&first, 0.0, self.chord_mm));
         self.best = first.map(|made| (0, made));
     }
 
@@ -147,7 +147,7 @@ impl<'a> Search<'a> {
 
     /// Returns whether edges bound only one face, so that facets would be useless, and keeps the
     /// model with the fewest such edges.
-    fn is_open(&mut self, kernel: &Arc<dyn Kernel>, heal_mm: f64) -> bool {
+    fn is_open(&mut self, kernel: &Arc<dyn KernelModel>, heal_mm: f64) -> bool {
         let edges = kernel.free_edges();
         if edges == 0 {
             return false;
@@ -156,7 +156,7 @@ impl<'a> Search<'a> {
         if self.open.as_ref().is_none_or(|(_, least, _)| edges < *least) {
             self.open = Some((self.tries.len(), edges, kernel.clone()));
         }
-        self.tries.push(Attempt { heal_mm, chord_mm: self.chord_mm, why });
+        self.tries.push(PreparationAttempt { heal_mm, chord_mm: self.chord_mm, why });
         true
     }
 
@@ -174,7 +174,7 @@ impl<'a> Search<'a> {
                 chord_mm *= OPEN_CHORD;
                 made = facets(kernel.clone(), heal_mm, chord_mm);
             }
-            self.tries[index] = Attempt::of(&made, heal_mm, chord_mm);
+            self.tries[index] = PreparationAttempt::of(&made, heal_mm, chord_mm);
             self.best = made.map(|made| (index, made));
         }
     }
@@ -198,9 +198,9 @@ impl<'a> Search<'a> {
     }
 
     /// Tessellates a model, and keeps it if it has fewer faults than the best attempt.
-    fn take(&mut self, kernel: Arc<dyn Kernel>, heal_mm: f64) {
+    fn take(&mut self, kernel: Arc<dyn KernelModel>, heal_mm: f64) {
         let made = facets(kernel, heal_mm, self.chord_mm);
-        self.tries.push(Attempt::of(&made, heal_mm, self.chord_mm));
+        self.tries.push(PreparationAttempt::of(&made, heal_mm, self.chord_mm));
         let Ok(made) = made else { return };
         let is_better = match &self.best {
             Ok((_, best)) => wrong(&made.reports) < wrong(&best.reports),
@@ -213,7 +213,11 @@ impl<'a> Search<'a> {
 }
 
 /// Tessellates a model and checks it.
-fn facets(kernel: Arc<dyn Kernel>, heal_mm: f64, chord_mm: f64) -> Result<Prepared, BrepError> {
+fn facets(
+    kernel: Arc<dyn KernelModel>,
+    heal_mm: f64,
+    chord_mm: f64,
+) -> Result<Prepared, BrepError> {
     let (mesh, reports) = caught("making facets", || {
         let mut mesh = kernel.tessellate(chord_mm)?;
         let mut reports = check(kernel.as_ref(), &mesh);
@@ -243,7 +247,7 @@ impl Prepared {
     }
 }
 
-impl Attempt {
+impl PreparationAttempt {
     fn of(made: &Result<Prepared, BrepError>, heal_mm: f64, chord_mm: f64) -> Self {
         let why = match made {
             Ok(made) => faults(&made.reports),

@@ -3,7 +3,7 @@
 //! Tessellation decides which side of a loop is the face; this module does not share that choice. A
 //! ray from outside must enter the body, leave it, enter it again, and so on.
 
-use crate::kernel::{Facet, Tessellation};
+use crate::kernel::{BrepFacet, Tessellation};
 use crate::vector::{Vec3, cross, dot, sub, unit};
 
 /// The direction of all rays. Faces of parts are rarely parallel to it.
@@ -28,7 +28,7 @@ pub(crate) const SHARES: [[f64; 3]; 4] = [
 
 /// The place where a ray meets a facet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hit {
+pub(crate) struct RayHit {
     /// The distance along the ray, in millimeters.
     pub(crate) depth_mm: f64,
     /// The index of the facet.
@@ -45,15 +45,19 @@ fn axes() -> [Vec3; 3] {
 }
 
 /// Returns twice the area of a facet as rays see it, negative where they enter.
-pub(crate) fn seen_mm2(mesh: &Tessellation, facet: &Facet) -> f64 {
+pub(crate) fn seen_mm2(mesh: &Tessellation, facet: &BrepFacet) -> f64 {
     let [a, b, c] = mesh.corners(facet);
     dot(cross(sub(b, a), sub(c, a)), axes()[2])
 }
 
 /// Returns the places where each ray meets facets, in order.
-pub(crate) fn hits(mesh: &Tessellation, facets: &[Facet], rays: &[RayPoint]) -> Vec<Vec<Hit>> {
+pub(crate) fn hits(
+    mesh: &Tessellation,
+    facets: &[BrepFacet],
+    rays: &[RayPoint],
+) -> Vec<Vec<RayHit>> {
     let axes = axes();
-    let seen = |facet: &Facet| mesh.corners(facet).map(|p| axes.map(|axis| dot(axis, p)));
+    let seen = |facet: &BrepFacet| mesh.corners(facet).map(|p| axes.map(|axis| dot(axis, p)));
     let point = |ray: &RayPoint| {
         let corners = seen(&facets[ray.facet]);
         [0, 1].map(|k| (0..3).map(|n| ray.shares[n] * corners[n][k]).sum::<f64>())
@@ -71,7 +75,7 @@ pub(crate) fn hits(mesh: &Tessellation, facets: &[Facet], rays: &[RayPoint]) -> 
             if let Some(depth_mm) = depth_mm(&corners, *p) {
                 let [a, b, c] = corners;
                 let cosine = unit(cross(sub(b, a), sub(c, a))).map_or(0.0, |normal| normal[2]);
-                hits[*ray].push(Hit { depth_mm, facet: number, cosine });
+                hits[*ray].push(RayHit { depth_mm, facet: number, cosine });
             }
         }
     }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::body_report::{BodyFault, BodyReport};
 use crate::geometry::HORN_TORUS;
-use crate::kernel::{Facet, Fault, Finding, Kernel, Tessellation};
+use crate::kernel::{BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
 use crate::measure::{MOST_OFF, bounds, doubled, sides};
 use crate::nest::crossed;
 use crate::vector::{length, scale, sub};
@@ -20,7 +20,7 @@ const LEAST_VOLUME: f64 = 1e-9;
 /// Checks every body: facets follow each edge as often in one direction as in the other; no face
 /// leaves the box of its control points; and the volumes of facets and surfaces agree within 0.1 %,
 /// or within the error that the chord allows.
-pub fn check(kernel: &dyn Kernel, mesh: &Tessellation) -> Vec<BodyReport> {
+pub fn check(kernel: &dyn KernelModel, mesh: &Tessellation) -> Vec<BodyReport> {
     let report = |body: &crate::kernel::Body| {
         let facets = mesh.of_faces(&body.faces);
         let box_mm = bounds(mesh, facets);
@@ -52,9 +52,9 @@ fn apart(report: &BodyReport, chord_mm: f64) -> Option<BodyFault> {
 }
 
 fn faults(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &Tessellation,
-    facets: &[Facet],
+    facets: &[BrepFacet],
     report: &BodyReport,
 ) -> Vec<BodyFault> {
     if facets.is_empty() {
@@ -90,7 +90,7 @@ fn faults(
 }
 
 /// Returns a fault unless facets follow each edge as often in one direction as in the other.
-fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
+fn open(kernel: &dyn KernelModel, mesh: &Tessellation, facets: &[BrepFacet]) -> Option<BodyFault> {
     // The number of uses of each edge, with ascending and with descending point indices.
     // In a closed mesh an edge takes two of the facets' three sides.
     let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::with_capacity(facets.len() * 3 / 2);
@@ -118,9 +118,9 @@ fn open(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<Bo
 /// Facets may be some chords off. For edges, the chord does not count: an error in the file stays
 /// the same at any tolerance.
 fn off(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &Tessellation,
-    facets: &[Facet],
+    facets: &[BrepFacet],
     report: &BodyReport,
 ) -> Option<BodyFault> {
     let sides = sub(report.box_mm[1], report.box_mm[0]);
@@ -145,7 +145,7 @@ fn off(
             off.iter().any(|(it, ..)| it.face == *near && matches!(it.fault, Fault::Off { .. }))
         })
     };
-    let is_local = |(finding, what, off_mm): &(&Finding, &str, f64)| {
+    let is_local = |(finding, what, off_mm): &(&BrepFinding, &str, f64)| {
         *what == "edges"
             && *off_mm <= LOCAL_OFF * longest_mm
             && face_mm2(mesh, facets, finding.face) * off_mm <= LOCAL_VOLUME * report.volume_mm3
@@ -165,13 +165,13 @@ const LOCAL_OFF: f64 = 4e-3;
 const LOCAL_VOLUME: f64 = 1e-4;
 
 /// Returns the area of a face's facets.
-fn face_mm2(mesh: &Tessellation, facets: &[Facet], face: u32) -> f64 {
+fn face_mm2(mesh: &Tessellation, facets: &[BrepFacet], face: u32) -> f64 {
     let of_face = facets.iter().filter(|facet| facet.face == face);
     of_face.map(|facet| length(doubled(mesh, facet)) / 2.0).sum()
 }
 
 /// Returns the faces that share an edge of facets with a face.
-fn neighbours(facets: &[Facet], face: u32) -> Vec<u32> {
+fn neighbours(facets: &[BrepFacet], face: u32) -> Vec<u32> {
     let own = facets.iter().filter(|facet| facet.face == face);
     // A neighbor follows the common edge in the other direction.
     let edges: HashSet<[u32; 2]> = own.flat_map(sides).map(|[a, b]| [b, a]).collect();
@@ -193,9 +193,13 @@ fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {
     off.fold(0.0, f64::max)
 }
 
-fn outside(kernel: &dyn Kernel, mesh: &Tessellation, facets: &[Facet]) -> Option<BodyFault> {
+fn outside(
+    kernel: &dyn KernelModel,
+    mesh: &Tessellation,
+    facets: &[BrepFacet],
+) -> Option<BodyFault> {
     let of_face = facets.chunk_by(|a, b| a.face == b.face);
-    let off = |facets: &[Facet]| {
+    let off = |facets: &[BrepFacet]| {
         let info = kernel.face(facets[0].face);
         let [least, most] = info.control_box_mm?;
         let [low, high] = bounds(mesh, facets);

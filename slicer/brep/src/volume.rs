@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use crate::kernel::{Body, Facet, Jet, Kernel, Tessellation};
+use crate::kernel::{Body, BrepFacet, Jet, KernelModel, Tessellation};
 use crate::measure::sides;
 use crate::vector::{Vec3, add, cross, dot, length, middle, scale, sub, unit};
 
 /// Returns the volume that facets enclose, in cubic millimeters. `about` is a point near them.
-pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[Facet], about: Vec3) -> f64 {
-    let six = |facet: &Facet| {
+pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[BrepFacet], about: Vec3) -> f64 {
+    let six = |facet: &BrepFacet| {
         let [a, b, c] = mesh.corners(facet).map(|corner| sub(corner, about));
         // The triple product is six times the tetrahedron from the origin to the facet. Its sign
         // removes the space outside the body.
@@ -23,15 +23,16 @@ pub(crate) fn facet_volume(mesh: &Tessellation, facets: &[Facet], about: Vec3) -
 /// surface, and onto both surfaces where two faces meet. The patches close as the facets do,
 /// and their error is of the fourth order in the facets' size.
 pub(crate) fn surface_volume(
-    kernel: &dyn Kernel,
+    kernel: &dyn KernelModel,
     mesh: &Tessellation,
     body: &Body,
     about: Vec3,
 ) -> f64 {
-    let facets: Vec<Facet> = [mesh.of_faces(&body.faces), mesh.tips_of_faces(&body.faces)].concat();
+    let facets: Vec<BrepFacet> =
+        [mesh.of_faces(&body.faces), mesh.tips_of_faces(&body.faces)].concat();
     let mut middles = middles(kernel, &facets);
     meet(mesh, &facets, &mut middles);
-    let patch = |(facet, middles): (&Facet, &[Jet; 3])| {
+    let patch = |(facet, middles): (&BrepFacet, &[Jet; 3])| {
         let corners = mesh.corners(facet).map(|corner| sub(corner, about));
         six_volumes(corners, middles.map(|jet| sub(jet.point, about)))
     };
@@ -39,10 +40,10 @@ pub(crate) fn surface_volume(
 }
 
 /// Returns the points of the surface at the middles of the facets' sides.
-fn middles(kernel: &dyn Kernel, facets: &[Facet]) -> Vec<[Jet; 3]> {
+fn middles(kernel: &dyn KernelModel, facets: &[BrepFacet]) -> Vec<[Jet; 3]> {
     let mut middles = Vec::with_capacity(facets.len());
     for of_face in facets.chunk_by(|a, b| a.face == b.face) {
-        let half = |facet: &Facet| {
+        let half = |facet: &BrepFacet| {
             let [p, q, r] = facet.uv;
             [[p, q], [q, r], [r, p]].map(|[a, b]| [0, 1].map(|k| (a[k] + b[k]) / 2.0))
         };
@@ -55,7 +56,7 @@ fn middles(kernel: &dyn Kernel, facets: &[Facet]) -> Vec<[Jet; 3]> {
 }
 
 /// Moves the middles of sides between two faces to the intersection of the faces' surfaces.
-fn meet(mesh: &Tessellation, facets: &[Facet], middles: &mut [[Jet; 3]]) {
+fn meet(mesh: &Tessellation, facets: &[BrepFacet], middles: &mut [[Jet; 3]]) {
     let mut waiting: HashMap<[u32; 2], (usize, usize)> = HashMap::new();
     for (number, facet) in facets.iter().enumerate() {
         // A tip's side at its pole has no length, and no neighbor.

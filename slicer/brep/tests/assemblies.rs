@@ -1,6 +1,6 @@
 //! Checks that exactly the solids that products place are read, each in its place.
 
-use lamp_brep::{BodyReport, BrepError, Kernel, Matter, Notice, StepError, StepModel, check};
+use lamp_brep::{BodyReport, BrepError, KernelModel, Matter, Notice, StepError, StepModel, check};
 use lamp_fixtures::{StepSample, StepUnit, step};
 
 /// A separate product, `#123`, with the shape `#120`.

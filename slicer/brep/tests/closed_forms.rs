@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use lamp_brep::{BodyReport, Facet, Kernel, StepModel, Tessellation, check};
+use lamp_brep::{BodyReport, BrepFacet, KernelModel, StepModel, Tessellation, check};
 use lamp_fixtures::{
     StepSample, StepUnit, blade_area_mm2, blade_volume_mm3, step, step_behind_tip, step_thin_tube,
 };
@@ -17,9 +17,9 @@ fn read(part: StepSample, unit: StepUnit, chord_mm: f64) -> (StepModel, Tessella
 }
 
 /// Reads a STEP text with each kernel.
-fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
-    let own: Arc<dyn Kernel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
-    let meshed = |kernel: Arc<dyn Kernel>| {
+fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn KernelModel>, Tessellation)> {
+    let own: Arc<dyn KernelModel> = Arc::new(StepModel::read(text.as_bytes()).unwrap());
+    let meshed = |kernel: Arc<dyn KernelModel>| {
         let mesh = kernel.tessellate(chord_mm).unwrap();
         (kernel, mesh)
     };
@@ -29,7 +29,7 @@ fn kernels(text: &str, chord_mm: f64) -> Vec<(Arc<dyn Kernel>, Tessellation)> {
 
 /// Returns a part's bodies, after checking that all kernels agree within the chord.
 fn bodies(part: StepSample, unit: StepUnit, chord_mm: f64) -> Vec<BodyReport> {
-    let reports = |(kernel, mesh): &(Arc<dyn Kernel>, Tessellation)| {
+    let reports = |(kernel, mesh): &(Arc<dyn KernelModel>, Tessellation)| {
         let reports = check(&**kernel, mesh);
         assert!(mesh.findings.is_empty(), "{part:?}: {:?}", mesh.findings);
         for report in &reports {
@@ -163,7 +163,7 @@ fn a_lofted_blade_has_its_sections() {
 
 /// Returns the area of the facets' section with a plane.
 fn area_mm2(mesh: &Tessellation, z_mm: f64) -> f64 {
-    let double = |facet: &Facet| {
+    let double = |facet: &BrepFacet| {
         let corners = mesh.corners(facet);
         let is_above = corners.map(|corner| corner[2] >= z_mm);
         let cross = |from_above: bool| {

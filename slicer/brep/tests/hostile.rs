@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use lamp_brep::{BrepError, Kernel, Matter, StepError, StepModel, check};
+use lamp_brep::{BrepError, KernelModel, Matter, StepError, StepModel, check};
 use lamp_fixtures::{SplitMix, StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// Numbers that are hard for geometry.

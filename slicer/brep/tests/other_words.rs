@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use lamp_brep::{BrepError, Kernel, StepError, StepModel, check};
+use lamp_brep::{BrepError, KernelModel, StepError, StepModel, check};
 use lamp_fixtures::{StepSample, StepUnit, step};
 
 /// The volume of a frustum of radii 15 and 7.5 mm, 30 mm high.

@@ -4,7 +4,9 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
-use lamp_brep::{BodyFault, Fault, Kernel, StepModel, Tessellation, check, prepare, read_step};
+use lamp_brep::{
+    BodyFault, Fault, KernelModel, StepModel, Tessellation, check, prepare, read_step,
+};
 use lamp_fixtures::{StepSample, StepUnit, step};
 
 /// A surface about the z axis, in millimeters.

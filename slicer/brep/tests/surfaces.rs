@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use lamp_brep::{Kernel, Matter, Prepared, StepModel, prepare, read_step};
+use lamp_brep::{KernelModel, Matter, Prepared, StepModel, prepare, read_step};
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// The volume of the block of 30 by 20 by 10 mm.

@@ -7,7 +7,7 @@ use lamp_brep::vector::{Vec3, cross, sub};
 use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
 use super::polish::polish;
-use super::tally::Tally;
+use super::tally::SolverTally;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
@@ -20,7 +20,7 @@ const BATCH: usize = 4096;
 pub(super) struct Batch<'a> {
     surfaces: &'a PlacedSurfaces,
     body: u32,
-    tally: &'a Tally,
+    tally: &'a SolverTally,
     cutter: Cutter<'a>,
     layers: Range<usize>,
     points: Vec<FacetPoint>,
@@ -32,7 +32,7 @@ impl<'a> Batch<'a> {
     pub(super) fn new(
         surfaces: &'a PlacedSurfaces,
         body: u32,
-        tally: &'a Tally,
+        tally: &'a SolverTally,
         cutter: Cutter<'a>,
         layers: Range<usize>,
     ) -> Self {

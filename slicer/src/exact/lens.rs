@@ -12,7 +12,7 @@ use lamp_brep::vector::{dot, sub};
 use super::curved_edge::{CurvedEdge, EdgePoint};
 use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
-use super::solve::{Wanted, solve};
+use super::solve::{WantedPoint, solve};
 use crate::grid::PixelGrid;
 use crate::planes::Planes;
 use crate::scan::{FacetEdge, Y, Z, ceil_clamped};
@@ -39,7 +39,7 @@ pub(super) struct LensSide {
 
 /// The plane of a section, or the plane of a row.
 #[derive(Clone, Copy)]
-pub(super) struct Line<'a, const ALONG: usize> {
+pub(super) struct LensPlane<'a, const ALONG: usize> {
     grid: &'a PixelGrid,
     /// The level, in micrometers or in rows.
     level: f64,
@@ -60,7 +60,7 @@ const NEAR: f64 = 4.0;
 /// facet's middle, on both sides, for contours that turn at the curve.
 const SEEDS: [f64; 5] = [0.0, 0.5, -0.5, 0.1, -0.1];
 
-impl<'a> Line<'a, Z> {
+impl<'a> LensPlane<'a, Z> {
     /// Returns the plane of a layer's section.
     pub(super) fn of_layer(grid: &'a PixelGrid, planes: &Planes, layer: usize) -> Self {
         let level = planes.z_um(layer);
@@ -68,7 +68,7 @@ impl<'a> Line<'a, Z> {
     }
 }
 
-impl<'a> Line<'a, Y> {
+impl<'a> LensPlane<'a, Y> {
     /// Returns the plane across y through a row's centers.
     pub(super) fn at_row(grid: &'a PixelGrid, row: u32) -> Self {
         let row = f64::from(row);
@@ -76,7 +76,7 @@ impl<'a> Line<'a, Y> {
     }
 }
 
-impl<const ALONG: usize> Line<'_, ALONG> {
+impl<const ALONG: usize> LensPlane<'_, ALONG> {
     /// The axis along which cells follow each other.
     const ACROSS: usize = if ALONG == Z { Y } else { 0 };
     /// The axis along which surfaces are crossed.
@@ -205,7 +205,7 @@ impl<const ALONG: usize> Line<'_, ALONG> {
             Z => ([Y, Z], self.grid.to_mm(0.0, cell)[Y]),
             _ => ([0, Y], self.grid.to_mm(cell, 0.0)[0]),
         };
-        let wanted = Wanted { uv, known_mm: [across_mm, self.level_mm] };
+        let wanted = WantedPoint { uv, known_mm: [across_mm, self.level_mm] };
         let (uv, jet) = solve(surfaces, surfaces.facet(facet).face, axes, &[wanted])[0]?;
         let normal = surfaces.normal(facet, &jet)?;
         let off_mm = dot(normal, sub(jet.point, near.at_mm)).abs();

@@ -5,7 +5,7 @@ use lamp_brep::vector::{Vec3, add, distance, dot, scale, sub};
 
 use super::facet_point::{FacetPoint, RowContact};
 use super::placed::PlacedSurfaces;
-use super::solve::{Wanted, solve};
+use super::solve::{WantedPoint, solve};
 
 /// The greatest distance of a point from its facet, in tolerances of the tessellation.
 const NEAR: f64 = 2.0;
@@ -80,7 +80,7 @@ impl PlacedSurfaces {
         // If the contour continues on another face, search on that face's surface.
         for _ in 0..MAX_FACES {
             let face = self.facet(point.facet).face;
-            let wanted = Wanted { uv: point.uv, known_mm: [point.at_mm[1], point.at_mm[2]] };
+            let wanted = WantedPoint { uv: point.uv, known_mm: [point.at_mm[1], point.at_mm[2]] };
             let (uv, jet) = solve(self, face, [1, 2], &[wanted])[0]?;
             let facet = self.facet_below(point.facet, jet.point)?;
             let is_there = self.curved_edges().holds(self, face, facet, jet.point);

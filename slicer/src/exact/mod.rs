@@ -37,7 +37,7 @@ pub use placed::{Chart, PlacedSurfaces};
 pub use polish::polish;
 pub(crate) use settle::settle;
 pub use tally::Polished;
-pub(crate) use tally::Tally;
+pub(crate) use tally::SolverTally;
 
 use crate::cutter::Cutter;
 use crate::facet::PlacedFacet;
@@ -57,7 +57,7 @@ impl<'a> ExactCut<'a> {
         surfaces: &'a PlacedSurfaces,
         first: u32,
         body: u32,
-        tally: &'a Tally,
+        tally: &'a SolverTally,
         cutter: Cutter<'a>,
         layers: Range<usize>,
         reach_um: Option<f64>,

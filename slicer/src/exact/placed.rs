@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::{Arc, OnceLock};
 
 use lamp_brep::vector::{Vec3, cross, dot, length, scale, sub, unit};
-use lamp_brep::{Facet, Jet, Kernel, Tessellation};
+use lamp_brep::{BrepFacet, Jet, KernelModel, Tessellation};
 use lamp_stack::Grouped;
 
 use super::critical::CriticalPoints;
@@ -16,7 +16,7 @@ use crate::transform::Transform;
 
 /// A model's surfaces and facets, scaled, rotated and moved into place.
 pub struct PlacedSurfaces {
-    kernel: Arc<dyn Kernel>,
+    kernel: Arc<dyn KernelModel>,
     mesh: Arc<Tessellation>,
     /// The affine map from model to machine coordinates, both in millimeters: one row per
     /// axis.
@@ -41,7 +41,7 @@ impl fmt::Debug for PlacedSurfaces {
 impl PlacedSurfaces {
     /// Places a model with the affine map `rows` from model to machine coordinates, in
     /// millimeters.
-    pub fn new(kernel: Arc<dyn Kernel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
+    pub fn new(kernel: Arc<dyn KernelModel>, mesh: Arc<Tessellation>, rows: [[f64; 4]; 3]) -> Self {
         // The longest column is the greatest stretch if axes stay at right angles.
         let stretch = |axis: usize| length([rows[0][axis], rows[1][axis], rows[2][axis]]);
         let tolerance_mm = mesh.chord_mm * (0..3).map(stretch).fold(0.0, f64::max);
@@ -93,7 +93,7 @@ impl PlacedSurfaces {
         self.is_flat[self.facet(facet).face as usize]
     }
 
-    pub(crate) fn facet(&self, number: u32) -> &Facet {
+    pub(crate) fn facet(&self, number: u32) -> &BrepFacet {
         &self.mesh.facets[number as usize]
     }
 

@@ -4,7 +4,7 @@ use lamp_brep::Jet;
 
 use super::facet_point::FacetPoint;
 use super::placed::PlacedSurfaces;
-use super::solve::{Wanted, solve};
+use super::solve::{WantedPoint, solve};
 
 /// The greatest move across the surface, in tolerances of the tessellation: one for the
 /// facet's distance, one for the difference of the normals.
@@ -34,11 +34,11 @@ pub fn polish(surfaces: &PlacedSurfaces, axis: usize, points: &mut [FacetPoint])
         points.sort_by_key(face);
     }
     for points in points.chunk_by_mut(|a, b| face(a) == face(b)) {
-        let wanted = |point: &&mut FacetPoint| Wanted {
+        let wanted = |point: &&mut FacetPoint| WantedPoint {
             uv: point.uv,
             known_mm: known.map(|axis| point.at_mm[axis]),
         };
-        let wanted: Vec<Wanted> = points.iter().map(wanted).collect();
+        let wanted: Vec<WantedPoint> = points.iter().map(wanted).collect();
         let found = solve(surfaces, face(&points[0]), known, &wanted);
         for (point, found) in points.iter_mut().zip(found) {
             let Some((uv, jet)) = found else { continue };

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::curved_edge::CurvedEdge;
 use super::extrema::Extremum;
 use super::facet_point::{FacetPoint, RowContact};
-use super::lens::{LensPoint, LensSide, Line};
+use super::lens::{LensPlane, LensPoint, LensSide};
 use super::placed::PlacedSurfaces;
 use super::polish::polish;
 use super::rims::{RimCrossing, Rims, SAME_UM};
@@ -117,7 +117,7 @@ impl RimSearch<'_> {
 
     /// Adds the pixels of a row between the chords and the curves of edges.
     fn add_edges(&self, row: u32, rims: &mut Rims) {
-        let line = Line::at_row(self.cutter.grid, row);
+        let line = LensPlane::at_row(self.cutter.grid, row);
         let mut points: Vec<(&CurvedEdge, LensPoint)> = Vec::new();
         for edge in &self.surfaces.curved_edges().all {
             points.extend(line.lens(self.surfaces, edge).into_iter().map(|point| (edge, point)));

@@ -11,10 +11,10 @@ use std::ops::{Range, RangeInclusive};
 use super::critical::Saddle;
 use super::extrema::Extremum;
 use super::facet_point::{FacetPoint, RowContact};
-use super::lens::Line;
+use super::lens::LensPlane;
 use super::placed::PlacedSurfaces;
-use super::switch::{RowLists, Switch};
-use super::tally::Tally;
+use super::switch::{RowCrossings, Switch};
+use super::tally::SolverTally;
 use crate::crossing::Crossing;
 use crate::cutter::Cutter;
 
@@ -24,7 +24,7 @@ struct UnsettledRow {
     /// The crossings on surfaces, as polishing found them.
     found: Vec<Crossing>,
     /// The row's crossings, as repaired.
-    lists: RowLists,
+    lists: RowCrossings,
     /// Pending changes next to curved edges.
     switches: Vec<Switch>,
 }
@@ -39,7 +39,7 @@ type UnsettledRows = HashMap<(u32, u32), UnsettledRow>;
 /// crossings on surfaces. Each body is settled by itself.
 pub(crate) fn settle(
     surfaces: &[PlacedSurfaces],
-    tally: &Tally,
+    tally: &SolverTally,
     layer: usize,
     cutter: Cutter<'_>,
     crossings: impl Iterator<Item = (u32, Crossing)>,
@@ -49,7 +49,7 @@ pub(crate) fn settle(
     let mut all_near = Vec::new();
     for planes in cutter.planes.each_at(layer) {
         let z_mm = planes.z_um(layer) / 1000.0;
-        let plane = Line::of_layer(cutter.grid, planes, layer);
+        let plane = LensPlane::of_layer(cutter.grid, planes, layer);
         // Bodies with planes of their own are cut at another height.
         let is_cut = |body: u32| cutter.planes.of_body(body).z_um(layer) == planes.z_um(layer);
         for surfaces in surfaces {
@@ -127,7 +127,7 @@ impl UnsettledRow {
     ///
     /// Two contours of a body that touch within a column, next to a kept crossing of a third
     /// contour, look the same. Then the third contour moves by at most the fold.
-    fn unfold(&mut self, tally: &Tally, max_columns: u32) {
+    fn unfold(&mut self, tally: &SolverTally, max_columns: u32) {
         let kept = std::mem::take(&mut self.lists.kept);
         for crossing in kept {
             let there = &self.lists.exact;
@@ -148,7 +148,7 @@ impl UnsettledRow {
     }
 
     /// Changes the faces of crossings next to curved edges, where both faces are known.
-    fn switch(&mut self, tally: &Tally) {
+    fn switch(&mut self, tally: &SolverTally) {
         if self.switches.is_empty() {
             return;
         }
@@ -163,7 +163,7 @@ impl UnsettledRow {
     /// Both are crossings of the row with the surface that no facet has, and they balance, so the
     /// part is between them. With another number of sides, or a kept crossing that may represent a
     /// side, the pairing is ambiguous and no sides are added.
-    fn add_sides(&mut self, tally: &Tally) {
+    fn add_sides(&mut self, tally: &SolverTally) {
         let mut sides: Vec<Crossing> = Vec::new();
         for side in std::mem::take(&mut self.lists.sides) {
             if !self.lists.exact.iter().chain(&sides).any(|other| is_same(side, *other)) {
@@ -244,7 +244,7 @@ impl Near {
     fn settle(
         &self,
         surfaces: &PlacedSurfaces,
-        tally: &Tally,
+        tally: &SolverTally,
         z_mm: f64,
         cutter: Cutter<'_>,
         rows: &mut UnsettledRows,
@@ -282,7 +282,7 @@ impl Near {
     }
 
     /// Removes a row's crossings on facets where the surface has none.
-    fn remove_kept(&self, tally: &Tally, row: &mut UnsettledRow) {
+    fn remove_kept(&self, tally: &SolverTally, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[]);
         if winding(&kept) == 0 {
             row.lists.kept.retain(|crossing| !kept.contains(crossing));
@@ -292,7 +292,7 @@ impl Near {
 
     /// Moves the crossing kept on a facet near the point to the surface's only crossing there. If
     /// there is no kept crossing, notes the surface's crossing.
-    fn set_side(&self, tally: &Tally, side: Crossing, row: &mut UnsettledRow) {
+    fn set_side(&self, tally: &SolverTally, side: Crossing, row: &mut UnsettledRow) {
         let kept = self.kept(row, &[side]);
         let is_there = row.lists.exact.iter().any(|other| is_same(side, *other));
         // With another number of kept crossings, none of them is sure to be this one.
@@ -306,7 +306,7 @@ impl Near {
     }
 
     /// Gives a row the surface's pair of crossings near the point, each once.
-    fn set_pair(&self, tally: &Tally, pair: [Crossing; 2], row: &mut UnsettledRow) {
+    fn set_pair(&self, tally: &SolverTally, pair: [Crossing; 2], row: &mut UnsettledRow) {
         let kept = self.kept(row, &pair);
         let is_one = |other: &Crossing| pair.iter().any(|crossing| is_same(*crossing, *other));
         let there: Vec<Crossing> =

@@ -13,7 +13,7 @@ const NEAR_AT_LAST_MM: f64 = 1e-7;
 
 /// A point to find on a surface.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted {
+pub(super) struct WantedPoint {
     /// The parameters to start from.
     pub(super) uv: [f64; 2],
     /// The known coordinates, in millimeters.
@@ -28,7 +28,7 @@ pub(super) fn solve(
     surfaces: &PlacedSurfaces,
     face: u32,
     axes: [usize; 2],
-    wanted: &[Wanted],
+    wanted: &[WantedPoint],
 ) -> Vec<Option<([f64; 2], Jet)>> {
     let mut found = vec![None; wanted.len()];
     let mut open: Vec<usize> = (0..wanted.len()).collect();

@@ -58,7 +58,7 @@ fn columns_around(surfaces: &PlacedSurfaces, facet: u32, cutter: Cutter<'_>) -> 
 
 /// A row's crossings.
 #[derive(Clone, Default)]
-pub(super) struct RowLists {
+pub(super) struct RowCrossings {
     /// The crossings on surfaces.
     pub(super) exact: Vec<Crossing>,
     /// The crossings kept on facets.
@@ -67,7 +67,7 @@ pub(super) struct RowLists {
     pub(super) sides: Vec<Crossing>,
 }
 
-impl RowLists {
+impl RowCrossings {
     /// Makes a row's switches that are known on both sides, and leaves the others. Returns the
     /// number of switches made.
     pub(super) fn switch(&mut self, switches: &mut Vec<Switch>) -> usize {

@@ -34,7 +34,7 @@ impl Polished {
 
 /// Shared counters. Sums are integers, so that their order does not matter.
 #[derive(Debug, Default)]
-pub(crate) struct Tally {
+pub(crate) struct SolverTally {
     moved: AtomicU64,
     kept: AtomicU64,
     mended: AtomicU64,
@@ -44,7 +44,7 @@ pub(crate) struct Tally {
 
 const PM_PER_MM: f64 = 1e9;
 
-impl Tally {
+impl SolverTally {
     /// Counts crossings by their moves along x, in millimeters; `None` is a kept crossing.
     pub(super) fn add(&self, moves_mm: impl Iterator<Item = Option<f64>>) {
         let (mut moved, mut kept, mut sum, mut most) = (0, 0, 0, 0);

@@ -16,13 +16,13 @@ mod xml;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::bodies::Role;
-use crate::part_file::PartFile;
+use crate::bodies::BodyRole;
+use crate::part_file::OpenPartFile;
 use crate::piece::{Facets, Piece};
 use crate::placement::Placement;
 use crate::read_note::ReadNote;
 use error::MAX_VISITS;
-use model::{Model, Object, Reference, Shape};
+use model::{Object, ObjectReference, ObjectShape, PackageModel};
 use package::{Package, without_root};
 use project::{PROJECT_FILES, Project, UNREAD_FILES, VolumeKind};
 use slices::Prisms;
@@ -44,7 +44,7 @@ pub(crate) struct Contents {
 }
 
 /// Reads a file's items.
-pub(crate) fn read(file: &PartFile) -> Result<Contents, ThreeMfError> {
+pub(crate) fn read(file: &OpenPartFile) -> Result<Contents, ThreeMfError> {
     let mut package = Package::open(file)?;
     let (root, encrypted) = package.model_path()?;
     let mut project = Project::default();
@@ -98,7 +98,7 @@ struct Found {
 impl Found {
     /// Leaves out negative volumes whose objects have no solids.
     fn drop_lone_negatives(&mut self) {
-        let solid = self.pieces.iter().filter(|piece| piece.role == Role::Solid);
+        let solid = self.pieces.iter().filter(|piece| piece.role == BodyRole::Solid);
         let solid: BTreeSet<usize> = solid.map(|piece| piece.object).collect();
         let before = self.pieces.len();
         self.pieces.retain(|piece| solid.contains(&piece.object));
@@ -155,7 +155,7 @@ struct Models<'a> {
     root: String,
     encrypted: Vec<String>,
     project: Project,
-    models: BTreeMap<String, Model>,
+    models: BTreeMap<String, PackageModel>,
     /// The solids of objects that have slices; `None` where the mesh is read.
     sliced: BTreeMap<(String, u32), Option<Piece>>,
     /// The number of their facets so far.
@@ -163,7 +163,7 @@ struct Models<'a> {
 }
 
 impl Models<'_> {
-    fn get(&mut self, path: &str) -> Result<&Model, ThreeMfError> {
+    fn get(&mut self, path: &str) -> Result<&PackageModel, ThreeMfError> {
         if !self.models.contains_key(path) {
             if self.encrypted.iter().any(|encrypted| encrypted == path) {
                 return Err(ThreeMfError::Encrypted(path.to_owned()));
@@ -171,7 +171,8 @@ impl Models<'_> {
             let none = Project::default();
             let project = if path == self.root { &self.project } else { &none };
             let facets = self.facets;
-            let model = self.package.read(path, |text| Model::read(text, facets, project))?;
+            let model =
+                self.package.read(path, |text| PackageModel::read(text, facets, project))?;
             let failed = |(at, fault)| ThreeMfError::Model { model: path.to_owned(), at, fault };
             let model = model.map_err(failed)?;
             self.facets = model.facets_end;
@@ -195,7 +196,7 @@ impl Models<'_> {
     fn expand(
         &mut self,
         from: &str,
-        reference: &Reference,
+        reference: &ObjectReference,
         outer: &Place,
         found: &mut Found,
     ) -> Result<(), ThreeMfError> {
@@ -239,17 +240,17 @@ impl Models<'_> {
             return self.add(&piece, &VolumeKind::Solid, &place, found);
         }
         let components = match &self.object(&path, id)?.shape {
-            Shape::Mesh(volumes) => {
+            ObjectShape::Mesh(volumes) => {
                 let volumes = volumes.clone();
                 return volumes
                     .iter()
                     .try_for_each(|(kind, piece)| self.add(piece, kind, &place, found));
             }
-            Shape::Components(components) => components.clone(),
+            ObjectShape::Components(components) => components.clone(),
         };
         let kind = place.kind.clone();
         for (number, component) in components.iter().enumerate() {
-            let is_same = |other: &&Reference| other.object == component.object;
+            let is_same = |other: &&ObjectReference| other.object == component.object;
             let before = components[..number].iter().filter(is_same).count();
             if is_listed {
                 let of_part = self.project.kind_of_component(id, component.object, before);
@@ -269,8 +270,8 @@ impl Models<'_> {
         found: &mut Found,
     ) -> Result<(), ThreeMfError> {
         let role = match place.kind.of_part(kind) {
-            VolumeKind::Solid => Role::Solid,
-            VolumeKind::Negative => Role::Negative,
+            VolumeKind::Solid => BodyRole::Solid,
+            VolumeKind::Negative => BodyRole::Negative,
             VolumeKind::LeftOut(name) => {
                 *found.left_out.volumes.entry(name).or_default() += 1;
                 return Ok(());
@@ -348,7 +349,7 @@ impl Models<'_> {
     /// Returns true if an object has about this volume, in units of its file, or consists of other
     /// objects, whose volume is not known.
     fn has_volume(&mut self, path: &str, id: u32, volume: f64) -> Result<bool, ThreeMfError> {
-        let Shape::Mesh(volumes) = &self.object(path, id)?.shape else { return Ok(true) };
+        let ObjectShape::Mesh(volumes) = &self.object(path, id)?.shape else { return Ok(true) };
         let facets = volumes.iter().flat_map(|(_, piece)| match &piece.facets {
             Facets::Memory(facets) => facets.as_slice(),
             _ => &[],

@@ -51,12 +51,12 @@ fn effect_of(namespace: &str) -> Option<Effect> {
 }
 
 /// A model: a file of a package.
-pub(super) struct Model {
+pub(super) struct PackageModel {
     pub(super) units: Units,
     pub(super) objects: BTreeMap<u32, Object>,
     pub(super) slice_stacks: BTreeMap<u32, SliceStack>,
     /// The items to build.
-    pub(super) items: Arc<Vec<Reference>>,
+    pub(super) items: Arc<Vec<ObjectReference>>,
     /// The number of facets of the package up to the end of this model.
     pub(super) facets_end: usize,
 }
@@ -66,7 +66,7 @@ pub(super) struct Object {
     pub(super) is_solid: bool,
     /// Its kind according to the settings of its project.
     pub(super) kind: VolumeKind,
-    pub(super) shape: Shape,
+    pub(super) shape: ObjectShape,
     /// The stack of its slices, if it has any.
     pub(super) slices: Option<u32>,
     /// Whether its shape represents a finer one elsewhere.
@@ -77,15 +77,15 @@ pub(super) struct Object {
     pub(super) unknown: BTreeSet<String>,
 }
 
-pub(super) enum Shape {
+pub(super) enum ObjectShape {
     /// The volumes of a mesh.
     Mesh(Vec<(VolumeKind, Piece)>),
-    Components(Arc<Vec<Reference>>),
+    Components(Arc<Vec<ObjectReference>>),
 }
 
 /// A reference to an object, from an item or another object.
 #[derive(Clone, Debug)]
-pub(super) struct Reference {
+pub(super) struct ObjectReference {
     /// The file of the object, if it is another file.
     pub(super) model: Option<String>,
     pub(super) object: u32,
@@ -94,7 +94,7 @@ pub(super) struct Reference {
     pub(super) is_built: bool,
 }
 
-impl Model {
+impl PackageModel {
     /// Reads a model whose facets are counted from `first_facet`. A project lists the volumes of
     /// its objects.
     pub(super) fn read(
@@ -127,7 +127,7 @@ struct ModelReader<'a> {
     units: Units,
     objects: BTreeMap<u32, Object>,
     slices: SliceReader,
-    items: Vec<Reference>,
+    items: Vec<ObjectReference>,
     first_facet: usize,
     /// The namespace of 3MF's own elements.
     own: Option<String>,
@@ -136,7 +136,7 @@ struct ModelReader<'a> {
     mesh: DecimalMesh,
     /// Volumes that the model lists itself.
     volumes: Vec<Volume>,
-    components: Vec<Reference>,
+    components: Vec<ObjectReference>,
     /// The key of the current setting.
     setting: Option<String>,
 }
@@ -197,7 +197,7 @@ impl<'a> ModelReader<'a> {
         let mut object = Object {
             is_solid: matches!(kind.as_deref(), None | Some("model" | "solidsupport")),
             kind: VolumeKind::Solid,
-            shape: Shape::Mesh(Vec::new()),
+            shape: ObjectShape::Mesh(Vec::new()),
             slices: None,
             is_stand_in: prefixed_attribute(tag, "meshresolution")?.as_deref() == Some("lowres"),
             unread: None,
@@ -294,22 +294,22 @@ impl<'a> ModelReader<'a> {
             object.kind = object.kind.of_part(&self.project.kind_of_mesh(id));
             let volumes = self.project.volumes(id).unwrap_or(&own_volumes);
             let volumes = volumes_of(&piece, volumes);
-            Shape::Mesh(volumes.ok_or(ModelFault::Volumes { object: id })?)
+            ObjectShape::Mesh(volumes.ok_or(ModelFault::Volumes { object: id })?)
         } else {
-            Shape::Components(Arc::new(components))
+            ObjectShape::Components(Arc::new(components))
         };
         self.objects.insert(id, object);
         Ok(())
     }
 
     /// Reads an item or a component.
-    fn reference(&self, tag: &BytesStart<'_>) -> Result<Reference, ModelFault> {
+    fn reference(&self, tag: &BytesStart<'_>) -> Result<ObjectReference, ModelFault> {
         let placement = match attribute(tag, "transform")? {
             Some(text) => transform(&text, self.units).ok_or_else(|| missing(tag, "transform"))?,
             None => Placement::default(),
         };
         let printable = attribute(tag, "printable")?;
-        Ok(Reference {
+        Ok(ObjectReference {
             model: prefixed_attribute(tag, "path")?,
             object: number(tag, "objectid")?,
             placement,

@@ -7,7 +7,7 @@ use zip::ZipArchive;
 
 use super::error::ThreeMfError;
 use super::xml::{BoundedText, Xml, attribute, for_each_piece};
-use crate::part_file::{FileReader, PartFile};
+use crate::part_file::{FileReader, OpenPartFile};
 use crate::unpack::most_unpacked;
 use crate::utf8_text::as_utf8;
 
@@ -30,7 +30,7 @@ pub(super) struct Package<'a> {
 }
 
 impl<'a> Package<'a> {
-    pub(super) fn open(file: &'a PartFile) -> Result<Self, ThreeMfError> {
+    pub(super) fn open(file: &'a OpenPartFile) -> Result<Self, ThreeMfError> {
         let archive = ZipArchive::new(BufReader::new(file.reader()))?;
         let mut files = HashMap::new();
         for (number, name) in archive.file_names_raw().enumerate() {
@@ -167,7 +167,7 @@ fn plain(name: &str) -> String {
 ///
 /// # Errors
 /// Returns an error if the file cannot be read.
-pub(crate) fn looks_packaged(file: &PartFile, start: &[u8]) -> io::Result<bool> {
+pub(crate) fn looks_packaged(file: &OpenPartFile, start: &[u8]) -> io::Result<bool> {
     /// The size of the record at a package's end; a comment may follow it.
     const END_BYTES: usize = 22;
     const LONGEST_COMMENT: u64 = 1 << 16;

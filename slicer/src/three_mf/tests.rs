@@ -7,7 +7,7 @@ use lamp_stack::{Dpi, Image, Layer, Length};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::bodies::Role;
+use crate::bodies::BodyRole;
 use crate::facet::Units;
 use crate::open::OpenOptions;
 use crate::part::Part;
@@ -65,7 +65,7 @@ fn said(bytes: &[u8]) -> String {
 }
 
 /// The object, role and number of facets of each piece.
-fn pieces(part: &Part) -> Vec<(usize, Role, usize)> {
+fn pieces(part: &Part) -> Vec<(usize, BodyRole, usize)> {
     let pieces = part.pieces().iter();
     pieces.map(|piece| (piece.object, piece.role, piece.facets.count())).collect()
 }
@@ -120,7 +120,9 @@ fn volumes_of_a_prusaslicer_project_have_their_kinds() {
     let kinds = kinds.each_ref().map(String::as_str);
     let items = format!("{ITEM}<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>\n");
     let part = open(&prusa_project(&items, &kinds));
-    let of = |object| [Role::Solid, Role::Negative, Role::Solid].map(|role| (object, role, 12));
+    let of = |object| {
+        [BodyRole::Solid, BodyRole::Negative, BodyRole::Solid].map(|role| (object, role, 12))
+    };
     assert_eq!(pieces(&part), [of(0), of(1)].concat());
     let firsts = part.pieces().iter().map(|piece| piece.first_facet).collect::<Vec<_>>();
     assert_eq!(firsts, [0, 12, 48, 0, 12, 48]);
@@ -140,7 +142,7 @@ fn volumes_of_old_projects_have_their_kinds() {
     let modifier = "<metadata type=\"volume\" key=\"modifier\" value=\"1\"/>";
     let solid = "<metadata type=\"volume\" key=\"modifier\" value=\"0\"/>";
     let part = open(&prusa_project(ITEM, &[solid, modifier, "", modifier]));
-    assert_eq!(pieces(&part), [(0, Role::Solid, 12), (0, Role::Solid, 12)]);
+    assert_eq!(pieces(&part), [(0, BodyRole::Solid, 12), (0, BodyRole::Solid, 12)]);
     assert_eq!(notes(&part), ["2 volumes are left out: their kind is modifier"]);
 
     let meshes = [slab(), slab(), slab()];
@@ -149,7 +151,7 @@ fn volumes_of_old_projects_have_their_kinds() {
         &model(&object(1, &meshes), ITEM),
         &[("Metadata/Slic3r_PE_model.config", &config)],
     );
-    assert_eq!(pieces(&open(&bytes)), [(0, Role::Negative, 12), (0, Role::Solid, 24)]);
+    assert_eq!(pieces(&open(&bytes)), [(0, BodyRole::Negative, 12), (0, BodyRole::Solid, 24)]);
 
     let volumes = "<slic3r:volumes><slic3r:volume ts=\"0\" te=\"11\" modifier=\"0\"/>\
                    <slic3r:volume ts=\"12\" te=\"23\" modifier=\"1\"/></slic3r:volumes></mesh>";
@@ -157,7 +159,7 @@ fn volumes_of_old_projects_have_their_kinds() {
     let xml = model(&object, ITEM)
         .replace("<model ", "<model xmlns:slic3r=\"http://schemas.slic3r.org/3mf/2017/06\" ");
     let part = open(&three_mf(&xml, &[]));
-    assert_eq!(pieces(&part), [(0, Role::Solid, 12)]);
+    assert_eq!(pieces(&part), [(0, BodyRole::Solid, 12)]);
     assert_eq!(notes(&part), ["1 volume is left out: its kind is modifier"]);
 }
 
@@ -214,7 +216,7 @@ fn parts_of_a_bambu_studio_project_have_their_kinds() {
         ["normal_part", "negative_part", "modifier_part", "support_blocker", "support_enforcer"];
     for is_apart in [false, true] {
         let part = open(&bambu(&kinds, is_apart));
-        let of = |object| [(object, Role::Solid, 12), (object, Role::Negative, 12)];
+        let of = |object| [(object, BodyRole::Solid, 12), (object, BodyRole::Negative, 12)];
         assert_eq!(pieces(&part), [of(0), of(1)].concat());
         let expected = [
             "1 item is left out: its file marks it as not printable",
@@ -234,7 +236,7 @@ fn parts_of_one_mesh_are_told_apart_by_their_order() {
                   <part id=\"1\" subtype=\"normal_part\"/></object></config>";
     let xml = model(&(object(1, &[slab()]) + &group), "<item objectid=\"9\"/>\n");
     let part = open(&three_mf(&xml, &[("Metadata/model_settings.config", config)]));
-    assert_eq!(pieces(&part), [(0, Role::Negative, 12), (0, Role::Solid, 12)]);
+    assert_eq!(pieces(&part), [(0, BodyRole::Negative, 12), (0, BodyRole::Solid, 12)]);
 }
 
 #[test]
@@ -271,7 +273,7 @@ fn negative_volumes_without_a_solid_are_left_out() {
     let objects = object(1, &[slab()]) + &object(2, &[post()]);
     let xml = model(&objects, &format!("{ITEM}<item objectid=\"2\"/>\n"));
     let part = open(&three_mf(&xml, &config));
-    assert_eq!(pieces(&part), [(0, Role::Solid, 12)]);
+    assert_eq!(pieces(&part), [(0, BodyRole::Solid, 12)]);
     assert_eq!(notes(&part), ["1 negative volume is left out: its object has no solid to cut"]);
     let alone = said(&three_mf(&model(&objects, "<item objectid=\"2\"/>\n"), &config));
     assert!(alone.contains("its only item is"), "{alone}");

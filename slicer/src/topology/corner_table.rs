@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::topology::edges::Edges;
+use crate::topology::edges::MeshEdges;
 
 /// Represents no corner or no edge in arrays.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -43,7 +43,7 @@ pub const fn facet_of(corner: u32) -> u32 {
 pub struct CornerTable {
     points: Vec<[f64; 3]>,
     vertices: Vec<u32>,
-    edges: Edges,
+    edges: MeshEdges,
     body_ends: Vec<u32>,
 }
 
@@ -68,7 +68,7 @@ impl CornerTable {
     ) -> Self {
         // No corner's number may equal `NONE`.
         assert!(vertices.len().is_multiple_of(3) && vertices.len() < NONE as usize);
-        let edges = Edges::of(&points, &vertices);
+        let edges = MeshEdges::of(&points, &vertices);
         Self { points, vertices, edges, body_ends }
     }
 

@@ -7,7 +7,7 @@ use crate::topology::corner_table::{NONE, next, previous};
 
 /// The edges of a mesh, as seen from its corners.
 #[derive(Clone, Debug)]
-pub(crate) struct Edges {
+pub(crate) struct MeshEdges {
     /// For each corner, the corner across the opposite edge.
     pub(crate) opposites: Vec<u32>,
     /// For each corner, the opposite edge.
@@ -20,7 +20,7 @@ pub(crate) struct Edges {
     crowded_corners: Vec<u32>,
 }
 
-impl Edges {
+impl MeshEdges {
     /// Finds the edges of facets, given by the vertices of their corners.
     ///
     /// Corners are put into bins by the lower vertex of their opposite edge, as in algorithm 2 of

@@ -109,7 +109,7 @@ fn along_axis(
     let mut around: Vec<Told> = vec![None; closed.len()];
     let mut left = closed.to_vec();
     for sign in [1.0, -1.0] {
-        for ray in Rays::new(table, shells, reports, axis, sign, &left).traced() {
+        for ray in ShellRays::new(table, shells, reports, axis, sign, &left).traced() {
             if ray.touches {
                 continue;
             }
@@ -139,7 +139,7 @@ fn along_axis(
 }
 
 /// Rays in one direction, from some shells of a body.
-struct Rays<'a> {
+struct ShellRays<'a> {
     table: &'a CornerTable,
     shells: &'a Shells,
     reports: &'a [ShellReport],
@@ -150,7 +150,7 @@ struct Rays<'a> {
     rays: Vec<Ray>,
 }
 
-impl<'a> Rays<'a> {
+impl<'a> ShellRays<'a> {
     fn new(
         table: &'a CornerTable,
         shells: &'a Shells,

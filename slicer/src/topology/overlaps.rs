@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lamp_stack::{Dpi, Length};
 
-use crate::bodies::Role;
+use crate::bodies::BodyRole;
 use crate::error::SliceError;
 use crate::facet::rounded;
 use crate::part::Part;
@@ -55,7 +55,7 @@ impl ShellOverlap {
         // The slicer counts the pixels that bodies share, so each shell becomes a body.
         let piece = |&shell: &u32| {
             let facets = Facets::Memory(Arc::new(std::mem::take(&mut facets[shell as usize])));
-            Piece { role: Role::Solid, ..Piece::new(facets) }
+            Piece { role: BodyRole::Solid, ..Piece::new(facets) }
         };
         let pieces: Vec<Piece> = candidates.iter().map(piece).collect();
         let part = Part::new("shells", pieces, String::new()).with(Vec::new(), true);

@@ -77,7 +77,7 @@ pub(crate) fn reports(table: &CornerTable, shells: &Shells) -> Vec<ShellReport> 
         let facets = groups.as_ref().map_or(&only[..], |groups| groups.group(shell));
         while body_ends.next_if(|&(_, end)| end <= facets[0]).is_some() {}
         let body = body_ends.peek().map_or(0, |&(body, _)| body as u32);
-        let mut tally = Tally::new(table, shells, shell as u32, facets[0]);
+        let mut tally = ShellTally::new(table, shells, shell as u32, facets[0]);
         facets.iter().for_each(|&facet| tally.add(facet, &mut last_shell_at));
         tally.report(body, crowded.get(shell).copied().unwrap_or(0))
     };
@@ -95,7 +95,7 @@ fn crowded_by_shell(table: &CornerTable, shells: &Shells) -> Vec<u32> {
 }
 
 /// Sums over the facets of a shell.
-struct Tally<'a> {
+struct ShellTally<'a> {
     table: &'a CornerTable,
     shells: &'a Shells,
     shell: u32,
@@ -109,7 +109,7 @@ struct Tally<'a> {
     moments: Moments,
 }
 
-impl<'a> Tally<'a> {
+impl<'a> ShellTally<'a> {
     fn new(table: &'a CornerTable, shells: &'a Shells, shell: u32, first: u32) -> Self {
         // Near the shell, sums lose few digits when they cancel.
         let about = table.point(3 * first);

@@ -18,14 +18,14 @@ pub struct Shells {
 }
 
 /// Facets connected by [`CornerTable::opposite`].
-struct Sheets {
+struct FacetSheets {
     of_facet: Vec<u32>,
     /// Whether a facet faces the other way than the first facet of its sheet.
     is_turned: Vec<bool>,
-    all: Vec<Sheet>,
+    all: Vec<FacetSheet>,
 }
 
-struct Sheet {
+struct FacetSheet {
     /// Whether most of its facets face the other way than the first one.
     is_turned: bool,
     is_one_sided: bool,
@@ -34,9 +34,9 @@ struct Sheet {
 impl Shells {
     /// Finds the shells. They are numbered by their first facets. Idle facets belong to no shell.
     pub fn new(table: &CornerTable) -> Self {
-        let sheets = Sheets::of(table);
+        let sheets = FacetSheets::of(table);
         let turned = sheets.turned();
-        let Sheets { mut of_facet, all, .. } = sheets;
+        let FacetSheets { mut of_facet, all, .. } = sheets;
         // Sheets that meet in a crowded edge are one shell.
         let mut parents: Vec<u32> = (0..all.len() as u32).collect();
         for corners in table.crowded() {
@@ -87,7 +87,7 @@ impl Shells {
     }
 }
 
-impl Sheets {
+impl FacetSheets {
     fn of(table: &CornerTable) -> Self {
         let facets = table.facet_count();
         let mut sheets =
@@ -103,7 +103,7 @@ impl Sheets {
     }
 
     /// Visits all facets of a new sheet.
-    fn visit(&mut self, first: u32, table: &CornerTable, waiting: &mut Vec<u32>) -> Sheet {
+    fn visit(&mut self, first: u32, table: &CornerTable, waiting: &mut Vec<u32>) -> FacetSheet {
         let number = self.all.len() as u32;
         let (mut facets, mut turned, mut is_one_sided) = (0_u32, 0, false);
         self.of_facet[first as usize] = number;
@@ -126,7 +126,7 @@ impl Sheets {
                 }
             }
         }
-        Sheet { is_turned: turned > facets - turned, is_one_sided }
+        FacetSheet { is_turned: turned > facets - turned, is_one_sided }
     }
 
     /// Returns the facets that face the other way than most of their sheet.

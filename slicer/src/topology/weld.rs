@@ -74,7 +74,7 @@ impl CornerTable {
             let mut vertices: Vec<u32> = rims.flat_map(|corner| self.edge_ends(corner)).collect();
             vertices.sort_unstable();
             vertices.dedup();
-            let mut cells = Cells { side: within_mm, vertices: HashMap::new() };
+            let mut cells = VertexCubes { side: within_mm, vertices: HashMap::new() };
             for vertex in vertices {
                 let point = self.points()[vertex as usize];
                 match cells.nearest(point, self.points()) {
@@ -89,12 +89,12 @@ impl CornerTable {
 
 /// Cubes as wide as the tolerance, and the vertices in each cube. The vertices are farther apart
 /// than the tolerance, so a cube has few.
-struct Cells {
+struct VertexCubes {
     side: f64,
     vertices: HashMap<[u64; 3], Vec<u32>>,
 }
 
-impl Cells {
+impl VertexCubes {
     fn key(&self, point: Vec3) -> [u64; 3] {
         self.key_beside(point, [0.0; 3])
     }

@@ -6,7 +6,7 @@ use crate::vector::{Vec3, distance, scale};
 /// Pieces of curves; each starts where the previous piece ends. Piece k has the parameters k to k +
 /// 1.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Chain {
+pub(crate) struct CurveChain {
     links: Vec<Link>,
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn closed(mut links: Vec<Link>) -> Option<Vec<Link>> {
     (!links.is_empty() && is_closed).then_some(links)
 }
 
-impl Chain {
+impl CurveChain {
     /// Returns a chain, or `None` if a piece does not start where the previous piece ends.
     pub(crate) fn new(links: Vec<Link>) -> Option<Self> {
         let ends = |link: &Link| link.range.map(|t| link.curve.place(t));
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_chain_goes_through_its_pieces() {
-        let chain = Chain::new(half()).unwrap();
+        let chain = CurveChain::new(half()).unwrap();
         for (t, place) in [(0.0, [2.0, 0.0, 0.0]), (0.5, [0.0, 2.0, 0.0]), (1.25, [-1.0, 0.0, 0.0])]
         {
             assert!(distance(chain.at(t)[0], place) < 1e-14);
@@ -148,7 +148,7 @@ mod tests {
             let mut links = right.clone();
             turned.iter().for_each(|&k: &usize| links[k].range.reverse());
             let links = closed(links).unwrap();
-            assert!(Chain::new(links).is_some(), "{turned:?}");
+            assert!(CurveChain::new(links).is_some(), "{turned:?}");
         }
         assert_eq!(closed(right[..1].to_vec()), None);
         assert_eq!(closed(Vec::new()), None);
@@ -158,7 +158,7 @@ mod tests {
     fn pieces_that_do_not_meet_are_no_chain() {
         let mut links = half();
         links[1].range = [-1.9, 2.0];
-        assert_eq!(Chain::new(links), None);
-        assert_eq!(Chain::new(Vec::new()), None);
+        assert_eq!(CurveChain::new(links), None);
+        assert_eq!(CurveChain::new(Vec::new()), None);
     }
 }

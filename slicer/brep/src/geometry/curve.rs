@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::chain::Chain;
+use super::chain::CurveChain;
 use super::spline::SplineCurve;
 use super::surface_curve::SurfaceCurve;
 use crate::vector::{Axes, Vec3, along, distance, dot, scale, sub};
@@ -28,7 +28,7 @@ pub(crate) enum Curve {
         focal: f64,
     },
     Spline(SplineCurve),
-    Chain(Chain),
+    Chain(CurveChain),
     OnSurface(Box<SurfaceCurve>),
 }
 

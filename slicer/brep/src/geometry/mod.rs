@@ -12,7 +12,7 @@ mod strips;
 pub(crate) mod surface;
 pub(crate) mod surface_curve;
 
-pub(crate) use chain::{Chain, Link, closed};
+pub(crate) use chain::{CurveChain, Link, closed};
 pub(crate) use curve::{Curve, edge_range};
 pub(crate) use surface::{HORN_TORUS, Pole, Surface, TorusPart};
 pub(crate) use surface_curve::SurfaceCurve;

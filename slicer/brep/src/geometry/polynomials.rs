@@ -1,6 +1,6 @@
 //! Converts B-spline basis functions to polynomials between knots, for fast evaluation.
 
-use super::spline::{BasisValues, Knots, Weighted, add_times};
+use super::spline::{BasisValues, Knots, WeightedPoint, add_times};
 
 /// The highest degree of the polynomials: higher ones would lose precision.
 const MAX_DEGREE: usize = 7;
@@ -83,7 +83,7 @@ impl PolynomialBasis {
 
     /// Returns the polynomials in a piece of the spline with these control points, highest
     /// power first.
-    pub(super) fn summed(&self, piece: usize, points: &[Weighted]) -> Vec<Weighted> {
+    pub(super) fn summed(&self, piece: usize, points: &[WeightedPoint]) -> Vec<WeightedPoint> {
         let points = &points[self.pieces[piece].first..];
         let size = self.degree + 1;
         let powers = self.coefficients[piece * size * size..].chunks(size).take(size);

@@ -126,23 +126,23 @@ impl Knots {
 }
 
 /// A control point times its weight, then the weight.
-pub(crate) type Weighted = [f64; 4];
+pub(crate) type WeightedPoint = [f64; 4];
 
 /// Returns a point times its weight, then the weight.
-pub(crate) fn weighted(p: Vec3, w: f64) -> Weighted {
+pub(crate) fn weighted(p: Vec3, w: f64) -> WeightedPoint {
     [p[0] * w, p[1] * w, p[2] * w, w]
 }
 
-pub(super) fn add_times(sum: &mut Weighted, p: &Weighted, by: f64) {
+pub(super) fn add_times(sum: &mut WeightedPoint, p: &WeightedPoint, by: f64) {
     sum.iter_mut().zip(p).for_each(|(sum, p)| *sum += p * by);
 }
 
 /// Divides by the weight.
-pub(super) fn divided(p: &Weighted) -> Vec3 {
+pub(super) fn divided(p: &WeightedPoint) -> Vec3 {
     [p[0] / p[3], p[1] / p[3], p[2] / p[3]]
 }
 
-pub(super) fn divided_slope(p: Vec3, w: f64, slope: &Weighted) -> Vec3 {
+pub(super) fn divided_slope(p: Vec3, w: f64, slope: &WeightedPoint) -> Vec3 {
     // The quotient rule for A / w, whose value is p.
     [0, 1, 2].map(|k| (slope[k] - slope[3] * p[k]) / w)
 }
@@ -151,7 +151,7 @@ pub(super) fn divided_slope(p: Vec3, w: f64, slope: &Weighted) -> Vec3 {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SplineCurve {
     pub(crate) knots: Knots,
-    pub(crate) points: Vec<Weighted>,
+    pub(crate) points: Vec<WeightedPoint>,
 }
 
 impl SplineCurve {

@@ -1,7 +1,7 @@
 //! Evaluates surfaces of rational B-splines.
 
-use super::spline::{Knots, Weighted, add_times, divided, divided_slope, inside};
-use super::strips::Strips;
+use super::spline::{Knots, WeightedPoint, add_times, divided, divided_slope, inside};
+use super::strips::PolynomialStrips;
 use crate::kernel::Jet;
 use crate::vector::{Vec3, distance};
 
@@ -11,11 +11,11 @@ pub(crate) struct SplineSurface {
     pub(crate) u: Knots,
     pub(crate) v: Knots,
     /// The control points, by u and then v.
-    pub(crate) points: Vec<Weighted>,
+    pub(crate) points: Vec<WeightedPoint>,
     /// The number of points along v.
     columns: usize,
     /// The same surface as polynomials, unless its degrees are too high.
-    strips: Option<Strips>,
+    strips: Option<PolynomialStrips>,
     /// The periods of u and v, where the surface is closed.
     pub(crate) periods: [Option<f64>; 2],
 }
@@ -25,12 +25,12 @@ const CLOSED_MM: f64 = 1e-6;
 
 impl SplineSurface {
     /// Returns a surface, or `None` if the number of points does not fit the knots.
-    pub(crate) fn new(u: Knots, v: Knots, points: Vec<Weighted>) -> Option<Self> {
+    pub(crate) fn new(u: Knots, v: Knots, points: Vec<WeightedPoint>) -> Option<Self> {
         let [rows, columns] = [u.count(), v.count()];
         if points.len() != rows * columns {
             return None;
         }
-        let strips = Strips::new(&u, &v, &points);
+        let strips = PolynomialStrips::new(&u, &v, &points);
         let periods = [None; 2];
         let mut surface = Self { u, v, points, columns, strips, periods };
         surface.periods = [0, 1].map(|axis| surface.period(axis));

@@ -1,7 +1,7 @@
 //! Converts B-spline surfaces to polynomials along v, for fast evaluation.
 
 use super::polynomials::{PolynomialBasis, horner};
-use super::spline::{Knots, Weighted};
+use super::spline::{Knots, WeightedPoint};
 use crate::kernel::Jet;
 use crate::vector::Vec3;
 
@@ -10,20 +10,20 @@ use crate::vector::Vec3;
 /// They take up to (degree of v + 1) times the memory of the control points. Polynomials
 /// along both parameters would be faster but multiply that by (degree of u + 1).
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Strips {
+pub(super) struct PolynomialStrips {
     u: PolynomialBasis,
     v: PolynomialBasis,
     /// The number of control points along u.
     rows: usize,
     /// The coefficients, by piece along v, row of control points, and power, highest first.
-    powers: Vec<Weighted>,
+    powers: Vec<WeightedPoint>,
     /// Whether weights differ from 1.
     is_rational: bool,
 }
 
-impl Strips {
+impl PolynomialStrips {
     /// Returns the strips, or `None` for high degrees.
-    pub(super) fn new(u: &Knots, v: &Knots, points: &[Weighted]) -> Option<Self> {
+    pub(super) fn new(u: &Knots, v: &Knots, points: &[WeightedPoint]) -> Option<Self> {
         let is_rational = points.iter().any(|point| point[3] != 1.0);
         let (rows, columns) = (u.count(), v.count());
         let (u, v) = (PolynomialBasis::new(u)?, PolynomialBasis::new(v)?);
@@ -70,7 +70,7 @@ impl Strips {
 
     /// Returns the point and the derivatives along u and v, all with weights.
     #[inline(always)]
-    fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [Weighted; 3] {
+    fn sums<const M: usize, const N: usize>(&self, [u, v]: [f64; 2]) -> [WeightedPoint; 3] {
         let (along_u, along_v) = (self.u.basis::<M>(u), self.v.local(v));
         let first = (along_v.number * self.rows + along_u.first) * N;
         let (rows, _) = self.powers[first..][..M * N].as_chunks::<N>();
@@ -88,22 +88,22 @@ impl Strips {
     }
 }
 
-fn position([x, y, z, _]: Weighted) -> Vec3 {
+fn position([x, y, z, _]: WeightedPoint) -> Vec3 {
     [x, y, z]
 }
 
 #[inline(always)]
-fn plain(sums: &[Weighted; 3]) -> Jet {
+fn plain(sums: &[WeightedPoint; 3]) -> Jet {
     let [point, du, dv] = sums.map(position);
     Jet { point, du, dv }
 }
 
 /// Divides by the weight, with derivatives by the quotient rule.
 #[inline(always)]
-fn divided(sums: &[Weighted; 3]) -> Jet {
+fn divided(sums: &[WeightedPoint; 3]) -> Jet {
     // One division instead of nine.
     let per_weight = 1.0 / sums[0][3];
     let point = position(sums[0]).map(|x| x * per_weight);
-    let slope = |d: Weighted| [0, 1, 2].map(|k| (d[k] - d[3] * point[k]) * per_weight);
+    let slope = |d: WeightedPoint| [0, 1, 2].map(|k| (d[k] - d[3] * point[k]) * per_weight);
     Jet { point, du: slope(sums[1]), dv: slope(sums[2]) }
 }

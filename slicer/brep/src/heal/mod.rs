@@ -12,13 +12,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use self::edge_curve::EdgeCurve;
 use crate::geometry::edge_range;
-use crate::kernel::{Fault, Finding};
+use crate::kernel::{BrepFinding, Fault};
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::Vec3;
 
 /// Joins vertices and edges within the tolerance, and returns a finding for each face
 /// changed.
-pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
+pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<BrepFinding> {
     let mut findings = Vec::new();
     for body in model.bodies.clone() {
         let faces = body.faces.start as usize..body.faces.end as usize;
@@ -38,7 +38,7 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<Finding> {
         for (face, (joints, off_mm)) in healing.joined() {
             let face = body.faces.start + face as u32;
             let entity = model.faces[face as usize].entity;
-            findings.push(Finding { face, entity, fault: Fault::Joined { joints, off_mm } });
+            findings.push(BrepFinding { face, entity, fault: Fault::Joined { joints, off_mm } });
         }
     }
     findings

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::body_report::BodyReport;
-use crate::kernel::Kernel;
+use crate::kernel::KernelModel;
 use crate::step::StepModel;
 use crate::validate::check;
 use lamp_fixtures::{SplitMix, StepSample, StepUnit, step};

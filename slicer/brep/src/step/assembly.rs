@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::contents::{Contents, Placed, PlacedShape};
+use super::contents::{Contents, PlacedBodies, PlacedShape};
 use super::entities::Entities;
 use super::error::StepError;
 use super::place::Place;
@@ -15,7 +15,7 @@ const MAX_PARTS: usize = 100_000;
 const MAX_LEVELS: usize = 64;
 
 /// Places all bodies of a file: the solids, or, if there are no solids, its surfaces.
-pub(crate) fn placed(entities: &Entities) -> Result<Placed, StepError> {
+pub(crate) fn placed(entities: &Entities) -> Result<PlacedBodies, StepError> {
     let products = Products::read(entities)?;
     let shapes = Shapes::read(entities, &products)?;
     let mut assembly = Assembly {

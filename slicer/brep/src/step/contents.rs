@@ -8,8 +8,8 @@ use super::entities::Entities;
 use super::error::StepError;
 use super::place::Place;
 use super::read_placement::{GeometryReader, MAX_NESTED};
-use super::shapes::Shape;
-use super::units::Units;
+use super::shapes::ShapeRepresentation;
+use super::units::RepresentationUnits;
 use crate::notice::{Matter, Notice};
 
 /// A body with its place.
@@ -17,21 +17,21 @@ use crate::notice::{Matter, Notice};
 pub(crate) struct PlacedBody {
     /// The solid, or the shells and faces to be sewn to a solid.
     pub(crate) items: Vec<u64>,
-    pub(crate) units: Units,
+    pub(crate) units: RepresentationUnits,
     pub(crate) place: Place,
     /// Its own name, or the name of its product; may be empty.
     pub(crate) name: String,
 }
 
 /// The bodies of a file in their places, and contents that are not sliced.
-pub(crate) struct Placed {
+pub(crate) struct PlacedBodies {
     pub(crate) bodies: Vec<PlacedBody>,
     pub(crate) notices: Vec<Notice>,
 }
 
 /// The kind of an item of a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum ItemKind {
     Solid,
     /// A solid, moved.
     Replica,
@@ -46,7 +46,7 @@ enum Kind {
     Other,
 }
 
-impl Kind {
+impl ItemKind {
     fn of(entities: &Entities, item: u64) -> Result<Self, StepError> {
         let records = entities.records(item)?;
         let mut kinds = records.iter().map(|record| Self::of_name(&record.name));
@@ -119,7 +119,7 @@ pub(super) struct Contents {
 /// A shape in its place.
 pub(super) struct PlacedShape<'a> {
     pub(super) id: u64,
-    pub(super) shape: &'a Shape,
+    pub(super) shape: &'a ShapeRepresentation,
     pub(super) place: Place,
     pub(super) product: &'a str,
     /// The number of the visit of its group.
@@ -127,7 +127,7 @@ pub(super) struct PlacedShape<'a> {
 }
 
 impl PlacedShape<'_> {
-    fn units(&self) -> Result<&Units, StepError> {
+    fn units(&self) -> Result<&RepresentationUnits, StepError> {
         self.shape.units.as_ref().ok_or(StepError::NoUnit { id: self.id })
     }
 
@@ -148,7 +148,7 @@ impl Contents {
     }
 
     /// Returns the solids, or, if there are no solids, the surfaces.
-    pub(super) fn finish(mut self, entities: &Entities) -> Result<Placed, StepError> {
+    pub(super) fn finish(mut self, entities: &Entities) -> Result<PlacedBodies, StepError> {
         if self.is_empty() {
             return Err(self.nothing(entities));
         }
@@ -160,14 +160,14 @@ impl Contents {
         }
         let bodies = if has_solids { std::mem::take(&mut self.solids) } else { surfaces };
         self.note_missing(entities, &bodies);
-        Ok(Placed { bodies, notices: self.notices })
+        Ok(PlacedBodies { bodies, notices: self.notices })
     }
 
     /// Notes solids that are not among the bodies, and parts in other files.
     fn note_missing(&mut self, entities: &Entities, bodies: &[PlacedBody]) {
         let placed: HashSet<u64> = bodies.iter().flat_map(|body| &body.items).copied().collect();
         for item in entities.every() {
-            if Kind::of_name(item.name()) == Kind::Solid && !placed.contains(&item.id) {
+            if ItemKind::of_name(item.name()) == ItemKind::Solid && !placed.contains(&item.id) {
                 self.note(Matter::Unplaced, item.id);
             }
         }
@@ -196,15 +196,15 @@ impl Contents {
     ) -> Result<(), StepError> {
         let mut open = Vec::new();
         for &item in &within.shape.items {
-            let kind = Kind::of(entities, item)?;
-            if kind == Kind::Other || !self.is_new(item, kind, within) {
+            let kind = ItemKind::of(entities, item)?;
+            if kind == ItemKind::Other || !self.is_new(item, kind, within) {
                 continue;
             }
             match kind {
-                Kind::Solid => self.solids.push(within.solid(entities, item, within.place)?),
-                Kind::Replica => self.solids.push(replicated(entities, item, within)?),
-                Kind::OtherSolid => return Err(entities.unsupported(item)),
-                Kind::Surfaces => {
+                ItemKind::Solid => self.solids.push(within.solid(entities, item, within.place)?),
+                ItemKind::Replica => self.solids.push(replicated(entities, item, within)?),
+                ItemKind::OtherSolid => return Err(entities.unsupported(item)),
+                ItemKind::Surfaces => {
                     for shell in shells(entities, item)? {
                         let closed = ["CLOSED_SHELL", "ORIENTED_CLOSED_SHELL"];
                         if closed.iter().any(|name| entities.find(shell, name).is_some()) {
@@ -215,9 +215,9 @@ impl Contents {
                         }
                     }
                 }
-                Kind::Wires => self.note(Matter::Wire, item),
-                Kind::Tessellated => self.note(Matter::Facets, item),
-                Kind::Other => {}
+                ItemKind::Wires => self.note(Matter::Wire, item),
+                ItemKind::Tessellated => self.note(Matter::Facets, item),
+                ItemKind::Other => {}
             }
         }
         if !open.is_empty() {
@@ -237,7 +237,7 @@ impl Contents {
 
     /// Returns whether an item is found for the first time in its place. Several shapes of a
     /// product may refer to it: one of them may carry properties.
-    fn is_new(&mut self, item: u64, kind: Kind, within: &PlacedShape) -> bool {
+    fn is_new(&mut self, item: u64, kind: ItemKind, within: &PlacedShape) -> bool {
         let Place { axes, scale } = within.place;
         // Exact bits are enough: the same way through the file gives the same numbers.
         let mut bits = [scale.to_bits(); 13];
@@ -249,7 +249,9 @@ impl Contents {
                 true
             }
             Entry::Occupied(entry) => {
-                if *entry.get() != within.visit && matches!(kind, Kind::Solid | Kind::Replica) {
+                if *entry.get() != within.visit
+                    && matches!(kind, ItemKind::Solid | ItemKind::Replica)
+                {
                     self.note(Matter::Twice, item);
                 }
                 false
@@ -268,8 +270,8 @@ fn replicated(
     // A replica may be a replica of itself.
     for _ in 0..MAX_NESTED {
         let Some(replica) = entities.find(solid, "SOLID_REPLICA") else {
-            return match Kind::of(entities, solid)? {
-                Kind::Solid => within.solid(entities, solid, place),
+            return match ItemKind::of(entities, solid)? {
+                ItemKind::Solid => within.solid(entities, solid, place),
                 _ => Err(entities.unsupported(solid)),
             };
         };

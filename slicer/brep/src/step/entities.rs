@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::HashMap;
 
 use super::error::StepError;
-use super::token::{Token, Tokens};
+use super::token::{StepToken, Tokens};
 
 /// The greatest nesting of brackets; schemas need less.
 const MAX_NESTED: usize = 32;
@@ -62,21 +62,21 @@ impl Entities {
         let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
         let mut reader = EntityReader { tokens: Tokens::new(bytes) };
         match reader.next() {
-            Ok(Token::Word(word)) if word.starts_with("ISO-10303-21") => {}
+            Ok(StepToken::Word(word)) if word.starts_with("ISO-10303-21") => {}
             _ => return Err(StepError::NotStep),
         }
         let mut entities = Self::default();
         let mut in_data = false;
         loop {
             match reader.next()? {
-                Token::Word(word) if word == "DATA" => {
+                StepToken::Word(word) if word == "DATA" => {
                     // A section may have a name in brackets (edition 2 of ISO 10303-21).
-                    while reader.next()? != Token::Sign(b';') {}
+                    while reader.next()? != StepToken::Sign(b';') {}
                     in_data = true;
                 }
-                Token::Word(word) if word == "ENDSEC" => in_data = false,
-                Token::Word(word) if word.starts_with("END-ISO-10303-21") => break,
-                Token::Reference(id) if in_data => {
+                StepToken::Word(word) if word == "ENDSEC" => in_data = false,
+                StepToken::Word(word) if word.starts_with("END-ISO-10303-21") => break,
+                StepToken::Reference(id) if in_data => {
                     reader.expect(b'=')?;
                     let records = flat(reader.instance()?);
                     if entities.map.insert(id, records).is_some() {
@@ -271,7 +271,7 @@ struct EntityReader<'a> {
 }
 
 impl EntityReader<'_> {
-    fn next(&mut self) -> Result<Token, StepError> {
+    fn next(&mut self) -> Result<StepToken, StepError> {
         self.tokens.next()?.ok_or(StepError::CutOff)
     }
 
@@ -280,18 +280,18 @@ impl EntityReader<'_> {
     }
 
     fn expect(&mut self, sign: u8) -> Result<(), StepError> {
-        if self.next()? == Token::Sign(sign) { Ok(()) } else { Err(self.unreadable()) }
+        if self.next()? == StepToken::Sign(sign) { Ok(()) } else { Err(self.unreadable()) }
     }
 
     fn instance(&mut self) -> Result<Vec<Record>, StepError> {
         match self.next()? {
-            Token::Word(name) => {
+            StepToken::Word(name) => {
                 self.expect(b'(')?;
                 Ok(vec![Record { name, values: self.values(0)? }])
             }
-            Token::Sign(b'(') => {
+            StepToken::Sign(b'(') => {
                 let mut records = Vec::new();
-                while let Token::Word(name) = self.next()? {
+                while let StepToken::Word(name) = self.next()? {
                     self.expect(b'(')?;
                     records.push(Record { name, values: self.values(0)? });
                 }
@@ -309,21 +309,21 @@ impl EntityReader<'_> {
         }
         loop {
             let value = match self.next()? {
-                Token::Sign(b')') => return Ok(values),
+                StepToken::Sign(b')') => return Ok(values),
                 // An omitted value is written as `$`, so commas only separate.
-                Token::Sign(b',') => continue,
-                Token::Sign(b'(') => Value::List(self.values(depth + 1)?),
-                Token::Word(_) => {
+                StepToken::Sign(b',') => continue,
+                StepToken::Sign(b'(') => Value::List(self.values(depth + 1)?),
+                StepToken::Word(_) => {
                     self.expect(b'(')?;
                     let within = self.values(depth + 1)?;
                     Value::Typed(Box::new(within.into_iter().next().unwrap_or(Value::Nothing)))
                 }
-                Token::Reference(id) => Value::Reference(id),
-                Token::Number(number) => Value::Number(number),
-                Token::Text(text) => Value::Text(text),
-                Token::Enumeration(word) => Value::Enumeration(word),
-                Token::Omitted | Token::Derived => Value::Nothing,
-                Token::Sign(_) => return Err(self.unreadable()),
+                StepToken::Reference(id) => Value::Reference(id),
+                StepToken::Number(number) => Value::Number(number),
+                StepToken::Text(text) => Value::Text(text),
+                StepToken::Enumeration(word) => Value::Enumeration(word),
+                StepToken::Omitted | StepToken::Derived => Value::Nothing,
+                StepToken::Sign(_) => return Err(self.unreadable()),
             };
             values.push(value);
         }

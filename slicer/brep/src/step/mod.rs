@@ -23,7 +23,7 @@ pub use error::StepError;
 
 use crate::error::BrepError;
 use crate::heal::heal;
-use crate::kernel::{Body, FaceInfo, Finding, Jet, Kernel, Tessellation};
+use crate::kernel::{Body, BrepFinding, FaceInfo, Jet, KernelModel, Tessellation};
 use crate::loops::reverse_contrary;
 use crate::model::BrepModel;
 use crate::notice::Notice;
@@ -52,9 +52,9 @@ pub fn read_step(bytes: &[u8], heal_mm: f64) -> Result<OpenedModel, BrepError> {
 pub struct StepModel {
     model: BrepModel,
     /// A finding for each face with joined edges.
-    healed: Vec<Finding>,
+    healed: Vec<BrepFinding>,
     /// A finding for each face with reversed loops.
-    reversed: Vec<Finding>,
+    reversed: Vec<BrepFinding>,
 }
 
 impl StepModel {
@@ -91,7 +91,7 @@ impl StepModel {
     }
 }
 
-impl Kernel for StepModel {
+impl KernelModel for StepModel {
     fn bodies(&self) -> &[Body] {
         &self.model.bodies
     }

@@ -3,8 +3,8 @@
 use super::entities::{Item, Value};
 use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
-use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
-use crate::geometry::{Chain, Curve, Link, edge_range};
+use crate::geometry::spline::{Knots, SplineCurve, WeightedPoint, weighted};
+use crate::geometry::{Curve, CurveChain, Link, edge_range};
 use crate::vector::{Vec3, along, cross, distance, dot, unit};
 
 impl GeometryReader<'_> {
@@ -85,7 +85,7 @@ impl GeometryReader<'_> {
     fn polyline(&self, item: Item) -> Result<Curve, StepError> {
         let points = item.references(1)?;
         self.entities.spend(points.len())?;
-        let points: Vec<Weighted> = points
+        let points: Vec<WeightedPoint> = points
             .iter()
             .map(|&id| Ok(weighted(self.point(id)?, 1.0)))
             .collect::<Result<_, _>>()?;
@@ -128,7 +128,7 @@ impl GeometryReader<'_> {
     /// Reads bounded curves joined end to end.
     fn composite(&self, item: Item, depth: usize) -> Result<Curve, StepError> {
         let bad = StepError::Numbers { id: item.id, what: "chain of curves" };
-        Chain::new(self.links(item, depth)?).map(Curve::Chain).ok_or(bad)
+        CurveChain::new(self.links(item, depth)?).map(Curve::Chain).ok_or(bad)
     }
 
     /// Reads the pieces of a chain of curves.

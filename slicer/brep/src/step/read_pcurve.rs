@@ -3,7 +3,7 @@
 use super::entities::Item;
 use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
-use super::units::Units;
+use super::units::RepresentationUnits;
 use crate::geometry::{Curve, Link, Surface, SurfaceCurve};
 use crate::vector::{Axes, Vec3, distance};
 
@@ -25,7 +25,7 @@ impl GeometryReader<'_> {
         let plane = self.entities.get(item.reference(2)?, "DEFINITIONAL_REPRESENTATION")?;
         let bad = StepError::Numbers { id: item.id, what: "curve" };
         let id = plane.references(1)?.into_iter().next().ok_or(bad)?;
-        let units = Units { mm: 1.0, ..self.units.clone() };
+        let units = RepresentationUnits { mm: 1.0, ..self.units.clone() };
         let (entities, place) = (self.entities, Axes::WORLD);
         let flat = GeometryReader { entities, units: &units, place, is_flat: true };
         let link = match (self.entities.find(id, "LINE"), ends) {
@@ -41,7 +41,7 @@ impl GeometryReader<'_> {
 
     /// Returns the factors of u and v that convert the file's parameters to the surface's.
     fn parameters(&self, id: u64, depth: usize) -> Result<[f64; 2], StepError> {
-        let Units { mm, radians, .. } = *self.units;
+        let RepresentationUnits { mm, radians, .. } = *self.units;
         // Of surfaces, only B-splines are complex instances.
         let Ok(item) = self.entities.simple(id) else { return Ok([1.0; 2]) };
         Ok(match item.name() {

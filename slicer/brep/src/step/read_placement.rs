@@ -3,13 +3,13 @@
 use super::entities::{Entities, Item};
 use super::error::StepError;
 use super::place::Place;
-use super::units::Units;
+use super::units::RepresentationUnits;
 use crate::vector::{Axes, Vec3, dot, scale, unit};
 
 /// A reader of a representation's geometry, placed and in millimeters.
 pub(crate) struct GeometryReader<'a> {
     pub(crate) entities: &'a Entities,
-    pub(crate) units: &'a Units,
+    pub(crate) units: &'a RepresentationUnits,
     pub(crate) place: Axes,
     /// Whether points have two coordinates, the parameters of a surface.
     pub(crate) is_flat: bool,
@@ -20,7 +20,7 @@ pub(super) const MAX_NESTED: usize = 8;
 
 impl<'a> GeometryReader<'a> {
     /// Returns a reader in a representation's own coordinates.
-    pub(super) fn unplaced(entities: &'a Entities, units: &'a Units) -> Self {
+    pub(super) fn unplaced(entities: &'a Entities, units: &'a RepresentationUnits) -> Self {
         Self { entities, units, place: Axes::WORLD, is_flat: false }
     }
 

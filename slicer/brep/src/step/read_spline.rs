@@ -3,7 +3,7 @@
 use super::entities::{Entities, Item, Value};
 use super::error::StepError;
 use super::read_placement::GeometryReader;
-use crate::geometry::spline::{Knots, SplineCurve, Weighted, weighted};
+use crate::geometry::spline::{Knots, SplineCurve, WeightedPoint, weighted};
 use crate::geometry::spline_surface::SplineSurface;
 
 impl GeometryReader<'_> {
@@ -27,7 +27,12 @@ impl GeometryReader<'_> {
         Ok(Some(SplineCurve { knots, points }))
     }
 
-    fn weighted(&self, ids: &[u64], weights: &[f64], of: u64) -> Result<Vec<Weighted>, StepError> {
+    fn weighted(
+        &self,
+        ids: &[u64],
+        weights: &[f64],
+        of: u64,
+    ) -> Result<Vec<WeightedPoint>, StepError> {
         let is_weight = |w: &f64| *w > 0.0 && w.is_finite();
         if ids.len() != weights.len() || !weights.iter().all(is_weight) {
             return Err(StepError::Numbers { id: of, what: "spline" });

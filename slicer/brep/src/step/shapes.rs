@@ -5,12 +5,12 @@ use std::collections::{HashMap, HashSet};
 use super::entities::{Entities, Item};
 use super::error::StepError;
 use super::product::Products;
-use super::units::Units;
+use super::units::RepresentationUnits;
 
 /// A shape: items in one coordinate system.
-pub(super) struct Shape {
+pub(super) struct ShapeRepresentation {
     pub(super) items: Vec<u64>,
-    pub(super) units: Option<Units>,
+    pub(super) units: Option<RepresentationUnits>,
     pub(super) parts: Vec<SubShape>,
     /// The index of its group.
     group: usize,
@@ -27,7 +27,7 @@ pub(super) struct SubShape {
 /// The shapes of a file.
 pub(super) struct Shapes<'a> {
     entities: &'a Entities,
-    map: HashMap<u64, Shape>,
+    map: HashMap<u64, ShapeRepresentation>,
     /// Their numbers, in the file's order.
     order: Vec<u64>,
     /// Groups of shapes in the same coordinates, in the file's order: shapes related without a
@@ -46,7 +46,7 @@ impl<'a> Shapes<'a> {
         Ok(shapes)
     }
 
-    pub(super) fn get(&self, id: u64) -> Option<&Shape> {
+    pub(super) fn get(&self, id: u64) -> Option<&ShapeRepresentation> {
         self.map.get(&id)
     }
 
@@ -78,8 +78,8 @@ impl<'a> Shapes<'a> {
             else {
                 continue;
             };
-            let units = Units::of_context(self.entities, context)?;
-            let shape = Shape { items, units, parts: Vec::new(), group: 0 };
+            let units = RepresentationUnits::of_context(self.entities, context)?;
+            let shape = ShapeRepresentation { items, units, parts: Vec::new(), group: 0 };
             if self.map.insert(item.id, shape).is_none() {
                 self.order.push(item.id);
             }

@@ -4,7 +4,7 @@ use super::error::StepError;
 
 /// A token of the text.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Token {
+pub(crate) enum StepToken {
     /// The name of an entity type or a section.
     Word(String),
     /// A reference to an entity, such as `#12`.
@@ -40,26 +40,26 @@ impl<'a> Tokens<'a> {
     }
 
     /// Returns the next token, or `None` at the end of the text.
-    pub(crate) fn next(&mut self) -> Result<Option<Token>, StepError> {
+    pub(crate) fn next(&mut self) -> Result<Option<StepToken>, StepError> {
         self.skip_blank()?;
         let Some(&byte) = self.bytes.get(self.at) else { return Ok(None) };
         let start = self.at;
         self.at += 1;
         Ok(Some(match byte {
-            b'(' | b')' | b',' | b';' | b'=' => Token::Sign(byte),
-            b'$' => Token::Omitted,
-            b'*' => Token::Derived,
-            b'#' => Token::Reference(self.number_from(self.at)?),
-            b'\'' => Token::Text(self.text(start)?),
+            b'(' | b')' | b',' | b';' | b'=' => StepToken::Sign(byte),
+            b'$' => StepToken::Omitted,
+            b'*' => StepToken::Derived,
+            b'#' => StepToken::Reference(self.number_from(self.at)?),
+            b'\'' => StepToken::Text(self.text(start)?),
             // A binary value, which no geometry uses.
-            b'"' => Token::Text(self.until(b'"', start)?),
+            b'"' => StepToken::Text(self.until(b'"', start)?),
             b'.' if self.peek_is(|b| b.is_ascii_alphabetic()) => {
-                Token::Enumeration(self.until(b'.', start)?)
+                StepToken::Enumeration(self.until(b'.', start)?)
             }
-            b'+' | b'-' | b'.' | b'0'..=b'9' => Token::Number(self.number_from(start)?),
+            b'+' | b'-' | b'.' | b'0'..=b'9' => StepToken::Number(self.number_from(start)?),
             b'!' | b'_' | b'a'..=b'z' | b'A'..=b'Z' => {
                 self.take_while(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
-                Token::Word(self.slice(start).to_ascii_uppercase())
+                StepToken::Word(self.slice(start).to_ascii_uppercase())
             }
             _ => return Err(StepError::Unreadable { offset: start }),
         }))
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    fn all(text: &str) -> Result<Vec<Token>, StepError> {
+    fn all(text: &str) -> Result<Vec<StepToken>, StepError> {
         let mut tokens = Tokens::new(text.as_bytes());
         let mut list = Vec::new();
         while let Some(token) = tokens.next()? {
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_token() {
-        use Token::{Derived, Enumeration, Number, Omitted, Reference, Sign, Text, Word};
+        use StepToken::{Derived, Enumeration, Number, Omitted, Reference, Sign, Text, Word};
         let text = "/* #9 */ #12 = b_Spline( 'it''s; (', -1.5E-3, 3, .T., $, *,\r\n\"0F\");";
         let expected = [
             Reference(12),

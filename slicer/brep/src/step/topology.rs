@@ -7,7 +7,7 @@ use super::contents::{PlacedBody, is_whole_surface};
 use super::entities::{Entities, Item};
 use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
-use super::units::Units;
+use super::units::RepresentationUnits;
 use crate::geometry::Curve;
 use crate::kernel::Body;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
@@ -49,7 +49,7 @@ impl<'a> BodyReader<'a> {
     fn new(
         entities: &'a Entities,
         body: &PlacedBody,
-        units: &'a Units,
+        units: &'a RepresentationUnits,
         model: &'a mut BrepModel,
     ) -> Self {
         let geometry = GeometryReader { entities, units, place: body.place.axes, is_flat: false };

@@ -5,7 +5,7 @@ use super::error::StepError;
 
 /// The units of a representation.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Units {
+pub(crate) struct RepresentationUnits {
     /// The millimeters per unit of length.
     pub(crate) mm: f64,
     /// The radians per unit of angle.
@@ -19,7 +19,7 @@ pub(crate) struct Units {
 /// The greatest number of chained conversions; more count as a cycle.
 const MAX_STEPS: usize = 8;
 
-impl Units {
+impl RepresentationUnits {
     /// Returns the units of scaled shapes.
     pub(crate) fn scaled(&self, by: f64) -> Self {
         let uncertainty_mm = self.uncertainty_mm.map(|mm| by * mm);
@@ -113,9 +113,9 @@ fn name(entities: &Entities, unit: u64) -> String {
 mod tests {
     use super::*;
 
-    fn units(data: &str) -> Result<Option<Units>, StepError> {
+    fn units(data: &str) -> Result<Option<RepresentationUnits>, StepError> {
         let text = format!("ISO-10303-21;DATA;{data}ENDSEC;END-ISO-10303-21;");
-        Units::of_context(&Entities::read(text.as_bytes())?, 1)
+        RepresentationUnits::of_context(&Entities::read(text.as_bytes())?, 1)
     }
 
     #[test]
@@ -125,7 +125,10 @@ mod tests {
         let of = |length: &str| units(&format!("{context}{radian}{length}")).unwrap().unwrap();
         let milli = of("#2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));");
         let name = "millimetre".into();
-        assert_eq!(milli, Units { mm: 1.0, radians: 1.0, name, uncertainty_mm: None });
+        assert_eq!(
+            milli,
+            RepresentationUnits { mm: 1.0, radians: 1.0, name, uncertainty_mm: None }
+        );
         assert_eq!(of("#2=(LENGTH_UNIT()SI_UNIT($,.METRE.));").mm, 1000.0);
         let inch = "#2=(CONVERSION_BASED_UNIT('INCH',#4)LENGTH_UNIT()NAMED_UNIT(#9));
             #4=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(2.54),#5);

@@ -4,7 +4,7 @@
 //! or to the pole there.
 
 use super::join::Joining;
-use super::points::{FacePoints, Node, PointRing};
+use super::points::{FaceNode, FacePoints, PointRing};
 use super::unwrap::{Unwrapped, between, unwrap};
 use crate::geometry::{Pole, Surface};
 use crate::kernel::Fault;
@@ -20,7 +20,7 @@ pub(super) fn polygons(
     rings: &[PointRing],
     points: &mut FacePoints,
     chord_mm: f64,
-) -> Result<Vec<Vec<Node>>, Fault> {
+) -> Result<Vec<Vec<FaceNode>>, Fault> {
     let poles = face.surface.poles();
     let mut tips = Vec::new();
     let mut loops = Vec::new();
@@ -54,7 +54,7 @@ pub(super) fn polygons(
         }
         _ => return Err(Fault::Unbounded),
     };
-    let mut polygons: Vec<Vec<Node>> =
+    let mut polygons: Vec<Vec<FaceNode>> =
         closed.into_iter().map(|hole| moved_into(hole.nodes, &outer, &face.surface)).collect();
     polygons.push(outer);
     Ok(polygons)
@@ -71,7 +71,7 @@ struct FaceOutline<'a, 'b> {
 impl FaceOutline<'_, '_> {
     /// Removes the outer loop from the loops that do not go around the surface. If there is no
     /// outer loop, makes it from the surface's whole domain.
-    fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
+    fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, Fault> {
         let areas: Vec<f64> = closed.iter().map(|hole| area(&hole.nodes)).collect();
         // A hole is smaller than the loop around it.
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
@@ -94,7 +94,7 @@ impl FaceOutline<'_, '_> {
     }
 
     /// Returns the polygon of a closed surface that has only holes.
-    fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<Node>, Fault> {
+    fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, Fault> {
         if !self.face.surface.is_closed() {
             return Err(Fault::Unbounded);
         }
@@ -134,10 +134,10 @@ impl FaceOutline<'_, '_> {
         };
         let inner = between(surface, place(low), place(high), self.chord_mm);
         let points = &mut *self.points;
-        let nodes: Vec<Node> = [place(low)]
+        let nodes: Vec<FaceNode> = [place(low)]
             .into_iter()
             .chain(inner)
-            .map(|uv| Node { uv, point: points.push(surface.point(uv)) })
+            .map(|uv| FaceNode { uv, point: points.push(surface.point(uv)) })
             .collect();
         // The face lies on the left of a line along u, above it, or on the right of one
         // along v.
@@ -145,7 +145,7 @@ impl FaceOutline<'_, '_> {
         let mut back = nodes.clone();
         let period = domain[axis][1] - domain[axis][0];
         back.iter_mut().for_each(|node| node.uv[axis] += period);
-        let ring = |mut nodes: Vec<Node>, turn: i32| {
+        let ring = |mut nodes: Vec<FaceNode>, turn: i32| {
             if turn < 0 {
                 nodes.reverse();
             }
@@ -168,7 +168,7 @@ impl FaceOutline<'_, '_> {
             let part = k as f64 / POLE_PARTS as f64;
             let mut uv = [pole.at; 2];
             uv[along] = low + (high - low) * if turn > 0 { part } else { 1.0 - part };
-            Node { uv, point: tip }
+            FaceNode { uv, point: tip }
         };
         let mut turns = [0; 2];
         turns[along] = turn;
@@ -224,7 +224,7 @@ impl FaceOutline<'_, '_> {
         rings: [Unwrapped; 2],
         is_left: bool,
         holes: &mut Vec<Unwrapped>,
-    ) -> Result<Vec<Node>, Fault> {
+    ) -> Result<Vec<FaceNode>, Fault> {
         let loops = rings.into_iter().chain(std::mem::take(holes)).collect();
         let joining = Joining::new(&self.face.surface, is_left, loops);
         let (outer, free) = joining.polygon(self.points, self.chord_mm)?;
@@ -277,20 +277,20 @@ fn gap(spans: &[[f64; 2]], low: f64, period: f64) -> Option<f64> {
 
 /// Returns whether the outer polygon is counterclockwise. A polygon made from a whole domain takes
 /// its direction from the face.
-pub(super) fn is_counter_clockwise(polygons: &[Vec<Node>]) -> bool {
+pub(super) fn is_counter_clockwise(polygons: &[Vec<FaceNode>]) -> bool {
     polygons.last().is_none_or(|outer| area(outer) > 0.0)
 }
 
 /// Returns twice the signed area of a polygon.
-fn area(nodes: &[Node]) -> f64 {
+fn area(nodes: &[FaceNode]) -> f64 {
     let next = nodes.iter().cycle().skip(1);
     nodes.iter().zip(next).map(|(a, b)| a.uv[0] * b.uv[1] - b.uv[0] * a.uv[1]).sum()
 }
 
 /// Returns whether a point lies in a polygon, from the sides crossed to its right.
-fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
+fn is_within(p: [f64; 2], polygon: &[FaceNode]) -> bool {
     let next = polygon.iter().cycle().skip(1);
-    let crosses = |(a, b): &(&Node, &Node)| {
+    let crosses = |(a, b): &(&FaceNode, &FaceNode)| {
         let ([ax, ay], [bx, by]) = (a.uv, b.uv);
         // Half-open sides keep the count right for a ray through a corner.
         (ay > p[1]) != (by > p[1]) && p[0] < ax + (p[1] - ay) / (by - ay) * (bx - ax)
@@ -299,14 +299,14 @@ fn is_within(p: [f64; 2], polygon: &[Node]) -> bool {
 }
 
 /// Returns a hole, moved by periods until it lies in the outer polygon.
-fn moved_into(mut hole: Vec<Node>, outer: &[Node], surface: &Surface) -> Vec<Node> {
+fn moved_into(mut hole: Vec<FaceNode>, outer: &[FaceNode], surface: &Surface) -> Vec<FaceNode> {
     let [u, v] = surface.periods().map(|period| match period {
         Some(period) => (-2..=2).map(|k| f64::from(k) * period).collect(),
         None => vec![0.0],
     });
     let all = u.iter().flat_map(|&u| v.iter().map(move |&v| [u, v]));
     let within = |by: &[f64; 2]| {
-        let is_in = |node: &&Node| is_within([node.uv[0] + by[0], node.uv[1] + by[1]], outer);
+        let is_in = |node: &&FaceNode| is_within([node.uv[0] + by[0], node.uv[1] + by[1]], outer);
         hole.iter().filter(is_in).count()
     };
     // Chooses the move that puts most nodes inside; if no move puts any inside, the hole stays.

@@ -2,7 +2,7 @@
 
 use spade::Point2;
 
-use super::points::Node;
+use super::points::FaceNode;
 use crate::geometry::Surface;
 use crate::vector::{Vec3, along, distance, dot, length, middle, sub, unit};
 
@@ -20,7 +20,7 @@ pub(super) struct CellScale {
 }
 
 impl CellScale {
-    pub(super) fn new(surface: &Surface, polygons: &[Vec<Node>], chord_mm: f64) -> Self {
+    pub(super) fn new(surface: &Surface, polygons: &[Vec<FaceNode>], chord_mm: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for node in polygons.iter().flatten() {
             for k in 0..2 {
@@ -91,12 +91,12 @@ pub(super) struct Borders {
 const CLEAR: f64 = 0.3;
 
 impl Borders {
-    pub(super) fn new(polygons: &[Vec<Node>], scale: &CellScale) -> Self {
+    pub(super) fn new(polygons: &[Vec<FaceNode>], scale: &CellScale) -> Self {
         let count = scale.count[1].ceil().clamp(1.0, 1000.0) as usize;
         let step = scale.count[1] / count as f64;
         let mut rows = vec![Vec::new(); count];
         for polygon in polygons {
-            let at = |node: &Node| {
+            let at = |node: &FaceNode| {
                 let p = scale.place(node.uv);
                 [p.x, p.y]
             };

@@ -13,7 +13,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::cells::{Borders, CellScale};
 use super::ears::{Corner, doubled, ears, refine};
-use super::points::{FacePoints, MAX_CELLS, Node};
+use super::points::{FaceNode, FacePoints, MAX_CELLS};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
 use crate::model::Face;
@@ -31,12 +31,12 @@ const MORE: [usize; 2] = [4, 20_000];
 /// The length below which sides are not halved, in cells.
 const LEAST_CELLS: f64 = 1e-3;
 
-type Filled = (Vec<[Node; 3]>, Option<Fault>);
+type Filled = (Vec<[FaceNode; 3]>, Option<Fault>);
 
 /// Triangulates a face. Triangles are counterclockwise in its parameters.
 pub(super) fn fill(
     face: &Face,
-    polygons: &[Vec<Node>],
+    polygons: &[Vec<FaceNode>],
     scale: CellScale,
     points: &mut FacePoints,
     chord_mm: f64,
@@ -66,14 +66,14 @@ pub(super) fn fill(
 /// surface, or than the chord.
 fn crossed(
     work: &FaceTriangulation,
-    polygons: &[Vec<Node>],
+    polygons: &[Vec<FaceNode>],
     points: &mut FacePoints,
 ) -> Result<Filled, Fault> {
     let (surface, chord_mm) = (work.surface, work.chord_mm);
-    let mut nodes: Vec<Node> = Vec::new();
+    let mut nodes: Vec<FaceNode> = Vec::new();
     let mut rings = Vec::new();
     for polygon in polygons {
-        let corner = |(k, node): (usize, &Node)| Corner {
+        let corner = |(k, node): (usize, &FaceNode)| Corner {
             at: work.scale.place(node.uv),
             number: nodes.len() + k,
         };
@@ -92,7 +92,7 @@ fn crossed(
     for hole in rings.iter_mut().filter(|hole| ring_area(hole) > 0.0) {
         hole.reverse();
     }
-    let off = |node: &Node| distance(points.get(node.point), surface.point(node.uv));
+    let off = |node: &FaceNode| distance(points.get(node.point), surface.point(node.uv));
     let off_mm = nodes.iter().map(off).fold(chord_mm, f64::max);
     let triangles = ears(outer, rings);
     let (turned, around) =
@@ -118,7 +118,7 @@ fn crossed(
     let is_long = |a: usize, b: usize| apart(a, b) > chord_mm;
     let refined = refine(triangles, &mut places, most, is_long, |a, b| {
         let uv = half(a, b);
-        let node = Node { uv, point: points.push(surface.point(uv)) };
+        let node = FaceNode { uv, point: points.push(surface.point(uv)) };
         nodes.borrow_mut().push(node);
         work.scale.place(uv)
     });
@@ -140,7 +140,7 @@ fn ring_area(ring: &[Corner]) -> f64 {
 /// Returns the area of the triangles that are upside down.
 fn turned_mm2(
     triangles: &[[usize; 3]],
-    nodes: &[Node],
+    nodes: &[FaceNode],
     scale: &CellScale,
     points: &FacePoints,
 ) -> f64 {
@@ -155,10 +155,10 @@ fn turned_mm2(
     triangles.iter().filter(is_turned).map(area).sum()
 }
 
-fn length_mm(polygons: &[Vec<Node>], points: &FacePoints) -> f64 {
-    let of_polygon = |polygon: &Vec<Node>| -> f64 {
+fn length_mm(polygons: &[Vec<FaceNode>], points: &FacePoints) -> f64 {
+    let of_polygon = |polygon: &Vec<FaceNode>| -> f64 {
         let next = polygon.iter().cycle().skip(1);
-        let place = |node: &Node| points.get(node.point);
+        let place = |node: &FaceNode| points.get(node.point);
         polygon.iter().zip(next).map(|(a, b)| distance(place(a), place(b))).sum()
     };
     polygons.iter().map(of_polygon).sum()
@@ -191,7 +191,7 @@ impl FaceTriangulation<'_> {
         (self.scale.count[0] * self.scale.count[1]) as usize
     }
 
-    fn add_borders(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
+    fn add_borders(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), Fault> {
         let mut rings = Vec::new();
         for polygon in polygons {
             let ring: Result<Vec<_>, _> = polygon.iter().map(|node| self.corner(node)).collect();
@@ -214,7 +214,7 @@ impl FaceTriangulation<'_> {
         Ok(())
     }
 
-    fn corner(&mut self, node: &Node) -> Result<FixedVertexHandle, Fault> {
+    fn corner(&mut self, node: &FaceNode) -> Result<FixedVertexHandle, Fault> {
         let handle = self.insert(self.scale.place(node.uv))?;
         if handle.index() < self.corners.len() {
             // Merging two different points would leave a gap to the neighboring face.
@@ -241,7 +241,7 @@ impl FaceTriangulation<'_> {
     }
 
     /// Adds corners at the corners of cells, away from the polygons.
-    fn add_grid(&mut self, polygons: &[Vec<Node>]) -> Result<(), Fault> {
+    fn add_grid(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), Fault> {
         let counts = self.scale.count.map(|count| count.ceil().min(1000.0) as usize);
         // A plane needs no inner corners, and a single row of cells has none.
         if matches!(self.surface, Surface::Plane(_)) || counts.contains(&1) {
@@ -386,7 +386,7 @@ impl FaceTriangulation<'_> {
     }
 
     /// Returns the triangles and their nodes.
-    fn triangles(&mut self, points: &mut FacePoints) -> Vec<[Node; 3]> {
+    fn triangles(&mut self, points: &mut FacePoints) -> Vec<[FaceNode; 3]> {
         let inside = self.inside();
         let mut list = Vec::with_capacity(inside.len());
         for face in inside {
@@ -395,7 +395,7 @@ impl FaceTriangulation<'_> {
                 let corner = &mut self.corners[k];
                 let place = corner.place;
                 let point = *corner.point.get_or_insert_with(|| points.push(place));
-                Node { uv: corner.uv, point }
+                FaceNode { uv: corner.uv, point }
             });
             list.push(nodes);
         }

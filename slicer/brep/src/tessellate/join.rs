@@ -5,7 +5,7 @@
 //! cuts, always with the face on the same hand, gives a closed polygon; both sides of a cut have
 //! the same points.
 
-use super::points::{FacePoints, Node};
+use super::points::{FaceNode, FacePoints};
 use super::unwrap::{Unwrapped, between};
 use crate::geometry::Surface;
 use crate::kernel::Fault;
@@ -17,17 +17,17 @@ const TRIES: usize = 500;
 
 /// A straight line from one node to another, each given by its loop and its index in the loop.
 #[derive(Clone, Copy)]
-struct Line {
+struct NodeLine {
     ends: [(usize, usize); 2],
     /// The periods to add to the second end to bring it next to the first.
     shift: [f64; 2],
 }
 
 /// A cut along a line.
-struct Cut {
-    line: Line,
+struct LineCut {
+    line: NodeLine,
     /// The nodes strictly between the ends, as seen from the first.
-    inner: Vec<Node>,
+    inner: Vec<FaceNode>,
 }
 
 /// The loops to be joined.
@@ -36,7 +36,7 @@ pub(super) struct Joining<'a> {
     /// Whether the face lies on the left of its loops.
     is_left: bool,
     loops: Vec<Unwrapped>,
-    cuts: Vec<Cut>,
+    cuts: Vec<LineCut>,
     /// Whether each loop is joined to the first.
     is_joined: Vec<bool>,
 }
@@ -54,17 +54,18 @@ impl<'a> Joining<'a> {
         mut self,
         points: &mut FacePoints,
         chord_mm: f64,
-    ) -> Result<(Vec<Node>, Vec<Unwrapped>), Fault> {
+    ) -> Result<(Vec<FaceNode>, Vec<Unwrapped>), Fault> {
         let mut cut = self.cut(0, 1);
         while !self.is_joined[1] {
             let line = cut.or_else(|| self.nearest()).ok_or(Fault::Unbounded)?;
-            let Line { ends, shift } = line;
+            let NodeLine { ends, shift } = line;
             let [a, b] = ends.map(|(number, k)| self.loops[number].nodes[k].uv);
             let inner = between(self.surface, a, plus(b, shift), chord_mm).into_iter();
-            let inner =
-                inner.map(|uv| Node { uv, point: points.push(self.surface.point(uv)) }).collect();
+            let inner = inner
+                .map(|uv| FaceNode { uv, point: points.push(self.surface.point(uv)) })
+                .collect();
             self.is_joined[ends[1].0] = true;
-            self.cuts.push(Cut { line, inner });
+            self.cuts.push(LineCut { line, inner });
             cut = if self.is_joined[1] { None } else { self.cut(ends[1].0, 1) };
         }
         let outer = self.walk()?;
@@ -73,7 +74,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the first cut found from a joined loop to a free one.
-    fn nearest(&self) -> Option<Line> {
+    fn nearest(&self) -> Option<NodeLine> {
         let count = self.loops.len();
         let pairs = (0..count).flat_map(|a| (1..count).rev().map(move |b| (a, b)));
         let mut pairs = pairs.filter(|&(a, b)| self.is_joined[a] && !self.is_joined[b]);
@@ -81,7 +82,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the shortest cut tried between two loops that crosses no loop.
-    fn cut(&self, a: usize, b: usize) -> Option<Line> {
+    fn cut(&self, a: usize, b: usize) -> Option<NodeLine> {
         let (from, to) = (&self.loops[a].nodes, &self.loops[b].nodes);
         let long = self.lengths();
         let is_free = |end: &(usize, usize)| self.cut_at(*end).is_none();
@@ -102,7 +103,7 @@ impl<'a> Joining<'a> {
         let mut tries = tries.into_iter().take(TRIES);
         let found =
             tries.find(|&(_, i, k, shift)| !self.is_crossed([from[i].uv, plus(to[k].uv, shift)]));
-        found.map(|(_, i, k, shift)| Line { ends: [(a, i), (b, k)], shift })
+        found.map(|(_, i, k, shift)| NodeLine { ends: [(a, i), (b, k)], shift })
     }
 
     /// Returns the lengths in space of a step along each parameter.
@@ -212,7 +213,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Walks along loops and cuts with the face on the same hand.
-    fn walk(&self) -> Result<Vec<Node>, Fault> {
+    fn walk(&self) -> Result<Vec<FaceNode>, Fault> {
         let nodes = |number: usize| &self.loops[number].nodes;
         let count = |number: usize| nodes(number).len();
         let start = (0..count(0)).find(|&k| self.cut_at((0, k)).is_none());
@@ -247,7 +248,7 @@ impl<'a> Joining<'a> {
     }
 
     /// Returns the cut at a node, and whether the node is its first end.
-    fn cut_at(&self, end: (usize, usize)) -> Option<(&Cut, bool)> {
+    fn cut_at(&self, end: (usize, usize)) -> Option<(&LineCut, bool)> {
         let cut = self.cuts.iter().find(|cut| cut.line.ends.contains(&end))?;
         Some((cut, cut.line.ends[0] == end))
     }
@@ -261,8 +262,8 @@ fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn moved(node: Node, by: [f64; 2]) -> Node {
-    Node { uv: plus(node.uv, by), ..node }
+fn moved(node: FaceNode, by: [f64; 2]) -> FaceNode {
+    FaceNode { uv: plus(node.uv, by), ..node }
 }
 
 /// Returns some of the numbers below `count`, spread evenly.

@@ -18,10 +18,10 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use self::cells::CellScale;
-use self::points::{FacePoints, MAX_CELLS, Node, PointRing};
+use self::points::{FaceNode, FacePoints, MAX_CELLS, PointRing};
 use crate::error::BrepError;
 use crate::geometry::edge_range;
-use crate::kernel::{Facet, Fault, Finding, Tessellation};
+use crate::kernel::{BrepFacet, BrepFinding, Fault, Tessellation};
 use crate::measure::MOST_OFF;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::{Vec3, distance, sub};
@@ -38,14 +38,14 @@ pub const MAX_FACETS: usize = 50_000_000;
 const MAX_POINTS: usize = 5_000_000;
 
 /// The polygons of one face.
-struct Outline {
+struct FacePolygons {
     own: Vec<Vec3>,
     /// The polygons, the outer one last, and their scale.
-    inner: Result<(Vec<Vec<Node>>, CellScale), Fault>,
+    inner: Result<(Vec<Vec<FaceNode>>, CellScale), Fault>,
     faults: Vec<Fault>,
 }
 
-impl Outline {
+impl FacePolygons {
     /// Returns the distance of edges from the surface, if it exceeds the limit for facets.
     fn off_mm(&self) -> Option<f64> {
         self.faults.iter().find_map(|fault| match fault {
@@ -62,8 +62,8 @@ impl Outline {
 /// The facets of one face.
 struct FacePatch {
     own: Vec<Vec3>,
-    facets: Vec<Facet>,
-    tips: Vec<Facet>,
+    facets: Vec<BrepFacet>,
+    tips: Vec<BrepFacet>,
     faults: Vec<Fault>,
 }
 
@@ -124,7 +124,7 @@ fn with_chords(
     let sure_mm: Vec<f64> =
         sure_mm(model).into_iter().map(|of_body| f64::min(chord_mm, of_body)).collect();
     let outlines = outlines(model, &chains, chord_mm, &sure_mm, &mut points);
-    let cells: Vec<f64> = outlines.iter().map(Outline::cells).collect();
+    let cells: Vec<f64> = outlines.iter().map(FacePolygons::cells).collect();
     let all: f64 = cells.iter().sum();
     let largest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
     // Refused before the work begins, which grows with the number of cells.
@@ -147,7 +147,7 @@ fn with_chords(
         if facets.len() + patch.facets.len() > MAX_FACETS {
             return Err(BrepError::TooMany { most: MAX_FACETS });
         }
-        let renumbered = |mut facet: Facet| {
+        let renumbered = |mut facet: BrepFacet| {
             for corner in facet.corners.iter_mut().filter(|corner| **corner >= shared as u32) {
                 *corner += moved;
             }
@@ -156,7 +156,7 @@ fn with_chords(
         facets.extend(patch.facets.into_iter().map(renumbered));
         tips.extend(patch.tips.into_iter().map(renumbered));
         let entity = model.faces[face as usize].entity;
-        findings.extend(patch.faults.into_iter().map(|fault| Finding { face, entity, fault }));
+        findings.extend(patch.faults.into_iter().map(|fault| BrepFinding { face, entity, fault }));
     }
     Ok(Tessellation { points, facets, tips, findings, chord_mm })
 }
@@ -189,8 +189,8 @@ fn outlines(
     chord_mm: f64,
     sure_mm: &[f64],
     points: &mut [Vec3],
-) -> Vec<Outline> {
-    let made = |numbers: &[usize], points: &[Vec3]| -> Vec<Outline> {
+) -> Vec<FacePolygons> {
+    let made = |numbers: &[usize], points: &[Vec3]| -> Vec<FacePolygons> {
         let of_face =
             |&face: &usize| outline(&model.faces[face], chains, points, chord_mm, sure_mm[face]);
         numbers.par_iter().map(of_face).collect()
@@ -240,7 +240,7 @@ fn outline(
     shared: &[Vec3],
     chord_mm: f64,
     sure_mm: f64,
-) -> Outline {
+) -> FacePolygons {
     let mut points = FacePoints { shared, own: Vec::new() };
     let mut faults = Vec::new();
     let polygons = boundary::polygons(face, &rings(face, chains), &mut points, chord_mm);
@@ -249,11 +249,17 @@ fn outline(
         let scale = CellScale::new(&face.surface, &polygons, chord_mm);
         (polygons, scale)
     });
-    Outline { own: points.own, inner, faults }
+    FacePolygons { own: points.own, inner, faults }
 }
 
-fn patch(number: u32, face: &Face, outline: Outline, shared: &[Vec3], chord_mm: f64) -> FacePatch {
-    let Outline { own, inner, mut faults } = outline;
+fn patch(
+    number: u32,
+    face: &Face,
+    outline: FacePolygons,
+    shared: &[Vec3],
+    chord_mm: f64,
+) -> FacePatch {
+    let FacePolygons { own, inner, mut faults } = outline;
     let mut points = FacePoints { shared, own };
     let mut outwards = face.outwards;
     let filled = inner.and_then(|(polygons, scale)| {
@@ -270,15 +276,19 @@ fn patch(number: u32, face: &Face, outline: Outline, shared: &[Vec3], chord_mm: 
         faults.push(fault);
         Vec::new()
     });
-    let facet = |[a, b, c]: [Node; 3]| {
+    let facet = |[a, b, c]: [FaceNode; 3]| {
         let nodes = if outwards { [a, b, c] } else { [a, c, b] };
-        Facet { corners: nodes.map(|node| node.point), uv: nodes.map(|node| node.uv), face: number }
+        BrepFacet {
+            corners: nodes.map(|node| node.point),
+            uv: nodes.map(|node| node.uv),
+            face: number,
+        }
     };
     let (facets, tips) = corners.into_iter().map(facet).partition(has_three_corners);
     FacePatch { facets, tips, own: points.own, faults }
 }
 
-fn has_three_corners(facet: &Facet) -> bool {
+fn has_three_corners(facet: &BrepFacet) -> bool {
     let [a, b, c] = facet.corners;
     a != b && b != c && c != a
 }
@@ -310,9 +320,15 @@ fn rings(face: &Face, chains: &[Vec<u32>]) -> Vec<PointRing> {
 }
 
 /// Returns a fault if the points of the edges are farther off the surface than allowed.
-fn off(face: &Face, polygons: &[Vec<Node>], points: &FacePoints, sure_mm: f64) -> Option<Fault> {
-    let apart =
-        |node: &Node| crate::vector::distance(points.get(node.point), face.surface.point(node.uv));
+fn off(
+    face: &Face,
+    polygons: &[Vec<FaceNode>],
+    points: &FacePoints,
+    sure_mm: f64,
+) -> Option<Fault> {
+    let apart = |node: &FaceNode| {
+        crate::vector::distance(points.get(node.point), face.surface.point(node.uv))
+    };
     let off_mm = polygons.iter().flatten().map(apart).fold(0.0, f64::max);
     (off_mm > sure_mm).then_some(Fault::Off { off_mm })
 }

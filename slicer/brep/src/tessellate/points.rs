@@ -4,7 +4,7 @@ use crate::vector::Vec3;
 
 /// A corner in a face's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Node {
+pub(super) struct FaceNode {
     pub(super) uv: [f64; 2],
     /// The point's index. A point has several corners along a seam or at a pole.
     pub(super) point: u32,

@@ -1,6 +1,6 @@
 //! Maps loops to the parameters of their surface, across seams and poles.
 
-use super::points::{FacePoints, Node};
+use super::points::{FaceNode, FacePoints};
 use crate::geometry::{Pole, Surface};
 use crate::model::Face;
 use crate::vector::distance;
@@ -8,7 +8,7 @@ use crate::vector::distance;
 /// A loop of nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Unwrapped {
-    pub(super) nodes: Vec<Node>,
+    pub(super) nodes: Vec<FaceNode>,
     /// The number of turns along u and along v around a closed surface, from start to
     /// start.
     pub(super) turns: [i32; 2],
@@ -38,7 +38,7 @@ pub(super) fn unwrap(
     // Start away from poles, where one parameter is arbitrary.
     let start = ring.iter().position(|&point| pole_at(point).is_none()).unwrap_or(0);
     let order = ring[start..].iter().chain(&ring[..start]).copied();
-    let mut nodes: Vec<Node> = Vec::with_capacity(ring.len() + 1);
+    let mut nodes: Vec<FaceNode> = Vec::with_capacity(ring.len() + 1);
     let mut waiting: Option<(&Pole, u32)> = None;
     // Points that share the pole with the previous point.
     let mut others = Vec::new();
@@ -59,10 +59,10 @@ pub(super) fn unwrap(
             if let Some((pole, tip)) = waiting.take() {
                 uv = around_pole(face, pole, tip, before, uv, &mut nodes);
                 let at = nodes.last().map_or(uv, |node| node.uv);
-                nodes.extend(others.drain(..).map(|point| Node { uv: at, point }));
+                nodes.extend(others.drain(..).map(|point| FaceNode { uv: at, point }));
             }
         }
-        nodes.push(Node { uv, point });
+        nodes.push(FaceNode { uv, point });
     }
     let mut turns = [0; 2];
     if let (Some(first), Some(last)) = (nodes.first(), nodes.last()) {
@@ -95,7 +95,7 @@ fn around_pole(
     tip: u32,
     before: [f64; 2],
     mut after: [f64; 2],
-    nodes: &mut Vec<Node>,
+    nodes: &mut Vec<FaceNode>,
 ) -> [f64; 2] {
     let free = 1 - pole.axis;
     if let Some(period) = face.surface.periods()[free] {
@@ -119,7 +119,7 @@ fn around_pole(
     for k in 0..=parts as usize {
         let mut uv = [pole.at; 2];
         uv[free] = before[free] + way * k as f64 / parts;
-        nodes.push(Node { uv, point: tip });
+        nodes.push(FaceNode { uv, point: tip });
     }
     after
 }

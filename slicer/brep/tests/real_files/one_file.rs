@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use lamp_brep::{Facet, Prepared, ReadFn, Tessellation, prepare};
+use lamp_brep::{BrepFacet, Prepared, ReadFn, Tessellation, prepare};
 use serde::{Deserialize, Serialize};
 
 /// The argument that requests one file.
@@ -131,8 +131,8 @@ fn areas(prepared: &Prepared, z: f64) -> f64 {
 }
 
 /// Returns the area of the facets' section with a plane.
-fn section_area(mesh: &Tessellation, facets: &[Facet], z: f64) -> f64 {
-    let double = |facet: &Facet| {
+fn section_area(mesh: &Tessellation, facets: &[BrepFacet], z: f64) -> f64 {
+    let double = |facet: &BrepFacet| {
         let corners = mesh.corners(facet);
         let is_above = corners.map(|corner| corner[2] >= z);
         // The points where the contour crosses the facet's edges downward and upward.

@@ -94,7 +94,7 @@ impl<'a> Relief<'a> {
     /// # Panics
     /// Panics if there are fewer heights than vertices.
     pub fn minima(&self, up: [f64; 3], heights: &[f64], deepest_mm: f64) -> Vec<Minimum> {
-        let field = Field { relief: self, heights };
+        let field = HeightField { relief: self, heights };
         let regions = level_regions(&field);
         let depths = depths(&field, &regions, deepest_mm);
         let minimum = |(region, depth_mm): (Vec<u32>, f64)| Minimum {
@@ -112,12 +112,12 @@ impl<'a> Relief<'a> {
 }
 
 /// The heights of a mesh's vertices.
-struct Field<'a> {
+struct HeightField<'a> {
     relief: &'a Relief<'a>,
     heights: &'a [f64],
 }
 
-impl Field<'_> {
+impl HeightField<'_> {
     fn height(&self, vertex: u32) -> f64 {
         self.heights[vertex as usize]
     }

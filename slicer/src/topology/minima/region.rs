@@ -2,12 +2,12 @@
 
 use lamp_brep::vector::{Vec3, along, cross, dot, sub};
 
-use super::Field;
+use super::HeightField;
 use crate::topology::{next, previous};
 
 /// Finds the regions that are minima, by ascending height, and at equal heights by first vertex.
 /// The vertices of each region are in ascending order.
-pub(super) fn level_regions(field: &Field<'_>) -> Vec<Vec<u32>> {
+pub(super) fn level_regions(field: &HeightField<'_>) -> Vec<Vec<u32>> {
     let has_lower = has_lower(field);
     let mut is_seen = vec![false; field.heights.len()];
     let mut regions = Vec::new();
@@ -28,7 +28,7 @@ pub(super) fn level_regions(field: &Field<'_>) -> Vec<Vec<u32>> {
 }
 
 /// Returns, for each vertex, whether an edge leads down from it.
-fn has_lower(field: &Field<'_>) -> Vec<bool> {
+fn has_lower(field: &HeightField<'_>) -> Vec<bool> {
     let table = field.relief.table;
     let mut has_lower = vec![false; field.heights.len()];
     let has_idle = field.relief.has_idle;
@@ -46,7 +46,7 @@ fn has_lower(field: &Field<'_>) -> Vec<bool> {
 }
 
 /// Returns the vertices connected to a vertex by level edges.
-fn level_with(vertex: u32, field: &Field<'_>, is_seen: &mut [bool]) -> Vec<u32> {
+fn level_with(vertex: u32, field: &HeightField<'_>, is_seen: &mut [bool]) -> Vec<u32> {
     let height = field.height(vertex);
     let mut region = vec![vertex];
     is_seen[vertex as usize] = true;
@@ -68,7 +68,7 @@ fn level_with(vertex: u32, field: &Field<'_>, is_seen: &mut [bool]) -> Vec<u32> 
 ///
 /// The plane is halfway up to the next vertex next to the region, where the section is a closed
 /// polygon, so that no limit is needed.
-pub(super) fn section_area(field: &Field<'_>, region: &[u32], up: Vec3) -> f64 {
+pub(super) fn section_area(field: &HeightField<'_>, region: &[u32], up: Vec3) -> f64 {
     let table = field.relief.table;
     let height = field.height(region[0]);
     let rises = region.iter().flat_map(|&vertex| field.beside(vertex));

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use lamp_stack::sets::root;
 
-use super::Field;
+use super::HeightField;
 
 /// No component has reached the vertex.
 const NONE: u32 = u32::MAX;
@@ -18,12 +18,12 @@ const DEEP: u32 = 0;
 /// This is the merge tree of the heights on vertices and edges. Each vertex waits once in a queue
 /// by height; a component deeper than `deepest_mm` requests no more vertices. A component that then
 /// finds a vertex below it that no component requested has met a component with a lower minimum.
-pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) -> Vec<f64> {
-    let mut sweep = Sweep::new(field, minima, deepest_mm);
+pub(super) fn depths(field: &HeightField<'_>, minima: &[Vec<u32>], deepest_mm: f64) -> Vec<f64> {
+    let mut sweep = HeightSweep::new(field, minima, deepest_mm);
     while let Some(Reverse((_, vertex))) = sweep.waiting.pop() {
         sweep.pass(vertex);
     }
-    let Sweep { births, tops, mut depths, .. } = sweep;
+    let HeightSweep { births, tops, mut depths, .. } = sweep;
     for (depth, (birth, top)) in depths.iter_mut().zip(births.iter().zip(&tops)) {
         // It never met a lower minimum.
         if depth.is_nan() {
@@ -34,8 +34,8 @@ pub(super) fn depths(field: &Field<'_>, minima: &[Vec<u32>], deepest_mm: f64) ->
     depths.split_off(1)
 }
 
-struct Sweep<'a> {
-    field: &'a Field<'a>,
+struct HeightSweep<'a> {
+    field: &'a HeightField<'a>,
     deepest_mm: f64,
     /// Vertices by height, encoded as bits in the same order.
     waiting: BinaryHeap<Reverse<(u64, u32)>>,
@@ -52,8 +52,8 @@ struct Sweep<'a> {
     depths: Vec<f64>,
 }
 
-impl<'a> Sweep<'a> {
-    fn new(field: &'a Field<'a>, minima: &[Vec<u32>], deepest_mm: f64) -> Self {
+impl<'a> HeightSweep<'a> {
+    fn new(field: &'a HeightField<'a>, minima: &[Vec<u32>], deepest_mm: f64) -> Self {
         let births: Vec<f64> = std::iter::once(f64::NEG_INFINITY)
             .chain(minima.iter().map(|region| field.height(region[0])))
             .collect();

@@ -103,7 +103,7 @@ fn open_flat_and_broken_meshes_get_an_answer() {
 }
 
 /// Finds the depth of a minimum by searching for the height of the lowest path to a lower minimum.
-fn depth_by_search(field: &Field<'_>, all: &[Minimum], one: usize) -> f64 {
+fn depth_by_search(field: &HeightField<'_>, all: &[Minimum], one: usize) -> f64 {
     let heights = field.heights;
     let mut levels: Vec<f64> =
         heights.iter().copied().filter(|&height| height >= all[one].height_mm).collect();
@@ -145,7 +145,7 @@ proptest! {
         let heights: Vec<f64> =
             (0..table.points().len()).map(|vertex| f64::from(steps[vertex % 64])).collect();
         let all = relief.minima(UP, &heights, f64::INFINITY);
-        let field = Field { relief: &relief, heights: &heights };
+        let field = HeightField { relief: &relief, heights: &heights };
         for (one, minimum) in all.iter().enumerate() {
             prop_assert_eq!(minimum.depth_mm, depth_by_search(&field, &all, one));
         }

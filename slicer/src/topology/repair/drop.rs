@@ -59,7 +59,7 @@ fn doubled(table: &CornerTable) -> Vec<u32> {
             *keep = Some(group.facets.len() % 2 == 1);
         }
     }
-    let of_group = |(group, keep): (&Group, &Option<bool>)| {
+    let of_group = |(group, keep): (&FacetGroup, &Option<bool>)| {
         let kept = (*keep == Some(true)).then_some(group.kept);
         group.facets.iter().copied().filter(move |&facet| Some(facet) != kept).collect::<Vec<u32>>()
     };
@@ -67,7 +67,7 @@ fn doubled(table: &CornerTable) -> Vec<u32> {
 }
 
 /// All facets between the same three vertices.
-struct Group {
+struct FacetGroup {
     facets: Vec<u32>,
     /// The first of the facets that face the same way as most.
     kept: u32,
@@ -75,7 +75,7 @@ struct Group {
     is_balanced: bool,
 }
 
-fn groups(table: &CornerTable) -> Vec<Group> {
+fn groups(table: &CornerTable) -> Vec<FacetGroup> {
     let mut doubled = Doubled::all(table);
     doubled.sort_unstable_by_key(|it| (it.of, it.facet));
     let group = |group: &[Doubled]| {
@@ -83,7 +83,7 @@ fn groups(table: &CornerTable) -> Vec<Group> {
         let turned = group.iter().find(|it| !it.is_same_way).map(|it| it.facet);
         let others = group.iter().filter(|it| !it.is_same_way).count();
         let same = 1 + group.len() - others;
-        Group {
+        FacetGroup {
             facets: std::iter::once(of).chain(group.iter().map(|it| it.facet)).collect(),
             kept: turned.filter(|_| others > same).unwrap_or(of),
             is_balanced: others == same,
@@ -103,10 +103,10 @@ struct GroupEdges {
 }
 
 impl GroupEdges {
-    fn new(table: &CornerTable, groups: &[Group]) -> Self {
+    fn new(table: &CornerTable, groups: &[FacetGroup]) -> Self {
         let facets_at: HashMap<Option<u32>, usize> =
             table.crowded().map(|corners| (table.edge(corners[0]), corners.len())).collect();
-        let edges = |group: &Group| {
+        let edges = |group: &FacetGroup| {
             let corner = 3 * group.facets[0];
             // Facets between three vertices have edges.
             [corner, corner + 1, corner + 2].map(|corner| table.edge(corner).unwrap_or(u32::MAX))
@@ -138,7 +138,7 @@ impl GroupEdges {
 
     /// Decides on a group, and on the groups connected to it by edges on which all other facets are
     /// known.
-    fn decide(&self, first: usize, groups: &[Group], keeps: &mut [Option<bool>]) {
+    fn decide(&self, first: usize, groups: &[FacetGroup], keeps: &mut [Option<bool>]) {
         // For each group, whether it stays if the first group does.
         let mut as_first = HashMap::from([(first, true)]);
         let (mut cluster, mut next) = (vec![first], 0);

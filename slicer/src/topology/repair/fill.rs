@@ -86,17 +86,17 @@ fn least_area(
             || !forbidden.contains(&edge(vertices[a], vertices[b]))
     };
     // For the first and last vertex of each piece of the loop: its cost, and where to cut it.
-    let mut best = vec![vec![(Cost::default(), 0); count]; count];
+    let mut best = vec![vec![(FillCost::default(), 0); count]; count];
     // Short pieces first, as longer ones consist of them.
     for reach in 2..count {
         for first in 0..count - reach {
             let last = first + reach;
-            best[first][last] = (Cost::NONE, 0);
+            best[first][last] = (FillCost::NONE, 0);
             if !may_join(first, last) {
                 continue;
             }
             for cut in first + 1..last {
-                let cost = Cost::of(point(first), point(cut), point(last));
+                let cost = FillCost::of(point(first), point(cut), point(last));
                 let cost = cost.plus(best[first][cut].0).plus(best[cut][last].0);
                 if cost < best[first][last].0 {
                     best[first][last] = (cost, cut);
@@ -104,7 +104,7 @@ fn least_area(
             }
         }
     }
-    if best[0][count - 1].0 == Cost::NONE {
+    if best[0][count - 1].0 == FillCost::NONE {
         return None;
     }
     let mut facets = Vec::with_capacity(count - 2);
@@ -121,12 +121,12 @@ fn least_area(
 
 /// The cost of facets: first the number of degenerate facets, then the sum of areas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-struct Cost {
+struct FillCost {
     flat: u32,
     twice_area: f64,
 }
 
-impl Cost {
+impl FillCost {
     /// The cost if there is no solution.
     const NONE: Self = Self { flat: u32::MAX, twice_area: f64::INFINITY };
 

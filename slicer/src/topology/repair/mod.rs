@@ -85,7 +85,7 @@ const MAX_ROUNDS: usize = 32;
 /// # Errors
 /// Returns an error if there are no facets, there are too many, or none would be left.
 pub fn repair(facets: Vec<Facet>, options: &RepairOptions) -> Result<Repaired, SliceError> {
-    let mut work = Work::new(facets);
+    let mut work = RepairWork::new(facets);
     for _ in 0..MAX_ROUNDS {
         if !work.round(options)? {
             break;
@@ -97,7 +97,7 @@ pub fn repair(facets: Vec<Facet>, options: &RepairOptions) -> Result<Repaired, S
 }
 
 /// Facets under repair.
-struct Work {
+struct RepairWork {
     facets: Vec<Facet>,
     /// The origin of each facet.
     origins: Vec<Origin>,
@@ -113,7 +113,7 @@ struct Origin {
     is_turned: bool,
 }
 
-impl Work {
+impl RepairWork {
     fn new(facets: Vec<Facet>) -> Self {
         let origin = |facet| Origin { facet: Some(facet), is_moved: false, is_turned: false };
         let origins = (0..facets.len() as u32).map(origin).collect();

@@ -55,7 +55,7 @@ impl<'a> EntityWriter<'a> {
     /// Adds a plane through a point.
     pub(super) fn plane(&mut self, point: u64, normal: Vec3) -> io::Result<u64> {
         // Across a meter, one digit more is a hundredth of a nanometer.
-        let [x, y, z] = normal.map(|c| Real((c * 1e11).round() / 1e11));
+        let [x, y, z] = normal.map(|c| StepReal((c * 1e11).round() / 1e11));
         let normal = self.add(|out| write!(out, "DIRECTION('',({x},{y},{z}))"))?;
         let place = self.add(|out| write!(out, "AXIS2_PLACEMENT_3D('',#{point},#{normal},$)"))?;
         self.add(|out| write!(out, "PLANE('',#{place})"))
@@ -111,9 +111,9 @@ fn write_list(list: &[u64], out: &mut dyn Write) -> io::Result<()> {
 /// A number as STEP writes it: with a point, without zeros after it, and with a capital E. It has
 /// just enough digits to identify it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Real(pub(super) f64);
+pub(super) struct StepReal(pub(super) f64);
 
-impl fmt::Display for Real {
+impl fmt::Display for StepReal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Adding zero turns -0 into 0.
         let number = self.0 + 0.0;

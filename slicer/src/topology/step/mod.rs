@@ -169,7 +169,7 @@ impl StepSolids {
         for (vertex, point) in self.table.points().iter().enumerate() {
             if self.dropped.is_used(vertex as u32) {
                 points[vertex] = file.add(|out| {
-                    let [x, y, z] = point.map(entities::Real);
+                    let [x, y, z] = point.map(entities::StepReal);
                     write!(out, "CARTESIAN_POINT('',({x},{y},{z}))")
                 })?;
             }

@@ -343,7 +343,7 @@ fn a_surface_through_itself_exactly_along_edges_is_refused() {
 
 #[test]
 fn numbers_and_texts_are_those_of_step() {
-    let real = |number: f64| entities::Real(number).to_string();
+    let real = |number: f64| entities::StepReal(number).to_string();
     assert_eq!([0.0, -0.0, 1.0, -2.5].map(real), ["0.", "0.", "1.", "-2.5"]);
     assert_eq!(
         [1e-7, -1.5e20, 12.41950798034668].map(real),
