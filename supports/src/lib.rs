@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use lamp_stack::{Dpi, Layer, Mask, PageInfo};
-//! use lamp_supports::{CheckError, CheckOptions, Disagreements, End, check};
+//! use lamp_supports::{CheckError, CheckOptions, Disagreements, IslandEnd, check};
 //!
 //! // A post, and a block beside it that begins in layer 1 and joins the post in layer 2.
 //! let layer = |transitions: &[u32]| {
@@ -18,7 +18,7 @@
 //! let found = check(layers, Ok, &CheckOptions::default())?;
 //! let [island] = &found.islands.list[..] else { panic!() };
 //! assert_eq!((island.layer, island.area, island.centroid), (1, 9, [10.5, 2.5]));
-//! assert_eq!(island.end, End::JoinsPart { layer: 2 });
+//! assert_eq!(island.end, IslandEnd::JoinsPart { layer: 2 });
 //! # Ok::<(), CheckError>(())
 //! ```
 
@@ -28,9 +28,9 @@ mod record;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, Disagreements, End, Findings, Island, IslandMinimum, LayerFacts,
-    Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint, check,
-    component_at, inner_components,
+    CheckError, CheckOptions, Disagreements, Findings, Island, IslandEnd, IslandMinimum,
+    LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint,
+    check, component_at, inner_components,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{

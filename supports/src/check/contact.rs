@@ -54,14 +54,14 @@ pub(super) struct Joint {
 
 /// How a layer rests on the one below.
 #[derive(Debug)]
-pub(super) struct Contact {
+pub(super) struct LayerContact {
     /// By component, then by the component below; of both colors.
     pub(super) joints: Vec<Joint>,
     /// Of supported components.
     pub(super) patches: Vec<OverhangPatch>,
 }
 
-impl Contact {
+impl LayerContact {
     /// Compares a layer with the one below. Overhangs reach farther than `limit` pixels.
     pub(super) fn new(below: &Labelled, layer: &Labelled, limit: Option<f64>, speck: u32) -> Self {
         let mut joints = Joints::new(layer.components.all.len());

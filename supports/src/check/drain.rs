@@ -12,8 +12,8 @@ use std::sync::Arc;
 use lamp_stack::{Mask, MaskBuilder};
 use rayon::prelude::*;
 
-use super::Checked;
-use super::contact::{Contact, Labelled};
+use super::LabeledLayer;
+use super::contact::{Labelled, LayerContact};
 use super::findings::{Listed, Pocket, PocketKind};
 use super::overhang::without;
 use super::pockets::Hollows;
@@ -23,7 +23,7 @@ pub(super) struct Drain {
     radius_um: f64,
     pitch_um: f64,
     /// The layers within reach of unfinished layers.
-    window: VecDeque<Near>,
+    window: VecDeque<NearLayer>,
     /// How many layers of the window are done, and the number of the next.
     done: usize,
     next: u32,
@@ -36,8 +36,8 @@ pub(super) struct Drain {
 }
 
 /// A layer near unfinished layers.
-struct Near {
-    layer: Arc<Checked>,
+struct NearLayer {
+    layer: Arc<LabeledLayer>,
     /// The height of its middle above the platform.
     middle_um: f64,
     thickness_um: f64,
@@ -61,23 +61,28 @@ impl Drain {
     }
 
     /// Adds a layer, given the black bodies of its components.
-    pub(super) fn add(&mut self, layer: Arc<Checked>, thickness_um: f64, bodies: Vec<Option<u32>>) {
+    pub(super) fn add(
+        &mut self,
+        layer: Arc<LabeledLayer>,
+        thickness_um: f64,
+        bodies: Vec<Option<u32>>,
+    ) {
         let middle_um = self.top_um + thickness_um / 2.0;
         self.top_um += thickness_um;
-        self.window.push_back(Near { layer, middle_um, thickness_um, bodies });
+        self.window.push_back(NearLayer { layer, middle_um, thickness_um, bodies });
     }
 
     /// Processes the layers that no later layer is near, or all layers at the end.
     pub(super) fn advance(&mut self, is_end: bool) {
         let Some(last_um) = self.window.back().map(|near| near.middle_um) else { return };
-        let is_ready = |near: &&Near| is_end || near.middle_um + self.radius_um <= last_um;
+        let is_ready = |near: &&NearLayer| is_end || near.middle_um + self.radius_um <= last_um;
         let ready = self.window.iter().skip(self.done).take_while(is_ready).count();
         let numbers: Vec<usize> = (self.done..self.done + ready).collect();
         let rooms: Vec<Labelled> =
             numbers.into_par_iter().map(|number| Labelled::new(self.crowded(number))).collect();
         for (room, number) in rooms.into_iter().zip(self.done..) {
             // Only joints matter here: overhangs are found in the layers themselves.
-            let contact = self.last.as_ref().map(|below| Contact::new(below, &room, None, 1));
+            let contact = self.last.as_ref().map(|below| LayerContact::new(below, &room, None, 1));
             let near = &self.window[number];
             // The center of a ball that fits is in the layer's own black.
             for black in room.of_colour(false) {
@@ -125,7 +130,7 @@ impl Drain {
         for y in 0..mask.height() {
             free.clear();
             free.extend(black_runs(mask.row(y), mask.width()));
-            for Reach { mask, aside } in &reaches {
+            for SidewaysReach { mask, aside } in &reaches {
                 if free.is_empty() {
                     break;
                 }
@@ -139,14 +144,14 @@ impl Drain {
     }
 
     /// Returns the layers near one, the nearest first, and how far their white reaches.
-    fn reaches(&self, number: usize) -> Vec<Reach<'_>> {
+    fn reaches(&self, number: usize) -> Vec<SidewaysReach<'_>> {
         let middle_um = self.window[number].middle_um;
-        let mut reaches: Vec<(f64, Reach<'_>)> = Vec::new();
+        let mut reaches: Vec<(f64, SidewaysReach<'_>)> = Vec::new();
         for near in &self.window {
             let off_um = (near.middle_um - middle_um).abs();
             let aside = asides(self.radius_um, off_um, self.pitch_um);
             if !aside.is_empty() {
-                reaches.push((off_um, Reach { mask: &near.layer.labelled.mask, aside }));
+                reaches.push((off_um, SidewaysReach { mask: &near.layer.labelled.mask, aside }));
             }
         }
         // Near layers reach farthest, and leave farther ones little to do.
@@ -156,7 +161,7 @@ impl Drain {
 }
 
 /// A layer and how far its white reaches sideways, for each distance in rows.
-struct Reach<'a> {
+struct SidewaysReach<'a> {
     mask: &'a Mask,
     aside: Vec<u32>,
 }

@@ -57,12 +57,12 @@ pub struct Island {
     /// The first layer that has them.
     pub largest_layer: u32,
     /// How it ends.
-    pub end: End,
+    pub end: IslandEnd,
 }
 
 /// How an island ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum IslandEnd {
     /// It never joins.
     Loose,
     /// It joins what stands on the platform.

@@ -2,13 +2,13 @@
 
 use super::balance::{Base, Weight};
 use super::components::Component;
-use super::contact::{Contact, Labelled};
-use super::findings::{End, Island, Listed, OffBalance, Region};
+use super::contact::{Labelled, LayerContact};
+use super::findings::{Island, IslandEnd, Listed, OffBalance, Region};
 use super::live::{Group, Live, Next};
 
 /// The white bodies of the layers so far.
 pub(super) struct Growth {
-    live: Live<Body>,
+    live: Live<ImageBody>,
     begun: u64,
     speck: u32,
     pub(super) islands: Listed<Island>,
@@ -17,7 +17,7 @@ pub(super) struct Growth {
 }
 
 /// White that is joined so far.
-enum Body {
+enum ImageBody {
     /// It stands on the platform.
     Standing(Base),
     Floating(Floating),
@@ -47,7 +47,7 @@ impl Growth {
     pub(super) fn add(
         &mut self,
         layer: &Labelled,
-        contact: Option<&Contact>,
+        contact: Option<&LayerContact>,
         number: u32,
         thickness_um: f64,
     ) {
@@ -57,7 +57,7 @@ impl Growth {
         for Group { bodies, components } in groups {
             let mut body = match (bodies.is_empty(), contact) {
                 // Nothing is below the first layer: it stands on the platform.
-                (true, None) => Body::Standing(Base::of(layer, &components)),
+                (true, None) => ImageBody::Standing(Base::of(layer, &components)),
                 (true, Some(_)) => {
                     // Only a body joins components of a layer, so a group that begins has one.
                     self.begin(&layer.components.all[components[0] as usize], number)
@@ -65,8 +65,8 @@ impl Growth {
                 (false, _) => self.unite(bodies, number),
             };
             match &mut body {
-                Body::Standing(base) => base.grow(layer, &components, number, thickness_um),
-                Body::Floating(island) => {
+                ImageBody::Standing(base) => base.grow(layer, &components, number, thickness_um),
+                ImageBody::Floating(island) => {
                     island.grow(layer, &components, number, thickness_um, self.speck);
                 }
             }
@@ -80,7 +80,7 @@ impl Growth {
         live.finish().into_iter().for_each(|body| self.end(body));
     }
 
-    fn begin(&mut self, component: &Component, layer: u32) -> Body {
+    fn begin(&mut self, component: &Component, layer: u32) -> ImageBody {
         self.begun += 1;
         let island = Island {
             number: self.begun,
@@ -93,51 +93,51 @@ impl Growth {
             floating_pixels_um: 0.0,
             largest_area: 0,
             largest_layer: layer,
-            end: End::Loose,
+            end: IslandEnd::Loose,
         };
-        Body::Floating(Floating { island, holds_square: false, weight: Weight::default() })
+        ImageBody::Floating(Floating { island, holds_square: false, weight: Weight::default() })
     }
 
     /// Makes one body of several: one that stands, or else the eldest island.
-    fn unite(&mut self, bodies: Vec<Body>, layer: u32) -> Body {
+    fn unite(&mut self, bodies: Vec<ImageBody>, layer: u32) -> ImageBody {
         let (mut base, mut floating) = (None::<Base>, Vec::new());
         for body in bodies {
             match (body, &mut base) {
-                (Body::Standing(other), Some(base)) => base.unite(other),
-                (Body::Standing(first), none) => *none = Some(first),
-                (Body::Floating(island), _) => floating.push(island),
+                (ImageBody::Standing(other), Some(base)) => base.unite(other),
+                (ImageBody::Standing(first), none) => *none = Some(first),
+                (ImageBody::Floating(island), _) => floating.push(island),
             }
         }
         if let Some(mut base) = base {
-            let end = End::JoinsPart { layer };
+            let end = IslandEnd::JoinsPart { layer };
             for island in floating {
                 // The island's weight rests on the base from here on.
                 base.carry(&island.weight);
                 self.list(island, end);
             }
-            return Body::Standing(base);
+            return ImageBody::Standing(base);
         }
         floating.sort_by_key(|floating| floating.island.number);
         let mut floating = floating.into_iter();
         let mut elder = floating.next().expect("a group has a body");
-        let end = End::JoinsIsland { layer, number: elder.island.number };
+        let end = IslandEnd::JoinsIsland { layer, number: elder.island.number };
         for island in floating {
             elder.weight.unite(&island.weight);
             self.list(island, end);
         }
-        Body::Floating(elder)
+        ImageBody::Floating(elder)
     }
 
-    fn end(&mut self, body: Body) {
+    fn end(&mut self, body: ImageBody) {
         match body {
-            Body::Standing(base) => {
+            ImageBody::Standing(base) => {
                 base.off().into_iter().for_each(|off| self.off_balance.push(off));
             }
-            Body::Floating(island) => self.list(island, End::Loose),
+            ImageBody::Floating(island) => self.list(island, IslandEnd::Loose),
         }
     }
 
-    fn list(&mut self, floating: Floating, end: End) {
+    fn list(&mut self, floating: Floating, end: IslandEnd) {
         let island = Island { end, ..floating.island };
         let list = if floating.holds_square { &mut self.islands } else { &mut self.specks };
         list.push(island);

@@ -26,11 +26,11 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use components::Components;
-use contact::{Contact, Labelled};
+use contact::{Labelled, LayerContact};
 use drain::Drain;
 pub use findings::{
-    End, Findings, Island, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketKind, Region,
-    WeakJoint,
+    Findings, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketKind,
+    Region, WeakJoint,
 };
 use islands::Growth;
 use overhangs::Overhangs;
@@ -118,7 +118,7 @@ where
     // Of large layers two are in work at most, however many threads there are.
     let at_once = rayon::current_num_threads().min(2);
     let mut checker: Option<Checker> = None;
-    let mut last: Option<Arc<Checked>> = None;
+    let mut last: Option<Arc<LabeledLayer>> = None;
     loop {
         let batch = take_batch(&mut layers, at_once);
         if batch.is_empty() {
@@ -126,9 +126,9 @@ where
         }
         let labelled = batch.into_par_iter().map(|item| {
             let layer = decode(item?)?;
-            Ok(Arc::new(Checked::new(layer, options)))
+            Ok(Arc::new(LabeledLayer::new(layer, options)))
         });
-        let batch: Vec<Arc<Checked>> = labelled.collect::<Result<_, E>>()?;
+        let batch: Vec<Arc<LabeledLayer>> = labelled.collect::<Result<_, E>>()?;
         let checker = match &mut checker {
             Some(checker) => checker,
             none => none.insert(Checker::new(&batch[0], options)?),
@@ -143,7 +143,7 @@ where
         let contacts = batch.par_iter().zip(below).map(|(layer, below)| {
             let limit = checker.limit(&layer.facts);
             let speck = options.speck.get();
-            below.map(|below| Contact::new(&below.labelled, &layer.labelled, limit, speck))
+            below.map(|below| LayerContact::new(&below.labelled, &layer.labelled, limit, speck))
         });
         let contacts: Vec<_> = contacts.collect();
         // Bodies pass from layer to layer, so this part goes in order.
@@ -196,7 +196,7 @@ pub fn inner_components(mask: &Mask, white: bool) -> Mask {
 }
 
 /// A layer, labeled.
-struct Checked {
+struct LabeledLayer {
     facts: LayerFacts,
     /// The layer's name in messages.
     name: String,
@@ -205,7 +205,7 @@ struct Checked {
     labelled: Labelled,
 }
 
-impl Checked {
+impl LabeledLayer {
     fn new(layer: Layer, options: &CheckOptions) -> Self {
         let Layer { info, dpi, image } = layer;
         let labelled = Labelled::new(image.into_image().into_mask(options.threshold));
@@ -235,7 +235,7 @@ struct Checker {
 }
 
 impl Checker {
-    fn new(first: &Checked, options: &CheckOptions) -> Result<Self, CheckError> {
+    fn new(first: &LabeledLayer, options: &CheckOptions) -> Result<Self, CheckError> {
         let speck = options.speck.get();
         let mut hollows = Hollows::new(speck);
         let drain = options.drain.map(|drain| {
@@ -261,7 +261,7 @@ impl Checker {
     }
 
     /// Checks that a layer can be compared with the first.
-    fn compare(&self, layer: &Checked) -> Result<(), CheckError> {
+    fn compare(&self, layer: &LabeledLayer) -> Result<(), CheckError> {
         let name = || layer.name.clone();
         if layer.size() != self.size {
             return Err(CheckError::Sizes { layer: name(), size: layer.size(), first: self.size });
@@ -280,7 +280,11 @@ impl Checker {
         Some(self.options.max_overhang.or_else(of_layer)?.pixels(self.dpi?))
     }
 
-    fn add(&mut self, layer: &Arc<Checked>, contact: Option<&Contact>) -> Result<(), CheckError> {
+    fn add(
+        &mut self,
+        layer: &Arc<LabeledLayer>,
+        contact: Option<&LayerContact>,
+    ) -> Result<(), CheckError> {
         let number = self.layers.len() as u32;
         // Without thicknesses, all layers weigh the same.
         let thickness_um = layer.facts.thickness_um.unwrap_or(1.0);
@@ -301,7 +305,7 @@ impl Checker {
         Ok(())
     }
 
-    fn add_weak_joints(&mut self, layer: &Labelled, contact: &Contact, number: u32) {
+    fn add_weak_joints(&mut self, layer: &Labelled, contact: &LayerContact, number: u32) {
         for joints in contact.joints.chunk_by(|a, b| a.component == b.component) {
             let component = &layer.components.all[joints[0].component as usize];
             let support = joints.iter().map(|joint| joint.pixels).sum::<u64>();

@@ -68,11 +68,11 @@ impl Findings {
     /// layers have no known height, thickness, resolution or place.
     pub fn compare_minima(&self, minima: &[IslandMinimum], cut: f64) -> Disagreements {
         let Some(grid) = Grid::new(self, cut) else { return Disagreements::default() };
-        let places: Vec<Place<'_>> =
+        let places: Vec<MinimumPlace<'_>> =
             minima.iter().filter_map(|minimum| grid.place(minimum)).collect();
         let mut islands: Vec<&Island> = self.islands.list.iter().chain(&self.specks.list).collect();
         islands.sort_by_key(|island| island.layer);
-        let is_lone = |place: &&Place<'_>| {
+        let is_lone = |place: &&MinimumPlace<'_>| {
             let first = islands.partition_point(|island| island.layer < *place.layers.start());
             let shown = islands[first..].iter().take_while(|it| place.layers.contains(&it.layer));
             place.is_deep && !shown.into_iter().any(|island| place.begins(island))
@@ -131,7 +131,7 @@ impl Grid {
     }
 
     /// Returns where a minimum shows; none if it stands on the platform or above the layers.
-    fn place<'a>(&self, minimum: &'a IslandMinimum) -> Option<Place<'a>> {
+    fn place<'a>(&self, minimum: &'a IslandMinimum) -> Option<MinimumPlace<'a>> {
         let z_mm = minimum.point_mm[2];
         let layer = self.layer_above(z_mm);
         let &thickness_mm = self.thickness_mm.get(layer).filter(|_| layer > 0)?;
@@ -139,7 +139,7 @@ impl Grid {
         let last = self.layer_above(z_mm + minimum.depth_mm).max(layer + 1);
         let [x, [least_y, most_y]] = minimum.box_mm;
         let sides = [x.map(|x| self.column(x)), [most_y, least_y].map(|y| self.row(y))];
-        Some(Place {
+        Some(MinimumPlace {
             minimum,
             // A curved surface reaches below its facets.
             layers: layer as u32 - 1..=last as u32,
@@ -153,7 +153,7 @@ impl Grid {
 }
 
 /// Where a minimum shows in the images.
-struct Place<'a> {
+struct MinimumPlace<'a> {
     minimum: &'a IslandMinimum,
     /// The layers that may begin its island.
     layers: RangeInclusive<u32>,
@@ -165,7 +165,7 @@ struct Place<'a> {
     drift: f64,
 }
 
-impl Place<'_> {
+impl MinimumPlace<'_> {
     /// Returns whether an island of one of the layers begins here.
     fn begins(&self, island: &Island) -> bool {
         let later = f64::from((island.layer + 1).saturating_sub(self.first));

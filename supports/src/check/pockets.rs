@@ -6,7 +6,7 @@
 use lamp_stack::sets::{root, unite};
 
 use super::components::Component;
-use super::contact::{Contact, Labelled};
+use super::contact::{Labelled, LayerContact};
 use super::findings::{Listed, Pocket, PocketKind};
 use super::live::{Group, Live, Next};
 
@@ -16,17 +16,17 @@ pub(super) struct Hollows {
     speck: u32,
     pub(super) pockets: Listed<Pocket>,
     /// None if nobody asks.
-    numbers: Option<Numbers>,
+    numbers: Option<BodyNumbers>,
 }
 
 /// Numbers of black bodies, in the order in which they begin. Bodies that unite share a number.
 #[derive(Default)]
-struct Numbers {
+struct BodyNumbers {
     parents: Vec<u32>,
     is_open: Vec<bool>,
 }
 
-impl Numbers {
+impl BodyNumbers {
     fn begin(&mut self) -> u32 {
         let number = self.parents.len() as u32;
         self.parents.push(number);
@@ -53,14 +53,14 @@ impl Hollows {
 
     /// Keeps the numbers of bodies that have ended, for [`is_open`](Self::is_open).
     pub(super) fn with_numbers(self) -> Self {
-        Self { numbers: Some(Numbers::default()), ..self }
+        Self { numbers: Some(BodyNumbers::default()), ..self }
     }
 
     /// Adds a layer, given its number from the first and how it lies on the one below.
     pub(super) fn add(
         &mut self,
         layer: &Labelled,
-        contact: Option<&Contact>,
+        contact: Option<&LayerContact>,
         number: u32,
         thickness_um: f64,
     ) {
@@ -77,7 +77,7 @@ impl Hollows {
             let mut hollow = united.unwrap_or_else(|| {
                 let first = &layer.components.all[components[0] as usize];
                 // Without numbers, no body is asked for by its number.
-                Hollow::begin(first, number, self.numbers.as_mut().map_or(0, Numbers::begin))
+                Hollow::begin(first, number, self.numbers.as_mut().map_or(0, BodyNumbers::begin))
             });
             hollow.grow(layer, &components, number, thickness_um, self.speck);
             self.live.put(hollow);

@@ -47,13 +47,17 @@ pub struct PoseFacts {
 ///
 /// Bodies that only overlap do not meet here: each has its own islands.
 pub fn measure(table: &CornerTable, poses: &[Pose], limits: &PoseLimits) -> Vec<PoseFacts> {
-    let part =
-        Measured { table, relief: Relief::new(table), points: points(table), areas: areas(table) };
+    let part = MeasuredPart {
+        table,
+        relief: Relief::new(table),
+        points: points(table),
+        areas: areas(table),
+    };
     poses.par_iter().map(|pose| part.facts(*pose, limits)).collect()
 }
 
 /// A part that is measured in many poses.
-struct Measured<'a> {
+struct MeasuredPart<'a> {
     table: &'a CornerTable,
     relief: Relief<'a>,
     /// The points that facets have.
@@ -86,7 +90,7 @@ fn areas(table: &CornerTable) -> Vec<[f32; 4]> {
     facets.map(|facet| if table.is_idle(facet) { [0.0; 4] } else { area(facet) }).collect()
 }
 
-impl Measured<'_> {
+impl MeasuredPart<'_> {
     fn facts(&self, pose: Pose, limits: &PoseLimits) -> PoseFacts {
         let axes = pose.axes();
         let up = axes[2];

@@ -9,8 +9,8 @@ use super::{
     Shown, StrayRowsRecord,
 };
 use crate::check::{
-    Disagreements, End, Findings, Island, LayerFacts, LoneMinimum, OffBalance, Overhang, Pocket,
-    PocketKind, Region, WeakJoint,
+    Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, OffBalance, Overhang,
+    Pocket, PocketKind, Region, WeakJoint,
 };
 
 /// Returns the records of all findings, the worst first, given the shear stress of the recoating
@@ -52,9 +52,9 @@ impl IslandRecord {
     /// blade in pascals.
     pub fn new(island: &Island, scale: &Scale<'_>, shear_pa: Option<f64>) -> Self {
         let (joins, into) = match island.end {
-            End::Loose => (None, None),
-            End::JoinsPart { layer } => (Some(layer), Some(Joined::Part(PartWord::Part))),
-            End::JoinsIsland { layer, number } => (Some(layer), Some(Joined::Island(number))),
+            IslandEnd::Loose => (None, None),
+            IslandEnd::JoinsPart { layer } => (Some(layer), Some(Joined::Part(PartWord::Part))),
+            IslandEnd::JoinsIsland { layer, number } => (Some(layer), Some(Joined::Island(number))),
         };
         Self {
             number: island.number,

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 /// White pixels as runs: rows, from the top, and columns.
-pub(super) type Runs = Vec<(u32, Range<u32>)>;
+pub(super) type WhiteRuns = Vec<(u32, Range<u32>)>;
 
 /// A piece of an island.
 #[derive(Debug, PartialEq)]
-pub(super) struct Piece {
+pub(super) struct IslandPiece {
     pub(super) area: u64,
     /// The point to hold, as column and row: the centroid, or else the center of the pixel that is
     /// nearest to it. The first pixel's center is at (0.5, 0.5).
@@ -17,14 +17,19 @@ pub(super) struct Piece {
 /// Divides an island by an even grid over its box into pieces up to `hold` pixels wide and high.
 /// Pieces of fewer than `least` pixels are left out, unless there is no other. Returns `None` if
 /// the grid has more than `most` cells.
-pub(super) fn divided(runs: &Runs, hold: f64, least: f64, most: usize) -> Option<Vec<Piece>> {
+pub(super) fn divided(
+    runs: &WhiteRuns,
+    hold: f64,
+    least: f64,
+    most: usize,
+) -> Option<Vec<IslandPiece>> {
     let rows = bounds(runs.iter().map(|(row, _)| *row..row + 1));
     let columns = bounds(runs.iter().map(|(_, run)| run.clone()));
     let (across, down) = (cells(&columns, hold, most)?, cells(&rows, hold, most)?);
     if across.len().saturating_mul(down.len()) > most {
         return None;
     }
-    let within = |cell: (&Range<u32>, &Range<u32>)| -> Runs {
+    let within = |cell: (&Range<u32>, &Range<u32>)| -> WhiteRuns {
         let in_rows = runs.iter().filter(|(row, _)| cell.0.contains(row));
         let clipped =
             in_rows.map(|(row, run)| (*row, run.start.max(cell.1.start)..run.end.min(cell.1.end)));
@@ -32,9 +37,9 @@ pub(super) fn divided(runs: &Runs, hold: f64, least: f64, most: usize) -> Option
         clipped.filter(|(_, run)| !run.is_empty()).collect()
     };
     let grid = down.iter().flat_map(|rows| across.iter().map(move |columns| (rows, columns)));
-    let pieces: Vec<Piece> =
+    let pieces: Vec<IslandPiece> =
         grid.map(within).filter(|runs| !runs.is_empty()).map(|runs| piece(&runs)).collect();
-    let is_large = |piece: &Piece| piece.area as f64 >= least;
+    let is_large = |piece: &IslandPiece| piece.area as f64 >= least;
     Some(match pieces.iter().any(is_large) {
         true => pieces.into_iter().filter(is_large).collect(),
         false => vec![piece(runs)],
@@ -54,7 +59,7 @@ fn cells(range: &Range<u32>, hold: f64, most: usize) -> Option<Vec<Range<u32>>> 
     (count <= most as u64).then(|| (0..count).map(|k| at(k)..at(k + 1)).collect())
 }
 
-fn piece(runs: &Runs) -> Piece {
+fn piece(runs: &WhiteRuns) -> IslandPiece {
     let area: u64 = runs.iter().map(|(_, run)| u64::from(run.end - run.start)).sum();
     let count = |run: &Range<u32>| f64::from(run.end - run.start);
     let columns = |run: &Range<u32>| count(run) * f64::midpoint(run.start.into(), run.end.into());
@@ -64,7 +69,7 @@ fn piece(runs: &Runs) -> Piece {
     let pixel = [x, y].map(|place| place as u32);
     // The centroid of a ring or a hook may be outside of it.
     if runs.iter().any(|(row, run)| *row == pixel[1] && run.contains(&pixel[0])) {
-        return Piece { area, middle: [x, y] };
+        return IslandPiece { area, middle: [x, y] };
     }
     let nearest = runs.iter().map(|(row, run)| {
         let column = pixel[0].clamp(run.start, run.end - 1);
@@ -72,7 +77,7 @@ fn piece(runs: &Runs) -> Piece {
         ((middle[0] - x).powi(2) + (middle[1] - y).powi(2), middle)
     });
     let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a piece has pixels");
-    Piece { area, middle: nearest.1 }
+    IslandPiece { area, middle: nearest.1 }
 }
 
 #[cfg(test)]
@@ -81,14 +86,17 @@ mod tests {
 
     #[test]
     fn a_ring_is_held_at_its_nearest_pixel() {
-        let ring: Runs = vec![(3, 4..9), (4, 4..5), (4, 8..9), (5, 4..9)];
-        assert_eq!(divided(&ring, 9.0, 1.0, 1), Some(vec![Piece { area: 12, middle: [6.5, 3.5] }]));
+        let ring: WhiteRuns = vec![(3, 4..9), (4, 4..5), (4, 8..9), (5, 4..9)];
+        assert_eq!(
+            divided(&ring, 9.0, 1.0, 1),
+            Some(vec![IslandPiece { area: 12, middle: [6.5, 3.5] }])
+        );
     }
 
     #[test]
     fn wide_islands_are_divided_evenly() {
         // An L: a bar of 12 x 2 pixels, and one of 2 x 7 below its left end.
-        let mut runs: Runs = (0..2).map(|row| (row, 10..22)).collect();
+        let mut runs: WhiteRuns = (0..2).map(|row| (row, 10..22)).collect();
         runs.extend((2..9).map(|row| (row, 10..12)));
         let divided = |hold, least| divided(&runs, hold, least, 108).unwrap();
         let pieces = divided(5.0, 1.0);

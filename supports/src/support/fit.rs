@@ -6,23 +6,23 @@ use lamp_slicer::brep::vector::{Vec3, dot, sub};
 use lamp_stack::{Length, Strut};
 
 use super::Rejection;
-use super::divide::Runs;
+use super::divide::WhiteRuns;
 use super::surface::Contact;
-use super::window::{Raster, Window};
+use super::window::{Raster, SupportWindow};
 use crate::check::LayerFacts;
 
 /// The surroundings of an island.
-pub(super) struct Surroundings<'a> {
+pub(super) struct IslandSurroundings<'a> {
     pub(super) raster: Raster,
     /// All layers of the stack, whose heights are known.
     pub(super) layers: &'a [LayerFacts],
     /// The images below the island.
-    pub(super) window: &'a Window,
+    pub(super) window: &'a SupportWindow,
     /// The first layer that a support may reach.
     pub(super) lowest: u32,
     /// The island's first layer, and its pixels there.
     pub(super) layer: u32,
-    pub(super) island: &'a Runs,
+    pub(super) island: &'a WhiteRuns,
 }
 
 /// Returns the bottom and the thickness of a layer in millimeters, if its page states them.
@@ -30,7 +30,7 @@ pub(super) fn span_mm(layer: &LayerFacts) -> Option<[f64; 2]> {
     Some([layer.z_um? / 1000.0, layer.thickness_um? / 1000.0])
 }
 
-impl Surroundings<'_> {
+impl IslandSurroundings<'_> {
     /// Checks that a strut of this radius from the island to a contact holds the island, if it
     /// is drawn into the images, touches nothing on the way and stays in the part below.
     pub(super) fn try_strut(
@@ -72,7 +72,7 @@ impl Surroundings<'_> {
         &self,
         number: u32,
         middle: Length,
-        section: &Runs,
+        section: &WhiteRuns,
         contact: &Contact,
         radius_mm: f64,
     ) -> Result<(), Rejection> {
@@ -106,7 +106,12 @@ impl Surroundings<'_> {
 
     /// Checks that at least half of a section rests on white or is white already, and some of
     /// each of its components. `below` is the strut's section one layer below.
-    fn check_rest(&self, number: u32, section: &Runs, below: &Runs) -> Result<(), Rejection> {
+    fn check_rest(
+        &self,
+        number: u32,
+        section: &WhiteRuns,
+        below: &WhiteRuns,
+    ) -> Result<(), Rejection> {
         // The first layer stands on the platform.
         if number == 0 {
             return Ok(());
@@ -136,7 +141,7 @@ impl Surroundings<'_> {
 }
 
 /// Returns what a run of a row shares with others, which have at most one run a row.
-fn overlaps(others: &Runs, row: u32, run: &Range<u32>) -> impl Iterator<Item = Range<u32>> {
+fn overlaps(others: &WhiteRuns, row: u32, run: &Range<u32>) -> impl Iterator<Item = Range<u32>> {
     let found = others.binary_search_by_key(&row, |(row, _)| *row).ok();
     let shared = found.map(|k| others[k].1.start.max(run.start)..others[k].1.end.min(run.end));
     shared.filter(|run| !run.is_empty()).into_iter()

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::cone::{beside, directions};
-use super::divide::{Piece, divided};
-use super::fit::{Surroundings, distance_mm, span_mm};
+use super::divide::{IslandPiece, divided};
+use super::fit::{IslandSurroundings, distance_mm, span_mm};
 use super::surface::{Contact, NearSurface, Surface};
-use super::window::{Raster, Window};
+use super::window::{Raster, SupportWindow};
 use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions};
 use crate::check::{Findings, Island, Region, component_at};
 
@@ -52,14 +52,14 @@ pub fn plan_supports<E: From<SupportError>>(
     surface: &Surface,
     options: &SupportOptions,
 ) -> Result<Vec<IslandPlan>, E> {
-    let mut planner = Planner::new(found, surface, options)?;
+    let mut planner = SupportPlanner::new(found, surface, options)?;
     let mut islands: Vec<&Island> = found.islands.list.iter().collect();
     islands.sort_by_key(|island| island.number);
     if islands.len() > MOST_SUPPORTS {
         return Err(SupportError::TooMany.into());
     }
     let regions = planner.regions(&islands);
-    let (mut window, mut plans) = (Window::default(), Vec::new());
+    let (mut window, mut plans) = (SupportWindow::default(), Vec::new());
     for (number, layer) in (0..).zip(layers) {
         let Some(next) = islands.get(plans.len()) else { break };
         let mask = layer?.image.into_image().into_mask(options.threshold);
@@ -86,7 +86,7 @@ const MOST_RADII: f64 = 4.0;
 /// The least angle by which supports are turned to make them shorter: some 4 um at 10 mm.
 const LEAST_STEP: f64 = 4e-4;
 
-struct Planner<'a> {
+struct SupportPlanner<'a> {
     found: &'a Findings,
     surface: &'a Surface,
     options: &'a SupportOptions,
@@ -96,7 +96,7 @@ struct Planner<'a> {
     built: Vec<[Vec3; 2]>,
 }
 
-impl<'a> Planner<'a> {
+impl<'a> SupportPlanner<'a> {
     fn new(
         found: &'a Findings,
         surface: &'a Surface,
@@ -165,12 +165,12 @@ impl<'a> Planner<'a> {
     fn plan(
         &mut self,
         island: &Island,
-        window: &Window,
+        window: &SupportWindow,
         mask: &Mask,
     ) -> Result<IslandPlan, SupportError> {
         let [column, row] = island.first;
         let runs = component_at(mask, column, row);
-        let surroundings = Surroundings {
+        let surroundings = IslandSurroundings {
             raster: self.raster,
             layers: &self.found.layers,
             window,
@@ -210,7 +210,12 @@ impl<'a> Planner<'a> {
     }
 
     /// Finds the supports of a piece of an island.
-    fn place(&self, piece: &Piece, near: &NearSurface, around: &Surroundings<'_>) -> HeldPlace {
+    fn place(
+        &self,
+        piece: &IslandPiece,
+        near: &NearSurface,
+        around: &IslandSurroundings<'_>,
+    ) -> HeldPlace {
         let [x, y] = self.raster.place_mm(piece.middle);
         let origin_mm = [x, y, self.bottom_mm(around.layer)];
         let tried = self.directions.par_iter();
@@ -233,7 +238,7 @@ impl<'a> Planner<'a> {
 
     /// Turns a support in ever smaller steps, beginning with half the angle between directions, as
     /// long as a turn makes it shorter.
-    fn shorten(&self, support: &mut Support, near: &NearSurface, around: &Surroundings<'_>) {
+    fn shorten(&self, support: &mut Support, near: &NearSurface, around: &IslandSurroundings<'_>) {
         // A direction's share of the solid angle, 2π (1 - cos), is about a step squared.
         let cone = 2.0 * PI * (1.0 - self.options.max_tilt.to_radians().cos());
         let mut step = (cone / self.directions.len() as f64).sqrt() / 2.0;
@@ -255,7 +260,7 @@ impl<'a> Planner<'a> {
         origin_mm: Vec3,
         direction: Vec3,
         near: &NearSurface,
-        around: &Surroundings<'_>,
+        around: &IslandSurroundings<'_>,
     ) -> Result<Support, Rejection> {
         let options = self.options;
         // The costly check, in the images, comes last.

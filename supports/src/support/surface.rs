@@ -50,7 +50,7 @@ impl Surface {
 #[derive(Debug)]
 pub(super) struct NearSurface {
     facets: RTree<NearFacet>,
-    edges: RTree<GeomWithData<Line<Vec3>, Turn>>,
+    edges: RTree<GeomWithData<Line<Vec3>, EdgeTurn>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +64,7 @@ struct NearFacet {
 
 /// How the surface turns at an edge.
 #[derive(Clone, Copy, Debug)]
-enum Turn {
+enum EdgeTurn {
     /// By more than 30°, or the edge is not between two facets.
     Crease,
     /// Evenly, with this curvature in 1/mm.
@@ -141,9 +141,9 @@ impl NearSurface {
             }
             let turn = match *sides {
                 [(_, a, of_a), (_, b, of_b)] => turn((&facets[a], of_a), (&facets[b], of_b)),
-                _ => Turn::Crease,
+                _ => EdgeTurn::Crease,
             };
-            if let Turn::Smooth(curvature) = turn {
+            if let EdgeTurn::Smooth(curvature) = turn {
                 for &(_, facet, _) in sides {
                     facets[facet].curvature = facets[facet].curvature.max(curvature);
                 }
@@ -155,7 +155,7 @@ impl NearSurface {
 
     /// Returns where a ray first enters the part; `direction` is a unit vector.
     pub(super) fn entered(&self, origin: Vec3, direction: Vec3) -> Option<Contact> {
-        let ray = Ray { origin, direction };
+        let ray = RaySelection { origin, direction };
         let met = self.facets.locate_with_selection_function(ray);
         let met = met.filter_map(|facet| Some((facet.entered(origin, direction)?, facet)));
         let (length_mm, facet) = met.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -166,15 +166,15 @@ impl NearSurface {
     /// Returns whether a crease is nearer to a point.
     pub(super) fn has_crease_within(&self, point: Vec3, distance_mm: f64) -> bool {
         let mut edges = self.edges.locate_within_distance(point, distance_mm * distance_mm);
-        edges.any(|edge| matches!(edge.data, Turn::Crease))
+        edges.any(|edge| matches!(edge.data, EdgeTurn::Crease))
     }
 
     /// Returns the largest curvature around a contact, in 1/mm.
     pub(super) fn curvature(&self, contact: &Contact, radius_mm: f64) -> f64 {
         let edges = self.edges.locate_within_distance(contact.at_mm, radius_mm * radius_mm);
         let curvatures = edges.filter_map(|edge| match edge.data {
-            Turn::Smooth(curvature) => Some(curvature),
-            Turn::Crease => None,
+            EdgeTurn::Smooth(curvature) => Some(curvature),
+            EdgeTurn::Crease => None,
         });
         curvatures.fold(contact.curvature, f64::max)
     }
@@ -189,20 +189,20 @@ fn key(facet: &NearFacet, side: usize) -> [[u64; 3]; 2] {
 /// Returns how the surface turns at the edge that sides of two facets share.
 ///
 /// Where facets stand for a curve, each turns against the next by its width times the curvature.
-fn turn((a, of_a): (&NearFacet, usize), (b, of_b): (&NearFacet, usize)) -> Turn {
+fn turn((a, of_a): (&NearFacet, usize), (b, of_b): (&NearFacet, usize)) -> EdgeTurn {
     // Exact for small angles, unlike the arc cosine.
     let angle = length(cross(a.normal, b.normal)).atan2(dot(a.normal, b.normal));
     let width = f64::midpoint(a.height(of_a), b.height(of_b));
-    if angle > CREASE { Turn::Crease } else { Turn::Smooth(angle / width) }
+    if angle > CREASE { EdgeTurn::Crease } else { EdgeTurn::Smooth(angle / width) }
 }
 
 /// Selects the boxes that a ray passes through.
-struct Ray {
+struct RaySelection {
     origin: Vec3,
     direction: Vec3,
 }
 
-impl SelectionFunction<NearFacet> for Ray {
+impl SelectionFunction<NearFacet> for RaySelection {
     fn should_unpack_parent(&self, envelope: &AABB<Vec3>) -> bool {
         let (low, high) = (envelope.lower(), envelope.upper());
         // The ray must be between all three pairs of planes at once (Kay and Kajiya 1986).

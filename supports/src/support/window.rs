@@ -37,7 +37,7 @@ impl Raster {
 
 /// The images below islands, cropped to what supports may reach.
 #[derive(Debug, Default)]
-pub(super) struct Window {
+pub(super) struct SupportWindow {
     /// The number of the first layer that is kept.
     first: u32,
     kept: VecDeque<Cropped>,
@@ -49,7 +49,7 @@ struct Cropped {
     mask: Mask,
 }
 
-impl Window {
+impl SupportWindow {
     /// Adds the next layer, or nothing of it.
     pub(super) fn push(&mut self, mask: &Mask, region: Option<&Region>) {
         let nothing = Region { columns: 0..0, rows: 0..0 };

@@ -4,7 +4,8 @@ use std::num::{NonZeroU8, NonZeroU32};
 
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo};
 use lamp_supports::{
-    CheckError, CheckOptions, End, Findings, Island, PocketKind, Region, check as check_layers,
+    CheckError, CheckOptions, Findings, Island, IslandEnd, PocketKind, Region,
+    check as check_layers,
 };
 
 use super::referee::{self, Block, Frame, Kind, Limits};
@@ -95,10 +96,10 @@ fn islands_agree(block: &Block, limits: &Limits, found: &Findings) {
         assert_eq!((ours.area as usize, frame(&ours.region)), (island.area, island.frame.clone()));
         near(ours.centroid, island.centroid);
         let end = match island.joins {
-            None => End::Loose,
-            Some((layer, None)) => End::JoinsPart { layer: layer as u32 },
+            None => IslandEnd::Loose,
+            Some((layer, None)) => IslandEnd::JoinsPart { layer: layer as u32 },
             Some((layer, Some(elder))) => {
-                End::JoinsIsland { layer: layer as u32, number: elder as u64 + 1 }
+                IslandEnd::JoinsIsland { layer: layer as u32, number: elder as u64 + 1 }
             }
         };
         assert_eq!(ours.end, end, "{island:?}");

@@ -6,7 +6,7 @@ use lamp_fixtures::{
 };
 use lamp_slicer::{Axis, Part, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
-use lamp_supports::{End, Findings, PocketKind};
+use lamp_supports::{Findings, IslandEnd, PocketKind};
 
 use super::agree::{agree_as, check};
 use super::referee::{Block, Limits};
@@ -60,7 +60,7 @@ fn finely(mesh: Mesh, placement: Placement) -> Findings {
 }
 
 /// Returns the layer of birth, area then, end and floating volume in mm³ of each island.
-fn islands(found: &Findings) -> Vec<(u32, u64, End, f64)> {
+fn islands(found: &Findings) -> Vec<(u32, u64, IslandEnd, f64)> {
     let island = |island: &lamp_supports::Island| {
         (island.layer, island.area, island.end, island.floating_pixels_um * 1e-5)
     };
@@ -103,7 +103,7 @@ fn parts_agree_with_flooded_voxels_at_100_dpi() {
 #[test]
 fn a_mug_has_a_floating_handle_and_a_cup() {
     let found = finely(mug(20_000), upright());
-    let [(80, 900, End::JoinsPart { layer: 140 }, floating_mm3)] = islands(&found)[..] else {
+    let [(80, 900, IslandEnd::JoinsPart { layer: 140 }, floating_mm3)] = islands(&found)[..] else {
         panic!("{:?}", found.islands)
     };
     near(floating_mm3, 54.0, 1e-12);
@@ -116,7 +116,7 @@ fn a_mug_has_a_floating_handle_and_a_cup() {
 #[test]
 fn cores_float_in_a_cavity_that_drains() {
     let found = finely(cavity_core(1000), upright());
-    let joins = End::JoinsPart { layer: 280 };
+    let joins = IslandEnd::JoinsPart { layer: 280 };
     let [(80, 6000, first, larger_mm3), (120, 2400, second, smaller_mm3)] = islands(&found)[..]
     else {
         panic!("{:?}", found.islands)
@@ -131,7 +131,7 @@ fn cores_float_in_a_cavity_that_drains() {
 #[test]
 fn a_needle_is_an_island_from_its_first_four_pixels() {
     let found = finely(needle(1000), upright());
-    let [(102, 4, End::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..] else {
+    let [(102, 4, IslandEnd::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..] else {
         panic!("{:?}", found.islands)
     };
     near(floating_mm3, 160.0 / 3.0, 0.02);
@@ -141,7 +141,8 @@ fn a_needle_is_an_island_from_its_first_four_pixels() {
 #[test]
 fn a_rod_floats_from_its_lowest_line() {
     let found = finely(lying_rod(20_000), upright());
-    let [(100, 1440, End::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..] else {
+    let [(100, 1440, IslandEnd::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..]
+    else {
         panic!("{:?}", found.islands)
     };
     near(floating_mm3, 48.0 * std::f64::consts::PI + 24.0, 5e-3);
@@ -151,7 +152,8 @@ fn a_rod_floats_from_its_lowest_line() {
 fn a_ring_is_an_island_around_its_centroid() {
     let layers = slice(ring(1000), FINE_DPI, 100.0, upright());
     let found = check(layers.clone(), &LIMITS);
-    let [(100, 15_600, End::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..] else {
+    let [(100, 15_600, IslandEnd::JoinsPart { layer: 200 }, floating_mm3)] = islands(&found)[..]
+    else {
         panic!("{:?}", found.islands)
     };
     near(floating_mm3, 408.0, 1e-12);
@@ -169,8 +171,8 @@ fn twin_islands_join_each_other_before_the_part() {
     else {
         panic!("{:?}", found.islands)
     };
-    assert_eq!(elder, End::JoinsPart { layer: 200 });
-    assert_eq!(younger, End::JoinsIsland { layer: 140, number: 1 });
+    assert_eq!(elder, IslandEnd::JoinsPart { layer: 200 });
+    assert_eq!(younger, IslandEnd::JoinsIsland { layer: 140, number: 1 });
     near(elder_mm3, 88.0, 1e-12);
     near(younger_mm3, 16.0, 1e-12);
 }

@@ -1,7 +1,7 @@
 //! Checks of arbitrary stacks.
 
 use lamp_stack::{Dpi, Layer, Mask, MaskBuilder, Orientation, PageInfo, Pages};
-use lamp_supports::{CheckError, CheckOptions, End, Findings};
+use lamp_supports::{CheckError, CheckOptions, Findings, IslandEnd};
 
 use super::{MAX_ROWS, decoded, file_of, one_line};
 
@@ -98,9 +98,9 @@ fn fits(found: &Findings, layers: &[Layer]) {
         assert!(island.area <= island.largest_area);
         assert!(island.largest_area <= island.floating_pixels);
         let end = match island.end {
-            End::Loose => layers,
-            End::JoinsPart { layer } => layer,
-            End::JoinsIsland { layer, number } => {
+            IslandEnd::Loose => layers,
+            IslandEnd::JoinsPart { layer } => layer,
+            IslandEnd::JoinsIsland { layer, number } => {
                 assert!(number < island.number);
                 layer
             }
