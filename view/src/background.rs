@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 
 /// Progress of work.
 #[derive(Debug, Default)]
-pub struct Progress {
+pub struct WorkProgress {
     done: AtomicU64,
     of: AtomicU64,
 }
 
-impl Progress {
+impl WorkProgress {
     /// Sets the amount of work.
     pub fn expect(&self, of: u64) {
         self.of.store(of, Ordering::Relaxed);
@@ -27,11 +27,11 @@ impl Progress {
 
 /// Work that goes on while the viewer answers, and its result.
 pub(crate) struct Background<T> {
-    progress: Progress,
-    result: Mutex<Stage<T>>,
+    progress: WorkProgress,
+    result: Mutex<WorkState<T>>,
 }
 
-enum Stage<T> {
+enum WorkState<T> {
     NotWanted,
     Running,
     Ready(T),
@@ -40,45 +40,45 @@ enum Stage<T> {
 
 impl<T> Default for Background<T> {
     fn default() -> Self {
-        Self { progress: Progress::default(), result: Mutex::new(Stage::NotWanted) }
+        Self { progress: WorkProgress::default(), result: Mutex::new(WorkState::NotWanted) }
     }
 }
 
 impl<T> Background<T> {
     /// Records that work will run.
     pub(crate) fn start(&self) {
-        *self.lock() = Stage::Running;
+        *self.lock() = WorkState::Running;
     }
 
     /// Records that work will run, if that is new. Returns whether it is new.
     pub(crate) fn start_once(&self) -> bool {
         let mut stage = self.lock();
-        let is_new = matches!(*stage, Stage::NotWanted);
+        let is_new = matches!(*stage, WorkState::NotWanted);
         if is_new {
-            *stage = Stage::Running;
+            *stage = WorkState::Running;
         }
         is_new
     }
 
     /// Works, and keeps the result or the failure.
-    pub(crate) fn run(&self, work: impl FnOnce(&Progress) -> Result<T, String>) {
+    pub(crate) fn run(&self, work: impl FnOnce(&WorkProgress) -> Result<T, String>) {
         self.start();
         let result = catch_unwind(AssertUnwindSafe(|| work(&self.progress)));
         *self.lock() = match result {
-            Ok(Ok(result)) => Stage::Ready(result),
-            Ok(Err(message)) => Stage::Failed(message),
-            Err(_) => Stage::Failed("an error of the program; please report it".to_owned()),
+            Ok(Ok(result)) => WorkState::Ready(result),
+            Ok(Err(message)) => WorkState::Failed(message),
+            Err(_) => WorkState::Failed("an error of the program; please report it".to_owned()),
         };
     }
 
     pub(crate) fn is_wanted(&self) -> bool {
-        !matches!(*self.lock(), Stage::NotWanted)
+        !matches!(*self.lock(), WorkState::NotWanted)
     }
 
     /// Returns the part of the result that `of` takes, if it is there.
     pub(crate) fn get<U>(&self, of: impl FnOnce(&T) -> U) -> Option<U> {
         match &*self.lock() {
-            Stage::Ready(result) => Some(of(result)),
+            WorkState::Ready(result) => Some(of(result)),
             _ => None,
         }
     }
@@ -86,17 +86,17 @@ impl<T> Background<T> {
     /// Returns the progress of the work.
     pub(crate) fn state(&self) -> Value {
         let (status, message) = match &*self.lock() {
-            Stage::NotWanted => ("none", None),
-            Stage::Running => ("running", None),
-            Stage::Ready(_) => ("ready", None),
-            Stage::Failed(message) => ("failed", Some(message.clone())),
+            WorkState::NotWanted => ("none", None),
+            WorkState::Running => ("running", None),
+            WorkState::Ready(_) => ("ready", None),
+            WorkState::Failed(message) => ("failed", Some(message.clone())),
         };
         let number = |number: &AtomicU64| number.load(Ordering::Relaxed);
-        let Progress { done, of } = &self.progress;
+        let WorkProgress { done, of } = &self.progress;
         json!({"status": status, "message": message, "done": number(done), "of": number(of)})
     }
 
-    fn lock(&self) -> MutexGuard<'_, Stage<T>> {
+    fn lock(&self) -> MutexGuard<'_, WorkState<T>> {
         self.result.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -9,7 +9,7 @@ use crate::error::ViewError;
 
 /// The key of a layer's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Key<K> {
+pub(crate) struct ImageKey<K> {
     pub(crate) stack: usize,
     pub(crate) layer: usize,
     pub(crate) kind: K,
@@ -24,7 +24,7 @@ pub(crate) struct Cache<K> {
 }
 
 struct Slots<K> {
-    of: HashMap<Key<K>, Slot>,
+    of: HashMap<ImageKey<K>, Slot>,
     /// Bytes of the images, and the most bytes that images in work may take.
     bytes: usize,
     requests: u64,
@@ -46,7 +46,7 @@ impl<K: Copy + Eq + std::hash::Hash> Cache<K> {
     /// Returns an image, made now if it is not kept. Until it is made, it may take `most_bytes`.
     pub(crate) fn get(
         &self,
-        key: Key<K>,
+        key: ImageKey<K>,
         most_bytes: usize,
         make: impl FnOnce() -> Result<Image, ViewError>,
     ) -> Result<Arc<Image>, ViewError> {
@@ -68,7 +68,7 @@ impl<K: Copy + Eq + std::hash::Hash> Cache<K> {
         slots.put(key, Slot { bytes: most_bytes, image: None, last_request: now });
         slots.free(self.most_bytes, key);
         drop(slots);
-        let mut work = Work { cache: self, key, image: None };
+        let mut work = ImageWork { cache: self, key, image: None };
         let image = Arc::new(make()?);
         work.image = Some(Arc::clone(&image));
         Ok(image)
@@ -81,18 +81,18 @@ impl<K: Copy + Eq + std::hash::Hash> Cache<K> {
 }
 
 impl<K: Copy + Eq + std::hash::Hash> Slots<K> {
-    fn put(&mut self, key: Key<K>, slot: Slot) {
+    fn put(&mut self, key: ImageKey<K>, slot: Slot) {
         self.bytes += slot.bytes;
         let before = self.of.insert(key, slot);
         self.bytes -= before.map_or(0, |before| before.bytes);
     }
 
-    fn remove(&mut self, key: Key<K>) {
+    fn remove(&mut self, key: ImageKey<K>) {
         self.bytes -= self.of.remove(&key).map_or(0, |slot| slot.bytes);
     }
 
     /// Drops images until the rest takes at most so many bytes, except `kept` and images in work.
-    fn free(&mut self, most_bytes: usize, kept: Key<K>) {
+    fn free(&mut self, most_bytes: usize, kept: ImageKey<K>) {
         while self.bytes > most_bytes {
             let made = self.of.iter().filter(|(key, slot)| **key != kept && slot.image.is_some());
             let Some((&oldest, _)) = made.min_by_key(|(_, slot)| slot.last_request) else { return };
@@ -102,13 +102,13 @@ impl<K: Copy + Eq + std::hash::Hash> Slots<K> {
 }
 
 /// An image in work. Its waiters learn of its end, whatever that is.
-struct Work<'a, K: Copy + Eq + std::hash::Hash> {
+struct ImageWork<'a, K: Copy + Eq + std::hash::Hash> {
     cache: &'a Cache<K>,
-    key: Key<K>,
+    key: ImageKey<K>,
     image: Option<Arc<Image>>,
 }
 
-impl<K: Copy + Eq + std::hash::Hash> Drop for Work<'_, K> {
+impl<K: Copy + Eq + std::hash::Hash> Drop for ImageWork<'_, K> {
     fn drop(&mut self) {
         let mut slots = self.cache.lock();
         match self.image.take() {
@@ -142,8 +142,8 @@ mod tests {
 
     use super::*;
 
-    fn key(layer: usize) -> Key<()> {
-        Key { stack: 0, layer, kind: () }
+    fn key(layer: usize) -> ImageKey<()> {
+        ImageKey { stack: 0, layer, kind: () }
     }
 
     fn black(rows: u32) -> Result<Image, ViewError> {

@@ -10,7 +10,7 @@ use crate::findings::{self, Finding};
 use crate::overlay::{only_in, rows};
 
 /// The source of an overlay's drawing.
-pub(crate) enum Drawing {
+pub(crate) enum DrawingSource {
     /// White in the layer alone, or else in any of the others alone, which have its size; missing
     /// images are black.
     Differs {
@@ -29,7 +29,7 @@ pub(crate) enum Drawing {
     },
 }
 
-impl Drawing {
+impl DrawingSource {
     /// The most bytes that the overlay takes.
     pub(crate) fn most_bytes(&self) -> usize {
         match self {

@@ -24,11 +24,11 @@ mod tile;
 mod viewer;
 
 pub use assets::licences;
-pub use background::Progress;
+pub use background::WorkProgress;
 pub use error::ViewError;
 pub use findings::{Finding, of_records, of_report};
 pub use overlay::Overlay;
 pub use server::{Address, Ticket, Token, serve};
 pub use stack::ViewedStack;
-pub use surface::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
+pub use surface::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions, SurfaceUnit};
 pub use viewer::Viewer;

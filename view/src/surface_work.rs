@@ -3,13 +3,13 @@
 use lamp_stack::StackError;
 use thiserror::Error;
 
-use crate::background::Progress;
+use crate::background::WorkProgress;
 use crate::error::ViewError;
 use crate::stack::ViewedStack;
 use crate::surface::{CellGrid, SurfaceError, SurfaceOptions};
 
 /// Makes the surface of a stack. One thread does, so that the others are free for tiles.
-pub(crate) fn surface_of(stack: &ViewedStack, progress: &Progress) -> Result<Vec<u8>, String> {
+pub(crate) fn surface_of(stack: &ViewedStack, progress: &WorkProgress) -> Result<Vec<u8>, String> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.map_err(|error| error.to_string())?;
     let made = pool.install(|| -> Result<Vec<u8>, SurfaceFault> {

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use lamp_stack::{FixRecord, Frame, Image, Mask};
 use serde_json::{Value, json};
 
-use crate::background::{Background, Progress};
-use crate::cache::{Cache, Key, image_bytes};
-use crate::drawing::Drawing;
+use crate::background::{Background, WorkProgress};
+use crate::cache::{Cache, ImageKey, image_bytes};
+use crate::drawing::DrawingSource;
 use crate::edge::nearest_edge;
 use crate::error::ViewError;
 use crate::findings::Finding;
@@ -23,7 +23,7 @@ use crate::tile::{Inks, TILE_SIDE, TileAt, tile};
 pub struct Viewer {
     stacks: Vec<ViewedStack>,
     partners: Partners,
-    cache: Cache<Kind>,
+    cache: Cache<ImageKind>,
     findings: Background<Vec<Finding>>,
     surface: Background<Vec<u8>>,
     version: &'static str,
@@ -31,7 +31,7 @@ pub struct Viewer {
 
 /// Which image of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Kind {
+pub(crate) enum ImageKind {
     /// As it is.
     Layer,
     /// White where a gray image has at least this level.
@@ -103,7 +103,7 @@ impl Viewer {
     /// Looks for findings of the first stack on a thread of their own.
     pub fn find(
         self: &Arc<Self>,
-        find: impl FnOnce(&ViewedStack, &Progress) -> Result<Vec<Finding>, String> + Send + 'static,
+        find: impl FnOnce(&ViewedStack, &WorkProgress) -> Result<Vec<Finding>, String> + Send + 'static,
     ) {
         let viewer = Arc::clone(self);
         self.findings.start();
@@ -171,7 +171,7 @@ impl Viewer {
         &self,
         stack: usize,
         layer: usize,
-        kind: Kind,
+        kind: ImageKind,
         at: TileAt,
         given_up: &GivenUp,
     ) -> Result<Vec<u8>, ViewError> {
@@ -181,8 +181,8 @@ impl Viewer {
         let image = self.image(stack, layer, kind, given_up)?;
         given_up.check()?;
         let inks = match kind {
-            Kind::Over(overlay) => Inks::One(overlay.colour()),
-            Kind::Layer | Kind::Cured(_) => Inks::Gray,
+            ImageKind::Over(overlay) => Inks::One(overlay.colour()),
+            ImageKind::Layer | ImageKind::Cured(_) => Inks::Gray,
         };
         tile(&image, at, inks).ok_or(ViewError::NoSuch("tile"))
     }
@@ -192,29 +192,29 @@ impl Viewer {
         &self,
         stack: usize,
         layer: usize,
-        kind: Kind,
+        kind: ImageKind,
         given_up: &GivenUp,
     ) -> Result<Arc<Image>, ViewError> {
         let of = self.stack(stack)?;
         of.header(layer)?;
         given_up.check()?;
-        let key = Key { stack, layer, kind };
+        let key = ImageKey { stack, layer, kind };
         match kind {
-            Kind::Layer => self.cache.get(key, of.expected_bytes(layer), || of.image(layer)),
-            Kind::Cured(level) => {
-                let image = self.image(stack, layer, Kind::Layer, given_up)?;
+            ImageKind::Layer => self.cache.get(key, of.expected_bytes(layer), || of.image(layer)),
+            ImageKind::Cured(level) => {
+                let image = self.image(stack, layer, ImageKind::Layer, given_up)?;
                 if matches!(*image, Image::Mask(_)) {
                     return Ok(image);
                 }
                 let cured = || Ok(Image::Mask(Image::clone(&image).into_mask(level)));
                 self.cache.get(key, image_bytes(&image), cured)
             }
-            Kind::Over(Overlay::Findings) if self.findings.get(|_| ()).is_none() => {
+            ImageKind::Over(Overlay::Findings) if self.findings.get(|_| ()).is_none() => {
                 // They may come yet, so this is not kept.
                 let [width, height] = of.header(layer)?.size;
                 Ok(Arc::new(Image::Mask(Mask::black(width, height))))
             }
-            Kind::Over(overlay) => {
+            ImageKind::Over(overlay) => {
                 let drawing = self.drawing(stack, layer, overlay, given_up)?;
                 self.cache.get(key, drawing.most_bytes(), || Ok(Image::Mask(drawing.draw())))
             }
@@ -228,8 +228,8 @@ impl Viewer {
         layer: usize,
         overlay: Overlay,
         given_up: &GivenUp,
-    ) -> Result<Drawing, ViewError> {
-        let image = |stack, layer| self.image(stack, layer, Kind::Layer, given_up);
+    ) -> Result<DrawingSource, ViewError> {
+        let image = |stack, layer| self.image(stack, layer, ImageKind::Layer, given_up);
         let below = || layer.checked_sub(1).map(|below| image(stack, below)).transpose();
         let header = self.stack(stack)?.header(layer)?;
         Ok(match overlay {
@@ -238,7 +238,7 @@ impl Viewer {
                 let frame = Frame { left: 0, top: 0, width, height };
                 let others = vec![below()?.map(|below| framed(below, frame))];
                 let in_layer = overlay == Overlay::New;
-                Drawing::Differs { layer: image(stack, layer)?, others, in_layer }
+                DrawingSource::Differs { layer: image(stack, layer)?, others, in_layer }
             }
             Overlay::Added | Overlay::Missing => {
                 let others = self.partners.of_layer(&self.stacks, stack, layer);
@@ -251,18 +251,20 @@ impl Viewer {
                 // Added pixels are white in the second stack alone, also where it is the one looked
                 // at.
                 let in_layer = (overlay == Overlay::Added) == (stack == 1);
-                Drawing::Differs { layer: image(stack, layer)?, others, in_layer }
+                DrawingSource::Differs { layer: image(stack, layer)?, others, in_layer }
             }
-            Overlay::Fixed => Drawing::Rows { bands: fixed_bands(&header.info), size: header.size },
+            Overlay::Fixed => {
+                DrawingSource::Rows { bands: fixed_bands(&header.info), size: header.size }
+            }
             Overlay::Stray => {
-                Drawing::Rows { bands: bands(&header.info.stray_rows), size: header.size }
+                DrawingSource::Rows { bands: bands(&header.info.stray_rows), size: header.size }
             }
             Overlay::Findings => {
                 let of_layer = |found: &Vec<Finding>| {
                     found.iter().filter(|found| stack == 0 && found.is_in(layer)).cloned().collect()
                 };
                 let found: Vec<Finding> = self.findings.get(of_layer).unwrap_or_default();
-                Drawing::Findings { found, layer: image(stack, layer)?, below: below()? }
+                DrawingSource::Findings { found, layer: image(stack, layer)?, below: below()? }
             }
         })
     }
@@ -281,7 +283,7 @@ impl Viewer {
         if x >= header.size[0] || y >= header.size[1] {
             return Err(ViewError::NoSuch("pixel"));
         }
-        let image = self.image(stack, layer, Kind::Layer, given_up)?;
+        let image = self.image(stack, layer, ImageKind::Layer, given_up)?;
         let level = image.level(x, y);
         let white = level >= threshold.map_or(1, NonZeroU8::get);
         let place = place_mm(header, x, y);
@@ -336,7 +338,7 @@ impl Viewer {
         if !(radius >= 0.0 && at.iter().all(|at| at.is_finite())) {
             return Err(ViewError::Malformed("x, y and radius must be numbers"));
         }
-        let image = self.image(stack, layer, Kind::Layer, given_up)?;
+        let image = self.image(stack, layer, ImageKind::Layer, given_up)?;
         let point = nearest_edge(&image.exposed(), at, radius);
         Ok(json!({"x": point.map(|point| point[0]), "y": point.map(|point| point[1])}))
     }

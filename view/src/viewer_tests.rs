@@ -48,7 +48,7 @@ fn viewer() -> Viewer {
 }
 
 fn drawn(viewer: &Viewer, stack: usize, layer: usize, overlay: Overlay) -> Image {
-    let image = viewer.image(stack, layer, Kind::Over(overlay), &GivenUp::default());
+    let image = viewer.image(stack, layer, ImageKind::Over(overlay), &GivenUp::default());
     Image::clone(&image.unwrap())
 }
 
@@ -160,7 +160,7 @@ fn pixels_are_told() {
     assert_eq!(pixel(3, 0, threshold).unwrap()["white"], json!(false));
     assert_eq!(pixel(8, 0, None), Err(ViewError::NoSuch("pixel")));
     let cured = |level| {
-        let kind = Kind::Cured(std::num::NonZeroU8::new(level).unwrap());
+        let kind = ImageKind::Cured(std::num::NonZeroU8::new(level).unwrap());
         let image = viewer.image(0, 0, kind, &GivenUp::default()).unwrap();
         image.change_count()
     };
@@ -184,7 +184,7 @@ fn what_there_is_not_and_what_nobody_waits_for_is_refused() {
     let viewer = viewer();
     let tile = |stack, layer, x, given_up: &GivenUp| {
         let at = TileAt { reduction: 0, x, y: 0 };
-        viewer.tile(stack, layer, Kind::Layer, at, given_up).map(drop)
+        viewer.tile(stack, layer, ImageKind::Layer, at, given_up).map(drop)
     };
     let waiting = GivenUp::default();
     assert_eq!(tile(0, 1, 0, &waiting), Ok(()));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_slicer::write_stl;
 use lamp_stack::IndexedStack;
-use lamp_view::{CellGrid, MAX_CELLS, Surface, SurfaceError, SurfaceOptions, SurfaceUnit};
+use lamp_view::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions, SurfaceUnit};
 
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -76,7 +76,7 @@ fn surface_of(
     stack: &IndexedStack,
     args: &MeshOutArgs,
     progress: &Progress,
-) -> Result<Surface, Exit> {
+) -> Result<StackSurface, Exit> {
     let name = input_name(&args.stack);
     let at_stack = |error: SurfaceError| Exit::from(error).at(name.clone());
     let options =

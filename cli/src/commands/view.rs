@@ -181,7 +181,7 @@ fn sliced(part: &SlicedPart, progress: &Progress) -> Result<File, Exit> {
 /// Finds what `lamp check` finds.
 fn find(
     stack: &ViewedStack,
-    progress: &lamp_view::Progress,
+    progress: &lamp_view::WorkProgress,
 ) -> Result<Vec<lamp_view::Finding>, Exit> {
     let headers = stack.headers();
     progress.expect(headers.len() as u64);

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 
 use super::answer::{refusal, welcome, with_policy};
 use super::connections::Trust;
-use super::ticket::{Shown, Ticket, show};
+use super::ticket::{Ticket, TicketCheck, show};
 use super::token::Token;
 
 const NO_TOKEN: &str = "lamp view printed an address that opens this page, once; for another, end \
@@ -66,13 +66,13 @@ impl Guard {
                 answer.headers_mut().insert(LOCATION, HeaderValue::from_static("/"));
                 with_policy(answer)
             }
-            Shown::Valid => {
+            TicketCheck::Valid => {
                 let (name, secret) = (&self.cookie, &self.secret);
                 let cookie = format!("{name}={secret}; Path=/; HttpOnly; SameSite=Strict");
                 welcome(&HeaderValue::from_str(&cookie).expect("it is ASCII"))
             }
-            Shown::UsedBefore => refusal(StatusCode::FORBIDDEN, USED_TOKEN),
-            Shown::Unknown => refusal(StatusCode::FORBIDDEN, NO_TOKEN),
+            TicketCheck::UsedBefore => refusal(StatusCode::FORBIDDEN, USED_TOKEN),
+            TicketCheck::Unknown => refusal(StatusCode::FORBIDDEN, NO_TOKEN),
         }
     }
 

@@ -20,7 +20,7 @@ use crate::assets;
 use crate::error::ViewError;
 use crate::overlay::Overlay;
 use crate::tile::TileAt;
-use crate::viewer::Kind;
+use crate::viewer::ImageKind;
 
 /// Returns all addresses, behind the guard.
 pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
@@ -53,10 +53,10 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
 
 type Answer = Result<Response, ViewError>;
 /// The names in an address. A name that is not a number, or not text, names nothing that exists.
-type Named<T> = Result<Path<T>, PathRejection>;
+type AddressNames<T> = Result<Path<T>, PathRejection>;
 type Keys<T> = Result<Query<T>, QueryRejection>;
 
-fn named<T>(path: Named<T>) -> Result<T, ViewError> {
+fn named<T>(path: AddressNames<T>) -> Result<T, ViewError> {
     path.map(|Path(names)| names).map_err(|_| ViewError::NoSuch("page"))
 }
 
@@ -75,7 +75,7 @@ fn asset_named(name: &str) -> Response {
     }
 }
 
-async fn file(path: Named<String>) -> Answer {
+async fn file(path: AddressNames<String>) -> Answer {
     Ok(asset_named(&named(path)?))
 }
 
@@ -97,12 +97,12 @@ async fn surface(State(workers): State<Arc<Workers>>) -> Answer {
     workers.run(|viewer, _| viewer.surface().map(binary)).await
 }
 
-async fn layers(State(workers): State<Arc<Workers>>, path: Named<usize>) -> Answer {
+async fn layers(State(workers): State<Arc<Workers>>, path: AddressNames<usize>) -> Answer {
     let stack = named(path)?;
     json(workers, move |viewer, _| Ok(viewer.stack(stack)?.layers())).await
 }
 
-async fn layer(State(workers): State<Arc<Workers>>, path: Named<(usize, usize)>) -> Answer {
+async fn layer(State(workers): State<Arc<Workers>>, path: AddressNames<(usize, usize)>) -> Answer {
     let (stack, layer) = named(path)?;
     let facts = json_of(&workers.viewer().layer(stack, layer)?);
     workers.expect_near(stack, layer);
@@ -118,7 +118,7 @@ struct PixelKeys {
 
 async fn pixel(
     State(workers): State<Arc<Workers>>,
-    path: Named<(usize, usize)>,
+    path: AddressNames<(usize, usize)>,
     query: Keys<PixelKeys>,
 ) -> Answer {
     let (stack, layer) = named(path)?;
@@ -138,7 +138,7 @@ struct EdgeKeys {
 
 async fn edge(
     State(workers): State<Arc<Workers>>,
-    path: Named<(usize, usize)>,
+    path: AddressNames<(usize, usize)>,
     query: Keys<EdgeKeys>,
 ) -> Answer {
     let (stack, layer) = named(path)?;
@@ -156,7 +156,7 @@ struct TileKeys {
 
 async fn tile(
     State(workers): State<Arc<Workers>>,
-    path: Named<(usize, usize, String, u32, u32, String)>,
+    path: AddressNames<(usize, usize, String, u32, u32, String)>,
     query: Keys<TileKeys>,
 ) -> Answer {
     let (stack, layer, kind, reduction, x, file) = named(path)?;
@@ -164,11 +164,11 @@ async fn tile(
     let y = y.ok_or(ViewError::NoSuch("tile"))?;
     let threshold = keys(query)?.threshold;
     let kind = match (kind.as_str(), threshold) {
-        ("layer", None) => Kind::Layer,
-        ("layer", Some(threshold)) => Kind::Cured(threshold),
+        ("layer", None) => ImageKind::Layer,
+        ("layer", Some(threshold)) => ImageKind::Cured(threshold),
         (name, _) => {
             let overlay: Result<Overlay, _> = name.parse();
-            Kind::Over(overlay.map_err(|_| ViewError::NoSuch("overlay"))?)
+            ImageKind::Over(overlay.map_err(|_| ViewError::NoSuch("overlay"))?)
         }
     };
     let at = TileAt { reduction, x, y };

@@ -13,7 +13,7 @@ pub struct Ticket {
 
 /// The result of checking a text as the token of a ticket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum TicketCheck {
     Unknown,
     /// It was shown for the first time.
     Valid,
@@ -27,25 +27,25 @@ impl Ticket {
     }
 
     /// Uses the ticket, if a text is its token.
-    fn show(&self, text: &str) -> Shown {
+    fn show(&self, text: &str) -> TicketCheck {
         if !self.token.is(text) {
-            return Shown::Unknown;
+            return TicketCheck::Unknown;
         }
         let unused = self.when_used.lock().unwrap_or_else(PoisonError::into_inner).take();
         match unused {
             Some(when_used) => {
                 when_used();
-                Shown::Valid
+                TicketCheck::Valid
             }
-            None => Shown::UsedBefore,
+            None => TicketCheck::UsedBefore,
         }
     }
 }
 
 /// Uses the ticket that has a text as its token, if there is one.
-pub(super) fn show(tickets: &[Ticket], text: &str) -> Shown {
+pub(super) fn show(tickets: &[Ticket], text: &str) -> TicketCheck {
     let shown = tickets.iter().map(|ticket| ticket.show(text));
-    shown.fold(Shown::Unknown, |all, one| if one == Shown::Unknown { all } else { one })
+    shown.fold(TicketCheck::Unknown, |all, one| if one == TicketCheck::Unknown { all } else { one })
 }
 
 #[cfg(test)]
@@ -66,11 +66,11 @@ mod tests {
                 used.fetch_add(1, Ordering::Relaxed);
             })
         });
-        assert_eq!(show(&tickets, "0"), Shown::Unknown);
+        assert_eq!(show(&tickets, "0"), TicketCheck::Unknown);
         for (before, text) in (0..).zip(&texts) {
             assert_eq!(used.load(Ordering::Relaxed), before);
-            assert_eq!(show(&tickets, text), Shown::Valid);
-            assert_eq!(show(&tickets, text), Shown::UsedBefore);
+            assert_eq!(show(&tickets, text), TicketCheck::Valid);
+            assert_eq!(show(&tickets, text), TicketCheck::UsedBefore);
         }
         assert_eq!(used.load(Ordering::Relaxed), 2);
     }

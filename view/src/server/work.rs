@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use tokio::sync::Semaphore;
 
 use crate::error::ViewError;
-use crate::viewer::{GivenUp, Kind, Viewer};
+use crate::viewer::{GivenUp, ImageKind, Viewer};
 
 /// Does the work for answers.
 pub(super) struct Workers {
@@ -108,7 +108,7 @@ impl Wish {
                     break;
                 }
                 // A viewer of that layer will see the error.
-                let decode = || viewer.image(stack, layer, Kind::Layer, &GivenUp::default());
+                let decode = || viewer.image(stack, layer, ImageKind::Layer, &GivenUp::default());
                 let _ = catch_unwind(AssertUnwindSafe(decode));
             }
         }

@@ -6,9 +6,9 @@ use std::num::NonZeroU32;
 use lamp_stack::{Layer, Length, MemorySize, PageHeader, map_in_order};
 
 use super::nets::Nets;
-use super::planes::{Planes, plane_of};
-use super::scale::Scale;
-use super::{Surface, SurfaceError, SurfaceUnit};
+use super::planes::{OpenPlanes, plane_of};
+use super::scale::StackScale;
+use super::{StackSurface, SurfaceError, SurfaceUnit};
 
 /// The most cells along the longest side.
 pub const MAX_CELLS: u32 = 1024;
@@ -36,20 +36,20 @@ impl Default for SurfaceOptions {
 /// A stack as cubic cells.
 #[derive(Debug)]
 pub struct CellGrid {
-    scale: Scale,
+    scale: StackScale,
     /// The width and height of the largest image.
     size: [u32; 2],
     /// The width of a cell, in pixels.
     side: NonZeroU32,
     /// The number of cells along x, y and z.
     counts: [u32; 3],
-    shares: Vec<Share>,
+    shares: Vec<CellContribution>,
     max_triangles: usize,
 }
 
 /// A layer's contribution to cells.
 #[derive(Clone, Debug)]
-struct Share {
+struct CellContribution {
     position: usize,
     index: u32,
     /// The memory that the layer takes, roughly.
@@ -60,7 +60,7 @@ struct Share {
     weights: Vec<f32>,
 }
 
-impl MemorySize for Share {
+impl MemorySize for CellContribution {
     fn bytes(&self) -> usize {
         self.bytes
     }
@@ -76,7 +76,7 @@ impl CellGrid {
     /// Panics if there are no pages.
     pub fn new(pages: &[PageHeader], options: &SurfaceOptions) -> Result<Self, SurfaceError> {
         let size = [0, 1].map(|axis| pages.iter().map(|page| page.size[axis]).max().unwrap_or(0));
-        let scale = Scale::of(pages, size[1])?;
+        let scale = StackScale::of(pages, size[1])?;
         let [bottom, _] = scale.heights[0];
         let [_, top] = scale.heights[pages.len() - 1];
         let height = (top - bottom) / scale.pitch;
@@ -126,7 +126,12 @@ impl CellGrid {
                 let position = lowest + above;
                 match self.shares.last_mut() {
                     Some(share) if share.position == position => share.weights.push(weight),
-                    _ => self.shares.push(Share::new(position, &pages[position], plane, weight)),
+                    _ => self.shares.push(CellContribution::new(
+                        position,
+                        &pages[position],
+                        plane,
+                        weight,
+                    )),
                 }
             }
         }
@@ -137,15 +142,18 @@ impl CellGrid {
     ///
     /// # Errors
     /// Returns the error of a layer, or an error if there is no surface, or too much of it.
-    pub fn surface<L, E>(&self, read: impl Fn(usize) -> Result<L, E> + Sync) -> Result<Surface, E>
+    pub fn surface<L, E>(
+        &self,
+        read: impl Fn(usize) -> Result<L, E> + Sync,
+    ) -> Result<StackSurface, E>
     where
         L: Borrow<Layer>,
         E: From<SurfaceError> + Send,
     {
         let [columns, rows, _] = self.counts;
-        let mut planes = Planes::new(columns as usize * rows as usize);
+        let mut planes = OpenPlanes::new(columns as usize * rows as usize);
         let mut nets = Nets::new([columns, rows], self.max_triangles);
-        let plane = |share: Share| {
+        let plane = |share: CellContribution| {
             let layer = read(share.position)?;
             let image = &layer.borrow().image;
             if image.width() > self.size[0] || image.height() > self.size[1] {
@@ -177,7 +185,7 @@ impl CellGrid {
     }
 }
 
-impl Share {
+impl CellContribution {
     fn new(position: usize, page: &PageHeader, first: u32, weight: f32) -> Self {
         let bytes = 16 * page.data_bytes as usize + 4 * page.size[1] as usize;
         Self { position, index: page.info.index, bytes, first, weights: vec![weight] }

@@ -21,7 +21,7 @@ pub use cells::{CellGrid, MAX_CELLS, SurfaceOptions};
 /// the surface touch, four triangles meet in an edge. Triangles run counter-clockwise seen from
 /// outside.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Surface {
+pub struct StackSurface {
     /// The unit of coordinates.
     pub unit: SurfaceUnit,
     /// The vertices, x to the right, y to the back and z up, in part coordinates.
@@ -47,7 +47,7 @@ const MAGIC: &[u8; 4] = b"LSRF";
 /// The version of their form.
 const VERSION: u32 = 1;
 
-impl Surface {
+impl StackSurface {
     /// Returns the corners of each triangle.
     pub fn facets(&self) -> impl ExactSizeIterator<Item = [[f32; 3]; 3]> + '_ {
         self.triangles.iter().map(|triangle| triangle.map(|vertex| self.vertices[vertex as usize]))

@@ -3,7 +3,7 @@
 use fast_surface_nets::ndshape::RuntimeShape;
 use fast_surface_nets::{SignedDistance, SurfaceNetsBuffer, surface_nets};
 
-use super::{Surface, SurfaceError, SurfaceUnit};
+use super::{StackSurface, SurfaceError, SurfaceUnit};
 
 /// The number of planes worked on at a time.
 const SLAB: usize = 18;
@@ -78,12 +78,12 @@ impl Nets {
         mut self,
         place: impl Fn([f64; 3]) -> [f32; 3],
         unit: SurfaceUnit,
-    ) -> Result<Surface, SurfaceError> {
+    ) -> Result<StackSurface, SurfaceError> {
         (0..BEHIND).try_for_each(|_| self.push(&[]))?;
         self.net()?;
         let vertices: Vec<_> = self.vertices.into_iter().map(place).collect();
         let normals = normals(&vertices, &self.triangles);
-        Ok(Surface { unit, vertices, normals, triangles: self.triangles })
+        Ok(StackSurface { unit, vertices, normals, triangles: self.triangles })
     }
 
     /// Returns the columns and rows of a plane with black around.

@@ -38,14 +38,14 @@ fn of_whole(mean: u8, pixels: u32, side: NonZeroU32) -> u8 {
 }
 
 /// The planes that layers still add to.
-pub(super) struct Planes {
+pub(super) struct OpenPlanes {
     cells: usize,
     /// The number of planes below.
     finished: u32,
     open: VecDeque<Vec<f32>>,
 }
 
-impl Planes {
+impl OpenPlanes {
     pub(super) fn new(cells: usize) -> Self {
         Self { cells, finished: 0, open: VecDeque::new() }
     }

@@ -9,7 +9,7 @@ const MAX_UM: f64 = 1e9;
 
 /// Where the pixels and layers of a stack lie.
 #[derive(Debug)]
-pub(super) struct Scale {
+pub(super) struct StackScale {
     pub(super) unit: SurfaceUnit,
     /// How wide a pixel is.
     pub(super) pitch: f64,
@@ -19,7 +19,7 @@ pub(super) struct Scale {
     pub(super) heights: Vec<[f64; 2]>,
 }
 
-impl Scale {
+impl StackScale {
     /// Returns where the pixels of pages lie whose highest has this many rows.
     pub(super) fn of(pages: &[PageHeader], rows: u32) -> Result<Self, SurfaceError> {
         let corner = [0.0, f64::from(rows)];
@@ -36,7 +36,7 @@ impl Scale {
 }
 
 /// Returns the scale in millimeters, if the pages state their resolution and heights.
-fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<Scale>, SurfaceError> {
+fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<StackScale>, SurfaceError> {
     let Some(dpi) = pages[0].dpi else { return Ok(None) };
     let Some(heights) = heights_um(pages) else { return Ok(None) };
     let pitch = dpi.pitch().mm();
@@ -56,7 +56,7 @@ fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<Scale>, Surf
     check_order(pages, &heights)?;
     let tops = heights.iter().skip(1).map(|[next, _]| *next).chain([f64::INFINITY]);
     let heights = heights.iter().zip(tops);
-    Ok(Some(Scale {
+    Ok(Some(StackScale {
         unit: SurfaceUnit::Millimetres,
         pitch,
         corner: origin.unwrap_or([0.0, f64::from(rows) * pitch]),

@@ -58,7 +58,7 @@ fn options(cells: u32) -> SurfaceOptions {
     SurfaceOptions { cells, layers_a_cell: None, ..SurfaceOptions::default() }
 }
 
-fn surface(layers: &[Layer], options: &SurfaceOptions) -> Result<Surface, SurfaceError> {
+fn surface(layers: &[Layer], options: &SurfaceOptions) -> Result<StackSurface, SurfaceError> {
     let headers: Vec<_> = layers.iter().map(header).collect();
     CellGrid::new(&headers, options)?.surface(|position| Ok(&layers[position]))
 }
@@ -73,7 +73,7 @@ fn ball([x, y, z]: [f64; 3]) -> u8 {
 
 const BALL_MM3: f64 = 4.0 / 3.0 * std::f64::consts::PI * 1.8 * 1.8 * 1.8;
 
-fn volume(surface: &Surface) -> f64 {
+fn volume(surface: &StackSurface) -> f64 {
     let six_times = |facet: [[f32; 3]; 3]| {
         let [a, b, c] = facet.map(|corner| corner.map(f64::from));
         a[0] * (b[1] * c[2] - b[2] * c[1])
@@ -84,7 +84,7 @@ fn volume(surface: &Surface) -> f64 {
 }
 
 /// Returns how much more often each edge is run one way than the other.
-fn unbalanced(surface: &Surface) -> usize {
+fn unbalanced(surface: &StackSurface) -> usize {
     let mut edges: HashMap<[u32; 2], i32> = HashMap::new();
     for &[a, b, c] in &surface.triangles {
         for [from, to] in [[a, b], [b, c], [c, a]] {
@@ -95,7 +95,7 @@ fn unbalanced(surface: &Surface) -> usize {
     edges.values().filter(|&&count| count != 0).count()
 }
 
-fn euler_characteristic(surface: &Surface) -> i64 {
+fn euler_characteristic(surface: &StackSurface) -> i64 {
     let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
     let edges: HashSet<[u32; 2]> =
         surface.triangles.iter().flat_map(sides).map(|[a, b]| [a.min(b), a.max(b)]).collect();
