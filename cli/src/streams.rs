@@ -17,7 +17,7 @@ use lamp_stack::{
     write_packed, write_stack,
 };
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
 use crate::output::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
 use crate::terminal::progress::Progress;
@@ -148,7 +148,7 @@ fn stdout_file() -> Option<File> {
 
 /// Reads the wanted layers of a stack, decoded, in order.
 pub(crate) fn read_layers(
-    input: &Input,
+    input: &InputArgs,
     progress: &Progress,
 ) -> Result<impl Iterator<Item = Result<Layer, Exit>> + use<>, Exit> {
     Ok(layers_of_input(open_pages(&input.stack)?, input, progress))
@@ -157,7 +157,7 @@ pub(crate) fn read_layers(
 /// Reads the wanted layers of the input, which is open.
 pub(crate) fn layers_of_input(
     pages: Pages,
-    input: &Input,
+    input: &InputArgs,
     progress: &Progress,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
     decoded(pages_of_input(pages, input, progress), input.stack.clone())
@@ -166,7 +166,7 @@ pub(crate) fn layers_of_input(
 /// Reads the wanted layers of a stack, in order. Layers that can pass as their pages have them are
 /// not decoded.
 pub(crate) fn read_passing(
-    input: &Input,
+    input: &InputArgs,
     progress: &Progress,
 ) -> Result<impl Iterator<Item = Result<PassingLayer, Exit>> + use<>, Exit> {
     let pages = pages_of_input(open_pages(&input.stack)?, input, progress);
@@ -180,9 +180,10 @@ pub(crate) fn read_passing(
     }))
 }
 
+
 fn pages_of_input(
     pages: Pages,
-    input: &Input,
+    input: &InputArgs,
     progress: &Progress,
 ) -> impl Iterator<Item = Result<(Page, Option<StackInfo>), Exit>> + use<> {
     let progress = progress.clone();

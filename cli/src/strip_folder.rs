@@ -5,7 +5,7 @@ use std::path::Path;
 use lamp_build::{StripForm, StripWriter, StripsError, is_strips, join_strips};
 use lamp_stack::{PassingLayer, is_stack_name, map_in_order};
 
-use crate::args::options::{Input, Output};
+use crate::args::options::{InputArgs, Output};
 use crate::exit::Exit;
 use crate::streams::{format, input_name, is_stream, new_folder, read_passing, write_layers};
 use crate::terminal::progress::Progress;
@@ -16,7 +16,7 @@ pub(crate) type PassingLayers = Box<dyn Iterator<Item = Result<PassingLayer, Exi
 /// Reads the wanted layers of a stack, undecoded where they can pass, or the layers of the build
 /// that a folder of strips makes.
 pub(crate) fn read_stack_or_strips(
-    input: &Input,
+    input: &InputArgs,
     progress: &Progress,
 ) -> Result<PassingLayers, Exit> {
     let folder = &input.stack;
@@ -46,7 +46,7 @@ pub(crate) fn read_stack_or_strips(
 /// they were cut.
 pub(crate) fn write_stack_or_strips(
     layers: impl Iterator<Item = Result<PassingLayer, Exit>>,
-    input: &Input,
+    input: &InputArgs,
     form: impl FnOnce(StripForm) -> StripForm,
     output: &Output,
     progress: &Progress,

@@ -23,7 +23,7 @@ type Layers<'a> = Box<dyn Iterator<Item = Result<PassingLayer, Error>> + 'a>;
 
 /// The stages that work layer by layer: slicing, then those from layers to layers.
 #[derive(Clone, Debug)]
-pub struct Chain {
+pub struct StageChain {
     /// Slicing; its part and range are left open.
     pub slice: SliceStage,
     /// The stages after it.
@@ -151,7 +151,7 @@ impl Working<'_> {
     }
 }
 
-impl Chain {
+impl StageChain {
     /// Returns the options that matter to bytes, a text for each stage. Equal texts, with equal
     /// input files and the same code, give equal bytes of the same part.
     pub fn canonical(&self) -> Vec<String> {

@@ -2,7 +2,7 @@
 //! and the keys of their results.
 //!
 //! A stage is its settings, a plain struct that serde knows, and its work between a reader and a
-//! writer. [`Chain`] runs slicing and the stages after it for a range of layers; ranges that are
+//! writer. [`StageChain`] runs slicing and the stages after it for a range of layers; ranges that are
 //! joined have the bytes of the pipeline typed by hand.
 
 #![forbid(unsafe_code)]
@@ -42,14 +42,14 @@ mod sliced_part;
 mod survey;
 mod wall_report;
 
-pub use chain::{Chain, Stage, Working, named};
+pub use chain::{Stage, StageChain, Working, named};
 pub use error::{Error, ErrorKind};
 pub use findings::RangeFindings;
 pub use fix_report::{FixHead, FixReport, ReportedBand, whereabouts};
 pub use names::{Names, stored_name};
 pub use ranges::ranges;
 pub use recorded_part::RecordedSlicing;
-pub use slice_settings::{Frame, GrayRule, SliceSettings, SlicingRecord, Thickness};
+pub use slice_settings::{GrayRule, SliceFrame, SliceSettings, SlicingRecord, Thickness};
 pub use sliced_part::{LayersOfPart, SlicedPart, check_slicing};
 pub use survey::Survey;
 pub use wall_report::{NarrowedWall, WallHead, WallReport};

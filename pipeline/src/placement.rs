@@ -14,7 +14,7 @@ use crate::words::{list, optional};
 pub struct PlacementSettings {
     /// Factors along the axes.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    pub scale: Option<Numbers<3>>,
+    pub scale: Option<FiniteNumbers<3>>,
 
     /// Axes along which it is mirrored.
     #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
@@ -26,14 +26,14 @@ pub struct PlacementSettings {
 
     /// The move at the end, in millimeters.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    pub translate: Option<Numbers<3>>,
+    pub translate: Option<FiniteNumbers<3>>,
 }
 
 impl PlacementSettings {
     /// Returns the placement of facets.
     pub fn placement(&self) -> Placement {
-        let mut placement =
-            Placement::default().scaled(self.scale.map_or([1.0; 3], |Numbers(factors)| factors));
+        let mut placement = Placement::default()
+            .scaled(self.scale.map_or([1.0; 3], |FiniteNumbers(factors)| factors));
         for &axis in &self.mirror {
             let mut factors = [1.0; 3];
             factors[axis as usize] = -1.0;
@@ -42,7 +42,7 @@ impl PlacementSettings {
         for &Rotation { axis, degrees } in &self.rotate {
             placement = placement.rotated(axis, degrees);
         }
-        placement.translated(self.translate.map_or([0.0; 3], |Numbers(by_mm)| by_mm))
+        placement.translated(self.translate.map_or([0.0; 3], |FiniteNumbers(by_mm)| by_mm))
     }
 
     /// Returns the rotations with others after them, as `--rotate` takes them.
@@ -56,18 +56,18 @@ impl PlacementSettings {
 
 /// Finite numbers with commas between: `X,Y` or `X,Y,Z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Numbers<const N: usize>(
+pub struct FiniteNumbers<const N: usize>(
     /// The numbers.
     pub [f64; N],
 );
 
-impl<const N: usize> fmt::Display for Numbers<N> {
+impl<const N: usize> fmt::Display for FiniteNumbers<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0.map(|number| number.to_string()).join(","))
     }
 }
 
-impl<const N: usize> FromStr for Numbers<N> {
+impl<const N: usize> FromStr for FiniteNumbers<N> {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -99,7 +99,7 @@ impl FromStr for Rotation {
     fn from_str(text: &str) -> Result<Self, String> {
         let parse = || {
             let (axis, degrees) = text.split_once(':')?;
-            let Numbers([degrees]) = degrees.parse().ok()?;
+            let FiniteNumbers([degrees]) = degrees.parse().ok()?;
             Some(Self { axis: axis.trim().to_ascii_lowercase().parse().ok()?, degrees })
         };
         parse().ok_or_else(|| {
@@ -112,16 +112,16 @@ impl FromStr for Rotation {
 ///
 /// # Errors
 /// Returns a sentence if the text is no scale, or would leave nothing of a part.
-pub fn parse_scale(text: &str) -> Result<Numbers<3>, String> {
-    let one = text.parse().map(|Numbers([factor])| Numbers([factor; 3]));
+pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
+    let one = text.parse().map(|FiniteNumbers([factor])| FiniteNumbers([factor; 3]));
     let factors = one.or_else(|_| text.parse()).map_err(|_| {
         format!("`{text}` is not a scale: write a factor, or X,Y,Z, as 1.02,1.02,1.015")
     })?;
     match factors {
-        Numbers(factors) if factors.contains(&0.0) => {
+        FiniteNumbers(factors) if factors.contains(&0.0) => {
             Err(format!("`{text}` would leave nothing of the part"))
         }
-        Numbers(factors) if factors.iter().any(|&f| f < 0.0) => {
+        FiniteNumbers(factors) if factors.iter().any(|&f| f < 0.0) => {
             Err(format!("`{text}` is below zero: mirror the part with --mirror"))
         }
         factors => Ok(factors),
@@ -132,7 +132,7 @@ pub fn parse_scale(text: &str) -> Result<Numbers<3>, String> {
 ///
 /// # Errors
 /// Returns a sentence if the text is no move.
-pub fn parse_translation(text: &str) -> Result<Numbers<3>, String> {
+pub fn parse_translation(text: &str) -> Result<FiniteNumbers<3>, String> {
     let wrong =
         || format!("`{text}` is not a translation: write X,Y,Z in millimetres, as -5,0,12.7");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
@@ -144,11 +144,11 @@ mod tests {
 
     #[test]
     fn values_people_write() {
-        assert_eq!(parse_scale("1.02"), Ok(Numbers([1.02; 3])));
-        assert_eq!(parse_scale("1, 2,.5"), Ok(Numbers([1.0, 2.0, 0.5])));
+        assert_eq!(parse_scale("1.02"), Ok(FiniteNumbers([1.02; 3])));
+        assert_eq!(parse_scale("1, 2,.5"), Ok(FiniteNumbers([1.0, 2.0, 0.5])));
         assert_eq!("x:90".parse(), Ok(Rotation { axis: Axis::X, degrees: 90.0 }));
         assert_eq!("Z: -12.5".parse(), Ok(Rotation { axis: Axis::Z, degrees: -12.5 }));
-        assert_eq!(parse_translation("-5,0,1e4mm"), Ok(Numbers([-5.0, 0.0, 1e4])));
+        assert_eq!(parse_translation("-5,0,1e4mm"), Ok(FiniteNumbers([-5.0, 0.0, 1e4])));
         for wrong in ["", "0", "-1", "1,2", "1,2,0", "1,2,3,4", "nan", "inf", "1e999", "two"] {
             assert!(parse_scale(wrong).is_err(), "{wrong}");
         }

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::exposure::{ExposureSettings, RecordedExposure};
 use crate::heights::HeightSettings;
 use crate::part_file::PartFile;
-use crate::placement::{Numbers, Rotation};
+use crate::placement::{FiniteNumbers, Rotation};
 use crate::solid::{SolidSettings, is_default};
 use crate::words::{differing, optional, parts, text, words_of};
 
@@ -49,7 +49,7 @@ pub struct SliceSettings {
     pub exposure: ExposureSettings,
     /// The pixels of the images.
     #[serde(flatten)]
-    pub frame: Frame,
+    pub frame: SliceFrame,
 }
 
 /// The thickness of layers.
@@ -100,12 +100,12 @@ struct GrayFlags {
 /// The part of the plane that images show.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Frame {
+pub enum SliceFrame {
     /// A given place, which holds the part.
     At {
         /// The top left corner (x, y) in part coordinates, in millimeters.
         #[serde(with = "text")]
-        origin: Numbers<2>,
+        origin: FiniteNumbers<2>,
         /// Its size.
         #[serde(with = "text")]
         size: Size,
@@ -149,7 +149,7 @@ impl Default for SliceSettings {
             no_polish: false,
             gray: GrayRule::default(),
             exposure: ExposureSettings::default(),
-            frame: Frame::Around { margin: 1 },
+            frame: SliceFrame::Around { margin: 1 },
         }
     }
 }
@@ -174,11 +174,11 @@ impl SliceSettings {
 
     fn grid(&self) -> GridRule {
         match self.frame {
-            Frame::At { origin: Numbers(origin_mm), size } => {
+            SliceFrame::At { origin: FiniteNumbers(origin_mm), size } => {
                 let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
                 GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }
-            Frame::Around { margin } => GridRule::Around { margin },
+            SliceFrame::Around { margin } => GridRule::Around { margin },
         }
     }
 
@@ -192,7 +192,7 @@ impl SliceSettings {
             dpi: dpi.and_then(Dpi::new).unwrap_or(usual.dpi),
             thickness: thickness
                 .map_or(usual.thickness, |thickness| Thickness::Uniform { thickness }),
-            frame: margin.map_or(usual.frame, |margin| Frame::Around { margin }),
+            frame: margin.map_or(usual.frame, |margin| SliceFrame::Around { margin }),
             ..usual
         };
         differing(self, &usual)
@@ -203,7 +203,7 @@ impl SliceSettings {
     pub fn turned(mut self, slicing: &TurnedSlicing) -> Self {
         let TurnedSlicing { degrees, origin_mm, size } = *slicing;
         self.solid.placement.rotate.push(Rotation { axis: Axis::Z, degrees });
-        self.frame = Frame::At { origin: Numbers(origin_mm), size };
+        self.frame = SliceFrame::At { origin: FiniteNumbers(origin_mm), size };
         self
     }
 
@@ -230,7 +230,7 @@ impl SliceSettings {
     /// Returns the exceeded limit.
     pub fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
         machine.check_dpi(self.dpi, "the stack")?;
-        if let Frame::At { size, .. } = self.frame {
+        if let SliceFrame::At { size, .. } = self.frame {
             machine.check_footprint(size, "the image")?;
         }
         match &self.thickness {

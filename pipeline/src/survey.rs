@@ -6,7 +6,7 @@ use std::time::Instant;
 use lamp_slicer::Slices;
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{Chain, Stage};
+use crate::chain::{Stage, StageChain};
 
 /// Layers that are estimated together. Ranges begin at multiples of it, where packed stacks have
 /// key layers.
@@ -29,7 +29,7 @@ pub struct Survey {
 
 /// The cost of a stage: nanoseconds of one processor for a row and for a crossing.
 #[derive(Clone, Copy)]
-struct Weight {
+struct StageCost {
     row_ns: f64,
     crossing_ns: f64,
 }
@@ -37,12 +37,12 @@ struct Weight {
 /// Slicing, with packing. Fitted, as all weights here, to runs of the samples blade (0.1 and 0.75
 /// million facets), torus, tower, stairs and sphere at 600 and 1500 dpi and 100 um, on one thread
 /// of a machine with two: within a third of slicing, `fix` and `edit` that took more than 50 ms.
-const SLICE: Weight = Weight { row_ns: 31.0, crossing_ns: 26.0 };
-const FIX: Weight = Weight { row_ns: 4.5, crossing_ns: 0.0 };
-const COMPENSATE: Weight = Weight { row_ns: 0.0, crossing_ns: 118.0 };
+const SLICE: StageCost = StageCost { row_ns: 31.0, crossing_ns: 26.0 };
+const FIX: StageCost = StageCost { row_ns: 4.5, crossing_ns: 0.0 };
+const COMPENSATE: StageCost = StageCost { row_ns: 0.0, crossing_ns: 118.0 };
 /// Masks pass, and dots of gray layers save as much packing as they take.
-const DITHER: Weight = Weight { row_ns: 0.0, crossing_ns: 0.0 };
-const EDIT: Weight = Weight { row_ns: 11.0, crossing_ns: 1.0 };
+const DITHER: StageCost = StageCost { row_ns: 0.0, crossing_ns: 0.0 };
+const EDIT: StageCost = StageCost { row_ns: 11.0, crossing_ns: 1.0 };
 /// Gray pixels along edges are runs, too: 2.3 times the work at 300 dpi, 4.6 times at 1500.
 const GRAY: f64 = 4.5;
 /// Bytes of memory of a process with its table of crossings, and of a crossing or a row of layers
@@ -52,7 +52,7 @@ const CROSSING_BYTES: f64 = 1000.0;
 /// Bytes of the packed stack for a crossing: blades at 300 to 2400 dpi have 0.085 to 0.123.
 const PACKED_BYTES: f64 = 0.12;
 
-impl Weight {
+impl StageCost {
     fn of(stage: &Stage) -> Self {
         match stage {
             Stage::Fix(_) => FIX,
@@ -73,10 +73,10 @@ impl Weight {
 impl Survey {
     /// Estimates the work of a chain on slices that are ready to begin. `begun` is the time when
     /// opening the part began.
-    pub(crate) fn of(slices: &Slices, chain: &Chain, begun: Instant) -> Self {
+    pub(crate) fn of(slices: &Slices, chain: &StageChain, begun: Instant) -> Self {
         let crossings = slices.crossings_per_layer();
         let rows = f64::from(slices.grid().height);
-        let weight = chain.stages.iter().map(Weight::of).fold(SLICE, Weight::joined);
+        let weight = chain.stages.iter().map(StageCost::of).fold(SLICE, StageCost::joined);
         let gray = if slices.is_gray() { GRAY } else { 1.0 };
         let seconds =
             |crossings: &f64| (weight.row_ns * rows + weight.crossing_ns * gray * crossings) * 1e-9;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
-use crate::tiled::{Rect, Tile, TileGrid, Tiled};
+use crate::tiled::{PixelRectangle, Tile, TileGrid, Tiled};
 
 /// A tile whose doses differ by less than this share of the largest is stored as one dose.
 const SAME: f32 = 1e-6;
@@ -21,39 +21,43 @@ pub(crate) fn next_layer(
     let grid = above.grid;
     let (own, passed) = (of.own as f32, of.passed as f32);
     let wide = own * blur.sum() as f32;
-    let tiles = (0..grid.tile_count()).into_par_iter().map_init(Room::default, |room, tile| {
-        let rect = grid.tile(tile);
-        // Deep inside and outside of a part, all doses of a tile are equal, and take no memory.
-        let from = &above.tiles[tile];
-        if let (Tile::Flat(above), Some(level)) =
-            (from, levels.value_in(&rect.grown(blur.radius()), 0))
-        {
-            // Far from any edge, pixels have the light of a wide field.
-            return Tile::Flat(above * passed + wide * light[usize::from(level)]);
-        }
-        let spread = room.spread(&rect, blur, |view, stride, light_of, room| {
-            room.resize(light_of.len(), 0);
-            levels.copy(view, 0, stride, room);
-            light_of.iter_mut().zip(room).for_each(|(of, level)| *of = light[usize::from(*level)]);
-        });
-        let mut doses = vec![0.0; grid.side * grid.side].into_boxed_slice();
-        for (row, spread) in spread.rows().enumerate() {
-            let line = row * grid.side;
-            let dose = |column: usize| match from {
-                Tile::Flat(above) => *above,
-                Tile::Dense(above) => above[line + column],
-            };
-            for (column, &light) in spread.iter().enumerate() {
-                doses[line + column] = dose(column) * passed + own * light;
+    let tiles =
+        (0..grid.tile_count()).into_par_iter().map_init(Workspace::default, |room, tile| {
+            let rect = grid.tile(tile);
+            // Deep inside and outside of a part, all doses of a tile are equal, and take no memory.
+            let from = &above.tiles[tile];
+            if let (Tile::Flat(above), Some(level)) =
+                (from, levels.value_in(&rect.grown(blur.radius()), 0))
+            {
+                // Far from any edge, pixels have the light of a wide field.
+                return Tile::Flat(above * passed + wide * light[usize::from(level)]);
             }
-        }
-        flat_if_same(doses, &rect, grid)
-    });
+            let spread = room.spread(&rect, blur, |view, stride, light_of, room| {
+                room.resize(light_of.len(), 0);
+                levels.copy(view, 0, stride, room);
+                light_of
+                    .iter_mut()
+                    .zip(room)
+                    .for_each(|(of, level)| *of = light[usize::from(*level)]);
+            });
+            let mut doses = vec![0.0; grid.side * grid.side].into_boxed_slice();
+            for (row, spread) in spread.rows().enumerate() {
+                let line = row * grid.side;
+                let dose = |column: usize| match from {
+                    Tile::Flat(above) => *above,
+                    Tile::Dense(above) => above[line + column],
+                };
+                for (column, &light) in spread.iter().enumerate() {
+                    doses[line + column] = dose(column) * passed + own * light;
+                }
+            }
+            flat_if_same(doses, &rect, grid)
+        });
     Tiled { grid, tiles: tiles.collect() }
 }
 
 /// Stores a tile as one value if all are nearly the same.
-fn flat_if_same(doses: Box<[f32]>, rect: &Rect, grid: TileGrid) -> Tile<f32> {
+fn flat_if_same(doses: Box<[f32]>, rect: &PixelRectangle, grid: TileGrid) -> Tile<f32> {
     let (mut least, mut most) = (f32::MAX, f32::MIN);
     for line in doses.chunks_exact(grid.side).take(rect.height()) {
         for &dose in &line[..rect.width()] {
@@ -70,7 +74,7 @@ fn flat_if_same(doses: Box<[f32]>, rect: &Rect, grid: TileGrid) -> Tile<f32> {
 
 /// Working space to spread light.
 #[derive(Default)]
-pub(crate) struct Room {
+pub(crate) struct Workspace {
     levels: Vec<u8>,
     light: Vec<f32>,
     spread: Vec<f32>,
@@ -94,14 +98,14 @@ impl SpreadLight<'_> {
     }
 }
 
-impl Room {
+impl Workspace {
     /// Spreads light over a rectangle. `fill` writes the light of the wider rectangle that it gets,
     /// in lines of the given stride.
     pub(crate) fn spread(
         &mut self,
-        rect: &Rect,
+        rect: &PixelRectangle,
         blur: &Blur<f32>,
-        fill: impl FnOnce(&Rect, usize, &mut [f32], &mut Vec<u8>),
+        fill: impl FnOnce(&PixelRectangle, usize, &mut [f32], &mut Vec<u8>),
     ) -> SpreadLight<'_> {
         let border = blur.radius();
         let view = rect.grown(border);

@@ -18,7 +18,7 @@ impl Spool {
     }
 
     /// Adds an image.
-    pub(crate) fn push(&mut self, image: Runs) -> io::Result<()> {
+    pub(crate) fn push(&mut self, image: SpooledRuns) -> io::Result<()> {
         let bytes = image.finish();
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&bytes)?;
@@ -39,13 +39,13 @@ impl Spool {
 
 /// The runs of an image, row after row: values and lengths of up to 7 bits a byte.
 #[derive(Debug, Default)]
-pub(crate) struct Runs {
+pub(crate) struct SpooledRuns {
     bytes: Vec<u8>,
     value: u32,
     length: u64,
 }
 
-impl Runs {
+impl SpooledRuns {
     /// Adds pixels of a value.
     pub(crate) fn push(&mut self, value: u32, length: usize) {
         if value != self.value {
@@ -132,7 +132,7 @@ mod tests {
         };
         let mut spool = Spool::new().unwrap();
         for seed in 0..4 {
-            let mut runs = Runs::default();
+            let mut runs = SpooledRuns::default();
             image(seed).into_iter().for_each(|value| runs.push(value, 1));
             spool.push(runs).unwrap();
         }

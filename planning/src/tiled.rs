@@ -13,12 +13,12 @@ pub(crate) struct TileGrid {
 
 /// A rectangle of pixels, which may reach beyond the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Rect {
+pub(crate) struct PixelRectangle {
     pub(crate) columns: Range<isize>,
     pub(crate) rows: Range<isize>,
 }
 
-impl Rect {
+impl PixelRectangle {
     pub(crate) fn width(&self) -> usize {
         self.columns.len()
     }
@@ -60,19 +60,19 @@ impl TileGrid {
         self.across() * self.down()
     }
 
-    pub(crate) fn image(&self) -> Rect {
-        Rect { columns: 0..self.width as isize, rows: 0..self.height as isize }
+    pub(crate) fn image(&self) -> PixelRectangle {
+        PixelRectangle { columns: 0..self.width as isize, rows: 0..self.height as isize }
     }
 
     /// Returns the pixels of a tile that are in the image.
-    pub(crate) fn tile(&self, tile: usize) -> Rect {
+    pub(crate) fn tile(&self, tile: usize) -> PixelRectangle {
         let (row, column) = (tile / self.across() * self.side, tile % self.across() * self.side);
         let side = |from: usize| from as isize..(from + self.side) as isize;
-        Rect { columns: side(column), rows: side(row) }.within(&self.image())
+        PixelRectangle { columns: side(column), rows: side(row) }.within(&self.image())
     }
 
     /// Returns the tiles that a rectangle meets.
-    pub(crate) fn met(&self, rect: &Rect) -> impl Iterator<Item = usize> + use<> {
+    pub(crate) fn met(&self, rect: &PixelRectangle) -> impl Iterator<Item = usize> + use<> {
         let inside = rect.within(&self.image());
         let tiles = |range: Range<isize>| {
             range.start as usize / self.side..(range.end as usize).div_ceil(self.side)
@@ -143,7 +143,7 @@ impl<V: Copy + PartialEq> Tiled<V> {
 
     /// Copies a rectangle, row by row into lines of `stride`; `outside` is the value beyond the
     /// image.
-    pub(crate) fn copy(&self, rect: &Rect, outside: V, stride: usize, out: &mut [V]) {
+    pub(crate) fn copy(&self, rect: &PixelRectangle, outside: V, stride: usize, out: &mut [V]) {
         out.fill(outside);
         for tile in self.grid.met(rect) {
             let own = self.grid.tile(tile);
@@ -168,7 +168,7 @@ impl<V: Copy + PartialEq> Tiled<V> {
 
     /// Returns the value of all pixels of a rectangle, if they have one; `outside` is the value
     /// beyond the image.
-    pub(crate) fn value_in(&self, rect: &Rect, outside: V) -> Option<V> {
+    pub(crate) fn value_in(&self, rect: &PixelRectangle, outside: V) -> Option<V> {
         let beyond = rect.within(&self.grid.image()) != *rect;
         let mut value = beyond.then_some(outside);
         let mut is_one = |other: V| *value.get_or_insert(other) == other;
@@ -238,7 +238,7 @@ mod tests {
         let flat = image.tiles.iter().filter(|tile| **tile == Tile::Flat(7)).count();
         assert_eq!(flat, 4);
         for (columns, rows) in [(0..20, 0..11), (-3..23, -5..14), (5..17, 6..9), (30..40, 0..3)] {
-            let rect = Rect { columns, rows };
+            let rect = PixelRectangle { columns, rows };
             let mut out = vec![0; 40 * rect.height()];
             image.copy(&rect, 99, 40, &mut out);
             for row in rect.rows.clone() {
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn a_rectangle_of_one_value_tells_it() {
         let image = image();
-        let of = |columns, rows| image.value_in(&Rect { columns, rows }, 99);
+        let of = |columns, rows| image.value_in(&PixelRectangle { columns, rows }, 99);
         assert_eq!(of(0..20, 8..11), Some(7));
         assert_eq!(of(1..8, 0..11), Some(7));
         assert_eq!(of(1..9, 0..11), None);

@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::PlotError;
-use crate::{Drawing, FAMILY, GRAY_INK, picture_of, with_font};
+use crate::{Drawing, Drawn, FAMILY, GRAY_INK, PlotArea, PlotError, picture_of, with_font};
 
 /// Doses of the same voxels in two cases, side by side.
 pub struct DoseMap {
@@ -41,9 +39,6 @@ pub fn dose_map(map: &DoseMap, path: &Path) -> Result<Vec<u8>, PlotError> {
     picture_of(map, map.size(), path)
 }
 
-type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
-type Area<B> = DrawingArea<B, plotters::coord::Shift>;
-
 impl DoseMap {
     fn height(&self) -> usize {
         self.wanted.len() / self.width
@@ -65,7 +60,7 @@ impl DoseMap {
         (MARGIN + case as i32 * (self.size().0 as i32 - MARGIN) / 2, TITLE)
     }
 
-    fn draw_case<B: DrawingBackend>(&self, area: &Area<B>, case: usize) -> Drawn<B> {
+    fn draw_case<B: DrawingBackend>(&self, area: &PlotArea<B>, case: usize) -> Drawn<B> {
         let (name, doses) = &self.cases[case];
         let (left, top) = self.corner(case);
         area.draw(&Text::new(*name, (left, top - 34), text(area, 24.0)))?;
@@ -94,7 +89,11 @@ impl DoseMap {
     }
 
     /// Draws a line between voxels that are wanted and others.
-    fn draw_outline<B: DrawingBackend>(&self, area: &Area<B>, (left, top): (i32, i32)) -> Drawn<B> {
+    fn draw_outline<B: DrawingBackend>(
+        &self,
+        area: &PlotArea<B>,
+        (left, top): (i32, i32),
+    ) -> Drawn<B> {
         let (width, height, cell) = (self.width as i32, self.height() as i32, self.cell());
         let wanted = |x: i32, y: i32| {
             let inside = (0..width).contains(&x) && (0..height).contains(&y);
@@ -114,7 +113,7 @@ impl DoseMap {
         area.draw(&Rectangle::new(frame, GRAY_INK.stroke_width(1)))
     }
 
-    fn draw_legend<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+    fn draw_legend<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         let (mut x, y) = (MARGIN, self.size().1 as i32 - LEGEND);
         for (name, ink) in
             [("wanted and cured", CURED), ("overcured", OVERCURED), ("undercured", UNDERCURED)]
@@ -129,12 +128,12 @@ impl DoseMap {
     }
 }
 
-fn text<B: DrawingBackend>(area: &Area<B>, size: f64) -> TextStyle<'static> {
+fn text<B: DrawingBackend>(area: &PlotArea<B>, size: f64) -> TextStyle<'static> {
     (FAMILY, size).into_text_style(area).color(&BLACK)
 }
 
 impl Drawing for DoseMap {
-    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+    fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         with_font();
         area.fill(&WHITE)?;
         area.draw(&Text::new(self.title.clone(), (MARGIN, 16), text(area, 28.0)))?;

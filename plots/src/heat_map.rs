@@ -1,11 +1,9 @@
 //! Draws a number for each square of a lattice as its color, with a scale next to the lattice.
 
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
-use crate::PlotError;
 use crate::axis_scale::AxisScale;
-use crate::{Drawing, GRAY_INK, SCALE, font, picture_of, with_font};
+use crate::{Drawing, Drawn, GRAY_INK, PlotArea, PlotError, SCALE, font, picture_of, with_font};
 
 /// Numbers on a square lattice, its middle on the axis of the light.
 pub struct HeatMap {
@@ -42,9 +40,6 @@ const BELOW: u32 = 44;
 const MARGIN: u32 = 16;
 const BAR: u32 = 20;
 const BAR_LABELS: u32 = 62;
-
-type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
-type Area<B> = DrawingArea<B, plotters::coord::Shift>;
 
 /// The bytes of a map as a PNG.
 pub fn heat_map(map: &HeatMap) -> Result<Vec<u8>, PlotError> {
@@ -103,7 +98,7 @@ impl HeatMap {
         }
     }
 
-    fn draw_map<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+    fn draw_map<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         let half = |count: usize| count as f64 * self.pitch_mm / 2.0;
         let (right, top) = (half(self.columns), half(self.rows()));
         let axis = |end: f64| AxisScale { range: -end..end, logarithmic: false };
@@ -141,7 +136,7 @@ impl HeatMap {
         pixels
     }
 
-    fn draw_scale<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+    fn draw_scale<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         const STEPS: u32 = 256;
         let scale = self.scale();
         let ColorScale { least, most, .. } = scale;
@@ -207,7 +202,7 @@ const RISING: [[f64; 3]; 5] = [
 ];
 
 impl Drawing for HeatMap {
-    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B> {
+    fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         with_font();
         area.fill(&WHITE)?;
         let [width, height] = self.map_size();

@@ -179,12 +179,14 @@ pub fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, PlotError> {
     }
 }
 
+/// A rectangle to draw on.
+type PlotArea<B> = DrawingArea<B, plotters::coord::Shift>;
+/// The end of drawing.
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
 /// A drawing of its own, not a plot of curves.
 trait Drawing {
-    fn draw<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, plotters::coord::Shift>,
-    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>>;
+    fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B>;
 }
 
 /// The bytes of a picture, in the format that the file's name says.
@@ -252,10 +254,7 @@ fn all_of((width, height): (u32, u32), plots: &[Plot]) -> (u32, u32) {
     (width, height * plots.len() as u32)
 }
 
-fn draw_all<B: DrawingBackend>(
-    plots: &[Plot],
-    area: &DrawingArea<B, plotters::coord::Shift>,
-) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+fn draw_all<B: DrawingBackend>(plots: &[Plot], area: &PlotArea<B>) -> Drawn<B> {
     with_font();
     area.fill(&WHITE)?;
     for (plot, area) in plots.iter().zip(area.split_evenly((plots.len(), 1))) {
@@ -265,10 +264,7 @@ fn draw_all<B: DrawingBackend>(
 }
 
 impl Plot {
-    fn draw<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, plotters::coord::Shift>,
-    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, font(19))
             .margin(14 * SCALE)

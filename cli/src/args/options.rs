@@ -97,7 +97,7 @@ impl Common {
 
 /// The stack that a stage reads.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct Input {
+pub(crate) struct InputArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
     pub(crate) stack: PathBuf,

@@ -46,17 +46,17 @@ pub(crate) fn settings_of(
         let (line, problem) = (line_of(text, error.span()), one_line(error.message()));
         format!("line {line}: {problem}: options files are TOML")
     })?;
-    let mut reader = Reader { text, settings: Vec::new() };
+    let mut reader = OptionsReader { text, settings: Vec::new() };
     reader.table(table.get_ref(), lamp, Some(path))?;
     Ok(reader.settings)
 }
 
-struct Reader<'a> {
+struct OptionsReader<'a> {
     text: &'a str,
     settings: Vec<Setting>,
 }
 
-impl Reader<'_> {
+impl OptionsReader<'_> {
     /// Reads the table of a command. `path` leads from there to the command that runs, if it is
     /// this one or one below it.
     fn table(

@@ -7,10 +7,10 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use lamp_pipeline::heights::HeightSettings;
 use lamp_pipeline::part_file::PartFile;
-use lamp_pipeline::placement::Numbers;
+use lamp_pipeline::placement::FiniteNumbers;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::words::differing;
-use lamp_pipeline::{Frame, GrayRule, SliceSettings, Thickness};
+use lamp_pipeline::{GrayRule, SliceFrame, SliceSettings, Thickness};
 use lamp_slicer::{PLANE_TOLERANCE, PlaneRule};
 use lamp_stack::{Dpi, Length, Size};
 
@@ -60,7 +60,7 @@ pub(crate) struct SlicingArgs {
     /// part's bounding box; the image must contain the part and keep its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
-    origin: Option<Numbers<2>>,
+    origin: Option<FiniteNumbers<2>>,
 
     /// Size of the image, for example 80x80mm or 4x4.5in; needs --origin
     #[arg(long, value_name = "WxH", requires = "origin")]
@@ -167,8 +167,8 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
             },
             exposure: (&args.exposure).into(),
             frame: match (args.origin, args.size) {
-                (Some(origin), Some(size)) => Frame::At { origin, size },
-                _ => Frame::Around { margin: args.margin },
+                (Some(origin), Some(size)) => SliceFrame::At { origin, size },
+                _ => SliceFrame::Around { margin: args.margin },
             },
         })
     }
@@ -193,7 +193,7 @@ impl TryFrom<&SliceStageArgs> for SliceStage {
 }
 
 /// Parses `X,Y` in millimeters.
-fn parse_origin(text: &str) -> Result<Numbers<2>, String> {
+fn parse_origin(text: &str) -> Result<FiniteNumbers<2>, String> {
     let wrong = || format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }

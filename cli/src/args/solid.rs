@@ -6,7 +6,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::placement::{
-    Numbers, PlacementSettings, Rotation, parse_scale, parse_translation,
+    FiniteNumbers, PlacementSettings, Rotation, parse_scale, parse_translation,
 };
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::step::{Kernel, ReaderSettings, StepSettings};
@@ -66,7 +66,7 @@ pub(crate) struct PlacementArgs {
     /// Scale the part, by one factor or one for each axis: 1.02 makes up for about 2% of shrinkage
     #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, help_heading = PLACEMENT)]
     #[arg(allow_hyphen_values = true)]
-    scale: Option<Numbers<3>>,
+    scale: Option<FiniteNumbers<3>>,
 
     /// Mirror the part: x swaps left and right
     #[arg(long, value_name = "AXIS", value_parser = one_of::<Axis>(), value_delimiter = ',')]
@@ -84,7 +84,7 @@ pub(crate) struct PlacementArgs {
     /// in the moved part's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = PLACEMENT)]
     #[arg(allow_hyphen_values = true)]
-    translate: Option<Numbers<3>>,
+    translate: Option<FiniteNumbers<3>>,
 }
 
 /// Options for reading STEP parts.

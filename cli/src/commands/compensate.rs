@@ -6,7 +6,7 @@ use clap::Args;
 use lamp_offset::CompensateError;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::CompensateStageArgs;
 use crate::exit::Exit;
 use crate::output::endings::parse_report;
@@ -31,7 +31,7 @@ Examples:
   lamp compensate stack.tif --shrinkage x:2.1%,y:1.8% -o larger.tif")]
 pub(crate) struct CompensateArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     settings: CompensateStageArgs,

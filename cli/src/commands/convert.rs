@@ -13,7 +13,7 @@ use lamp_stack::{
     FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
 };
 
-use crate::args::options::{Common, Input, Output, one_of};
+use crate::args::options::{Common, InputArgs, Output, one_of};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
 use crate::output::endings::is_step_name;
@@ -41,7 +41,7 @@ Examples:
   lamp convert part.stl part.step")]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
     /// File to write for a part, in millimeters: a binary STL of a STEP part, or a STEP file of a
     /// mesh
     #[arg(value_name = "PART.stl|PART.step", value_parser = parse_part)]

@@ -18,7 +18,7 @@ use lamp_planning::{Light, SampleHeight};
 use lamp_stack::{CompensateRecord, DitherRecord, Length, StackInfo};
 
 use crate::args::lamp_option::LampOption;
-use crate::args::options::{Common, Input, one_of_described};
+use crate::args::options::{Common, InputArgs, one_of_described};
 use crate::args::planning_options::SAMPLE_HEIGHTS;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
@@ -49,7 +49,7 @@ Examples:
       --scale 4 -o detail.png")]
 pub(crate) struct CureArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     /// Resin: a built-in material's name (see lamp material list) or a file
     #[arg(long, value_name = "NAME|FILE")]

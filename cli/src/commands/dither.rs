@@ -4,7 +4,7 @@ use clap::Args;
 use lamp_build::{Seam, StripForm};
 use lamp_pipeline::dither::DitherSettings;
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;
 use crate::streams::progress;
@@ -29,7 +29,7 @@ Examples:
   dither strips/ -o dots/")]
 pub(crate) struct DitherArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     settings: DitherStageArgs,

@@ -4,7 +4,7 @@ use clap::Args;
 use lamp_edit::EditError;
 use lamp_pipeline::edit::{EditSettings, Editing, unused_text};
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::EditStageArgs;
 use crate::exit::Exit;
 use crate::streams::{
@@ -37,7 +37,7 @@ An edits.toml:
   z = [\"0mm\", \"0.5mm\"]")]
 pub(crate) struct EditArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     settings: EditStageArgs,

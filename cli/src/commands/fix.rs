@@ -8,7 +8,7 @@ use lamp_pipeline::fix::{FixSettings, Fixing};
 use lamp_pipeline::whereabouts;
 use lamp_stack::PageInfo;
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::FixStageArgs;
 use crate::exit::Exit;
 use crate::output::band_pictures::BandPictures;
@@ -39,7 +39,7 @@ Examples:
   fix pages/ --layers 100..200 --method nearest -o fixed/")]
 pub(crate) struct FixArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     settings: FixStageArgs,

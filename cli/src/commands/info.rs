@@ -8,7 +8,7 @@ use lamp_stack::{
 use serde::Serialize;
 
 use super::info_strips::print_strips;
-use crate::args::options::Input;
+use crate::args::options::InputArgs;
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::output::stack_facts::{StackFacts, compression_name};
@@ -27,7 +27,7 @@ Examples:
   slice blade.stl | lamp info --runs")]
 pub(crate) struct InfoArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     /// Also decode the images, and count their transitions
     #[arg(long)]
@@ -79,7 +79,7 @@ fn with_stack((mut header, stack): (PageHeader, Option<StackInfo>)) -> PageHeade
 }
 
 /// Sums up the pages and the transitions of their images.
-fn runs_of(pages: Pages, input: &Input) -> Result<Option<Facts>, Exit> {
+fn runs_of(pages: Pages, input: &InputArgs) -> Result<Option<Facts>, Exit> {
     let path = input.stack.clone();
     let pages = in_range(pages, Page::info, path.clone(), input.layers.clone());
     Facts::sum(map_in_order(pages, move |(page, stack): (Page, _)| {

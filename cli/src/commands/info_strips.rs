@@ -12,7 +12,7 @@ use crate::output::stack_facts::StackFacts;
 use crate::streams::{failed_at, input_name, print};
 
 /// A strip, and what its pages say.
-struct Strip {
+struct StripSummary {
     file: StripFile,
     totals: StackTotals,
 }
@@ -30,7 +30,7 @@ struct Totals<'a> {
 }
 
 impl<'a> Totals<'a> {
-    fn of(form: &'a StripForm, strips: &[Strip]) -> Self {
+    fn of(form: &'a StripForm, strips: &[StripSummary]) -> Self {
         let sum = |number: fn(&StackTotals) -> u64| strips.iter().map(|s| number(&s.totals)).sum();
         Self {
             mirrors: form.mirrors,
@@ -65,13 +65,13 @@ pub(super) fn print_strips(folder: &Path, as_json: bool) -> Result<(), Exit> {
 }
 
 /// Returns the input of a strip, and the commands that made its build: all but the strip's own.
-fn made_by(strip: &Strip) -> Option<(&str, &[String])> {
+fn made_by(strip: &StripSummary) -> Option<(&str, &[String])> {
     let stack = strip.totals.first.info.stack.as_ref()?;
     let (_, commands) = stack.commands.split_last()?;
     Some((&stack.digest, commands))
 }
 
-fn read(folder: &Path, file: StripFile, number: u32) -> Result<Strip, Exit> {
+fn read(folder: &Path, file: StripFile, number: u32) -> Result<StripSummary, Exit> {
     let path = folder.join(&file.name);
     let at = |error| failed_at(input_name(&path), error);
     let mut totals: Option<StackTotals> = None;
@@ -87,10 +87,10 @@ fn read(folder: &Path, file: StripFile, number: u32) -> Result<Strip, Exit> {
         }
     }
     let totals = totals.ok_or(lamp_stack::StackError::NoLayers).map_err(at)?;
-    Ok(Strip { file, totals })
+    Ok(StripSummary { file, totals })
 }
 
-fn json<'a>(totals: &'a Totals<'a>, strips: &'a [Strip]) -> impl Serialize + 'a {
+fn json<'a>(totals: &'a Totals<'a>, strips: &'a [StripSummary]) -> impl Serialize + 'a {
     #[derive(Serialize)]
     struct Answer<'a> {
         #[serde(flatten)]
@@ -104,7 +104,7 @@ fn json<'a>(totals: &'a Totals<'a>, strips: &'a [Strip]) -> impl Serialize + 'a 
         #[serde(flatten)]
         facts: StackFacts<'a>,
     }
-    let line = |strip: &'a Strip| Line {
+    let line = |strip: &'a StripSummary| Line {
         file: &strip.file.name,
         columns: [strip.file.columns.start, strip.file.columns.end],
         facts: StackFacts::new(&strip.totals),
@@ -112,7 +112,7 @@ fn json<'a>(totals: &'a Totals<'a>, strips: &'a [Strip]) -> impl Serialize + 'a 
     Answer { totals, strips: strips.iter().map(line).collect() }
 }
 
-fn text(name: &str, totals: &Totals<'_>, strips: &[Strip]) -> String {
+fn text(name: &str, totals: &Totals<'_>, strips: &[StripSummary]) -> String {
     let exposed = |pixels: Option<u64>| match pixels {
         Some(pixels) => format!("{pixels} pixels"),
         None => "an unknown number of pixels".to_owned(),
@@ -132,7 +132,7 @@ fn text(name: &str, totals: &Totals<'_>, strips: &[Strip]) -> String {
         exposed(totals.exposed_px),
         totals.data_bytes,
     );
-    for Strip { file, totals } in strips {
+    for StripSummary { file, totals } in strips {
         text.push_str(&format!(
             "{}: columns {} to {}, {} layers, {}, {} bytes\n",
             file.name,

@@ -23,11 +23,11 @@ Examples:
   tile blade.tif --machine mine.toml -o build.tif")]
 pub(crate) struct MachineArgs {
     #[command(subcommand)]
-    action: Action,
+    action: MachineAction,
 }
 
 #[derive(Subcommand)]
-enum Action {
+enum MachineAction {
     /// List the built-in machines
     List {
         /// Print JSON, as docs/json.md describes it
@@ -48,10 +48,10 @@ enum Action {
 
 pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
-        Action::List { json: true } => answer(Machine::builtins()),
-        Action::List { json: false } => print(&table()),
-        Action::Show { machine, json: true } => answer([document(machine)?]),
-        Action::Show { machine, json: false } => show::<Machine>(machine),
+        MachineAction::List { json: true } => answer(Machine::builtins()),
+        MachineAction::List { json: false } => print(&table()),
+        MachineAction::Show { machine, json: true } => answer([document(machine)?]),
+        MachineAction::Show { machine, json: false } => show::<Machine>(machine),
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 use lamp_stack::{Format, PackLevel};
 
-use crate::args::options::{Common, Input, Output};
+use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
 use crate::output::endings::{PACKED_STACK, check_ending};
 use crate::streams::{is_stream, layers_of_input, open_pages, progress, write_packed_layers};
@@ -26,7 +26,7 @@ Examples:
   lamp convert build.lamp -o build.tif")]
 pub(crate) struct PackArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     output: Output,

@@ -23,11 +23,11 @@ Examples:
   lamp projector check mine.toml")]
 pub(crate) struct ProjectorArgs {
     #[command(subcommand)]
-    action: Action,
+    action: ProjectorAction,
 }
 
 #[derive(Subcommand)]
-enum Action {
+enum ProjectorAction {
     /// List the built-in projectors
     List {
         /// Print JSON, as docs/json.md describes it
@@ -57,11 +57,13 @@ enum Action {
 
 pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
     match &args.action {
-        Action::List { json: true } => answer(Projector::builtins()),
-        Action::List { json: false } => print(&table()),
-        Action::Show { projector, json: true } => answer([documents::document(projector)?]),
-        Action::Show { projector, json: false } => catalogue::show::<Projector>(projector),
-        Action::Check { file, json } => check(file, *json),
+        ProjectorAction::List { json: true } => answer(Projector::builtins()),
+        ProjectorAction::List { json: false } => print(&table()),
+        ProjectorAction::Show { projector, json: true } => {
+            answer([documents::document(projector)?])
+        }
+        ProjectorAction::Show { projector, json: false } => catalogue::show::<Projector>(projector),
+        ProjectorAction::Check { file, json } => check(file, *json),
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct ShowArgs {
     stack: PathBuf,
 
     #[command(flatten)]
-    shown: Shown,
+    shown: ShownLayers,
 
     /// Show only this part of the image: left column, top row, width and height in pixels
     #[arg(long, value_name = "X,Y,W,H")]
@@ -70,7 +70,7 @@ pub(crate) struct ShowArgs {
 /// The layers to show.
 #[derive(Args)]
 #[group(required = true, multiple = false)]
-struct Shown {
+struct ShownLayers {
     /// Index of the layer
     #[arg(long, value_name = "K")]
     layer: Option<u32>,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use lamp_stack::{SplitError, SplitPoints, write_split};
 
-use crate::args::options::{Common, Input};
+use crate::args::options::{Common, InputArgs};
 use crate::exit::Exit;
 use crate::streams::{format, input_name, new_folder, read_layers, written_to};
 use crate::terminal::progress::Progress;
@@ -25,7 +25,7 @@ Examples:
   lamp join ranges/*.tif -o build.tif")]
 pub(crate) struct SplitArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     /// Put N layers into each file; the last takes the rest
     #[arg(long, value_name = "N", group = "cuts", value_parser = parse_every)]

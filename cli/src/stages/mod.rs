@@ -7,3 +7,4 @@ mod goldens;
 pub(crate) mod parse;
 #[cfg(test)]
 mod tests;
+

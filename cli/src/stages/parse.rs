@@ -15,7 +15,7 @@ use lamp_pipeline::documents::is_file;
 use lamp_pipeline::edit::{EditSettings, Editing};
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::SliceStage;
-use lamp_pipeline::{Chain, Stage};
+use lamp_pipeline::{Stage, StageChain};
 
 use super::after::After;
 use crate::Lamp;
@@ -65,7 +65,7 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
             let stages = STAGES.join(", ");
             return Err(refused(format!("it is no stage of a part: these are {stages}")));
         }
-        let reader = Reader::new(name, words, folder).map_err(refused)?;
+        let reader = StageReader::new(name, words, folder).map_err(refused)?;
         if (name == "slice") != (stage == 0) {
             return Err(refused(match stage {
                 0 => "a part's first stage is slice".to_owned(),
@@ -91,16 +91,16 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
         name: "stages".to_owned(),
         why: "there are none: a part needs slice at least".to_owned(),
     };
-    Ok(Stages { chain: Chain { slice: slice.ok_or_else(none)?, stages: per_layer }, after })
+    Ok(Stages { chain: StageChain { slice: slice.ok_or_else(none)?, stages: per_layer }, after })
 }
 
 /// A stage's words, read.
-struct Reader<'a> {
+struct StageReader<'a> {
     matches: ArgMatches,
     folder: &'a Path,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> StageReader<'a> {
     fn new(name: &str, words: &[String], folder: &'a Path) -> Result<Self, String> {
         static LAMP: OnceLock<clap::Command> = OnceLock::new();
         let lamp = LAMP.get_or_init(|| formed(Lamp::command()));
@@ -180,14 +180,14 @@ impl<'a> Reader<'a> {
 
 /// Reads the options of `tile`, without stacks.
 pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, String> {
-    let mut args: TileArgs = Reader::new("tile", &with_name("tile", options), folder)?.read();
+    let mut args: TileArgs = StageReader::new("tile", &with_name("tile", options), folder)?.read();
     args.settings.files_mut().for_each(|path| *path = folder.join(&*path));
     Ok(args)
 }
 
 /// Reads the options of `check`, without stacks.
 pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
-    let args: CheckArgs = Reader::new("check", &with_name("check", options), folder)?.read();
+    let args: CheckArgs = StageReader::new("check", &with_name("check", options), folder)?.read();
     let mut settings = CheckSettings::clone(&args.settings);
     settings.set_folder(folder);
     Ok(settings)

@@ -120,7 +120,7 @@ fn best_starts(times: &[(u64, u64)], sums: &PrefixSums, count: usize) -> (Vec<us
     for cluster in 1..=count {
         let mut next = vec![f64::INFINITY; n + 1];
         let mut start = vec![0_u32; n + 1];
-        let row = Row { before: &best, sums };
+        let row = ClusterRow { before: &best, sums };
         row.fill(cluster, [cluster - 1, n - 1], &mut next[cluster..], &mut start[cluster..]);
         best = next;
         starts.push(start);
@@ -142,12 +142,12 @@ fn best_starts(times: &[(u64, u64)], sums: &PrefixSums, count: usize) -> (Vec<us
 const SHARED: usize = 1 << 12;
 
 /// One cluster more than before.
-struct Row<'a> {
+struct ClusterRow<'a> {
     before: &'a [f64],
     sums: &'a PrefixSums,
 }
 
-impl Row<'_> {
+impl ClusterRow<'_> {
     /// Writes the least sums of squares for ends from `end` on, and the start of their last
     /// cluster, which is within `starts`. Later ends have no earlier start, so the two halves are
     /// independent.

@@ -2,7 +2,7 @@
 
 use super::light::{GlassLight, product};
 use super::taps::Taps;
-use crate::numeric::Curvature;
+use crate::numeric::CurvatureMatrix;
 
 /// The product of H's transpose with H, or its mean over shifts: a matrix for each axis.
 pub(super) struct Normal<'a> {
@@ -23,7 +23,7 @@ impl<'a> Normal<'a> {
     }
 }
 
-impl Curvature for Normal<'_> {
+impl CurvatureMatrix for Normal<'_> {
     fn apply(&self, mirrors: &[f64]) -> Vec<f64> {
         let square = self.light.setup().irradiance.powi(2);
         let mut weighed: Vec<_> = mirrors.iter().map(|number| number * square).collect();
@@ -40,7 +40,7 @@ pub(super) struct Weighted<'a> {
     pub(super) weights: &'a [&'a [f64]],
 }
 
-impl Curvature for Weighted<'_> {
+impl CurvatureMatrix for Weighted<'_> {
     fn apply(&self, mirrors: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; mirrors.len()];
         for (light, weights) in self.lights.iter().zip(self.weights) {

@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::light::GlassLight;
-use crate::numeric::{Bounded, Curvature, dot};
+use crate::numeric::{Bounded, CurvatureMatrix, dot};
 
 /// Rows of column voxels that a thread takes at a time.
 const ROWS: usize = 16;
 
 /// The wanted doses on one light.
-pub(super) struct Wish<'a> {
+pub(super) struct WantedDoses<'a> {
     pub(super) light: &'a GlassLight,
     /// The dose of each column voxel, in mJ/cm2.
     pub(super) wanted: &'a [f64],
@@ -20,7 +20,7 @@ pub(super) struct Wish<'a> {
 /// A symmetric matrix, row by row.
 struct Dense(Vec<Vec<f64>>);
 
-impl Curvature for Dense {
+impl CurvatureMatrix for Dense {
     fn apply(&self, numbers: &[f64]) -> Vec<f64> {
         self.0.iter().map(|row| dot(row, numbers)).collect()
     }
@@ -51,7 +51,7 @@ impl ClusterSums {
 /// whose `clusters` are k and above, from 1. No time is below zero, all together are at most
 /// `max_s`, and the doses are as near as possible to the wishes (least squares).
 pub(super) fn best_seconds(
-    wishes: &[Wish<'_>],
+    wishes: &[WantedDoses<'_>],
     clusters: &[u16],
     count: usize,
     max_s: f64,
@@ -109,7 +109,7 @@ fn within(mut seconds: Vec<f64>, max_s: f64) -> Vec<f64> {
     seconds
 }
 
-fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> ClusterSums {
+fn sums_of(wish: &WantedDoses<'_>, clusters: &[u16], count: usize) -> ClusterSums {
     let rows = wish.light.setup().voxels[1];
     let chunks: Vec<_> = (0..rows.div_ceil(ROWS))
         .into_par_iter()
@@ -126,7 +126,7 @@ fn sums_of(wish: &Wish<'_>, clusters: &[u16], count: usize) -> ClusterSums {
 }
 
 /// Adds the light that clusters bring to a row of column voxels.
-fn add_row(sums: &mut ClusterSums, wish: &Wish<'_>, clusters: &[u16], row: usize) {
+fn add_row(sums: &mut ClusterSums, wish: &WantedDoses<'_>, clusters: &[u16], row: usize) {
     let setup = wish.light.setup();
     let [width, columns] = [setup.mirrors[0], setup.voxels[0]];
     let [along, down] = wish.light.taps();

@@ -7,7 +7,7 @@ use super::bitmaps::{Bitmap, Mirrors, black_and_white, gray};
 use super::clusters::{Clusters, TooFewTimes};
 use super::curve::HeightCurve;
 use super::heights::{HeightMisfit, nearest_heights};
-use super::levels::{Wish, best_seconds};
+use super::levels::{WantedDoses, best_seconds};
 use super::light::GlassLight;
 use super::spread::Tracing;
 use super::times::{MirrorTimes, Stop, nearest_times};
@@ -255,13 +255,13 @@ impl<'a> ColumnProblem<'a> {
             ColumnObjective::Dose => self
                 .lights
                 .iter()
-                .map(|light| Wish { light, wanted: &self.wanted, weights: &[] })
+                .map(|light| WantedDoses { light, wanted: &self.wanted, weights: &[] })
                 .collect(),
             ColumnObjective::Height => self
                 .lights
                 .iter()
                 .zip(&wishes)
-                .map(|(light, to)| Wish { light, wanted: &to.wanted, weights: &to.weights })
+                .map(|(light, to)| WantedDoses { light, wanted: &to.wanted, weights: &to.weights })
                 .collect(),
         };
         best_seconds(&wishes, clusters, count, max_s)

@@ -53,14 +53,14 @@ pub struct CureSection<'a> {
     resin: &'a Resin,
     rule: CureRule,
     course: SectionLine,
-    cured: Cured,
+    cured: CuredResin,
     has_gray: bool,
     heights_um: Range<f64>,
 }
 
 /// The cured resin of an exposure: in full, and by gray levels.
 #[derive(Debug)]
-enum Cured {
+enum CuredResin {
     Alone { depths: Option<(ExposureTime, Vec<Length>)>, lines: [CuredLine; 2] },
     Summed([SummedLine; 2]),
     Spread(Box<(Light, [DoseSection; 2])>),
@@ -70,14 +70,14 @@ impl<'a> CureSection<'a> {
     /// Starts without a layer.
     pub fn new(resin: &'a Resin, rule: CureRule, course: SectionLine) -> Self {
         let cured = match rule {
-            CureRule::Alone => Cured::Alone { depths: None, lines: Default::default() },
+            CureRule::Alone => CuredResin::Alone { depths: None, lines: Default::default() },
             CureRule::Straight(fading) => {
                 let line = SummedLine::new(fading, course.pixels);
-                Cured::Summed([line.clone(), line])
+                CuredResin::Summed([line.clone(), line])
             }
             CureRule::Spread(light) | CureRule::Voxels(light) => {
                 let section = DoseSection::new(light, course.line, course.dpi);
-                Cured::Spread(Box::new((light, [section.clone(), section])))
+                CuredResin::Spread(Box::new((light, [section.clone(), section])))
             }
         };
         Self { resin, rule, course, cured, has_gray: false, heights_um: f64::MAX..f64::MIN }
@@ -108,7 +108,7 @@ impl<'a> CureSection<'a> {
         let (line, image) = (self.course.line, &layer.image);
         let top = Length::from_um(bottom.um() + thickness.um());
         match &mut self.cured {
-            Cured::Alone { depths, lines: [in_full, by_levels] } => {
+            CuredResin::Alone { depths, lines: [in_full, by_levels] } => {
                 if depths.as_ref().is_none_or(|(of, _)| *of != time) {
                     let depth = |level| self.resin.depth(GrayLevel::from_u8(level), time);
                     *depths = Some((time, (0..=255u8).map(depth).collect()));
@@ -118,7 +118,7 @@ impl<'a> CureSection<'a> {
                 in_full.expose_runs(&runs, pixels, top, |_| depths[255]);
                 by_levels.expose_runs(&runs, pixels, top, |level| depths[usize::from(level)]);
             }
-            Cured::Summed([in_full, by_levels]) => {
+            CuredResin::Summed([in_full, by_levels]) => {
                 let end = self.course.pixels;
                 // A later page may be larger.
                 let within = |(from, to, level): LineRun| (from.min(end), to.min(end), level);
@@ -126,7 +126,7 @@ impl<'a> CureSection<'a> {
                 in_full.expose(whitened(&runs), bottom, thickness, time);
                 by_levels.expose(runs, bottom, thickness, time);
             }
-            Cured::Spread(spread) => {
+            CuredResin::Spread(spread) => {
                 let exposed = LayerTime { thickness, time };
                 let (light, [in_full, by_levels]) = &mut **spread;
                 in_full.expose(image, bottom, exposed, |_| 1.0);
@@ -166,9 +166,9 @@ impl<'a> CureSection<'a> {
     /// are any.
     pub fn cured(&self) -> Vec<(&'static str, Vec<SolidHeights>)> {
         let of = |k: usize| match &self.cured {
-            Cured::Alone { lines, .. } => lines[k].pixels().to_vec(),
-            Cured::Summed(lines) => lines[k].cured(self.heights_um.start),
-            Cured::Spread(spread) => match self.rule {
+            CuredResin::Alone { lines, .. } => lines[k].pixels().to_vec(),
+            CuredResin::Summed(lines) => lines[k].cured(self.heights_um.start),
+            CuredResin::Spread(spread) => match self.rule {
                 CureRule::Voxels(_) => spread.1[k].cured(),
                 _ => spread.1[k].cured_by_height(),
             },

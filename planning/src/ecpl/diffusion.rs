@@ -7,13 +7,13 @@ const TOGETHER: usize = 4;
 
 /// The factors of a tridiagonal matrix `1 + D dt L`, where nothing leaves at the ends.
 #[derive(Clone, Debug)]
-struct Line {
+struct TridiagonalFactors {
     before: Vec<f64>,
     over: Vec<f64>,
     after: Vec<f64>,
 }
 
-impl Line {
+impl TridiagonalFactors {
     /// Factors the matrix, whose rows exchange with the rows before and after them.
     fn new(exchange: impl Iterator<Item = [f64; 2]>) -> Self {
         let [mut before, mut over, mut after] = [const { Vec::<f64>::new() }; 3];
@@ -75,8 +75,8 @@ impl Line {
 /// makes a whole step.
 #[derive(Clone, Debug)]
 pub(super) struct Diffusion {
-    across: Line,
-    deep: Line,
+    across: TridiagonalFactors,
+    deep: TridiagonalFactors,
 }
 
 impl Diffusion {
@@ -90,8 +90,10 @@ impl Diffusion {
         let last = cells.deep - 1;
         let walls = |z| [if z == 0 { 0.0 } else { high }, if z == last { 0.0 } else { high }];
         Some(Self {
-            across: Line::new((0..cells.across).map(|x| cells.exchange(x).map(|e| e * wide))),
-            deep: Line::new((0..cells.deep).map(walls)),
+            across: TridiagonalFactors::new(
+                (0..cells.across).map(|x| cells.exchange(x).map(|e| e * wide)),
+            ),
+            deep: TridiagonalFactors::new((0..cells.deep).map(walls)),
         })
     }
 

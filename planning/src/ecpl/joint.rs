@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::exposure::nested;
 use super::profile::WantedProfile;
 use super::reactor::Chamber;
-use super::simulation::{RingSimulation, Shown};
+use super::simulation::{RingSimulation, ShownLight};
 use super::{RingExposure, RingPlanError};
 use crate::numeric::{DescentEnd, descend, dot};
 
@@ -111,20 +111,20 @@ impl<'a> KnotSearch<'a> {
     }
 
     /// Returns the light that is shown when rings shine for these times.
-    fn shown(&self, times: &[f64]) -> Vec<Shown> {
+    fn shown(&self, times: &[f64]) -> Vec<ShownLight> {
         let mut rings: Vec<usize> = (0..times.len()).filter(|&ring| times[ring] > 0.0).collect();
         // Longest first: light is added up from the last bitmap to the first, since rings only go
         // dark.
         // dark.
         rings.sort_by(|&a, &b| times[b].total_cmp(&times[a]));
         let mut light = vec![0.0; self.simulation.reaction().cells().across];
-        let mut shown: Vec<Shown> = Vec::new();
+        let mut shown: Vec<ShownLight> = Vec::new();
         for ring in rings {
             light.iter_mut().zip(self.simulation.ring(ring)).for_each(|(sum, l)| *sum += l);
             let until_s = times[ring];
             match shown.last_mut() {
                 Some(last) if last.until_s == until_s => last.light.clone_from(&light),
-                _ => shown.push(Shown { until_s, light: light.clone() }),
+                _ => shown.push(ShownLight { until_s, light: light.clone() }),
             }
         }
         shown.reverse();

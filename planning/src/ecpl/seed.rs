@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::RingExposure;
 use super::profile::{Profile, WantedProfile};
 use super::reactor::Chamber;
-use super::simulation::{RingSimulation, Shown};
+use super::simulation::{RingSimulation, ShownLight};
 
 /// The longest time in the database of single discs, in whole seconds (003 table 2).
 const DATABASE_S: u32 = 30;
@@ -37,8 +37,8 @@ pub(super) fn plan(simulation: &RingSimulation, wanted: &WantedProfile) -> Vec<R
     plan
 }
 
-fn disc(simulation: &RingSimulation, pixels: u32, until_s: f64) -> Shown {
-    Shown { until_s, light: simulation.light(|ring| ring < pixels as usize) }
+fn disc(simulation: &RingSimulation, pixels: u32, until_s: f64) -> ShownLight {
+    ShownLight { until_s, light: simulation.light(|ring| ring < pixels as usize) }
 }
 
 /// Returns the difference between a profile and the part up to the profile's own height, as a share
@@ -75,7 +75,7 @@ pub(super) fn first_disc(
 }
 
 /// A disc to show after others.
-struct Next {
+struct NextDisc {
     pixels: u32,
     time: ExposureTime,
     misfit: f64,
@@ -89,7 +89,7 @@ fn next_disc(
     wanted: &WantedProfile,
     chamber: &Chamber,
     reach: u32,
-) -> Option<Next> {
+) -> Option<NextDisc> {
     let now = Profile::of(chamber, simulation.reaction());
     let rms_now = wanted.rms_um(&now);
     let tries = (1..reach).into_par_iter().filter_map(|pixels| {
@@ -109,10 +109,10 @@ fn try_disc(
     wanted: &WantedProfile,
     chamber: &Chamber,
     pixels: u32,
-) -> Option<Next> {
+) -> Option<NextDisc> {
     let step_s = simulation.setting().step.ms() / 1000.0;
     let mut chamber = chamber.clone();
-    let mut best: Option<Next> = None;
+    let mut best: Option<NextDisc> = None;
     let mut shown_s = 0.0;
     while shown_s < LONGEST_S {
         simulation.expose(&mut chamber, &[disc(simulation, pixels, step_s)], 0, |_, _| ());
@@ -126,7 +126,7 @@ fn try_disc(
                     break;
                 }
             }
-            _ => best = Some(Next { pixels, time, misfit, chamber: chamber.clone() }),
+            _ => best = Some(NextDisc { pixels, time, misfit, chamber: chamber.clone() }),
         }
     }
     best

@@ -21,7 +21,7 @@ pub struct RingSimulation {
 
 /// The light of each column, shown until a time in seconds.
 #[derive(Clone, Debug)]
-pub(super) struct Shown {
+pub(super) struct ShownLight {
     pub(super) until_s: f64,
     pub(super) light: Vec<f64>,
 }
@@ -81,7 +81,8 @@ impl RingSimulation {
     /// Returns the profiles that a plan cures up to the end of each of its bitmaps.
     pub fn growth(&self, plan: &[RingExposure]) -> Vec<Profile> {
         let shown = self.shown(plan);
-        let step_of = |shown: &Shown| (shown.until_s / self.reaction.seconds()).round() as usize;
+        let step_of =
+            |shown: &ShownLight| (shown.until_s / self.reaction.seconds()).round() as usize;
         let ends: Vec<usize> = shown.iter().map(step_of).collect();
         let mut grown = Vec::with_capacity(plan.len());
         self.expose(&mut Chamber::new(&self.reaction), &shown, 0, |step, chamber| {
@@ -124,11 +125,11 @@ impl RingSimulation {
         Ok(heights)
     }
 
-    fn shown(&self, plan: &[RingExposure]) -> Vec<Shown> {
+    fn shown(&self, plan: &[RingExposure]) -> Vec<ShownLight> {
         let mut until_s = 0.0;
         let shown = |exposure: &RingExposure| {
             until_s += exposure.time.ms() / 1000.0;
-            Shown { until_s, light: self.light(|ring| exposure.is_white(ring as u32)) }
+            ShownLight { until_s, light: self.light(|ring| exposure.is_white(ring as u32)) }
         };
         plan.iter().map(shown).collect()
     }
@@ -152,7 +153,7 @@ impl RingSimulation {
     pub(super) fn expose(
         &self,
         chamber: &mut Chamber,
-        shown: &[Shown],
+        shown: &[ShownLight],
         from: usize,
         mut before: impl FnMut(usize, &Chamber),
     ) {

@@ -13,7 +13,7 @@ const CHUNK: usize = 1 << 13;
 const STEP: f64 = 1.9;
 
 /// A matrix that is symmetric and has no negative eigenvalue, as a product.
-pub(crate) trait Curvature: Sync {
+pub(crate) trait CurvatureMatrix: Sync {
     /// Returns the product with numbers.
     fn apply(&self, numbers: &[f64]) -> Vec<f64>;
 }
@@ -60,7 +60,7 @@ struct Sums {
     conjugate: f64,
 }
 
-impl<C: Curvature> Bounded<'_, C> {
+impl<C: CurvatureMatrix> Bounded<'_, C> {
     /// Searches from `x` until `is_done` returns true. It is called at every `look`th step with the
     /// number of steps so far.
     pub(crate) fn search(
@@ -236,7 +236,7 @@ mod tests {
     /// A matrix of one number.
     struct One(f64);
 
-    impl Curvature for One {
+    impl CurvatureMatrix for One {
         fn apply(&self, numbers: &[f64]) -> Vec<f64> {
             vec![self.0 * numbers[0]]
         }

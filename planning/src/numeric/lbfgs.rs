@@ -21,7 +21,7 @@ pub(crate) struct DescentEnd {
     pub(crate) fall: f64,
 }
 
-struct Pair {
+struct CorrectionPair {
     step: Vec<f64>,
     change: Vec<f64>,
     scale: f64,
@@ -42,7 +42,7 @@ pub(crate) fn descend(
     };
     clamp(x);
     let (mut value, mut slopes) = function(x);
-    let mut pairs: VecDeque<Pair> = VecDeque::new();
+    let mut pairs: VecDeque<CorrectionPair> = VecDeque::new();
     for _ in 0..stop.steps {
         // A bound that the slopes push against stays.
         let is_free = |k: usize| if slopes[k] > 0.0 { x[k] > low[k] } else { x[k] < high[k] };
@@ -89,7 +89,7 @@ pub(crate) fn descend(
             if pairs.len() == MEMORY {
                 pairs.pop_front();
             }
-            pairs.push_back(Pair { step, change, scale: 1.0 / curve });
+            pairs.push_back(CorrectionPair { step, change, scale: 1.0 / curve });
         }
         (*x, value, slopes) = (next, next_value, next_slopes);
         if fall <= stop.fall * value.abs() {
@@ -99,7 +99,12 @@ pub(crate) fn descend(
 }
 
 /// Returns the direction of the two loops of L-BFGS, among only the free numbers.
-fn direction(slopes: &[f64], free: &[bool], pairs: &VecDeque<Pair>, x: &[f64]) -> Vec<f64> {
+fn direction(
+    slopes: &[f64],
+    free: &[bool],
+    pairs: &VecDeque<CorrectionPair>,
+    x: &[f64],
+) -> Vec<f64> {
     let only_free = |mut numbers: Vec<f64>| {
         numbers.iter_mut().zip(free).filter(|(_, free)| !**free).for_each(|(n, _)| *n = 0.0);
         numbers

@@ -9,7 +9,7 @@ mod cholesky;
 mod conjugate_gradients;
 mod lbfgs;
 
-pub(crate) use bounded::{Bounded, Curvature, SearchPlace};
+pub(crate) use bounded::{Bounded, CurvatureMatrix, SearchPlace};
 pub(crate) use cholesky::solve_positive;
 pub(crate) use conjugate_gradients::solve_by_conjugate_gradients;
 pub(crate) use lbfgs::{DescentEnd, descend};

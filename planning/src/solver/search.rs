@@ -173,7 +173,7 @@ pub fn solve<T: Real>(
         // Halpern's weights (k + 1) / (k + 2), with k = 0 at each restart: the anchor counts less
         // and less.
         let share = f64::from(since) / f64::from(since + 1);
-        Step::new(problem, &steps, weight, share).take(&mut now, &mut next, &anchor);
+        SearchIteration::new(problem, &steps, weight, share).take(&mut now, &mut next, &anchor);
         if iteration % LOOK_AFTER != 0 {
             continue;
         }
@@ -237,7 +237,7 @@ impl<T: Real> Best<T> {
 }
 
 /// One iteration.
-struct Step<'a, T> {
+struct SearchIteration<'a, T> {
     problem: &'a Problem<T>,
     steps: &'a Steps<T>,
     /// Factors of steps in light and in prices.
@@ -249,7 +249,7 @@ struct Step<'a, T> {
     rest: T,
 }
 
-impl<'a, T: Real> Step<'a, T> {
+impl<'a, T: Real> SearchIteration<'a, T> {
     fn new(problem: &'a Problem<T>, steps: &'a Steps<T>, weight: f64, share: f64) -> Self {
         Self {
             problem,

@@ -12,22 +12,22 @@ pub(crate) const LANES: usize = 256;
 /// The light of pixel columns for a second of every layer's light. Its sign is the role: negative
 /// where a voxel is wanted, positive elsewhere. Without light it is zero, of either sign.
 #[derive(Clone, Debug)]
-pub(crate) struct Columns {
+pub(crate) struct PixelColumns {
     layers: usize,
-    blocks: Vec<Block>,
+    blocks: Vec<ColumnBlock>,
 }
 
 /// [`LANES`] columns side by side.
 #[derive(Clone, Debug)]
-pub(crate) struct Block {
+pub(crate) struct ColumnBlock {
     /// The number of pixels that each column stands for.
     pub(crate) weights: Vec<f32>,
     /// Layer by layer.
     pub(crate) light: Vec<f32>,
 }
 
-impl Columns {
-    pub(crate) fn blocks(&self) -> &[Block] {
+impl PixelColumns {
+    pub(crate) fn blocks(&self) -> &[ColumnBlock] {
         &self.blocks
     }
 
@@ -95,11 +95,11 @@ impl ColumnSet {
     }
 
     /// Returns the columns side by side.
-    pub(crate) fn finish(self) -> Columns {
+    pub(crate) fn finish(self) -> PixelColumns {
         let block = |first: usize| {
             let numbers = first..(first + LANES).min(self.len());
             let mut block =
-                Block { weights: vec![0.0; LANES], light: vec![0.0; LANES * self.layers] };
+                ColumnBlock { weights: vec![0.0; LANES], light: vec![0.0; LANES * self.layers] };
             for (lane, number) in numbers.enumerate() {
                 // Lanes beyond the last column have weight zero.
                 block.weights[lane] = self.weights[number] as f32;
@@ -110,7 +110,7 @@ impl ColumnSet {
             block
         };
         let blocks = (0..self.len()).step_by(LANES).map(block).collect();
-        Columns { layers: self.layers, blocks }
+        PixelColumns { layers: self.layers, blocks }
     }
 }
 

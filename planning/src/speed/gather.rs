@@ -3,7 +3,7 @@
 use lamp_stack::Image;
 use rayon::prelude::*;
 
-use super::columns::{ColumnSet, Columns};
+use super::columns::{ColumnSet, PixelColumns};
 use super::part::{TimedPart, fill_window};
 use crate::blur::{Blur, LANES};
 use crate::light::Light;
@@ -100,7 +100,7 @@ impl<'a> Gather<'a> {
 
     /// Returns all columns, or a sample of them that takes no more than `bytes`, and the number of
     /// pixels that each sampled column stands for.
-    pub(crate) fn columns(&self, bytes: usize) -> (Columns, u32) {
+    pub(crate) fn columns(&self, bytes: usize) -> (PixelColumns, u32) {
         let layers = self.part.images.len();
         let most = (bytes / (layers * size_of::<f32>())).max(1);
         let mut step = 1;
@@ -117,7 +117,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Returns the columns of a sample, if there are at most `most`.
-    fn sample(&self, step: u32, most: usize) -> Option<Columns> {
+    fn sample(&self, step: u32, most: usize) -> Option<PixelColumns> {
         let mut all = ColumnSet::new(self.part.images.len());
         for tile in self.tiles(step, |tile| tile) {
             all.add_all(&tile, 1.0);
@@ -278,7 +278,7 @@ mod tests {
         let (some, many) = gather.columns(240 * 4 * 600);
         assert!(one == 1 && many > 1);
         // The wanted voxels of each layer, and their light.
-        let sums = |columns: &Columns, layer: usize| {
+        let sums = |columns: &PixelColumns, layer: usize| {
             let lanes = super::super::columns::LANES;
             let each = columns.blocks().iter().flat_map(|block| {
                 let light = &block.light[layer * lanes..(layer + 1) * lanes];

@@ -6,13 +6,13 @@
 
 use rayon::prelude::*;
 
-use super::columns::{Block, Columns, LANES};
+use super::columns::{ColumnBlock, LANES, PixelColumns};
 use crate::light::LayerLight;
 use crate::wide::wide;
 
 /// The light that reaches a layer's voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reach {
+pub(crate) struct LightReach {
     /// The share that passes, and the dose of a second under a wide white field.
     pub(crate) light: LayerLight,
     /// The factor on the dose before it is compared: 1, or a factor from measurements.
@@ -57,7 +57,7 @@ impl Priced {
 /// The error of a part's voxels as a function of times.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hinge<'a> {
-    pub(crate) layers: &'a [Reach],
+    pub(crate) layers: &'a [LightReach],
     /// The distance that doses must keep from 1.
     pub(crate) margin: f64,
     /// The error is exact at this distance from the kink and farther; zero leaves the kink.
@@ -66,8 +66,8 @@ pub(crate) struct Hinge<'a> {
 
 impl Hinge<'_> {
     /// Returns the error of all columns and its slopes.
-    pub(crate) fn of(&self, columns: &Columns, times: &[f64]) -> Priced {
-        let price = |room: &mut Vec<f32>, block: &Block| self.of_block(block, times, room);
+    pub(crate) fn of(&self, columns: &PixelColumns, times: &[f64]) -> Priced {
+        let price = |room: &mut Vec<f32>, block: &ColumnBlock| self.of_block(block, times, room);
         let blocks: Vec<_> = columns.blocks().par_iter().map_init(Vec::new, price).collect();
         // Blocks are added in order, so the sum is the same on any number of threads.
         let mut all = Priced::none(columns.layers());
@@ -77,7 +77,7 @@ impl Hinge<'_> {
         all
     }
 
-    fn of_block(&self, block: &Block, times: &[f64], room: &mut Vec<f32>) -> Priced {
+    fn of_block(&self, block: &ColumnBlock, times: &[f64], room: &mut Vec<f32>) -> Priced {
         wide(
             #[inline(always)]
             || {
@@ -89,7 +89,7 @@ impl Hinge<'_> {
 
     /// Runs from the last layer to the first with the cost of an additional dose.
     #[inline(always)]
-    fn price(&self, block: &Block, doses: &[f32]) -> Priced {
+    fn price(&self, block: &ColumnBlock, doses: &[f32]) -> Priced {
         let mut priced = Priced::none(self.layers.len());
         let mut cost = [0.0_f32; LANES];
         for (layer, reach) in self.layers.iter().enumerate().rev() {
@@ -144,7 +144,12 @@ impl Hinge<'_> {
 
 /// Computes the doses of a block's voxels, layer by layer.
 #[inline(always)]
-pub(crate) fn expose(block: &Block, layers: &[Reach], times: &[f64], doses: &mut Vec<f32>) {
+pub(crate) fn expose(
+    block: &ColumnBlock,
+    layers: &[LightReach],
+    times: &[f64],
+    doses: &mut Vec<f32>,
+) {
     doses.resize(block.light.len(), 0.0);
     let mut above = [0.0_f32; LANES];
     for (layer, (reach, time)) in layers.iter().zip(times).enumerate() {
@@ -165,7 +170,7 @@ mod tests {
     use super::*;
     use crate::speed::columns::ColumnSet;
 
-    fn columns() -> Columns {
+    fn columns() -> PixelColumns {
         let mut set = ColumnSet::new(5);
         for n in 0..700_u32 {
             let noise = |k: u32| {
@@ -177,8 +182,8 @@ mod tests {
         set.finish()
     }
 
-    fn layers() -> Vec<Reach> {
-        let reach = |k: u32| Reach {
+    fn layers() -> Vec<LightReach> {
+        let reach = |k: u32| LightReach {
             light: LayerLight { passed: 0.8, own: 0.5 + 0.1 * f64::from(k) },
             scale: 1.0 + 0.05 * f64::from(k),
         };

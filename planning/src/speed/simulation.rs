@@ -1,8 +1,8 @@
 //! Computes the cure by given times.
 
-use super::columns::Columns;
+use super::columns::PixelColumns;
 use super::gather::Gather;
-use super::hinge::Reach;
+use super::hinge::LightReach;
 use super::part::{PartError, TimedPart};
 use super::tally::Tally;
 use crate::blur::Blur;
@@ -15,8 +15,8 @@ const MOST_COLUMN_BYTES: u64 = 64 << 20;
 /// A part under a light, whose layers can be given times.
 pub struct Simulation<'a> {
     gather: Gather<'a>,
-    layers: Vec<Reach>,
-    columns: Columns,
+    layers: Vec<LightReach>,
+    columns: PixelColumns,
     sampled: u32,
 }
 
@@ -45,7 +45,7 @@ impl<'a> Simulation<'a> {
         let layers = per_second.map(|(mut light, log_dose)| {
             // Columns have the light 1 under a wide white field.
             light.own *= field;
-            Reach { light, scale: log_dose.exp() }
+            LightReach { light, scale: log_dose.exp() }
         });
         let layers = layers.collect();
         let gather = Gather::new(part, light);
@@ -60,7 +60,8 @@ impl<'a> Simulation<'a> {
     /// Panics if the number of times is not the number of layers.
     pub fn tally<const N: usize>(&self, times: [&[f64]; N]) -> [Tally; N] {
         assert!(times.iter().all(|times| times.len() == self.layers.len()));
-        let of = |columns: &Columns| times.map(|times| Tally::of(columns, &self.layers, times));
+        let of =
+            |columns: &PixelColumns| times.map(|times| Tally::of(columns, &self.layers, times));
         // The search may see a sample; counts are always of every voxel.
         if self.sampled == 1 {
             return of(&self.columns);
@@ -75,7 +76,7 @@ impl<'a> Simulation<'a> {
     /// Returns the dose of each layer under a wide white field.
     pub fn field_doses(&self, times: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
-        let of_layer = |(reach, time): (&Reach, &f64)| {
+        let of_layer = |(reach, time): (&LightReach, &f64)| {
             // 004 eq. 2.5 from layer to layer. A correction by measurements is a factor of the
             // dose, and does not pass on to other layers.
             dose = dose * reach.light.passed + reach.light.own * time;
@@ -91,7 +92,7 @@ impl<'a> Simulation<'a> {
     /// a half.
     pub fn times_for(&self, dose: f64) -> Vec<f64> {
         let mut above = 0.0;
-        let of_layer = |reach: &Reach| {
+        let of_layer = |reach: &LightReach| {
             // A layer can get more light, but the light that reaches it from above cannot be
             // removed.
             let passed = above * reach.light.passed;
@@ -105,7 +106,7 @@ impl<'a> Simulation<'a> {
     pub fn doses_at(&self, pixel: [u32; 2], times: &[f64]) -> Vec<f64> {
         let mut dose = 0.0;
         let light = self.gather.light_at(pixel);
-        let of_layer = |((reach, time), light): ((&Reach, &f64), f32)| {
+        let of_layer = |((reach, time), light): ((&LightReach, &f64), f32)| {
             dose = dose * reach.light.passed + reach.light.own * time * f64::from(light);
             dose * reach.scale
         };
@@ -113,12 +114,12 @@ impl<'a> Simulation<'a> {
     }
 
     /// Returns the light that reaches each layer in a second.
-    pub(crate) fn layers(&self) -> &[Reach] {
+    pub(crate) fn layers(&self) -> &[LightReach] {
         &self.layers
     }
 
     /// Returns the columns that a search sees.
-    pub(crate) fn columns(&self) -> &Columns {
+    pub(crate) fn columns(&self) -> &PixelColumns {
         &self.columns
     }
 

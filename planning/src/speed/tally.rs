@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::columns::{Block, Columns, LANES};
-use super::hinge::{Reach, expose};
+use super::columns::{ColumnBlock, LANES, PixelColumns};
+use super::hinge::{LightReach, expose};
 use crate::wide::wide;
 
 /// The light of each count, as a share of the model's light: counts are made at all of these.
@@ -73,8 +73,8 @@ impl Tally {
     }
 
     /// Counts the voxels of all columns.
-    pub(crate) fn of(columns: &Columns, layers: &[Reach], times: &[f64]) -> Self {
-        let count = |room: &mut Vec<f32>, block: &Block| {
+    pub(crate) fn of(columns: &PixelColumns, layers: &[LightReach], times: &[f64]) -> Self {
+        let count = |room: &mut Vec<f32>, block: &ColumnBlock| {
             wide(
                 #[inline(always)]
                 || {
@@ -91,7 +91,7 @@ impl Tally {
     }
 
     #[inline(always)]
-    fn of_block(block: &Block, layers: &[Reach], doses: &[f32]) -> Self {
+    fn of_block(block: &ColumnBlock, layers: &[LightReach], doses: &[f32]) -> Self {
         let mut tally = Self::none(layers.len());
         for (layer, reach) in layers.iter().enumerate() {
             let scale = reach.scale as f32;

@@ -3,7 +3,7 @@
 use crate::blur::{Blur, LANES};
 use crate::light::LayerLight;
 use crate::solver::{Operator, Problem, Role, Search, SearchProgress, Shape, Terms, solve};
-use crate::tiled::{Rect, TileGrid, Tiled};
+use crate::tiled::{PixelRectangle, TileGrid, Tiled};
 use crate::voxels::levels::Levels;
 use crate::voxels::roles::{LayerImages, RoleRules};
 
@@ -18,7 +18,7 @@ const AGAIN: usize = 100;
 /// The plan of a tile in some layers, from the light.
 #[derive(Clone, Debug)]
 pub(crate) struct TilePlan {
-    pub(crate) rect: Rect,
+    pub(crate) rect: PixelRectangle,
     /// The first layer, counted from the light.
     pub(crate) first: usize,
     /// The gray levels, layer by layer, row by row.
@@ -41,9 +41,15 @@ impl TilePlan {
 }
 
 /// Copies the intersection of a rectangle of values with another rectangle.
-fn copy_common<V: Copy>(values: &[V], of: &Rect, rect: &Rect, stride: usize, out: &mut [V]) {
+fn copy_common<V: Copy>(
+    values: &[V],
+    of: &PixelRectangle,
+    rect: &PixelRectangle,
+    stride: usize,
+    out: &mut [V],
+) {
     let common = of.within(rect);
-    let start = |of: &Rect| (common.columns.start - of.columns.start) as usize;
+    let start = |of: &PixelRectangle| (common.columns.start - of.columns.start) as usize;
     for row in common.rows.clone() {
         let from = &values[(row - of.rows.start) as usize * of.width() + start(of)..];
         let to = &mut out[(row - rect.rows.start) as usize * stride + start(rect)..];
@@ -96,21 +102,21 @@ pub(crate) struct BlockResult {
 
 /// The plan of a tile in a layer.
 struct PlanOfLayer<'a> {
-    rect: &'a Rect,
+    rect: &'a PixelRectangle,
     levels: &'a [u8],
     prices: &'a [f32],
 }
 
 /// The chunks of a block that are planned.
-struct Area {
-    rect: Rect,
+struct PlannedChunks {
+    rect: PixelRectangle,
     /// The shape of its complete layers.
     shape: Shape,
     /// Where the chunks begin in each layer.
     starts: Vec<usize>,
 }
 
-impl Area {
+impl PlannedChunks {
     /// Returns the values of the chunks, from a complete layer.
     fn chunks<'a, V>(&'a self, layer: &'a [V]) -> impl Iterator<Item = &'a [V]> {
         self.starts.iter().map(|&start| &layer[start..start + LANES])
@@ -157,7 +163,13 @@ impl PlannedWindow<'_> {
     }
 
     /// Returns a tile's plan; outside the chunks, it keeps the earlier plan.
-    fn written(&self, core: Rect, area: &Area, light: &[f32], prices: &[f32]) -> TilePlan {
+    fn written(
+        &self,
+        core: PixelRectangle,
+        area: &PlannedChunks,
+        light: &[f32],
+        prices: &[f32],
+    ) -> TilePlan {
         let pixels = core.width() * core.height();
         let mut levels = vec![0; self.lit * pixels];
         for (layer, levels) in levels.chunks_exact_mut(pixels).enumerate() {
@@ -199,7 +211,7 @@ impl PlannedWindow<'_> {
 
     /// Finds the chunks near a tile whose light or doses can matter: the chunks near places where a
     /// layer differs from its neighbors.
-    fn area(&self, core: &Rect) -> Area {
+    fn area(&self, core: &PixelRectangle) -> PlannedChunks {
         let rect = core.grown(self.overlap).within(&self.grid.image());
         let shape = Shape::holding(self.lights.len(), rect.height(), rect.width());
         let view = rect.grown(self.near);
@@ -234,10 +246,10 @@ impl PlannedWindow<'_> {
             }
         }
         let starts = (0..is_near.len()).filter(|&chunk| is_near[chunk]);
-        Area { rect, shape, starts: starts.map(|chunk| chunk * LANES).collect() }
+        PlannedChunks { rect, shape, starts: starts.map(|chunk| chunk * LANES).collect() }
     }
 
-    fn roles(&self, area: &Area) -> Vec<Role> {
+    fn roles(&self, area: &PlannedChunks) -> Vec<Role> {
         let mut of_layer = vec![Role::NONE; area.shape.plane()];
         let mut roles = Vec::with_capacity(area.voxels());
         for layer in 0..area.shape.layers {
@@ -252,7 +264,7 @@ impl PlannedWindow<'_> {
     }
 
     /// Returns the doses from the layers above and from the pixels that are not planned here.
-    fn incoming(&self, area: &Area) -> Vec<f32> {
+    fn incoming(&self, area: &PlannedChunks) -> Vec<f32> {
         let border = self.blur.radius();
         let view = area.rect.grown(border);
         let wide = Shape::holding(area.shape.layers, view.height(), view.width());
@@ -290,7 +302,7 @@ impl PlannedWindow<'_> {
     }
 
     /// Writes the levels planned so far of a layer of the window: white where there is no plan.
-    fn planned(&self, layer: usize, rect: &Rect, stride: usize, levels: &mut [u8]) {
+    fn planned(&self, layer: usize, rect: &PixelRectangle, stride: usize, levels: &mut [u8]) {
         self.images[self.at + layer].wanted.copy(rect, 0, stride, levels);
         for tile in self.grid.met(rect) {
             if let Some(plan) = self.plan_of(tile, layer) {
@@ -302,7 +314,12 @@ impl PlannedWindow<'_> {
     /// Returns the light and the prices to start from: the planned ones so far. Where there is no
     /// plan, the light is the part's, and prices are halfway to the prices of the doses of white
     /// light.
-    fn start(&self, area: &Area, problem: &Problem<f32>, white: &[f32]) -> (Vec<f32>, Vec<f32>) {
+    fn start(
+        &self,
+        area: &PlannedChunks,
+        problem: &Problem<f32>,
+        white: &[f32],
+    ) -> (Vec<f32>, Vec<f32>) {
         let mut levels = vec![0; area.shape.plane()];
         let mut of_layer = vec![0.0; area.shape.plane()];
         let mut light = Vec::with_capacity(area.voxels());

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::doses::Room;
+use crate::doses::Workspace;
 use crate::solver::Role;
 use crate::tiled::{Tile, Tiled};
 use crate::voxels::setting::VoxelSetting;
@@ -38,7 +38,7 @@ impl Ascent {
             tiles.clone().map(|tile| sum_tile(&prices.tiles[tile], &below.tiles[tile], passed));
         let sums = Tiled { grid: setting.grid, tiles: sums.collect() };
         let terms: Vec<f64> = tiles
-            .map_init(Room::default, |room, tile| {
+            .map_init(Workspace::default, |room, tile| {
                 of_doses(setting, tile, prices)
                     + of_light(setting, layer, tile, &sums, wanted, room)
             })
@@ -89,7 +89,7 @@ fn of_light(
     tile: usize,
     sums: &Tiled<f32>,
     wanted: &Tiled<u8>,
-    room: &mut Room,
+    room: &mut Workspace,
 ) -> f64 {
     let own = setting.lights[layer].own;
     let rect = setting.grid.tile(tile);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::doses::next_layer;
 use crate::solver::Role;
-use crate::spool::{Runs, Spool};
+use crate::spool::{Spool, SpooledRuns};
 use crate::tiled::{Tile, Tiled};
 use crate::voxels::block::{PlannedWindow, TilePlan};
 use crate::voxels::measure::{TileValues, Voxel};
@@ -212,7 +212,7 @@ impl Descent<'_> {
         price_unplanned(setting, &images, at, &self.doses, &mut planned.prices);
         let tally = self.tally(&images, at);
         self.done.layers.push(tally);
-        let [mut levels, mut prices] = [Runs::default(), Runs::default()];
+        let [mut levels, mut prices] = [SpooledRuns::default(), SpooledRuns::default()];
         for row in 0..setting.grid.height {
             planned.levels.runs_of_row(row, |level, length| levels.push(level.into(), length));
             planned.prices.runs_of_row(row, |price, length| prices.push(code(price), length));

@@ -1,8 +1,8 @@
 //! Counts the results of doses.
 
 use crate::solver::{Role, Terms};
-use crate::tiled::Rect;
-use crate::voxels::outcome::{Counts, DoseHistogram, VoxelTally};
+use crate::tiled::PixelRectangle;
+use crate::voxels::outcome::{DoseHistogram, VoxelCounts, VoxelTally};
 
 /// The share by which light may vary.
 const LIGHT_OFF: f32 = 0.05;
@@ -40,7 +40,7 @@ impl VoxelTally {
     }
 }
 
-impl Counts {
+impl VoxelCounts {
     fn add(&mut self, voxel: Voxel, cured: bool, count: u64) {
         match (voxel.wanted, cured) {
             (false, true) => self.overcured += count,
@@ -55,7 +55,7 @@ impl Counts {
 
 /// The values of a tile's voxels, row by row in lines of a stride.
 pub(crate) struct TileValues<'a> {
-    pub(crate) rect: &'a Rect,
+    pub(crate) rect: &'a PixelRectangle,
     pub(crate) stride: usize,
     pub(crate) wanted: &'a [u8],
     pub(crate) targets: &'a [u8],

@@ -19,5 +19,5 @@ mod setting;
 mod unplanned;
 
 pub use options::{Options, Sources, VoxelObjective, Window};
-pub use outcome::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
+pub use outcome::{DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelCounts, VoxelTally};
 pub use plan::{VoxelPlan, VoxelPlanError, plan};

@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 
 /// Voxels of a layer, or of all, that are cured wrongly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct VoxelCounts {
     /// Voxels that are cured but not wanted.
     pub overcured: u64,
     /// Voxels that are wanted but not cured.
@@ -13,7 +13,7 @@ pub struct Counts {
     pub lost: u64,
 }
 
-impl AddAssign for Counts {
+impl AddAssign for VoxelCounts {
     fn add_assign(&mut self, other: Self) {
         self.overcured += other.overcured;
         self.undercured += other.undercured;
@@ -57,11 +57,11 @@ impl AddAssign<&Self> for DoseHistogram {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VoxelTally {
     /// Voxels cured wrongly.
-    pub counts: Counts,
+    pub counts: VoxelCounts,
     /// The same with 5 % less light.
-    pub dimmer: Counts,
+    pub dimmer: VoxelCounts,
     /// The same with 5 % more light.
-    pub brighter: Counts,
+    pub brighter: VoxelCounts,
     /// The quantity that the plan minimizes.
     pub cost: f64,
     /// The doses.
@@ -88,9 +88,9 @@ pub struct LayerOutcome {
     /// Wanted voxels that white light cures.
     pub targets: u64,
     /// Voxels cured wrongly by white light.
-    pub before: Counts,
+    pub before: VoxelCounts,
     /// Voxels cured wrongly by the plan.
-    pub after: Counts,
+    pub after: VoxelCounts,
 }
 
 /// The gap between cost and bound of all blocks of voxels, after some iterations of the search.

@@ -9,7 +9,7 @@ use thiserror::Error;
 use crate::blur::Blur;
 use crate::light::{LayerTime, Light, LightError};
 use crate::solver::Terms;
-use crate::spool::{Runs, Spool};
+use crate::spool::{Spool, SpooledRuns};
 use crate::tiled::{TileGrid, Tiled};
 use crate::voxels::bound::Ascent;
 use crate::voxels::descent::{Descended, descend};
@@ -90,7 +90,7 @@ pub fn plan<E: From<VoxelPlanError>>(
 ) -> Result<VoxelPlan, E> {
     light.check().map_err(VoxelPlanError::from)?;
     let mut wanted = Spool::new().map_err(VoxelPlanError::from)?;
-    let mut pages = Pages::default();
+    let mut pages = PageStatements::default();
     for layer in part {
         let layer = layer?;
         pages.add(&layer)?;
@@ -109,14 +109,14 @@ pub fn plan<E: From<VoxelPlanError>>(
 
 /// The numbers that the pages of a stack state.
 #[derive(Debug, Default)]
-struct Pages {
+struct PageStatements {
     infos: Vec<PageInfo>,
     times: Vec<LayerTime>,
     size: Option<[u32; 2]>,
     dpi: Option<Dpi>,
 }
 
-impl Pages {
+impl PageStatements {
     fn add(&mut self, layer: &Layer) -> Result<(), VoxelPlanError> {
         let name = || layer.info.name();
         let size = [layer.image.width(), layer.image.height()];
@@ -140,8 +140,8 @@ impl Pages {
     }
 }
 
-fn runs_of(wanted: &Mask) -> Runs {
-    let mut runs = Runs::default();
+fn runs_of(wanted: &Mask) -> SpooledRuns {
+    let mut runs = SpooledRuns::default();
     for row in wanted.rows() {
         let mut at = 0;
         for (start, end) in white_runs(row, wanted.width()) {
@@ -154,7 +154,7 @@ fn runs_of(wanted: &Mask) -> Runs {
     runs
 }
 
-fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetting> {
+fn setting(pages: &PageStatements, light: &Light, options: &Options) -> Option<VoxelSetting> {
     let (size, dpi) = (pages.size?, pages.dpi?);
     let image = size.map(|side| side as usize);
     let sigma = light.spread_pixels(dpi);
@@ -210,7 +210,7 @@ fn setting(pages: &Pages, light: &Light, options: &Options) -> Option<VoxelSetti
     })
 }
 
-fn outcome(done: &Descended, pages: &Pages) -> Outcome {
+fn outcome(done: &Descended, pages: &PageStatements) -> Outcome {
     let mut outcome = Outcome { search: done.search.clone(), ..Outcome::default() };
     for (settled, info) in done.layers.iter().rev().zip(&pages.infos) {
         outcome.layers.push(LayerOutcome {
@@ -235,7 +235,7 @@ pub struct VoxelPlan {
     setting: VoxelSetting,
     wanted: Spool,
     done: Descended,
-    pages: Pages,
+    pages: PageStatements,
     ascent: Ascent,
     /// The layers that are left.
     left: usize,

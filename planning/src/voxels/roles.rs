@@ -1,7 +1,7 @@
 //! The dose wanted at each voxel of a rectangle, and the light allowed at its pixel.
 
 use crate::solver::Role;
-use crate::tiled::{Rect, Tiled};
+use crate::tiled::{PixelRectangle, Tiled};
 use crate::voxels::options::{Options, Sources, VoxelObjective};
 
 /// The distance of a boundary voxel from a target, in voxels along each axis.
@@ -59,7 +59,7 @@ impl RoleRules {
         &self,
         layers: &[&LayerImages],
         layer: usize,
-        rect: &Rect,
+        rect: &PixelRectangle,
         stride: usize,
         roles: &mut [Role],
     ) {
@@ -89,7 +89,7 @@ impl RoleRules {
         &self,
         layers: &[&LayerImages],
         layer: usize,
-        rect: &Rect,
+        rect: &PixelRectangle,
     ) -> Option<Role> {
         self.light_of_all(&layers[layer].wanted, rect)?;
         if self.objective == VoxelObjective::Boundary {
@@ -105,7 +105,7 @@ impl RoleRules {
 
     /// Returns the common light allowed at all pixels of a rectangle in the image, if it is plain
     /// that they have one.
-    pub(crate) fn light_of_all(&self, wanted: &Tiled<u8>, rect: &Rect) -> Option<Role> {
+    pub(crate) fn light_of_all(&self, wanted: &Tiled<u8>, rect: &PixelRectangle) -> Option<Role> {
         // Roles depend on pixels up to the reach of outlines: where these pixels are alike, so are
         // the roles.
         wanted.value_in(&rect.grown(self.outline()), 0)?;
@@ -116,7 +116,7 @@ impl RoleRules {
     pub(crate) fn light_roles_of(
         &self,
         image: &Tiled<u8>,
-        rect: &Rect,
+        rect: &PixelRectangle,
         stride: usize,
     ) -> Vec<Role> {
         let mut wanted = vec![0; stride * rect.height()];
@@ -127,7 +127,7 @@ impl RoleRules {
     fn light_roles(
         &self,
         image: &Tiled<u8>,
-        rect: &Rect,
+        rect: &PixelRectangle,
         stride: usize,
         wanted: &[u8],
     ) -> Vec<Role> {
@@ -165,7 +165,7 @@ impl RoleRules {
         roles
     }
 
-    fn can_be_lit(&self, rect: &Rect, stride: usize, place: usize) -> bool {
+    fn can_be_lit(&self, rect: &PixelRectangle, stride: usize, place: usize) -> bool {
         let row = rect.rows.start + (place / stride) as isize;
         let column = rect.columns.start + (place % stride) as isize;
         let [left, right, top, bottom] = self.image;
@@ -173,9 +173,9 @@ impl RoleRules {
     }
 }
 
-fn first_pixel(rect: &Rect) -> Rect {
+fn first_pixel(rect: &PixelRectangle) -> PixelRectangle {
     let first = |range: &std::ops::Range<isize>| range.start..range.start + 1;
-    Rect { columns: first(&rect.columns), rows: first(&rect.rows) }
+    PixelRectangle { columns: first(&rect.columns), rows: first(&rect.rows) }
 }
 
 fn either(wanted: u8, yes: Role, no: Role) -> Role {
@@ -185,7 +185,7 @@ fn either(wanted: u8, yes: Role, no: Role) -> Role {
 fn boundary_roles(
     layers: &[&LayerImages],
     layer: usize,
-    rect: &Rect,
+    rect: &PixelRectangle,
     stride: usize,
     wanted: &[u8],
 ) -> Vec<Role> {
@@ -211,7 +211,7 @@ fn boundary_roles(
 /// for which `is` returns true. Outside the image, all is black.
 fn around(
     image: &Tiled<u8>,
-    rect: &Rect,
+    rect: &PixelRectangle,
     stride: usize,
     by: usize,
     is: impl Fn(u8) -> bool,

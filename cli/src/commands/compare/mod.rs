@@ -18,7 +18,7 @@ use crate::streams::{check_beside, failed_at, input_name, is_stream, open_indexe
 use crate::terminal::progress::Progress;
 
 use picture::write_picture;
-use report::{Comparison, answer, text};
+use report::{StackComparison, answer, text};
 use walk::walk;
 
 /// Find where two stacks differ: pixels added and missing, layer by layer
@@ -129,7 +129,7 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
     let stacks = [(&a, &*names[0]), (&b, &*names[1])];
     let sections = walk(stacks, &pairing, tolerance, &progress);
     progress.done();
-    let comparison = Comparison {
+    let comparison = StackComparison {
         names,
         pairing: &pairing,
         headers: [a.headers(), b.headers()],

@@ -15,7 +15,7 @@ const SIDE: u32 = 1200;
 
 /// The kind of a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum PixelKind {
     Black,
     White,
     Forgiven,
@@ -23,7 +23,7 @@ enum Kind {
     Added,
 }
 
-impl Shade for Kind {
+impl Shade for PixelKind {
     const NONE: Self = Self::Black;
 
     fn colour(self) -> [u8; 3] {
@@ -59,12 +59,12 @@ pub(super) fn write_picture(
     write_file(path, |out| {
         picture.write_png(out, |row, paint| {
             let layers = [
-                (exposed[0].row(row), Kind::White),
-                (exposed[1].row(row), Kind::White),
-                (all.missing.row(row), Kind::Forgiven),
-                (all.added.row(row), Kind::Forgiven),
-                (left.missing.row(row), Kind::Missing),
-                (left.added.row(row), Kind::Added),
+                (exposed[0].row(row), PixelKind::White),
+                (exposed[1].row(row), PixelKind::White),
+                (all.missing.row(row), PixelKind::Forgiven),
+                (all.added.row(row), PixelKind::Forgiven),
+                (left.missing.row(row), PixelKind::Missing),
+                (left.added.row(row), PixelKind::Added),
             ];
             for (transitions, kind) in layers {
                 white_runs(transitions, width).for_each(|(start, end)| paint(start..end, kind));

@@ -15,7 +15,7 @@ const MOST_LINES: usize = 20;
 const MOST_BOX_LINES: usize = 3;
 
 /// Differences between two stacks.
-pub(super) struct Comparison<'a> {
+pub(super) struct StackComparison<'a> {
     pub(super) names: [String; 2],
     pub(super) pairing: &'a Pairing,
     /// The headers of the pages of the first and of the second stack.
@@ -26,7 +26,7 @@ pub(super) struct Comparison<'a> {
     pub(super) sections: Vec<SectionDifference>,
 }
 
-impl Comparison<'_> {
+impl StackComparison<'_> {
     /// Returns the sections that differ, from the bottom up.
     fn told(&self) -> impl Iterator<Item = &SectionDifference> {
         self.sections.iter().filter(|found| found.is_told())
@@ -75,7 +75,7 @@ impl Comparison<'_> {
 }
 
 /// Returns the lines to print: the worst layers first.
-pub(super) fn text(comparison: &Comparison<'_>, all: bool) -> String {
+pub(super) fn text(comparison: &StackComparison<'_>, all: bool) -> String {
     let [a, b] = &comparison.names;
     let sections = comparison.pairing.sections().len();
     let unit = if comparison.pairing.is_by_height() { "heights" } else { "layers" };
@@ -109,7 +109,7 @@ pub(super) fn text(comparison: &Comparison<'_>, all: bool) -> String {
     text.lines().map(|line| format!("{}\n", printable(line))).collect()
 }
 
-fn lines(comparison: &Comparison<'_>, found: &SectionDifference, all: bool) -> String {
+fn lines(comparison: &StackComparison<'_>, found: &SectionDifference, all: bool) -> String {
     let [a, b] = &comparison.names;
     let only = match (found.section.a, found.section.b) {
         (Some(_), None) => format!(", only in {a}"),
@@ -146,7 +146,7 @@ fn pixels_text(pixels: u64) -> String {
 
 /// Returns least and greatest x and y of a box, if the page says where its image lies.
 fn box_mm(
-    comparison: &Comparison<'_>,
+    comparison: &StackComparison<'_>,
     found: &SectionDifference,
     each: &DifferenceBox,
 ) -> Option<[f64; 4]> {
@@ -158,7 +158,7 @@ fn box_mm(
 }
 
 /// Returns the answer for scripts.
-pub(super) fn answer(comparison: &Comparison<'_>) -> impl Serialize {
+pub(super) fn answer(comparison: &StackComparison<'_>) -> impl Serialize {
     let page = |stack: usize, position: Option<usize>| {
         position.map(|position| comparison.headers[stack][position].info.index)
     };
@@ -191,7 +191,11 @@ pub(super) fn answer(comparison: &Comparison<'_>) -> impl Serialize {
     })
 }
 
-fn box_json(comparison: &Comparison<'_>, found: &SectionDifference, each: &DifferenceBox) -> Value {
+fn box_json(
+    comparison: &StackComparison<'_>,
+    found: &SectionDifference,
+    each: &DifferenceBox,
+) -> Value {
     let ([left, right], [top, bottom]) = (each.columns, each.rows);
     json!({
         "pixels": each.pixels,

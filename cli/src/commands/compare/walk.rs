@@ -52,13 +52,13 @@ impl SectionDifference {
 }
 
 /// The two pages of a section, not decoded yet.
-struct Pages {
+struct PagePair {
     section: Section,
     a: Option<Page>,
     b: Option<Page>,
 }
 
-impl MemorySize for Pages {
+impl MemorySize for PagePair {
     fn bytes(&self) -> usize {
         [&self.a, &self.b].into_iter().flatten().map(MemorySize::bytes).sum()
     }
@@ -73,9 +73,9 @@ pub(super) fn walk(
 ) -> Result<Vec<SectionDifference>, Exit> {
     let pages = pairing.sections().iter().map(|section| {
         let [a, b] = stacks;
-        Ok(Pages { section: section.clone(), a: page(a, section.a)?, b: page(b, section.b)? })
+        Ok(PagePair { section: section.clone(), a: page(a, section.a)?, b: page(b, section.b)? })
     });
-    let compared = map_in_order(pages, |pages: Pages| {
+    let compared = map_in_order(pages, |pages: PagePair| {
         let found = of_pages(stacks, pages, tolerance);
         progress.layer_done();
         found
@@ -92,7 +92,7 @@ fn page((stack, name): NamedStack<'_>, position: Option<usize>) -> Result<Option
 /// Compares two pages. Pages of one coded image are decoded once, to see that they are whole.
 fn of_pages(
     stacks: [NamedStack<'_>; 2],
-    Pages { section, a, b }: Pages,
+    PagePair { section, a, b }: PagePair,
     tolerance: f64,
 ) -> Result<SectionDifference, Exit> {
     let shift = shift_of(stacks, &section)?;

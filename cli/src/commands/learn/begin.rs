@@ -11,7 +11,7 @@ use lamp_planning::speed::{PartPages, times_table};
 use lamp_stack::{Destination, FolderBeside, Format, sealed, write_stack};
 
 use super::KeptOptions;
-use crate::args::options::Input;
+use crate::args::options::InputArgs;
 use crate::exit::Exit;
 use crate::streams::{input_name, new_folder, read_layers};
 use crate::terminal::progress::Progress;
@@ -29,7 +29,7 @@ pub(super) fn begin(
     let light = Light::of(&material, kept.at.unwrap_or_default())?;
     light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
     let name = input_name(stack);
-    let input = Input { stack: stack.to_owned(), layers: None };
+    let input = InputArgs { stack: stack.to_owned(), layers: None };
     let wanted = kept.wanted.map_or(128, std::num::NonZeroU8::get);
     let mut pages = PartPages::new(wanted);
     let (mut part, mut origin_mm) = (String::new(), None);

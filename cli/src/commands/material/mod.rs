@@ -30,11 +30,11 @@ Examples:
   lamp material profile mine.toml --dose 500mJ/cm2 --beam 17um")]
 pub(crate) struct MaterialArgs {
     #[command(subcommand)]
-    action: Action,
+    action: MaterialAction,
 }
 
 #[derive(Subcommand)]
-enum Action {
+enum MaterialAction {
     /// List the built-in materials
     List {
         /// Print JSON, as docs/json.md describes it
@@ -66,13 +66,13 @@ enum Action {
 
 pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     match &args.action {
-        Action::List { json: true } => answer(Material::builtins()),
-        Action::List { json: false } => print(&table()),
-        Action::Show { material, json: true } => answer([documents::document(material)?]),
-        Action::Show { material, json: false } => catalogue::show::<Material>(material),
-        Action::Check { file, json } => check(file, *json),
-        Action::Make(args) => make::run(args, common),
-        Action::Profile(args) => profile::run(args, common),
+        MaterialAction::List { json: true } => answer(Material::builtins()),
+        MaterialAction::List { json: false } => print(&table()),
+        MaterialAction::Show { material, json: true } => answer([documents::document(material)?]),
+        MaterialAction::Show { material, json: false } => catalogue::show::<Material>(material),
+        MaterialAction::Check { file, json } => check(file, *json),
+        MaterialAction::Make(args) => make::run(args, common),
+        MaterialAction::Profile(args) => profile::run(args, common),
     }
 }
 

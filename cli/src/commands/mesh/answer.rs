@@ -6,14 +6,14 @@ use lamp_slicer::topology::{
 };
 use serde_json::{Value, json};
 
-use crate::commands::mesh::check::Findings;
+use crate::commands::mesh::check::MeshFindings;
 
 /// The most items of a list; a mesh may have millions of faults.
 pub(super) const MAX_LISTED: usize = 10_000;
 
 /// Returns the fields of an answer to `lamp mesh check`.
-pub(super) fn check_fields(name: &str, findings: &Findings) -> Value {
-    let Findings { table, check, welded, crossings, overlaps } = findings;
+pub(super) fn check_fields(name: &str, findings: &MeshFindings) -> Value {
+    let MeshFindings { table, check, welded, crossings, overlaps } = findings;
     let crowded = table.crowded().map(|corners| {
         let ends = table.edge_ends(corners[0]).map(|vertex| table.points()[vertex as usize]);
         let facets: Vec<u32> = corners.iter().map(|&corner| facet_of(corner)).collect();

@@ -25,7 +25,7 @@ Examples:
   lamp mesh check blade.stl
   lamp mesh check blade.stl --strict --self-intersections
   lamp mesh check blade.stl --weld 5um --json | jq .loops")]
-pub(super) struct CheckArgs {
+pub(super) struct MeshCheckArgs {
     #[command(flatten)]
     part: MeshPart,
 
@@ -47,7 +47,7 @@ pub(super) struct CheckArgs {
 }
 
 /// Findings of a check.
-pub(super) struct Findings {
+pub(super) struct MeshFindings {
     pub(super) table: CornerTable,
     pub(super) check: MeshCheck,
     /// The corners that welding moved.
@@ -58,14 +58,14 @@ pub(super) struct Findings {
     pub(super) overlaps: Vec<ShellOverlap>,
 }
 
-impl Findings {
+impl MeshFindings {
     fn are_none(&self) -> bool {
         let crossings = self.crossings.as_ref().map_or(0, |crossings| crossings.count);
         self.check.is_clean() && crossings == 0
     }
 }
 
-pub(super) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
+pub(super) fn run(args: &MeshCheckArgs, common: &Common) -> Result<(), Exit> {
     let name = args.part.name();
     let (part, _) = args.part.open("mesh check", common)?;
     let table = CornerTable::of_part(&part, &Placement::default(), args.part.units);
@@ -76,7 +76,7 @@ pub(super) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let overlaps = ShellOverlap::all(&table, &shells, &check)
         .map_err(|error| Exit::from(error).at(name.clone()))?;
     let crossings = args.self_intersections.then(|| Crossings::new(&table, MAX_LISTED));
-    let findings = Findings { table, check, welded: welded.len(), crossings, overlaps };
+    let findings = MeshFindings { table, check, welded: welded.len(), crossings, overlaps };
     match args.json {
         true => print_answer("lamp-mesh-1", &check_fields(&name, &findings))?,
         false => print(&check_text(&name, &findings))?,

@@ -30,19 +30,19 @@ Examples:
   lamp mesh repair blade.stl -o mended.stl --weld 5um")]
 pub(crate) struct MeshArgs {
     #[command(subcommand)]
-    what: Mesh,
+    what: MeshCommand,
 }
 
 #[derive(Subcommand)]
-enum Mesh {
-    Check(check::CheckArgs),
+enum MeshCommand {
+    Check(check::MeshCheckArgs),
     Repair(repair::RepairArgs),
 }
 
 pub(crate) fn run(args: &MeshArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
-        Mesh::Check(args) => check::run(args, common),
-        Mesh::Repair(args) => repair::run(args, common),
+        MeshCommand::Check(args) => check::run(args, common),
+        MeshCommand::Repair(args) => repair::run(args, common),
     }
 }
 

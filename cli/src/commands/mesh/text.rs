@@ -6,7 +6,7 @@ use lamp_slicer::topology::{
     CornerTable, Lump, Mass, MeshCheck, ShellOverlap, ShellReport, facet_of,
 };
 
-use crate::commands::mesh::check::Findings;
+use crate::commands::mesh::check::MeshFindings;
 
 /// The most shells that are described one by one.
 const MAX_SHELLS: usize = 10;
@@ -14,8 +14,8 @@ const MAX_SHELLS: usize = 10;
 const MAX_NAMED: usize = 5;
 
 /// Returns the answer to `lamp mesh check`.
-pub(super) fn check_text(name: &str, findings: &Findings) -> String {
-    let Findings { table, check, welded, crossings, overlaps } = findings;
+pub(super) fn check_text(name: &str, findings: &MeshFindings) -> String {
+    let MeshFindings { table, check, welded, crossings, overlaps } = findings;
     let (facets, vertices, edges) = (table.facet_count(), table.points().len(), table.edge_count());
     let mut text = format!(
         "part:       {name}\nmesh:       {facets} facets, {vertices} vertices, {edges} edges\n\

@@ -80,7 +80,7 @@ fn parse_overhang_angle(text: &str) -> Result<f64, String> {
 }
 
 /// The poses of a part, and what is known of them.
-struct Compared {
+struct ComparedPoses {
     poses: Vec<PoseFacts>,
     /// Pareto-optimal poses, the best first.
     pareto: Vec<usize>,
@@ -90,7 +90,7 @@ struct Compared {
     rotations: Vec<String>,
 }
 
-impl Compared {
+impl ComparedPoses {
     /// Returns the best pose: the one whose images have the fewest islands.
     fn best(&self) -> usize {
         let on_images = self.pareto.iter().zip(&self.image_islands);
@@ -123,7 +123,7 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     let image_islands = images.collect::<Result<_, Exit>>()?;
     let rotations =
         poses.iter().map(|facts| solid.placement.rotation_with(facts.pose.turns())).collect();
-    let compared = Compared { poses, pareto, image_islands, rotations };
+    let compared = ComparedPoses { poses, pareto, image_islands, rotations };
     if let Some(path) = &args.plot {
         let title = format!("Islands by the direction that is up: {}", name_of_all(&args.parts));
         let bytes = sphere_picture(&title, &compared.poses, compared.best(), path)?;

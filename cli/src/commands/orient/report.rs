@@ -7,7 +7,7 @@ use lamp_supports::PoseFacts;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{Compared, OrientArgs};
+use super::{ComparedPoses, OrientArgs};
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::streams::print;
@@ -16,7 +16,7 @@ use crate::streams::print;
 const MOST_ROWS: usize = 20;
 
 impl OrientArgs {
-    pub(super) fn report(&self, compared: &Compared) -> Result<(), Exit> {
+    pub(super) fn report(&self, compared: &ComparedPoses) -> Result<(), Exit> {
         let part = name_of_all(&self.parts);
         if !self.json {
             return print(&table(&part, compared));
@@ -59,8 +59,8 @@ struct PoseRow<'a> {
 }
 
 /// The best poses, a line each, and how to build the best.
-fn table(part: &str, compared: &Compared) -> String {
-    let Compared { poses, pareto, image_islands, rotations } = compared;
+fn table(part: &str, compared: &ComparedPoses) -> String {
+    let ComparedPoses { poses, pareto, image_islands, rotations } = compared;
     let mut text = format!(
         "{part}: {} poses; of {} no other is better in every respect\n\
          {:<20}{:>9}{:>6}{:>16}{:>13}{:>18}{:>18}\n",

@@ -30,11 +30,11 @@ Examples:
   lamp cure planned.tif --material mine.toml --section y=12mm --at top -o section.png")]
 pub(crate) struct PlanArgs {
     #[command(subcommand)]
-    what: Plan,
+    what: PlanCommand,
 }
 
 #[derive(Subcommand)]
-enum Plan {
+enum PlanCommand {
     Voxels(voxels::VoxelsArgs),
     ColumnCure(column_cure::ColumnCureArgs),
     Speed(speed::SpeedArgs),
@@ -44,10 +44,10 @@ enum Plan {
 
 pub(crate) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
-        Plan::Voxels(args) => voxels::run(args, common),
-        Plan::ColumnCure(args) => column_cure::run(args, common),
-        Plan::Speed(args) => speed::run(args, common),
-        Plan::Ecpl(args) => ecpl::run(args, common),
-        Plan::Simulate(args) => simulate::run(args, common),
+        PlanCommand::Voxels(args) => voxels::run(args, common),
+        PlanCommand::ColumnCure(args) => column_cure::run(args, common),
+        PlanCommand::Speed(args) => speed::run(args, common),
+        PlanCommand::Ecpl(args) => ecpl::run(args, common),
+        PlanCommand::Simulate(args) => simulate::run(args, common),
     }
 }

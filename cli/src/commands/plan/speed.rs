@@ -11,8 +11,8 @@ use lamp_planning::speed::{
 use lamp_stack::Layer;
 
 use super::speed_plot::plots_of;
-use super::speed_report::{Planned, lines_of, write_report};
-use crate::args::options::{Common, Input, Output, parse_memory};
+use super::speed_report::{PlannedTimes, lines_of, write_report};
+use crate::args::options::{Common, InputArgs, Output, parse_memory};
 use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::args::platform_options::PlatformOptions;
 use crate::exit::Exit;
@@ -38,7 +38,7 @@ Examples:
   slice part.stl | lamp plan speed --material mine.toml --profile speed.csv | tile > build.tif")]
 pub(super) struct SpeedArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     planning: PlanningOptions,
@@ -83,7 +83,7 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     let name = input_name(&args.input.stack);
     let part = args.part(&mut stack, &progress)?;
     let plan = plan(&part, &options).map_err(|error: SpeedPlanError| Exit::from(error).at(name))?;
-    let planned = Planned { material: &material.name, part: &part, plan: &plan };
+    let planned = PlannedTimes { material: &material.name, part: &part, plan: &plan };
     args.write(&mut stack, &planned, &args.command(&words), &progress)?;
     let doses = MeasuredDoses::of_working_curve(&material);
     if let Some(light) = material.light().map_err(anyhow::Error::new)? {
@@ -133,7 +133,7 @@ impl SpeedArgs {
     fn write(
         &self,
         stack: &mut KeptStack,
-        planned: &Planned<'_>,
+        planned: &PlannedTimes<'_>,
         command: &str,
         progress: &Progress,
     ) -> Result<(), Exit> {

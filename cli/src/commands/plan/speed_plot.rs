@@ -3,23 +3,23 @@
 use lamp_pipeline::heights::{significant, time_text};
 use lamp_planning::speed::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 
-use super::speed_report::{Planned, seconds};
+use super::speed_report::{PlannedTimes, seconds};
 use lamp_plots::{Plot, PlotAxis, Series, by_layer, curve, linear, stairs};
 
 /// The plots of a plan, one below the other.
-pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {
+pub(super) fn plots_of(planned: &PlannedTimes<'_>) -> Vec<Plot> {
     vec![wrong(planned), times(planned), doses(planned), light(planned), search(planned)]
 }
 
 /// The layers' heights in millimeters, and a number for each.
-fn over_z(planned: &Planned<'_>, number: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+fn over_z(planned: &PlannedTimes<'_>, number: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
     let layer = |(at, layer): (usize, &lamp_planning::speed::TimedLayer)| {
         [layer.z.mm(), layer.z.mm() + layer.thickness.mm()].map(|z| (z, number(at)))
     };
     planned.part.layers().iter().enumerate().rev().flat_map(layer).collect()
 }
 
-fn wrong(planned: &Planned<'_>) -> Plot {
+fn wrong(planned: &PlannedTimes<'_>) -> Plot {
     let of = |name: &str, tally: &Tally, count: fn(&Wrong) -> u64| {
         curve(name, over_z(planned, |at| count(&tally.layers[at]) as f64))
     };
@@ -38,7 +38,7 @@ fn wrong(planned: &Planned<'_>) -> Plot {
     by_layer(title, "voxels", series)
 }
 
-fn times(planned: &Planned<'_>) -> Plot {
+fn times(planned: &PlannedTimes<'_>) -> Plot {
     let plan = planned.plan;
     let single = seconds(plan.single);
     let series = vec![
@@ -56,7 +56,7 @@ fn times(planned: &Planned<'_>) -> Plot {
     Plot { y, ..by_layer("Time of each layer".to_owned(), "", series) }
 }
 
-fn doses(planned: &Planned<'_>) -> Plot {
+fn doses(planned: &PlannedTimes<'_>) -> Plot {
     const LEAST: f64 = 0.7;
     let of = |name: &str, tally: &Tally, other: usize| {
         let count = |bin: usize| (tally.doses[other][bin] as f64).max(LEAST);
@@ -80,7 +80,7 @@ fn doses(planned: &Planned<'_>) -> Plot {
     Plot { title: "Doses".to_owned(), x, y, series }
 }
 
-fn light(planned: &Planned<'_>) -> Plot {
+fn light(planned: &PlannedTimes<'_>) -> Plot {
     let of = |name: &str, tally: &Tally, count: fn(&Wrong) -> u64| {
         let shares = LIGHT_SHARES.iter().zip(&tally.at_light);
         let mut points: Vec<_> =
@@ -99,7 +99,7 @@ fn light(planned: &Planned<'_>) -> Plot {
     Plot { x: linear("light (%)", 94.0..106.0), ..by_layer(title, "voxels", series) }
 }
 
-fn search(planned: &Planned<'_>) -> Plot {
+fn search(planned: &PlannedTimes<'_>) -> Plot {
     const LEAST: f64 = 1e-3;
     let plan = planned.plan;
     let of = |name: &str, error: fn(&lamp_planning::speed::SearchStage) -> f64| {

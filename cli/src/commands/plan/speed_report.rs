@@ -11,13 +11,13 @@ use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 
 /// A plan, and what it is for.
-pub(super) struct Planned<'a> {
+pub(super) struct PlannedTimes<'a> {
     pub(super) material: &'a str,
     pub(super) part: &'a TimedPart,
     pub(super) plan: &'a SpeedPlan,
 }
 
-impl Planned<'_> {
+impl PlannedTimes<'_> {
     /// The seconds that all layers take.
     pub(super) fn seconds(&self) -> f64 {
         self.plan.times.iter().map(|time| time.ms() / 1000.0).sum()
@@ -30,7 +30,7 @@ impl Planned<'_> {
 }
 
 /// The lines that are printed.
-pub(super) fn lines_of(planned: &Planned<'_>) -> Vec<String> {
+pub(super) fn lines_of(planned: &PlannedTimes<'_>) -> Vec<String> {
     let plan = planned.plan;
     let counts = |wrong: Wrong| format!("{} overcured, {} undercured", wrong.over, wrong.under);
     let share = |tally: &Tally| 100.0 * tally.wrong().sum() as f64;
@@ -56,8 +56,12 @@ pub(super) fn lines_of(planned: &Planned<'_>) -> Vec<String> {
 }
 
 /// Writes the report.
-pub(super) fn write_report(planned: &Planned<'_>, margin: f64, path: &Path) -> Result<(), Exit> {
-    let Planned { material, part, plan } = planned;
+pub(super) fn write_report(
+    planned: &PlannedTimes<'_>,
+    margin: f64,
+    path: &Path,
+) -> Result<(), Exit> {
+    let PlannedTimes { material, part, plan } = planned;
     let last = plan.stages.last();
     let head = json!({
         "schema": "lamp-plan-speed-1",

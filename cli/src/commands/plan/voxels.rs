@@ -13,8 +13,8 @@ use lamp_stack::Layer;
 
 use super::layer_map::{LayerMap, MapOptions};
 use super::voxels_plot::plots_of;
-use super::voxels_report::{Planned, lines_of, write_report};
-use crate::args::options::{Common, Input, Output, one_of_described, parse_memory};
+use super::voxels_report::{PlannedVoxels, lines_of, write_report};
+use crate::args::options::{Common, InputArgs, Output, one_of_described, parse_memory};
 use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::exit::Exit;
 use crate::output::endings::parse_report;
@@ -41,7 +41,7 @@ Examples:
       --sources shell:1px --min-level 40 --report plan.json -o planned.tif")]
 pub(super) struct VoxelsArgs {
     #[command(flatten)]
-    input: Input,
+    input: InputArgs,
 
     #[command(flatten)]
     planning: PlanningOptions,
@@ -166,7 +166,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
-    let planned = Planned {
+    let planned = PlannedVoxels {
         material: &material.name,
         objective: args.objective,
         margin: args.planning.margin,

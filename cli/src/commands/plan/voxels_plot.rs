@@ -1,13 +1,13 @@
 //! Plots what a plan of gray levels reaches.
 
 use lamp_pipeline::heights::significant;
-use lamp_planning::voxels::{Counts, DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelTally};
+use lamp_planning::voxels::{DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelCounts, VoxelTally};
 
-use super::voxels_report::Planned;
+use super::voxels_report::PlannedVoxels;
 use lamp_plots::{Plot, PlotAxis, Series, curve, linear};
 
 /// The plots of a plan, one below the other.
-pub(super) fn plots_of(planned: &Planned<'_>) -> Vec<Plot> {
+pub(super) fn plots_of(planned: &PlannedVoxels<'_>) -> Vec<Plot> {
     let outcome = planned.outcome;
     vec![by_layer(planned), by_dose(outcome), by_light(outcome), by_iteration(outcome)]
 }
@@ -32,7 +32,7 @@ fn logarithmic(label: &str, least: f64, most: f64) -> PlotAxis {
 }
 
 /// Voxels that are cured wrongly, by layer.
-fn by_layer(planned: &Planned<'_>) -> Plot {
+fn by_layer(planned: &PlannedVoxels<'_>) -> Plot {
     let outcome = planned.outcome;
     let of = |name: &str, count: &dyn Fn(&LayerOutcome) -> u64| {
         let at = |layer: &LayerOutcome| (f64::from(layer.index), drawn(count(layer)));
@@ -76,7 +76,7 @@ fn by_dose(outcome: &Outcome) -> Plot {
 
 /// Voxels that are cured wrongly at a little less and more light.
 fn by_light(outcome: &Outcome) -> Plot {
-    let of = |name: &str, tally: &VoxelTally, count: fn(Counts) -> u64| {
+    let of = |name: &str, tally: &VoxelTally, count: fn(VoxelCounts) -> u64| {
         let all = [(95.0, tally.dimmer), (100.0, tally.counts), (105.0, tally.brighter)];
         let points: Vec<_> = all.map(|(light, counts)| (light, drawn(count(counts)))).into();
         Series { points: points.clone(), ..curve(name, points) }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lamp_planning::voxels::{
-    Counts, DoseHistogram, LayerOutcome, Outcome, VoxelObjective, VoxelTally,
+    DoseHistogram, LayerOutcome, Outcome, VoxelCounts, VoxelObjective, VoxelTally,
 };
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 
 /// A plan, and what it was for.
-pub(super) struct Planned<'a> {
+pub(super) struct PlannedVoxels<'a> {
     pub(super) material: &'a str,
     pub(super) objective: VoxelObjective,
     pub(super) margin: f64,
@@ -19,7 +19,7 @@ pub(super) struct Planned<'a> {
 }
 
 /// The lines that are printed.
-pub(super) fn lines_of(planned: &Planned<'_>) -> Vec<String> {
+pub(super) fn lines_of(planned: &PlannedVoxels<'_>) -> Vec<String> {
     let outcome = planned.outcome;
     let [before, after] = [&outcome.before, &outcome.after];
     let targets: u64 = outcome.layers.iter().map(|layer| layer.targets).sum();
@@ -33,7 +33,7 @@ pub(super) fn lines_of(planned: &Planned<'_>) -> Vec<String> {
         after.counts.undercured,
         after.counts.lost,
     )];
-    let of = |name: &str, counts: Counts| {
+    let of = |name: &str, counts: VoxelCounts| {
         format!("{name}: {} overcured, {} undercured", counts.overcured, counts.undercured)
     };
     lines.push(format!(
@@ -76,8 +76,8 @@ fn uncurable(layers: &[LayerOutcome]) -> Option<String> {
 }
 
 /// Writes the report.
-pub(super) fn write_report(planned: &Planned<'_>, path: &Path) -> Result<(), Exit> {
-    let Planned { material, objective, margin, outcome } = planned;
+pub(super) fn write_report(planned: &PlannedVoxels<'_>, path: &Path) -> Result<(), Exit> {
+    let PlannedVoxels { material, objective, margin, outcome } = planned;
     let head = json!({
         "schema": "lamp-plan-voxels-1",
         "material": material,
@@ -129,8 +129,8 @@ fn tally(tally: &VoxelTally) -> Value {
     value
 }
 
-fn counts(counts: Counts) -> Value {
-    let Counts { overcured, undercured, lost } = counts;
+fn counts(counts: VoxelCounts) -> Value {
+    let VoxelCounts { overcured, undercured, lost } = counts;
     json!({ "overcured": overcured, "undercured": undercured, "lost": lost })
 }
 

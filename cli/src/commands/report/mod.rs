@@ -78,7 +78,7 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     if stacks.is_empty() {
         return Err(Exit::Failed(anyhow!("{}: there is no stack in it", input_name(&args.stack))));
     }
-    let work = Work { machine: machine.as_ref(), common };
+    let work = ReportWork { machine: machine.as_ref(), common };
     match &args.output {
         Some(folder) if is_folder(folder) || stacks.len() > 1 => {
             work.write_folder(&stacks, folder, args)
@@ -87,12 +87,12 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     }
 }
 
-struct Work<'a> {
+struct ReportWork<'a> {
     machine: Option<&'a Machine>,
     common: &'a Common,
 }
 
-impl Work<'_> {
+impl ReportWork<'_> {
     /// Reports on a stack.
     fn report(&self, path: &Path) -> Result<StackReport, Exit> {
         let progress = Progress::new("report", self.common, true);

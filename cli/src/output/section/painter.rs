@@ -16,7 +16,7 @@ const MISSING: [u8; 3] = [52, 130, 226];
 const OUTLINE: [u8; 3] = [255, 205, 60];
 
 /// The contents of the pictures of a section.
-pub(super) struct Scene<'a> {
+pub(super) struct SectionScene<'a> {
     pub(super) pixels: Range<u32>,
     pub(super) heights_um: Range<f64>,
     pub(super) pitch_um: f64,
@@ -24,7 +24,7 @@ pub(super) struct Scene<'a> {
     pub(super) part: Option<&'a [Vec<OutlinePiece>]>,
 }
 
-impl Scene<'_> {
+impl SectionScene<'_> {
     /// Returns the width and height of one picture, at least a pixel.
     pub(super) fn size(&self, scale: PictureScale) -> [usize; 2] {
         let height = (self.heights_um.end - self.heights_um.start) / self.pitch_um;

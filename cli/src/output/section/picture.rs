@@ -7,7 +7,7 @@ use lamp_grayscale::PixelLine;
 use lamp_planning::cure_section::ShownSection;
 use lamp_stack::write_rgb_png;
 
-use super::painter::Scene;
+use super::painter::SectionScene;
 use crate::output::picture::PictureScale;
 
 /// A section's pictures side by side, and its areas as a table.
@@ -48,9 +48,9 @@ impl SectionPicture {
         text
     }
 
-    fn scene(&self) -> Scene<'_> {
+    fn scene(&self) -> SectionScene<'_> {
         let Self(shown) = self;
-        Scene {
+        SectionScene {
             pixels: shown.pixels.clone(),
             heights_um: shown.heights_um.clone(),
             pitch_um: shown.course.dpi.pitch().um(),

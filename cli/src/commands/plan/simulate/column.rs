@@ -6,13 +6,13 @@ use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
 use serde_json::{Map, json};
 
-use super::{Outcome, Shown};
+use super::{ShownExposures, SimulationOutcome};
 use crate::commands::plan::column_measures;
 use crate::exit::Exit;
 
 /// Returns the heights that the doses of all bitmaps together cure.
-pub(super) fn cured(shown: &Shown, tracing: Tracing) -> Result<Outcome, Exit> {
-    let Shown { exposures, projector, material, target } = shown;
+pub(super) fn cured(shown: &ShownExposures, tracing: Tracing) -> Result<SimulationOutcome, Exit> {
+    let ShownExposures { exposures, projector, material, target } = shown;
     let curve = HeightCurve::of(material).map_err(anyhow::Error::new)?;
     let voxel = projector.voxel.as_ref().map_or(projector.pitch.value, |voxel| voxel.value);
     let MirrorSeconds { mirrors, seconds } =
@@ -46,7 +46,7 @@ pub(super) fn cured(shown: &Shown, tracing: Tracing) -> Result<Outcome, Exit> {
         lines.extend(column_measures::doubt(target, &curve, material));
         report.insert("measures".to_owned(), column_measures::fields(&measures));
     }
-    Ok(Outcome { cured, wanted, lines, report })
+    Ok(SimulationOutcome { cured, wanted, lines, report })
 }
 
 /// Returns the rectangle of the images of mirrors, and of one more all round.

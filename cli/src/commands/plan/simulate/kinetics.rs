@@ -6,14 +6,14 @@ use lamp_planning::ecpl::{RingExposure, RingSimulation, WantedProfile};
 use lamp_planning::target::Round;
 use lamp_stack::Image;
 
-use super::{Outcome, Shown};
+use super::{ShownExposures, SimulationOutcome};
 use crate::commands::plan::ecpl::{failed, grid_of, setting_of};
 use crate::commands::plan::kinetics_report::{Cured, fields, lines_of};
 use crate::exit::Exit;
 
 /// Returns the heights that all bitmaps cure, one after the other.
-pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
-    let Shown { exposures, projector, material, target } = shown;
+pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
+    let ShownExposures { exposures, projector, material, target } = shown;
     let setting = setting_of(projector, material)?;
     let place = || exposures.name.clone();
     let bitmaps = (1..).zip(&exposures.bitmaps).map(exposure).collect::<Result<Vec<_>, _>>();
@@ -35,7 +35,7 @@ pub(super) fn cured(shown: &Shown) -> Result<Outcome, Exit> {
         cured: &cured,
         wanted: wanted.as_ref(),
     };
-    Ok(Outcome {
+    Ok(SimulationOutcome {
         lines: lines_of(&reported),
         report: fields(&reported),
         wanted: round.map(|round| grid.round(|um| round.height_um(um))),

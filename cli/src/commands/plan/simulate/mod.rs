@@ -42,11 +42,11 @@ pub(super) struct SimulateArgs {
     bitmaps: OsString,
 
     /// How light cures
-    #[arg(long, value_parser = one_of_described::<Model>(&[
+    #[arg(long, value_parser = one_of_described::<SimulationModel>(&[
         "Doses add up; each column is as high as its dose cures (000)",
         "Light, radicals and oxygen react; bitmaps must be discs and rings (003)",
     ]))]
-    model: Model,
+    model: SimulationModel,
 
     /// Projector: a built-in projector's name (see lamp projector list) or a file
     #[arg(long, value_name = "NAME|FILE")]
@@ -79,12 +79,12 @@ pub(super) struct SimulateArgs {
 
 /// How light cures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Model {
+enum SimulationModel {
     Column,
     Kinetics,
 }
 
-named!(Model { Column = "column", Kinetics = "kinetics" });
+named!(SimulationModel { Column = "column", Kinetics = "kinetics" });
 
 /// Parses rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
 pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
@@ -96,7 +96,7 @@ pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
 }
 
 /// Exposures of bitmaps, and the setup in which they are shown.
-struct Shown {
+struct ShownExposures {
     exposures: Exposures,
     projector: Projector,
     material: Material,
@@ -104,7 +104,7 @@ struct Shown {
 }
 
 /// The outcome of showing bitmaps.
-struct Outcome {
+struct SimulationOutcome {
     cured: HeightMap,
     /// The wanted heights, on the same columns.
     wanted: Option<HeightMap>,
@@ -125,18 +125,18 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
         Some(path) => Some(args.reading.open(path, &projector, &progress)?),
         None => None,
     };
-    let shown = Shown {
+    let shown = ShownExposures {
         exposures: Exposures::read(&args.bitmaps, &projector)?,
         material: document(&args.material)?,
         projector,
         target,
     };
     let outcome = match args.model {
-        Model::Column => column::cured(&shown, args.rays.unwrap_or_default())?,
-        Model::Kinetics if args.rays.is_some() => {
+        SimulationModel::Column => column::cured(&shown, args.rays.unwrap_or_default())?,
+        SimulationModel::Kinetics if args.rays.is_some() => {
             return Err(Exit::usage("--rays is for --model column: leave it out"));
         }
-        Model::Kinetics => kinetics::cured(&shown)?,
+        SimulationModel::Kinetics => kinetics::cured(&shown)?,
     };
     outcome.lines.iter().for_each(|line| progress.say(line));
     match folder {
@@ -145,8 +145,13 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     }
 }
 
-fn write(folder: PlanFolder, model: Model, shown: &Shown, outcome: &Outcome) -> Result<(), Exit> {
-    let Shown { exposures, projector, material, target } = shown;
+fn write(
+    folder: PlanFolder,
+    model: SimulationModel,
+    shown: &ShownExposures,
+    outcome: &SimulationOutcome,
+) -> Result<(), Exit> {
+    let ShownExposures { exposures, projector, material, target } = shown;
     let name = target.as_ref().map(|target| target.name());
     let mut report = json!({
         "schema": "lamp-simulation-1",
