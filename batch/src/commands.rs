@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use lamp_pipeline::{Chain, RangeFindings};
+use lamp_pipeline::{RangeFindings, StageChain};
 use lamp_stack::{Layer, StackError};
 
 use crate::error::BatchError;
@@ -28,7 +28,7 @@ pub trait Call {
 /// The stages of a part: first layer by layer, in ranges, then on the whole stack.
 pub struct Stages<W> {
     /// Slicing, and stages from layers to layers.
-    pub chain: Chain,
+    pub chain: StageChain,
     /// Stages that need the whole stack, and stages behind them.
     pub after: Vec<W>,
 }

@@ -180,7 +180,6 @@ pub(crate) fn read_passing(
     }))
 }
 
-
 fn pages_of_input(
     pages: Pages,
     input: &InputArgs,

@@ -7,4 +7,3 @@ mod goldens;
 pub(crate) mod parse;
 #[cfg(test)]
 mod tests;
-

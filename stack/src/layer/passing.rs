@@ -119,9 +119,8 @@ impl PassingLayer {
     pub fn decode(self) -> Result<Layer, StackError> {
         match self.0 {
             PassingState::Decoded(layer) => Ok(*layer),
-            PassingState::Coded(page, _, file) => page.decode().map_err(|source| StackError::InFile {
-                file: file.into(),
-                source: Box::new(source),
+            PassingState::Coded(page, _, file) => page.decode().map_err(|source| {
+                StackError::InFile { file: file.into(), source: Box::new(source) }
             }),
         }
     }

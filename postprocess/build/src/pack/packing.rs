@@ -4,7 +4,7 @@ use lamp_stack::{Length, Size};
 
 use super::super::{CopyPlacement, Layout, PartStack, PixelSize, TileError};
 use super::Pack;
-use super::job::Job;
+use super::job::PackingJob;
 
 impl Layout {
     /// Finds places for copies of each part, at least a gap apart. `None` as a count
@@ -54,7 +54,7 @@ fn pack(
     gap: u32,
     how: Pack,
 ) -> Result<Vec<CopyPlacement>, TileError> {
-    within_edges(layout, how, |within| Job::new(within, gap, how).pack(counts))
+    within_edges(layout, how, |within| PackingJob::new(within, gap, how).pack(counts))
 }
 
 /// Finds places as [`pack`] does, by outlines alone. Copies of each part may have their images from
@@ -66,7 +66,7 @@ pub(crate) fn pack_turned(
     how: Pack,
     stacks: &[Vec<usize>],
 ) -> Result<Vec<CopyPlacement>, TileError> {
-    within_edges(layout, how, |within| Job::turned(within, gap, how, stacks).pack(counts))
+    within_edges(layout, how, |within| PackingJob::turned(within, gap, how, stacks).pack(counts))
 }
 
 /// Finds places on the area without its edges.
