@@ -52,6 +52,7 @@ pub fn collect(store: &Store, keep: Duration) -> Result<Removed, StoreError> {
     }
     for shard in folders_in(&store.root().join("notes")) {
         for path in files(&shard).map_err(failed)? {
+            // No batch lists notes, so their age decides. A time in the future counts as now.
             let age = path.metadata().and_then(|file| file.modified()).map(|at| at.elapsed());
             if age.is_ok_and(|age| age.unwrap_or_default() > keep) {
                 removed.remove(&path)?;

@@ -74,6 +74,7 @@ impl Journal {
     pub fn append(&mut self, event: &Event) -> io::Result<()> {
         let mut line = serde_json::to_string(event).expect("events have text keys");
         line.push('\n');
+        // Without a line break, a line that a loss of power cut would spoil this one, too.
         if self.ends_in_a_line_that_is_cut()? {
             line.insert(0, '\n');
         }

@@ -51,6 +51,8 @@ impl Kind {
 impl Recipe {
     /// Returns the key of the task.
     pub fn key(&self) -> Key {
+        // The tag keeps keys of tasks and of notes apart. Its number changes with the form of
+        // recipes. Fields are written in the order of the struct, so equal recipes have one text.
         let text = serde_json::to_vec(&("lamp-task-1", self)).expect("recipes have text keys");
         Key(*blake3::hash(&text).as_bytes())
     }
@@ -71,6 +73,7 @@ impl Key {
     /// Returns the place of the key's files in the store: a folder and a name in it.
     pub(crate) fn place(&self, end: &str) -> PathBuf {
         let text = self.to_string();
+        // Two digits make 256 folders: none of them grows long.
         PathBuf::from(&text[..2]).join(format!("{text}.{end}"))
     }
 
@@ -103,6 +106,7 @@ impl FromStr for Key {
     type Err = KeyError;
 
     fn from_str(text: &str) -> Result<Self, KeyError> {
+        // BLAKE3 also reads capital digits, but a key must have one text only: it names files.
         let is_plain = text.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f'));
         let hash = blake3::Hash::from_hex(text).ok().filter(|_| is_plain);
         hash.map(|hash| Self(*hash.as_bytes())).ok_or_else(|| KeyError(lamp_stack::one_line(text)))

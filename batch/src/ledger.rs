@@ -69,7 +69,9 @@ impl<'a> Ledger<'a> {
     /// Adds tasks whose results are missing, now.
     fn add_missing(&mut self) {
         let missing = self.graph.missing(&self.goals, |key| match self.states.get(&key) {
+            // A damaged result may have been taken away since: the store is asked again.
             Some(State::Done) | None => self.store.manifest(key).is_some(),
+            // Nothing below a failed task is worth making for it.
             Some(State::Failed(_) | State::Skipped) => true,
             Some(State::Waiting | State::Running) => false,
         });
@@ -112,10 +114,13 @@ impl<'a> Ledger<'a> {
     /// Records the end of an attempt at a task. Returns whether it is to be tried again.
     pub fn end(&mut self, key: Key, end: End) -> bool {
         let (state, is_counted) = match end {
+            // An exit status alone proves nothing: a result counts once its manifest is there.
             End::Done if self.store.manifest(key).is_some() => (State::Done, false),
             End::Done => (State::Failed("it ended without a result".to_owned()), true),
+            // The same input would fail again, so it is not retried.
             End::Bad(why) => (State::Failed(why), false),
             End::Failed(why) | End::Crashed(why) | End::Damaged(why) => (State::Failed(why), true),
+            // A full disk is no fault of the task: it waits for the next run.
             End::NoRoom(why) => {
                 self.no_room = Some(why);
                 (State::Waiting, false)
@@ -126,6 +131,7 @@ impl<'a> Ledger<'a> {
             *failures += 1;
             if *failures <= self.retries {
                 self.states.insert(key, State::Waiting);
+                // It may have failed because a result that it needs was damaged and taken away.
                 self.add_missing();
                 return true;
             }
@@ -140,6 +146,8 @@ impl<'a> Ledger<'a> {
 
     /// Sets aside tasks that cannot be done any more, and tasks that have become useless.
     fn skip(&mut self) {
+        // Keys come after the keys that they need, so one pass reaches all tasks above a failed
+        // one.
         for key in self.keys() {
             let is_lost =
                 |need: &Key| matches!(self.state(*need), State::Failed(_) | State::Skipped);
@@ -148,6 +156,7 @@ impl<'a> Ledger<'a> {
                 self.states.insert(key, State::Skipped);
             }
         }
+        // A task whose users are all skipped would make a result that nothing reads.
         let wanted: HashSet<Key> = self
             .graph
             .missing(&self.goals, |key| {

@@ -39,10 +39,12 @@ impl Local {
             let ready = ledger.ready();
             for (at, &key) in ready.iter().enumerate() {
                 let memory = work.graph.task(key).cost.memory;
+                // No later task overtakes: small ones could keep a large one waiting for long.
                 let Some(threads) = self.threads(&running, memory, ready.len() - at) else {
                     break;
                 };
                 if let Err(error) = work.store.write_task(work.graph.task(key)) {
+                    // A full disk ends the run in order: running tasks may still finish.
                     let Some(why) = error.no_room() else { return Err(error.into()) };
                     let end = End::NoRoom(why);
                     let again = ledger.end(key, end.clone());

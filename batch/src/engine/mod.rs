@@ -50,6 +50,8 @@ impl End {
             Some(status::NO_ROOM) => Self::NoRoom(why),
             Some(status::DAMAGED) => Self::Damaged(why),
             Some(status::INPUT_OUTPUT) => Self::Failed(why),
+            // Signals, panics (101) and lack of memory: the process could not state its reason
+            // itself.
             _ => Self::Crashed(why),
         }
     }

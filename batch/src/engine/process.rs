@@ -73,6 +73,7 @@ fn ask_to_end() {}
 /// Starts a process and sends its end, with its last words.
 pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) -> io::Result<()> {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    // Locked until the child is listed: `end_children` must not miss a child that starts now.
     let mut now = running();
     if now.is_ending {
         return Err(io::Error::new(io::ErrorKind::Interrupted, "a signal ends the night"));

@@ -124,6 +124,7 @@ pub(super) fn run<S: Scheduler>(
 ) -> Result<(), EngineError> {
     while !ledger.ready().is_empty() {
         let round = round::<S>(work, ledger)?;
+        // Counted before the round is submitted: a task may fail at once.
         let before = failures(work.store)?;
         let job = scheduler.submit(&round, work.store)?;
         let pending = round.iter().map(|task| task.key).collect();
@@ -149,6 +150,7 @@ fn round<S: Scheduler>(
     let task = |&key: &Key| {
         let task = work.graph.task(key);
         work.store.write_task(task)?;
+        // Schedulers count threads as processors, and each task is submitted with one.
         let words = work.launcher.words(key, work.store, S::NAME, 1);
         let words = std::iter::once(work.launcher.program.clone().into()).chain(words);
         Ok(RoundTask {
@@ -195,6 +197,7 @@ impl Following<'_, '_, '_> {
                 pause = LOOKS[0];
             }
             if self.ledger.no_room().is_some() {
+                // On a full disk, the other tasks of the round would only fail as well.
                 return Ok(scheduler.cancel(job)?);
             }
             if self.pending.is_empty() && !is_at_work {
@@ -224,6 +227,7 @@ impl Following<'_, '_, '_> {
         for event in failed {
             let time = times.entry(event.key).or_default();
             *time += 1;
+            // The journal also has the failures of earlier rounds and nights.
             if *time <= self.before.get(&event.key).copied().unwrap_or(0) {
                 continue;
             }
@@ -242,6 +246,7 @@ impl Following<'_, '_, '_> {
     fn give_up(&mut self) {
         let ready = self.ledger.ready();
         for key in std::mem::take(&mut self.pending) {
+            // Other tasks wait for a task that failed: they had no turn, and so no failure.
             if ready.contains(&key) {
                 let why = "it ended without a word, as tasks do that are killed or run out of \
                            memory or time";

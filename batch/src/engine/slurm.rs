@@ -130,6 +130,7 @@ fn submit_array(
         memory,
         time,
         "--requeue".to_owned(),
+        // Jobs behind a failed one would otherwise stay in the queue forever.
         "--kill-on-invalid-dep=yes".to_owned(),
         // Last words are in the journal.
         "--output=/dev/null".to_owned(),

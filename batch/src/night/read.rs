@@ -23,6 +23,7 @@ const TABLES: [&str; 5] = ["defaults", "part", "build", "store", "output"];
 
 pub(super) fn night(text: &str, path: &Path) -> Read<Night> {
     let folder = match path.parent() {
+        // The parent of a bare file name is the empty path, which is no folder.
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
@@ -78,6 +79,7 @@ impl Reader<'_> {
         let start = before.rfind('\n').map_or(0, |at| at + 1);
         Place {
             line: before.matches('\n').count() + 1,
+            // Editors count columns in characters, TOML spans in bytes.
             column: before[start..].chars().count() + 1,
         }
     }
@@ -101,11 +103,13 @@ impl Reader<'_> {
             let problem = "there is no part: add [[part]] and below it file = \"parts/*.stl\"";
             return Err(NightError { place, problem: problem.to_owned() });
         }
+        // Not before all are read: a later [[part]] may change an earlier one's settings.
         let parts = drafts
             .list
             .into_iter()
             .map(|draft| finished(draft, &defaults))
             .collect::<Read<Vec<_>>>()?;
+        // Results are delivered under these names: one would replace the other.
         if let Some((before, part)) = twice(&parts, |part| &part.name) {
             let problem = format!(
                 "two parts are called {}, {} and {}: give one of them a name of its own",
@@ -214,6 +218,8 @@ impl Reader<'_> {
                 "check" => read.check = Some(self.command(value, &["check"])?),
                 "ranges" => read.ranges = Some(self.count(value)?),
                 "file" => {}
+                // Stages are not known here, so any other key with a text may be one. `finished`
+                // looks for it.
                 name => {
                     let place = self.place(key.span().start);
                     let words = match value.get_ref() {
@@ -268,6 +274,8 @@ impl Reader<'_> {
             return Err(NightError { place: *place, problem });
         }
         for (file, fault, place) in files {
+            // A file may match two patterns, or have links: it is one part, with the settings of
+            // both.
             let real = real(&self.folder.join(&file));
             match drafts.places.get(&real) {
                 Some(&place) => drafts.list[place].table.change(read.clone()),
@@ -282,11 +290,13 @@ impl Reader<'_> {
     fn files(&self, value: &TomlValue<'_>) -> Read<Vec<(PathBuf, Option<String>)>> {
         let name = self.text(value)?;
         let path = self.folder.join(name);
+        // Names of files may have these characters, too.
         if path.exists() || !name.contains(['*', '?', '[']) {
             return Ok(vec![(name.into(), None)]);
         }
         let wrong = |error: glob::PatternError| self.at(value, format!("{name}: {}", error.msg));
         let Walk { files, closed } = Walk::new(self.folder, name).map_err(wrong)?;
+        // A closed folder may hold files: it becomes a part with a fault, and the others go on.
         if files.is_empty() && closed.is_empty() {
             return Err(
                 self.at(value, format!("no file matches {name}: check its folder and its end"))
@@ -376,6 +386,7 @@ impl Reader<'_> {
     fn output(&self, value: Option<&TomlValue<'_>>, path: &Path) -> Read<NightOutput> {
         let stem = path.file_stem().unwrap_or("night".as_ref());
         let mut output = NightOutput { folder: self.folder.join(stem), format: NightFormat::Lamp };
+        // A night file without an ending has the name that its output's folder would get.
         if output.folder == path {
             output.folder.set_extension("out");
         }
@@ -424,6 +435,7 @@ fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
         return Err(NightError { place: name_place, problem });
     }
     let (stages, options) = match table.stages {
+        // Options in the defaults are for the defaults' stages.
         Some(stages) => (stages, table.options),
         None => {
             let all = defaults.options.iter().cloned().chain(table.options);
@@ -472,6 +484,7 @@ fn stem_of(file: &Path) -> String {
 
 /// Returns why a text cannot be the name of a file and of a part in a build.
 fn bad_name(name: &str) -> Option<String> {
+    // Results are files of these names, on any system; a colon parts a name from its copies.
     let is_bad = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');
     let name = one_line(name);
     if name.contains(is_bad) || name.starts_with('.') || name.is_empty() || name.len() > 100 {

@@ -44,6 +44,7 @@ impl Digests {
     /// Reads the digests that the store knows.
     pub fn of(store: &Store) -> Self {
         let path = store.root().join("digests.json");
+        // Without known digests, files are read once more: no error.
         let known = sealed::read(&path).unwrap_or_default();
         Self { path, known, is_changed: false }
     }
@@ -64,8 +65,10 @@ impl Digests {
             return Ok(known.digest.clone());
         }
         let file = File::open(path)?;
+        // The path may name another file since the first look.
         let stamp = Stamp::of(&file.metadata()?);
         let digest = digest_of(&file)?;
+        // Displayed names that are not UTF-8 may be equal for two files.
         if now_ns().saturating_sub(stamp.modified) > STEP_NS && path.to_str().is_some() {
             self.known.insert(name, Known { stamp, digest: digest.clone() });
             self.is_changed = true;
@@ -79,6 +82,7 @@ impl Digests {
     /// Returns an error if it cannot be written.
     pub fn keep(&mut self) -> Result<(), StoreError> {
         if std::mem::take(&mut self.is_changed) {
+            // Otherwise it would grow with every file that was ever named.
             self.known.retain(|path, _| Path::new(path).exists());
             match sealed::write_lightly(&self.path, &self.known) {
                 Err(error) if is_read_only(&error) => {}

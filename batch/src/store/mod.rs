@@ -181,6 +181,7 @@ impl Store {
     fn whole_manifest(&self, key: Key) -> Result<Manifest, Damage> {
         let path = self.of_task(key, "json");
         let manifest: Manifest = sealed::read(&path).ok_or(Damage::NoManifest)?;
+        // A copied or renamed file would otherwise stand for another task's result.
         if manifest.recipe.key() != key {
             return Err(Damage::OtherTask);
         }
@@ -315,6 +316,7 @@ impl Store {
                 keys.extend(name.split_once('.').and_then(|(key, _)| key.parse::<Key>().ok()));
             }
         }
+        // A task has up to three files, all with its key.
         keys.sort();
         keys.dedup();
         Ok(keys)
@@ -323,6 +325,7 @@ impl Store {
 
 /// Returns whether an error means a read-only store: it still serves its results.
 pub(crate) fn is_read_only(error: &io::Error) -> bool {
+    // A store of another user denies permission, a snapshot is mounted read-only.
     matches!(error.kind(), io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied)
 }
 

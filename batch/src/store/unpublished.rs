@@ -31,9 +31,11 @@ impl Unpublished {
     pub fn finish(self) -> io::Result<Written> {
         let mut file = self.beside.file();
         file.rewind()?;
+        // Writers hold the file itself, so only the finished file shows all bytes.
         let digest = digest_of(&*file)?;
         let metadata = file.metadata()?;
         let mut permissions = metadata.permissions();
+        // Later runs share the result by its digest: no program may change it in place.
         permissions.set_readonly(true);
         file.set_permissions(permissions)?;
         drop(file);
