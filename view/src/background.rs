@@ -63,6 +63,7 @@ impl<T> Background<T> {
     /// Works, and keeps the result or the failure.
     pub(crate) fn run(&self, work: impl FnOnce(&WorkProgress) -> Result<T, String>) {
         self.start();
+        // The page waits for a result: without one, it would wait forever.
         let result = catch_unwind(AssertUnwindSafe(|| work(&self.progress)));
         *self.lock() = match result {
             Ok(Ok(result)) => WorkState::Ready(result),
@@ -97,6 +98,7 @@ impl<T> Background<T> {
     }
 
     fn lock(&self) -> MutexGuard<'_, WorkState<T>> {
+        // Stages are replaced whole, so one is valid even after a panic.
         self.result.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

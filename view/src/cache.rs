@@ -65,6 +65,7 @@ impl<K: Copy + Eq + std::hash::Hash> Cache<K> {
                 None => break,
             }
         }
+        // Counted before the work: images made at once must not exceed the memory together.
         slots.put(key, Slot { bytes: most_bytes, image: None, last_request: now });
         slots.free(self.most_bytes, key);
         drop(slots);

@@ -78,6 +78,7 @@ impl Placed {
         let [width, height] = self.size;
         let (across, down) = self.turn.size(width, height);
         let inside = |at: u32, start: i64, size: u32| {
+            // Places come from the text of pages, and may be any number.
             let at = u32::try_from(i64::from(at).checked_sub(start)?).ok()?;
             (at < size).then_some(at)
         };

@@ -37,6 +37,7 @@ impl DrawingSource {
                 image_bytes(layer)
                     + others.iter().flatten().map(|other| image_bytes(other)).sum::<usize>()
             }
+            // A row takes its start and one change at most, of four bytes each.
             Self::Rows { size, .. } => 8 * size[1] as usize,
             Self::Findings { layer, .. } => image_bytes(layer),
         }
@@ -61,6 +62,7 @@ impl DrawingSource {
             Self::Rows { bands, size } => rows(*size, bands),
             Self::Findings { found, layer, below } => {
                 let layer = layer.exposed();
+                // Rows that are missing count as black, so no rows are enough.
                 let black = Mask::black(layer.width(), 0);
                 let below = below.as_ref().map(|below| below.exposed());
                 findings::drawn(found.iter(), &layer, below.as_deref().unwrap_or(&black))

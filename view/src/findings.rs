@@ -69,6 +69,7 @@ fn fitting(found: Vec<Finding>, headers: &[PageHeader]) -> Result<Vec<Finding>, 
 /// Returns the position of a layer by its index.
 fn position(headers: &[PageHeader], index: u64) -> usize {
     let same = headers.iter().position(|header| u64::from(header.info.index) == index);
+    // `fitting` refuses a layer that is not there.
     same.unwrap_or(usize::MAX)
 }
 
@@ -78,6 +79,7 @@ fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, 
         return Err(format!("the report is about {} stacks: check this one alone", inputs.len()));
     };
     let size = headers.first().map_or([0; 2], |first| first.size);
+    // Pixels of findings fit only images of the same size.
     if [&input["width_px"], &input["height_px"]] != size.map(Value::from).each_ref() {
         return Err("the report is about a stack of another size".to_owned());
     }
@@ -109,6 +111,7 @@ fn support_report(report: &Value, headers: &[PageHeader]) -> Vec<Finding> {
 fn of_plan(plan: &Value, headers: &[PageHeader]) -> Option<Finding> {
     let layer = position(headers, plan["layer"].as_u64()?);
     let header = headers.get(layer);
+    // A stack without an origin has no place for millimeters: the finding is only listed.
     let at = header.and_then(|header| {
         let at = plan["at_mm"].as_array()?;
         let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
@@ -151,6 +154,7 @@ pub(crate) fn drawn<'a>(
     for finding in findings {
         let Some([left, top, right, bottom]) = finding.bounds else { continue };
         let [width, height] = [layer.width(), layer.height()];
+        // Bounds may come from a report, and images of one stack differ in size.
         let bounds = [left.min(width), top.min(height), right.min(width), bottom.min(height)];
         // A margin of a pixel, so that findings do not touch the border.
         let frame = around(bounds);

@@ -75,6 +75,7 @@ pub(crate) fn rows(size: [u32; 2], rows: &[Range<u32>]) -> Mask {
     let mut mask = MaskBuilder::new(width);
     let mut next = 0;
     for band in rows {
+        // Bands come from the text of pages, which may be wrong: no row may repeat or lie outside.
         let band = band.start.clamp(next, height)..band.end.min(height);
         mask.push_black(band.start - next);
         for _ in band.clone() {

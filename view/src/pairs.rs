@@ -29,6 +29,7 @@ impl Partners {
     pub(crate) fn of(stacks: &[ViewedStack]) -> Self {
         let [a, b, ..] = stacks else { return Self { of: None } };
         let (a, b) = (a.headers(), b.headers());
+        // Overlays are offered for whole stacks, so the first layers decide for all.
         if shift_between(&a[0], &b[0]).is_err() {
             return Self { of: None };
         }
@@ -71,6 +72,7 @@ impl Partners {
             stacks.get(stack)?.headers().get(layer)
         };
         let partner = |other: usize| {
+            // Origins and sizes may change from layer to layer.
             let shift = shift_between(header(stack, layer)?, header(1 - stack, other)?).ok()?;
             Some(Partner { stack: 1 - stack, layer: other, shift })
         };

@@ -46,6 +46,7 @@ impl ViewedStack {
     /// Reads and decodes a layer.
     pub(crate) fn image(&self, layer: usize) -> Result<Image, ViewError> {
         let mut image = self.pages.layer(layer)?.image.into_image();
+        // Images stay in the cache, where room left over for growth would count.
         image.shrink_to_fit();
         Ok(image)
     }

@@ -25,6 +25,7 @@ impl TileAt {
     /// image, if there is such a tile.
     pub(crate) fn on(self, size: [u32; 2]) -> Option<(NonZeroU32, [Range<u32>; 2])> {
         let side = 1u32.checked_shl(self.reduction).and_then(NonZeroU32::new)?;
+        // The address may name any reduction and place: products of both may exceed 32 bits.
         let step = u64::from(TILE_SIDE) * u64::from(side.get());
         let range = |at: u32, size: u32| {
             let start = u64::from(at).checked_mul(step)?;
@@ -56,10 +57,12 @@ fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_depth(png::BitDepth::Eight);
+    // The tile goes over the loopback address, where time counts more than bytes.
     encoder.set_compression(png::Compression::Fastest);
     match inks {
         Inks::Gray => encoder.set_color(png::ColorType::Grayscale),
         Inks::One(colour) => {
+            // A palette of one color with 256 opacities takes one byte a pixel, not four.
             encoder.set_color(png::ColorType::Indexed);
             encoder.set_palette(colour.repeat(256));
             encoder.set_trns((0..=255).collect::<Vec<u8>>());

@@ -106,6 +106,7 @@ impl Viewer {
         find: impl FnOnce(&ViewedStack, &WorkProgress) -> Result<Vec<Finding>, String> + Send + 'static,
     ) {
         let viewer = Arc::clone(self);
+        // Before the thread runs: the page asks at once whether there will be findings.
         self.findings.start();
         std::thread::spawn(move || {
             viewer.findings.run(|progress| find(&viewer.stacks[0], progress));
@@ -203,6 +204,7 @@ impl Viewer {
             ImageKind::Layer => self.cache.get(key, of.expected_bytes(layer), || of.image(layer)),
             ImageKind::Cured(level) => {
                 let image = self.image(stack, layer, ImageKind::Layer, given_up)?;
+                // Any level keeps the white of a mask, so the same image serves, and is kept once.
                 if matches!(*image, Image::Mask(_)) {
                     return Ok(image);
                 }

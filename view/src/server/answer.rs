@@ -73,6 +73,7 @@ pub(super) fn json_of(value: &Value) -> Response {
 }
 
 pub(super) fn asset(asset: &Asset) -> Response {
+    // Every browser reads gzip, so the files are kept in this form alone.
     let mut answer = bytes(asset.content_type, asset.gzip);
     answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     answer

@@ -36,9 +36,11 @@ impl Guard {
         if !self.is_for_us(request) {
             return Some(refusal(StatusCode::FORBIDDEN, "this address is not the viewer's"));
         }
+        // A token is good once: other methods must not use it up.
         let is_get = request.method() == Method::GET;
         let token = if is_get { token_in(request) } else { None };
         let has_cookie = self.has_cookie(request.headers());
+        // Before the method is looked at: strangers learn nothing about the viewer.
         if !has_cookie && token.is_none() {
             return Some(refusal(StatusCode::FORBIDDEN, NO_TOKEN));
         }
@@ -68,6 +70,7 @@ impl Guard {
             }
             TicketCheck::Valid => {
                 let (name, secret) = (&self.cookie, &self.secret);
+                // Scripts cannot read it, and requests from pages of other sites do not have it.
                 let cookie = format!("{name}={secret}; Path=/; HttpOnly; SameSite=Strict");
                 welcome(&HeaderValue::from_str(&cookie).expect("it is ASCII"))
             }
@@ -79,6 +82,8 @@ impl Guard {
     /// Returns whether the request names this address: a page of another name that leads here (DNS
     /// rebinding) does not.
     fn is_for_us(&self, request: &Request) -> bool {
+        // Two Host headers could name two sites, and a URI in absolute form replaces the header
+        // (RFC 9112, section 3.2.2): all must agree.
         let mut hosts = request.headers().get_all(HOST).iter();
         let host = hosts.next().and_then(|host| host.to_str().ok());
         let of_uri = request.uri().authority().map(axum::http::uri::Authority::as_str);

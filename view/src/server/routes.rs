@@ -105,6 +105,7 @@ async fn layers(State(workers): State<Arc<Workers>>, path: AddressNames<usize>) 
 async fn layer(State(workers): State<Arc<Workers>>, path: AddressNames<(usize, usize)>) -> Answer {
     let (stack, layer) = named(path)?;
     let facts = json_of(&workers.viewer().layer(stack, layer)?);
+    // After the layer is known to exist: wrong addresses cause no work.
     workers.expect_near(stack, layer);
     Ok(facts)
 }
@@ -160,6 +161,7 @@ async fn tile(
     query: Keys<TileKeys>,
 ) -> Answer {
     let (stack, layer, kind, reduction, x, file) = named(path)?;
+    // Routes match whole segments, so the ending is part of the name.
     let y = file.strip_suffix(".png").and_then(|y| y.parse().ok());
     let y = y.ok_or(ViewError::NoSuch("tile"))?;
     let threshold = keys(query)?.threshold;

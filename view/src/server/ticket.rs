@@ -31,6 +31,7 @@ impl Ticket {
         if !self.token.is(text) {
             return TicketCheck::Unknown;
         }
+        // Of two requests at once, one alone takes it.
         let unused = self.when_used.lock().unwrap_or_else(PoisonError::into_inner).take();
         match unused {
             Some(when_used) => {
@@ -44,6 +45,7 @@ impl Ticket {
 
 /// Uses the ticket that has a text as its token, if there is one.
 pub(super) fn show(tickets: &[Ticket], text: &str) -> TicketCheck {
+    // All tickets are compared, so that the time does not depend on which of them fits.
     let shown = tickets.iter().map(|ticket| ticket.show(text));
     shown.fold(TicketCheck::Unknown, |all, one| if one == TicketCheck::Unknown { all } else { one })
 }

@@ -20,6 +20,7 @@ impl Token {
     pub(super) fn is(&self, text: &str) -> bool {
         let digits = self.to_string();
         let differs = digits.bytes().zip(text.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+        // The compiler must not leave the comparison at the first difference.
         std::hint::black_box(differs) == 0 && text.len() == digits.len()
     }
 }

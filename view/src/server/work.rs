@@ -35,11 +35,14 @@ impl Workers {
         &self,
         work: impl FnOnce(&Viewer, &GivenUp) -> Result<T, ViewError> + Send + 'static,
     ) -> Result<T, ViewError> {
+        // A waiting answer takes no thread, and ends as soon as it is dropped.
         let permit = Arc::clone(&self.free).acquire_owned().await;
         let dropped = WhenDropped(GivenUp::default());
         let (viewer, given_up) = (Arc::clone(&self.viewer), dropped.0.clone());
         let done = tokio::task::spawn_blocking(move || {
             let result = work(&viewer, &given_up);
+            // The thread holds the permit: if its answer is given up, it still works until its next
+            // step.
             drop(permit);
             result
         });
@@ -81,6 +84,7 @@ impl Wish {
     fn set(&self, stack: usize, layer: usize) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let down = match state.last {
+            // The same layer again has no new direction.
             Some((same, before, down)) if same == stack && before == layer => down,
             Some((same, before, _)) => same == stack && before > layer,
             None => false,
@@ -109,6 +113,7 @@ impl Wish {
                 }
                 // A viewer of that layer will see the error.
                 let decode = || viewer.image(stack, layer, ImageKind::Layer, &GivenUp::default());
+                // This thread serves all layers: one that panics must not end it.
                 let _ = catch_unwind(AssertUnwindSafe(decode));
             }
         }

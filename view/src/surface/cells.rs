@@ -115,6 +115,7 @@ impl CellGrid {
         let cell = self.scale.pitch * f64::from(self.side.get());
         let heights = &self.scale.heights;
         let start = heights[0][0];
+        // Layers and planes both go up, so one pass over the layers finds all pairs.
         let mut lowest = 0;
         for plane in 0..self.counts[2] {
             let [from, to] = [plane, plane + 1].map(|k| start + f64::from(k) * cell);
@@ -125,6 +126,7 @@ impl CellGrid {
             for (above, weight) in thinned(&weights, at_most) {
                 let position = lowest + above;
                 match self.shares.last_mut() {
+                    // A layer at the border of planes adds to both, and is read once.
                     Some(share) if share.position == position => share.weights.push(weight),
                     _ => self.shares.push(CellContribution::new(
                         position,
@@ -187,6 +189,8 @@ impl CellGrid {
 
 impl CellContribution {
     fn new(position: usize, page: &PageHeader, first: u32, weight: f32) -> Self {
+        // As in `ViewedStack::expected_bytes`: four bytes a transition, whose code takes a fourth
+        // byte.
         let bytes = 16 * page.data_bytes as usize + 4 * page.size[1] as usize;
         Self { position, index: page.info.index, bytes, first, weights: vec![weight] }
     }
@@ -202,6 +206,7 @@ fn thinned(
     let kept = at_most.map_or(count, |most| count.min(most.get() as usize));
     let shared = weights.iter().sum::<f64>() / kept as f64;
     (0..kept).map(move |k| {
+        // The middle of each of `kept` equal pieces.
         let place = (2 * k + 1) * count / (2 * kept);
         (place, if kept == count { weights[place] } else { shared } as f32)
     })

@@ -56,9 +56,11 @@ impl StackSurface {
     /// Returns the surface as the viewer's page reads it: `LSRF`, version, numbers of vertices and
     /// triangles, vertices, normals and triangles, all little-endian and of four bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
+        // The viewer's limit of triangles keeps both numbers far below 2^32.
         let head = [VERSION, self.vertices.len() as u32, self.triangles.len() as u32];
         let places = self.vertices.iter().chain(&self.normals).flatten();
         let mut bytes =
+            // The head has 16 bytes, a vertex with its normal 24, a triangle 12.
             Vec::with_capacity(16 + 24 * self.vertices.len() + 12 * self.triangles.len());
         bytes.extend_from_slice(MAGIC);
         bytes.extend(head.into_iter().flat_map(u32::to_le_bytes));

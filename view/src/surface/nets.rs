@@ -116,9 +116,11 @@ impl Nets {
         let last = [columns - 1, rows - 1, planes - 1];
         surface_nets(&self.levels, &shape, [0; 3], last, &mut self.buffer);
         let found = &self.buffer;
+        // Checked for each slab, before memory runs out.
         if self.triangles.len() + found.indices.len() / 3 > self.max_triangles {
             return Err(SurfaceError::TooManyTriangles { most: self.max_triangles });
         }
+        // Vertices come plane by plane, so those known from the slab below are the first ones.
         let known = match self.first {
             0 => 0,
             _ => found.surface_points.iter().take_while(|[_, _, plane]| *plane == 0).count(),

@@ -17,6 +17,8 @@ pub(super) fn plane_of(image: &Image, side: NonZeroU32, [columns, rows]: [u32; 2
     for (line, means) in lines.zip(mean_levels(image, 0..width, 0..height, side)) {
         line[..means.len()].copy_from_slice(&means);
         if let Some(last) = means.len().checked_sub(1) {
+            // `mean_levels` takes the mean of the pixels that there are. Beyond the border, a cell
+            // is black.
             line[last] = of_whole(line[last], width, side);
         }
     }
@@ -69,6 +71,7 @@ impl OpenPlanes {
         mut push: impl FnMut(&[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
         for _ in self.finished..end {
+            // No layer reaches into this plane: a gap between layers.
             let sums = self.open.pop_front().unwrap_or_else(|| vec![0.0; self.cells]);
             let levels: Vec<u8> = sums.into_iter().map(|sum| sum.round() as u8).collect();
             push(&levels)?;

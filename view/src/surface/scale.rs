@@ -60,6 +60,7 @@ fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<StackScale>,
         unit: SurfaceUnit::Millimetres,
         pitch,
         corner: origin.unwrap_or([0.0, f64::from(rows) * pitch]),
+        // A thickness that reaches into the next layer, by rounding or by error, would count twice.
         heights: heights.map(|([z, top], next)| [z / 1e3, top.min(next) / 1e3]).collect(),
     }))
 }
