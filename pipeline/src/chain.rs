@@ -184,12 +184,14 @@ impl StageChain {
     pub fn survey(&self, part: &Path) -> Result<Survey, Error> {
         let begun = Instant::now();
         let settings = self.settings(part, None);
+        // The survey's remarks are dropped: each range makes them again.
         let slicing = settings.open(None, &KeptRemarks::default().of("slice"))?;
         slicing.with_slices(|slices| Ok(Survey::of(slices, self, begun)))
     }
 
     fn settings(&self, part: &Path, layers: Option<Range<u32>>) -> SliceStage {
         let mut settings = self.slice.clone();
+        // A part of a night is one file at its own coordinates.
         settings.parts = vec![PartFile { path: part.to_owned(), placement: None }];
         settings.layers = layers;
         settings
@@ -208,6 +210,7 @@ impl StageChain {
         write: impl FnOnce(&mut dyn Iterator<Item = Result<Layer, Error>>) -> Result<(), E>,
     ) -> Result<RangeFindings, E> {
         let remarks = KeptRemarks::default();
+        // A stage needs finished layers of the stage before around its own, so reaches add up.
         let reach: u32 = self.stages.iter().map(Stage::reach).sum();
         let around = range.start.saturating_sub(reach)..range.end.saturating_add(reach);
         let settings = self.settings(part, Some(around.clone()));
@@ -217,6 +220,7 @@ impl StageChain {
         doubts.for_each(|doubt| watcher.remark(doubt));
         let working = self.stages.iter().map(|stage| stage.start(&remarks));
         let working = working.collect::<Result<Vec<_>, _>>()?;
+        // Beyond the ends of a range other layers follow, so another stack may go on there.
         let is_end = [around.start == 0, around.end >= slicing.part_layers()];
         let sliced = slicing.layers(range.clone(), |_| ());
         let mut layers: Layers<'_> = Box::new(sliced.map(|layer| layer.map(PassingLayer::from)));
@@ -232,6 +236,7 @@ impl StageChain {
         for (stage, working) in (1..).zip(&working) {
             working.find(stage, name, &mut findings);
         }
+        // After the work: stages add remarks while layers pass.
         findings.of_part = remarks.take();
         Ok(findings.of(&range))
     }
@@ -249,6 +254,7 @@ fn only(
             Err(error) => return Some(Err(error)),
         };
         let index = layer.info.index;
+        // A layer outside the range may carry the record: it moves to the first layer within.
         let of_page = layer.info.stack.take().map(|stack| stack.of_range(index, &range));
         stack = of_page.or(stack.take());
         range.contains(&index).then(|| {

@@ -67,6 +67,7 @@ impl FiringShrinkage {
 impl CompensateSettings {
     /// Returns the files that are read.
     pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        // Built-in materials are part of the program: they are no inputs.
         self.material.iter().filter(|path| is_file::<Material>(path))
     }
 
@@ -77,6 +78,7 @@ impl CompensateSettings {
 
     /// Returns the settings as one text. Files have no names in it.
     pub fn canonical(&self) -> String {
+        // The digest of a file is among the inputs of a task, so its name decides nothing.
         let material = self.material.as_deref().map(canonical_word::<Material>);
         let settings = Self { material: material.map(PathBuf::from), ..self.clone() };
         format!("compensate{}", words_of(&settings))
@@ -117,6 +119,7 @@ impl<'a> Compensating<'a> {
         let shrinkage = shrinkage.map(FiringShrinkage::shares).unwrap_or_default();
         let layers = layers.inspect(|layer| {
             self.layer_count.set(self.layer_count.get() + 1);
+            // An error is left to the library, which passes it on in its place.
             layer.iter().for_each(|layer| self.done_before.borrow_mut().look_at(layer));
         });
         let options = CompensateOptions { min_feature, one_bit, shrinkage };
@@ -214,6 +217,7 @@ impl EdgeMove {
                 (None, None) => {
                     Err(Error::settings("give --uniform 25um, --material M or --shrinkage 2.1%"))
                 }
+                // Shrinkage alone enlarges images and leaves edges where they are: a move by zero.
                 (by, _) => Ok(Self::Uniform(by.unwrap_or_default())),
             };
         };
@@ -252,6 +256,7 @@ impl EdgeMove {
             Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
             Self::CureWidth(by) => {
                 let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
+                // Doubts need the doses of all layers, which are known only at the end.
                 by.doses.see(dose);
                 (&by.width, dose)
             }
@@ -267,6 +272,7 @@ impl EdgeMove {
 /// Returns the dose of a layer from its page's exposure time.
 fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Error> {
     let no_dose = |text: String| Error::new(ErrorKind::Work, NoDose(text));
+    // NaN and negative times of damaged pages are no times.
     let time = layer.info.exposure_ms.filter(|ms| *ms >= 0.0).ok_or_else(|| {
         no_dose(format!("{} states no exposure time: give --dose", layer.info.name()))
     })?;
@@ -306,10 +312,12 @@ impl FromStr for FiringShrinkage {
                 "y" | "Y" => &mut y,
                 _ => return Err(wrong()),
             };
+            // An axis that stands twice would hide a slip.
             if side.replace(share(value).ok_or_else(wrong)?).is_some() {
                 return Err(wrong());
             }
         }
+        // An axis that is not named does not shrink.
         Ok(Self { percent: [x, y].map(Option::unwrap_or_default) })
     }
 }

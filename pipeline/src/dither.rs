@@ -31,6 +31,7 @@ impl DitherSettings {
         layers: impl Iterator<Item = Result<PassingLayer, E>> + 'a,
         watcher: &'a dyn Watcher,
     ) -> impl Iterator<Item = Result<PassingLayer, E>> + 'a {
+        // A threshold makes no dots that could cure unevenly.
         let mut has_warned = self.method == DitherMethod::Threshold;
         let layers = layers.inspect(move |layer| {
             if let Ok(layer) = layer

@@ -90,6 +90,7 @@ pub fn word_of_text(path: &Path, text: &str) -> String {
 /// Takes the digest from a word that stacks record.
 pub fn without_digest(path: &Path) -> (PathBuf, Option<&str>) {
     match path.to_str().and_then(|text| text.rsplit_once(DIGEST)) {
+        // A file of the whole name is meant as it is.
         Some((name, digest)) if !path.exists() => (name.into(), Some(digest)),
         _ => (path.to_owned(), None),
     }
@@ -99,6 +100,7 @@ pub fn without_digest(path: &Path) -> (PathBuf, Option<&str>) {
 pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
     let (name, Some(digest)) = without_digest(path) else { return Ok(()) };
     let found = found.rsplit_once(DIGEST).map_or("", |(_, found)| found);
+    // A shortened digest is enough for people; an empty one would fit every file.
     if digest.is_empty() || !found.starts_with(digest) {
         let name = name.display();
         return Err(Error::work(format!(
@@ -114,6 +116,8 @@ pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
 /// Returns an error if there is no such document, or it is wrong.
 pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error> {
     let (path, _) = without_digest(word);
+    // Built-in names win over files of the same name, so that a record means the same in every
+    // folder.
     let (document, text) = if let Some(builtin) = builtin::<T>(&path) {
         let document =
             T::from_toml(builtin.toml).map_err(|error| Error::new(ErrorKind::Work, error))?;
@@ -180,6 +184,7 @@ pub fn read_text(path: &Path, max: u64, what: &str) -> Result<String, Error> {
             Box::new(File::open(path)?)
         };
         let mut bytes = Vec::new();
+        // One byte more than allowed shows that there is more; a pipe may have no end.
         from.take(max + 1).read_to_end(&mut bytes)?;
         Ok(bytes)
     };

@@ -141,6 +141,7 @@ impl Editing {
         noting: Noting<'_>,
     ) -> Result<impl Iterator<Item = Result<PassingLayer, E>> + 'a, Error> {
         let EditFiles { edits, stacks, pictures, .. } = &self.files;
+        // Where a range ends before the stack does, the other stack has layers for other ranges.
         let may_reach_beyond = is_end.map(|is_end| !is_end);
         let other = |file: &PathBuf| {
             let layers = Box::new(layers_beside(noting(open_stack(file)?, file), file));
@@ -160,6 +161,7 @@ impl Editing {
     /// Returns the edits, from 1, that were made in no layer so far.
     pub fn unused(&self) -> impl Iterator<Item = usize> {
         let unused = |(number, count): (usize, &usize)| (*count == 0).then_some(number);
+        // Collected, since the borrow of the counts ends here.
         let unused: Vec<_> = (1..).zip(self.counts.borrow().iter()).filter_map(unused).collect();
         unused.into_iter()
     }
@@ -204,6 +206,7 @@ fn open_picture<E: From<Error> + Send + 'static>(
     let max = Limits::default().png_bytes;
     let copied = || -> io::Result<(File, u64, String)> {
         let mut copy = tempfile::tempfile()?;
+        // One byte more than allowed shows that the file is too large, without copying all of it.
         let bytes = io::copy(&mut File::open(path)?.take(max + 1), &mut copy)?;
         copy.rewind()?;
         let digest = digest_of(&copy)?;

@@ -72,6 +72,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Places were added from the cause outwards; people read from the file inwards.
         self.places.iter().rev().try_for_each(|place| write!(f, "{place}: "))?;
         write!(f, "{}", self.cause)?;
         let mut next = self.cause.source();

@@ -75,9 +75,11 @@ impl ExposureSettings {
         if let Self::Material { material, .. } = self
             && !is_file::<Material>(material)
         {
+            // A built-in material has no file: only its digest is checked, against this program's.
             return self.exposure().map(drop);
         }
         let Some(path) = self.path_mut() else { return Ok(()) };
+        // A file of the same name may have changed: the digest decides, and the search goes on.
         let is_it = |word: &PathBuf| {
             let text = fs::read_to_string(without_digest(word).0);
             text.is_ok_and(|text| check_word(word, &word_of_text(word, &text)).is_ok())
@@ -108,6 +110,7 @@ impl ExposureSettings {
 
     /// Returns the files that the settings name, to be changed.
     pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        // A built-in material is no file, though its name stands in the place of a path.
         let builtin =
             matches!(self, Self::Material { material, .. } if !is_file::<Material>(material));
         self.path_mut().filter(|_| !builtin).into_iter()

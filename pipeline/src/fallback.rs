@@ -109,6 +109,8 @@ impl Fallback {
         let step = &options.solid.step;
         let opening = step.reader.for_opening(step.tolerance(options.dpi))?;
         let options = SliceOptions {
+            // Both must cut the same planes on the same pixels, so that a layer can replace the
+            // other's.
             heights: Some(slices.layer_heights()),
             shading: slices.shading(),
             grid: GridRule::At { origin_mm: grid.origin_mm, pixels: [grid.width, grid.height] },
@@ -127,6 +129,7 @@ impl Fallback {
         let note = |note| watcher.remark(Remark::note(format!("{name}: {note}")));
         part_notes(&part).into_iter().for_each(note);
         let fallback = Slices::new(part, &options).map_err(|error| match error {
+            // The frame is the STEP part's own, so a file that leaves it is another part.
             SliceError::OutsideFrame { .. } => other("is larger".to_owned()),
             error => Error::from(error),
         })?;
@@ -143,13 +146,18 @@ impl Fallback {
 
     /// Returns the layer, or a replacement if it has gaps or lacks contours.
     fn better(&mut self, layer: Layer, slices: &Slices) -> Result<Layer, SliceError> {
+        // In lockstep with the part's layers, also where nothing is wrong: slices come only in
+        // order.
         let Some(other) = self.slices.next().transpose()? else { return Ok(layer) };
         let number = layer.info.index;
         let is_good = |layer: &Layer| is_whole(layer) && has_same_contours(layer, &other);
         if is_good(&layer) {
             return Ok(layer);
         }
+        // The stack's record stays with the first page, whichever file its image is from.
         let stack = layer.info.stack.clone();
+        // A face that is missing is also missing next to the plane: if all rows balance, only the
+        // fallback helps.
         for by_um in NUDGES_UM.into_iter().filter(|_| !is_whole(&layer)) {
             let again = slices.cut_again(number, Length::from_um(by_um))?;
             if is_good(&again) {

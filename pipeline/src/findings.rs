@@ -47,6 +47,7 @@ impl RangeFindings {
     pub(crate) fn add_fixed(&mut self, report: &FixReport) {
         self.bands_corrected += report.corrected();
         self.pixels_corrected += report.pixels();
+        // A later `fix` sees the bands that an earlier one left, so the last count holds.
         self.bands_left = report.left();
         self.first_left = report.first_left().map(ToOwned::to_owned);
     }
@@ -69,7 +70,9 @@ impl RangeFindings {
         self.pixels_corrected += other.pixels_corrected;
         self.first_left = self.first_left.or(other.first_left);
         self.is_blank &= other.is_blank;
+        // An edit that one range uses is used.
         self.unused_edits.retain(|edit| other.unused_edits.contains(edit));
+        // Every range opens the part, and finds the same about it.
         other.of_part.retain(|line| !self.of_part.contains(line));
         self.of_part.append(&mut other.of_part);
         self.of_range.append(&mut other.of_range);

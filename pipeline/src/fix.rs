@@ -56,6 +56,7 @@ impl FixSettings {
 /// Layers whose rows are being corrected.
 pub struct Fixing {
     options: FixOptions,
+    // A cell, since the layers' iterator still borrows this while the report is read.
     report: RefCell<FixReport>,
 }
 

@@ -169,6 +169,7 @@ impl FixReport {
             gap_columns: band.gap.as_ref().map(first_and_last),
             kinds: band.kinds.iter().map(BandKind::name).collect(),
             method: self.options.method.name(),
+            // A confidence is an estimate: more digits say nothing.
             confidence: (band.confidence * 1e4).round() / 1e4,
             pixels: band.pixels,
             outcome: match band.outcome {
@@ -190,6 +191,7 @@ fn bands_were(bands: usize) -> (String, &'static str) {
 
 /// Returns the place to repair the mesh at: `x 31.4-33.0 y 12.1-12.8 mm`.
 pub fn whereabouts(layer: &Layer, band: &Band) -> String {
+    // The gap is where the mesh is open; the band's columns only reach around it.
     let columns = band.gap.clone().unwrap_or_else(|| band.columns.clone());
     let Some(place) = PixelLocation::of(layer) else {
         return match columns.is_empty() {

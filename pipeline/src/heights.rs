@@ -121,6 +121,7 @@ impl HeightSettings {
         self.thicknesses()?;
         self.measure()?;
         if self.time_budget.is_some() {
+            // Only its errors count here: the search would find them after minutes.
             let _ = self.seconds_of_layers(exposure)?;
         }
         Ok(())
@@ -131,6 +132,7 @@ impl HeightSettings {
         let criterion = self.criterion.unwrap_or(default);
         match (criterion == Measure::Cusp, self.cusp.is_some()) {
             (false, true) => Err(Error::settings("--cusp needs --criterion cusp")),
+            // A deviation is a share, which bounds no cusp: cusps are lengths.
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
                 Err(Error::settings("--criterion cusp needs a bound, as --cusp 10um"))
             }
@@ -149,6 +151,7 @@ impl HeightSettings {
         watcher: &dyn Watcher,
     ) -> Result<FoundHeights, Error> {
         let found = self.search(part, exposure, watcher);
+        // Also after an error, so that no line of progress is left on the terminal.
         watcher.heights_found();
         found
     }
@@ -174,6 +177,8 @@ impl HeightSettings {
         let found = WantedHeights { thicknesses, measure, goal, snap }.find(part, Watch(&watch));
         let found = found.map_err(|error| over(error, goal))?;
         if let Some(exposure) = exposure {
+            // The search may choose a thickness that the material cannot cure or the table does not
+            // list.
             found.thicknesses().try_for_each(|thickness| exposure.check(thickness))?;
         }
         Ok(found)
@@ -193,6 +198,7 @@ impl HeightSettings {
         let overhead = self.overhead();
         Ok(move |thickness: Length| {
             let time = exposure.time(thickness);
+            // A thickness without a time is never the cheapest.
             overhead + time.map_or(f64::INFINITY, |time| time.ms() / 1000.0)
         })
     }

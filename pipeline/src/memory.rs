@@ -6,6 +6,7 @@ use std::path::Path;
 /// Returns the bytes that this process may still take, or 4 GiB if that is unknown.
 pub fn available() -> u64 {
     let most = [machine(), container(), within_limits()];
+    // Each limit ends the process by itself, so the least counts.
     most.into_iter().flatten().min().unwrap_or(4 << 30)
 }
 
@@ -17,6 +18,7 @@ pub fn within_limits() -> Option<u64> {
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let left = |(resource, used)| {
             let limit = getrlimit(resource).current?;
+            // Such limits count what the process has already reserved.
             Some(limit.saturating_sub(bytes_of(&status, used)?))
         };
         [(Resource::As, "VmSize:"), (Resource::Data, "VmData:")].into_iter().filter_map(left).min()
@@ -48,13 +50,18 @@ fn container() -> Option<u64> {
 /// Returns the least limit of a group, a line of `/proc/self/cgroup`, and of those around it.
 fn limit_of_group(line: &str, root: &Path) -> Option<u64> {
     let mut fields = line.splitn(3, ':').skip(1);
+    // Version 2 has one hierarchy without a controller's name, version 1 one for each controller
+    // (cgroups(7)).
     let (folder, file) = match fields.next()? {
         "" => (root.to_owned(), "memory.max"),
         "memory" => (root.join("memory"), "memory.limit_in_bytes"),
         _ => return None,
     };
     let group = folder.join(fields.next()?.trim_start_matches('/'));
+    // A limit holds for all groups within, and inside a container the inner folders may not be
+    // visible.
     let around = group.ancestors().take_while(|group| group.starts_with(&folder));
+    // A group without a limit says `max`, which is no number.
     let limit = |group: &Path| fs::read_to_string(group.join(file)).ok()?.trim().parse().ok();
     around.filter_map(limit).min()
 }

@@ -55,6 +55,8 @@ impl Names {
 
     /// Puts files' names in the place of stored ones.
     pub fn named(&self, stack: StackInfo) -> StackInfo {
+        // Names stand in records of all stages, also of stages that this crate does not know: as
+        // JSON, all are reached.
         let mut value = serde_json::to_value(stack).expect("a stack's metadata is JSON");
         self.rename(&mut value);
         serde_json::from_value(value).expect("only texts changed")

@@ -29,8 +29,10 @@ impl PartFile {
         let split = text.to_str().and_then(|text| text.rsplit_once('@'));
         let named = |name: &str| is_stream(Path::new(name)) || Path::new(name).exists();
         match split {
+            // Names of files may have an `@` themselves: a file of the whole name is meant.
             Some((name, placement)) if !Path::new(&text).exists() => match placement.parse() {
                 Ok(placement) => Ok(Self { path: name.into(), placement: Some(placement) }),
+                // The file is there, so the rest was meant as a placement.
                 Err(why) if named(name) => Err(why),
                 Err(_) => Ok(Self { path: text.into(), placement: None }),
             },

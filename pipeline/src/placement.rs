@@ -121,6 +121,7 @@ pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
         FiniteNumbers(factors) if factors.contains(&0.0) => {
             Err(format!("`{text}` would leave nothing of the part"))
         }
+        // A negative factor would mirror the part, which is more often a slip than a wish.
         FiniteNumbers(factors) if factors.iter().any(|&f| f < 0.0) => {
             Err(format!("`{text}` is below zero: mirror the part with --mirror"))
         }
@@ -135,6 +136,7 @@ pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
 pub fn parse_translation(text: &str) -> Result<FiniteNumbers<3>, String> {
     let wrong =
         || format!("`{text}` is not a translation: write X,Y,Z in millimetres, as -5,0,12.7");
+    // Lengths of other options have units, so people add one here, too.
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }
 

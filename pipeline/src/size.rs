@@ -31,11 +31,13 @@ impl PartSize {
         let [x, y, z] = self.mm;
         let size = || format!("the part is {} x {} x {} mm", short(x), short(y), short(z));
         let pixels = |mm: f64| Length::from_mm(mm).pixels(dpi);
+        // Adaptive heights choose the number of layers: nothing to doubt before.
         let layers = thickness.map_or(FEW, |thickness| (1000.0 * z / thickness.um()).round());
         let advice = self.advice();
         if x.max(y).max(z) > LARGE_MM {
             Some(format!("{}, larger than any machine builds: {advice}", size()))
         } else if x.max(y).max(z) < SMALL_MM && self.likely_unit().is_some() {
+            // If no unit makes the size usual, the unit is not at fault.
             Some(format!("{}, smaller than any casting: {advice}", size()))
         } else if pixels(x.min(y)) < FEW {
             let [columns, rows] = [x, y].map(|mm| short(pixels(mm)));

@@ -131,6 +131,8 @@ impl SliceSettings {
         watcher: &dyn Watcher,
     ) -> Result<(Slices, PageWords), Error> {
         let mut settings = self.clone();
+        // Records name files without folders, and the kernel that made the images: bytes must not
+        // depend on where files lie.
         settings.exposure.name(exposure.as_ref());
         settings.solid.name();
         settings.solid.step.reader.kernel = settings.solid.step.reader.kernel.of_images();
@@ -147,6 +149,7 @@ impl SliceSettings {
             doubts.into_iter().for_each(|doubt| watcher.remark(Remark::note(doubt)));
         }
         let slices = Slices::new(model, &options)?;
+        // Before the first layer: systems may end a process that takes too much without a word.
         check_memory(&slices)?;
         Ok((slices, PageWords { record, stored_name: None, exposure }))
     }
@@ -243,6 +246,7 @@ impl SliceStage {
     /// Returns an error if settings contradict each other, or the part cannot be sliced.
     pub fn open(&self, name: Option<&str>, watcher: &dyn Watcher) -> Result<Slicing<'_>, Error> {
         let Self { parts, settings, .. } = self;
+        // Before any file is opened: STEP parts can take minutes.
         if settings.gray == GrayRule::PrintThrough && self.fallback.is_some() {
             let why = "--print-through looks at all layers above one, and --fallback mends single \
                        ones: leave out one of them";
@@ -262,12 +266,14 @@ impl SliceStage {
             return Err(Error::settings("--fallback needs a STEP part"));
         }
         let files = match name {
+            // Stored results name a part by its content, and a part of a night has no placement.
             Some(name) => vec![PartFile { path: name.into(), placement: None }],
             None => parts.iter().map(PartFile::named).collect(),
         };
         let (slices, mut pages) = settings
             .slices(part.clone(), files, self.layers.clone(), self.memory, exposure, watcher)
             .map_err(|error| at_part(error, &settings.solid.files(parts).0))?;
+        // Only now, as the part's box is known once it is opened and placed.
         if let Some(machine) = &machine {
             check_part(machine, &slices)
                 .map_err(|limit| Error::from(limit).at(name_of_all(parts)))?;
@@ -407,6 +413,7 @@ impl Slicing<'_> {
         let detail =
             |polished| Remark { importance: Importance::Detail, text: polish_text(polished) };
         let overlap: fn(String) -> Remark = match self.stage.settings.solid.bodies {
+            // Overlaps that unite are as designed; overlaps that cancel leave voids.
             Bodies::Xor => Remark::warning,
             _ => Remark::note,
         };
@@ -458,6 +465,7 @@ pub(crate) fn stem(file: &Path) -> String {
 /// Checks that a part fits within a machine's area and height.
 fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
     let [low, high] = slices.box_mm();
+    // Differences of coordinates are off by rounding: a part as large as the area must fit.
     let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
     machine.check_footprint(Size { width: side(0), height: side(1) }, "the part")?;
     let thicknesses = slices.layer_heights();

@@ -121,6 +121,7 @@ pub enum SliceFrame {
 impl From<GrayFlags> for GrayRule {
     fn from(flags: GrayFlags) -> Self {
         match flags {
+            // Print-through is a kind of gray, so its flag decides, whatever `gray` says.
             GrayFlags { print_through: true, .. } => Self::PrintThrough,
             GrayFlags { gray: true, .. } => Self::ByDepth,
             GrayFlags { .. } => Self::None,
@@ -175,6 +176,7 @@ impl SliceSettings {
     fn grid(&self) -> GridRule {
         match self.frame {
             SliceFrame::At { origin: FiniteNumbers(origin_mm), size } => {
+                // A size of whole pixels may come out a hair above: that must not add a pixel.
                 let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
                 GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }
@@ -235,6 +237,7 @@ impl SliceSettings {
         }
         match &self.thickness {
             Thickness::Adaptive { heights, .. } => {
+                // The search chooses between both limits, so the machine must build both.
                 machine.check_thickness(heights.min(), "the thinnest layer")?;
                 machine.check_thickness(heights.max(), "the thickest layer")
             }
@@ -325,6 +328,8 @@ impl SlicingRecord {
     pub fn of(stack: &StackInfo) -> Option<Self> {
         let value = stack.other.get(Self::KEY)?;
         let record: Self = serde_json::from_value(value.clone()).ok()?;
+        // serde ignores keys that it does not know, and a setting that is ignored would slice
+        // another part.
         (serde_json::to_value(&record).ok().as_ref() == Some(value)).then_some(record)
     }
 

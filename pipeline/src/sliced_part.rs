@@ -63,6 +63,7 @@ impl SlicedPart {
         slicing: &SliceSettings,
         watcher: &dyn Watcher,
     ) -> Result<Option<Self>, Error> {
+        // Only the first bytes show whether a file is a stack, and a pipe cannot be read twice.
         let is_part =
             !is_stream(path) && matches!(Pages::open(path), Err(StackError::NotTiff { .. }));
         if !is_part {

@@ -70,6 +70,7 @@ impl SolidSettings {
             parts.iter().map(|part| (part.clone(), join)).collect::<Vec<_>>()
         };
         let all = [
+            // The order gives files their numbers, by which errors and overlaps name them.
             of(parts, Join::Unite),
             of(&self.subtract, Join::Subtract),
             of(&self.intersect, Join::Intersect),
@@ -144,10 +145,12 @@ impl SolidSettings {
             true => Part::from_stream("stdin", io::stdin().lock(), &options)?,
             false => Part::open(path, &options)?,
         };
+        // After opening: only the content shows whether a file states its unit.
         if self.units != Units::default() && model.states_unit() {
             let why = "a STEP or 3MF file states its own unit: leave out --units";
             return Err(Error::settings(why));
         }
+        // Crossings move onto the surfaces, but where faces meet, facets decide.
         if model.prepared().next().is_some() && tolerance.um() > reading.dpi.pitch().um() {
             reading.watcher.remark(Remark::note(format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \

@@ -56,6 +56,7 @@ pub enum Kernel {
 impl Kernel {
     /// Returns the kernel whose images a stack has. The other one only agrees or refuses.
     pub(crate) fn of_images(self) -> Self {
+        // The second kernel changes no image, so it must change no record either.
         if self == Self::Both { Self::Lamp } else { self }
     }
 
@@ -116,6 +117,7 @@ pub fn notes(prepared: &Prepared) -> Vec<String> {
     if prepared.heal_mm > 0.0 {
         notes.push(format!("edges within {} of each other were joined", length(prepared.heal_mm)));
     }
+    // Rejected tries have the tolerance that was asked for. Only an open body gets coarser facets.
     let wanted_mm = prepared.tries.first().map_or(prepared.chord_mm, |first| first.chord_mm);
     if prepared.chord_mm > wanted_mm {
         notes.push(format!(
@@ -146,6 +148,7 @@ fn findings(findings: &[BrepFinding]) -> Vec<String> {
     let line = |(worst, count): (&BrepFinding, usize)| {
         let more = match count {
             1 => String::new(),
+            // Faults without a distance have no worst one.
             count if worst.fault.off_mm() == 0.0 => format!(", as are {} others", count - 1),
             2 => ", the worse of two such faces".to_owned(),
             count => format!(", the worst of {count} such faces"),

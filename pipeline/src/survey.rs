@@ -103,6 +103,7 @@ impl Survey {
         let (mut ranges, mut start, mut cost) = (Vec::new(), 0, 0.0);
         for (end, block_s) in (1..).zip(&self.block_s) {
             let wanted = all * (ranges.len() + 1) as f64 / count as f64;
+            // The last range takes all that is left, whatever the sums rounded to.
             let last = end as usize == self.block_s.len();
             // Half of the next block would be too much.
             let next = self.block_s.get(end as usize).map_or(0.0, |next| next / 2.0);
@@ -122,6 +123,7 @@ impl Survey {
 
     /// Returns the bytes of the packed result of a range.
     pub fn bytes(&self, range: &Range<u32>) -> u64 {
+        // A part without layers takes no seconds: its share must be a number, too.
         let share = self.seconds(range) / self.seconds(&(0..self.layers)).max(f64::MIN_POSITIVE);
         (self.bytes as f64 * share) as u64
     }

@@ -82,8 +82,11 @@ impl WallReport {
         let pitch_um = done.layer.dpi.map_or(0.0, |dpi| dpi.pitch().um());
         for wall in done.walls {
             self.walls += 1;
+            // The library clamps `asked` to zero where the wall would vanish, so the comparison is
+            // exact.
             self.kept += usize::from(wall.asked == 0.0);
             let um = wall.width * pitch_um;
+            // Of equally narrow walls, the lowest is named: layers come from below.
             if self.narrowest.as_ref().is_none_or(|(narrowest, _)| um < *narrowest) {
                 self.narrowest = Some((um, whereabouts(done.layer, &wall.columns, &wall.rows)));
             }

@@ -79,6 +79,7 @@ struct KeptOfStage<'a> {
 
 impl Watcher for KeptOfStage<'_> {
     fn remark(&self, Remark { importance, text }: Remark) {
+        // Kept lines become findings of a night, where nobody asked for details.
         if importance > Importance::Detail {
             self.kept.keep(format!("{}: {text}", self.stage));
         }

@@ -15,6 +15,7 @@ use serde_json::Value;
 /// the order of the fields.
 pub fn words_of(settings: &impl Serialize) -> String {
     let word = |(key, value): (&String, &Value)| match value {
+        // A flag is its name alone, and a false one has no word.
         Value::Bool(true) => format!(" --{key}"),
         Value::String(value) => option(key, value),
         Value::Number(value) => option(key, &value.to_string()),
@@ -34,6 +35,7 @@ pub fn differing<T: Serialize>(a: &T, b: &T) -> Option<String> {
     let [a, b] = [a, b].map(|it| serde_json::to_value(it).expect("settings are texts and flags"));
     let (a, b) = (a.as_object()?, b.as_object()?);
     let differs = |key: &&String| a.get(*key) != b.get(*key);
+    // Keys with default values may be left out of one of them.
     a.keys().chain(b.keys()).find(differs).cloned()
 }
 
