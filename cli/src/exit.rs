@@ -78,6 +78,7 @@ impl Exit {
     pub(crate) fn io_kind(&self) -> Option<io::ErrorKind> {
         let (Self::Failed(error) | Self::Output(error)) = self else { return None };
         let kind = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
+            // It is transparent, so that its error is no cause of its own.
             Some(StackError::Io(error)) => Some(error.kind()),
             _ => cause.downcast_ref().map(io::Error::kind),
         };
@@ -97,6 +98,7 @@ impl Exit {
     /// failure of this one.
     pub(crate) fn is_reader_gone(&self) -> bool {
         let Self::Output(error) = self else { return false };
+        // Writers wrap the error in their own.
         causes(error).any(|cause| {
             let io = match cause.downcast_ref::<StackError>() {
                 Some(StackError::Io(io)) => Some(io),
@@ -198,6 +200,7 @@ failures!(
 impl From<StackError> for Exit {
     fn from(error: StackError) -> Self {
         match error {
+            // A stack without layers is bad input, though only the writer notices.
             StackError::NoLayers | StackError::InFile { .. } => Self::Failed(error.into()),
             error => Self::Output(error.into()),
         }
@@ -231,6 +234,7 @@ impl From<lamp_pipeline::Error> for Exit {
     fn from(error: lamp_pipeline::Error) -> Self {
         let kind = error.kind();
         let (cause, places) = error.into_parts();
+        // Places come from the cause outwards, as contexts wrap.
         let error = places.into_iter().fold(boxed(cause), anyhow::Error::context);
         match kind {
             ErrorKind::Settings => Self::Usage(error),

@@ -24,11 +24,13 @@ impl KeptStack {
 
     /// Opens the pages; standard input is kept if it will be read `again`.
     pub(crate) fn pages(&mut self, again: bool) -> Result<Pages, Exit> {
+        // Standard input that is read once needs no copy.
         if !is_stream(&self.path) || (!again && self.spooled.is_none()) {
             return open_pages(&self.path);
         }
         let reopened = |file: &File| -> Result<Pages, StackError> {
             let mut file = file.try_clone()?;
+            // Clones share one position in the file.
             file.rewind()?;
             Pages::from_file(file)
         };

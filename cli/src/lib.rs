@@ -56,6 +56,7 @@ slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and 
 
 /// Runs `lamp` with the process's arguments.
 pub fn run_lamp() -> ExitCode {
+    // Before the words are parsed, which need a command.
     if terminal::licences::are_asked_for() {
         return finish("lamp", print_licences());
     }
@@ -117,6 +118,7 @@ fn programs() -> Vec<clap::Command> {
 }
 
 fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit> {
+    // First, so that an end by lack of memory has the command's name.
     note_command(name);
     print_notes_of(name, common.quiet);
     keep_freed_memory();
@@ -127,6 +129,7 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
     }
     common.apply()?;
     command.run(common)?;
+    // A full disk may show only here: the status must not say success before.
     settle_output()?;
     Ok(ExitCode::SUCCESS)
 }
@@ -135,6 +138,8 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
 /// memory back to the system from 128 KiB on, and asks for it again, unless it
 /// has seen a larger block come and go: a fifth of a stage's time.
 fn keep_freed_memory() {
+    // Freeing a mapped block raises the threshold to its size, up to 32 MiB (M_MMAP_THRESHOLD in
+    // mallopt(3)).
     drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
 
@@ -149,6 +154,7 @@ fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
             give_up(&error);
             ExitCode::from(error.status())
         }
+        // The reader has all that it wanted, as `head` does.
         Err(_) => ExitCode::SUCCESS,
         Ok(status) => status,
     }

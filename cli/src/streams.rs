@@ -68,6 +68,7 @@ pub(crate) fn learning_part<'a>(
 
 /// Prints the result of a command to standard output.
 pub(crate) fn print(text: &str) -> Result<(), Exit> {
+    // Not `print!`, which panics when the reader is gone.
     let written = io::stdout().lock().write_all(text.as_bytes());
     written.map_err(|error| Exit::output(error, "standard output"))
 }
@@ -87,12 +88,14 @@ pub(crate) fn open_indexed(path: &Path) -> Result<IndexedStack, Exit> {
         false => IndexedStack::open(path),
     };
     let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
+    // An index has read all pages already: a listener would come too late.
     stack.notes().iter().for_each(|note| print_note(path, note));
     Ok(stack)
 }
 
 /// Keeps standard input in a temporary file without a name, to be read twice.
 pub(crate) fn spool_stdin() -> Result<File, Exit> {
+    // Nobody types a stack: without a pipe, reading would wait forever.
     refuse_terminal()?;
     widen_pipe(&io::stdin());
     let spool = || -> io::Result<File> {
@@ -121,6 +124,7 @@ pub(crate) fn give_up(error: &Exit) {
 
 /// Returns the progress of a command that writes to `output`.
 pub(crate) fn progress(command: &'static str, common: &Common, output: &Output) -> Progress {
+    // Behind a terminal there is no next stage.
     IS_AWAITED.store(is_stream(&output.output) && !io::stdout().is_terminal(), Ordering::Relaxed);
     let last = !is_stream(&output.output) || io::stdout().is_terminal() || stdout_file().is_some();
     Progress::new(command, common, last)
@@ -249,6 +253,7 @@ pub(crate) fn in_range<P>(
             let page = match page {
                 Ok(page) => page,
                 Err(error) => {
+                    // An error of reading is reported alone, without an empty range behind it.
                     found = true;
                     return Some(Err(failed_at(input_name(&path), error)));
                 }
@@ -258,12 +263,15 @@ pub(crate) fn in_range<P>(
             let Some(layers) = &layers else { return Some(Ok((page, of_page))) };
             let index = info(&page).index;
             ends = Some((ends.map_or(index, |(first, _)| first), index));
+            // The stack's first page may lie before the range: its record waits for the first
+            // wanted page.
             stack = of_page.map(|of_page| of_page.of_range(index, layers)).or(stack.take());
             if layers.contains(&index) {
                 found = true;
                 return Some(Ok((page, stack.take())));
             }
         }
+        // Once: an iterator that is asked again after its end must not fail again.
         let none_found = layers.is_some() && !std::mem::replace(&mut found, true);
         none_found.then(|| {
             let name = input_name(&path);
@@ -379,12 +387,14 @@ fn destination(output: &Output) -> Result<Destination, Exit> {
             ));
         }
         widen_pipe(&io::stdout());
+        // From here on, the writer itself ends a stream that fails.
         IS_AWAITED.store(false, Ordering::Relaxed);
         return Ok(Destination::Stream(Box::new(io::stdout().lock())));
     }
     if is_folder(path) {
         return Ok(Destination::Folder(new_folder(path, output.force)?));
     }
+    // After folders, whose names may end in anything.
     check_stack_name(path)?;
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
@@ -409,6 +419,7 @@ pub(crate) fn new_folder(path: &Path, force: bool) -> Result<FolderBeside, Exit>
     if path.file_name().is_none() || is_stream(path) {
         return Err(Exit::usage(format!("{}: name the folder to write to", name())));
     }
+    // A name that ends in / is meant as it is; another may be a slip.
     if !is_folder(path) {
         check_ending(path, &FOLDER)?;
     }
@@ -425,6 +436,7 @@ pub(crate) fn check_beside<'a>(
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<(), Exit> {
     let folder = match beside.parent() {
+        // A bare name has the empty parent, which is no folder.
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
@@ -432,6 +444,7 @@ pub(crate) fn check_beside<'a>(
         let (beside, folder) = (beside.display(), folder.display());
         return Err(Exit::Failed(anyhow!("{beside}: there is no folder {folder}")));
     }
+    // A shell may have sent standard output to the same file.
     if is_same(beside, stack) || (is_stream(stack) && is_stdout(beside)) {
         return Err(Exit::usage(format!("{}: the stack is written there", beside.display())));
     }
@@ -451,6 +464,7 @@ pub(crate) fn check_not_input<'a>(
 }
 
 fn is_same(path: &Path, other: &Path) -> bool {
+    // `-` names no file of the folder.
     !is_stream(path) && !is_stream(other) && place_of(other) == place_of(path)
 }
 
@@ -459,6 +473,7 @@ fn place_of(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| *folder != Path::new(""));
     let absent =
         || Some(fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?.join(path.file_name()?));
+    // A file that is still to be written has no canonical path, but its folder has.
     fs::canonicalize(path).ok().or_else(absent)
 }
 
@@ -492,6 +507,7 @@ fn widen_pipe<T>(_: &T) {}
 /// Opens `path` if it is a pipe or a device, which is written to and not replaced.
 fn open_device(path: &Path) -> Result<Option<File>, Exit> {
     match fs::metadata(path) {
+        // A file renamed over /dev/null or a named pipe would replace it.
         Ok(metadata) if !metadata.is_file() => {
             let device = OpenOptions::new().write(true).open(path);
             Ok(Some(device.with_context(|| path.display().to_string())?))
@@ -517,6 +533,7 @@ pub(crate) fn write_file(
     let path = &behind_links(path);
     let whole = || -> io::Result<()> {
         let file = FileBeside::new(path)?;
+        // Reports are written in small pieces: 256 KiB make few system calls of them.
         let mut out = BufWriter::with_capacity(1 << 18, file.file());
         write(&mut out)?;
         out.flush()?;
@@ -532,6 +549,7 @@ pub(crate) fn settle_output() -> Result<(), Exit> {
         io::stdout().flush()?;
         let Some(file) = stdout_file() else { return Ok(()) };
         sync(&file)?;
+        // Some network file systems report a full disk only when a file is closed.
         close(file)
     };
     settle().map_err(|error| Exit::output(error, "standard output"))

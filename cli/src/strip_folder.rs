@@ -54,6 +54,7 @@ pub(crate) fn write_stack_or_strips(
     if !is_strips(&input.stack) {
         return write_layers(layers, output, progress);
     }
+    // Strips are cut from images, so no layer passes undecoded.
     let layers = map_in_order(layers, |layer: PassingLayer| Ok::<_, Exit>(layer.decode()?));
     let cut_as = StripForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;
     let StripForm { mirrors, overlap, seam } = form(cut_as);

@@ -48,15 +48,18 @@ const MAX_TICKS: usize = 30;
 /// powers of ten; empty for an empty range.
 fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
     let length = range.end - range.start;
+    // Infinite ranges and NaN have no ticks either.
     if !(length.is_normal() && length > 0.0) {
         return Vec::new();
     }
     if logarithmic {
         let ticks = logarithmic_ticks(range);
+        // Less than a decade has too few powers of ten and their multiples.
         if ticks.len() > 2 {
             return ticks;
         }
     }
+    // Eight steps at most, and three at least: round steps are at most 2.5 times the one before.
     let rough = length / 8.0;
     let power = 10.0_f64.powi(rough.log10().floor() as i32);
     let step = [1.0, 2.0, 5.0, 10.0].map(|step| step * power).into_iter().find(|&s| s >= rough);
@@ -69,6 +72,7 @@ fn ticks(range: &Range<f64>, logarithmic: bool) -> Vec<f64> {
 }
 
 fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
+    // Powers of ten of 64 bits go from -324 to 308; a zero's logarithm is infinite.
     let [first, last] = [range.start.log10().floor(), range.end.log10().ceil()]
         .map(|power| power.clamp(-330.0, 330.0) as i32);
     let decades = (last - first).unsigned_abs() as usize;

@@ -21,9 +21,11 @@ pub fn caption(text: &str, background: u8) -> Result<Vec<Vec<u8>>, PlotError> {
     let mut pixels = vec![background; 3 * (width * CAPTION_HEIGHT) as usize];
     let area = BitMapBackend::with_buffer(&mut pixels, (width, CAPTION_HEIGHT)).into_drawing_area();
     let down = CAPTION_HEIGHT.saturating_sub(height) / 2;
+    // Letters may begin left of their origin, or above the line.
     area.draw_text(text, &style, (-left, down as i32 - top))
         .map_err(|error| PlotError::Drawing(error.to_string()))?;
     drop(area);
+    // White on gray: red, green and blue are equal.
     let levels: Vec<u8> = pixels.chunks(3).map(|pixel| pixel[0]).collect();
     Ok(levels.chunks(width as usize).map(<[u8]>::to_vec).collect())
 }

@@ -65,6 +65,7 @@ impl DoseMap {
         let (left, top) = self.corner(case);
         area.draw(&Text::new(*name, (left, top - 34), text(area, 24.0)))?;
         let cell = self.cell();
+        // Small doses need a decimal to differ, and large ones have no room for it in a cell.
         let decimals = if self.critical_mj < 20.0 { 1 } else { 0 };
         for (place, (&dose, &wanted)) in doses.iter().zip(&self.wanted).enumerate() {
             let x = left + (place % self.width) as i32 * cell;
@@ -101,6 +102,7 @@ impl DoseMap {
         };
         let at = |x: i32, y: i32| (left + x * cell, top + y * cell);
         let ink = BLACK.stroke_width(2);
+        // One step beyond, for edges along the right and the lower side.
         for (x, y) in (0..=height).flat_map(|y| (0..=width).map(move |x| (x, y))) {
             if wanted(x, y) != wanted(x - 1, y) {
                 area.draw(&PathElement::new([at(x, y), at(x, y + 1)], ink))?;

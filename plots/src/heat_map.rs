@@ -44,6 +44,7 @@ const BAR_LABELS: u32 = 62;
 /// The bytes of a map as a PNG.
 pub fn heat_map(map: &HeatMap) -> Result<Vec<u8>, PlotError> {
     let map = map.coarsened();
+    // The name only chooses the format: as SVG, each square would be an element.
     picture_of(&map, map.size(), "map.png".as_ref())
 }
 
@@ -61,6 +62,7 @@ impl HeatMap {
             let (column, row) = (place % columns * many, place / columns * many);
             let squares = (row..row + many)
                 .flat_map(|row| &self.values[row * self.columns..][column..column + many]);
+            // A mean would hide single columns that are wrong.
             squares.copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
         };
         Self {
@@ -91,6 +93,7 @@ impl HeatMap {
     }
 
     fn scale(&self) -> ColorScale {
+        // A map of zeros needs a scale of some length.
         let most = self.values.iter().map(|value| value.abs()).fold(0.0, f64::max).max(1e-9);
         match self.colors {
             Colors::AboutZero => ColorScale { least: -most, most, stops: &DIVERGING },
@@ -117,6 +120,7 @@ impl HeatMap {
             .axis_style(GRAY_INK.stroke_width(SCALE))
             .draw()?;
         let [width, height] = self.map_size();
+        // In pixels of the picture, so that no square is blurred between two of them.
         let painted = BitMapElement::with_owned_buffer((0, 0), (width, height), self.painted());
         let painted = painted.expect("a map has as many pixels as its size says");
         chart.plotting_area().strip_coord_spec().draw(&painted)
@@ -174,6 +178,7 @@ impl ColorScale {
     fn color(&self, value: f64) -> RGBColor {
         let share = ((value - self.least) / (self.most - self.least)).clamp(0.0, 1.0);
         let at = share * (self.stops.len() - 1) as f64;
+        // The greatest number is the end of the last stretch, not the start of another.
         let below = (at as usize).min(self.stops.len() - 2);
         let along = at - below as f64;
         let [from, to] = [self.stops[below], self.stops[below + 1]];

@@ -37,6 +37,7 @@ impl<'a> LayoutPicture<'a> {
         let PixelSize { width, height } = layout.pixels();
         let scale = f64::from(SIDE) / f64::from(width.max(height).max(1));
         let mut outlines = layout.silhouettes();
+        // A part without an outline fills its box, which needs no mask.
         outlines.retain(|&(part, _), _| layout.parts()[part].outline().is_some());
         Self { layout, scale, outlines }
     }
@@ -176,6 +177,7 @@ impl OutlinePolygons {
         let go_on = both.all(|(strip, &(from, to))| {
             strip.last().is_some_and(|&(_, [left, right])| left <= to && from <= right)
         });
+        // Where runs part or meet, all polygons end: that is rare, and keeps each a simple one.
         if runs.len() != self.open.len() || !go_on {
             self.close();
             self.open.resize(runs.len(), Vec::new());

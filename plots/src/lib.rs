@@ -125,6 +125,7 @@ pub fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
         (numbers().fold(f64::MAX, f64::min), numbers().fold(f64::MIN, f64::max))
     };
     let ((first, last), (least, most)) = (ends(|at| at.0), ends(|at| at.1));
+    // Without points the ends are the wrong way round, and one point has no length.
     let (first, last) = if first < last { (first, last) } else { (0.0, 1.0) };
     let (least, most) = (least.min(0.0), most.max(1e-9));
     // Room for the legend.
@@ -217,6 +218,7 @@ fn svg(plots: &[Plot], size: (u32, u32)) -> String {
         .expect("a text takes all");
     let [drawn, shown] =
         [pixels, size].map(|(width, height)| format!(r#"width="{width}" height="{height}""#));
+    // Only the root's size: its viewBox keeps the units of the drawing, and viewers scale.
     text.replacen(&drawn, &shown, 1)
 }
 
@@ -282,6 +284,7 @@ impl Plot {
             .bold_line_style(GRID.stroke_width(SCALE))
             .light_line_style(TRANSPARENT)
             .draw()?;
+        // Bands first, so that none covers a curve.
         for (series, ink) in self.series.iter().zip(inks()).filter(|(s, _)| !s.band.is_empty()) {
             let up = series.band.iter().map(|&[x, _, high]| (x, high));
             let down = series.band.iter().rev().map(|&[x, low, _]| (x, low));

@@ -151,6 +151,7 @@ impl Drawing for SpherePicture<'_> {
             self.draw_half(area, half)?;
         }
         let up = self.poses[self.best].pose.up();
+        // Last, so that no dot covers it.
         area.draw(&Circle::new(Half::of(up).at(up), self.dot() + 6, BEST.stroke_width(4)))?;
         self.draw_legend(area)?;
         area.present()

@@ -60,6 +60,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     let options = step.reader.for_opening(step.tolerance(args.dpi))?;
     let bytes = bytes_of(&args.part).map_err(failed)?;
     let prepared = read_step(bytes.clone(), &options).map_err(failed)?;
+    // OpenCASCADE reads the file anew, which may take as long as the first reading.
     let second = match args.both || step.reader.kernel == Kernel::Both {
         true => Some(second_opinion::asked(&prepared, bytes, &options)),
         false => None,
@@ -69,6 +70,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
         true => print_answer("lamp-brep-1", &answer(&name, &prepared, second.as_ref()))?,
         false => print(&text(&name, &prepared, second.as_ref()))?,
     }
+    // After the answer is printed: a difference is a finding, and no failure to read.
     if second.is_some_and(|second| !second.differences().is_empty()) {
         let why = format!("{name}: LAMP and OpenCASCADE read it differently");
         return Err(Exit::Findings(why));
@@ -180,6 +182,7 @@ fn kinds<'a>(body: &Body, prepared: &'a Prepared) -> Vec<(&'a str, usize)> {
             None => kinds.push((kind, 1)),
         }
     }
+    // Equal counts go by name, so that the order does not depend on the file.
     kinds.sort_by_key(|&(kind, count)| (std::cmp::Reverse(count), kind));
     kinds
 }

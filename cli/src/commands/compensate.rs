@@ -55,6 +55,7 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("compensate", common, output);
     let layers = compensating.layers(read_layers(input, &progress)?, 0..u32::MAX);
     let name = input_name(&input.stack);
+    // Other errors have their place already: a page, or the output.
     let is_of_stage = |error: &Exit| {
         error.cause::<CompensateError>().is_some() || error.cause::<NoDose>().is_some()
     };

@@ -48,6 +48,7 @@ pub(crate) fn run(args: &ComposeArgs, common: &Common) -> Result<(), Exit> {
     let failed = |error: RecipeError| Exit::from(error).at(name.clone());
     let mut composer = Composer::open(&args.recipe).map_err(failed)?;
     let layers = args.layers.clone().unwrap_or(0..u32::MAX);
+    // The bar needs the number of layers that are made, not of the build.
     let indices = composer.indices().iter().filter(|index| layers.contains(index));
     progress.expect(indices.count() as u64);
     let composed = composer.range(layers).map_err(failed)?;

@@ -77,6 +77,7 @@ pub(crate) struct ConvertArgs {
 }
 
 pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
+    // Before stacks: a name that ends in .stl or .step means a part, whatever the input is.
     match args.part() {
         Some(part) if is_stl_name(part) => return args.write_stl(part, common),
         Some(part) => return args.write_step(part, common),
@@ -134,6 +135,7 @@ enum OutputKind {
 impl ConvertArgs {
     /// The part to write, if one is named.
     fn part(&self) -> Option<&Path> {
+        // `-o part.stl` means the same as a second name.
         let output = Some(self.output.output.as_path());
         let output = output.filter(|output| parse_part(&output.to_string_lossy()).is_ok());
         self.part.as_deref().or(output)
@@ -159,6 +161,7 @@ impl ConvertArgs {
             false => Part::open(path, &options),
         };
         let part = part.map_err(|error| Exit::from(error).at(name.clone()))?;
+        // Its surfaces would become flat facets.
         if part.prepared().next().is_some() {
             return Err(Exit::usage(format!("{name} is a STEP part already")));
         }

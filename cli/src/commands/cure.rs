@@ -128,6 +128,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let (mut section, mut stack) = (None, None);
     for layer in read_layers(&args.input, &progress)? {
         let layer = layer?;
+        // The first layer has the resolution and the origin that the cut's place needs.
         if section.is_none() {
             if layer.info.has_record::<DitherRecord>() {
                 progress
@@ -156,6 +157,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     };
     let shown = ShownSection::new(&section, outline, args.along.as_ref());
     let panels = SectionPicture(shown.map_err(no_section)?);
+    // Before the file is begun: a picture at a wrong scale could fill the disk.
     panels.check_size(args.scale).map_err(failed)?;
     write_file(&args.output, |out| panels.write_png(args.scale, out))?;
     print(&panels.text(&material.name))
@@ -185,5 +187,6 @@ fn parse_along(text: &str) -> Result<Range<f64>, String> {
     let (from, to) = text.split_once("..").ok_or_else(wrong)?;
     let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
     let range = mm(from)?..mm(to)?;
+    // An end that is NaN makes an empty range, too.
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }

@@ -73,6 +73,7 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
     let range = (!args.whole_build).then(|| middle - AROUND..middle + AROUND);
     let made = build_in_mesh(&stl, &meshed, range.clone(), &progress)?;
     let mesh_seconds = started.elapsed().as_secs_f64();
+    // The part stands on layers of build mesh alone.
     let shown = middle + MeshOptions::default().base_layers;
     draw_in_mesh(&meshed, &in_mesh, shown)?;
     if common.quiet {
@@ -153,6 +154,7 @@ fn build_in_mesh(
     let (machine, word) = document_and_word::<Machine>(Path::new("alpha"))?;
     let area = machine.area.value;
     let mut layers = part_layers(stl, range, progress)?;
+    // The first layer has the size that the layout needs.
     let first = layers.next().ok_or(StackError::NoLayers)??;
     let parts = vec![PartStack::of_image("the mould", &first)?];
     let mesh = MeshOptions::default();
@@ -192,6 +194,7 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
         write_picture(&sheet.with_file_name(name), picture)?;
     }
     let content = shown.iter().filter_map(|layer| Region::of_content(&layer.image));
+    // One region for all, so that the pictures show the same place at the same scale.
     let content = content.reduce(Region::joined).context("the pictured layers are black")?;
     let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE));
     write_picture(sheet, Picture::side_by_side(parts.collect()))?;

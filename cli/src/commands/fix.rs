@@ -89,6 +89,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     };
     let fixed = unless_found(fixed, finding);
     let written = write_stack_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
+    // After a finding, the report and the pictures still show it.
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
@@ -103,6 +104,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     if let Some(line) = findings.text_of_corrected() {
         progress.say(&line);
     }
+    // With --strict, the error says it.
     if let Some(line) = findings.text_of_left().filter(|_| !args.strict) {
         progress.warn(&line);
     }

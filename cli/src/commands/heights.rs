@@ -110,6 +110,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let all: Vec<_> =
         std::iter::once((bound(&found), found.heights.clone())).chain(uniform).collect();
     if let Some(path) = &args.plot {
+        // More than two choices would hide each other.
         let bytes = drawn(&plots(&name_of_all(&args.parts), &all[..2]), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
@@ -178,8 +179,10 @@ struct LayerRow {
 
 impl LayerRow {
     fn new(layer: &SweptLayer, exposure: Option<&Exposure>) -> Self {
+        // Uniform layers may be of a thickness that no exposure is known for.
         let time = exposure.and_then(|e| e.time(Length::from_um(layer.thickness_um)).ok());
         Self {
+            // Sums of thicknesses end in digits that are rounding.
             z_um: Length::from_um(layer.bottom_um).to_whole_nm().um(),
             thickness_um: Length::from_um(layer.thickness_um).to_whole_nm().um(),
             volume_mm3: layer.volume_mm3,
@@ -249,6 +252,7 @@ impl Choice {
         let layers = &heights.layers;
         let [lost_mm3, gained_mm3, volume_mm3] = heights.volumes_mm3();
         let measures = layers.iter().map(|layer| found.measure.criterion().measure(layer));
+        // One layer without a time leaves the sum unknown.
         let ms: Option<f64> =
             layers.iter().map(|layer| LayerRow::new(layer, exposure).exposure_ms).sum();
         Self {
@@ -347,6 +351,7 @@ fn plot(
     let places = series.iter().flat_map(|series| &series.curve).map(|place| place.1);
     let highest = places.fold(0.0, f64::max);
     let axis = |label: &str, range| PlotAxis { label: label.to_owned(), range, logarithmic: false };
+    // Room for the legend; an axis of zeros needs a length.
     let y = axis(label, 0.0..if highest > 0.0 { 1.25 * highest } else { 1.0 });
     let layers = &all[0].1.layers;
     let (first, last) = (z_mm(&layers[0])[0], z_mm(&layers[layers.len() - 1])[1]);

@@ -107,6 +107,7 @@ impl Facts {
                 None => facts = Some(Self { totals: StackTotals::of(&header), runs }),
                 Some(facts) => {
                     facts.totals.add(&header);
+                    // Unknown stays unknown: a sum of some layers would look like all.
                     facts.runs = facts.runs.zip(runs).map(|(sum, runs)| sum + runs);
                 }
             }

@@ -53,6 +53,7 @@ pub(super) fn print_strips(folder: &Path, as_json: bool) -> Result<(), Exit> {
     let files = strip_files(folder).map_err(failed)?;
     let strips = files.into_iter().zip(0..).map(|(file, number)| read(folder, file, number));
     let strips = strips.collect::<Result<Vec<_>, _>>()?;
+    // Strips of two runs may lie in one folder, and sums of both would mean nothing.
     if let Some(strip) = strips.iter().find(|strip| made_by(strip) != made_by(&strips[0])) {
         let (file, difference) = (strip.file.name.clone(), StripDifference::Input);
         return Err(failed(StripsError::Unlike { file, difference }));

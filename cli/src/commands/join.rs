@@ -50,6 +50,7 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
     }
     let progress = progress("join", common, &args.output);
     match &args.stacks[..] {
+        // Strips are joined side by side, ranges of layers one above the other.
         [folder] if is_strips(folder) => return join_one(folder, &args.output, &progress),
         stacks => {
             if let Some(folder) = stacks.iter().find(|stack| is_strips(stack)) {

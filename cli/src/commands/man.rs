@@ -38,12 +38,14 @@ pub(crate) fn run(args: &ManArgs) -> Result<(), Exit> {
 /// Writes the page of a command, and of those below it.
 fn write_pages(command: &Command, folder: &Path) -> Result<(), Exit> {
     let examples = command.get_after_long_help().map(ToString::to_string);
+    // The generator would wrap the examples as prose: they follow in a section of their own.
     let plain = command.clone().after_help(Resettable::Reset).after_long_help(Resettable::Reset);
     let man = Man::new(plain);
     write_file(&folder.join(man.get_filename()), |out| {
         man.render(out)?;
         write_examples(&examples.unwrap_or_default(), out)
     })?;
+    // `help` is a command of the parser's own, without options worth a page.
     let below = command.get_subcommands().filter(|command| command.get_name() != "help");
     below.into_iter().try_for_each(|command| write_pages(command, folder))
 }

@@ -80,6 +80,7 @@ fn surface_of(
     let name = input_name(&args.stack);
     let at_stack = |error: SurfaceError| Exit::from(error).at(name.clone());
     let options =
+        // All layers are read, as the mesh is to be kept; the viewer takes samples of them.
         SurfaceOptions { cells: args.cells, layers_a_cell: None, max_triangles: MAX_TRIANGLES };
     let grid = CellGrid::new(stack.headers(), &options).map_err(at_stack)?;
     progress.expect(grid.layers() as u64);

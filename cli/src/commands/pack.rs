@@ -43,6 +43,7 @@ pub(crate) fn run(args: &PackArgs, common: &Common) -> Result<(), Exit> {
     let path = &args.input.stack;
     let pages = open_pages(path)?;
     let mut to = args.output.clone();
+    // lamp convert gives a TIFF of the same format back.
     to.classic |= pages.format() == Format::Classic;
     let layers = layers_of_input(pages, &args.input, &progress);
     write_packed_layers(layers, &to, args.level.unwrap_or_default(), &progress)?;

@@ -126,6 +126,7 @@ fn two_digits(length: Length) -> Length {
 
 fn image(projector: &Projector) -> String {
     let [width, height] =
+        // An image is millimeters wide: 10 um are exact enough for a table.
         projector.image().map(|side| Length::from_um((side.um() / 10.0).round() * 10.0));
     Size { width, height }.to_string()
 }

@@ -90,6 +90,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Exit> {
     if io::stdout().is_terminal() {
         return Err(Exit::usage("an STL is not for terminals: name a file with -o, or pipe it on"));
     }
+    // Facets are written one by one, 50 bytes each.
     let mut out = BufWriter::new(io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
     written.map_err(|error| Exit::output(error, "standard output"))
@@ -107,6 +108,7 @@ impl SampleArgs {
                 return Err(Exit::usage(why));
             }
         };
+        // Exact surfaces have no facets to break.
         if self.ascii || self.defect.is_some() {
             return Err(Exit::usage("--ascii and --defect are for STL: name a .stl file"));
         }

@@ -114,6 +114,7 @@ fn show_one(args: &ShowArgs) -> Result<(), Exit> {
     };
     let region = region_on(args, &image)?;
     let form = args.terminal_form();
+    // A file takes pixels as they are; a terminal has only so many columns.
     let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region));
     let scale = args.scale.unwrap_or_else(fitting);
     check_size(scale.size(&region))?;
@@ -129,6 +130,7 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
     let mut pages = learning_part(open_pages(&args.stack)?, &args.stack);
     let mut next = 0;
     let pages = std::iter::from_fn(|| {
+        // Nothing above the wanted layers is read: the stack may be cut off there.
         if next >= layers.range.end {
             return None;
         }
@@ -144,6 +146,7 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
         let region = region_on(args, &layer.image)?;
         let scale = args.scale.unwrap_or_else(|| PictureScale::fitting(&region, THUMBNAIL_SIDE));
         let [width, height] = scale.size(&region);
+        // Counted before the pictures take their memory, by all threads together.
         if pixels.fetch_add(width * height, Ordering::Relaxed) + width * height > MAX_PIXELS {
             return Err(Exit::usage(format!(
                 "the pictures of the layers would have more than {MAX_PIXELS} pixels: choose fewer layers, as every 40th with --layers 0..1270/40, or a smaller --scale"
@@ -160,6 +163,7 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
         return write(args, |out| write_animation(&thumbnails, args.fps, out));
     }
     let sheet = contact_sheet(thumbnails);
+    // The sheet may be too large though each picture is small.
     check_size([sheet.width, sheet.height].map(u64::from))?;
     write(args, |out| sheet.write_png(out))
 }

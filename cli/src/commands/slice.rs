@@ -59,6 +59,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("slice", common, &args.output);
     let slicing = stage.open(None, &progress)?;
     let doubts = slicing.doubts();
+    // Before any layer is made: a part of a wrong size may take hours.
     if args.strict && !doubts.is_empty() {
         return Err(Exit::Findings(doubts.join("; ")).at(name_of_all(&stage.parts)));
     }
@@ -72,6 +73,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     });
     let bodies = stage.settings.solid.bodies;
     let finding = || {
+        // Where bodies unite, an overlap is harmless; here it becomes a void.
         let overlap = slicing.overlap().filter(|_| bodies == Bodies::Xor);
         let found = overlap.into_iter().chain(slicing.is_blank().then(|| BLANK.to_owned()));
         let found: Vec<String> = found.collect();

@@ -51,6 +51,7 @@ pub(crate) struct SplitArgs {
 pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
     let cuts = match args.every {
         Some(layers) => SplitPoints::Every(layers),
+        // Not even equal ones: between them no layer would be left for a file.
         None if args.at.is_sorted_by(|a, b| a < b) => SplitPoints::At(args.at.clone()),
         None => {
             return Err(Exit::usage(

@@ -50,11 +50,13 @@ pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
     let digests = digests.collect::<Result<Vec<_>, _>>()?;
     let mut verdicts = Vec::new();
     let stacks = stacks_at(&args.stacks)?;
+    // Strips of one build lie beside each other: their folder is checked once.
     let folders: BTreeSet<&Path> = stacks.iter().filter_map(|path| path.parent()).collect();
     let strips = folders.into_iter().filter(|folder| is_strips(folder));
     let of_stacks = stacks.iter().map(|path| Verdict::of(path, &digests));
     for verdict in of_stacks.chain(strips.map(Verdict::of_strips)) {
         if !args.json && (!common.quiet || verdict.result.is_err()) {
+            // Each as soon as it is known: a folder may take hours.
             print(&format!("{}\n", printable(&verdict.line())))?;
         }
         verdicts.push(verdict);

@@ -79,6 +79,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     let slicing = SliceSettings::try_from(&args.slicing)?;
     check_slicing(&slicing, &args.inputs, None)?;
     give_freed_memory_back();
+    // Before stacks are opened, which may take long: a port that is taken shows at once.
     let address = Address::new(args.port).with_context(|| match args.port {
         0 => "a port of the loopback address".to_owned(),
         port => format!("port {port} of the loopback address"),
@@ -158,6 +159,7 @@ fn opened(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<Viewe
         Some(part) => IndexedStack::from_file(sliced(&part, &progress)?).map_err(failed)?,
         None => open_indexed(path)?,
     };
+    // The layers before a damage are worth a look, so it is no error here.
     if let Some(end) = pages.end() {
         progress.warn(&format!("{name}: {end}; the layers before are shown"));
     }
@@ -171,6 +173,7 @@ fn sliced(part: &SlicedPart, progress: &Progress) -> Result<File, Exit> {
     let layers = slices.layers.map(|layer| Ok::<_, Exit>(layer?));
     let layers = layers.inspect(|_| progress.layer_done());
     let place = "a temporary file for the layers";
+    // Without a name, it is gone with the process.
     let file = tempfile::tempfile().context(place)?;
     let to = Destination::Stream(Box::new(file.try_clone().context(place)?));
     write_stack(layers, to, Format::Big)?;

@@ -38,6 +38,7 @@ impl BandPictures {
     /// Draws the bands of a layer. After a failure it draws no more.
     pub(crate) fn add(&mut self, fixed: &Fixed<'_>) {
         for band in fixed.bands {
+            // The stack is still written, so a failure waits for the end.
             if self.failed.is_none() {
                 self.failed = self.draw(fixed, band).err();
             }

@@ -102,6 +102,7 @@ pub(crate) fn check_ending(path: &Path, writes: &Writes) -> Result<(), Exit> {
     let ending = extension(path);
     let format = FORMATS.iter().find(|(endings, _)| endings.contains(&&*ending));
     match format {
+        // An ending that names no format is no slip: `build.v2` is a name.
         Some((_, format)) if !writes.endings.contains(&&*ending) => {
             let (path, sentence) = (path.display(), writes.sentence);
             Err(Exit::usage(format!("{path}: {sentence} (.{ending} names {format})")))

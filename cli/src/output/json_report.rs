@@ -27,6 +27,7 @@ impl JsonReport {
     /// Starts a report with the fields of `head`.
     pub(crate) fn new(head: &impl Serialize) -> Self {
         let mut text = json(head);
+        // Lists follow before the closing brace.
         text.pop();
         Self(text)
     }

@@ -76,6 +76,7 @@ fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeL
     EdgeLine {
         edge,
         fault: match &facets[..] {
+            // A faulty edge has an odd number of facets, so all others have three and more.
             [_] => "open",
             _ => "shared by more than two",
         },

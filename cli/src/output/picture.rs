@@ -25,6 +25,7 @@ impl Region {
         let of_row = |row| {
             let mut runs = image.runs(row);
             let (start, end, _) = runs.next()?;
+            // A single run is the first and the last.
             let end = runs.last().map_or(end, |(_, end, _)| end);
             Some(Self { columns: start..end, rows: row..row + 1 })
         };
@@ -56,6 +57,7 @@ impl FromStr for Region {
             text.split(',').map(|number| number.trim().parse()).collect();
         match numbers.as_deref() {
             Ok(&[x, y, width, height]) if width > 0 && height > 0 => {
+                // `on` cuts off the part beyond the image.
                 Ok(Self { columns: x..x.saturating_add(width), rows: y..y.saturating_add(height) })
             }
             _ => Err(wrong()),

@@ -81,6 +81,7 @@ fn section(files: &PlanFiles<'_>) -> Plot {
             .map(|column| (x_mm(column) - pitch_mm / 2.0, target.height_um(column, row)));
         series.push(curve("target", stairs(steps, pitch_mm)));
     }
+    // An axis needs a length, also where nothing is cured.
     let most = series.iter().flat_map(|series| &series.curve).map(|at| at.1).fold(1e-9, f64::max);
     let half_mm = grid.columns as f64 * pitch_mm / 2.0;
     Plot {

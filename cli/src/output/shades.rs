@@ -62,6 +62,7 @@ impl ShadedPicture {
                         let first = (run.start - columns.start) / down;
                         let end = (run.end - columns.start).div_ceil(*down);
                         let places = &mut shades[first as usize..end as usize];
+                        // One pixel of a finding must show among all that share its place.
                         places.iter_mut().for_each(|place| *place = shade.max(*place));
                     }
                 });

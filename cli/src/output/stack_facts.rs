@@ -51,6 +51,7 @@ impl<'a> StackFacts<'a> {
             height_px: first.size[1],
             one_size: totals.one_size,
             dpi: first.dpi.map(Dpi::get),
+            // To the nanometer: the digits beyond are rounding of sums.
             bottom_mm: first.info.z().map(|z| to_nm(z.mm())),
             top_mm: totals.top_mm().map(to_nm),
             thickness_um: totals.thickness_um.map(ends),

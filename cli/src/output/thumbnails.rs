@@ -69,6 +69,7 @@ impl CellSize {
 pub(crate) fn contact_sheet(thumbnails: Vec<Thumbnail>) -> Picture<'static> {
     let cell = CellSize::of(&thumbnails);
     let (cell_width, cell_height) = (cell.width + GUTTER, cell.height_with_caption() + GUTTER);
+    // Columns c and rows n / c with c · width = aspect · height · n / c: c is the root of this.
     let across = SHEET_ASPECT * (thumbnails.len() * cell_height) as f64 / cell_width as f64;
     let columns = (across.sqrt().round() as usize).clamp(1, thumbnails.len());
     let width = columns * cell_width + GUTTER;
@@ -87,6 +88,7 @@ pub(crate) fn contact_sheet(thumbnails: Vec<Thumbnail>) -> Picture<'static> {
                 row.extend([BACKGROUND; GUTTER]);
             }
         }
+        // The last band may have fewer thumbnails.
         rows.iter_mut().for_each(|row| row.resize(width, BACKGROUND));
         blank().chain(rows)
     });

@@ -82,12 +82,14 @@ impl After {
                     map_in_order(pages.map(move |page| page.map_err(failed)), move |page: Page| {
                         page.decode().map(PassingLayer::from).map_err(failed)
                     });
+                // All of the stack is here, so both ends are its own.
                 let layers = working.layers(Box::new(layers), 0..u32::MAX, [true; 2])?;
                 let mut decoded = layers.map(|layer| {
                     let layer = layer.and_then(|layer| Ok(layer.decode()?));
                     layer.map_err(|error| Exit::from(named(error, part)))
                 });
                 write(&mut decoded)?;
+                // It borrows the stage, whose findings come next.
                 drop(decoded);
                 working.find(0, &part.display().to_string(), &mut findings);
             }

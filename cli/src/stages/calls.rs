@@ -33,6 +33,7 @@ impl Tiling {
         folder: &Path,
     ) -> Result<Self, String> {
         let args = parse_tile(options, folder)?;
+        // Now, so that a night is refused before it begins.
         args.check_for(copies).map_err(|error| error.to_string())?;
         Ok(Self(args))
     }
@@ -51,6 +52,7 @@ impl Tiling {
         let build = self.0.build_of(stacks, &Progress::keeping("tile", &kept))?;
         let Build { mut layers, stray_rows, no_mesh, .. } = build;
         write(&mut layers)?;
+        // Counted while layers pass, so complete only now.
         let found = [stray_rows.borrow().text(), no_mesh.borrow().text()].into_iter().flatten();
         Ok(kept.take().into_iter().chain(found.map(|text| format!("tile: {text}"))).collect())
     }

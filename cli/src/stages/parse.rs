@@ -102,6 +102,7 @@ struct StageReader<'a> {
 
 impl<'a> StageReader<'a> {
     fn new(name: &str, words: &[String], folder: &'a Path) -> Result<Self, String> {
+        // Built once: a night may have hundreds of stages.
         static LAMP: OnceLock<clap::Command> = OnceLock::new();
         let lamp = LAMP.get_or_init(|| formed(Lamp::command()));
         let mut command = crate::stage(lamp, name);
@@ -114,6 +115,7 @@ impl<'a> StageReader<'a> {
             _ => {}
         }
         let matches = |words: &[OsString]| {
+            // Help and version come as errors, too.
             command.clone().try_get_matches_from(words).map_err(|error| match error.use_stderr() {
                 true => sentence(&error),
                 false => "help and version are for the command line".to_owned(),
@@ -127,6 +129,7 @@ impl<'a> StageReader<'a> {
             let settings = settings_of_machine(&of_machine(machine, folder))
                 .map_err(|error| error.to_string())?;
             words.extend(words_left_open(&command, &found, &settings));
+            // A machine's settings are words like others, so that the same parser checks them.
             found = matches(&words)?;
         }
         Ok(Self { matches: found, folder })
@@ -144,8 +147,10 @@ impl<'a> StageReader<'a> {
         if stage.parts.len() > 1 {
             return Err("leave out the part's file: the stages are for one".to_owned());
         }
+        // The word in the place of the part: each part of the night stands there later.
         stage.parts.clear();
         stage.named_mut().for_each(|path| *path = self.folder.join(&*path));
+        // Materials and tables are read now: a slip in them must show before the night, not in it.
         stage.settings.exposure().map_err(said)?;
         Ok(stage)
     }
@@ -165,6 +170,7 @@ impl<'a> StageReader<'a> {
             "compensate" => {
                 let mut settings = CompensateSettings::from(&self.read::<CompensateStageArgs>());
                 settings.inputs_mut().for_each(in_folder);
+                // Tried now, as a night must not begin with a file that is wrong.
                 Compensating::new(&settings).map_err(said)?;
                 Stage::Compensate(settings)
             }
@@ -205,6 +211,7 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
     let ids: Vec<&str> = matches.ids().map(clap::Id::as_str).collect();
     let is_given =
         |id: &str| ids.contains(&id) && matches.value_source(id) == Some(ValueSource::CommandLine);
+    // The word in the place of the part counts as one: only a second is somebody's.
     let of_part = |id: &str| {
         id == "part" && matches.get_many::<PartFile>(id).is_none_or(|parts| parts.len() < 2)
     };
@@ -215,6 +222,7 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
     if is_given("stacks") || is_given("inputs") {
         return Err("leave out the stacks: what it works on is known".to_owned());
     }
+    // Left out, it is `-`, which means the stage before.
     if ids.contains(&"stack")
         && let Some(stack) = matches.get_one::<PathBuf>("stack")
         && !is_stream(stack)

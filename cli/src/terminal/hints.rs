@@ -29,6 +29,7 @@ use lamp_view::SurfaceError;
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
+    // The error is generic over what is wrong with a document, so each type is tried by itself.
     let catalogued = || {
         let material = error.downcast_ref::<CatalogueError<MaterialError>>();
         let machine = error.downcast_ref::<CatalogueError<MachineError>>();
@@ -444,6 +445,7 @@ fn stack(error: &StackError) -> Option<String> {
         } => "if a part is in it, slice it first; if it holds pages, unpack it first",
         StackError::NotTiff { format: Some(FileFormat::Part(_)), .. } => "slice it first",
         StackError::NotTiff { format: Some(format), .. } => match other_format(*format) {
+            // A part alone is no stack yet.
             Some(hint) if hint.starts_with("export") => return Some(hint + ", and slice it first"),
             hint => return hint,
         },

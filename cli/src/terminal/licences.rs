@@ -11,6 +11,7 @@ const RULE: &str =
 /// Whether the process is only to print [`licences`]. This is not a command, and clap wants one.
 pub(crate) fn are_asked_for() -> bool {
     let words: Vec<_> = std::env::args_os().skip(1).collect();
+    // Alone only: behind a command, it is an option of that.
     matches!(&words[..], [word] if word == "--licences" || word == "--licenses")
 }
 

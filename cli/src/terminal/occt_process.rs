@@ -27,7 +27,9 @@ fn asks(words: &[OsString]) -> bool {
 /// its status; nothing where this is the child, or OpenCASCADE is not asked for. A
 /// child that crashes is a failure as any other: it has not written anything.
 pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
+    // The mark keeps the child from starting a child of its own.
     if env::var_os(MARK).is_some() {
+        // OpenCASCADE may hang: it must not outlive a parent that was killed.
         let signal = Some(rustix::process::Signal::TERM);
         rustix::process::set_parent_process_death_signal(signal)
             .context("the process that watches over this one")?;

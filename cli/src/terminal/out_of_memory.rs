@@ -95,6 +95,7 @@ fn end(bytes: usize) -> ! {
         Ok(_) => {}
         // There is not even enough to remove folders. The next command removes them.
         Err(ends_it) if ends_it == thread => exit(STATUS.load(Relaxed)),
+        // Another thread ends the process, and this one cannot return without its memory.
         Err(_) => loop {
             thread::sleep(Duration::MAX);
         },
@@ -107,6 +108,7 @@ fn end(bytes: usize) -> ! {
 
 /// Prints the message past standard error's lock, which a thread may hold that waits in [`end`].
 fn tell(bytes: usize) {
+    // On the stack, as there is no memory for a string.
     let mut line = [0; 256];
     let mut cursor = Cursor::new(&mut line[..]);
     let command = COMMAND.get().map_or("lamp", String::as_str);

@@ -35,6 +35,7 @@ impl Progress {
     /// only the last shows one (`is_last`), because they share the terminal.
     pub(crate) fn new(command: &'static str, common: &Common, is_last: bool) -> Self {
         let &Common { quiet, verbose, .. } = common;
+        // A bar in a file or a log would be thousands of lines.
         let watched = !quiet && is_last && io::stderr().is_terminal();
         let bar = ProgressBar::hidden();
         bar.set_style(style("{prefix} {human_pos} layers {per_sec}"));
@@ -50,6 +51,7 @@ impl Progress {
 
     /// Counts a layer. The bar appears with the first.
     pub(crate) fn layer_done(&self) {
+        // A command that fails before its first layer shows no bar.
         if self.watched && self.bar.position() == 0 {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
@@ -80,6 +82,7 @@ impl Progress {
         let line = format!("{}: {line}", self.command);
         match &self.kept {
             Some(kept) => kept.keep(line),
+            // A line over the bar would spoil both.
             None => self.bar.suspend(|| say(&line)),
         }
     }

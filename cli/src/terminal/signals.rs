@@ -41,12 +41,16 @@ pub(crate) fn say_no_more() {
 /// that passes the limit of sizes is an error of writing it, and no signal.
 pub(crate) fn clean_up_on_signals() -> Result<(), Exit> {
     let ignored = ignored_signals();
+    // SIGXFSZ ends a process that does not expect it. Once it is watched, the write fails with
+    // EFBIG (setrlimit(2)).
     let wanted = ENDING.into_iter().chain([SIGXFSZ]);
     let wanted = wanted.filter(|signal| ignored >> (signal - 1) & 1 == 0);
     let mut signals = Signals::new(wanted).context(WATCH)?;
     let watch = move || {
         if let Some(signal) = signals.forever().find(|&signal| signal != SIGXFSZ) {
+            // Before files are removed: writers that then fail must not report it.
             say_no_more();
+            // Tasks remove their own temporary files, so they end first.
             end_children();
             remove_temporaries();
             std::process::exit(128 + signal);

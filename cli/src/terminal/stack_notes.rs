@@ -42,6 +42,7 @@ pub(crate) fn print_note(path: &Path, note: &StackNote) {
     let mut printed = printed();
     let printed = printed.get_or_insert_default();
     let line = format!("{}: {}: {note}", printed.command, input_name(path));
+    // For --strict, which asks only at the end.
     printed.is_doubtful |= note.is_doubt();
     if (note.is_doubt() || !printed.quiet) && printed.lines.insert(line.clone()) {
         say(&line);

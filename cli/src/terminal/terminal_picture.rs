@@ -45,6 +45,7 @@ impl TerminalForm {
 fn columns() -> u32 {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse::<u16>().ok());
     let own = || terminal_size::terminal_size().map(|(width, _)| width.0);
+    // A width of 0 means that it is not known.
     told.filter(|&columns| columns > 0).or_else(own).map_or(USUAL_COLUMNS, u32::from).max(1)
 }
 
@@ -59,6 +60,7 @@ fn write_ascii(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
             character(sum, if lower.is_some() { 2 } else { 1 })
         };
         let mut line: Vec<u8> = upper.iter().enumerate().map(mean).collect();
+        // Blanks at the end show nothing, and may wrap in a narrow terminal.
         line.truncate(line.iter().rposition(|&c| c != b' ').map_or(0, |last| last + 1));
         line.push(b'\n');
         out.write_all(&line)?;
@@ -69,6 +71,7 @@ fn write_ascii(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
 /// Returns the character for the mean of levels, given their sum and number.
 fn character(sum: u32, count: u32) -> u8 {
     let steps = RAMP.len() as u32 - 1;
+    // Rounds to the nearest step in whole numbers: the sum is at most 510, so 32 bits are enough.
     let step = (2 * sum * steps + 255 * count) / (2 * 255 * count);
     RAMP[step.max(u32::from(sum > 0)) as usize]
 }
@@ -76,8 +79,10 @@ fn character(sum: u32, count: u32) -> u8 {
 /// Writes a picture in the form of DEC's VT340: rows of sixels, each color of a row by itself.
 fn write_sixel(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
     let (width, height) = (picture.width, picture.height);
+    // Pixels that no color draws stay as they are (1), and pixels are square (1;1).
     write!(out, "\x1bP0;1q\"1;1;{width};{height}")?;
     for gray in 0..GRAYS {
+        // Sixels have colors in percent.
         let percent = (100 * gray + (GRAYS - 1) / 2) / (GRAYS - 1);
         write!(out, "#{gray};2;{percent};{percent};{percent}")?;
     }
@@ -102,6 +107,7 @@ fn write_band(rows: &[Vec<u8>], out: &mut impl Write) -> io::Result<()> {
         }
         let sixel = |column: usize| {
             let bits = rows.iter().enumerate().filter(|(_, row)| gray(row[column]) == colour);
+            // A sixel is six bits above `?`, the uppermost pixel the lowest bit.
             bits.map(|(row, _)| 1 << row).sum::<u8>() + b'?'
         };
         let sixels: Vec<u8> = (0..width).map(sixel).collect();
@@ -109,10 +115,12 @@ fn write_band(rows: &[Vec<u8>], out: &mut impl Write) -> io::Result<()> {
         for run in sixels.chunk_by(|a, b| a == b) {
             let sixel = char::from(run[0]);
             match run.len() {
+                // A repeat takes three characters, so shorter runs stand as they are.
                 1..=3 => write!(out, "{}", sixel.to_string().repeat(run.len()))?,
                 length => write!(out, "!{length}{sixel}")?,
             }
         }
+        // Back to the left: the next color draws over the same rows.
         out.write_all(b"$")?;
     }
     out.write_all(b"-")

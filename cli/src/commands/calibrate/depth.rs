@@ -57,6 +57,7 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
     let has_gray = table.columns().iter().any(|column| column == "gray");
     let model = args.model.unwrap_or(if has_gray { DepthModel::Gray } else { DepthModel::Jacobs });
     let points = &measured.points[..];
+    // The other models take every dose for one of full white.
     if model != DepthModel::Gray && points.iter().any(|point| point.gray != GrayLevel::WHITE) {
         return Err(at_place(Exit::usage("some rows are gray: fit them with --model gray")));
     }
@@ -145,6 +146,7 @@ impl DepthFit {
     fn least_dose(&self) -> f64 {
         let least = |ec: &Estimate<Dose>| {
             let [value, low] = [ec.value, ec.low].map(Dose::mj_per_cm2);
+            // A lower end near zero would stretch the logarithmic axis over decades.
             low.max(value / 2.0)
         };
         match self {
@@ -188,7 +190,9 @@ pub(super) fn write_line<T: Quantity>(
 fn plot(title: String, fit: &DepthFit, points: &[DepthPoint]) -> Plot {
     let most = points.iter().map(|point| point.dose.mj_per_cm2()).fold(0.0, f64::max);
     let least = points.iter().map(|point| point.dose.mj_per_cm2()).fold(fit.least_dose(), f64::min);
+    // Room on both sides, so that no point lies on the frame.
     let range = least / 1.1..most * 1.1;
+    // Even steps on the logarithmic axis.
     let step = |i| range.start * (range.end / range.start).powf(f64::from(i) / 30.0);
     let doses: Vec<_> = (0..=30).map(|i| Dose::from_mj_per_cm2(step(i))).collect();
     let series = match fit {
@@ -266,6 +270,7 @@ fn series(
     Series {
         name,
         points: points.iter().map(|p| (p.dose.mj_per_cm2(), p.depth.um())).collect(),
+        // At the critical dose the depth is zero: there the curve begins.
         curve: std::iter::once((curve_begins, 0.0)).chain(curve).collect(),
         band: band_start.into_iter().chain(band).collect(),
     }

@@ -57,6 +57,7 @@ pub(super) fn numbers<T: Quantity>(estimate: &Estimate<T>) -> [String; 3] {
     [value, low, high].map(|number| {
         let own = short(number);
         let alike = format!("{number:.decimals$}");
+        // With the value's decimals, a much smaller end would be shown as zero.
         let vanishes = number != 0.0 && alike.parse() == Ok(0.0);
         if vanishes || [&own, &shown].iter().any(|text| text.contains('e')) || own == "-" {
             own

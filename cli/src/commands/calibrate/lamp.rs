@@ -64,6 +64,7 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
 fn plot(title: String, fit: &LampFit, points: &[LampPoint]) -> Plot {
     let doses = || points.iter().map(|point| point.film.dose.mj_per_cm2());
     let critical = fit.critical_dose.at_zero.value.mj_per_cm2();
+    // Curves begin at the critical dose, which may lie below all points.
     let range = doses().fold(critical, f64::min) / 1.1..doses().fold(0.0, f64::max) * 1.1;
     let step = |i: u32| range.start * (range.end / range.start).powf(f64::from(i) / 30.0);
     let steps: Vec<f64> = (0..=30).map(step).collect();

@@ -167,6 +167,7 @@ impl CalibrationFiles {
                 let source = format!("given with {}", self.source_name());
                 material.intensity = Some(Given { value, plus_minus: None, source });
                 if let Some(spread) = &mut material.spread {
+                    // The given intensity is of a wide field, and no longer of a pixel.
                     spread.pixel = None;
                 }
             }

@@ -48,6 +48,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     files.check()?;
     let base = files.base()?;
     let of_depths = args.depth_material.as_deref().map(document).transpose()?;
+    // The squares may be of a resin whose depths were measured in another file.
     let of_depths = of_depths.as_ref().or(base.as_ref());
     let depths = match of_depths {
         Some(material) => cure_depths(material).map_err(anyhow::Error::new)?,
@@ -69,6 +70,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let mut text = EstimateTable::new(&measured, "washed away");
     for fit in &fits {
         write(&mut text, fit, args.dpi, depths.as_deref());
+        // Broadening depths are cure depths at these doses.
         doses.iter().for_each(|doses| doses.see(fit.critical_dose.value));
     }
     let doubt = doses.and_then(|doses| doses.doubt("broadening depths"));

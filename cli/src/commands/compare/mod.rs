@@ -116,6 +116,7 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
         check_beside(picture, Path::new("-"), paths)?;
     }
     let [a, b] = [opened(&args.a)?, opened(&args.b)?];
+    // Pages of two resolutions are refused when they are compared.
     let dpi = a.headers()[0].dpi;
     let tolerance = args.tolerance.unwrap_or(Tolerance::Pixels(0.0)).pixels(dpi);
     let tolerance = tolerance.ok_or_else(|| {
@@ -148,6 +149,7 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
     if args.json {
         print_answer("lamp-compare-1", &answer(&comparison))?;
     } else if !common.quiet {
+        // Quiet, the status alone answers, as of `cmp -s`.
         print(&text(&comparison, common.verbose))?;
     }
     if comparison.is_same() { Ok(()) } else { Err(Exit::Different) }

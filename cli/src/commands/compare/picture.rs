@@ -50,6 +50,7 @@ pub(super) fn write_picture(
         Ok::<_, Exit>(layer.map(|layer| layer.image.into_image()))
     };
     let (a, b) = (image(stacks[0], section.a)?, image(stacks[1], section.b)?);
+    // Decoded again: the comparison keeps counts and boxes, not the images of all layers.
     let images = Images::new(a, b, shift_of(stacks, section)?, tolerance);
     let found = images.compared().expect("the layer was compared before");
     let Compared { overlaid, all, left } = found;

@@ -59,6 +59,7 @@ impl StackComparison<'_> {
         };
         let is_whole_layer = |stack: usize, position: Option<usize>| {
             let page = position.map(|position| &self.headers[stack][position].info);
+            // Heights are stated to the nanometer, so 10 nm forgive the rounding of both ends.
             page.and_then(|info| info.thickness_um)
                 .is_none_or(|um| (um / 1000.0 - (top - bottom)).abs() < 1e-5)
         };
@@ -70,6 +71,7 @@ impl StackComparison<'_> {
     }
 
     fn sum(&self, of: fn(&SectionDifference) -> u64) -> u64 {
+        // A report must not fail for the size of a sum.
         self.sections.iter().map(of).fold(0, u64::saturating_add)
     }
 }
@@ -106,6 +108,7 @@ pub(super) fn text(comparison: &StackComparison<'_>, all: bool) -> String {
     if shown < told.len() {
         text += &format!("  {} more (--verbose or --json lists them)\n", told.len() - shown);
     }
+    // Names come from files: they must not steer the terminal.
     text.lines().map(|line| format!("{}\n", printable(line))).collect()
 }
 

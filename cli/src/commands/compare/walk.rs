@@ -95,6 +95,7 @@ fn of_pages(
     PagePair { section, a, b }: PagePair,
     tolerance: f64,
 ) -> Result<SectionDifference, Exit> {
+    // Before decoding: images that cannot be compared cost nothing.
     let shift = shift_of(stacks, &section)?;
     let is_one_image =
         shift == [0, 0] && a.as_ref().zip(b.as_ref()).is_some_and(|(a, b)| a.is_coded_as(b));
@@ -121,6 +122,7 @@ fn of_pages(
     let forgiven = pixels(&all).iter().sum::<u64>() - told.iter().sum::<u64>();
     let differing = left.added.combined(Op::Union, &left.missing);
     let boxes = largest_boxes(&differing.ok_or_else(too_many)?, MOST_BOXES);
+    // Boxes are on the frame of both images. Its corner brings them to the first image's pixels.
     Ok(counted(section, forgiven, told, boxes, [overlaid.frame.left, overlaid.frame.top]))
 }
 

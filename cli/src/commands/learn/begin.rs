@@ -33,6 +33,7 @@ pub(super) fn begin(
     let wanted = kept.wanted.map_or(128, std::num::NonZeroU8::get);
     let mut pages = PartPages::new(wanted);
     let (mut part, mut origin_mm) = (String::new(), None);
+    // The stack may be standard input: it is kept while it is read.
     let new = new_folder_of(folder)?;
     let file = new.path().join(JobFile::STACK);
     let layers = read_layers(&input, progress)?.map(|layer| -> Result<_, Exit> {
@@ -57,6 +58,7 @@ pub(super) fn begin(
     progress.done();
     written?;
     let digest = digest_of_stack(&file)?;
+    // Only now, as the digest shows whether it is a job of the same stack.
     if folder.join(JobFile::NAME).exists() {
         return Err(refuse_second(folder, stack, &digest)?);
     }

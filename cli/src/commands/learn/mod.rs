@@ -178,6 +178,8 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let name = input_name(measured);
     let (measured, text) = read_measured(measured)?;
     let last = job.prints.len() - 1;
+    // A run that was cut off is called again with the same table: it must not count as one more
+    // print.
     let may_be_again = args.print.is_none_or(|print| print + 1 == last);
     let again = if may_be_again { job.take_back(&text) } else { None };
     let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
@@ -195,7 +197,10 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
             }
         }
     }
+    // After the job's own files: a print from a profile that the job lacks could not be learned
+    // from.
     write_file(output, |out| out.write_all(job.profile(&learned.times).as_bytes()))?;
+    // Read again, so that report and plot show the job as it is on the disk.
     let job = open(&args.job, &progress)?;
     if let Some(path) = &args.report {
         write_report(&job, print_number, &learned, path)?;
@@ -248,6 +253,7 @@ fn parse_gain(text: &str) -> Result<f64, String> {
 
 fn parse_step(text: &str) -> Result<f64, String> {
     match text.parse() {
+        // Beyond twice the way, a step ends farther off than it began.
         Ok(step) if step > 0.0 && step <= 2.0 => Ok(step),
         _ => Err(format!("`{text}` is not a step above 0 and up to 2: write 0.5")),
     }

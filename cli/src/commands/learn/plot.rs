@@ -11,6 +11,7 @@ const MOST: usize = 8;
 
 /// The plots of a job, one below the other.
 pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
+    // Later prints are compared with the first, so that is always drawn.
     let drawn: Vec<_> = job
         .prints
         .iter()
@@ -48,6 +49,7 @@ fn course(job: &Job) -> Vec<Plot> {
             .filter_map(|(number, error)| Some((number, error.filter(|error| is_of(*error))?)))
             .map(|(number, error)| (number as f64, error.number()))
             .collect();
+        // An axis needs a length, also where no print has an error.
         let most = points.iter().map(|point| point.1).fold(1e-9, f64::max);
         let series = vec![Series { points: points.clone(), ..curve("errors", points.clone()) }];
         let x = linear("print", -0.5..job.prints.len() as f64 - 0.5);

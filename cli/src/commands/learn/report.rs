@@ -62,6 +62,7 @@ pub(super) fn write_report(
         }
         value
     });
+    // Layers are counted from the light down, and reports go upward.
     let layers = job.part.layers().iter().enumerate().rev().map(|(at, layer)| {
         json!({
             "layer": layer.index,

@@ -87,6 +87,7 @@ fn fields(material: &Material) -> Value {
     let example = resin.as_ref().ok().map(example);
     let why = match (&resin, &example) {
         (Err(why), _) => Some(why.to_string()),
+        // A resin may have a model that holds, and still not cure such a layer.
         (_, Some((_, Err(why)))) => Some(why.clone()),
         _ => None,
     };
@@ -116,6 +117,7 @@ fn table() -> String {
         let light = light_of(&material).map(|light| light.to_string());
         let light = light.unwrap_or_else(|| "-".to_owned());
         let mut models = models_and_widths(&material);
+        // A blank column would look like a fault of the table.
         if models.is_empty() {
             models.push('-');
         }
@@ -184,6 +186,7 @@ fn allows(material: &Material) -> String {
     let resin = match material.resin() {
         Ok(resin) => resin,
         Err(why) => {
+            // Plans by kinetics need no model of cure depths.
             let others = material.kinetics.iter().map(|_| "kinetics".to_owned());
             let others: Vec<_> = others.chain(widths(material)).collect();
             let gives = if others.is_empty() { "" } else { " and gives " };

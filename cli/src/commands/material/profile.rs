@@ -58,6 +58,7 @@ pub(super) fn run(args: &ProfileArgs, common: &Common) -> Result<(), Exit> {
             let spread = spread.ok_or_else(|| {
                 Exit::usage(format!("{} has no [spread]: give --beam", material.name))
             })?;
+            // exp(-2 y²/Wo²) is a Gaussian of the standard deviation Wo / 2.
             Length::from_um(2.0 * spread.sigma().um())
         }
     };

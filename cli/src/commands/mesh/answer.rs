@@ -103,6 +103,7 @@ fn lump_fields(lump: &Lump) -> Value {
 }
 
 fn loop_fields(rims: &RimLoop) -> Value {
+    // A hole may have as many edges as the mesh: its number is in `rims`.
     let facets = rims.corners.iter().take(MAX_LISTED).map(|&corner| facet_of(corner));
     json!({
         "facets": facets.collect::<Vec<_>>(),

@@ -81,6 +81,7 @@ pub(super) fn run(args: &MeshCheckArgs, common: &Common) -> Result<(), Exit> {
         true => print_answer("lamp-mesh-1", &check_fields(&name, &findings))?,
         false => print(&check_text(&name, &findings))?,
     }
+    // After the answer: a script reads what was found, and the status.
     match args.strict && !findings.are_none() {
         true => Err(Exit::Findings(format!("{name}: its mesh has faults"))),
         false => Ok(()),

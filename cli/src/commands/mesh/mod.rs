@@ -82,6 +82,7 @@ impl MeshPart {
     /// Opens the part; returns its bytes, too, if they came from a stream.
     fn open(&self, command: &str, common: &Common) -> Result<(Part, Vec<u8>), Exit> {
         let options = ReaderSettings::from(&self.reader).for_opening(self.chord)?;
+        // A stream cannot be read twice, and repair copies a mesh in which it changes nothing.
         let mut bytes = Vec::new();
         let part = match is_stream(&self.part) {
             true => stdin()
@@ -97,6 +98,7 @@ impl MeshPart {
             return Err(Exit::usage(why).at(self.name()));
         }
         let there_is = available();
+        // A limit above the free memory would end in a crash.
         let most = self.memory.unwrap_or(there_is).min(there_is);
         let needed = part.facet_count() as u64 * FACET_BYTES;
         if needed > most {

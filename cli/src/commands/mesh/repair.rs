@@ -67,6 +67,8 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     }
     let failed = |error: SliceError| Exit::from(error).at(name.clone());
     let (part, bytes) = args.part.open("mesh repair", common)?;
+    // Facets stay in the file's own unit, so that coordinates keep their bits: lengths are
+    // converted.
     let unit = if part.states_unit() { 1.0 } else { args.part.units.mm() };
     let facets = part.facets().map_err(failed)?;
     let weld = match args.weld {
@@ -79,6 +81,7 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     match repaired.touched.is_empty() && is_stl(input, &bytes)? {
         true => write_mesh(output, |out| {
             copy(input, &bytes, out)?;
+            // Another program may have written to the file since its facets were read.
             part.check_unchanged().map_err(io::Error::other)
         })?,
         false => write_mesh(output, |out| write_stl(repaired.facets.iter().copied(), out))?,
@@ -108,6 +111,8 @@ fn is_stl(input: &Path, bytes: &[u8]) -> Result<bool, Exit> {
     };
     read.with_context(|| input.display().to_string())?;
     let count = start.get(80..84).map(|count| u32::from_le_bytes(count.try_into().unwrap()));
+    // A binary STL has 80 bytes, a count, and 50 bytes a facet. Its header may begin with `solid`,
+    // so its size comes first.
     let is_binary = count.is_some_and(|count| 84 + 50 * u64::from(count) == size);
     Ok(is_binary || start.trim_ascii_start().starts_with(b"solid"))
 }

@@ -123,6 +123,7 @@ fn shells(found: impl Iterator<Item = u32>, what: &str) -> Option<String> {
 }
 
 fn loops(check: &MeshCheck) -> Option<String> {
+    // A line has room for one loop, and the longest matters most.
     let longest = check.loops.iter().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
     let facet = facet_of(longest.corners[0]);
     let which = if check.loops.len() == 1 { "it" } else { "the longest" };

@@ -115,8 +115,10 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     let (files, _) = solid.files(&args.parts);
     let table = table.map_err(|error| at_part(error.into(), &files))?;
     let poses = measure(&table, &poses(args.directions, args.cone), &limits);
+    // Slicing needs the memory.
     drop(table);
     let pareto = pareto(&poses);
+    // Slicing takes far longer than measuring a mesh, so only the best are sliced.
     let images = pareto.iter().take(args.best);
     let images =
         images.map(|&pose| args.islands_on_images(&solid, &files, &part, &poses[pose].pose));

@@ -74,6 +74,7 @@ fn table(part: &str, compared: &ComparedPoses) -> String {
         "footprint (mm)",
         "islands on images"
     );
+    // All poses that were sliced are shown, which took the time.
     for (rank, &pose) in pareto.iter().enumerate().take(MOST_ROWS.max(image_islands.len())) {
         let PoseFacts { islands, pits, overhang_mm2, height_mm, .. } = poses[pose];
         let [width, depth] = poses[pose].footprint_mm;

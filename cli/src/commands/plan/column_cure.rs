@@ -136,6 +136,7 @@ fn parse_gap(text: &str) -> Result<f64, String> {
 const MOST_STEPS: usize = 20_000;
 
 pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
+    // Before the search, which may take minutes: a folder that is in the way shows at once.
     let folder = plan_folder(&args.output, args.force)?;
     let (projector, projector_word) = document_and_word::<Projector>(&args.projector)?;
     let (material, material_word) = document_and_word::<Material>(&args.material)?;
@@ -213,6 +214,7 @@ impl ColumnCureArgs {
         };
         let reach = Setup::reach(projector);
         if let Some(robust) = self.robust.filter(|robust| *robust > reach) {
+            // Rounded down, so that the length in the message is accepted.
             let reach = Length::from_um(reach.um().floor());
             let text =
                 format!("--robust {robust}: a mirror's light is about {reach} wide: give less");
@@ -227,6 +229,8 @@ impl ColumnCureArgs {
         Ok(ColumnOptions {
             objective: self.optimise,
             bitmaps: self.bitmaps.unwrap_or(BITMAPS),
+            // A number that was asked for is kept. By default, fewer distinct times need fewer
+            // bitmaps.
             fewer: self.bitmaps.is_none(),
             gray: self.gray.then(|| Box::new(shares)),
             max_s,
@@ -244,6 +248,7 @@ impl ColumnCureArgs {
         curve: &HeightCurve,
     ) -> Result<f64, Exit> {
         let highest = Length::from_um(map.highest_um());
+        // A height that no dose cures takes forever, and is refused below.
         let dose = curve.dose(highest.um()).unwrap_or(f64::INFINITY);
         let wide_s = dose / projector.irradiance().mw_per_cm2();
         if wide_s > A_DAY_S {
@@ -271,6 +276,7 @@ impl ColumnCureArgs {
         material: &str,
         options: &ColumnOptions,
     ) -> String {
+        // Values that were used, not given: defaults may change, and the command must not.
         let mut command = format!(
             "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimise {} \
              --max-time {:.3}s --gap {}",
@@ -318,6 +324,7 @@ fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Exit> {
         return Err(Exit::Failed(anyhow!("all black: no mirror has light").context(name())));
     }
     let mean = sum / picture.levels.len() as f64;
+    // The mirrors in use are the middle of the display.
     let [left, top] = [0, 1].map(|axis| (setup.display[axis] - setup.mirrors[axis]) / 2);
     let row = |row: usize| &picture.levels[row * columns + left..][..setup.mirrors[0]];
     let used = (top..top + setup.mirrors[1]).flat_map(row);

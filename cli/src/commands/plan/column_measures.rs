@@ -48,6 +48,7 @@ pub(super) fn doubt(
 ) -> Option<String> {
     let (known, name) = (curve.known(), &material.name);
     let low = target.lower_than(known.from);
+    // Heights outside the model come first: an extrapolation within it is the lesser doubt.
     if low > 0 {
         return Some(format!(
             "{low} columns of the target are lower than {}, from where on the numbers of {name} \

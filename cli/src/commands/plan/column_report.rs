@@ -73,6 +73,7 @@ impl Reported<'_> {
 
     /// The plan where the glass stands off along x or y: the direction that is the worst.
     fn shifted(&self, um: f64) -> Value {
+        // A part may suffer more along one axis than along the other.
         let directions = [[um, 0.0], [-um, 0.0], [0.0, um], [0.0, -um]];
         let doses = directions.map(|shift| self.light.shifted(shift).doses(&self.plan.seconds));
         let worst =
@@ -83,6 +84,7 @@ impl Reported<'_> {
     }
 
     fn brighter(&self, by: f64) -> Value {
+        // Doses are linear in light.
         let doses: Vec<_> = self.plan.doses.iter().map(|dose| dose * by).collect();
         let mut value = self.measured(&doses);
         value["light"] = by.into();

@@ -126,8 +126,10 @@ const MOST_ROWS: f64 = 1000.0;
 
 /// Returns columns that hold all of a part, with room around it.
 pub(super) fn grid_of(cured: &Profile, radius_um: f64) -> Grid {
+    // A cured part may be wider than its target.
     let radius_um = 1.1 * radius_um.max(cured.base_um) + 10.0;
     let pitch_um = (2.0 * radius_um / MOST_ROWS).max(FINEST_UM);
+    // An odd number puts a column on the axis.
     let columns = 2 * (radius_um / pitch_um).ceil() as usize + 1;
     Grid { columns, rows: columns, pitch_um }
 }

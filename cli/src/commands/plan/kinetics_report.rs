@@ -108,6 +108,7 @@ fn measures(wanted: &WantedProfile, cured: &Profile) -> Value {
 }
 
 fn other_light(of: &Cured<'_>, times: f64) -> Value {
+    // The reaction is not linear in light, so it is stepped again.
     let cured = of.simulation.under(times).cure(of.exposures);
     let mut fields = shape(&cured);
     fields["light"] = json!(times);
@@ -127,5 +128,6 @@ fn seconds(exposures: &[RingExposure]) -> f64 {
 
 /// Rounds to a thousandth.
 fn rounded(number: f64) -> f64 {
+    // No number of a simulation is known to more digits.
     (number * 1000.0).round() / 1000.0
 }

@@ -58,6 +58,7 @@ impl<'a> LayerMap<'a> {
         let Some((number, exposed)) = self.options.map_layer.zip(time_of(layer)) else {
             return Ok(());
         };
+        // Light goes down: layers below the mapped one add nothing to its doses.
         if layer.info.index == number {
             self.begun = self.begin(layer)?;
         }
@@ -70,6 +71,7 @@ impl<'a> LayerMap<'a> {
     }
 
     fn begin(&self, layer: &Layer) -> Result<Option<Begun>, Exit> {
+        // Plans refuse pages without a resolution themselves.
         let Some(dpi) = layer.dpi else { return Ok(None) };
         self.light.check_spread(dpi)?;
         let (image, name) = (&layer.image, layer.info.name());

@@ -137,6 +137,7 @@ impl SpeedArgs {
         command: &str,
         progress: &Progress,
     ) -> Result<(), Exit> {
+        // Read twice: a plan needs all layers, and their images may not fit in memory together.
         let layers = layers_of(stack.pages(false)?, &self.input.stack, self.input.layers.clone());
         // Times count from the light.
         let timed = layers.zip(planned.plan.times.iter().rev()).map(|(layer, time)| {

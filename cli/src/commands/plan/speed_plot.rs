@@ -57,6 +57,7 @@ fn times(planned: &PlannedTimes<'_>) -> Plot {
 }
 
 fn doses(planned: &PlannedTimes<'_>) -> Plot {
+    // A logarithm has no zero: counts of none are drawn just below one.
     const LEAST: f64 = 0.7;
     let of = |name: &str, tally: &Tally, other: usize| {
         let count = |bin: usize| (tally.doses[other][bin] as f64).max(LEAST);
@@ -85,6 +86,7 @@ fn light(planned: &PlannedTimes<'_>) -> Plot {
         let shares = LIGHT_SHARES.iter().zip(&tally.at_light);
         let mut points: Vec<_> =
             shares.map(|(share, wrong)| (100.0 * share, count(wrong) as f64)).collect();
+        // Full light comes first in the tally, and a curve goes from left to right.
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         Series { points: points.clone(), ..curve(name, points) }
     };
@@ -104,6 +106,7 @@ fn search(planned: &PlannedTimes<'_>) -> Plot {
     let plan = planned.plan;
     let of = |name: &str, error: fn(&lamp_planning::speed::SearchStage) -> f64| {
         let stage = |(number, stage): (usize, &_)| {
+            // A part without errors must not divide by zero.
             ((number + 1) as f64, (100.0 * error(stage) / plan.single_error.max(1e-9)).max(LEAST))
         };
         let points: Vec<_> = plan.stages.iter().enumerate().map(stage).collect();

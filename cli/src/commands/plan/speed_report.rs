@@ -39,6 +39,7 @@ pub(super) fn lines_of(planned: &PlannedTimes<'_>) -> Vec<String> {
         significant(plan.single.ms() / 1000.0),
         counts(plan.before.wrong()),
         counts(plan.after.wrong()),
+        // Without a wrong voxel before, there is no share, and no division by zero.
         share(&plan.after) / plan.before.wrong().sum().max(1) as f64,
     )];
     let [_, less, more] = plan.after.at_light;
@@ -79,6 +80,7 @@ pub(super) fn write_report(
         "one_pixel_in": plan.sampled,
         "exposure_s": planned.seconds(),
     });
+    // Layers are counted from the light down, and reports go upward.
     let layers = part.layers().iter().enumerate().rev().map(|(at, layer)| {
         json!({
             "layer": layer.index,

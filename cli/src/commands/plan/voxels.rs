@@ -154,15 +154,18 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     });
     let mut settled = 0;
     let planned = plan(seen_by(&mut map, layers), &light, &args.options(), |layers| {
+        // A plan reports the number of all settled layers, and the bar counts one by one.
         (settled..layers).for_each(|_| progress.layer_done());
         settled = layers;
     });
     let mut planned = planned.map_err(|error: Exit| args.at_input(error))?;
     progress.done();
     let outcome = planned.outcome();
+    // The bar above has counted the planned layers to its end.
     let writing = Progress::new("plan", common, true);
     writing.expect(outcome.layers.len() as u64);
     let written = args.write(&mut planned, &mut map, &outcome, &writing);
+    // After a finding, report and plots still show the plan.
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;
     }
@@ -196,6 +199,7 @@ fn seen_by(
 ) -> impl Iterator<Item = Result<Layer, Exit>> {
     std::iter::from_fn(move || match layers.next() {
         Some(layer) => Some(layer.and_then(|layer| map.before(&layer).map(|()| layer))),
+        // Only the end shows that a layer is missing.
         None => map.check().err().map(Err),
     })
 }

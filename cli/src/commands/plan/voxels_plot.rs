@@ -51,6 +51,7 @@ fn by_layer(planned: &PlannedVoxels<'_>) -> Plot {
         planned.material,
         significant(outcome.exposure_ms / 1000.0)
     );
+    // A single layer needs an axis of some length.
     counts_plot(title, linear("layer", first..last.max(first + 1.0)), series)
 }
 

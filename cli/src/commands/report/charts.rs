@@ -13,6 +13,7 @@ const MOST_POINTS: usize = 1200;
 pub(super) fn charts(report: &StackReport) -> Vec<String> {
     let layers = &report.layers;
     let pitch_mm = report.totals.first.dpi.map(|dpi: Dpi| dpi.pitch().mm());
+    // One axis cannot have heights of some layers and numbers of others.
     let has_heights = layers.iter().all(|layer| layer.z_um.is_some());
     let place = |(number, layer): (usize, &LayerNumbers)| match layer.z_um {
         Some(um) if has_heights => um / 1000.0,
@@ -76,6 +77,7 @@ pub(super) fn charts(report: &StackReport) -> Vec<String> {
     ];
     if has(|layer| layer.gray_px) {
         let share = |_, layer: &LayerNumbers| {
+            // A black layer has no share, and must not divide by zero.
             Some(100.0 * layer.gray_px as f64 / layer.area_px.max(1) as f64)
         };
         charts.push(chart("Gray", "share of gray pixels (%)", vec![curve("gray", points(&share))]));
@@ -102,6 +104,7 @@ pub(super) fn same_thickness_um(layers: &[LayerNumbers]) -> Option<f64> {
 /// Returns at most so many points, with the extremes of neighbors.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let step = points.len().div_ceil(MOST_POINTS / 2);
+    // Each group leaves two points: groups of two would keep all.
     if step <= 2 {
         return points;
     }

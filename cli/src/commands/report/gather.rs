@@ -56,10 +56,12 @@ impl StackReport {
         progress.expect(headers.len() as u64);
         let mut totals = StackTotals::of(&headers[0]);
         headers[1..].iter().for_each(|header| totals.add(header));
+        // The check draws the layers, and what they leave on the way is needed behind it.
         let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
         let mut layers = measured(stack, &numbers, &sheet, progress);
         let found = match CheckSettings::default().find(&mut layers, Ok, machine) {
             Ok(found) => Ok(found),
+            // A stack that cannot be checked still has numbers and pictures.
             Err(error) => match error.cause::<CheckError>() {
                 Some(why) => Err(why.to_string()),
                 None => return Err(error),
@@ -212,6 +214,7 @@ fn failed(error: lamp_stack::StackError) -> Exit {
 /// Returns whether a layer is on the sheet: the first, the last, and others evenly between.
 fn is_on_sheet(position: usize, count: usize) -> bool {
     let shown = count.min(SHEET);
+    // The only layer of a stack must not divide by zero.
     let last = (shown - 1).max(1);
     (0..shown).any(|k| k * (count - 1) / last == position)
 }

@@ -51,6 +51,7 @@ impl Entry {
 /// Returns the name of a stack's page: its number and what of its name any system takes.
 pub(super) fn file_name(number: usize, stack: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    // Names of files have 255 bytes on most systems. Numbers keep names apart that begin alike.
     let stem: String = stack.chars().take(60).map(plain).collect();
     format!("report_{number:03}_{stem}.html")
 }

@@ -51,6 +51,7 @@ fn perimeter(mask: &Mask) -> u64 {
     for row in mask.rows() {
         // A row that ends white ends at the border.
         sides += row.len().next_multiple_of(2) as u64;
+        // Between equal rows no side is free, and most rows equal the row above.
         if row != above {
             let white = white_in_row(row, width);
             sides += white + white_above - 2 * white_in_both(above, row, width);

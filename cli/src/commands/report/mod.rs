@@ -111,6 +111,7 @@ impl ReportWork<'_> {
         args: &ReportArgs,
     ) -> Result<(), Exit> {
         if let Some(output) = output {
+            // A page and JSON cannot share standard output.
             if is_stream(output) && (io::stdout().is_terminal() || args.json) {
                 return Err(Exit::usage("a page is not for terminals: name a file with -o"));
             }
@@ -164,6 +165,7 @@ impl ReportWork<'_> {
                     index::Entry::of(&report, file)
                 }
                 Err(error) => {
+                    // One stack that cannot be read must not cost the reports of the others.
                     answers.push(json!({ "stack": name, "fault": error.to_string() }));
                     index::Entry::faulty(name, error.to_string())
                 }
@@ -173,6 +175,7 @@ impl ReportWork<'_> {
         let html = index::html(&entries);
         let written = folder.add("index.html", |out| out.write_all(html.as_bytes()));
         written.map_err(|error| Exit::Output(error.into()).at("index.html"))?;
+        // Before the JSON, whose reader may look for the pages.
         folder.persist().map_err(|error| Exit::Failed(error.into()))?;
         if args.json {
             print_stacks(&answers)?;

@@ -47,6 +47,7 @@ fn base64(bytes: &[u8]) -> String {
     for three in bytes.chunks(3) {
         let bits = (0..3).fold(0, |bits, k| bits << 8 | u32::from(*three.get(k).unwrap_or(&0)));
         for digit in 0..4 {
+            // Of n bytes come n + 1 digits; the rest of four is padding.
             let is_there = digit <= three.len();
             let digit = DIGITS[(bits >> (18 - 6 * digit) & 63) as usize];
             text.push(if is_there { char::from(digit) } else { '=' });

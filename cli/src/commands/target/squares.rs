@@ -178,6 +178,7 @@ fn parse_doses(text: &str) -> Result<Doses, String> {
         let number = |c: char| c.is_ascii_digit() || " .+-eE".contains(c);
         text.trim_start_matches(number).to_owned()
     };
+    // A split at dots serves both `..` and decimals: the unit stands behind the last of them.
     let unit = unit_of(text.rsplit([',', '.']).next().unwrap_or_default());
     let dose = |text: &str| -> Result<Dose, String> {
         let unit = if unit_of(text).is_empty() { &unit[..] } else { "" };
@@ -193,6 +194,7 @@ fn parse_doses(text: &str) -> Result<Doses, String> {
         return Ok(Doses(text.split(',').map(dose).collect::<Result<_, _>>()?));
     };
     let [from, to] = [dose(from)?, dose(to)?].map(Dose::mj_per_cm2);
+    // Equal ends would give ten equal doses, and nothing to fit.
     if from >= to {
         return Err(format!("`{text}` contains no doses: the end must be above the start"));
     }

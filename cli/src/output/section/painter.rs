@@ -48,6 +48,7 @@ impl SectionScene<'_> {
         let place = |column: usize| (column as f64 + 0.5) / factor(scale);
         let pixel = |column: usize| {
             let pixel = self.pixels.start + place(column) as u32;
+            // The picture's width is rounded up, and may reach past the last pixel.
             pixel.min(self.pixels.end - 1) as usize
         };
         let part = self.part.map(|part| {
@@ -63,6 +64,8 @@ impl SectionScene<'_> {
         };
         let mut next_part = part.as_mut().map(|part| holds(part, z_at(0)));
         (0..height).map(move |row| {
+            // Each row is asked once, though an edge needs the row below, too: answers move up by
+            // one.
             let here = next_part.take();
             next_part = part.as_mut().map(|part| holds(part, below_um(row)));
             let mut rgb = Vec::with_capacity(3 * (width + GAP) * cured.len());
@@ -75,6 +78,8 @@ impl SectionScene<'_> {
                     (Some(here), Some(below)) => {
                         for (column, &is_cured) in is_cured.iter().enumerate() {
                             let is_part = here[column];
+                            // The first column has no neighbor to the left, so it makes no edge by
+                            // itself.
                             let left = here[column.saturating_sub(1)];
                             let is_edge = is_part != left || is_part != below[column];
                             rgb.extend(colour(is_edge, is_cured, is_part));
@@ -112,6 +117,7 @@ pub(super) fn factor(scale: PictureScale) -> f64 {
 /// Returns the heights of the part at a place of a pixel.
 fn part_at(pieces: &[OutlinePiece], along: f64) -> SolidHeights {
     let mut heights: SolidHeights = pieces.iter().filter_map(|piece| piece.at(along)).collect();
+    // `Falling` needs intervals in rising order.
     heights.sort_by(|a, b| a[0].total_cmp(&b[0]));
     heights
 }

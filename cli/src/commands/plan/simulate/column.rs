@@ -23,6 +23,7 @@ pub(super) fn cured(shown: &ShownExposures, tracing: Tracing) -> Result<Simulati
         Some(target) => Some(target.heights(&grid, projector)?),
         None => None,
     };
+    // Dark margins were cut off on both sides alike, so the middle stays on the axis.
     let setup = Setup { mirrors, display: mirrors, ..Setup::of(projector, &grid, tracing) };
     let doses = GlassLight::new(setup).doses(&seconds);
     let heights_um = doses.iter().map(|&dose| curve.height_um(dose)).collect();

@@ -26,6 +26,7 @@ impl Exposures {
     /// Reads bitmaps from a stack, or from a text if there is no file of that name.
     pub(super) fn read(given: &OsStr, projector: &Projector) -> Result<Self, Exit> {
         let path = Path::new(given);
+        // A file of that name is meant as it is.
         let text = given.to_str().filter(|text| text.contains(':') && !path.exists());
         let exposures = match text {
             Some(text) => Self::of_text(text, projector)?,

@@ -88,6 +88,7 @@ named!(SimulationModel { Column = "column", Kinetics = "kinetics" });
 
 /// Parses rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
 pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
+    // 99 points and directions a side are already 96 million rays of each mirror.
     let number = |text: &str| text.parse().ok().filter(|number| (1..=99).contains(number));
     let rays = text.split_once('x').and_then(|(points, directions)| {
         Some(Tracing::Rays { points: number(points)?, directions: number(directions)? })
@@ -115,6 +116,7 @@ struct SimulationOutcome {
 }
 
 pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
+    // Before the simulation, which may take minutes: a folder that is in the way shows at once.
     let folder = match &args.output {
         Some(path) => Some(plan_folder(path, args.force)?),
         None => None,
@@ -133,6 +135,7 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     };
     let outcome = match args.model {
         SimulationModel::Column => column::cured(&shown, args.rays.unwrap_or_default())?,
+        // Options can exclude each other, but not values of others, so this is checked here.
         SimulationModel::Kinetics if args.rays.is_some() => {
             return Err(Exit::usage("--rays is for --model column: leave it out"));
         }
