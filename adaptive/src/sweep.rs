@@ -6,8 +6,8 @@
 //! along x or z.
 //!
 //! Most columns pass one facet at most. There, facets alone give the volume lost and gained,
-//! without rows ([`FacetSums`](crate::facets::FacetSums)). So rows need only add how other columns differ
-//! from that.
+//! without rows ([`FacetSums`](crate::facets::FacetSums)). So rows need only add how other columns
+//! differ from that.
 
 use lamp_slicer::{FillRule, Position, Turn};
 

@@ -2,8 +2,8 @@
 //! and the keys of their results.
 //!
 //! A stage is its settings, a plain struct that serde knows, and its work between a reader and a
-//! writer. [`StageChain`] runs slicing and the stages after it for a range of layers; ranges that are
-//! joined have the bytes of the pipeline typed by hand.
+//! writer. [`StageChain`] runs slicing and the stages after it for a range of layers; ranges
+//! that are joined have the bytes of the pipeline typed by hand.
 
 #![forbid(unsafe_code)]
 

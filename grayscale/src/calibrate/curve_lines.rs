@@ -16,8 +16,8 @@ pub(super) struct LinePoint {
 /// The numbers of the curve `(d + d' x) (ln E - ln(c + c' x))`: `c`, `c'`, `d`, `d'`.
 pub(super) type CurveCoefficients = [f64; 4];
 
-/// The positions in [`CurveCoefficients`] where the lines of the critical dose and of the penetration depth
-/// begin.
+/// The positions in [`CurveCoefficients`] where the lines of the critical dose and of the
+/// penetration depth begin.
 pub(super) const CRITICAL_DOSE: usize = 0;
 pub(super) const PENETRATION_DEPTH: usize = 2;
 

@@ -6,7 +6,9 @@ use rayon::prelude::*;
 
 use crate::calls::{Chain, Mesh, Node};
 use crate::refine::Patch;
-use lamp_brep::{BrepError, BrepFacet, BrepFinding, Fault, KernelModel, MAX_FACETS, Tessellation};
+use lamp_brep::{
+    BrepError, BrepFacet, BrepFinding, FaceFault, KernelModel, MAX_FACETS, Tessellation,
+};
 
 /// A missing index.
 const NONE: u32 = u32::MAX;
@@ -48,8 +50,9 @@ pub(super) fn joined(
     }
     let faults = mesh.faults().iter().map(|bad| (bad.face, fault(bad.status)));
     let of_face = |(face, edges_mm, facets_mm): (u32, f64, f64)| {
-        let edges = (edges_mm > chord_mm).then_some(Fault::Off { off_mm: edges_mm });
-        let facets = (facets_mm > FAR * chord_mm).then_some(Fault::Coarse { off_mm: facets_mm });
+        let edges = (edges_mm > chord_mm).then_some(FaceFault::Off { off_mm: edges_mm });
+        let facets =
+            (facets_mm > FAR * chord_mm).then_some(FaceFault::Coarse { off_mm: facets_mm });
         [edges, facets].into_iter().flatten().map(move |fault| (face, fault))
     };
     let faults = faults.chain(off.into_iter().flat_map(of_face));
@@ -110,13 +113,13 @@ impl Points {
     }
 }
 
-fn fault(status: u32) -> Fault {
+fn fault(status: u32) -> FaceFault {
     if status & CROSSING_WIRE != 0 {
-        Fault::Crossing
+        FaceFault::Crossing
     } else if status & (OPEN_WIRE | MISDIRECTED_WIRE) != 0 {
-        Fault::Broken
+        FaceFault::Broken
     } else {
-        Fault::Missing
+        FaceFault::Missing
     }
 }
 

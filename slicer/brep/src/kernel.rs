@@ -169,13 +169,13 @@ pub struct BrepFinding {
     /// The entity's number in the file.
     pub entity: u64,
     /// The fault.
-    pub fault: Fault,
+    pub fault: FaceFault,
 }
 
 /// A fault of a face.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum FaceFault {
     /// Its loops do not bound a region of its surface.
     #[error("its loops bound nothing")]
     Unbounded,
@@ -237,7 +237,7 @@ pub enum Fault {
     },
 }
 
-impl Fault {
+impl FaceFault {
     /// Returns the distance of a fault, in millimeters, or 0 for faults without one.
     pub fn off_mm(&self) -> f64 {
         match self {

@@ -57,7 +57,9 @@ mod volume;
 pub use body_report::{BodyFault, BodyReport};
 pub use compare::{BodyMeasure, BodyPair, Comparison, KernelDifference, MeasurePair, NamedBody};
 pub use error::BrepError;
-pub use kernel::{Body, BrepFacet, BrepFinding, FaceInfo, Fault, Jet, KernelModel, Tessellation};
+pub use kernel::{
+    Body, BrepFacet, BrepFinding, FaceFault, FaceInfo, Jet, KernelModel, Tessellation,
+};
 pub use notice::{Matter, Notice};
 pub use prepare::{OpenedModel, PreparationAttempt, Prepared, ReadFn, prepare};
 pub use step::{StepError, StepModel, check_syntax, read_step};

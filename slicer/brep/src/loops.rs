@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use crate::kernel::{BrepFinding, Fault};
+use crate::kernel::{BrepFinding, FaceFault};
 use crate::model::{BrepModel, Loop};
 use crate::orient::{neighbours, pieces};
 
@@ -37,7 +37,7 @@ pub(crate) fn reverse_contrary(model: &mut BrepModel) -> Vec<BrepFinding> {
         findings.extend(contrary.into_iter().map(|(face, _)| BrepFinding {
             face: face as u32,
             entity: model.faces[face].entity,
-            fault: Fault::Contrary,
+            fault: FaceFault::Contrary,
         }));
     }
     findings

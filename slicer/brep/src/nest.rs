@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::body_report::{BodyFault, BodyReport};
-use crate::kernel::{Body, BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
+use crate::kernel::{Body, BrepFacet, BrepFinding, FaceFault, KernelModel, Tessellation};
 use crate::rays::{RayHit, RayPoint, SHARES, hits, seen_mm2};
 use crate::volume::facet_volume;
 
@@ -126,7 +126,7 @@ fn turn(
     let finding = |(face, _): (u32, usize)| BrepFinding {
         face,
         entity: kernel.face(face).entity,
-        fault: Fault::Shell,
+        fault: FaceFault::Shell,
     };
     mesh.findings.extend(faces.into_iter().map(finding));
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::body_report::BodyReport;
-use crate::kernel::{Body, BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
+use crate::kernel::{Body, BrepFacet, BrepFinding, FaceFault, KernelModel, Tessellation};
 use crate::measure::{bounds, doubled, sides};
 use crate::vector::{length, middle};
 use crate::volume::facet_volume;
@@ -65,10 +65,10 @@ fn turn(kernel: &dyn KernelModel, mesh: &mut Tessellation, body: &Body, turned: 
     mesh.facets.iter_mut().chain(&mut mesh.tips).filter(is_turned).for_each(BrepFacet::turn_over);
     let finding = |face: u32, fault| BrepFinding { face, entity: kernel.face(face).entity, fault };
     if turned.iter().all(|&turned| turned) {
-        mesh.findings.push(finding(body.faces.start, Fault::InsideOut));
+        mesh.findings.push(finding(body.faces.start, FaceFault::InsideOut));
     } else {
         let faces = body.faces.clone().zip(turned).filter(|(_, turned)| **turned);
-        mesh.findings.extend(faces.map(|(face, _)| finding(face, Fault::Inverted)));
+        mesh.findings.extend(faces.map(|(face, _)| finding(face, FaceFault::Inverted)));
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::body_report::{BodyFault, BodyReport};
 use crate::geometry::HORN_TORUS;
-use crate::kernel::{BrepFacet, BrepFinding, Fault, KernelModel, Tessellation};
+use crate::kernel::{BrepFacet, BrepFinding, FaceFault, KernelModel, Tessellation};
 use crate::measure::{MOST_OFF, bounds, doubled, sides};
 use crate::nest::crossed;
 use crate::vector::{length, scale, sub};
@@ -131,10 +131,10 @@ fn off(
     let faces = facets.first()?.face..=facets.last()?.face;
     let of_body = || mesh.findings.iter().filter(|finding| faces.contains(&finding.face));
     let off = of_body().filter_map(|finding| match finding.fault {
-        Fault::Off { off_mm } | Fault::Rebuilt { off_mm } => {
+        FaceFault::Off { off_mm } | FaceFault::Rebuilt { off_mm } => {
             (off_mm > most_mm).then_some((finding, "edges", off_mm))
         }
-        Fault::Coarse { off_mm } => {
+        FaceFault::Coarse { off_mm } => {
             (off_mm > f64::max(4.0 * mesh.chord_mm, most_mm)).then_some((finding, FACETS, off_mm))
         }
         _ => None,
@@ -142,14 +142,14 @@ fn off(
     let off: Vec<_> = off.collect();
     let alone = |face: u32| {
         !neighbours(facets, face).iter().any(|near| {
-            off.iter().any(|(it, ..)| it.face == *near && matches!(it.fault, Fault::Off { .. }))
+            off.iter().any(|(it, ..)| it.face == *near && matches!(it.fault, FaceFault::Off { .. }))
         })
     };
     let is_local = |(finding, what, off_mm): &(&BrepFinding, &str, f64)| {
         *what == "edges"
             && *off_mm <= LOCAL_OFF * longest_mm
             && face_mm2(mesh, facets, finding.face) * off_mm <= LOCAL_VOLUME * report.volume_mm3
-            && (matches!(finding.fault, Fault::Rebuilt { .. }) || alone(finding.face))
+            && (matches!(finding.fault, FaceFault::Rebuilt { .. }) || alone(finding.face))
     };
     let worst = off.iter().filter(|off| !is_local(off)).max_by(|a, b| a.2.total_cmp(&b.2));
     worst.map(|&(finding, what, off_mm)| BodyFault::Off { entity: finding.entity, what, off_mm })
@@ -187,7 +187,7 @@ fn neighbours(facets: &[BrepFacet], face: u32) -> Vec<u32> {
 fn off_edges_mm(mesh: &Tessellation, face: u32) -> f64 {
     let findings = mesh.findings.iter().filter(|finding| finding.face == face);
     let off = findings.filter_map(|finding| match finding.fault {
-        Fault::Off { off_mm } => Some(off_mm),
+        FaceFault::Off { off_mm } => Some(off_mm),
         _ => None,
     });
     off.fold(0.0, f64::max)

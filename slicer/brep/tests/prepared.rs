@@ -1,6 +1,6 @@
 //! Checks which broken files are healed, and the reason and place given for rejected files.
 
-use lamp_brep::{BodyFault, Fault, Prepared, prepare, read_step};
+use lamp_brep::{BodyFault, FaceFault, Prepared, prepare, read_step};
 use lamp_fixtures::{StepDefect, StepSample, StepUnit, broken_step, step};
 
 /// The block's volume, in cubic millimeters.
@@ -44,7 +44,9 @@ fn edges_that_faces_do_not_share_are_joined() {
         let faces: Vec<u32> = prepared.mesh.findings.iter().map(|finding| finding.face).collect();
         assert_eq!(faces, [0, 1, 2, 3, 4, 5]);
         for finding in &prepared.mesh.findings {
-            let Fault::Joined { joints: 4, off_mm } = finding.fault else { panic!("{finding:?}") };
+            let FaceFault::Joined { joints: 4, off_mm } = finding.fault else {
+                panic!("{finding:?}")
+            };
             assert!((off_mm - f64::from(gap_nm) * 1e-6).abs() < 1e-9, "{gap_nm}: {off_mm}");
         }
     }
@@ -85,7 +87,7 @@ fn an_inverted_face_is_turned_over_and_named() {
     let prepared = broken(StepDefect::Inverted, 0.05);
     assert!((volume_mm3(&prepared) - BLOCK_MM3).abs() < 1e-9);
     let [finding] = &prepared.mesh.findings[..] else { panic!("{:?}", prepared.mesh.findings) };
-    assert_eq!((finding.face, &finding.fault), (2, &Fault::Inverted));
+    assert_eq!((finding.face, &finding.fault), (2, &FaceFault::Inverted));
     assert_eq!(finding.entity, prepared.kernel.face(2).entity);
 }
 
@@ -94,7 +96,7 @@ fn a_body_that_is_inside_out_is_turned_over() {
     let prepared = broken(StepDefect::InsideOut, 0.05);
     assert!((volume_mm3(&prepared) - BLOCK_MM3).abs() < 1e-9);
     let [finding] = &prepared.mesh.findings[..] else { panic!("{:?}", prepared.mesh.findings) };
-    assert_eq!(finding.fault, Fault::InsideOut);
+    assert_eq!(finding.fault, FaceFault::InsideOut);
 }
 
 #[test]
@@ -102,9 +104,9 @@ fn loops_that_cross_themselves_are_named() {
     let prepared = broken(StepDefect::Crossing, 0.05);
     assert!(!prepared.is_good());
     // Bottom and top.
-    let named: Vec<(u32, &Fault)> =
+    let named: Vec<(u32, &FaceFault)> =
         prepared.mesh.findings.iter().map(|finding| (finding.face, &finding.fault)).collect();
-    assert_eq!(named, [(0, &Fault::Crossing), (5, &Fault::Crossing)]);
+    assert_eq!(named, [(0, &FaceFault::Crossing), (5, &FaceFault::Crossing)]);
     let entities = prepared.mesh.findings.iter().map(|finding| finding.entity);
     assert!(entities.eq([0, 5].map(|face| prepared.kernel.face(face).entity)));
 }

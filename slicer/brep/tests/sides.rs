@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use lamp_brep::{
-    BodyFault, Fault, KernelModel, StepModel, Tessellation, check, prepare, read_step,
+    BodyFault, FaceFault, KernelModel, StepModel, Tessellation, check, prepare, read_step,
 };
 use lamp_fixtures::{StepSample, StepUnit, step};
 
@@ -284,7 +284,7 @@ fn a_void_is_a_void_whichever_way_its_shell_points() {
         let (faults, volume_mm3, mesh) = prepared(&text.file(solid));
         assert_eq!(faults, []);
         assert!((volume_mm3 - 936.0).abs() < 1e-9, "{volume_mm3}");
-        let is_turned = mesh.findings.iter().any(|finding| finding.fault == Fault::Shell);
+        let is_turned = mesh.findings.iter().any(|finding| finding.fault == FaceFault::Shell);
         assert_eq!(is_turned, sense == ".T.");
     }
 }
@@ -307,7 +307,8 @@ fn edges_off_their_surfaces_are_moved_onto_them() {
     let (_, whole_mm3, _) = prepared(&text);
     assert_eq!(faults, []);
     assert!((volume_mm3 / whole_mm3 - 1.0).abs() < 1e-4, "{volume_mm3} {whole_mm3}");
-    let is_moved = |fault: &Fault| matches!(fault, Fault::Rebuilt { off_mm } if *off_mm > 0.01);
+    let is_moved =
+        |fault: &FaceFault| matches!(fault, FaceFault::Rebuilt { off_mm } if *off_mm > 0.01);
     assert!(mesh.findings.iter().any(|finding| is_moved(&finding.fault)), "{:?}", mesh.findings);
 }
 

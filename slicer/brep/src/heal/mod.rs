@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use self::edge_curve::EdgeCurve;
 use crate::geometry::edge_range;
-use crate::kernel::{BrepFinding, Fault};
+use crate::kernel::{BrepFinding, FaceFault};
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::Vec3;
 
@@ -38,7 +38,11 @@ pub(crate) fn heal(model: &mut BrepModel, tolerance_mm: f64) -> Vec<BrepFinding>
         for (face, (joints, off_mm)) in healing.joined() {
             let face = body.faces.start + face as u32;
             let entity = model.faces[face as usize].entity;
-            findings.push(BrepFinding { face, entity, fault: Fault::Joined { joints, off_mm } });
+            findings.push(BrepFinding {
+                face,
+                entity,
+                fault: FaceFault::Joined { joints, off_mm },
+            });
         }
     }
     findings

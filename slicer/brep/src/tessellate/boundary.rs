@@ -7,7 +7,7 @@ use super::join::Joining;
 use super::points::{FaceNode, FacePoints, PointRing};
 use super::unwrap::{Unwrapped, between, unwrap};
 use crate::geometry::{Pole, Surface};
-use crate::kernel::Fault;
+use crate::kernel::FaceFault;
 use crate::model::Face;
 
 /// The number of nodes that represent a pole.
@@ -20,14 +20,14 @@ pub(super) fn polygons(
     rings: &[PointRing],
     points: &mut FacePoints,
     chord_mm: f64,
-) -> Result<Vec<Vec<FaceNode>>, Fault> {
+) -> Result<Vec<Vec<FaceNode>>, FaceFault> {
     let poles = face.surface.poles();
     let mut tips = Vec::new();
     let mut loops = Vec::new();
     for (number, ring) in rings.iter().enumerate() {
         match ring {
             PointRing::Point(point) => tips.push(*point),
-            PointRing::Points(None) => return Err(Fault::Broken),
+            PointRing::Points(None) => return Err(FaceFault::Broken),
             PointRing::Points(Some(ring)) => {
                 let unwrapped = unwrap(face, &poles, ring, points, chord_mm);
                 if unwrapped.nodes.is_empty() {
@@ -52,7 +52,7 @@ pub(super) fn polygons(
             let is_left = work.is_left(one, other)?;
             work.joined([one.clone(), other.clone()], is_left, &mut closed)?
         }
-        _ => return Err(Fault::Unbounded),
+        _ => return Err(FaceFault::Unbounded),
     };
     let mut polygons: Vec<Vec<FaceNode>> =
         closed.into_iter().map(|hole| moved_into(hole.nodes, &outer, &face.surface)).collect();
@@ -71,7 +71,7 @@ struct FaceOutline<'a, 'b> {
 impl FaceOutline<'_, '_> {
     /// Removes the outer loop from the loops that do not go around the surface. If there is no
     /// outer loop, makes it from the surface's whole domain.
-    fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, Fault> {
+    fn outer(&mut self, closed: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, FaceFault> {
         let areas: Vec<f64> = closed.iter().map(|hole| area(&hole.nodes)).collect();
         // A hole is smaller than the loop around it.
         let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
@@ -94,9 +94,9 @@ impl FaceOutline<'_, '_> {
     }
 
     /// Returns the polygon of a closed surface that has only holes.
-    fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, Fault> {
+    fn whole(&mut self, holes: &mut Vec<Unwrapped>) -> Result<Vec<FaceNode>, FaceFault> {
         if !self.face.surface.is_closed() {
-            return Err(Fault::Unbounded);
+            return Err(FaceFault::Unbounded);
         }
         let is_left = self.face.along_normal;
         let rings = match self.poles {
@@ -104,7 +104,7 @@ impl FaceOutline<'_, '_> {
             poles => {
                 let mut ends: Vec<Pole> = poles.to_vec();
                 ends.sort_by(|a, b| a.at.total_cmp(&b.at));
-                let [first, last] = ends[..] else { return Err(Fault::Unbounded) };
+                let [first, last] = ends[..] else { return Err(FaceFault::Unbounded) };
                 // The face lies on the left of the least v and of the greatest u.
                 let turn = if (first.axis == 1) == is_left { 1 } else { -1 };
                 [self.ring_at(first, turn), self.ring_at(last, -turn)]
@@ -114,9 +114,9 @@ impl FaceOutline<'_, '_> {
     }
 
     /// Returns both sides of a line around a torus that meets no hole.
-    fn seam(&mut self, holes: &[Unwrapped]) -> Result<[Unwrapped; 2], Fault> {
+    fn seam(&mut self, holes: &[Unwrapped]) -> Result<[Unwrapped; 2], FaceFault> {
         let surface = &self.face.surface;
-        let [Some(u), Some(v)] = surface.domain() else { return Err(Fault::Unbounded) };
+        let [Some(u), Some(v)] = surface.domain() else { return Err(FaceFault::Unbounded) };
         let domain = [u, v];
         let free = |axis: usize| {
             let [low, high] = domain[axis];
@@ -124,7 +124,7 @@ impl FaceOutline<'_, '_> {
             gap(&spans, low, high - low).map(|at| (axis, at))
         };
         // The line is constant in `axis` and goes along the other.
-        let (axis, at) = free(1).or_else(|| free(0)).ok_or(Fault::Unbounded)?;
+        let (axis, at) = free(1).or_else(|| free(0)).ok_or(FaceFault::Unbounded)?;
         let along = 1 - axis;
         let [low, high] = domain[along];
         let place = |t: f64| {
@@ -177,7 +177,7 @@ impl FaceOutline<'_, '_> {
 
     /// Returns the pole to which a face with one loop around the surface reaches, and
     /// whether the face lies on the left of the loop.
-    fn pole_beside(&mut self, around: &Unwrapped) -> Result<(Unwrapped, bool), Fault> {
+    fn pole_beside(&mut self, around: &Unwrapped) -> Result<(Unwrapped, bool), FaceFault> {
         let axis = axis(around)?;
         let across = 1 - axis;
         let middle = mean(around, across);
@@ -197,17 +197,17 @@ impl FaceOutline<'_, '_> {
                     b
                 }
             }
-            _ => return Err(Fault::Unbounded),
+            _ => return Err(FaceFault::Unbounded),
         };
         let is_left = is_on_left(&pole);
         Ok((self.ring_at(pole, -around.turns[axis]), is_left))
     }
 
     /// Returns whether a face between two loops around the surface lies on their left.
-    fn is_left(&self, one: &Unwrapped, other: &Unwrapped) -> Result<bool, Fault> {
+    fn is_left(&self, one: &Unwrapped, other: &Unwrapped) -> Result<bool, FaceFault> {
         let axis = axis(one)?;
         if other.turns.map(|turn| -turn) != one.turns {
-            return Err(Fault::Unbounded);
+            return Err(FaceFault::Unbounded);
         }
         let across = 1 - axis;
         if self.face.surface.periods()[across].is_some() {
@@ -224,7 +224,7 @@ impl FaceOutline<'_, '_> {
         rings: [Unwrapped; 2],
         is_left: bool,
         holes: &mut Vec<Unwrapped>,
-    ) -> Result<Vec<FaceNode>, Fault> {
+    ) -> Result<Vec<FaceNode>, FaceFault> {
         let loops = rings.into_iter().chain(std::mem::take(holes)).collect();
         let joining = Joining::new(&self.face.surface, is_left, loops);
         let (outer, free) = joining.polygon(self.points, self.chord_mm)?;
@@ -234,11 +234,11 @@ impl FaceOutline<'_, '_> {
 }
 
 /// Returns the parameter, 0 for u or 1 for v, around which a loop goes once.
-fn axis(around: &Unwrapped) -> Result<usize, Fault> {
+fn axis(around: &Unwrapped) -> Result<usize, FaceFault> {
     match around.turns {
         [1 | -1, 0] => Ok(0),
         [0, 1 | -1] => Ok(1),
-        _ => Err(Fault::Unbounded),
+        _ => Err(FaceFault::Unbounded),
     }
 }
 

@@ -15,7 +15,7 @@ use super::cells::{Borders, CellScale};
 use super::ears::{Corner, doubled, ears, refine};
 use super::points::{FaceNode, FacePoints, MAX_CELLS};
 use crate::geometry::Surface;
-use crate::kernel::Fault;
+use crate::kernel::FaceFault;
 use crate::model::Face;
 use crate::vector::{Vec3, cross, distance, dot, length, middle, sub, unit};
 
@@ -31,7 +31,7 @@ const MORE: [usize; 2] = [4, 20_000];
 /// The length below which sides are not halved, in cells.
 const LEAST_CELLS: f64 = 1e-3;
 
-type Filled = (Vec<[FaceNode; 3]>, Option<Fault>);
+type Filled = (Vec<[FaceNode; 3]>, Option<FaceFault>);
 
 /// Triangulates a face. Triangles are counterclockwise in its parameters.
 pub(super) fn fill(
@@ -40,11 +40,11 @@ pub(super) fn fill(
     scale: CellScale,
     points: &mut FacePoints,
     chord_mm: f64,
-) -> Result<Filled, Fault> {
+) -> Result<Filled, FaceFault> {
     let cells = scale.count[0] * scale.count[1];
     // `NaN` counts as too many.
     if !matches!(cells.partial_cmp(&MAX_CELLS), Some(Ordering::Less)) {
-        return Err(Fault::Fine { cells });
+        return Err(FaceFault::Fine { cells });
     }
     let mut work = FaceTriangulation {
         surface: &face.surface,
@@ -54,7 +54,7 @@ pub(super) fn fill(
         corners: Vec::new(),
         borders: HashMap::new(),
     };
-    if let Err(Fault::Crossing) = work.add_borders(polygons) {
+    if let Err(FaceFault::Crossing) = work.add_borders(polygons) {
         return crossed(&work, polygons, points);
     }
     work.add_grid(polygons)?;
@@ -68,7 +68,7 @@ fn crossed(
     work: &FaceTriangulation,
     polygons: &[Vec<FaceNode>],
     points: &mut FacePoints,
-) -> Result<Filled, Fault> {
+) -> Result<Filled, FaceFault> {
     let (surface, chord_mm) = (work.surface, work.chord_mm);
     let mut nodes: Vec<FaceNode> = Vec::new();
     let mut rings = Vec::new();
@@ -82,9 +82,9 @@ fn crossed(
     }
     // The time for cutting ears grows with the square of their number.
     if nodes.len() > MOST_CROSSED {
-        return Err(Fault::Crossing);
+        return Err(FaceFault::Crossing);
     }
-    let Some(mut outer) = rings.pop() else { return Err(Fault::Unbounded) };
+    let Some(mut outer) = rings.pop() else { return Err(FaceFault::Unbounded) };
     let is_clockwise = ring_area(&outer) < 0.0;
     if is_clockwise {
         outer.reverse();
@@ -99,7 +99,7 @@ fn crossed(
         (turned_mm2(&triangles, &nodes, &work.scale, points), length_mm(polygons, points));
     // Loops that are this far off overlap at most in a strip as wide, along their whole length.
     if turned > off_mm * around {
-        return Err(Fault::Crossing);
+        return Err(FaceFault::Crossing);
     }
     let most = triangles.len() + MORE[0] * work.cells() + MORE[1];
     let mut places = nodes.iter().map(|node| work.scale.place(node.uv)).collect();
@@ -126,7 +126,7 @@ fn crossed(
         true => refined.sides().map(|[a, b]| apart(a, b)).fold(0.0, f64::max),
         false => 0.0,
     };
-    let coarse = (worst_mm > 4.0 * chord_mm).then_some(Fault::Coarse { off_mm: worst_mm });
+    let coarse = (worst_mm > 4.0 * chord_mm).then_some(FaceFault::Coarse { off_mm: worst_mm });
     let nodes = nodes.into_inner();
     let corners = refined.triangles.into_iter().map(|triangle| triangle.map(|k| nodes[k]));
     Ok((corners.collect(), coarse))
@@ -191,7 +191,7 @@ impl FaceTriangulation<'_> {
         (self.scale.count[0] * self.scale.count[1]) as usize
     }
 
-    fn add_borders(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), Fault> {
+    fn add_borders(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), FaceFault> {
         let mut rings = Vec::new();
         for polygon in polygons {
             let ring: Result<Vec<_>, _> = polygon.iter().map(|node| self.corner(node)).collect();
@@ -202,36 +202,36 @@ impl FaceTriangulation<'_> {
             for (&a, &b) in ring.iter().zip(next).filter(|(a, b)| a != b) {
                 *self.borders.entry(ordered(a, b)).or_default() += 1;
                 if !self.mesh.can_add_constraint(a, b) {
-                    return Err(Fault::Crossing);
+                    return Err(FaceFault::Crossing);
                 }
                 self.mesh.add_constraint(a, b);
                 if !self.mesh.exists_constraint(a, b) {
                     // Another corner lies on the edge.
-                    return Err(Fault::Crossing);
+                    return Err(FaceFault::Crossing);
                 }
             }
         }
         Ok(())
     }
 
-    fn corner(&mut self, node: &FaceNode) -> Result<FixedVertexHandle, Fault> {
+    fn corner(&mut self, node: &FaceNode) -> Result<FixedVertexHandle, FaceFault> {
         let handle = self.insert(self.scale.place(node.uv))?;
         if handle.index() < self.corners.len() {
             // Merging two different points would leave a gap to the neighboring face.
             let is_same = self.corners[handle.index()].point == Some(node.point);
-            return if is_same { Ok(handle) } else { Err(Fault::Crossing) };
+            return if is_same { Ok(handle) } else { Err(FaceFault::Crossing) };
         }
         let place = self.surface.point(node.uv);
         self.corners.push(MeshCorner { uv: node.uv, place, point: Some(node.point) });
         Ok(handle)
     }
 
-    fn insert(&mut self, at: Point2<f64>) -> Result<FixedVertexHandle, Fault> {
-        self.mesh.insert(at).map_err(|_| Fault::Unbounded)
+    fn insert(&mut self, at: Point2<f64>) -> Result<FixedVertexHandle, FaceFault> {
+        self.mesh.insert(at).map_err(|_| FaceFault::Unbounded)
     }
 
     /// Adds a corner inside the face.
-    fn add_inner(&mut self, at: Point2<f64>) -> Result<(), Fault> {
+    fn add_inner(&mut self, at: Point2<f64>) -> Result<(), FaceFault> {
         let handle = self.insert(at)?;
         if handle.index() == self.corners.len() {
             let uv = self.scale.uv(at);
@@ -241,7 +241,7 @@ impl FaceTriangulation<'_> {
     }
 
     /// Adds corners at the corners of cells, away from the polygons.
-    fn add_grid(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), Fault> {
+    fn add_grid(&mut self, polygons: &[Vec<FaceNode>]) -> Result<(), FaceFault> {
         let counts = self.scale.count.map(|count| count.ceil().min(1000.0) as usize);
         // A plane needs no inner corners, and a single row of cells has none.
         if matches!(self.surface, Surface::Plane(_)) || counts.contains(&1) {
@@ -262,7 +262,7 @@ impl FaceTriangulation<'_> {
     }
 
     /// Halves edges until all triangles are near the surface.
-    fn refine(&mut self, points: &FacePoints) -> Result<Option<Fault>, Fault> {
+    fn refine(&mut self, points: &FacePoints) -> Result<Option<FaceFault>, FaceFault> {
         // Facets begin at the points of edges, which may be off the surface.
         for corner in &mut self.corners {
             if let Some(point) = corner.point {
@@ -282,7 +282,7 @@ impl FaceTriangulation<'_> {
                 self.add_inner(at)?;
             }
         }
-        Ok((worst > 4.0 * self.chord_mm).then_some(Fault::Coarse { off_mm: worst }))
+        Ok((worst > 4.0 * self.chord_mm).then_some(FaceFault::Coarse { off_mm: worst }))
     }
 
     /// Returns the places that need more corners, and the greatest distance between the

@@ -8,7 +8,7 @@
 use super::points::{FaceNode, FacePoints};
 use super::unwrap::{Unwrapped, between};
 use crate::geometry::Surface;
-use crate::kernel::Fault;
+use crate::kernel::FaceFault;
 
 /// The greatest number of nodes of a loop from which cuts are tried.
 const ENDS: usize = 48;
@@ -54,10 +54,10 @@ impl<'a> Joining<'a> {
         mut self,
         points: &mut FacePoints,
         chord_mm: f64,
-    ) -> Result<(Vec<FaceNode>, Vec<Unwrapped>), Fault> {
+    ) -> Result<(Vec<FaceNode>, Vec<Unwrapped>), FaceFault> {
         let mut cut = self.cut(0, 1);
         while !self.is_joined[1] {
-            let line = cut.or_else(|| self.nearest()).ok_or(Fault::Unbounded)?;
+            let line = cut.or_else(|| self.nearest()).ok_or(FaceFault::Unbounded)?;
             let NodeLine { ends, shift } = line;
             let [a, b] = ends.map(|(number, k)| self.loops[number].nodes[k].uv);
             let inner = between(self.surface, a, plus(b, shift), chord_mm).into_iter();
@@ -213,11 +213,11 @@ impl<'a> Joining<'a> {
     }
 
     /// Walks along loops and cuts with the face on the same hand.
-    fn walk(&self) -> Result<Vec<FaceNode>, Fault> {
+    fn walk(&self) -> Result<Vec<FaceNode>, FaceFault> {
         let nodes = |number: usize| &self.loops[number].nodes;
         let count = |number: usize| nodes(number).len();
         let start = (0..count(0)).find(|&k| self.cut_at((0, k)).is_none());
-        let start = (0, start.ok_or(Fault::Unbounded)?);
+        let start = (0, start.ok_or(FaceFault::Unbounded)?);
         let joined = (0..self.loops.len()).filter(|&number| self.is_joined[number]);
         let most: usize = joined.map(count).sum();
         let (mut at, mut shift) = (start, [0.0; 2]);
@@ -244,7 +244,7 @@ impl<'a> Joining<'a> {
             }
         }
         // A walk that has not visited all loops has cut the face in two.
-        if at == start { Ok(polygon) } else { Err(Fault::Unbounded) }
+        if at == start { Ok(polygon) } else { Err(FaceFault::Unbounded) }
     }
 
     /// Returns the cut at a node, and whether the node is its first end.

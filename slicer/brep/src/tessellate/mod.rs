@@ -21,7 +21,7 @@ use self::cells::CellScale;
 use self::points::{FaceNode, FacePoints, MAX_CELLS, PointRing};
 use crate::error::BrepError;
 use crate::geometry::edge_range;
-use crate::kernel::{BrepFacet, BrepFinding, Fault, Tessellation};
+use crate::kernel::{BrepFacet, BrepFinding, FaceFault, Tessellation};
 use crate::measure::MOST_OFF;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
 use crate::vector::{Vec3, distance, sub};
@@ -41,15 +41,15 @@ const MAX_POINTS: usize = 5_000_000;
 struct FacePolygons {
     own: Vec<Vec3>,
     /// The polygons, the outer one last, and their scale.
-    inner: Result<(Vec<Vec<FaceNode>>, CellScale), Fault>,
-    faults: Vec<Fault>,
+    inner: Result<(Vec<Vec<FaceNode>>, CellScale), FaceFault>,
+    faults: Vec<FaceFault>,
 }
 
 impl FacePolygons {
     /// Returns the distance of edges from the surface, if it exceeds the limit for facets.
     fn off_mm(&self) -> Option<f64> {
         self.faults.iter().find_map(|fault| match fault {
-            Fault::Off { off_mm } => Some(*off_mm),
+            FaceFault::Off { off_mm } => Some(*off_mm),
             _ => None,
         })
     }
@@ -64,7 +64,7 @@ struct FacePatch {
     own: Vec<Vec3>,
     facets: Vec<BrepFacet>,
     tips: Vec<BrepFacet>,
-    faults: Vec<Fault>,
+    faults: Vec<FaceFault>,
 }
 
 /// Tessellates all faces of a model.
@@ -95,7 +95,7 @@ const FINER: f64 = 1.0 / 16.0;
 
 /// Returns the faces whose loops cross.
 fn crossing(mesh: &Tessellation) -> Vec<usize> {
-    let findings = mesh.findings.iter().filter(|it| matches!(it.fault, Fault::Crossing));
+    let findings = mesh.findings.iter().filter(|it| matches!(it.fault, FaceFault::Crossing));
     findings.map(|finding| finding.face as usize).collect()
 }
 
@@ -202,7 +202,7 @@ fn outlines(
         rebuild::rebuild(model, chains, &off, chord_mm, points).into_iter().collect();
     for (&face, mut outline) in again.iter().zip(made(&again, points)) {
         if let (None, Some(off_mm)) = (outline.off_mm(), outlines[face].off_mm()) {
-            outline.faults.push(Fault::Rebuilt { off_mm });
+            outline.faults.push(FaceFault::Rebuilt { off_mm });
         }
         outlines[face] = outline;
     }
@@ -267,7 +267,7 @@ fn patch(
         if boundary::is_counter_clockwise(&polygons) != face.along_normal {
             // Neighbors share the loops, not the sense flag, so the loops decide.
             outwards = !outwards;
-            faults.push(Fault::Sense);
+            faults.push(FaceFault::Sense);
         }
         faults.extend(coarse);
         Ok(corners)
@@ -325,10 +325,10 @@ fn off(
     polygons: &[Vec<FaceNode>],
     points: &FacePoints,
     sure_mm: f64,
-) -> Option<Fault> {
+) -> Option<FaceFault> {
     let apart = |node: &FaceNode| {
         crate::vector::distance(points.get(node.point), face.surface.point(node.uv))
     };
     let off_mm = polygons.iter().flatten().map(apart).fold(0.0, f64::max);
-    (off_mm > sure_mm).then_some(Fault::Off { off_mm })
+    (off_mm > sure_mm).then_some(FaceFault::Off { off_mm })
 }
