@@ -141,14 +141,14 @@ pub fn now() -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::key::Recipe;
+    use crate::key::TaskRecipe;
 
     #[test]
     fn a_line_that_was_cut_costs_itself_alone() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::create(&folder.path().join("store")).unwrap();
         assert_eq!(events(&store).unwrap(), []);
-        let recipe = Recipe { kind: Kind::Join, options: vec![], inputs: vec![], code: vec![] };
+        let recipe = TaskRecipe { kind: Kind::Join, options: vec![], inputs: vec![], code: vec![] };
         let event = |at: f64| Event {
             at,
             host: host(),

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Everything that decides the bytes of a task's result, and nothing else.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Recipe {
+pub struct TaskRecipe {
     /// The kind of task.
     pub kind: Kind,
     /// Options that matter to bytes, in canonical form.
@@ -48,7 +48,7 @@ impl Kind {
     }
 }
 
-impl Recipe {
+impl TaskRecipe {
     /// Returns the key of the task.
     pub fn key(&self) -> Key {
         // The tag keeps keys of tasks and of notes apart. Its number changes with the form of
@@ -58,7 +58,7 @@ impl Recipe {
     }
 }
 
-/// The key of a task: BLAKE3 of its [`Recipe`]. Equal keys mean equal results.
+/// The key of a task: BLAKE3 of its [`TaskRecipe`]. Equal keys mean equal results.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Key([u8; 32]);
@@ -131,8 +131,8 @@ impl From<Key> for String {
 mod tests {
     use super::*;
 
-    fn recipe() -> Recipe {
-        Recipe {
+    fn recipe() -> TaskRecipe {
+        TaskRecipe {
             kind: Kind::Range,
             options: vec!["slice --dpi 1500".to_owned(), "fix".to_owned()],
             inputs: vec!["blake3:aa".to_owned()],
@@ -149,7 +149,7 @@ mod tests {
         others[2].inputs.push(String::new());
         others[3].code[0].1 = 2;
         others[4].options.swap(0, 1);
-        let mut keys: Vec<_> = others.iter().map(Recipe::key).chain([plain.key()]).collect();
+        let mut keys: Vec<_> = others.iter().map(TaskRecipe::key).chain([plain.key()]).collect();
         keys.sort();
         keys.dedup();
         assert_eq!(keys.len(), 6);

@@ -12,11 +12,11 @@
 //! ```
 //! use std::io::Write;
 //!
-//! use lamp_batch::{Kind, Manifest, Recipe, Store};
+//! use lamp_batch::{Kind, Manifest, TaskRecipe, Store};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! let store = Store::create(&folder.path().join("store"))?;
-//! let recipe = Recipe {
+//! let recipe = TaskRecipe {
 //!     kind: Kind::Range,
 //!     options: vec!["slice --dpi 1500".to_owned()],
 //!     inputs: vec!["blake3:af13...".to_owned()],
@@ -64,7 +64,7 @@ pub use engine::{
 pub use error::BatchError;
 pub use gc::{Removed, collect};
 pub use journal::{Event, Journal, events, host, now};
-pub use key::{Key, KeyError, Kind, Recipe};
+pub use key::{Key, KeyError, Kind, TaskRecipe};
 pub use ledger::{End, Ledger, State};
 pub use named::{NamedTask, NamedTasks};
 pub use night::{Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage};

@@ -11,7 +11,7 @@ use lamp_pipeline::{Survey, stored_name};
 use crate::assignment::{Assignment, Work};
 use crate::commands::{Call, Commands, JOIN_CODE, PACK_CODE, Stages};
 use crate::error::BatchError;
-use crate::key::{Key, Kind, Recipe};
+use crate::key::{Key, Kind, TaskRecipe};
 use crate::night::{Build, Night, Part, Place, Stage};
 use crate::store::{Digests, Store};
 use crate::task::{Cost, Graph, InputFile, Task};
@@ -242,7 +242,7 @@ impl<C: Commands> NightPlanner<'_, C> {
         let mut stack = joined;
         for (which, after) in chained.stages.after.iter().enumerate() {
             let files = self.inputs(after.input_files()?)?;
-            let recipe = Recipe {
+            let recipe = TaskRecipe {
                 kind: Kind::Whole,
                 options: vec![after.canonical()],
                 inputs: inputs_of([stack.to_string()], &files),
@@ -255,7 +255,7 @@ impl<C: Commands> NightPlanner<'_, C> {
             stack = self.add(recipe, &part.name, label, vec![stack], files, cost, work);
         }
         let check = Called::clone(&*self.check_call(part)?);
-        let recipe = Recipe {
+        let recipe = TaskRecipe {
             kind: Kind::Check,
             options: vec![check.options],
             inputs: inputs_of([stack.to_string()], &check.files),
@@ -285,7 +285,7 @@ impl<C: Commands> NightPlanner<'_, C> {
         survey: &Survey,
     ) -> Key {
         let files: Vec<InputFile> = std::iter::once(input).chain(&chained.files).cloned().collect();
-        let recipe = |kind: Kind, cut: Option<&Range<u32>>| Recipe {
+        let recipe = |kind: Kind, cut: Option<&Range<u32>>| TaskRecipe {
             kind,
             options: chained
                 .options
@@ -380,7 +380,7 @@ impl<C: Commands> NightPlanner<'_, C> {
         let needs: Vec<Key> = of_parts.iter().map(|(part, _)| part.stack).collect();
         let copies: Vec<Option<u32>> = of_parts.iter().map(|(_, copies)| *copies).collect();
         let told = copies.iter().map(|copies| copies.map_or("-".to_owned(), |n| n.to_string()));
-        let recipe = Recipe {
+        let recipe = TaskRecipe {
             kind: Kind::Tile,
             options: vec![tile.options, told.collect::<Vec<_>>().join(" ")],
             inputs: inputs_of(needs.iter().map(ToString::to_string), &tile.files),
@@ -398,7 +398,7 @@ impl<C: Commands> NightPlanner<'_, C> {
     #[expect(clippy::too_many_arguments, reason = "they are the fields of a task")]
     fn add(
         &mut self,
-        recipe: Recipe,
+        recipe: TaskRecipe,
         subject: &str,
         label: String,
         needs: Vec<Key>,

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::key::{Key, Recipe};
+use crate::key::{Key, TaskRecipe};
 use crate::path_bytes;
 
 /// A piece of work with one result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The recipe, which decides the bytes of its result.
-    pub recipe: Recipe,
+    pub recipe: TaskRecipe,
     /// The part or build that it is for, as the night file names it.
     pub subject: String,
     /// The work, for people: `layers 0..320`.
@@ -129,7 +129,7 @@ pub(crate) mod tests {
     /// A task with a name, which does nothing and has only needs.
     pub(crate) fn task(name: &str, kind: Kind, needs: &[Key]) -> Task {
         let inputs = needs.iter().map(ToString::to_string).collect();
-        let recipe = Recipe { kind, options: vec![name.to_owned()], inputs, code: Vec::new() };
+        let recipe = TaskRecipe { kind, options: vec![name.to_owned()], inputs, code: Vec::new() };
         Task {
             recipe,
             subject: name.to_owned(),

@@ -205,7 +205,11 @@ impl Reader<'_> {
     fn part_table(&self, table: &DeTable<'_>, known: &[&str]) -> Read<PartTable> {
         let mut read = PartTable::default();
         for (key, value) in table {
-            match key.get_ref().as_ref() {
+            let name = key.get_ref().as_ref();
+            if PART_KEYS.contains(&name) && !known.contains(&name) {
+                return Err(self.at(key, format!("{name} is for one part: move it to a [[part]]")));
+            }
+            match name {
                 "name" => read.name = Some((self.name(value)?, self.place(value.span().start))),
                 "stages" => {
                     let stages = self.list(value)?;

@@ -94,6 +94,11 @@ fn what_is_wrong_is_told_with_its_place() {
             "ranges = 0\nstages =",
             "line 4, column 10: write a whole number from 1 to 1000",
         ),
+        (
+            "stages =",
+            "name = \"a\"\nstages =",
+            "line 4, column 1: name is for one part: move it to a [[part]]",
+        ),
         ("stages =", "stage =", "line 4, column 1: there is no key stage: did you mean stages?"),
         ("file = \"parts/*.stl\"", "fiel = \"a\"", "line 6, column 1: this part has no file"),
         ("parts/*.stl", "parts/*.stp", "line 7, column 8: no file matches parts/*.stp: "),

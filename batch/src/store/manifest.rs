@@ -3,13 +3,13 @@
 use lamp_pipeline::RangeFindings;
 use serde::{Deserialize, Serialize};
 
-use crate::key::Recipe;
+use crate::key::TaskRecipe;
 
 /// The record of a task. The same task always gives the same manifest: times are in the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// The recipe that decided the result.
-    pub recipe: Recipe,
+    pub recipe: TaskRecipe,
     /// The result, if the task has one besides facts.
     pub result: Option<Written>,
     /// Counts and findings of the task.

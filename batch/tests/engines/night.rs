@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lamp_batch::{
-    Cost, Engine, Event, Graph, Key, Kind, Launcher, Ledger, Local, Recipe, State, Store, Task,
+    Cost, Engine, Event, Graph, Key, Kind, Launcher, Ledger, Local, State, Store, Task, TaskRecipe,
     Work as Works, events,
 };
 
@@ -32,7 +32,7 @@ struct Tasks {
 
 fn task(name: String, kind: Kind, needs: &[Key], work: &Work) -> Task {
     Task {
-        recipe: Recipe {
+        recipe: TaskRecipe {
             kind,
             options: vec![name.clone()],
             inputs: needs.iter().map(ToString::to_string).collect(),

@@ -20,7 +20,7 @@ use lamp_stack::{Layer, Pages, StackError};
 
 use crate::args::options::{Common, Output, parse_count};
 use crate::exit::Exit;
-use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::picture::{Picture, PictureRegion, PictureScale};
 use crate::streams::{failed_at, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
@@ -190,12 +190,12 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
     let shown = read(stack, &pictured(layers))?;
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
-        let picture = Picture::new(&layer.image, Region::of(&layer.image), SCALE);
+        let picture = Picture::new(&layer.image, PictureRegion::of(&layer.image), SCALE);
         write_picture(&sheet.with_file_name(name), picture)?;
     }
-    let content = shown.iter().filter_map(|layer| Region::of_content(&layer.image));
+    let content = shown.iter().filter_map(|layer| PictureRegion::of_content(&layer.image));
     // One region for all, so that the pictures show the same place at the same scale.
-    let content = content.reduce(Region::joined).context("the pictured layers are black")?;
+    let content = content.reduce(PictureRegion::joined).context("the pictured layers are black")?;
     let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE));
     write_picture(sheet, Picture::side_by_side(parts.collect()))?;
     Ok(shown.iter().map(|layer| layer.info.index.to_string()).collect::<Vec<_>>().join(", "))
@@ -205,7 +205,7 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
 fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), Exit> {
     let layers = read(stack, &[index])?;
     let Layer { image, .. } = layers.first().context("the pictured layer is not there")?;
-    write_picture(picture, Picture::new(image, Region::of(image), SCALE))
+    write_picture(picture, Picture::new(image, PictureRegion::of(image), SCALE))
 }
 
 /// Some layers of a stack.

@@ -11,7 +11,7 @@ use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order}
 use crate::args::options::EveryNth;
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
-use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::picture::{Picture, PictureRegion, PictureScale};
 use crate::output::thumbnails::{Thumbnail, contact_sheet, write_animation};
 use crate::streams::{failed_at, input_name, is_stream, learning_part, open_pages, write_file};
 use crate::terminal::terminal_picture::TerminalForm;
@@ -37,7 +37,7 @@ pub(crate) struct ShowArgs {
 
     /// Show only this part of the image: left column, top row, width and height in pixels
     #[arg(long, value_name = "X,Y,W,H")]
-    region: Option<Region>,
+    region: Option<PictureRegion>,
 
     /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8 [default: 1; of
     /// several layers, what makes each at most 400 pixels wide and high; in a terminal, what fits
@@ -185,8 +185,8 @@ fn check_size([width, height]: [u64; 2]) -> Result<(), Exit> {
 }
 
 /// Returns the region to show of an image.
-fn region_on(args: &ShowArgs, image: &Image) -> Result<Region, Exit> {
-    let whole = Region::of(image);
+fn region_on(args: &ShowArgs, image: &Image) -> Result<PictureRegion, Exit> {
+    let whole = PictureRegion::of(image);
     args.region.as_ref().unwrap_or(&whole).on(image).ok_or_else(|| {
         let (width, height) = (image.width(), image.height());
         Exit::usage(format!(

@@ -7,7 +7,7 @@ use lamp_fix::{Band, BandOutcome, Fixed};
 use lamp_stack::{FolderBeside, Image, write_rgb_png};
 
 use crate::exit::Exit;
-use crate::output::picture::{Region, levels_of_region};
+use crate::output::picture::{PictureRegion, levels_of_region};
 use crate::streams::new_folder;
 
 /// Rows above and below a band, and columns at its sides, that are shown with it.
@@ -78,14 +78,14 @@ impl BandPictures {
 }
 
 /// Returns the region to show of a band, from a little left of its gap on.
-fn region(image: &Image, band: &Band) -> Region {
+fn region(image: &Image, band: &Band) -> PictureRegion {
     let gap = band.gap.clone().unwrap_or_else(|| band.columns.clone());
     let left = gap.start.min(image.width() - 1).saturating_sub(COLUMNS_AROUND);
     let right = band.columns.end.max(gap.end).saturating_add(COLUMNS_AROUND);
     let [top, bottom] =
         [band.first_row.saturating_sub(ROWS_AROUND), band.end().saturating_add(ROWS_AROUND)];
     let bottom = bottom.min(top.saturating_add(MAX_ROWS));
-    Region {
+    PictureRegion {
         columns: left..right.min(left.saturating_add(MAX_COLUMNS)).min(image.width()),
         rows: top..bottom.min(image.height()),
     }

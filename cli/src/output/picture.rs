@@ -9,12 +9,12 @@ use lamp_stack::{Image, mean_levels, write_gray_png};
 
 /// A rectangle of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Region {
+pub(crate) struct PictureRegion {
     pub(crate) columns: Range<u32>,
     pub(crate) rows: Range<u32>,
 }
 
-impl Region {
+impl PictureRegion {
     /// The whole of an image.
     pub(crate) fn of(image: &Image) -> Self {
         Self { columns: 0..image.width(), rows: 0..image.height() }
@@ -46,7 +46,7 @@ impl Region {
     }
 }
 
-impl FromStr for Region {
+impl FromStr for PictureRegion {
     type Err = String;
 
     /// Parses `X,Y,W,H`: the left column, the top row, width and height.
@@ -78,7 +78,7 @@ const MAX_FACTOR: u32 = 1000;
 
 impl PictureScale {
     /// The width and height of a region's picture, in pixels.
-    pub(crate) fn size(self, region: &Region) -> [u64; 2] {
+    pub(crate) fn size(self, region: &PictureRegion) -> [u64; 2] {
         [region.columns.len() as u64, region.rows.len() as u64].map(|side| match self {
             Self::Up(up) => side * u64::from(up),
             Self::Down(down) => side.div_ceil(down.into()),
@@ -87,7 +87,7 @@ impl PictureScale {
 
     /// Returns the scale, at most 1, at which a region's picture is at most `side` pixels wide
     /// and high, as far as scales go.
-    pub(crate) fn fitting(region: &Region, side: u32) -> Self {
+    pub(crate) fn fitting(region: &PictureRegion, side: u32) -> Self {
         let longer = region.columns.len().max(region.rows.len()) as u32;
         Self::Down(longer.div_ceil(side).clamp(1, MAX_FACTOR))
     }
@@ -119,7 +119,7 @@ pub(crate) struct Picture<'a> {
 impl<'a> Picture<'a> {
     /// A picture of a region, which must lie on the image. It is made row by
     /// row, so a large layer takes little memory.
-    pub(crate) fn new(image: &'a Image, region: Region, scale: PictureScale) -> Self {
+    pub(crate) fn new(image: &'a Image, region: PictureRegion, scale: PictureScale) -> Self {
         let (up, down) = match scale {
             PictureScale::Up(up) => (up, 1),
             PictureScale::Down(down) => (1, down),
@@ -173,7 +173,7 @@ impl<'a> Picture<'a> {
 /// The rows of a region, which must lie on the image, level by level.
 pub(crate) fn levels_of_region<'a>(
     image: &'a Image,
-    region: &Region,
+    region: &PictureRegion,
 ) -> impl Iterator<Item = Vec<u8>> + 'a {
     mean_levels(image, region.columns.clone(), region.rows.clone(), NonZeroU32::MIN)
 }
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn pixels_are_copied_enlarged_and_averaged() {
         let image = image();
-        let all = Region::of(&image);
+        let all = PictureRegion::of(&image);
         let picture = |scale| rows(Picture::new(&image, all.clone(), scale));
         assert_eq!(picture(PictureScale::Up(1)), [[0, 255, 255, 0, 255], [255; 5]]);
         assert_eq!(picture(PictureScale::Up(2))[1], [0, 0, 255, 255, 255, 255, 0, 0, 255, 255]);
@@ -209,21 +209,21 @@ mod tests {
     #[test]
     fn a_region_is_cut_to_the_image() {
         let image = image();
-        let region: Region = "3,1,99,99".parse().unwrap();
+        let region: PictureRegion = "3,1,99,99".parse().unwrap();
         let region = region.on(&image).unwrap();
         assert_eq!(rows(Picture::new(&image, region, PictureScale::Up(1))), [[255, 255]]);
-        assert_eq!("5,0,1,1".parse::<Region>().unwrap().on(&image), None);
+        assert_eq!("5,0,1,1".parse::<PictureRegion>().unwrap().on(&image), None);
         for wrong in ["", "1,2,3", "1,2,0,4", "a,b,c,d", "1,2,3,4,5"] {
-            assert!(wrong.parse::<Region>().is_err(), "{wrong}");
+            assert!(wrong.parse::<PictureRegion>().is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn content_is_found() {
         let mask = Mask::new(9, vec![0, 0, 2, 3, 3], vec![3, 5, 8]).unwrap();
-        let region = Region::of_content(&Image::Mask(mask)).unwrap();
-        assert_eq!(region, Region { columns: 3..9, rows: 1..3 });
-        assert_eq!(Region::of_content(&Image::Mask(Mask::black(9, 9))), None);
+        let region = PictureRegion::of_content(&Image::Mask(mask)).unwrap();
+        assert_eq!(region, PictureRegion { columns: 3..9, rows: 1..3 });
+        assert_eq!(PictureRegion::of_content(&Image::Mask(Mask::black(9, 9))), None);
     }
 
     #[test]
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn a_picture_is_reduced_to_fit() {
         let fitting = |width: u32, height, side| {
-            PictureScale::fitting(&Region { columns: 5..5 + width, rows: 0..height }, side)
+            PictureScale::fitting(&PictureRegion { columns: 5..5 + width, rows: 0..height }, side)
         };
         assert_eq!(fitting(400, 10, 400), PictureScale::Down(1));
         assert_eq!(fitting(401, 10, 400), PictureScale::Down(2));
@@ -252,7 +252,9 @@ mod tests {
         gray.push_runs([(1, 0), (2, 100), (1, 255)]).unwrap();
         let image = Image::Gray(gray);
         let mut png = Vec::new();
-        Picture::new(&image, Region::of(&image), PictureScale::Up(1)).write_png(&mut png).unwrap();
+        Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1))
+            .write_png(&mut png)
+            .unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
         let mut pixels = vec![0; 4];
         reader.next_frame(&mut pixels).unwrap();
@@ -262,7 +264,7 @@ mod tests {
     #[test]
     fn pictures_stand_side_by_side() {
         let image = image();
-        let one = || Picture::new(&image, Region::of(&image), PictureScale::Up(1));
+        let one = || Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1));
         let both = rows(Picture::side_by_side(vec![one(), one()]));
         assert_eq!(both[0][..6], [0, 255, 255, 0, 255, 128]);
         assert_eq!(both[1].len(), 18);

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use lamp_stack::write_rgb_png;
 
-use crate::output::picture::Region;
+use crate::output::picture::PictureRegion;
 
 /// The least that is shown around a region, in pixels, and the share of its size.
 const LEAST_AROUND: u32 = 16;
@@ -24,7 +24,7 @@ pub(crate) trait Shade: Copy + Ord {
 
 /// A picture of a region and what is around it, reduced or enlarged to come near to a size.
 pub(crate) struct ShadedPicture {
-    region: Region,
+    region: PictureRegion,
     down: u32,
     up: u32,
 }
@@ -32,13 +32,13 @@ pub(crate) struct ShadedPicture {
 impl ShadedPicture {
     /// A picture whose longer side has at most `side` pixels, of a region on an image of a width
     /// and a height.
-    pub(crate) fn new(region: Region, [width, height]: [u32; 2], side: u32) -> Self {
+    pub(crate) fn new(region: PictureRegion, [width, height]: [u32; 2], side: u32) -> Self {
         let grow = |range: Range<u32>, end: u32| {
             let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
         };
         let region =
-            Region { columns: grow(region.columns, width), rows: grow(region.rows, height) };
+            PictureRegion { columns: grow(region.columns, width), rows: grow(region.rows, height) };
         let longer = (region.columns.len().max(region.rows.len()) as u32).max(1);
         Self { region, down: longer.div_ceil(side), up: (side / longer).clamp(1, MOST_ENLARGED) }
     }
@@ -50,7 +50,7 @@ impl ShadedPicture {
         out: impl Write,
         mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)),
     ) -> io::Result<()> {
-        let Self { region: Region { columns, rows }, down, up } = self;
+        let Self { region: PictureRegion { columns, rows }, down, up } = self;
         let [width, height] =
             [columns, rows].map(|range| (range.len() as u32).div_ceil(*down) * up);
         let pictured = rows.clone().step_by(*down as usize).flat_map(|first| {

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use lamp_stack::{Layer, write_gray_animation};
 
-use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::picture::{Picture, PictureRegion, PictureScale};
 use lamp_plots::{CAPTION_HEIGHT, caption};
 
 /// The level around thumbnails and behind their captions. Neither black nor white, so that the
@@ -26,7 +26,11 @@ impl Thumbnail {
     ///
     /// # Errors
     /// Returns an error if the layer's name cannot be drawn.
-    pub(crate) fn new(layer: &Layer, region: Region, scale: PictureScale) -> anyhow::Result<Self> {
+    pub(crate) fn new(
+        layer: &Layer,
+        region: PictureRegion,
+        scale: PictureScale,
+    ) -> anyhow::Result<Self> {
         let rows = Picture::new(&layer.image, region, scale).into_rows().collect();
         Ok(Self { rows, caption: caption(&layer.info.name(), BACKGROUND)? })
     }

@@ -6,6 +6,7 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, anyhow};
 
+use crate::args::arguments::words_in_effect;
 use crate::exit::Exit;
 
 /// Set in the environment of the process that does the work.
@@ -35,12 +36,12 @@ pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
             .context("the process that watches over this one")?;
         return Ok(None);
     }
-    let words: Vec<OsString> = env::args_os().collect();
-    if !asks(&words) {
+    // A file of options may ask for it, too.
+    if !asks(words_in_effect()) {
         return Ok(None);
     }
     let program = env::current_exe().context("this program's own file")?;
-    let status = Command::new(program).args(&words[1..]).env(MARK, "1").status();
+    let status = Command::new(program).args(env::args_os().skip(1)).env(MARK, "1").status();
     let status = status.context("a process for OpenCASCADE")?;
     match status.code() {
         Some(code) => Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1)))),

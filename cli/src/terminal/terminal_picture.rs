@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::output::picture::{Picture, PictureScale, Region};
+use crate::output::picture::{Picture, PictureRegion, PictureScale};
 
 /// The width to draw for where the terminal does not report its own, in characters.
 const USUAL_COLUMNS: u32 = 80;
@@ -24,7 +24,7 @@ pub(crate) enum TerminalForm {
 
 impl TerminalForm {
     /// Returns the scale, at most 1, at which a region is as wide as the terminal.
-    pub(crate) fn fitting(self, region: &Region) -> PictureScale {
+    pub(crate) fn fitting(self, region: &PictureRegion) -> PictureScale {
         let across = match self {
             Self::Ascii => columns(),
             Self::Sixel => columns() * COLUMN_PIXELS,

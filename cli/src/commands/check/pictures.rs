@@ -134,7 +134,7 @@ pub(in crate::commands) fn draw(
     shown: &Shown,
 ) -> io::Result<()> {
     let Region { columns, rows } = &shown.region;
-    let region = picture::Region { columns: columns.clone(), rows: rows.clone() };
+    let region = picture::PictureRegion { columns: columns.clone(), rows: rows.clone() };
     let found = shown.pixel.map_or_else(Vec::new, |[column, row]| component_at(layer, column, row));
     let picture = ShadedPicture::new(region, [layer.width(), layer.height()], SIDE);
     picture.write_png(out, |row, paint| {

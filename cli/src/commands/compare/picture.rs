@@ -6,7 +6,7 @@ use lamp_stack::{Difference, Image, Section, white_runs};
 
 use super::walk::{Compared, Images, NamedStack, shift_of};
 use crate::exit::Exit;
-use crate::output::picture::Region;
+use crate::output::picture::PictureRegion;
 use crate::output::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, write_file};
 
@@ -75,9 +75,9 @@ pub(super) fn write_picture(
 }
 
 /// Returns the region around all that differs.
-fn region(difference: Difference) -> Region {
+fn region(difference: Difference) -> PictureRegion {
     let Difference { added, missing } = difference;
-    let regions = [added, missing].map(|mask| Region::of_content(&Image::Mask(mask)));
-    let all = regions.into_iter().flatten().reduce(Region::joined);
+    let regions = [added, missing].map(|mask| PictureRegion::of_content(&Image::Mask(mask)));
+    let all = regions.into_iter().flatten().reduce(PictureRegion::joined);
     all.expect("the layer differs")
 }

@@ -9,7 +9,7 @@ use lamp_planning::{LayerTime, Light, RegionDoses};
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
-use crate::output::picture::Region;
+use crate::output::picture::PictureRegion;
 use lamp_plots::{DoseMap, dose_map};
 
 /// The options of a map.
@@ -26,7 +26,7 @@ pub(super) struct MapOptions {
 
     /// Pixels to map: left column, top row, width, height [default: all]
     #[arg(long, value_name = "X,Y,W,H", requires = "map")]
-    map_region: Option<Region>,
+    map_region: Option<PictureRegion>,
 }
 
 /// The widest and highest map, in voxels.
@@ -75,9 +75,9 @@ impl<'a> LayerMap<'a> {
         let Some(dpi) = layer.dpi else { return Ok(None) };
         self.light.check_spread(dpi)?;
         let (image, name) = (&layer.image, layer.info.name());
-        let all = Region::of(image);
+        let all = PictureRegion::of(image);
         let region = self.options.map_region.as_ref().unwrap_or(&all).on(image);
-        let Some(Region { columns, rows }) = region else {
+        let Some(PictureRegion { columns, rows }) = region else {
             return Err(Exit::usage(format!("--map-region lies outside the image of {name}")));
         };
         if columns.len().max(rows.len()) > MOST {

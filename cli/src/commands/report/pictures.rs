@@ -5,7 +5,7 @@ use lamp_supports::Shown;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::check::draw;
-use crate::output::picture::{self, PictureScale, Region};
+use crate::output::picture::{self, PictureRegion, PictureScale};
 
 /// The longer side of a layer on the sheet, in pixels.
 const SIDE: u32 = 260;
@@ -19,7 +19,7 @@ pub(in crate::commands) struct Picture {
 
 /// Draws a layer. An image without pixels has none.
 pub(in crate::commands) fn of_layer(layer: &Layer) -> Picture {
-    let region = Region::of(&layer.image);
+    let region = PictureRegion::of(&layer.image);
     let mut png = Vec::new();
     if !region.columns.is_empty() && !region.rows.is_empty() {
         let scale = PictureScale::fitting(&region, SIDE);
