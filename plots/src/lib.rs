@@ -1,5 +1,5 @@
 //! Plots as SVG and PNG: curves and measured points, maps of doses and heights, islands over the
-//! sphere of poses, and layouts of builds. Equal plots give equal bytes, on every system: the one
+//! sphere of poses, and layouts of builds; and pictures of layers and of vertical sections. Equal plots give equal bytes, on every system: the one
 //! font comes with the crate.
 //!
 //! ```
@@ -21,7 +21,11 @@ mod caption;
 mod dose_map;
 mod heat_map;
 mod layout;
+mod picture;
+mod section;
+mod shades;
 mod sphere;
+mod thumbnails;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -37,7 +41,11 @@ pub use caption::{CAPTION_HEIGHT, caption};
 pub use dose_map::{DoseMap, dose_map};
 pub use heat_map::{Colors, HeatMap, heat_map};
 pub use layout::layout_picture;
+pub use picture::{Picture, PictureRegion, PictureScale, levels_of_region};
+pub use section::SectionPicture;
+pub use shades::{Shade, ShadedPicture};
 pub use sphere::sphere_picture;
+pub use thumbnails::{Thumbnail, contact_sheet, write_animation};
 
 /// The error of a plot.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +54,9 @@ pub enum PlotError {
     /// The file's name ends in no format of plots.
     #[error("{}: a plot is an SVG or a PNG: end its name in .svg or .png", .0.display())]
     Name(PathBuf),
+    /// A picture has more pixels on a side, across and up, than people look at.
+    #[error("the picture would be {} x {} pixels", .0[0], .0[1])]
+    TooLarge([usize; 2]),
     /// The library that draws refuses what it was given.
     #[error("the picture cannot be drawn: {0}")]
     Drawing(String),

@@ -23,10 +23,10 @@ use crate::args::planning_options::SAMPLE_HEIGHTS;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
-use crate::output::picture::PictureScale;
-use crate::output::section::SectionPicture;
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 use crate::terminal::progress::Progress;
+use lamp_plots::PictureScale;
+use lamp_plots::SectionPicture;
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
@@ -158,7 +158,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let shown = ShownSection::new(&section, outline, args.along.as_ref());
     let panels = SectionPicture(shown.map_err(no_section)?);
     // Before the file is begun: a picture at a wrong scale could fill the disk.
-    panels.check_size(args.scale).map_err(failed)?;
+    panels.check_size(args.scale).map_err(|error| failed(error.into()))?;
     write_file(&args.output, |out| panels.write_png(args.scale, out))?;
     print(&panels.text(&material.name))
 }

@@ -20,9 +20,9 @@ use lamp_stack::{Layer, Pages, StackError};
 
 use crate::args::options::{Common, Output, parse_count};
 use crate::exit::Exit;
-use crate::output::picture::{Picture, PictureRegion, PictureScale};
 use crate::streams::{failed_at, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
+use lamp_plots::{Picture, PictureRegion, PictureScale};
 
 /// Run the whole pipeline on a built-in blade mold, and draw the result
 #[derive(Args)]

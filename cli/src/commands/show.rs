@@ -11,10 +11,10 @@ use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order}
 use crate::args::options::EveryNth;
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
-use crate::output::picture::{Picture, PictureRegion, PictureScale};
-use crate::output::thumbnails::{Thumbnail, contact_sheet, write_animation};
 use crate::streams::{failed_at, input_name, is_stream, learning_part, open_pages, write_file};
 use crate::terminal::terminal_picture::TerminalForm;
+use lamp_plots::{Picture, PictureRegion, PictureScale};
+use lamp_plots::{Thumbnail, contact_sheet, write_animation};
 
 /// Show a layer as a PNG picture or in the terminal, or many on one sheet or as an animation
 ///

@@ -7,8 +7,8 @@ use lamp_fix::{Band, BandOutcome, Fixed};
 use lamp_stack::{FolderBeside, Image, write_rgb_png};
 
 use crate::exit::Exit;
-use crate::output::picture::{PictureRegion, levels_of_region};
 use crate::streams::new_folder;
+use lamp_plots::{PictureRegion, levels_of_region};
 
 /// Rows above and below a band, and columns at its sides, that are shown with it.
 const ROWS_AROUND: u32 = 16;

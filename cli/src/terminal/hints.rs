@@ -20,12 +20,21 @@ use lamp_planning::projector::ProjectorError;
 use lamp_planning::speed::PartError;
 use lamp_planning::target::TargetError;
 use lamp_planning::voxels::VoxelPlanError;
+use lamp_plots::PlotError;
 use lamp_slicer::brep::{BrepError, Matter, StepError};
 use lamp_slicer::topology::NoSolid;
 use lamp_slicer::{SliceError, ThreeMfError};
 use lamp_stack::{CatalogueError, FileFormat, Length, PartFormat, StackError};
 use lamp_supports::SupportError;
 use lamp_view::SurfaceError;
+
+fn plot(error: &PlotError) -> Option<String> {
+    let hint = match error {
+        PlotError::TooLarge(_) => "choose a smaller --scale, or less with --along and --layers",
+        _ => return None,
+    };
+    Some(hint.to_owned())
+}
 
 /// Returns what to try about an error, to stand after its message.
 pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
@@ -55,6 +64,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(timed_part))
         .or_else(|| error.downcast_ref().and_then(job))
         .or_else(|| error.downcast_ref().and_then(learning))
+        .or_else(|| error.downcast_ref().and_then(plot))
         .or_else(|| error.downcast_ref().and_then(strips))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().map(no_solid))
@@ -105,11 +115,11 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::GrayPlane => "slice them with --plane top",
         SliceError::Faulty { .. } => {
             return Some(format!(
-                "lamp brep tells more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
+                "lamp brep reports more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
             ));
         }
         SliceError::KernelsDisagree { .. } => {
-            "lamp brep --both tells more; --kernel lamp or occt slices what one of them reads"
+            "lamp brep --both reports more; --kernel lamp or occt slices what one of them reads"
         }
         SliceError::Brep(BrepError::Step(error)) => return of_step(error),
         SliceError::Timeout { tolerance, .. } => {

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::output::picture::{Picture, PictureRegion, PictureScale};
+use lamp_plots::{Picture, PictureRegion, PictureScale};
 
 /// The width to draw for where the terminal does not report its own, in characters.
 const USUAL_COLUMNS: u32 = 80;

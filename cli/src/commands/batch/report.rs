@@ -15,7 +15,7 @@ use maud::{Markup, PreEscaped, html};
 use super::night_file::NightFile;
 use super::run::counts;
 use super::task::{CheckResult, middle};
-use crate::commands::report::{Picture, document};
+use crate::commands::report::{InlinePicture, document};
 use crate::exit::Exit;
 use crate::streams::write_file;
 use crate::terminal::progress::printable;
@@ -42,7 +42,7 @@ pub(super) fn write(
 ) -> Result<(), Exit> {
     let done = done(plan, store)?;
     let took = took(&done);
-    let pictures: HashMap<usize, (Picture, Vec<String>)> =
+    let pictures: HashMap<usize, (InlinePicture, Vec<String>)> =
         summary.lines().filter_map(|line| Some((line.place, seen(line, plan, store)?))).collect();
     let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
     let content = html! {
@@ -181,7 +181,11 @@ fn table(lines: &[SubjectSummary], took: &HashMap<&str, Took>) -> Markup {
 }
 
 /// Returns the picture of a part or a build, and its findings.
-fn seen(line: &SubjectSummary, plan: &NightPlan, store: &Store) -> Option<(Picture, Vec<String>)> {
+fn seen(
+    line: &SubjectSummary,
+    plan: &NightPlan,
+    store: &Store,
+) -> Option<(InlinePicture, Vec<String>)> {
     let wanted = plan.subjects[line.place].wanted.as_ref().ok()?;
     let Some(check) = wanted.check else {
         store.manifest(wanted.stack)?;

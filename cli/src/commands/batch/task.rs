@@ -12,7 +12,7 @@ use lamp_stack::{IndexedStack, KEY_LAYERS, Page, StackError};
 use serde::{Deserialize, Serialize};
 
 use super::TaskArgs;
-use crate::commands::report::{Picture, of_layer};
+use crate::commands::report::{InlinePicture, of_layer};
 use crate::exit::Exit;
 use crate::stages::after::After;
 use crate::stages::calls::{Checking, Tiling};
@@ -131,11 +131,11 @@ pub(super) struct CheckResult {
     /// A line for each finding, the worst first.
     pub(super) lines: Vec<String>,
     /// A layer in the middle.
-    pub(super) picture: Option<Picture>,
+    pub(super) picture: Option<InlinePicture>,
 }
 
 /// Draws a layer in the middle of a stack: one that stands in the pack by itself.
-pub(super) fn middle(stack: &Path) -> Result<Picture, Exit> {
+pub(super) fn middle(stack: &Path) -> Result<InlinePicture, Exit> {
     let failed = |error: StackError| Exit::Failed(error.into()).at(stack.display().to_string());
     let stack = IndexedStack::open(stack).map_err(failed)?;
     let half = stack.headers().len() / 2;

@@ -10,10 +10,10 @@ use lamp_supports::{FindingRecord, Region, Shown, component_at};
 use super::{CheckArgs, CheckedInput, Input};
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::picture;
-use crate::output::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, in_range, input_name};
 use crate::terminal::progress::Progress;
+use lamp_plots::PictureRegion;
+use lamp_plots::{Shade, ShadedPicture};
 
 /// The most pictures of an input.
 const MOST_PICTURES: usize = 24;
@@ -35,7 +35,7 @@ enum Kind {
 impl Shade for Kind {
     const NONE: Self = Self::Black;
 
-    fn colour(self) -> [u8; 3] {
+    fn color(self) -> [u8; 3] {
         match self {
             Self::Black => [0; 3],
             Self::Below => [90; 3],
@@ -134,7 +134,7 @@ pub(in crate::commands) fn draw(
     shown: &Shown,
 ) -> io::Result<()> {
     let Region { columns, rows } = &shown.region;
-    let region = picture::PictureRegion { columns: columns.clone(), rows: rows.clone() };
+    let region = PictureRegion { columns: columns.clone(), rows: rows.clone() };
     let found = shown.pixel.map_or_else(Vec::new, |[column, row]| component_at(layer, column, row));
     let picture = ShadedPicture::new(region, [layer.width(), layer.height()], SIDE);
     picture.write_png(out, |row, paint| {

@@ -6,9 +6,9 @@ use lamp_stack::{Difference, Image, Section, white_runs};
 
 use super::walk::{Compared, Images, NamedStack, shift_of};
 use crate::exit::Exit;
-use crate::output::picture::PictureRegion;
-use crate::output::shades::{Shade, ShadedPicture};
 use crate::streams::{failed_at, write_file};
+use lamp_plots::PictureRegion;
+use lamp_plots::{Shade, ShadedPicture};
 
 /// The longer side of the picture, in pixels.
 const SIDE: u32 = 1200;
@@ -26,7 +26,7 @@ enum PixelKind {
 impl Shade for PixelKind {
     const NONE: Self = Self::Black;
 
-    fn colour(self) -> [u8; 3] {
+    fn color(self) -> [u8; 3] {
         match self {
             Self::Black => [0; 3],
             Self::White => [150; 3],

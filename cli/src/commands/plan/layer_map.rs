@@ -9,7 +9,7 @@ use lamp_planning::{LayerTime, Light, RegionDoses};
 use lamp_stack::{Layer, Length};
 
 use crate::exit::Exit;
-use crate::output::picture::PictureRegion;
+use lamp_plots::PictureRegion;
 use lamp_plots::{DoseMap, dose_map};
 
 /// The options of a map.

@@ -10,7 +10,7 @@ use lamp_supports::{CheckError, FindingRecord, Findings};
 use serde_json::{Value, json};
 
 use super::measure::{LayerNumbers, new_pixels};
-use super::pictures::{Picture, of_finding, of_layer};
+use super::pictures::{InlinePicture, of_finding, of_layer};
 use crate::exit::Exit;
 use crate::output::stack_facts::StackFacts;
 use crate::terminal::progress::Progress;
@@ -26,7 +26,7 @@ pub(super) struct StackReport {
     pub(super) layers: Vec<LayerNumbers>,
     /// The findings of `lamp check`, or why it cannot check the stack.
     pub(super) found: Result<Found, String>,
-    pub(super) sheet: Vec<Picture>,
+    pub(super) sheet: Vec<InlinePicture>,
     pub(super) time: BuildTime,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Found {
     pub(super) findings: Findings,
     pub(super) records: Vec<FindingRecord>,
     /// Pictures of the worst, each with the number of its record.
-    pub(super) pictures: Vec<(usize, Picture)>,
+    pub(super) pictures: Vec<(usize, InlinePicture)>,
 }
 
 impl Found {
@@ -182,7 +182,7 @@ fn found_text(found: &Found) -> Option<String> {
 fn measured<'a>(
     stack: &'a IndexedStack,
     numbers: &'a RefCell<Vec<LayerNumbers>>,
-    sheet: &'a RefCell<Vec<Picture>>,
+    sheet: &'a RefCell<Vec<InlinePicture>>,
     progress: &'a Progress,
 ) -> impl Iterator<Item = Result<Layer, Exit>> + 'a {
     let count = stack.headers().len();
@@ -220,7 +220,10 @@ fn is_on_sheet(position: usize, count: usize) -> bool {
 }
 
 /// Draws the worst findings, as `lamp check --evidence` does.
-fn drawn(stack: &IndexedStack, records: &[FindingRecord]) -> Result<Vec<(usize, Picture)>, Exit> {
+fn drawn(
+    stack: &IndexedStack,
+    records: &[FindingRecord],
+) -> Result<Vec<(usize, InlinePicture)>, Exit> {
     let shown =
         records.iter().enumerate().filter_map(|(number, record)| Some((number, record.shown()?)));
     let worst = shown.take(MOST_DRAWN).map(|(number, shown)| {

@@ -29,7 +29,7 @@ use lamp_pipeline::documents;
 
 use gather::StackReport;
 pub(super) use page::document;
-pub(super) use pictures::{Picture, of_layer};
+pub(super) use pictures::{InlinePicture, of_layer};
 
 /// Write a page to send about a stack: warnings, numbers, curves, pictures
 ///

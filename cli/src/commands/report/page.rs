@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::charts::{charts, same_thickness_um};
 use super::gather::{Found, StackReport};
-use super::pictures::Picture;
+use super::pictures::InlinePicture;
 use crate::commands::info;
 use crate::terminal::progress::printable;
 
@@ -154,7 +154,7 @@ fn with_signs(line: &str) -> String {
     signs.iter().fold(line.to_owned(), |line, (letters, sign)| line.replace(letters, sign))
 }
 
-fn figure(picture: &Picture) -> Markup {
+fn figure(picture: &InlinePicture) -> Markup {
     html! {
         figure {
             img src=(picture.address) alt=(picture.caption);

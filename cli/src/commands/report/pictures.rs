@@ -5,35 +5,35 @@ use lamp_supports::Shown;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::check::draw;
-use crate::output::picture::{self, PictureRegion, PictureScale};
+use lamp_plots::{PictureRegion, PictureScale};
 
 /// The longer side of a layer on the sheet, in pixels.
 const SIDE: u32 = 260;
 
 /// A PNG as the address of an image, and its caption.
 #[derive(Debug, Serialize, Deserialize)]
-pub(in crate::commands) struct Picture {
+pub(in crate::commands) struct InlinePicture {
     pub(in crate::commands) address: String,
     pub(in crate::commands) caption: String,
 }
 
 /// Draws a layer. An image without pixels has none.
-pub(in crate::commands) fn of_layer(layer: &Layer) -> Picture {
+pub(in crate::commands) fn of_layer(layer: &Layer) -> InlinePicture {
     let region = PictureRegion::of(&layer.image);
     let mut png = Vec::new();
     if !region.columns.is_empty() && !region.rows.is_empty() {
         let scale = PictureScale::fitting(&region, SIDE);
-        let written = picture::Picture::new(&layer.image, region, scale).write_png(&mut png);
+        let written = lamp_plots::Picture::new(&layer.image, region, scale).write_png(&mut png);
         written.expect("memory takes all");
     }
-    Picture { address: address(&png), caption: layer.info.name() }
+    InlinePicture { address: address(&png), caption: layer.info.name() }
 }
 
 /// Draws a finding.
-pub(super) fn of_finding(below: Option<&Mask>, layer: &Mask, shown: &Shown) -> Picture {
+pub(super) fn of_finding(below: Option<&Mask>, layer: &Mask, shown: &Shown) -> InlinePicture {
     let mut png = Vec::new();
     draw(&mut png, below, layer, shown).expect("memory takes all");
-    Picture { address: address(&png), caption: String::new() }
+    InlinePicture { address: address(&png), caption: String::new() }
 }
 
 fn address(png: &[u8]) -> String {

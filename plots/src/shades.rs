@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use lamp_stack::write_rgb_png;
 
-use crate::output::picture::PictureRegion;
+use crate::picture::PictureRegion;
 
 /// The least that is shown around a region, in pixels, and the share of its size.
 const LEAST_AROUND: u32 = 16;
@@ -14,16 +14,16 @@ const SHARE_AROUND: u32 = 4;
 const MOST_ENLARGED: u32 = 8;
 
 /// The kind of a pixel. Of several pixels that share a picture's, the greatest wins.
-pub(crate) trait Shade: Copy + Ord {
+pub trait Shade: Copy + Ord {
     /// The kind that is not painted.
     const NONE: Self;
 
     /// Returns red, green and blue.
-    fn colour(self) -> [u8; 3];
+    fn color(self) -> [u8; 3];
 }
 
 /// A picture of a region and what is around it, reduced or enlarged to come near to a size.
-pub(crate) struct ShadedPicture {
+pub struct ShadedPicture {
     region: PictureRegion,
     down: u32,
     up: u32,
@@ -32,7 +32,7 @@ pub(crate) struct ShadedPicture {
 impl ShadedPicture {
     /// A picture whose longer side has at most `side` pixels, of a region on an image of a width
     /// and a height.
-    pub(crate) fn new(region: PictureRegion, [width, height]: [u32; 2], side: u32) -> Self {
+    pub fn new(region: PictureRegion, [width, height]: [u32; 2], side: u32) -> Self {
         let grow = |range: Range<u32>, end: u32| {
             let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
@@ -45,7 +45,7 @@ impl ShadedPicture {
 
     /// Writes the picture as a PNG. `shade` is called with each row of the image that shows, from
     /// the top, to paint runs of columns.
-    pub(crate) fn write_png<S: Shade>(
+    pub fn write_png<S: Shade>(
         &self,
         out: impl Write,
         mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)),
@@ -67,7 +67,7 @@ impl ShadedPicture {
                     }
                 });
             }
-            let wide = shades.iter().flat_map(|shade| shade.colour().repeat(*up as usize));
+            let wide = shades.iter().flat_map(|shade| shade.color().repeat(*up as usize));
             std::iter::repeat_n(wide.collect::<Vec<u8>>(), *up as usize)
         });
         write_rgb_png(out, width, height, pictured)

@@ -3,4 +3,4 @@
 mod painter;
 mod picture;
 
-pub(crate) use picture::SectionPicture;
+pub use picture::SectionPicture;

@@ -2,23 +2,26 @@
 
 use std::io::{self, Write};
 
-use anyhow::anyhow;
 use lamp_grayscale::PixelLine;
 use lamp_planning::cure_section::ShownSection;
 use lamp_stack::write_rgb_png;
 
 use super::painter::SectionScene;
-use crate::output::picture::PictureScale;
+use crate::PlotError;
+use crate::picture::PictureScale;
 
 /// A section's pictures side by side, and its areas as a table.
-pub(crate) struct SectionPicture(pub(crate) ShownSection);
+pub struct SectionPicture(
+    /// The section.
+    pub ShownSection,
+);
 
 /// Pictures wider or higher than this cannot be looked at.
 const MAX_PICTURE_SIDE: f64 = 50_000.0;
 
 impl SectionPicture {
     /// The areas, as a table.
-    pub(crate) fn text(&self, material: &str) -> String {
+    pub fn text(&self, material: &str) -> String {
         let Self(shown) = self;
         let line = match shown.course.line {
             PixelLine::Row(row) => format!("row {row}"),
@@ -60,20 +63,22 @@ impl SectionPicture {
     }
 
     /// Draws the pictures.
-    pub(crate) fn write_png(&self, scale: PictureScale, out: impl Write) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// Returns the errors of `out`.
+    pub fn write_png(&self, scale: PictureScale, out: impl Write) -> io::Result<()> {
         let scene = self.scene();
         let size = [scene.whole_width(scale), scene.size(scale)[1]].map(|side| side as u32);
         write_rgb_png(out, size[0], size[1], scene.rows(scale))
     }
 
     /// Checks that a picture can be looked at.
-    pub(crate) fn check_size(&self, scale: PictureScale) -> anyhow::Result<()> {
-        let [width, height] = self.scene().size(scale);
-        if width.max(height) as f64 > MAX_PICTURE_SIDE {
-            return Err(anyhow!(
-                "the picture would be {width} x {height} pixels: choose a smaller --scale, or less with --along and --layers"
-            ));
-        }
-        Ok(())
+    ///
+    /// # Errors
+    /// Returns an error if it would be too large.
+    pub fn check_size(&self, scale: PictureScale) -> Result<(), PlotError> {
+        let size = self.scene().size(scale);
+        let is_large = size.iter().any(|&side| side as f64 > MAX_PICTURE_SIDE);
+        if is_large { Err(PlotError::TooLarge(size)) } else { Ok(()) }
     }
 }

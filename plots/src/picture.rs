@@ -9,19 +9,21 @@ use lamp_stack::{Image, mean_levels, write_gray_png};
 
 /// A rectangle of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct PictureRegion {
-    pub(crate) columns: Range<u32>,
-    pub(crate) rows: Range<u32>,
+pub struct PictureRegion {
+    /// The columns.
+    pub columns: Range<u32>,
+    /// The rows.
+    pub rows: Range<u32>,
 }
 
 impl PictureRegion {
     /// The whole of an image.
-    pub(crate) fn of(image: &Image) -> Self {
+    pub fn of(image: &Image) -> Self {
         Self { columns: 0..image.width(), rows: 0..image.height() }
     }
 
     /// Returns the smallest region that contains all but black.
-    pub(crate) fn of_content(image: &Image) -> Option<Self> {
+    pub fn of_content(image: &Image) -> Option<Self> {
         let of_row = |row| {
             let mut runs = image.runs(row);
             let (start, end, _) = runs.next()?;
@@ -33,13 +35,13 @@ impl PictureRegion {
     }
 
     /// Returns the smallest region that contains both.
-    pub(crate) fn joined(self, other: Self) -> Self {
+    pub fn joined(self, other: Self) -> Self {
         let join = |a: Range<u32>, b: Range<u32>| a.start.min(b.start)..a.end.max(b.end);
         Self { columns: join(self.columns, other.columns), rows: join(self.rows, other.rows) }
     }
 
     /// Returns the part of the region that lies on the image, if any.
-    pub(crate) fn on(&self, image: &Image) -> Option<Self> {
+    pub fn on(&self, image: &Image) -> Option<Self> {
         let columns = self.columns.start..self.columns.end.min(image.width());
         let rows = self.rows.start..self.rows.end.min(image.height());
         (!columns.is_empty() && !rows.is_empty()).then_some(Self { columns, rows })
@@ -65,11 +67,12 @@ impl FromStr for PictureRegion {
     }
 }
 
-/// How many picture pixels an image pixel has, or how many image pixels (on a
-/// side) a picture pixel is the mean of.
+/// How much larger or smaller a picture is than its region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PictureScale {
+pub enum PictureScale {
+    /// How many picture pixels an image pixel has on a side.
     Up(u32),
+    /// How many image pixels a picture pixel has on a side.
     Down(u32),
 }
 
@@ -78,7 +81,7 @@ const MAX_FACTOR: u32 = 1000;
 
 impl PictureScale {
     /// The width and height of a region's picture, in pixels.
-    pub(crate) fn size(self, region: &PictureRegion) -> [u64; 2] {
+    pub fn size(self, region: &PictureRegion) -> [u64; 2] {
         [region.columns.len() as u64, region.rows.len() as u64].map(|side| match self {
             Self::Up(up) => side * u64::from(up),
             Self::Down(down) => side.div_ceil(down.into()),
@@ -87,7 +90,7 @@ impl PictureScale {
 
     /// Returns the scale, at most 1, at which a region's picture is at most `side` pixels wide
     /// and high, as far as scales go.
-    pub(crate) fn fitting(region: &PictureRegion, side: u32) -> Self {
+    pub fn fitting(region: &PictureRegion, side: u32) -> Self {
         let longer = region.columns.len().max(region.rows.len()) as u32;
         Self::Down(longer.div_ceil(side).clamp(1, MAX_FACTOR))
     }
@@ -110,16 +113,18 @@ impl FromStr for PictureScale {
 }
 
 /// A gray picture, made row by row.
-pub(crate) struct Picture<'a> {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
+pub struct Picture<'a> {
+    /// Its width in pixels.
+    pub width: u32,
+    /// Its height in pixels.
+    pub height: u32,
     rows: Box<dyn Iterator<Item = Vec<u8>> + 'a>,
 }
 
 impl<'a> Picture<'a> {
     /// A picture of a region, which must lie on the image. It is made row by
     /// row, so a large layer takes little memory.
-    pub(crate) fn new(image: &'a Image, region: PictureRegion, scale: PictureScale) -> Self {
+    pub fn new(image: &'a Image, region: PictureRegion, scale: PictureScale) -> Self {
         let (up, down) = match scale {
             PictureScale::Up(up) => (up, 1),
             PictureScale::Down(down) => (1, down),
@@ -137,21 +142,17 @@ impl<'a> Picture<'a> {
     }
 
     /// A picture of rows of `width` levels.
-    pub(crate) fn from_rows(
-        width: u32,
-        height: u32,
-        rows: impl Iterator<Item = Vec<u8>> + 'a,
-    ) -> Self {
+    pub fn from_rows(width: u32, height: u32, rows: impl Iterator<Item = Vec<u8>> + 'a) -> Self {
         Self { width, height, rows: Box::new(rows) }
     }
 
     /// Returns the rows of levels.
-    pub(crate) fn into_rows(self) -> impl Iterator<Item = Vec<u8>> {
+    pub fn into_rows(self) -> impl Iterator<Item = Vec<u8>> {
         self.rows
     }
 
     /// Pictures of one height side by side, with a gray gutter between.
-    pub(crate) fn side_by_side(pictures: Vec<Self>) -> Self {
+    pub fn side_by_side(pictures: Vec<Self>) -> Self {
         const GUTTER: usize = 8;
         let count = pictures.len() as u32;
         let width = pictures.iter().map(|p| p.width).sum::<u32>() + (count - 1) * GUTTER as u32;
@@ -165,13 +166,13 @@ impl<'a> Picture<'a> {
     }
 
     /// Writes the picture as an 8-bit gray PNG.
-    pub(crate) fn write_png(self, out: impl Write) -> io::Result<()> {
+    pub fn write_png(self, out: impl Write) -> io::Result<()> {
         write_gray_png(out, self.width, self.height, self.rows)
     }
 }
 
 /// The rows of a region, which must lie on the image, level by level.
-pub(crate) fn levels_of_region<'a>(
+pub fn levels_of_region<'a>(
     image: &'a Image,
     region: &PictureRegion,
 ) -> impl Iterator<Item = Vec<u8>> + 'a {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lamp_grayscale::{OutlinePiece, SolidHeights};
 
-use crate::output::picture::PictureScale;
+use crate::picture::PictureScale;
 
 /// Black pixels between two pictures.
 const GAP: usize = 8;
@@ -82,7 +82,7 @@ impl SectionScene<'_> {
                             // itself.
                             let left = here[column.saturating_sub(1)];
                             let is_edge = is_part != left || is_part != below[column];
-                            rgb.extend(colour(is_edge, is_cured, is_part));
+                            rgb.extend(color(is_edge, is_cured, is_part));
                         }
                     }
                     _ => rgb.extend(is_cured.iter().flat_map(
@@ -97,7 +97,7 @@ impl SectionScene<'_> {
     }
 }
 
-fn colour(is_edge: bool, is_cured: bool, is_part: bool) -> [u8; 3] {
+fn color(is_edge: bool, is_cured: bool, is_part: bool) -> [u8; 3] {
     match (is_edge, is_cured, is_part) {
         (true, ..) => OUTLINE,
         (_, true, true) => CURED,

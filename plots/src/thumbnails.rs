@@ -4,8 +4,9 @@ use std::io::{self, Write};
 
 use lamp_stack::{Layer, write_gray_animation};
 
-use crate::output::picture::{Picture, PictureRegion, PictureScale};
-use lamp_plots::{CAPTION_HEIGHT, caption};
+use crate::PlotError;
+use crate::caption::{CAPTION_HEIGHT, caption};
+use crate::picture::{Picture, PictureRegion, PictureScale};
 
 /// The level around thumbnails and behind their captions. Neither black nor white, so that the
 /// edges of images show.
@@ -16,7 +17,7 @@ const GUTTER: usize = 12;
 const SHEET_ASPECT: f64 = 1.4;
 
 /// A small picture of a layer and its name.
-pub(crate) struct Thumbnail {
+pub struct Thumbnail {
     rows: Vec<Vec<u8>>,
     caption: Vec<Vec<u8>>,
 }
@@ -26,11 +27,11 @@ impl Thumbnail {
     ///
     /// # Errors
     /// Returns an error if the layer's name cannot be drawn.
-    pub(crate) fn new(
+    pub fn new(
         layer: &Layer,
         region: PictureRegion,
         scale: PictureScale,
-    ) -> anyhow::Result<Self> {
+    ) -> Result<Self, PlotError> {
         let rows = Picture::new(&layer.image, region, scale).into_rows().collect();
         Ok(Self { rows, caption: caption(&layer.info.name(), BACKGROUND)? })
     }
@@ -70,7 +71,7 @@ impl CellSize {
 }
 
 /// Puts thumbnails on a sheet, row by row from the top left.
-pub(crate) fn contact_sheet(thumbnails: Vec<Thumbnail>) -> Picture<'static> {
+pub fn contact_sheet(thumbnails: Vec<Thumbnail>) -> Picture<'static> {
     let cell = CellSize::of(&thumbnails);
     let (cell_width, cell_height) = (cell.width + GUTTER, cell.height_with_caption() + GUTTER);
     // Columns c and rows n / c with c · width = aspect · height · n / c: c is the root of this.
@@ -100,7 +101,7 @@ pub(crate) fn contact_sheet(thumbnails: Vec<Thumbnail>) -> Picture<'static> {
 }
 
 /// Writes thumbnails as an animated PNG.
-pub(crate) fn write_animation(
+pub fn write_animation(
     thumbnails: &[Thumbnail],
     per_second: u16,
     out: impl Write,
