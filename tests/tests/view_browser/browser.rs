@@ -122,7 +122,13 @@ impl Browser {
     /// Goes to a view, as a link does.
     #[track_caller]
     pub(crate) fn go(&self, hash: &str) {
-        self.run("location.hash = arguments[0]", vec![json!(hash)]);
+        // The page takes the view in an event: a click before it would be undone by it.
+        let script = "const [hash, done] = arguments;
+             if (location.hash === hash) return done(true);
+             addEventListener('hashchange', () => setTimeout(() => done(true)), { once: true });
+             location.hash = hash;";
+        let went = self.client().execute_async(script, vec![json!(hash)]);
+        self.runtime.block_on(went).unwrap();
         self.settle();
     }
 
