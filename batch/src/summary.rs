@@ -21,7 +21,7 @@ pub struct Summary {
 pub struct SubjectSummary {
     /// The name in the night file.
     pub name: String,
-    /// What has become of it.
+    /// Its state.
     pub state: SubjectState,
     /// Why it failed or waits, or what a person should look at.
     pub why: Option<String>,

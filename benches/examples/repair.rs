@@ -41,7 +41,7 @@ const METHODS: [(&str, Method); 4] = [
         fixed(layers, FixOptions { method: FixMethod::Nearest, ..UNRESTRAINED })
     }),
     ("spline, every band", |layers| fixed(layers, UNRESTRAINED)),
-    ("spline with neighbours, every band", |layers| {
+    ("spline with neighbors, every band", |layers| {
         fixed(layers, FixOptions { use_neighbours: true, ..UNRESTRAINED })
     }),
     ("spline, default limits", |layers| fixed(layers, FixOptions::default())),

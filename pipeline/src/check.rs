@@ -1,4 +1,4 @@
-//! What a check looks for in a stack.
+//! The settings of a check.
 
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::words::{list, optional, path, text, words_of};
 /// Changes when other findings come of the same settings and stack.
 pub const CODE: u32 = 1;
 
-/// What to look for.
+/// The findings to look for, and their limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct CheckSettings {

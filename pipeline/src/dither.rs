@@ -58,7 +58,7 @@ fn unevenness(dpi: Dpi) -> Option<String> {
     };
     let [pitch, even, uneven] = [pitch, EVEN_DOTS, UNEVEN_DOTS].map(short);
     Some(format!(
-        "dots are as wide as pixels, {pitch} um; dots of {even} um cured evenly, those of \
+        "dots are as wide as pixels, {pitch} um; dots of {even} um cured evenly, dots of \
          {uneven} um did not; {fear}"
     ))
 }
@@ -83,7 +83,7 @@ mod tests {
         let unknown = told(1000.0).unwrap();
         let uneven = told(300.0).unwrap();
         assert!(unknown.contains("pixels, 25.4 um; dots of 17 um cured evenly"), "{unknown}");
-        assert!(unknown.contains("those of 85 um did not; sizes between"), "{unknown}");
+        assert!(unknown.contains("dots of 85 um did not; sizes between"), "{unknown}");
         assert!(uneven.contains("pixels, 84.7 um") && uneven.contains("spots"), "{uneven}");
     }
 }

@@ -26,7 +26,7 @@ pub(crate) fn overlap_text(
     };
     let then = match cancels {
         false => "they unite",
-        true => "what lies in both cancels out, or unites without --bodies xor",
+        true => "their common volume cancels out, or unites without --bodies xor",
     };
     let pair = pair_name(worst, part.prepared_of(worst.file));
     let place = match files {

@@ -135,7 +135,7 @@ pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
 /// Returns a sentence if the text is no move.
 pub fn parse_translation(text: &str) -> Result<FiniteNumbers<3>, String> {
     let wrong =
-        || format!("`{text}` is not a translation: write X,Y,Z in millimetres, as -5,0,12.7");
+        || format!("`{text}` is not a translation: write X,Y,Z in millimeters, as -5,0,12.7");
     // Lengths of other options have units, so people add one here, too.
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }

@@ -78,10 +78,10 @@ impl PartSize {
 
 fn plural(unit: Units) -> &'static str {
     match unit {
-        Units::Millimetres => "millimetres",
-        Units::Centimetres => "centimetres",
-        Units::Metres => "metres",
-        Units::Micrometres => "micrometres",
+        Units::Millimetres => "millimeters",
+        Units::Centimetres => "centimeters",
+        Units::Metres => "meters",
+        Units::Micrometres => "micrometers",
         Units::Inches => "inches",
         Units::Feet => "feet",
     }
@@ -112,12 +112,12 @@ mod tests {
             (
                 [0.076, 0.076, 0.127],
                 Units::Millimetres,
-                "0.076 x 0.076 x 0.127 mm, smaller than any casting: if its file is in metres, give --units m",
+                "0.076 x 0.076 x 0.127 mm, smaller than any casting: if its file is in meters, give --units m",
             ),
             (
                 [0.0076, 0.0076, 0.1],
                 Units::Millimetres,
-                "smaller than any casting: if its file is in metres, give --units m",
+                "smaller than any casting: if its file is in meters, give --units m",
             ),
             (
                 [1.0, 1.5, 0.1],
@@ -127,12 +127,12 @@ mod tests {
             (
                 [76e3, 76e3, 127e3],
                 Units::Millimetres,
-                "76000 x 76000 x 127000 mm, larger than any machine builds: if its file is in micrometres, give --units um",
+                "76000 x 76000 x 127000 mm, larger than any machine builds: if its file is in micrometers, give --units um",
             ),
             (
                 [1930.4, 1930.4, 3225.8],
                 Units::Inches,
-                "if its file is in millimetres, give --units mm",
+                "if its file is in millimeters, give --units mm",
             ),
             ([50.0, 50.0, 0.2], Units::Millimetres, "only 2 layers: check --units"),
         ] {

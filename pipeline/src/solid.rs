@@ -99,7 +99,7 @@ impl SolidSettings {
     pub fn overlap_doubt(&self, parts: &[PartFile], found: Option<[usize; 2]>) -> Option<String> {
         let [a, b] = found.filter(|_| self.fill == Fill::EvenOdd)?.map(|file| parts[file].name());
         Some(format!(
-            "the bounding boxes of {a} and {b} overlap: what lies in both cancels out, or unites \
+            "the bounding boxes of {a} and {b} overlap: their common volume cancels out, or unites \
              with --fill solid"
         ))
     }

@@ -166,7 +166,7 @@ impl DoseSection {
     /// # Panics
     /// Panics if they are computed elsewhere.
     pub fn cured_by_height(&self) -> Vec<SolidHeights> {
-        assert_eq!(self.light.at, SampleHeight::Top, "doses are those of the tops");
+        assert_eq!(self.light.at, SampleHeight::Top, "doses are at the tops");
         let depth_um = self.light.penetration_depth.um();
         let mut cured = Vec::new();
         self.for_each_layer(|number, doses| {

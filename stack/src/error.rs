@@ -148,7 +148,7 @@ pub enum StackError {
     NoPages,
     /// A folder has pages of two formats.
     #[error(
-        "the folder holds {} and {} pages: keep those that are the stack, and move the others away", formats[0], formats[1]
+        "the folder holds {} and {} pages: keep the pages of the stack, and move the others away", formats[0], formats[1]
     )]
     MixedPages {
         /// The formats' names.
@@ -353,7 +353,7 @@ pub enum UnsupportedFeature {
     #[error("a picture of 16 bits")]
     SixteenBits,
     /// A picture with a pixel that is not gray.
-    #[error("a picture in colour")]
+    #[error("a picture in color")]
     Colour,
     /// A picture file with several images, such as an animation.
     #[error("a picture file of several images")]

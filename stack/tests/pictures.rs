@@ -142,7 +142,7 @@ fn what_is_not_gray_is_refused() {
         if format == ImageFormat::Pnm {
             colour = colour.to_rgb8().into();
         }
-        assert!(refused(&colour, format).contains("a picture in colour"), "{format:?}");
+        assert!(refused(&colour, format).contains("a picture in color"), "{format:?}");
     }
     let clear = coloured([0, 0, 0, 0xFF]).into();
     for format in [ImageFormat::Gif, ImageFormat::WebP, ImageFormat::Bmp] {

@@ -75,7 +75,7 @@ fn one_bit_pngs_are_masks() {
     let error = palette(&[0, 0, 0]).unwrap_err().to_string();
     assert!(error.contains("palette has no entry 1"), "{error}");
     let error = palette(&[0, 0, 0, 255, 0, 0]).unwrap_err().to_string();
-    assert!(error.contains("a picture in colour is not read"), "{error}");
+    assert!(error.contains("a picture in color is not read"), "{error}");
 }
 
 #[test]
@@ -125,8 +125,8 @@ fn what_is_not_read_is_named() {
     let eight = |colour| (colour, BitDepth::Eight);
     let clear = |encoder: &mut Encoder<'_, &mut Vec<u8>>| encoder.set_trns(vec![0, 1]);
     for (file, words) in [
-        (png(1, eight(ColorType::Rgb), &[1, 1, 3], 1, |_| {}), "a picture in colour"),
-        (png(1, eight(ColorType::Rgba), &[1, 3, 1, 255], 1, |_| {}), "a picture in colour"),
+        (png(1, eight(ColorType::Rgb), &[1, 1, 3], 1, |_| {}), "a picture in color"),
+        (png(1, eight(ColorType::Rgba), &[1, 3, 1, 255], 1, |_| {}), "a picture in color"),
         (png(1, eight(ColorType::Rgba), &[1, 1, 1, 254], 1, |_| {}), "transparency"),
         (png(1, eight(ColorType::GrayscaleAlpha), &[1, 1], 1, |_| {}), "transparency"),
         (animated(), "a picture file of several images"),

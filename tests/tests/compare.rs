@@ -130,7 +130,7 @@ fn edges_within_the_tolerance_are_forgiven_and_gaps_are_not() {
         status_and_text(&ran),
         (
             Some(0),
-            "a.tif and c.tif are the same at 2 heights, but for 20 pixels that the tolerance forgives\n"
+            "a.tif and c.tif are the same at 2 heights, except 20 pixels that the tolerance forgives\n"
         )
     );
     assert_eq!(self::status(&scratch.run("lamp compare a.tif c.tif --tolerance 0.9px")), Some(1));

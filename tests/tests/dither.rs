@@ -80,7 +80,7 @@ fn pixels_too_wide_to_cure_evenly_are_told_of_once() {
     assert_eq!(even.run("dither gray.tif -o dots.tif").succeeds().stderr, "");
     for (dpi, words) in [
         (1000.0, ["25.4 um", "dots of 17 um cured evenly", "sizes between are untested"]),
-        (300.0, ["84.7 um", "those of 85 um did not", "will cure as spots"]),
+        (300.0, ["84.7 um", "dots of 85 um did not", "will cure as spots"]),
     ] {
         let scratch = with_gray_stack(dpi);
         let ran = scratch.run("dither gray.tif -o dots.tif").succeeds();

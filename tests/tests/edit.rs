@@ -521,7 +521,7 @@ fn a_build_keeps_what_is_not_in_its_copies() {
     // Nothing is lost outside the image.
     scratch
         .run("lamp edit cube.tif --union torus.tif -o x.tif")
-        .is_refused_with(&["beside its image", "pad"]);
+        .is_refused_with(&["beyond its image", "pad"]);
     // Without metadata in the stack, the build still records the copies' places.
     let mut plain = scratch.layers("cube.tif");
     plain[0].info.stack = None;

@@ -287,7 +287,7 @@ fn stages_read_folders_of_pictures_and_meshes_their_templates() {
     scratch.run("dither gif -o x.tif").is_refused_with(&["gif: ", "GIF and JPEG pages"]);
     let red = RgbImage::from_pixel(9, 9, [200, 0, 0].into());
     red.save(scratch.path("red.bmp")).unwrap();
-    let words = ["red.bmp: ", "a picture in colour is not read here"];
+    let words = ["red.bmp: ", "a picture in color is not read here"];
     scratch.run("tile cube.tif --mesh red.bmp -o x.tif").is_refused_with(&words);
 }
 

@@ -105,8 +105,8 @@ fn a_wrong_unit_is_told() {
     scratch.run(&format!("slice ball.stl {COARSE} -o out.tif")).succeeds_quietly();
     let expected = scratch.layers("out.tif");
     for (unit, per_mm, words) in [
-        ("m", 0.001, "smaller than any casting: if its file is in metres, give --units m"),
-        ("um", 1000.0, "larger than any machine builds: if its file is in micrometres"),
+        ("m", 0.001, "smaller than any casting: if its file is in meters, give --units m"),
+        ("um", 1000.0, "larger than any machine builds: if its file is in micrometers"),
     ] {
         scratch.mesh("part.stl", &ball.map(|corner| corner.map(|c| c * per_mm)));
         let line = format!("slice part.stl {COARSE} --layers 0..2 -o out.tif");

@@ -31,7 +31,7 @@ fn without_lamp_a_stage_says_so() {
         assert_eq!((ran.status.code(), &ran.stdout[..]), (Some(1), &b""[..]), "{stage}");
         assert_eq!(
             String::from_utf8_lossy(&ran.stderr),
-            format!("{stage}: the program lamp is neither beside it nor in PATH\n")
+            format!("{stage}: the program lamp is neither next to it nor in PATH\n")
         );
     }
 }

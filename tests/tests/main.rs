@@ -5,6 +5,7 @@ mod batch;
 mod batch_engines;
 mod batch_kills;
 mod bodies;
+mod book;
 mod broken_pipes;
 mod build_report;
 mod calibrate;
@@ -45,7 +46,9 @@ mod orient;
 mod other_readers;
 mod pack;
 mod pipeline;
+
 mod placement;
+mod plain_words;
 mod plan;
 mod plan_column_cure;
 mod plan_ecpl;

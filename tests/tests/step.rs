@@ -276,7 +276,7 @@ fn kernels_that_disagree_stop_the_slicer() {
     assert!(text.contains("differs:    body 1") && text.contains("its volume is"), "{text}");
     scratch
         .run("slice part.step --kernel both -o part.tif")
-        .is_refused_with(&["the kernels disagree about body 1", "lamp brep --both tells more"]);
+        .is_refused_with(&["the kernels disagree about body 1", "lamp brep --both reports more"]);
     assert_eq!(scratch.names(), ["part.step"]);
     scratch.run("slice part.step --dpi 100 -o part.tif").succeeds();
 }

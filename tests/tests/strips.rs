@@ -294,7 +294,7 @@ fn strips_that_do_not_belong_together_are_named() {
     with("strips.json", index.replace("65", "99").as_bytes());
     refused(&["strip_000.tif", "18 layers that strips.json lists are missing"]);
     with("strips.json", index.replace("65", "81").replace("[236, 236]", "[236, 235]").as_bytes());
-    refused(&["layer 0", "not those of such a layer"]);
+    refused(&["layer 0", "do not make up such a layer"]);
     with("more", b"");
     fs::remove_file(scratch.path("s/strip_001.tif")).unwrap();
     refused(&["strip_001.tif", "No such file"]);

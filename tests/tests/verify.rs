@@ -134,7 +134,7 @@ fn a_page_that_libtiff_left_out_is_missed_by_every_reader() {
     if !copy(7, "seven.tif") || !copy(19, "last.tif") || !copy(0, "first.tif") {
         return;
     }
-    let missing = "layer 19: the pages before it are not those that were written: there is nothing \
+    let missing = "layer 19: the pages before it are not the pages that were written: there is nothing \
                    between layer 6 and layer 8";
     let ran = scratch.run("fix seven.tif | tile -o build.tif");
     assert_eq!(ran.statuses, [Some(1), Some(1)], "{ran:?}");

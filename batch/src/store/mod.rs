@@ -85,7 +85,7 @@ pub enum Damage {
     #[error("it has no whole manifest")]
     NoManifest,
     /// The manifest stands under another key.
-    #[error("its manifest is that of another task")]
+    #[error("its manifest belongs to another task")]
     OtherTask,
     /// The result is not there.
     #[error("its file is gone")]

@@ -35,7 +35,7 @@ pub(crate) fn write_lightly(path: &Path, value: &impl Serialize) -> io::Result<(
 }
 
 fn sealed(value: &impl Serialize) -> Vec<u8> {
-    let line = serde_json::to_string(value).expect("what is kept has text keys");
+    let line = serde_json::to_string(value).expect("kept values have text keys");
     let seal = blake3::hash(line.as_bytes()).to_hex();
     format!("{line}\n{seal}\n").into_bytes()
 }

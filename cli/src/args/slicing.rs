@@ -194,6 +194,6 @@ impl TryFrom<&SliceStageArgs> for SliceStage {
 
 /// Parses `X,Y` in millimeters.
 fn parse_origin(text: &str) -> Result<FiniteNumbers<2>, String> {
-    let wrong = || format!("`{text}` is not a point: write X,Y in millimetres, as -1,77.2");
+    let wrong = || format!("`{text}` is not a point: write X,Y in millimeters, as -1,77.2");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }

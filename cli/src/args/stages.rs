@@ -24,7 +24,7 @@ use crate::args::options::{one_of_described, parse_distance, parse_thickness};
 pub(crate) struct FixStageArgs {
     /// Source of the missing crossings
     #[arg(long, default_value_t, value_parser = one_of_described::<FixMethod>(&[
-        "What the good rows above and below share; edges of wide bands become steps",
+        "The pixels that the good rows above and below share; edges of wide bands become steps",
         "Smooth curves along the part's contours",
     ]))]
     method: FixMethod,
@@ -90,7 +90,7 @@ pub(crate) struct DitherStageArgs {
     method: DitherMethod,
 }
 
-/// What a check looks for.
+/// The findings to look for, and their limits.
 #[derive(Args, Clone)]
 pub(crate) struct CheckStageArgs {
     /// Kinds of findings to report
@@ -100,7 +100,7 @@ pub(crate) struct CheckStageArgs {
         "White that rests on little",
         "Black without a way out",
         "White far from the white below",
-        "Centres of gravity off their base",
+        "Centers of gravity off their base",
         "Stray rows, white at the border, empty layers",
     ]))]
     only: Vec<FindingGroup>,

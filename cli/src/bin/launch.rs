@@ -16,7 +16,7 @@ pub(crate) fn launch(stage: &str) -> ExitCode {
     lamp.args(words).env("LAMP_STAGE", stage);
     let error = become_it(&mut lamp, name);
     let why = match error.kind() {
-        io::ErrorKind::NotFound => "the program lamp is neither beside it nor in PATH".to_owned(),
+        io::ErrorKind::NotFound => "the program lamp is neither next to it nor in PATH".to_owned(),
         _ => format!("the program lamp does not start: {error}"),
     };
     // There is nobody left to read it if it cannot be printed.

@@ -41,7 +41,7 @@ const REFUSED: [(&str, &str); 18] = [
     ("force", "leave out --force: nothing that stands is replaced"),
     ("report", "leave out --report: findings stand with the results"),
     ("evidence", "leave out --evidence: run this stage by hand for pictures of its findings"),
-    ("strict", "leave out --strict: findings are told, and decide the status at the end"),
+    ("strict", "leave out --strict: findings are reported, and decide the status at the end"),
     ("layers", "leave out --layers: a part is cut into ranges of layers by itself"),
     ("options", "leave out --options: write its options into the stage"),
     ("plan", "leave out --plan: run lamp support by hand for its plan"),
@@ -220,7 +220,7 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
         return Err((*why).to_owned());
     }
     if is_given("stacks") || is_given("inputs") {
-        return Err("leave out the stacks: what it works on is known".to_owned());
+        return Err("leave out the stacks: its input is known".to_owned());
     }
     // Left out, it is `-`, which means the stage before.
     if ids.contains(&"stack")

@@ -16,7 +16,7 @@ Stacks:
   view        look at layers in a browser    show        draw layers
   check       find islands and pockets       support     hold islands
   info        describe a stack               report      write a page to send
-  verify      prove that it is whole         compare     tell where two differ
+  verify      check it for damage            compare     show where two differ
   join        join ranges of layers          split       split into ranges
   convert     write in another form          pack        make it small
 Parts, resins and machines:

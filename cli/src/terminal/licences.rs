@@ -24,7 +24,7 @@ pub(crate) fn licences() -> String {
     format!(
         "lamp {version} (MIT OR Apache-2.0)\n\n{own}\n\n\
          {RULE}\nRoboto 2.138 (Apache-2.0), https://github.com/googlefonts/roboto-2\n\n\
-         Copyright Google. The terms are those of ab_glyph, below.\n\n\
+         Copyright Google. The terms are the terms of ab_glyph, below.\n\n\
          {RULE}\n{page}\n\n{CRATES}"
     )
 }

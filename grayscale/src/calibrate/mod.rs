@@ -143,7 +143,7 @@ pub enum FitError {
     },
     /// The slope might be zero.
     #[error(
-        "the points scatter too much to tell how the dose acts: \
+        "the points scatter too much to show how the dose acts: \
          the slope is {} +- {} {unit}; measure more points or a wider range of doses",
         short(*slope),
         short(*half)
@@ -165,7 +165,7 @@ pub enum FitError {
     Level(f64),
     /// The interval of a number that must be above zero reaches zero.
     #[error(
-        "the points do not tell {what}: {} +- {} {unit} reaches zero; \
+        "the points do not determine {what}: {} +- {} {unit} reaches zero; \
          measure more doses, and several films of each",
         short(*value),
         short(*half)
@@ -189,13 +189,13 @@ pub enum FitError {
     NoCriticalDose(f64),
     /// Only the highest dose makes squares grow, which determines no line.
     #[error(
-        "squares grow at the highest dose alone, which does not tell from which dose on: measure \
+        "squares grow at the highest dose alone, which does not show from which dose on: measure \
          higher doses"
     )]
     LastDoseAlone,
     /// The points leave a line open.
     #[error(
-        "the points do not tell how the working curve changes: measure several doses at each level"
+        "the points do not show how the working curve changes: measure several doses at each level"
     )]
     NoLines,
     /// There are too few gray levels.

@@ -11,7 +11,7 @@ use super::exposure::{RingExposure, rings_of};
 /// An image that is not made of whole rings around its middle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
-    "it is not round about the middle of the image: row {row} is not that of the rings which \
+    "it is not round about the middle of the image: row {row} does not have the rings that \
      the middle row shows"
 )]
 pub struct NotRound {

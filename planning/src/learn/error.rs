@@ -111,7 +111,7 @@ pub enum JobFileError {
     #[error(transparent)]
     PrintMeasurements(#[from] MeasuredError),
     /// Its rows belong to other layers.
-    #[error("its layers are not those of the job's stack")]
+    #[error("its layers differ from the layers of the job's stack")]
     OtherLayers,
     /// A time is not above zero.
     #[error("exposure_ms must be above zero")]

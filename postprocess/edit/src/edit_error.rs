@@ -238,7 +238,7 @@ pub enum LayerProblem {
         edit: usize,
     },
     /// The other stack is white outside the image.
-    #[error("what is added to it reaches beside its image: pad it first")]
+    #[error("the addition reaches beyond its image: pad it first")]
     BesideImage,
     /// Rotating would make columns of stray rows.
     #[error("its stray rows would become columns, which no stage mends")]

@@ -43,7 +43,7 @@ pub enum BodyFault {
     /// body crosses itself.
     #[error(
         "the body crosses itself at #{entity} near ({:.3}, {:.3}, {:.3}) mm, \
-         or the side of a face cannot be told",
+         or the side of a face cannot be determined",
         at_mm[0], at_mm[1], at_mm[2]
     )]
     Crossed {
@@ -55,7 +55,7 @@ pub enum BodyFault {
     /// As [`Crossed`](Self::Crossed), of a body with a face on a torus whose radii are equal.
     #[error(
         "#{entity} lies on a torus whose tube touches itself in its center (R = r), and the side of \
-         its loops cannot be told there, or the body crosses itself"
+         its loops cannot be determined there, or the body crosses itself"
     )]
     Horn {
         /// The entity of the face.
@@ -63,7 +63,7 @@ pub enum BodyFault {
     },
     /// A face on a closed surface contradicts its neighbors.
     #[error(
-        "the side of #{entity} cannot be told: its loop runs against its neighbours, \
+        "the side of #{entity} cannot be determined: its loop runs against its neighbors, \
          and its surface is closed"
     )]
     Side {

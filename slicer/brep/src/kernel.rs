@@ -204,7 +204,7 @@ pub enum FaceFault {
     #[error("its sense is against its loops; the loops were followed")]
     Sense,
     /// A loop ran along an edge in the same direction as a neighbor's loop.
-    #[error("a loop ran against its neighbours; it was reversed")]
+    #[error("a loop ran against its neighbors; it was reversed")]
     Contrary,
     /// Some of its edges were joined with edges of its neighbors.
     #[error("{joints} of its edges were joined, up to {off_mm:.6} mm apart")]
@@ -215,7 +215,7 @@ pub enum FaceFault {
         off_mm: f64,
     },
     /// It points inward where its neighbors point outward.
-    #[error("it is inside out beside its neighbours; it was turned over")]
+    #[error("it is inside out next to its neighbors; it was turned over")]
     Inverted,
     /// The shell that begins with it points the wrong way: out of a void, or into the body.
     #[error("its shell points the wrong way; it was turned over")]

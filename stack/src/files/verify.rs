@@ -31,7 +31,7 @@ pub enum VerifyError {
 #[non_exhaustive]
 pub enum LayerFault {
     /// The index does not follow the index of the layer before.
-    #[error("it follows layer {before}: what is between them is missing")]
+    #[error("it follows layer {before}: the layers between them are missing")]
     Gap {
         /// The index of the layer before.
         before: u32,
@@ -56,7 +56,7 @@ pub enum LayerFault {
         number: f64,
     },
     /// The image's size in pixels differs from the first page's.
-    #[error("its image has {} x {} pixels, that of the first page {} x {}", found[0], found[1], first[0], first[1])]
+    #[error("its image has {} x {} pixels, the first page has {} x {}", found[0], found[1], first[0], first[1])]
     Size {
         /// The image's width and height.
         found: [u32; 2],
@@ -64,7 +64,7 @@ pub enum LayerFault {
         first: [u32; 2],
     },
     /// The resolution differs from the first page's.
-    #[error("its resolution is not that of the first page")]
+    #[error("its resolution differs from the first page's")]
     Resolution,
     /// A stray row is outside the image.
     #[error("its text names row {row} of {height}")]

@@ -109,7 +109,7 @@ pub enum CheckFault {
     Text,
     /// The pages before the last differ from the pages that its check was made of.
     #[error(
-        "the pages before it are not those that were written: {}",
+        "the pages before it are not the pages that were written: {}",
         chain_text(*gap, *found, *written)
     )]
     Chain {

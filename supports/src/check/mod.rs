@@ -190,7 +190,7 @@ pub fn inner_components(mask: &Mask, white: bool) -> Mask {
         let inner_ones = segments.filter(|(_, label)| is_inner[**label as usize]);
         row.clear();
         row.extend(inner_ones.flat_map(|(k, _)| [transitions[k - 1], transitions[k]]));
-        inner.push_row(&row).expect("segments of one colour do not touch");
+        inner.push_row(&row).expect("segments of one color do not touch");
     }
     inner.finish()
 }

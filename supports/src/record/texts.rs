@@ -274,7 +274,7 @@ impl fmt::Display for OffBalanceRecord {
         let off = length_text(self.off_px, self.off_mm);
         write!(
             f,
-            "from {layer} on the centre of gravity lies beyond the base, by {off} after layer \
+            "from {layer} on the center of gravity lies beyond the base, by {off} after layer \
              {worst_layer}, at {at}"
         )
     }

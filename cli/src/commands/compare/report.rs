@@ -85,10 +85,10 @@ pub(super) fn text(comparison: &StackComparison<'_>, all: bool) -> String {
     let forgiven = comparison.sum(|found| found.forgiven);
     let [but, besides] = match forgiven {
         0 => [String::new(), String::new()],
-        1 => [", but for 1 pixel that the tolerance forgives", "; the tolerance forgives 1 more"]
+        1 => [", except 1 pixel that the tolerance forgives", "; the tolerance forgives 1 more"]
             .map(str::to_owned),
         pixels => [
-            format!(", but for {pixels} pixels that the tolerance forgives"),
+            format!(", except {pixels} pixels that the tolerance forgives"),
             format!("; the tolerance forgives {pixels} more"),
         ],
     };

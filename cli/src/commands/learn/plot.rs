@@ -27,7 +27,7 @@ pub(super) fn plots_of(job: &Job) -> Vec<Plot> {
     }
     let heights: Vec<_> = drawn.iter().filter_map(|&(n, print)| heights(n, print)).collect();
     if !heights.is_empty() {
-        let title = "Measured heights less those of the part".to_owned();
+        let title = "Measured heights minus the part's".to_owned();
         plots.push(by_layer(title, "error (µm)", heights));
     }
     let times = drawn.iter().map(|(number, print)| {

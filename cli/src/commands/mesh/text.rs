@@ -96,7 +96,7 @@ pub(super) fn faults(table: &CornerTable, check: &MeshCheck) -> Vec<String> {
         of_facets(&check.not_finite, "with a coordinate that is not finite"),
         loops(check),
         crowded(table, check),
-        of_facets(&check.turned, "turned over against the neighbours"),
+        of_facets(&check.turned, "turned over against the neighbors"),
         shells(check.inside_out(), "facing into the material"),
         shells(one_sided(check), "with one side only"),
         of_facets(&doubled, "doubled"),
@@ -180,8 +180,8 @@ fn not_closed(shell: &ShellReport) -> String {
     let why = match shell.open_sides {
         0 if shell.is_one_sided => "none, it has one side only".to_owned(),
         0 => "none, its numbers are too large".to_owned(),
-        1 => "not closed: 1 side of a facet has no neighbour".to_owned(),
-        sides => format!("not closed: {sides} sides of facets have no neighbour"),
+        1 => "not closed: 1 side of a facet has no neighbor".to_owned(),
+        sides => format!("not closed: {sides} sides of facets have no neighbor"),
     };
     format!("  volume:   {why}\n")
 }
@@ -190,7 +190,7 @@ fn mass_text(mass: &Mass) -> String {
     let [x, y, z] = mass.centre_mm;
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = mass.inertia_mm5;
     format!(
-        "  volume:   {:.6} mm3\n  centre:   {x:.6}, {y:.6}, {z:.6} mm\n\
+        "  volume:   {:.6} mm3\n  center:   {x:.6}, {y:.6}, {z:.6} mm\n\
          \x20 inertia:  xx {xx:.6e}, yy {yy:.6e}, zz {zz:.6e}, xy {xy:.6e}, yz {yz:.6e}, xz {xz:.6e} mm5\n",
         mass.volume_mm3,
     )

@@ -52,7 +52,7 @@ pub(super) fn doubt(
     if low > 0 {
         return Some(format!(
             "{low} columns of the target are lower than {}, from where on the numbers of {name} \
-             hold: they may come out otherwise",
+             hold: they may be different",
             Length::to_whole_nm(known.from),
         ));
     }

@@ -39,7 +39,7 @@ pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
         },
         line(&measures),
         format!(
-            "the bitmaps' error is {:.2}% above that of the best times, which is within {:.1e} of \
+            "the bitmaps' error is {:.2}% above the error of the best times, which is within {:.1e} of \
              the least there is",
             100.0 * plan.excess(),
             plan.best.relative_gap()

@@ -113,7 +113,7 @@ pub(super) fn setting_of(
 ) -> Result<KineticSetting, Exit> {
     let Some(kinetics) = material.kinetics().map_err(anyhow::Error::new)? else {
         let name = &material.name;
-        let text = format!("{name} does not tell the rates of its reaction: add [kinetics]");
+        let text = format!("{name} lacks the rates of its reaction: add [kinetics]");
         return Err(Exit::Failed(anyhow!(text)));
     };
     KineticSetting::of(projector, kinetics)

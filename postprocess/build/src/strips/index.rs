@@ -27,7 +27,7 @@ pub enum IndexError {
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// The strips that it lists do not fit a build of its size.
-    #[error("its strips are not those of such a build")]
+    #[error("its strips do not make up such a build")]
     Strips,
 }
 

@@ -12,7 +12,7 @@ use super::Swaths;
 #[non_exhaustive]
 pub enum JoinSwathsError {
     /// There are too many or too few swaths, or one has another size.
-    #[error("the swaths are not those of such a layer")]
+    #[error("the swaths do not make up such a layer")]
     Unlike,
     /// Swaths add up to more than full exposure, or expose pixels beyond the layer.
     #[error("row {row}, column {column}: the swaths add up to more than full exposure")]

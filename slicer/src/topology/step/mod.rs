@@ -26,7 +26,7 @@ use outline::{Dropped, outer_first, outlines};
 #[non_exhaustive]
 pub enum NoSolid {
     /// It has holes.
-    #[error("the mesh is not closed: {sides} sides of facets have no neighbour")]
+    #[error("the mesh is not closed: {sides} sides of facets have no neighbor")]
     Open {
         /// The number of sides of facets without a neighbor.
         sides: u64,

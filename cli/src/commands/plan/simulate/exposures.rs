@@ -77,7 +77,7 @@ impl Exposures {
             if let Some(first) = bitmaps.first()
                 && [first.image.width(), first.image.height()] != [width, height]
             {
-                return failed("its size differs from that of the first page".to_owned());
+                return failed("its size differs from the first page's".to_owned());
             }
             let Some(ms) = layer.info.exposure_ms else {
                 return failed("it does not say how long it is shown (exposure_ms)".to_owned());
