@@ -57,11 +57,13 @@ impl HeatMap {
     /// number among them that is farthest from zero.
     fn coarsened(&self) -> Self {
         let many = self.columns.max(self.rows()).div_ceil(SIDE);
-        let [columns, rows] = [self.columns, self.rows()].map(|count| count / many);
+        let [columns, rows] = [self.columns, self.rows()].map(|count| count.div_ceil(many));
         let worst = |place: usize| {
             let (column, row) = (place % columns * many, place / columns * many);
-            let squares = (row..row + many)
-                .flat_map(|row| &self.values[row * self.columns..][column..column + many]);
+            // The last ones of a side may stand for fewer.
+            let columns = column..(column + many).min(self.columns);
+            let squares = (row..(row + many).min(self.rows()))
+                .flat_map(|row| &self.values[row * self.columns..][columns.clone()]);
             // A mean would hide single columns that are wrong.
             squares.copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
         };
@@ -249,6 +251,12 @@ mod tests {
         assert_eq!((coarse.columns, coarse.rows()), (1000, 500));
         assert_eq!((coarse.values[2], coarse.values[1000 * 500 - 1]), (-5.0, 3.0));
         assert!((coarse.pitch_mm - 0.03).abs() < 1e-12);
+        // A side that is no multiple, and one of a single square.
+        let mut values = vec![0.0; 2501];
+        values[2500] = 2.0;
+        let coarse = map(1, values, Colors::AboutZero).coarsened();
+        assert_eq!((coarse.columns, coarse.rows()), (1, 834));
+        assert_eq!(coarse.values[833], 2.0);
     }
 
     #[test]

@@ -19,6 +19,9 @@ pub(super) fn grid(
     };
     // Sides of up to 2^26 pixels hold more tiny parts than a u32 counts.
     let copies = columns.saturating_mul(rows).min(wanted);
+    if copies == 0 {
+        return Vec::new();
+    }
     let columns = columns.min(copies);
     let lefts = positions(area.width, part.width, gap, columns);
     let tops = positions(area.height, part.height, gap, copies.div_ceil(columns));

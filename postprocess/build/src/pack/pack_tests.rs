@@ -59,6 +59,18 @@ const OUTLINES: Pack = Pack {
 };
 
 #[test]
+fn no_copies_take_no_places() {
+    let part = outlined(&mask_of(&["##", "##"]));
+    let none = packed(&[part.clone()], &[Some(0)], "31x31mm", 1, Pack::default()).unwrap();
+    assert_eq!(none.placements(), []);
+    let shares = Pack { shares: true, ..Pack::default() };
+    let parts = [part.clone(), part];
+    // Without a share nothing is placed, which is no layout of several parts.
+    let unshared = packed(&parts, &[Some(0), Some(0)], "31x31mm", 1, shares);
+    assert!(unshared.is_ok_and(|layout| layout.placements().is_empty()));
+}
+
+#[test]
 fn outlines_gain_parts_where_boxes_waste_room() {
     let stair = mask_of(&["#.....", "##....", "####..", "#####.", "######", "######"]);
     let part = [outlined(&stair)];

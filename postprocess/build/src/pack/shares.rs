@@ -10,6 +10,9 @@ use super::job::{PackingJob, sum};
 
 /// Places as many copies as fit, up to a limit, and at least one of each part if that is possible.
 pub(super) fn most(job: &mut PackingJob<'_>, shares: &[u32], limit: u32) -> Vec<CopyPlacement> {
+    if shares.iter().all(|&share| share == 0) {
+        return Vec::new();
+    }
     let mut order = Order::new(shares);
     let (mut most, mut best) = (0, Vec::new());
     // The step grows as long as all fit, and shrinks once they do not.
