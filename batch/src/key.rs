@@ -97,9 +97,7 @@ impl fmt::Debug for Key {
 
 /// The error of a text that is no key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{0}` is no key: lamp batch status --verbose lists keys, each of 64 digits 0 to 9 and a to f"
-)]
+#[error("`{0}` is not a key: lamp batch status --verbose lists keys, 64 digits 0 to 9 and a to f")]
 pub struct KeyError(String);
 
 impl FromStr for Key {

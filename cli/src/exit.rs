@@ -200,7 +200,8 @@ failures!(
 impl From<StackError> for Exit {
     fn from(error: StackError) -> Self {
         match error {
-            // A stack without layers is bad input, though only the writer notices.
+            // A stack without layers and a page that cannot be decoded are bad input, though only
+            // the writer notices.
             StackError::NoLayers | StackError::InFile { .. } => Self::Failed(error.into()),
             error => Self::Output(error.into()),
         }

@@ -1,7 +1,7 @@
 //! One error for all rooms.
 
 use lamp_adaptive::HeightsError;
-use lamp_batch::{NightError, StoreError};
+use lamp_batch::{BatchError, NightError, StoreError};
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
@@ -34,6 +34,7 @@ macro_rules! errors {
 }
 
 errors!(
+    Batch(BatchError),
     Check(CheckError),
     Compensate(CompensateError),
     Dither(DitherError),

@@ -10,12 +10,13 @@
 //! - [`fix`] corrects stray rows, [`offset`] moves edges, and [`edit`] changes designs.
 //! - [`build`] lays copies of parts out on the area of a [`machine`].
 //! - [`supports`] finds what floats or is trapped, and holds it.
-//! - [`planning`] chooses exposures, [`pipeline`] runs stages from their settings, [`batch`] keeps the
-//!   results of nights, [`plots`] draws curves and maps, and [`view`] shows layers in a browser.
+//! - [`planning`] chooses exposures, [`pipeline`] runs stages from their settings, [`batch`] plans,
+//!   does and delivers nights, [`plots`] draws curves and maps, and [`view`] shows layers in a browser.
 //! - [`stack`] has what they share: images as runs, layers, lengths, files and streams.
 //!
-//! A stage takes and gives an iterator over `Result<Layer, E>`, so stages are chained
-//! without coding images in between. [`Error`] takes the errors of all of them.
+//! A stage takes and gives an iterator of layers, so stages are chained without coding images in
+//! between. `fix`, `edit` and `dither` take whole layers or [`stack::PassingLayer`], whose page is
+//! decoded only where its image is needed, and give the latter. [`Error`] takes the errors of all.
 //!
 //! # Slice, fix and write
 //!

@@ -103,8 +103,8 @@ impl CheckSettings {
         records
     }
 
-    /// Finds what there is in layers, and returns the records that are asked for with it. The blade
-    /// is the blade of `machine`, or else of the settings' machine.
+    /// Finds what there is in layers, and returns the records that are asked for with it. Drag is
+    /// computed for `machine`, or else for the settings' machine.
     ///
     /// # Errors
     /// Returns the first error of the layers, or an error if they cannot be checked.

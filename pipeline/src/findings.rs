@@ -11,6 +11,7 @@ use crate::slice::Counts;
 
 /// Findings of stages in a range of layers, or in several.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RangeFindings {
     /// Layers that were made.
     pub layers: usize,

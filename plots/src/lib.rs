@@ -1,6 +1,6 @@
 //! Plots as SVG and PNG: curves and measured points, maps of doses and heights, islands over the
-//! sphere of poses, and layouts of builds; and pictures of layers and of vertical sections. Equal plots give equal bytes, on every system: the one
-//! font comes with the crate.
+//! sphere of poses, and layouts of builds; and pictures of layers and of vertical sections. Equal
+//! plots give equal bytes, on every system: the one font comes with the crate.
 //!
 //! ```
 //! use lamp_plots::{Plot, curve, drawn, linear};

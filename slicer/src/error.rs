@@ -20,9 +20,7 @@ pub enum SliceError {
     #[error("this is a folder, not a file")]
     Folder,
     /// Another program wrote to the file, or replaced it, while it was read.
-    #[error(
-        "the file was changed while it was read, so that images would mix its versions: {change}"
-    )]
+    #[error("the file changed while it was read, so images would mix two versions: {change}")]
     Changed {
         /// The index of the file among the joined files, from 0.
         file: usize,
@@ -203,7 +201,7 @@ pub enum SliceError {
         layers: f64,
     },
     /// The heights give no layers, or too many.
-    #[error("these heights make {layers} layers, not between one and four million")]
+    #[error("these heights make {layers} layers, not one to four million")]
     LayerCount {
         /// The resulting number of layers.
         layers: usize,
@@ -322,7 +320,7 @@ pub enum ObjFault {
     #[error("is a face with more corners than 500000")]
     ManyCorners,
     /// Bytes of zero before further words.
-    #[error("holds bytes of zero, so the file is damaged")]
+    #[error("has NUL bytes, so the file is damaged")]
     Zeros,
     /// Numbers with commas.
     #[error("has commas in its numbers, which may be decimal points or stand between thousands")]
@@ -340,7 +338,7 @@ pub enum AsciiFault {
     #[error("the file ends within it: it was cut off")]
     CutOff,
     /// A word where another one should be.
-    #[error("`{found}` stands where {expected} should")]
+    #[error("found `{found}`, expected {expected}")]
     Unexpected {
         /// The start of the word.
         found: String,

@@ -85,7 +85,7 @@ pub enum StackError {
     },
     /// The parts of a TIFF are in an order that cannot be read from a stream.
     #[error(
-        "page {page}: its parts do not follow each other, so it cannot be read from a pipe; give the file's name instead"
+        "page {page}: its data is out of order, so it cannot be read from a pipe; give the file's name instead"
     )]
     NotForward {
         /// The page, from 0.
@@ -263,7 +263,7 @@ pub enum PageFault {
     #[error("its strips overlap")]
     Overlap,
     /// A `strip` or `tile` ends before its last row.
-    #[error("a {0} is shorter than its rows")]
+    #[error("a {0} ends before its rows do")]
     TooShort(&'static str),
     /// A `strip` or `tile` does not decompress.
     #[error("a {0} does not decode: it is damaged")]
@@ -350,7 +350,7 @@ pub enum UnsupportedFeature {
     #[error("a picture with transparency")]
     Transparency,
     /// A picture with 16 bits per sample.
-    #[error("a picture of 16 bits")]
+    #[error("a 16-bit picture")]
     SixteenBits,
     /// A picture with a pixel that is not gray.
     #[error("a picture in color")]

@@ -149,7 +149,7 @@ fn what_is_not_gray_is_refused() {
         assert!(refused(&clear, format).contains("transparency"), "{format:?}");
     }
     let deep = DynamicImage::from(gray()).into_luma16().into();
-    assert!(refused(&deep, ImageFormat::Pnm).contains("16 bits"));
+    assert!(refused(&deep, ImageFormat::Pnm).contains("16-bit"));
 }
 
 #[test]

@@ -131,7 +131,7 @@ fn what_is_not_read_is_named() {
         (png(1, eight(ColorType::GrayscaleAlpha), &[1, 1], 1, |_| {}), "transparency"),
         (animated(), "a picture file of several images"),
         (png(1, BITS, &[0], 1, clear), "transparency"),
-        (png(1, (ColorType::Grayscale, BitDepth::Sixteen), &[1, 1], 1, |_| {}), "16 bits"),
+        (png(1, (ColorType::Grayscale, BitDepth::Sixteen), &[1, 1], 1, |_| {}), "16-bit"),
         (interlaced(), "an interlaced PNG"),
     ] {
         let error = read(file).unwrap_err().to_string();

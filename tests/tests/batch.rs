@@ -248,6 +248,11 @@ fn what_is_wrong_with_a_night_is_told_before_anything_runs() {
     let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
     for (from, to, words) in [
         ("\"fix\"]", "\"fix --widht 3\"]", ["night.toml: line 2, column 48: fix: ", "--widht"]),
+        (
+            "\"fix\"]",
+            "\"fix\"]\ncheck = \"--machine gone.toml\"",
+            ["night.toml: line 3, column 9: check: ", "gone.toml"],
+        ),
         ("--dpi 100", "--dpi none", ["night.toml: line 2, column 11: slice: ", "none"]),
         (
             "--mesh none",

@@ -56,7 +56,7 @@ fn a_job_keeps_every_print() {
     let bytes = scratch.bytes("next.csv");
     std::fs::remove_file(scratch.path("next.csv")).unwrap();
     let again = scratch.run(line).succeeds();
-    assert!(again.stderr.contains("print 0 was learnt from already"), "{}", again.stderr);
+    assert!(again.stderr.contains("print 0 was used already"), "{}", again.stderr);
     assert_eq!(scratch.bytes("next.csv"), bytes);
     scratch
         .run("lamp learn job/ --measured a.csv -o next.csv")

@@ -7,7 +7,7 @@ use lamp_tests::Scratch;
 
 /// Turns of phrase between words in small letters, and what to write instead. British spellings
 /// stand among them: the field writes American English.
-const PHRASES: [(&str, &str); 16] = [
+const PHRASES: [(&str, &str); 18] = [
     (" told ", "report, print, warn"),
     (" tell ", "report, print, show"),
     (" tells ", "reports, prints, shows"),
@@ -24,6 +24,8 @@ const PHRASES: [(&str, &str); 16] = [
     (" neighbour", "neighbor"),
     (" behaviour", "behavior"),
     (" millimetre", "millimeter"),
+    (" mould ", "mold"),
+    (" learnt ", "learned, used"),
 ];
 
 fn root() -> PathBuf {

@@ -41,7 +41,10 @@ fn a_part_has_the_name_that_it_is_given() {
     scratch.run("lamp compare a.tif b.tif").succeeds();
     scratch.run("lamp support a.tif --part tower.stl -o c.tif").succeeds();
     assert_eq!(part(&scratch, "c.tif"), "Blade 7");
-    scratch.run("slice tower.stl --name= -o d.tif").is_wrong_usage(&["--name"]);
+    for blank in ["--name=", "'--name=  '"] {
+        let ran = shell(&scratch, &format!("slice tower.stl {blank} -o d.tif"));
+        ran.is_wrong_usage(&["--name", "blank"]);
+    }
 }
 
 /// Names of files that shells and options would take for something else.

@@ -43,7 +43,7 @@ fn supports_hold_islands_and_their_plan_draws_the_same() {
     let ran = scratch.run(line).succeeds();
     let first = ran.stderr.lines().next().unwrap();
     assert!(
-        first.contains("2 supports stay in the mould and become features of the casting"),
+        first.contains("2 supports stay in the mold and become features of the casting"),
         "{first}"
     );
     assert!(islands(&scratch, "held.tif").is_empty());

@@ -54,7 +54,7 @@ impl ViewedStack {
     /// The most bytes that a layer is expected to take while it is decoded.
     pub(crate) fn expected_bytes(&self, layer: usize) -> usize {
         self.headers().get(layer).map_or(0, |header| {
-            // A transition is four bytes, and its code in T.6 a fourth byte at the least.
+            // A transition is four bytes, and its code in T.6 at least a quarter of a byte.
             let data = usize::try_from(header.data_bytes).unwrap_or(usize::MAX);
             data.saturating_mul(16).saturating_add(4 * header.size[1] as usize)
         })

@@ -50,8 +50,7 @@ impl End {
             Some(status::NO_ROOM) => Self::NoRoom(why),
             Some(status::DAMAGED) => Self::Damaged(why),
             Some(status::INPUT_OUTPUT) => Self::Failed(why),
-            // Signals, panics (101) and lack of memory: the process could not state its reason
-            // itself.
+            // Signals, panics (101) and lack of memory: the process left no line in the journal.
             _ => Self::Crashed(why),
         }
     }

@@ -90,7 +90,7 @@ pub enum SchedulerError {
         path: String,
     },
     /// A program of the scheduler is silent.
-    #[error("{program} has not answered for {seconds} s: see whether the scheduler is well")]
+    #[error("{program} has not answered for {seconds} s: check the scheduler")]
     Silent {
         /// The program.
         program: &'static str,

@@ -274,7 +274,7 @@ impl Reader<'_> {
             files.extend(found.into_iter().map(|(file, fault)| (file, fault, place)));
         }
         if let (Some((_, place)), true) = (&read.name, files.len() > 1) {
-            let problem = format!("there are {} files: a name is for one", files.len());
+            let problem = format!("there are {} files: name only one", files.len());
             return Err(NightError { place: *place, problem });
         }
         for (file, fault, place) in files {

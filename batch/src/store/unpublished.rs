@@ -35,7 +35,7 @@ impl Unpublished {
         let digest = digest_of(&*file)?;
         let metadata = file.metadata()?;
         let mut permissions = metadata.permissions();
-        // Later runs share the result by its digest: no program may change it in place.
+        // Later runs find the result by its key and expect these bytes.
         permissions.set_readonly(true);
         file.set_permissions(permissions)?;
         drop(file);

@@ -86,7 +86,7 @@ pub(crate) fn parse_margin(text: &str) -> Result<f64, String> {
 /// Parses a gap above zero.
 fn parse_gap(text: &str) -> Result<f64, String> {
     match parse_share(text)? {
-        0.0 => Err("the best is never met exactly: write 0.1%".to_owned()),
+        0.0 => Err("the best is never reached: write 0.1%".to_owned()),
         gap => Ok(gap),
     }
 }

@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::NonEmptyStringValueParser;
 use lamp_pipeline::heights::HeightSettings;
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::placement::FiniteNumbers;
@@ -105,9 +104,8 @@ pub(crate) struct SliceStageArgs {
     #[arg(value_name = "PART", required = true, value_parser = part_file())]
     parts: Vec<PartFile>,
 
-    /// Name of the part in its stack and in all that is made of it [default: the file's, without
-    /// its ending]
-    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    /// Name of the part in its stack [default: the file's, without its ending]
+    #[arg(long, value_name = "NAME", value_parser = parse_name)]
     name: Option<String>,
 
     #[command(flatten)]
@@ -190,6 +188,12 @@ impl TryFrom<&SliceStageArgs> for SliceStage {
             fallback: args.fallback.clone(),
         })
     }
+}
+
+/// Takes any name that has a letter.
+fn parse_name(text: &str) -> Result<String, String> {
+    let is_blank = text.trim().is_empty();
+    if is_blank { Err("the name is blank".to_owned()) } else { Ok(text.to_owned()) }
 }
 
 /// Parses `X,Y` in millimeters.

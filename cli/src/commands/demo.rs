@@ -88,7 +88,7 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
     let range = range.unwrap_or_default();
     print(&format!(
         "\
-{stl}: a hollow blade mould, 76 x 76 x 127 mm, {facets} facets
+{stl}: a hollow blade mold, 76 x 76 x 127 mm, {facets} facets
 {stack}: {layers} layers of {width} x {height} pixels at 1500 dpi and 100 um, {megabytes:.1} MB, made in {seconds:.2} s
 {sheet}: layers {pictures}, one pixel for 8 x 8
 {meshed}: {made} layers of the build on the alpha machine, in its mesh, made in {mesh_seconds:.2} s
@@ -156,7 +156,7 @@ fn build_in_mesh(
     let mut layers = part_layers(stl, range, progress)?;
     // The first layer has the size that the layout needs.
     let first = layers.next().ok_or(StackError::NoLayers)??;
-    let parts = vec![PartStack::of_image("the mould", &first)?];
+    let parts = vec![PartStack::of_image("the mold", &first)?];
     let mesh = MeshOptions::default();
     let layout = Layout::packed(parts, &[None], area, mesh.gap(), Pack::default())?;
     let layout = layout.for_machine(&word);

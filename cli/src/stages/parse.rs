@@ -51,7 +51,7 @@ const REFUSED: [(&str, &str); 18] = [
     ("time", "leave out --time: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
     ("layout_picture", "leave out --layout-picture: run lamp tile by hand for the picture"),
-    ("name", "leave out --name: results have the part's name in the night file"),
+    ("name", "leave out --name: a stack's part is named after its file"),
     ("part", "leave out --part: the part is the one that the stages are for"),
 ];
 
@@ -196,6 +196,8 @@ pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSett
     let args: CheckArgs = StageReader::new("check", &with_name("check", options), folder)?.read();
     let mut settings = CheckSettings::clone(&args.settings);
     settings.set_folder(folder);
+    // A slip in its file must show before the night.
+    settings.machine().map_err(|error| Exit::from(error).to_string())?;
     Ok(settings)
 }
 

@@ -5,7 +5,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use lamp_batch::LayersOf;
+use lamp_batch::{Call, LayersOf};
+use lamp_pipeline::check::CheckSettings;
+use lamp_pipeline::support::SupportSettings;
+use lamp_pipeline::tile::TileSettings;
 use lamp_pipeline::{Names, RangeFindings, stored_name};
 use lamp_stack::{Destination, Format, Layer, join, write_stack};
 use proptest::prelude::*;
@@ -14,7 +17,7 @@ use tempfile::TempDir;
 
 use super::after::After;
 use super::calls::{CheckFindings, Checking, Tiling};
-use super::parse::parse;
+use super::parse::{parse, parse_check, parse_tile};
 use crate::Lamp;
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -372,4 +375,14 @@ fn what_follows_on_ranges_does_what_its_command_does() {
     assert!(refused(&["--strips", "a/"]).contains("leave out --strips"));
     assert!(refused(&["--copies", "3"]).contains("--copies is for one stack"));
     assert!(refused(&["--layout", "none.json", "a.tif"]).contains("leave out the stacks"));
+}
+
+#[test]
+fn options_left_out_are_the_defaults_of_settings() {
+    let folder = Path::new("");
+    assert_eq!(parse_check(&[], folder).unwrap(), CheckSettings::default());
+    assert_eq!(*parse_tile(&[], folder).unwrap().settings, TileSettings::default());
+    let stages = ["slice", "support"].map(|word| vec![word.to_owned()]);
+    let stages = parse(&stages, folder).unwrap();
+    assert_eq!(stages.after[0].canonical(), SupportSettings::default().canonical());
 }

@@ -101,7 +101,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::ThreeMf(error) => match **error {
             ThreeMfError::Unread { .. } => "export it as a plain mesh",
             ThreeMfError::Encrypted(_) => "export it without protection",
-            ThreeMfError::NothingToBuild { .. } => "mark what is to be built as a part",
+            ThreeMfError::NothingToBuild { .. } => "give items to build the type part",
             _ => "export the part again",
         },
         SliceError::Obj { .. } => "export the part again",

@@ -115,7 +115,7 @@ fn write_band(rows: &[Vec<u8>], out: &mut impl Write) -> io::Result<()> {
         for run in sixels.chunk_by(|a, b| a == b) {
             let sixel = char::from(run[0]);
             match run.len() {
-                // A repeat takes three characters, so shorter runs stand as they are.
+                // A repeat takes three characters, so runs of up to three are written out.
                 1..=3 => write!(out, "{}", sixel.to_string().repeat(run.len()))?,
                 length => write!(out, "!{length}{sixel}")?,
             }

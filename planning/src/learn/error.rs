@@ -165,7 +165,7 @@ pub enum JobError {
         last: usize,
     },
     /// The measured print is earlier than the last one.
-    #[error("{}: print {print} was learnt from already: print {last} is the last", folder.display())]
+    #[error("{}: print {print} was used already: print {last} is the last", folder.display())]
     LearntFrom {
         /// The job.
         folder: PathBuf,
@@ -189,7 +189,7 @@ pub enum JobError {
     },
     /// The same measurements were used before with other options.
     #[error(
-        "{}: print {print} was learnt from with other options: {name} is there already, and print \
+        "{}: print {print} was used with other options: {name} is there already, and print \
          {} is the next to be measured",
         folder.display(),
         print + 1

@@ -111,7 +111,7 @@ pub enum TileError {
         layer: String,
     },
     /// A layer's resolution differs from the first layer's.
-    #[error("{name}: {layer} has another resolution than the first layer: a stack has one")]
+    #[error("{name}: {layer} differs in resolution from the first layer: a stack has one")]
     OtherResolution {
         /// The part.
         name: String,

@@ -43,7 +43,7 @@ pub enum EditError {
     #[error("the stack has no resolution, so lengths have no meaning in it")]
     NoResolution,
     /// A layer's size, place or resolution differs from the first layer's.
-    #[error("{layer} has another size, place or resolution than the first layer: a stack has one")]
+    #[error("{layer} differs in size, place or resolution from the first layer: a stack has one")]
     Unlike {
         /// The layer's name.
         layer: String,
@@ -277,7 +277,7 @@ pub enum LayerProblem {
         count: usize,
     },
     /// A layer of another stack says its height, which the edited stack's do not.
-    #[error("says at what height it is, and the stack that is edited does not")]
+    #[error("states its height, and the edited stack does not")]
     HeightUnlikeEdited,
     /// A layer of another stack does not say its height, which the edited stack's do.
     #[error("does not say at what height it is, and the stack that is edited does")]

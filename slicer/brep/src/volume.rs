@@ -152,7 +152,8 @@ fn six_volumes(corners: [Vec3; 3], middles: [Vec3; 3]) -> f64 {
         let along_t = mixed([first, 0.0, 4.0 * t - 1.0, -4.0 * s, 4.0 * s, 4.0 * (r - t)]);
         dot(place, cross(along_s, along_t))
     };
-    // Weights add up to 1 over an area of 1/2, so their sum is twice the flux: six thirds of it.
+    // Weights add up to 1 over an area of 1/2, so their sum is twice the flux, and the
+    // volume is a third of the flux: the result is six volumes.
     GAUSS.iter().map(|(at, weight)| weight * flux(*at)).sum()
 }
 

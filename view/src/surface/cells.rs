@@ -189,8 +189,8 @@ impl CellGrid {
 
 impl CellContribution {
     fn new(position: usize, page: &PageHeader, first: u32, weight: f32) -> Self {
-        // As in `ViewedStack::expected_bytes`: four bytes a transition, whose code takes a fourth
-        // byte.
+        // As in `ViewedStack::expected_bytes`: four bytes a transition, whose code takes a
+        // quarter of a byte.
         let bytes = 16 * page.data_bytes as usize + 4 * page.size[1] as usize;
         Self { position, index: page.info.index, bytes, first, weights: vec![weight] }
     }

@@ -58,7 +58,7 @@ fn line(kind: &str, missing: usize, all: usize, cost: &Cost) -> String {
     let takes = match missing {
         0 => String::new(),
         _ => format!(
-            ", about {} of a processor, {} of memory, {} on disk",
+            ", about {} of CPU time, {} of memory, {} on disk",
             time_text(cost.cpu_s),
             in_words(cost.memory),
             in_words(cost.disk)

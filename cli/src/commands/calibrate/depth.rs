@@ -173,7 +173,7 @@ fn write_level(text: &mut EstimateTable, level: &LevelFit) {
             text.estimate(&format!("Dp at {gray} (um)"), &curve.penetration_depth);
             text.line(&format!("R^2 at {gray}, {points}"), &[&short(curve.r2)]);
         }
-        None => text.line(&format!("{gray}: {points}, no curve alone"), &[]),
+        None => text.line(&format!("{gray}: {points}, no curve of its own"), &[]),
     }
 }
 

@@ -189,7 +189,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     match again {
         Some(print) => {
             job.check_again(print, &learned)?;
-            progress.say(&format!("print {print} was learnt from already: this is the same again"));
+            progress.say(&format!("print {print} was used already: this is the same again"));
         }
         None => {
             for (file, text) in job.files_to_keep(print_number, &text, &learned) {

@@ -127,7 +127,7 @@ fn parse_time(text: &str) -> Result<ExposureTime, String> {
 
 fn parse_gap(text: &str) -> Result<f64, String> {
     match parse_share(text)? {
-        0.0 => Err("the best is never met exactly: write 1e-6".to_owned()),
+        0.0 => Err("the best is never reached: write 1e-6".to_owned()),
         gap => Ok(gap),
     }
 }

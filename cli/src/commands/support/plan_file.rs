@@ -11,7 +11,7 @@ pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> S
     let mut text = format!(
         "\
 # Supports of {}: lamp edit STACK THIS -o OUT draws them.
-# They stay in the mould and become features of the casting. Delete the [[edit]] of one that is
+# They stay in the mold and become features of the casting. Delete the [[edit]] of one that is
 # not wanted, or exchange its strut for one of the alternatives below it. lamp check shows
 # whether islands are left.
 ",

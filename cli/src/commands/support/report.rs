@@ -43,10 +43,10 @@ impl<'a> SupportReport<'a> {
             progress.say(&format!(
                 "{}, {} mm long and {} mm3 in all, so look at each",
                 match count {
-                    1 => "1 support stays in the mould and becomes a feature of the casting"
+                    1 => "1 support stays in the mold and becomes a feature of the casting"
                         .to_owned(),
                     count => format!(
-                        "{count} supports stay in the mould and become features of the casting"
+                        "{count} supports stay in the mold and become features of the casting"
                     ),
                 },
                 significant(length),
@@ -95,7 +95,7 @@ impl<'a> SupportReport<'a> {
         let left = self.plans.iter().filter(|plan| plan.is_left()).count() as u64;
         let head = json!({
             "schema": "lamp-support-1",
-            "note": "supports stay in the mould and become features of the casting",
+            "note": "supports stay in the mold and become features of the casting",
             "part": part,
             "islands": self.plans.len() as u64 + self.unlisted,
             "left": left + self.unlisted,
