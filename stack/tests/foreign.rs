@@ -316,7 +316,7 @@ fn what_is_not_read_is_named() {
         (page().with(259, 3).with(258, 8), "TIFF compression 3"),
         (garbage(5), "a strip does not decode"),
         (garbage(8).tiled(16, 16), "a tile does not decode"),
-        (page().with(257, 2), "shorter than its rows"),
+        (page().with(257, 2), "ends before its rows do"),
         (page().tiled(16, 0), "a side of 0 pixels"),
         (page().with(256, 1 << 23).with(274, 5), "too many to turn it upright"),
         (page().with(257, 17).tiled(16, 16), "it has 1 tiles where its size makes 2"),
@@ -347,7 +347,7 @@ fn sizes_that_lie_cost_only_an_error() {
             let tile = Tiff::new((8, 8), bits, number, vec![zeros]).tiled(side, side);
             for page in [strip, tile] {
                 let error = read(page.bytes()).unwrap_err().to_string();
-                assert!(error.contains("shorter than its rows"), "{error}");
+                assert!(error.contains("ends before its rows do"), "{error}");
             }
         }
     }
@@ -379,7 +379,7 @@ fn lengths_that_the_directory_does_not_state_are_found() {
     assert!(matches!(read(page().bytes()), Err(StackError::NotForward { .. })));
     let mut cut = page().bytes();
     cut.truncate(cut.len() - 4);
-    assert!(read_file(&cut).unwrap_err().to_string().contains("shorter than its rows"));
+    assert!(read_file(&cut).unwrap_err().to_string().contains("ends before its rows do"));
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn stacks_that_lie(scratch: &Scratch) {
     for compression in [1, 32_773] {
         for bits in [1, 8] {
             let fields = [(256, all), (257, all), (258, bits), (259, compression), (262, 1)];
-            stack_is_refused(scratch, "shorter than its rows", classic_tiff(&fields, &black));
+            stack_is_refused(scratch, "ends before its rows do", classic_tiff(&fields, &black));
         }
     }
     let fields = [(256, 8), (257, 8), (259, 4), (262, 1), (279, u32::MAX)];
