@@ -14,11 +14,11 @@ pub(crate) const EXPOSURE: &str = "Exposure";
 pub(crate) struct ExposureArgs {
     /// Resin: a built-in material's name (see lamp material list) or a file
     ///
-    /// Pages then state their exposure time
+    /// Each page then states its exposure time
     #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
     material: Option<PathBuf>,
 
-    /// Depth that full white cures, in layers: 1 cures just the layer, more bonds it to the one
+    /// Depth that full white cures, in layers: 1 cures just the layer, more bonds it to the layer
     /// below
     #[arg(long, value_name = "LAYERS", default_value = "1", value_parser = parse_overcure)]
     #[arg(requires = "material", help_heading = EXPOSURE)]

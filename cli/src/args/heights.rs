@@ -20,17 +20,17 @@ pub(crate) struct HeightArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
     max: Option<Length>,
 
-    /// Step of layer thickness: all are multiples of it [default: 1um]
+    /// Step of layer thickness: every thickness is a multiple of it [default: 1um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
     step: Option<Length>,
 
-    /// Measure of a layer's error: the volume it lacks or has in excess, the height of cusps at its
+    /// Measure of a layer's error: the volume missing or in excess, the height of cusps at its
     /// edge, or the change of its section's area [default: volume, or cusp with --cusp]
     #[arg(long, value_parser = one_of::<Measure>(), help_heading = HEIGHTS)]
     criterion: Option<Measure>,
 
-    /// Largest error of a layer, as a share of its volume (with --criterion area, of its section's
-    /// area): 2% or 0.02 [default: 2%]
+    /// Largest error of a layer, as a share of its volume, or of its section's area with
+    /// --criterion area: 2% or 0.02 [default: 2%]
     #[arg(long, value_name = "SHARE", value_parser = parse_share, help_heading = HEIGHTS)]
     deviation: Option<f64>,
 
@@ -39,18 +39,18 @@ pub(crate) struct HeightArgs {
     #[arg(conflicts_with = "deviation")]
     cusp: Option<Length>,
 
-    /// Use at most N layers, with the smallest error that allows it (found to one percent)
+    /// Use at most N layers, with the smallest possible error (found to within one percent)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(conflicts_with_all = ["deviation", "cusp", "time_budget"], help_heading = HEIGHTS)]
     layers_budget: Option<u32>,
 
-    /// Build all layers within this time, for example 8h, 90min or 1200s: exposures, from
-    /// --material or --exposure-table, plus --layer-overhead
+    /// Build all layers within this time, for example 8h, 90min or 1200s. It includes exposures,
+    /// from --material or --exposure-table, and --layer-overhead
     #[arg(long, value_name = "TIME", help_heading = HEIGHTS)]
     #[arg(conflicts_with_all = ["deviation", "cusp"])]
     time_budget: Option<Seconds>,
 
-    /// Time per layer besides its exposure, mostly for recoating, for example 30s
+    /// Time per layer in addition to its exposure, mostly for recoating, for example 30s
     #[arg(long, value_name = "TIME", help_heading = HEIGHTS)]
     layer_overhead: Option<Seconds>,
 
@@ -58,8 +58,8 @@ pub(crate) struct HeightArgs {
     #[arg(long, help_heading = HEIGHTS)]
     snap: bool,
 
-    /// Distance between the rows that measure where parts of a layer lie above each other; features
-    /// thinner than that may be missed there [default: four pixels]
+    /// Distance between measured rows, used where parts of a layer lie above each other; thinner
+    /// features may be missed there [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
     row_pitch: Option<Length>,
 }

@@ -11,9 +11,9 @@ use lamp_pipeline::words::optional;
 #[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct LampOption {
-    /// Light of full white now, if the lamp has aged or shines through a filter: 1.2W/cm2, 75% of
-    /// the material's, or od0.3 for a filter of that optical density. The critical dose follows by
-    /// the material's [dimmed-lamp] [default: the material's]
+    /// Present light of full white, if the lamp has aged or has a filter: 1.2W/cm2, 75% of the
+    /// material's, or od0.3 for a filter of that optical density. The material's [dimmed-lamp]
+    /// gives the critical dose [default: the material's]
     #[arg(long, value_name = "LIGHT", requires = "material")]
     #[serde(with = "optional")]
     lamp_intensity: Option<LampLight>,

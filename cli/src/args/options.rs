@@ -25,7 +25,7 @@ pub(crate) struct Common {
     #[arg(short, long, global = true, help_heading = GENERAL)]
     pub(crate) quiet: bool,
 
-    /// Print more of what was done
+    /// Print more details
     #[arg(short, long, global = true, help_heading = "General options", conflicts_with = "quiet")]
     pub(crate) verbose: bool,
 
@@ -34,18 +34,18 @@ pub(crate) struct Common {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 
-    /// Do not wait until the disk has what is written
+    /// Do not wait until outputs are on the disk
     ///
-    /// Commands end once the disk has the bytes and the names of their outputs. Without that, a loss
-    /// of power or a disk that fails late may take an output that was reported as written. For disks
-    /// whose files can be made again
+    /// By default, commands end once the bytes and names of their outputs are on the disk. With
+    /// this option, a power loss or a late disk failure may lose an output that was reported as
+    /// written. Use it for files that can be made again
     #[arg(long, global = true, help_heading = GENERAL, hide_short_help = true)]
     no_sync: bool,
 
     /// Take further options from a TOML file
     ///
-    /// Keys are the long options, as thickness = "50um" or gray = true; a table, as [slice], is for
-    /// that command alone. The command line wins
+    /// Keys are the long options, such as thickness = "50um" or gray = true. A table such as
+    /// [slice] applies only to that command. The command line takes precedence
     #[arg(long, value_name = "FILE.toml", global = true, help_heading = GENERAL)]
     options: Option<PathBuf>,
 }
@@ -112,7 +112,7 @@ pub(crate) struct InputArgs {
 pub(crate) struct Output {
     /// Where to write the stack: a file, a folder of pages, or - for standard output
     ///
-    /// A folder's name ends in /, or names an empty folder
+    /// For a folder, end the name in /, or name an empty folder
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: PathBuf,
 
@@ -120,7 +120,8 @@ pub(crate) struct Output {
     #[arg(long)]
     pub(crate) classic: bool,
 
-    /// Write gray pages as PackBits, for readers without Deflate: several times the size
+    /// Compress gray pages with PackBits, for readers without Deflate; files are several times
+    /// larger
     #[arg(long)]
     pub(crate) packbits: bool,
 

@@ -17,12 +17,12 @@ use crate::exit::Exit;
 
 /// The heights in a layer, as `--help` describes them.
 pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
-    ["Where light enters it", "Half-way", "Where it must reach what it rests on"];
+    ["Where light enters it", "Half-way", "Where it must reach the surface below"];
 
 /// The target to cure, and the light that cures it.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlanningOptions {
-    /// Resin: a built-in material's name (see lamp material list) or a file; it must say how far
+    /// Resin: a built-in material's name (see lamp material list) or a file. It must state how far
     /// light spreads ([spread]) and which dose cures ([working-curve])
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) material: PathBuf,
@@ -30,16 +30,16 @@ pub(crate) struct PlanningOptions {
     #[command(flatten)]
     lamp: LampOption,
 
-    /// Lowest gray level of pixels that are wanted
+    /// Lowest gray level that counts as part of the wanted solid
     #[arg(long, value_name = "LEVEL", default_value = "128", value_parser = parse_wanted)]
     pub(crate) wanted: NonZeroU8,
 
-    /// How far beyond the critical dose voxels should be: so much above it where they are
-    /// wanted, so much below it elsewhere
+    /// Margin to the critical dose: wanted voxels should be this far above it, all others this far
+    /// below
     #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = parse_margin)]
     pub(crate) margin: f64,
 
-    /// Stop so near to the best, as a share of the error without a plan
+    /// Stop this near the best, as a share of the error without a plan
     #[arg(long, value_name = "SHARE", default_value = "0.1%", value_parser = parse_gap)]
     pub(crate) gap: f64,
 

@@ -16,7 +16,7 @@ pub(crate) struct PlatformOptions {
     #[arg(long, value_name = "A..B", default_value = "5um/s..2mm/s", value_parser = parse_speeds)]
     speed: (Speed, Speed),
 
-    /// Greatest difference of the speed from a neighboring layer's speed, as 20%
+    /// Greatest difference in speed between neighboring layers, such as 20%
     #[arg(long, value_name = "SHARE", value_parser = parse_change)]
     max_change: Option<f64>,
 }

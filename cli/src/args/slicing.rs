@@ -36,18 +36,17 @@ pub(crate) struct SlicingArgs {
     #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
     plane: PlaneRule,
 
-    /// How far a vertex may be from a layer's plane and still count as lying on it
+    /// Largest distance at which a vertex counts as lying on a layer's plane
     ///
-    /// Files round heights: 0.7 mm is 0.699999988 in 32 bits. Such noise would move a flat face by
-    /// a layer. 0um compares heights as they are
+    /// Files round heights: 0.7 mm is 0.699999988 in 32 bits. Such rounding would move a flat face
+    /// by a layer. 0um compares heights exactly
     #[arg(long, value_name = "LENGTH", default_value_t = PLANE_TOLERANCE)]
     plane_tolerance: Length,
 
     #[command(flatten)]
     solid: SolidArgs,
 
-    /// Leave crossings on the facets of STEP parts, instead of moving them onto the exact
-    /// surfaces
+    /// Leave crossings on the facets of STEP parts; do not move them onto the exact surfaces
     #[arg(long, help_heading = STEP)]
     no_polish: bool,
 
@@ -55,8 +54,8 @@ pub(crate) struct SlicingArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 1)]
     margin: u32,
 
-    /// Top left corner of the image in part coordinates, in millimeters, instead of around the
-    /// part's bounding box; the image must contain the part and keep its last column black
+    /// Top left corner of the image in part coordinates, in millimeters [default: from the part's
+    /// bounding box]. The image must contain the part and keep its last column black
     #[arg(long, value_name = "X,Y", value_parser = parse_origin, requires = "size", conflicts_with = "margin")]
     #[arg(allow_hyphen_values = true)]
     origin: Option<FiniteNumbers<2>>,
@@ -77,19 +76,19 @@ pub(crate) struct SlicingArgs {
     #[command(flatten)]
     exposure: ExposureArgs,
 
-    /// Write gray layers, which cure just down to where the part ends
+    /// Write gray layers, which cure down to where the part ends
     ///
-    /// Each pixel is just bright enough to cure down to where the part ends below it, or white if
-    /// that is deeper than white cures
+    /// Each pixel is just bright enough to cure down to where the part ends below it. It is white
+    /// if that is deeper than white cures
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,
 
-    /// Choose gray levels for doses that add up, so that light of the layers above does not cure
+    /// Choose gray levels for doses that add up, so that light from layers above does not cure
     /// through undersides
     ///
-    /// With --gray. Down each column of pixels, the least light is taken away that leaves the
-    /// underside where it is, from the lowest layers first
+    /// Use it with --gray. In each column of pixels, it removes just enough light to keep the
+    /// underside in place, starting with the lowest layers
     #[arg(long, requires = "gray", help_heading = EXPOSURE)]
     print_through: bool,
 }
@@ -97,14 +96,14 @@ pub(crate) struct SlicingArgs {
 /// The part to slice, and the options of slicing.
 #[derive(Args, Clone)]
 pub(crate) struct SliceStageArgs {
-    /// The part: STL, STEP, 3MF or OBJ files, also packed by gzip, or - for standard input
+    /// The part: STL, STEP, 3MF or OBJ files, even gzipped, or - for standard input
     ///
-    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns one about z and moves it
-    /// first. Where they overlap they unite; --subtract and --intersect cut them
+    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES first turns a file about z and
+    /// moves it. Overlapping files are united; --subtract and --intersect cut them
     #[arg(value_name = "PART", required = true, value_parser = part_file())]
     parts: Vec<PartFile>,
 
-    /// Name of the part in its stack [default: the file's, without its ending]
+    /// Name of the part in its stack [default: the file's name, without its ending]
     #[arg(long, value_name = "NAME", value_parser = parse_name)]
     name: Option<String>,
 
@@ -113,8 +112,9 @@ pub(crate) struct SliceStageArgs {
 
     /// Machine to build on: alpha, beta or a file (see lamp machine)
     ///
-    /// A part, a resolution or a layer thickness beyond its limits is refused before the work. Its
-    /// defaults hold where no other resolution, thickness or margin is given
+    /// A part, a resolution or a layer thickness beyond the machine's limits is refused at the
+    /// start. The machine's defaults apply to resolution, thickness and margin unless you give
+    /// others
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 
@@ -122,16 +122,16 @@ pub(crate) struct SliceStageArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 
-    /// Memory for the table of crossings, at least 16MB; with less, fewer layers are cut at a time
-    /// [default: a quarter of available memory, or as much as helps]. Facets in no order of height
-    /// are first sorted in a temporary file, 36 bytes per facet. --adaptive also holds the mesh in
-    /// memory, 49 bytes per facet
+    /// Memory for the table of crossings, at least 16MB; with less memory, fewer layers are cut at
+    /// a time [default: a quarter of available memory, or as much as helps]. Facets that are not in
+    /// order of height are first sorted in a temporary file, 36 bytes per facet. --adaptive also
+    /// holds the mesh in memory, 49 bytes per facet
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
     /// An STL of the same STEP part, in millimeters. Layers where the STEP part has gaps are cut up
-    /// to 10 um off their plane, or else taken from this STL, as are layers that lack contours of
-    /// it
+    /// to 10 um off their plane, or else from this STL. Layers that lack contours of this STL are
+    /// cut from it, too
     #[arg(long, value_name = "PART.stl", help_heading = STEP)]
     fallback: Option<PathBuf>,
 }

@@ -30,13 +30,13 @@ pub(crate) struct SolidArgs {
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
     units: Units,
 
-    /// Rule for what is inside: all that shells wind around, which unites shells, bodies and files
-    /// that overlap; or between odd and even crossings, where they cut each other
+    /// Rule for the inside: everything that shells wind around, which unites overlapping shells,
+    /// bodies and files; or between odd and even crossings, where overlaps cut each other
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
     fill: Fill,
 
-    /// How the bodies of a STEP file, or the items of a 3MF, join where they overlap under --fill
-    /// even-odd: as one part, or as files do, which cut each other
+    /// How overlapping bodies of a STEP file, or items of a 3MF, join under --fill even-odd: as one
+    /// part, or cutting each other as files do
     #[arg(long, value_parser = one_of::<Bodies>(), default_value_t)]
     bodies: Bodies,
 
@@ -44,15 +44,15 @@ pub(crate) struct SolidArgs {
     #[arg(long, value_name = "FILE", value_parser = part_file())]
     subtract: Vec<PartFile>,
 
-    /// Keep of the part only what lies in this file, too; may be given several times
+    /// Keep only where the part and this file overlap; may be given several times
     #[arg(long, value_name = "FILE", value_parser = part_file())]
     intersect: Vec<PartFile>,
 
     #[command(flatten)]
     placement: PlacementArgs,
 
-    /// Take the part as large as it seems, also if single vertices lie far outside the rest, or
-    /// there are more rows than any machine exposes
+    /// Accept the part's size, even if single vertices lie far outside the rest, or there are more
+    /// rows than any machine exposes
     #[arg(long)]
     trust_extent: bool,
 
@@ -63,7 +63,8 @@ pub(crate) struct SolidArgs {
 /// Options of a part's placement.
 #[derive(Args, Clone)]
 pub(crate) struct PlacementArgs {
-    /// Scale the part, by one factor or one for each axis: 1.02 makes up for about 2% of shrinkage
+    /// Scale the part, by one factor or a factor for each axis: 1.02 makes up for about 2% of
+    /// shrinkage
     #[arg(long, value_name = "F|X,Y,Z", value_parser = parse_scale, help_heading = PLACEMENT)]
     #[arg(allow_hyphen_values = true)]
     scale: Option<FiniteNumbers<3>>,
@@ -73,15 +74,15 @@ pub(crate) struct PlacementArgs {
     #[arg(help_heading = PLACEMENT)]
     mirror: Vec<Axis>,
 
-    /// Rotate the part by degrees, as in x:90,z:-12.5
+    /// Rotate the part by degrees, for example x:90,z:-12.5
     ///
-    /// It turns about an axis through the origin, counter-clockwise seen from the axis's tip.
+    /// The axis goes through the origin; rotation is counterclockwise as seen from the axis's tip.
     /// Several rotations apply in order. Quarter turns are exact
     #[arg(long, value_name = "AXIS:DEGREES", value_delimiter = ',', help_heading = PLACEMENT)]
     rotate: Vec<Rotation>,
 
-    /// Move the part, in millimeters. The image moves along: its origin and the layers' heights are
-    /// in the moved part's coordinates
+    /// Move the part, in millimeters. The image moves with the part: its origin and the layers'
+    /// heights are in the moved part's coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_translation, help_heading = PLACEMENT)]
     #[arg(allow_hyphen_values = true)]
     translate: Option<FiniteNumbers<3>>,

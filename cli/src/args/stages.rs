@@ -29,16 +29,17 @@ pub(crate) struct FixStageArgs {
     ]))]
     method: FixMethod,
 
-    /// Leave bands of more rows as they are, however certain their correction is [default: no limit]
+    /// Do not correct bands of more rows than this, however certain the correction [default: no
+    /// limit]
     #[arg(long, value_name = "ROWS")]
     max_width: Option<u32>,
 
-    /// Leave bands whose correction is less certain than this as they are, from 0 to 1
+    /// Do not correct bands whose correction is less certain than this, from 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = FixSettings::default().min_confidence)]
     #[arg(value_parser = parse_share)]
     min_confidence: f64,
 
-    /// Use the layers below and above to find where contours cross bands of three rows and more
+    /// Use the layers below and above to find where contours cross bands of three or more rows
     #[arg(long)]
     use_neighbours: bool,
 }
@@ -62,8 +63,8 @@ pub(crate) struct CompensateStageArgs {
     #[command(flatten)]
     lamp: LampOption,
 
-    /// Keep walls at least this wide, or as they are if thinner; 0um lets them vanish [default: two
-    /// pixels]
+    /// Keep walls at least this wide, and thinner walls unchanged; 0um lets walls vanish [default:
+    /// two pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     min_feature: Option<Length>,
 
@@ -81,11 +82,11 @@ pub(crate) struct CompensateStageArgs {
 pub(crate) struct DitherStageArgs {
     /// Dithering method
     #[arg(long, default_value_t, value_parser = one_of_described::<DitherMethod>(&[
-        "Dots far from each other, in no pattern: a mask of 128 x 128 thresholds",
+        "Dots far from each other, without a pattern: a mask of 128 x 128 thresholds",
         "Bayer's pattern of 16 x 16 thresholds",
         "Error diffusion, with the thresholds of blue noise",
-        "Error diffusion in rows that turn: the most even gray within a layer",
-        "No dots: levels of 128 and more, of 255, are white",
+        "Error diffusion in alternating row directions: the most even gray within a layer",
+        "No dots: levels from 128 to 255 are white",
     ]))]
     method: DitherMethod,
 }
@@ -105,7 +106,7 @@ pub(crate) struct CheckStageArgs {
     ]))]
     only: Vec<FindingGroup>,
 
-    /// Side of the square that a finding must hold, in pixels
+    /// Side of the square that must fit in a finding, in pixels
     #[arg(long, value_name = "PIXELS", default_value = "3")]
     speck: NonZeroU32,
 
@@ -113,23 +114,23 @@ pub(crate) struct CheckStageArgs {
     #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
     least_support: f64,
 
-    /// How far white may reach beyond the white below [default: as far as a layer is thick: 45
+    /// How far white may reach beyond the white below [default: the layer's thickness, which is 45
     /// degrees]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     max_overhang: Option<Length>,
 
-    /// How wide a way out must be to drain a pocket: narrower ways are found, too, by placing a ball
-    /// of this size everywhere; takes several times longer [default: a pixel and a layer]
+    /// Smallest width of a way out that drains a pocket. To find narrower ways, a ball of this size
+    /// is placed everywhere, which takes several times longer [default: a pixel and a layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     drain: Option<Length>,
 
-    /// Level from which a gray pixel is white
+    /// Lowest gray level that counts as white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
     threshold: NonZeroU8,
 
-    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
+    /// Machine whose blade drags on floating features: alpha, beta or a file (see lamp machine)
     ///
-    /// Its defaults hold where no other resolution, thickness or margin is given
+    /// The machine's defaults apply to resolution, thickness and margin unless you give others
     #[arg(long, value_name = "M", default_value = "alpha")]
     machine: PathBuf,
 }
@@ -145,7 +146,7 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
     radius: Length,
 
-    /// Largest angle of a support to the vertical
+    /// Largest angle between a support and the vertical
     #[arg(long, value_name = "ANGLE", default_value_t = Degrees(SupportOptions::default().max_tilt))]
     #[arg(help_heading = CHOICE)]
     max_tilt: Degrees,
@@ -155,7 +156,7 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
     max_length: Length,
 
-    /// Least distance of a contact to edges where the surface turns by more than 30 degrees
+    /// Smallest distance from a contact to edges where the surface turns by more than 30 degrees
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().edge_clearance)]
     #[arg(value_parser = parse_distance, help_heading = CHOICE)]
     edge_clearance: Length,
@@ -170,21 +171,21 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
     hold: Length,
 
-    /// Directions to try
+    /// Number of directions to try
     #[arg(long, value_name = "N", default_value_t = 400, help_heading = CHOICE)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     candidates: u32,
 
-    /// Supports to list for each place: the one that is drawn, and alternatives
+    /// Number of supports to list for each place: the one that is drawn, and alternatives
     #[arg(long, value_name = "N", default_value_t = 3, help_heading = CHOICE)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
     keep: u16,
 
-    /// Side of the square that an island must hold, in pixels
+    /// Side of the square that must fit in an island, in pixels
     #[arg(long, value_name = "PIXELS", default_value = "3")]
     speck: NonZeroU32,
 
-    /// Level from which a gray pixel is white
+    /// Lowest gray level that counts as white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
     threshold: NonZeroU8,
 }
@@ -197,19 +198,19 @@ pub(crate) struct EditStageArgs {
     #[arg(value_name = "EDITS.toml")]
     edits: Option<PathBuf>,
 
-    /// Keep what is white in either stack
+    /// Keep pixels that are white in either stack
     #[arg(long, value_name = "STACK")]
     union: Option<PathBuf>,
 
-    /// Keep what is white in both stacks
+    /// Keep pixels that are white in both stacks
     #[arg(long, value_name = "STACK")]
     intersect: Option<PathBuf>,
 
-    /// Remove what is white in this stack
+    /// Remove pixels that are white in this stack
     #[arg(long, value_name = "STACK")]
     difference: Option<PathBuf>,
 
-    /// Keep what is white in exactly one of the stacks
+    /// Keep pixels that are white in exactly one of the stacks
     #[arg(long, value_name = "STACK")]
     xor: Option<PathBuf>,
 }

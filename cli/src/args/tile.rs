@@ -27,49 +27,49 @@ pub(crate) struct TileStageArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     copies: Option<u32>,
 
-    /// Take the counts of several stacks for shares: blade.tif:3 core.tif:1 places as many as fit,
-    /// three blades for each core, to within one copy
+    /// Use the counts of several stacks as shares: blade.tif:3 core.tif:1 places as many as fit,
+    /// three blades per core, to within one copy
     #[arg(long)]
     shares: bool,
 
-    /// Smallest distance between copies [default: twice the mesh's clearance and 2mm; 1mm with
-    /// --mesh none]. With --layout, nearer copies cause a warning
+    /// Smallest distance between copies [default: twice the mesh's clearance plus 2mm; 1mm with
+    /// --mesh none]. With --layout, closer copies cause a warning
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     gap: Option<Length>,
 
-    /// Smallest distance of copies to the area's edges
+    /// Smallest distance between copies and the area's edges
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, allow_hyphen_values = true)]
     #[arg(default_value = "0mm")]
     edge_gap: Length,
 
-    /// Place parts by the extent of what is white in any layer, not by their whole images. Stacks
-    /// are read twice; standard input is kept in a temporary file
+    /// Place parts by the extent of white in all layers, not by their full images. Stacks are read
+    /// twice; standard input is kept in a temporary file
     #[arg(long)]
     fit: bool,
 
-    /// Shape by which copies are kept apart; outline implies --fit
+    /// Shape that keeps copies apart; outline implies --fit
     #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
         "The boxes around the parts",
-        "The parts' outlines, one after another or, of one part, on a lattice, if boxes place fewer",
+        "The parts' outlines, one after another or, for one part, on a lattice, if boxes place fewer",
     ]))]
     pack: PackBy,
 
-    /// Turns that packing may use if more copies fit [default: none, or quarters with --pack
-    /// outline]. An angle below 90deg makes a plan, which packs by outlines
+    /// Rotations that packing may use if more copies fit [default: none, or quarters with --pack
+    /// outline]. An angle below 90deg makes a plan, packed by outlines
     #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
     turns: Option<TileTurns>,
 
-    /// Place copies as this file says, instead of packing them
+    /// Place copies from this file, instead of packing them
     #[arg(long, value_name = "FILE.json")]
     #[arg(conflicts_with_all = ["copies", "shares", "edge_gap", "pack", "turns"])]
     layout: Option<PathBuf>,
 
-    /// Count heights from each stack's first layer, so that all parts stand on the platform
+    /// Measure heights from each stack's first layer, so that all parts are on the platform
     #[arg(long)]
     settle: bool,
 
-    /// Accept layers that do not match: the build has the heights of the first stack, and takes
-    /// from each other stack the layer at the top of its own
+    /// Accept layers that do not match: the build has the heights of the first stack. Each of its
+    /// layers takes, from every other stack, the layer that contains its top
     #[arg(long)]
     resample: bool,
 
@@ -83,7 +83,7 @@ const HEADING: &str = "Mesh around the parts";
 #[derive(Args, Clone)]
 pub(crate) struct MeshStageArgs {
     /// Mesh around the parts, which keeps the suspension from sloshing: hexagon, square, an image
-    /// that is repeated, or none
+    /// to repeat, or none
     #[arg(long, value_name = "hexagon|square|none|FILE", default_value = "hexagon")]
     #[arg(help_heading = HEADING)]
     mesh: PathBuf,
@@ -102,20 +102,20 @@ pub(crate) struct MeshStageArgs {
 
     /// Shape that the moat follows [default: rising]
     #[arg(long, help_heading = HEADING, value_parser = one_of_described::<Moat>(&[
-        "The part in each layer and in those below it: no mesh stands on faces that look up",
-        "The part in each layer: mesh cures onto faces that look up, and in cross bores",
-        "The part's outline over all layers, also below faces that look down; implies --fit",
+        "The part in each layer and in the layers below it: no mesh is on upward faces",
+        "The part in each layer: mesh cures onto upward faces, and in cross bores",
+        "The part's outline over all layers, even below downward faces; implies --fit",
     ]))]
     moat: Option<Moat>,
 
-    /// Least area of a piece of mesh in a layer: smaller pieces are left out, and so are pieces
-    /// that hang on no mesh below; 0 keeps all that hang [default: 1mm2]
+    /// Smallest area of a piece of mesh in a layer. Smaller pieces are left out, as are pieces not
+    /// joined to mesh below; 0 keeps all joined pieces [default: 1mm2]
     #[arg(long, value_name = "AREA", value_parser = parse_area, help_heading = HEADING)]
     #[arg(allow_hyphen_values = true)]
     least_piece: Option<f64>,
 
-    /// Width of the break lines, which cut the mesh from each part up, down, left and right to the
-    /// next part or the area's edge; 0 makes none [default: 500um]
+    /// Width of the break lines. They run through the mesh from each part up, down, left and right
+    /// to the next part or the area's edge; 0 makes none [default: 500um]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance, help_heading = HEADING)]
     break_width: Option<Length>,
 
@@ -123,7 +123,7 @@ pub(crate) struct MeshStageArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     break_pitch: Option<Length>,
 
-    /// Number of layers of mesh alone below the parts, for them to break off from [default: 5]
+    /// Number of layers of only mesh below the parts, which the parts break off from [default: 5]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..100_000))]
     #[arg(help_heading = HEADING)]
     base_layers: Option<u32>,
@@ -184,14 +184,14 @@ impl TypedValueParser for TurnsParser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let values = [
-            ("none", "Parts stay as they were sliced"),
+            ("none", "Parts keep their sliced orientation"),
             ("half", "By 180 degrees"),
             ("quarters", "By 90, 180 and 270 degrees"),
             (
                 "15deg",
-                "By all multiples of this or another angle that divides a right angle into at most \
-                 18, by outlines. No build is written, but a script: it slices the parts at the \
-                 angles that this takes, and lays the build out",
+                "By all multiples of this or another angle, by outlines. The angle must divide a \
+                 right angle into at most 18 parts. Instead of a build, this writes a script, \
+                 which slices the parts at the chosen angles and lays the build out",
             ),
         ];
         let values = values.map(|(name, help)| PossibleValue::new(name).help(help));

@@ -18,9 +18,9 @@ use crate::streams::{input_name, print};
 
 /// Describe a STEP part, and check whether it can be sliced
 ///
-/// Lists for each body its faces by kind of surface, and its bounding box, volume and area by the
-/// facets that `slice` would make. A body is sliced only if its facets close, stay inside the
-/// control points of its surfaces, and enclose the same volume as the surfaces.
+/// For each body, it lists the faces by kind of surface, and the bounding box, volume and area
+/// computed from the facets that `slice` would make. A body is sliced only if its facets close,
+/// stay inside the control points of its surfaces, and enclose the same volume as the surfaces.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -32,7 +32,7 @@ pub(crate) struct BrepArgs {
     #[arg(value_name = "PART")]
     part: PathBuf,
 
-    /// Resolution to check the part for; the default tolerance is a quarter of a pixel
+    /// Resolution to check for; the default tolerance is a quarter of a pixel
     #[arg(long, value_name = "DPI", default_value = "1500")]
     dpi: Dpi,
 
@@ -40,7 +40,7 @@ pub(crate) struct BrepArgs {
     brep: StepArgs,
 
     /// Read the part with OpenCASCADE, too, and compare boxes, volumes and five sections of each
-    /// body; exit with status 3 if they differ by more than the tolerance explains
+    /// body. Exit with status 3 if they differ by more than the tolerance explains
     #[arg(long, conflicts_with = "kernel")]
     both: bool,
 

@@ -15,13 +15,13 @@ use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };
 
-/// Narrow images by the width that resin cures beyond them, and make up for firing shrinkage
+/// Narrow images by the excess cure width, and compensate for firing shrinkage
 ///
 /// Edges move by the exact distance at every angle; fractions of a pixel become gray, which
-/// `dither` turns into dots. Walls that would become thinner than --min-feature are narrowed less, so that
-/// none breaks or is lost, and each is reported; with --min-feature 0um walls may vanish, and each
-/// piece that is lost or breaks apart is reported. Gray layers move by their outlines. Images are
-/// first enlarged for shrinkage; if you have the mesh, slice --scale is more exact.
+/// `dither` turns into dots. Walls that would become thinner than --min-feature are narrowed less,
+/// so that no wall breaks or is lost; each such wall is reported. With --min-feature 0um, walls may
+/// vanish, and each piece that is lost or breaks apart is reported. In gray layers, outlines move.
+/// Images are first enlarged for shrinkage; if you have the mesh, slice --scale is more exact.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ pub(crate) struct CompensateArgs {
     #[command(flatten)]
     settings: CompensateStageArgs,
 
-    /// Write the walls that were narrowed less than asked, and lost pieces, as JSON
+    /// Write lost pieces, and walls narrowed less than requested, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 

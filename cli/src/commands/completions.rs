@@ -9,7 +9,7 @@ use crate::streams::print;
 
 /// Print the completions of lamp, slice, fix, dither and tile for a shell
 ///
-/// The shell is to read them when it starts.
+/// Let the shell read them when it starts.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

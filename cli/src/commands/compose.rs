@@ -10,12 +10,13 @@ use crate::args::options::{Common, Output, parse_layers};
 use crate::exit::Exit;
 use crate::streams::{check_not_input, input_name, is_stream, progress, write_layers};
 
-/// Make layers of a build by its recipe
+/// Make layers of a build from its recipe
 ///
-/// tile --recipe writes where copies stand and what mesh is around them, and the names and digests of
-/// the parts' stacks, in some kilobytes. From that and the stacks, any layers of the build are made, the
-/// same bytes as tile writes: for a machine that fetches a layer when it needs it. A range of layers is
-/// a whole stack, as of lamp split. Stacks that were changed since are refused.
+/// tile --recipe writes a few kilobytes: the places of copies, the mesh around them, and the names
+/// and digests of the parts' stacks. From the recipe and the stacks, this command makes any layers
+/// of the build, with the same bytes as tile. A machine can thus fetch each layer when it needs it.
+/// A range of layers is a complete stack, as from lamp split. Stacks changed since then are
+/// refused.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -24,7 +25,7 @@ Examples:
   lamp compose build.json | lamp verify -
   lamp compose build.json --layers 812 | lamp show - --layer 812 -o layer.png")]
 pub(crate) struct ComposeArgs {
-    /// Recipe that tile --recipe wrote. Names of stacks in it count from its folder
+    /// Recipe that tile --recipe wrote. Stack names in it are relative to its folder
     #[arg(value_name = "RECIPE")]
     recipe: PathBuf,
 

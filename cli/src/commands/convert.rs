@@ -24,12 +24,13 @@ use crate::streams::{
 use crate::terminal::progress::say;
 use crate::terminal::stack_notes::doubts;
 
-/// Convert a stack to a file, a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
+/// Convert a stack to a file or a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
 ///
-/// Images and their metadata stay as they are, and the command is not recorded: a stack converted
+/// Images and their metadata stay unchanged, and the command is not recorded: a stack converted
 /// from file to folder and back has the same bytes.
 ///
-/// A mesh must be closed. In a STEP file its facets are flat faces, those in one plane a single one.
+/// A mesh must be closed. In a STEP file, its facets become flat faces; facets in one plane become
+/// a single face.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -42,8 +43,8 @@ Examples:
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: InputArgs,
-    /// File to write for a part, in millimeters: a binary STL of a STEP part, or a STEP file of a
-    /// mesh
+    /// File to write for a part, in millimeters: a binary STL from a STEP part, or a STEP file from
+    /// a mesh
     #[arg(value_name = "PART.stl|PART.step", value_parser = parse_part)]
     part: Option<PathBuf>,
 
@@ -66,12 +67,12 @@ pub(crate) struct ConvertArgs {
     #[arg(long, conflicts_with = "classic")]
     png: bool,
 
-    /// Take pages that another program has changed as they are, and make new checks
+    /// Accept pages that another program has changed, and make new checks
     #[arg(long)]
     ignore_checks: bool,
 
-    /// Stop with status 3 and no output if the pages may not be one whole stack, such as a folder
-    /// that lacks a number
+    /// Stop with status 3 and no output if the stack may be incomplete, for example a folder with a
+    /// missing number
     #[arg(long)]
     strict: bool,
 }

@@ -30,15 +30,15 @@ use lamp_plots::SectionPicture;
 
 /// Draw a vertical section of what a stack cures, compared with the part
 ///
-/// The doses of all exposures that reach a place add up: light fades as it goes down from each
-/// layer's top, and spreads sideways as far as the material says ([spread]). Resin is cured where
-/// they come to the critical dose. With --alone each exposure cures by itself, as deep as its gray
-/// level reaches in the material's cure model. A stack with gray layers is drawn twice: on the left
-/// with every pixel that is not black exposed in full, on the right by its gray levels. Resin cured
-/// outside the part is red, uncured places of the part are blue, and the part's outline is yellow.
-/// The areas, which are exact over whole pixels, are printed; next to them, as `pixels`, the areas
-/// of columns of pixels that cure just the part at their centers, as exact as pixels can be. Dots
-/// are drawn as they are, so use a stack from before `dither`.
+/// The doses of all exposures add up. Light fades on its way down from each layer's top, and
+/// spreads sideways as the material's [spread] states. Resin cures where the doses add up to the
+/// critical dose. With --alone, each exposure cures by itself, as deep as its gray level reaches in
+/// the material's cure model. A stack with gray layers is drawn twice: on the left with every pixel
+/// that is not black exposed in full, on the right with its gray levels. Resin cured outside the
+/// part is red, uncured places of the part are blue, and the part's outline is yellow. The printed
+/// areas are exact over whole pixels. Next to them, `pixels` gives the areas for pixel columns that
+/// cure just the part at their centers, the limit of what pixels can do. Dots are drawn as they
+/// are, so use a stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -62,30 +62,30 @@ pub(crate) struct CureArgs {
     #[arg(long, value_name = "AXIS=LENGTH")]
     section: SectionPlane,
 
-    /// Part that the stack was sliced from, for its outline; it is placed as the stack records.
-    /// Give several files in the order in which slice got them, each with its own placement
+    /// Part that the stack was sliced from, for its outline; the stack's record places it. Give
+    /// several files in the same order as to slice, each with its own placement
     #[arg(long, value_name = "FILE", value_parser = part_file())]
     part: Vec<PartFile>,
 
-    /// Draw only this stretch of the section, for example 10mm..14mm
+    /// Draw only this part of the section, for example 10mm..14mm
     #[arg(long, value_name = "A..B", value_parser = parse_along, allow_hyphen_values = true)]
     along: Option<Range<f64>>,
 
-    /// Add up the doses of all layers that reach a place; this is the default
+    /// Add up the doses of all layers (the default)
     #[arg(long, conflicts_with = "alone")]
     add_up: bool,
 
-    /// Let each exposure cure by itself, without what the others add
+    /// Let each exposure cure by itself, without the doses of others
     #[arg(long)]
     alone: bool,
 
-    /// Cure whole layers, by the dose at this height of each, as planners do, instead of any height
-    /// where the dose is the critical one
+    /// Cure complete layers, by the dose at this height in each layer, as planners do. By default,
+    /// cure may end at any height in a layer
     #[arg(long, value_name = "HEIGHT", conflicts_with = "alone")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     at: Option<SampleHeight>,
 
-    /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 only every eighth
+    /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 draws every eighth pixel
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     scale: PictureScale,
 

@@ -12,13 +12,13 @@ use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
-/// A gray level becomes the share of white pixels. Solid black and white stay as they are: no dot
+/// A gray level becomes the share of white pixels. Solid black and white do not change: no dot
 /// appears outside the part. The pattern moves from layer to layer, so that holes do not line up;
 /// the same layer always becomes the same dots. Resin averages dots of 17 um, but not of 85 um, so
-/// wider pixels than 17 um cause a warning.
+/// pixels wider than 17 um cause a warning.
 ///
-/// Of a folder of strips, the build that they make is dithered and cut again, by a comb: no pixel of
-/// a seam is white in two strips.
+/// For a folder of strips, their build is dithered and cut again with a comb: no pixel of a seam is
+/// white in two strips.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -12,14 +12,14 @@ use crate::streams::{
 };
 use crate::terminal::stack_notes::noting;
 
-/// Change a design at image level, without slicing it again
+/// Edit the images of a part, without slicing it again
 ///
-/// Adds or subtracts boxes, cylinders, cones, spheres, lines, polygons, labels, pictures and other
-/// stacks in a range of heights, also repeated along lines and circles; crops, pads, mirrors and
-/// rotates all layers. Lengths and positions are in part coordinates, also in the copies of a build,
-/// of which some can be chosen; serial numbers of labels may come from a CSV file. Edits are listed
-/// in a TOML file and applied in order; docs/edit.md describes every key. Pages that no edit changes
-/// pass with their code and check, and are not decoded.
+/// It adds or subtracts boxes, cylinders, cones, spheres, lines, polygons, labels, pictures and
+/// other stacks in a range of heights, and can repeat them along lines and circles. It crops, pads,
+/// mirrors and rotates all layers. Lengths and positions are in part coordinates, even in a build,
+/// where you can choose copies. Serial numbers of labels may come from a CSV file. A TOML file
+/// lists the edits, which are applied in order; docs/edit.md describes every key. Pages that no
+/// edit changes pass with their code and check, and are not decoded.
 #[derive(Args)]
 #[command(override_usage = "\
 lamp edit [OPTIONS] <STACK> <EDITS.toml>

@@ -22,14 +22,14 @@ use crate::terminal::stack_notes::doubts;
 ///
 /// A row is stray if it ends white (the last column of every part is black) or if `slice` found
 /// that its crossings do not balance. Where `slice` found that contours break off, a row is also
-/// stray if it lacks crossings that the rows above and below have, or has a run that they lack.
-/// Missing crossings are added; existing ones stay unless they contradict the contours around them.
-/// A band of any width is corrected if the rows and layers around it show how; if they do not, it is
-/// left and reported.
-/// Changes are recorded on their pages, and summed up in two lines; --verbose and --report list them
-/// all. All other layers pass byte for byte. Gray layers are corrected by their outlines.
+/// stray if its neighbors above and below have crossings that it lacks, or lack a run that it has.
+/// Missing crossings are added; existing crossings stay unless they contradict the contours around
+/// them. A band of any width is corrected if the rows and layers around it show how; otherwise it
+/// is left and reported. Pages record their changes, and two lines sum them up; --verbose and
+/// --report list all changes. All other layers pass byte for byte. In gray layers, outlines are
+/// corrected.
 ///
-/// Of a folder of strips, the build that they make is corrected and cut again.
+/// For a folder of strips, their build is corrected and cut again.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -44,16 +44,16 @@ pub(crate) struct FixArgs {
     #[command(flatten)]
     settings: FixStageArgs,
 
-    /// Write all bands, and what was done about them, as JSON
+    /// Write all bands and their corrections as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Write a picture of each band into a new folder: before, after and the difference (new white
-    /// in blue, new black in red), or just the band if it was left as it is
+    /// Write a picture of each band to a new folder: before, after and the difference (new white in
+    /// blue, new black in red), or just the band if it was not corrected
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 
-    /// Give up with status 3 if a band was left as it is, or if pages of a folder may be missing: no
+    /// Stop with status 3 if a band was not corrected, or if pages of a folder may be missing: no
     /// stack is written, and the next stage of a pipe fails, too
     #[arg(long)]
     strict: bool,

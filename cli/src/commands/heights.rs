@@ -31,11 +31,11 @@ use crate::streams::{check_beside, print, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::{self as plots, Plot, PlotAxis, Series, drawn};
 
-/// Find how thick each layer of a part may be, and what that saves
+/// Find how thick each layer of a part may be, and the savings
 ///
-/// Each layer is built as its section at the top, swept down. Its error is kept within a bound, as
-/// by `slice --adaptive` with the same options. The layers are compared with uniform ones; no
-/// images are written.
+/// Each layer is built as its top section, swept down. Its error stays within a bound, as in `slice
+/// --adaptive` with the same options. The layers are compared with uniform layers; no images are
+/// written.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,8 +48,8 @@ pub(crate) struct HeightsArgs {
     #[arg(value_name = "PART", required = true, value_parser = part_file())]
     parts: Vec<PartFile>,
 
-    /// Write a table of the layers: height, thickness, volume lost and gained, and the error by
-    /// every criterion
+    /// Write a table of the layers: height, thickness, volume lost and gained, and the error under
+    /// each criterion
     #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
     report: Option<PathBuf>,
 
@@ -58,7 +58,8 @@ pub(crate) struct HeightsArgs {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// Uniform thicknesses to compare with; the first is plotted [default: the thickest layer]
+    /// Uniform thicknesses to compare with; the first thickness is plotted [default: the thickest
+    /// layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
     uniform: Vec<Length>,
 

@@ -17,8 +17,8 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 /// Describe a stack: pages, size, resolution, heights, area, exposure, checks
 ///
 /// Only directories and texts are read, which takes a moment for any file. Area and volume are the
-/// numbers that the pages state. lamp verify also decodes the images. Of a folder of strips, totals
-/// and each strip are described.
+/// numbers stated on the pages. lamp verify also decodes the images. For a folder of strips, it
+/// describes each strip and the totals.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

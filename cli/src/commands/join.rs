@@ -17,11 +17,11 @@ use crate::terminal::stack_notes::print_note;
 
 /// Join stacks of consecutive layers into one stack
 ///
-/// Ranges made separately, by `slice --layers` and later stages or by `lamp split`, give the same
-/// bytes as a stack made at once. They are joined only if they are of one part, size and
-/// resolution, made by the same commands from the same input, and if each starts right after the
-/// last layer of the one before: a build that lacks layers is scrap. Layers missing below the first
-/// or above the last go unnoticed: `lamp info` shows how many there are.
+/// Ranges made separately, with `slice --layers` and later stages or with `lamp split`, give the
+/// same bytes as a stack made at once. They must have the same part, size, resolution, commands and
+/// input, and each must start right after the last layer of the previous range: a build that lacks
+/// layers is scrap. Layers missing below the first or above the last are not noticed: `lamp info`
+/// shows how many layers there are.
 ///
 /// A folder of strips from `tile --strips` gives the build that they were cut from.
 #[derive(Args)]

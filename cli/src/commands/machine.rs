@@ -34,9 +34,9 @@ enum MachineAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a machine's file and print it as it was written, to read or to start a new one from
+    /// Check a machine's file and print it unchanged, to read or to start a new file from
     Show {
-        /// Which machine: a built-in machine's name, a file, or - for standard input
+        /// Machine: a built-in machine's name, a file, or - for standard input
         #[arg(value_name = "MACHINE")]
         machine: PathBuf,
 

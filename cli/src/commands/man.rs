@@ -16,8 +16,8 @@ use crate::streams::write_file;
 
 /// Write the manual pages of all commands into a folder
 ///
-/// Each command has a page, as lamp-slice.1 and slice.1. The folder is made if it does not exist;
-/// pages in it are replaced.
+/// Each command has a page, such as lamp-slice.1 or slice.1. The folder is made if it does not
+/// exist; existing pages are replaced.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -16,10 +16,10 @@ use crate::terminal::progress::Progress;
 
 /// Write the surface of a stack as a mesh
 ///
-/// The stack is divided into cubic cells, a whole number of pixels wide. The surface runs where
-/// cells are half white: features thinner than half a cell are left out, and edges are rounded by
-/// up to half a cell. Gray levels count by their share of white. The mesh is a closed binary STL in
-/// millimeters, at the place of the part.
+/// The stack is divided into cubic cells, a whole number of pixels wide. The surface is where cells
+/// are half white: features thinner than half a cell are left out, and edges are rounded by up to
+/// half a cell. A gray level counts as its share of white. The mesh is a closed binary STL in
+/// millimeters, at the part's position.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,7 +35,7 @@ pub(crate) struct MeshOutArgs {
     #[arg(short, long, value_name = "OUT.stl")]
     output: PathBuf,
 
-    /// About how many cells there are along the longest side, from 8 to 1024
+    /// Approximate number of cells along the longest side, from 8 to 1024
     #[arg(long, value_name = "N", default_value = "256", value_parser = parse_cells)]
     cells: NonZeroU32,
 }

@@ -11,12 +11,12 @@ use crate::output::endings::{PACKED_STACK, check_ending};
 use crate::streams::{is_stream, layers_of_input, open_pages, progress, write_packed_layers};
 use crate::terminal::progress::say;
 
-/// Pack a stack: each layer as what differs from the one below
+/// Pack a stack: store each layer as its difference from the layer below
 ///
-/// A packed stack takes from half (thick layers) to a fortieth (builds in a mesh) of its TIFF. Every
-/// command reads it as it reads a TIFF, and writes one where -o names a file that ends in .lamp.
-/// lamp convert gives the TIFF back, byte for byte. Images, texts and checks stay as they are, and
-/// the command is not recorded.
+/// A packed stack is from half (thick layers) to a fortieth (builds in a mesh) the size of its
+/// TIFF. Every command can read a packed stack, and writes one if -o names a file that ends in
+/// .lamp. lamp convert restores the TIFF, byte for byte. Images, texts and checks do not change,
+/// and the command is not recorded.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +31,7 @@ pub(crate) struct PackArgs {
     #[command(flatten)]
     output: Output,
 
-    /// Effort to make it small, from 1 to 19 [default: a level that costs little]
+    /// Compression effort, from 1 to 19 [default: a low-cost level]
     #[arg(long, value_name = "N", value_parser = parse_level)]
     level: Option<PackLevel>,
 }

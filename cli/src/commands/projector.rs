@@ -14,7 +14,7 @@ use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::streams::{input_name, print};
 
-/// List, show or check projectors: where and how bright mirrors light the glass
+/// List, show or check projectors: where mirrors light the glass, and how brightly
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +34,7 @@ enum ProjectorAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a projector's file and print it as it was written, to read or to start a new one from
+    /// Check a projector's file and print it unchanged, to read or to start a new file from
     Show {
         /// Projector: a built-in projector's name, a file, or - for standard input
         #[arg(value_name = "PROJECTOR")]
@@ -44,7 +44,7 @@ enum ProjectorAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a projector file and report what it lights, and where its lens images
+    /// Check a projector file and report its lit area, and where its lens forms the image
     Check {
         /// The file, or - for standard input
         file: PathBuf,

@@ -14,7 +14,7 @@ use crate::output::endings::{SAMPLE, check_ending, is_step_name};
 use crate::streams::{is_stream, write_file};
 use crate::terminal::progress::Progress;
 
-/// Write a sample part as STL, whole or with defects, or as STEP with exact surfaces
+/// Write a sample part as STL, intact or with defects, or as STEP with exact surfaces
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,8 +35,8 @@ pub(crate) struct SampleArgs {
     #[arg(long)]
     ascii: bool,
 
-    /// Break the mesh: drop, flip or duplicate facets, nudge a corner of each, or
-    /// open a gap along an edge of each
+    /// Break the mesh: drop, flip or duplicate facets, nudge a corner of each facet, or open a gap
+    /// along an edge of each
     #[arg(long, value_parser = PossibleValuesParser::new(Defect::NAMES))]
     defect: Option<String>,
 
@@ -44,11 +44,11 @@ pub(crate) struct SampleArgs {
     #[arg(long, value_name = "N", default_value = "10", value_parser = parse_count, requires = "defect")]
     count: usize,
 
-    /// Seed of the choice of facets: the same seed breaks the same ones
+    /// Seed of the choice of facets: the same seed breaks the same facets
     #[arg(long, value_name = "N", default_value_t = 1, requires = "defect")]
     seed: u64,
 
-    /// Distance that a nudge moves a corner, or width of a gap
+    /// Distance by which a nudge moves a corner, or width of a gap
     #[arg(long, value_name = "LENGTH", default_value = "50um", requires = "defect")]
     by: Length,
 

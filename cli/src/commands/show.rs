@@ -18,7 +18,8 @@ use lamp_plots::{Thumbnail, contact_sheet, write_animation};
 
 /// Show a layer as a PNG picture or in the terminal, or many on one sheet or as an animation
 ///
-/// The stack is read only up to the last layer shown, so one that is cut off after it works, too.
+/// The stack is read only up to the last layer shown, so a stack that is cut off after that layer
+/// works, too.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -39,9 +40,9 @@ pub(crate) struct ShowArgs {
     #[arg(long, value_name = "X,Y,W,H")]
     region: Option<PictureRegion>,
 
-    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 the mean of 8 x 8 [default: 1; of
-    /// several layers, what makes each at most 400 pixels wide and high; in a terminal, what fits
-    /// its width]
+    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 shows the mean of 8 x 8 pixels
+    /// [default: 1; for several layers, at most 400 pixels wide and high each; in a terminal, its
+    /// width]
     #[arg(long, value_name = "N|1/N")]
     scale: Option<PictureScale>,
 
@@ -54,7 +55,7 @@ pub(crate) struct ShowArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
     fps: u16,
 
-    /// Print the layer with characters, the brighter the fuller; a line shows two rows
+    /// Print the layer with characters, fuller for brighter pixels; a line shows two rows
     #[arg(long, conflicts_with_all = ["animate", "layers"])]
     ascii: bool,
 
@@ -75,11 +76,12 @@ struct ShownLayers {
     #[arg(long, value_name = "K")]
     layer: Option<u32>,
 
-    /// Show the layer at this height, as 12mm; where two layers meet, the upper one
+    /// Show the layer at this height, for example 12mm; where two layers meet, it shows the upper
+    /// layer
     #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
     z: Option<Length>,
 
-    /// Show all layers from A to B - 1 on one sheet, or every Nth of them
+    /// Show all layers from A to B - 1 on one sheet, or every Nth layer
     #[arg(long, value_name = "A..B[/N]")]
     layers: Option<EveryNth>,
 }

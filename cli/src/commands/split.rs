@@ -13,7 +13,7 @@ use crate::terminal::progress::Progress;
 
 /// Split a stack into files, each with a range of layers
 ///
-/// Each file is a stack of its own, named after its first and last layer: `layers_00500-00999.tif`.
+/// Each file is a separate stack, named after its first and last layer: `layers_00500-00999.tif`.
 /// `lamp join` puts them together again, byte for byte.
 #[derive(Args)]
 #[command(group = ArgGroup::new("cuts").required(true))]
@@ -27,7 +27,7 @@ pub(crate) struct SplitArgs {
     #[command(flatten)]
     input: InputArgs,
 
-    /// Put N layers into each file; the last takes the rest
+    /// Put N layers into each file; the last file takes the rest
     #[arg(long, value_name = "N", group = "cuts", value_parser = parse_every)]
     every: Option<NonZeroU32>,
 

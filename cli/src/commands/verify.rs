@@ -18,10 +18,10 @@ use crate::terminal::progress::printable;
 
 /// Check that stacks are complete and undamaged: every page, image, text and height
 ///
-/// Each stack is read to its end and gets one line. Pages decode to the images that were written,
-/// in the order that they were written in, up to the last; each layer starts where the one before
-/// ends; all images have one size and resolution. A stack of an older version or of another program
-/// has no checks: its line says what cannot be known.
+/// Each stack is read to its end and gets one line. Every page must decode to the image that was
+/// written, in the original order, up to the last page. Each layer must start where the previous
+/// layer ends, and all images must have one size and resolution. A stack from an older version or
+/// another program has no checks: its line names the facts that cannot be verified.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ pub(crate) struct VerifyArgs {
     #[arg(value_name = "STACK", default_value = "-")]
     stacks: Vec<PathBuf>,
 
-    /// The part that each stack must be made from; repeat it for several parts, in their order
+    /// Part that each stack must be made from; repeat it for several parts, in their order
     #[arg(long, value_name = "PART")]
     against: Vec<PathBuf>,
 

@@ -22,11 +22,11 @@ use crate::terminal::progress::Progress;
 
 /// Look at layers in a browser
 ///
-/// Prints an address to open; it has a secret and works once, so that nobody else on this machine
-/// can see the layers. Zoom and place stay while the layer changes. Shown on demand: white that is
-/// new over the layer below, pixels that a second stack adds or lacks, stray rows and what `fix`
-/// changed, findings of `lamp check`, and the part in 3D. A part is sliced first. Ctrl-C ends the
-/// viewer.
+/// It prints an address to open. The address has a secret and works once, so that nobody else on
+/// this machine can see the layers. Zoom and position stay while the layer changes. On demand, it
+/// shows white that is new over the layer below, pixels that a second stack adds or lacks, stray
+/// rows and changes by `fix`, findings of `lamp check`, and the part in 3D. A part is sliced first.
+/// Ctrl-C ends the viewer.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,23 +41,23 @@ pub(crate) struct ViewArgs {
     #[arg(value_name = "STACK|PART", default_value = "-")]
     inputs: Vec<PathBuf>,
 
-    /// Open the page in the usual browser, by a private file that leads to it
+    /// Open the page in the default browser, through a private file that leads to it
     #[arg(long)]
     open: bool,
 
-    /// Look for what `lamp check` finds in the first stack, in the background
+    /// Run `lamp check` on the first stack, in the background
     #[arg(long, conflicts_with = "report")]
     check: bool,
 
-    /// Show what a report of `lamp check` or `lamp support` says of the first stack
+    /// Show a report of `lamp check` or `lamp support` on the first stack
     #[arg(long, value_name = "FILE.json")]
     report: Vec<PathBuf>,
 
-    /// Port of the loopback address [default: any that is free]
+    /// Port of the loopback address [default: any free port]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     port: u16,
 
-    /// Memory for decoded layers and all else; layers not looked at for the longest go first
+    /// Memory limit of the viewer; decoded layers not viewed for the longest time are dropped first
     #[arg(long, value_name = "BYTES", default_value = "512MB", value_parser = parse_memory)]
     memory: u64,
 

@@ -18,11 +18,11 @@ use lamp_batch::Key;
 use crate::args::options::{Common, one_of_described, parse_memory};
 use crate::exit::Exit;
 
-/// Make all parts and builds of a night, whatever crashes meanwhile
+/// Make all parts and builds of a night, even if tasks crash
 ///
-/// The night file names parts, their stages and builds; docs/batch.md shows one. Results are kept in
-/// a store by all that decides their bytes, whole or not at all, so that the same command again
-/// resumes a night that was ended, and does only what is missing.
+/// The night file names parts, their stages and builds; docs/batch.md shows one. A store keeps
+/// complete results, identified by everything that decides their bytes. To resume a night that was
+/// stopped, run the same command again: it does only the missing work.
 #[derive(Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -52,31 +52,31 @@ pub(crate) struct RunArgs {
     #[arg(value_name = "NIGHT.toml")]
     night: Option<PathBuf>,
 
-    /// Engine that runs tasks. HyperQueue and Slurm find their servers as hq and sbatch do; all
-    /// machines must see the store, the parts and this program under the same paths
+    /// Engine that runs tasks. HyperQueue and Slurm find their servers as hq and sbatch do. The
+    /// store, the parts and this program must have the same paths on all machines
     #[arg(long, value_name = "NAME", default_value_t)]
     #[arg(value_parser = one_of_described::<EngineName>(&[
         "Processes on this machine",
-        "HyperQueue: one's own machines, or allocations of a cluster",
+        "HyperQueue: your own machines, or allocations of a cluster",
         "Slurm: arrays with dependencies",
     ]))]
     engine: EngineName,
 
-    /// How many threads work at once, in all tasks together [default: one per processor]
+    /// Number of threads for all tasks together [default: one per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
     jobs: Option<u16>,
 
-    /// Memory that all tasks may take together, by their estimates [default: three quarters of what
-    /// there is]
+    /// Memory that all tasks may use together, by their estimates [default: three quarters of all
+    /// memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 
-    /// How often a task that crashed is tried again
+    /// How many times a crashed task is tried again
     #[arg(long, value_name = "N", default_value = "2")]
     retries: u32,
 
-    /// Command to run at the end, by the shell: a JSON summary on its input, the exit status in
-    /// LAMP_BATCH_STATUS
+    /// Shell command to run at the end. It gets a JSON summary on standard input and the exit
+    /// status in LAMP_BATCH_STATUS
     #[arg(long, value_name = "CMD")]
     notify: Option<String>,
 }
@@ -98,13 +98,13 @@ lamp_stack::named!(EngineName {
 
 #[derive(Subcommand)]
 enum BatchCommand {
-    /// Print what a night will do: tasks, what exists, and what they take
+    /// Print a night's plan: tasks, existing results, and the tasks' time, memory and disk space
     Plan(NightArgs),
-    /// Print what has become of each part and build
+    /// Print the state of each part and build
     Status(NightArgs),
-    /// Hash all results and delivered files anew, and take away results that are damaged
+    /// Hash all results and delivered files again, and remove damaged results
     Verify(StoreArgs),
-    /// Remove results that no batch names which was run lately
+    /// Remove results that no recent batch names
     Gc(GcArgs),
     /// Do one task, as engines call it
     #[command(hide = true)]
@@ -120,7 +120,7 @@ struct NightArgs {
 
 #[derive(Args)]
 struct StoreArgs {
-    /// A night file, whose store it is
+    /// A night file that names the store
     #[arg(value_name = "NIGHT.toml", required_unless_present = "store")]
     night: Option<PathBuf>,
 
@@ -134,7 +134,7 @@ struct GcArgs {
     #[command(flatten)]
     store: StoreArgs,
 
-    /// How long ago a batch may have been run for its results to stay: 12h, 30d
+    /// Keep results of batches run within this time: 12h, 30d
     #[arg(long, value_name = "TIME", default_value = "30d", value_parser = parse_age)]
     keep: Duration,
 }

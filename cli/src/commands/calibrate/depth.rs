@@ -19,7 +19,7 @@ use lamp_plots::{Plot, PlotAxis, Series, highest};
 /// Fit a working curve to measured cure depths
 ///
 /// The CSV file has a header with the columns dose_mj_per_cm2 (or exposure_ms, with --intensity)
-/// and depth_um, and gray (0 black to 1 white) for the gray model. Doses are doses of full white.
+/// and depth_um. The gray model also needs gray (0 black to 1 white). Doses are for full white.
 /// Rows with a depth of 0 or less are uncured and left out.
 #[derive(Args)]
 #[command(after_help = "\

@@ -13,12 +13,12 @@ use crate::exit::Exit;
 use crate::terminal::progress::Progress;
 use lamp_plots::{Plot, PlotAxis, Series, highest};
 
-/// Fit how the critical dose follows a lamp that ages, from cure depths under several lights
+/// Fit how the critical dose changes as a lamp ages, from cure depths under several lights
 ///
 /// The CSV file has a header with the columns lamp_mw_per_cm2 (the light of full white under which
 /// the film was cured), dose_mj_per_cm2 (or exposure_ms, the time under that light) and depth_um.
-/// Filters before the lamp give several lights. --lamp-intensity of other commands reads the
-/// result.
+/// Filters in front of the lamp give several lights. Other commands use the result with
+/// --lamp-intensity.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -26,8 +26,8 @@ use lamp_plots::{self as plots, Plot, drawn};
 
 /// Fit a resin's parameters to measured cure depths or widths
 ///
-/// Prints each parameter with its 95% confidence interval, writes them into a material file, and
-/// plots the fit with the measured points.
+/// It prints each parameter with its 95% confidence interval, writes the parameters to a material
+/// file, and plots the fit with the measured points.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -60,7 +60,7 @@ struct CalibrationFiles {
     #[arg(value_name = "DATA")]
     data: PathBuf,
 
-    /// Intensity of full white, which turns exposure_ms into doses; it is written into the material
+    /// Intensity of full white, which turns exposure_ms into doses; the material file records it
     /// [default: the material's]
     #[arg(long, value_name = "INTENSITY", value_parser = parse_light)]
     intensity: Option<Intensity>,

@@ -21,9 +21,9 @@ use lamp_plots::{Plot, PlotAxis, Series, highest};
 ///
 /// The CSV file has a header with the columns feature_px (the squares' side in the image; or
 /// feature_um), dose_mj_per_cm2 (or exposure_ms, with --intensity), and cured_um (the side after
-/// curing; or width_um, the distance of each edge outside its image). Squares no larger than their
-/// image count: they show from which dose on squares grow. Leave out only squares that were washed
-/// away, or write 0 as their side. lamp target squares writes a file to fill in.
+/// curing; or width_um, the distance of each edge outside its image). Include squares no larger
+/// than their image: they show the dose at which squares start to grow. Leave out only squares that
+/// were washed away, or enter 0 as their side. lamp target squares writes a file to fill in.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -34,13 +34,13 @@ pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
 
-/// Find what would be swept away, trapped or bent as a stack is built
+/// Find features that would be swept away, trapped or bent as a stack is built
 ///
-/// An island is white that rests on nothing: the recoating blade sweeps it away. Each gets a line,
-/// as do weak joints, pockets that hold resin, overhangs, bodies off balance, white at the border
-/// and empty layers; the worst come first. A part is sliced on the way, by the options of `slice`;
-/// its mesh then says where islands must be, too. Effects of rounding to pixels, and islands that
-/// never hold a square of --speck pixels, are only in the report.
+/// An island is white that rests on nothing: the recoating blade sweeps it away. Each island gets a
+/// line, as do weak joints, pockets that hold resin, overhangs, unbalanced bodies, white at the
+/// border and empty layers; the worst come first. A part is sliced first, with the options of
+/// `slice`; its mesh also shows where islands must be. Only the report lists effects of rounding to
+/// pixels, and islands too small for a square of --speck pixels.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
@@ -49,10 +49,10 @@ Examples:
   slice blade.stl | fix | lamp check --strict
   lamp check night/*.tif --only islands,pockets --report check.json
 
-Exit status: 0 if the work is done, whatever was found; 3 with --strict if something was.")]
+Exit status: 0 if the work is done, even with findings; 3 with --strict if there are any.")]
 pub(crate) struct CheckArgs {
-    /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts, each
-    /// checked on its own
+    /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts; each is
+    /// checked separately
     #[arg(value_name = "STACK|PART", default_value = "-")]
     inputs: Vec<PathBuf>,
 
@@ -63,7 +63,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Write pictures of the worst findings into a new folder: findings in red, other white without
+    /// Write pictures of the worst findings to a new folder: findings in red, other white without
     /// white below in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
@@ -76,8 +76,8 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     strict: bool,
 
-    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended. The first of them
-    /// stands on the platform
+    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended. The first of these
+    /// layers is on the platform
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     layers: Option<Range<u32>>,
 

@@ -23,9 +23,9 @@ use walk::walk;
 
 /// Find where two stacks differ: pixels added and missing, layer by layer
 ///
-/// Layers of one height are compared, or of one index where a stack states no heights. Images lie
-/// where their pages' origins and resolutions say, by whole pixels. A pixel that is brighter in B is
-/// added, one that is darker is missing.
+/// Layers of the same height are compared, or of the same index if a stack states no heights. The
+/// origins and resolutions on the pages place the images, to whole pixels. A pixel that is brighter
+/// in B is added; a darker pixel is missing.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +34,7 @@ Examples:
   lamp compare coarse.tif fine.tif --json | jq .layers
   fix blade.tif | lamp compare blade.tif - || echo changed
 
-Exit status, as of cmp and diff: 0 if the images are the same, 1 if they differ, 2 if they cannot be
+Exit status, as in cmp and diff: 0 if the images are the same, 1 if they differ, 2 if they cannot be
 compared or a stack is broken. The other commands end with 1 for bad input and 2 for wrong usage.")]
 pub(crate) struct CompareArgs {
     /// The first stack: a TIFF or picture file, a folder of pages, or - for standard input
@@ -45,11 +45,11 @@ pub(crate) struct CompareArgs {
     #[arg(value_name = "B")]
     b: PathBuf,
 
-    /// Forgive edges that lie this far apart, as 1px or 20um [default: 0px]
+    /// Forgive edges up to this far apart, for example 1px or 20um [default: 0px]
     ///
-    /// A pixel that differs is forgiven if, within this distance, A somewhere has the color that B
-    /// has at the pixel, and B somewhere has A's color. Gaps that close and walls that appear or
-    /// vanish are still reported
+    /// A different pixel is forgiven if two colors occur within this distance: B's color at the
+    /// pixel in A, and A's color in B. Gaps that close and walls that appear or vanish are still
+    /// reported
     #[arg(long, value_name = "DISTANCE")]
     tolerance: Option<Tolerance>,
 

@@ -29,12 +29,12 @@ use report::{lines_of, write_report};
 /// Measurements are read whole.
 const MAX_TABLE: u64 = 64 << 20;
 
-/// Correct the times of layers after every print, from what was measured
+/// Correct layer times after every print, from measurements
 ///
-/// A job is a folder that keeps a stack, its material, and all prints: the times of each and what
-/// was measured. Begin one with a stack that has exposure times, print it, and give what you
-/// measured: the heights of faces that look down, or the wrongly cured pixels of each layer. The
-/// times for the next print are written, and whether such steps make errors smaller is printed.
+/// A job is a folder that keeps a stack, its material, and the times and measurements of all
+/// prints. Begin a job with a stack that has exposure times, print it, and give your measurements:
+/// the heights of downward faces, or the wrongly cured pixels of each layer. The command writes the
+/// times for the next print, and prints whether such steps make errors smaller.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -66,11 +66,11 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_enum, default_value = "model")]
     law: LawName,
 
-    /// Gain of the laws single and multi, in seconds a pixel [default: 6e-6]
+    /// Gain of the laws single and multi, in seconds per pixel [default: 6e-6]
     #[arg(long, value_name = "S/PX", value_parser = parse_gain)]
     gain: Option<f64>,
 
-    /// Share of the way that measured heights move the doses
+    /// Share of the full correction that measured heights make to the doses
     #[arg(long, value_name = "SHARE", default_value = "0.5", value_parser = parse_step)]
     step: f64,
 
@@ -78,7 +78,7 @@ pub(crate) struct LearnArgs {
     #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
     output: Option<PathBuf>,
 
-    /// Write the errors of all prints and the numbers for the next as JSON
+    /// Write the errors of all prints and the numbers for the next print as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report, requires = "measured")]
     report: Option<PathBuf>,
 
@@ -86,7 +86,7 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "FILE", requires = "measured")]
     plot: Option<PathBuf>,
 
-    /// Memory to work in, besides the layers' edges [default: a quarter of available memory]
+    /// Memory to work in, in addition to the layers' edges [default: a quarter of available memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 }
@@ -101,7 +101,7 @@ struct KeptOptions {
     #[command(flatten)]
     lamp: LampOption,
 
-    /// Lowest gray level of pixels that are wanted [default: 128]
+    /// Lowest gray level that counts as part of the wanted solid [default: 128]
     #[arg(long, value_name = "LEVEL", requires = "start")]
     wanted: Option<NonZeroU8>,
 
@@ -118,7 +118,7 @@ struct KeptOptions {
     #[arg(long, value_name = "A..B", requires = "start", value_parser = parse_speeds)]
     speed: Option<(Speed, Speed)>,
 
-    /// Greatest difference of the speed from a neighboring layer's speed, as 20%
+    /// Greatest difference in speed between neighboring layers, such as 20%
     #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_change)]
     max_change: Option<f64>,
 }
@@ -133,11 +133,11 @@ impl KeptOptions {
 /// Laws of learning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum LawName {
-    /// The step that the model says is best
+    /// The best step according to the model
     Model,
-    /// Each layer by its own error
+    /// Each layer from its own error
     Single,
-    /// Each layer by the errors around and below
+    /// Each layer from the errors around and below it
     Multi,
 }
 

@@ -14,9 +14,9 @@ use crate::terminal::progress::Progress;
 
 /// Make a material from the composition of a suspension
 ///
-/// Critical dose, penetration depth and shrinkage follow from what is mixed by models that show
-/// trends: which way a recipe moves a resin. docs/materials.md has the file. Calibrate before you
-/// build.
+/// Models compute critical dose, penetration depth and shrinkage from the composition. They show
+/// only trends: which way a recipe moves a resin. docs/materials.md describes the file. Calibrate
+/// before you build.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

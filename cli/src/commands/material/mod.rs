@@ -41,7 +41,7 @@ enum MaterialAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a material's file and print it as it was written, to read or to start a new one from
+    /// Check a material's file and print it unchanged, to read or to start a new file from
     Show {
         /// Material: a built-in material's name, a file, or - for standard input
         #[arg(value_name = "MATERIAL")]
@@ -51,7 +51,7 @@ enum MaterialAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a material file and report what it allows
+    /// Check a material file and report its possible uses
     Check {
         /// The file, or - for standard input
         file: PathBuf,

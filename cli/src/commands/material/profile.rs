@@ -15,11 +15,12 @@ use crate::exit::Exit;
 use crate::streams::print;
 use crate::terminal::progress::Progress;
 
-/// Print the profile that a line of light cures: how wide at the surface, how deep where
+/// Print the profile that a line of light cures: its width at the surface, and its depth across the
+/// width
 ///
-/// The light falls off as exp(-2 y^2/Wo^2) with the distance y from the line, as the light of one
-/// pixel nearly does, and down in the resin by its working curve (002 equations 41 to 45). Ceramic
-/// scatters, too: give a width and a critical dose that were fitted to cured lines (equation 46).
+/// Light falls off as exp(-2 y^2/Wo^2) with the distance y from the line, nearly as light from one
+/// pixel does. Depth follows the resin's working curve (002 equations 41 to 45). Ceramic also
+/// scatters light: give a width and a critical dose that were fitted to cured lines (equation 46).
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,7 +42,7 @@ pub(super) struct ProfileArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     beam: Option<Length>,
 
-    /// Critical dose of the width, if it was fitted to lines [default: the working curve's]
+    /// Critical dose for the width, if it was fitted to lines [default: the working curve's]
     #[arg(long, value_name = "DOSE", value_parser = parse_dose)]
     critical_dose: Option<Dose>,
 }

@@ -13,12 +13,12 @@ use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::streams::print;
 
-/// Find what is wrong with a mesh, and what its shells enclose
+/// Find faults in a mesh, and the volumes that its shells enclose
 ///
-/// Lists shells with their Euler numbers, areas, volumes, centers of mass and inertia, and the
-/// lumps of material that they make with their voids; holes, edges of three facets and more, facets
-/// turned over, doubled, without area or not finite; shells that overlap. Facets are numbered from
-/// 0.
+/// It lists shells with their Euler numbers, areas, volumes, centers of mass and inertia, and the
+/// lumps of material that they form with their voids. It also lists holes, edges of three or more
+/// facets, overlapping shells, and facets that are flipped, doubled, without area or not finite.
+/// Facets are numbered from 0.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,11 +29,11 @@ pub(super) struct MeshCheckArgs {
     #[command(flatten)]
     part: MeshPart,
 
-    /// Take vertices of open edges for one if they are no farther apart
+    /// Merge vertices of open edges that are no farther apart than this
     #[arg(long, value_name = "LENGTH", default_value = "0um", value_parser = parse_distance)]
     weld: Length,
 
-    /// Look for facets that pass through each other, too
+    /// Also look for facets that pass through each other
     #[arg(long)]
     self_intersections: bool,
 

@@ -65,7 +65,7 @@ struct MeshPart {
     #[command(flatten)]
     reader: ReaderArgs,
 
-    /// Most memory for the mesh, which takes some 70 bytes a facet [default: all that is free]
+    /// Memory limit for the mesh, which takes about 70 bytes per facet [default: all free memory]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 }

@@ -21,11 +21,11 @@ use crate::output::json_report::JsonReport;
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
 use crate::terminal::progress::say;
 
-/// Mend a mesh: weld, drop, turn over and add facets, and list each
+/// Repair a mesh: weld, drop, flip and add facets, and list each change
 ///
-/// Welds vertices of open edges, drops doubled facets and those without area, turns facets the same
-/// way and shells outwards (voids inwards), and closes small holes. Writes a binary STL, in the
-/// units of the file. A mesh in which nothing can be mended keeps its bytes.
+/// It welds vertices of open edges, drops facets that are doubled or without area, turns facets the
+/// same way and shells outward (voids inward), and closes small holes. It writes a binary STL, in
+/// the units of the file. A mesh keeps its bytes if nothing can be repaired.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -40,8 +40,9 @@ pub(super) struct RepairArgs {
     #[arg(short, long, value_name = "OUT.stl")]
     output: PathBuf,
 
-    /// Make vertices of open edges one if they are no farther apart [default: 1/20000 of the part's
-    /// diagonal, at most a quarter of the shortest open edge, at least the resolution of 32 bits]
+    /// Merge vertices of open edges that are no farther apart than this [default: 1/20000 of the
+    /// part's diagonal, at most a quarter of the shortest open edge, at least the resolution of 32
+    /// bits]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     weld: Option<Length>,
 
@@ -53,7 +54,7 @@ pub(super) struct RepairArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Exit with status 3 if faults are left; the mesh is written all the same
+    /// Exit with status 3 if faults are left; the mesh is still written
     #[arg(long)]
     strict: bool,
 }

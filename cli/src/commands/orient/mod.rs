@@ -20,11 +20,11 @@ use crate::streams::{check_beside, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::{self as plots, sphere_picture};
 
-/// Find how to turn a part so that few islands float, and little overhangs
+/// Find rotations of a part that give few islands and little overhang
 ///
-/// Islands, pits, overhanging area and size of each pose follow from the mesh alone. A pose is left
-/// out if another pose is better in every respect; the best of the rest are sliced, and islands
-/// counted on their images.
+/// The mesh gives the islands, pits, overhanging area and size of each pose. A pose is left out if
+/// another pose is better in every respect. The best remaining poses are sliced, and their islands
+/// counted on the images.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -42,15 +42,15 @@ pub(crate) struct OrientArgs {
     #[arg(value_parser = clap::value_parser!(u32).range(..=1_000_000))]
     directions: u32,
 
-    /// Try only directions that are at most so far from the part's z axis: 0 to 180 degrees
+    /// Try only directions within this angle of the part's z axis: 0 to 180 degrees
     #[arg(long, value_name = "ANGLE", default_value = "180deg", value_parser = parse_angle)]
     cone: f64,
 
-    /// Angle from upright beyond which what faces down is an overhang: 0 to 90 degrees
+    /// Angle from vertical beyond which a downward face is an overhang: 0 to 90 degrees
     #[arg(long, value_name = "ANGLE", default_value = "45deg", value_parser = parse_overhang_angle)]
     max_overhang_angle: f64,
 
-    /// Layer thickness: islands and pits that are less deep do not count
+    /// Layer thickness: shallower islands and pits do not count
     #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
     thickness: Length,
 
@@ -58,7 +58,7 @@ pub(crate) struct OrientArgs {
     #[arg(long, value_name = "N", default_value = "5")]
     best: usize,
 
-    /// Resolution of their images
+    /// Resolution of the sliced images
     #[arg(long, value_name = "DPI", default_value = "200")]
     dpi: Dpi,
 

@@ -28,12 +28,12 @@ use crate::exit::Exit;
 use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 
-/// Choose bitmaps and times that cure a part through a glass, without layers
+/// Choose bitmaps and times that cure a part through glass, without layers
 ///
-/// Each column of resin is cured from the glass up to its height by the light that it gets in
-/// all. This finds the time of each mirror whose doses are nearest to those wanted, proves how
-/// near to the best they are, and groups mirrors into bitmaps, each within the one before. The
-/// folder gets bitmaps.tif, report.json and pictures.
+/// The total light on each column of resin cures it from the glass up to its height. This command
+/// finds mirror times that give doses nearest to the wanted doses, proves how near the best they
+/// are, and groups mirrors into bitmaps, each within the previous bitmap. The folder gets
+/// bitmaps.tif, report.json and pictures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -50,12 +50,12 @@ pub(super) struct ColumnCureArgs {
     #[arg(long, value_name = "NAME|FILE")]
     projector: PathBuf,
 
-    /// Resin: a built-in material's name (see lamp material list) or a file; it must say which dose
-    /// cures how deep ([two-depth] or [working-curve])
+    /// Resin: a built-in material's name (see lamp material list) or a file. It must state how deep
+    /// each dose cures ([two-depth] or [working-curve])
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
 
-    /// How many bitmaps there are [default: 25, or as many as there are distinct times]
+    /// Number of bitmaps [default: 25, or the number of distinct times if smaller]
     #[arg(long, value_name = "N", value_parser = parse_bitmaps)]
     bitmaps: Option<usize>,
 
@@ -70,17 +70,16 @@ pub(super) struct ColumnCureArgs {
     ]))]
     optimise: ColumnObjective,
 
-    /// Longest time of a mirror [default: four times what a wide white field takes for the highest
-    /// column]
+    /// Longest time of a mirror [default: four times the flood exposure time of the highest column]
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     max_time: Option<ExposureTime>,
 
-    /// Make the plan the best on average where the glass stands off by so much along each axis
+    /// Make the plan best on average for glass that is off by this much along each axis
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
     robust: Option<Length>,
 
-    /// Count rays instead of integrating light: so many points and directions along each side of
-    /// a mirror, as 9x15
+    /// Count rays instead of integrating light: the numbers of points and directions along each
+    /// side of a mirror, such as 9x15
     #[arg(long, value_name = "NxM", value_parser = parse_rays)]
     rays: Option<Tracing>,
 
@@ -92,7 +91,7 @@ pub(super) struct ColumnCureArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
     voxel: Option<Length>,
 
-    /// Stop so near to the best, as a share of the error
+    /// Stop this near the best, as a share of the error
     #[arg(long, value_name = "SHARE", default_value = "1e-6", value_parser = parse_gap)]
     gap: f64,
 

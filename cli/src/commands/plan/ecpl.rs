@@ -19,13 +19,12 @@ use crate::exit::Exit;
 use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 
-/// Choose bitmaps and times that cure a round part, by the kinetics of resin and oxygen
+/// Choose bitmaps and times that cure an axisymmetric part, by the kinetics of resin and oxygen
 ///
-/// Oxygen stops the reaction until light has used it up, and comes back from where there is no
-/// light, so doses do not just add up. This computes the reaction in the chamber, and finds the
-/// time of each ring of mirrors that cures a part nearest to the target. Rings begin together, so
-/// that each bitmap is inside the one before. The folder gets bitmaps.tif, report.json and
-/// pictures.
+/// Oxygen stops the reaction until light has used it up, and returns from dark places, so doses do
+/// not just add up. This command computes the reaction in the chamber, and finds the times of the
+/// rings of mirrors that cure a part nearest to the target. Rings begin together, so that each
+/// bitmap is inside the previous bitmap. The folder gets bitmaps.tif, report.json and pictures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -37,12 +36,12 @@ pub(super) struct EcplArgs {
     #[command(flatten)]
     target: TargetArg,
 
-    /// Projector: a built-in projector's name (see lamp projector list) or a file; it must say how
-    /// high the chamber is, and spread light by a Gaussian
+    /// Projector: a built-in projector's name (see lamp projector list) or a file. It must state
+    /// the chamber's height, and spread light as a Gaussian
     #[arg(long, value_name = "NAME|FILE")]
     projector: PathBuf,
 
-    /// Resin: a built-in material's name (see lamp material list) or a file; it must have
+    /// Resin: a built-in material's name (see lamp material list) or a file. It must have
     /// [kinetics]
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
@@ -51,7 +50,7 @@ pub(super) struct EcplArgs {
     #[arg(long, default_value_t)]
     #[arg(value_parser = one_of_described::<Method>(&[
         "The times of all rings of mirrors at once",
-        "A disc from a table of discs, then one smaller disc after the other, as 003 does",
+        "A disc from a table of discs, then successively smaller discs, as 003 does",
     ]))]
     method: Method,
 

@@ -15,8 +15,8 @@ use lamp_plots::{DoseMap, dose_map};
 /// The options of a map.
 #[derive(Args)]
 pub(super) struct MapOptions {
-    /// Draw the doses of a layer, voxel by voxel, by white light and as planned: a file that ends
-    /// in .svg or .png
+    /// Draw the doses of a layer, voxel by voxel, under white light and as planned: a file that
+    /// ends in .svg or .png
     #[arg(long, value_name = "FILE", requires = "map_layer")]
     pub(super) map: Option<PathBuf>,
 

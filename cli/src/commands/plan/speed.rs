@@ -27,9 +27,9 @@ use lamp_plots as plots;
 
 /// Choose the time of each layer, and so the speed of the platform
 ///
-/// Light that cures a layer also cures below it and to its sides. The images stay as they are; each
-/// layer gets the time with which as few voxels as possible are cured wrongly, within the limits of
-/// the platform. A bound on the best plan is printed. Pages must state thickness and resolution.
+/// Light that cures a layer also cures below it and to its sides. The images do not change; each
+/// layer gets the time that cures the fewest voxels wrongly, within the limits of the platform. A
+/// bound on the best plan is printed. Pages must state thickness and resolution.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -50,17 +50,17 @@ pub(super) struct SpeedArgs {
     #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
     profile: Option<PathBuf>,
 
-    /// Write what the plan reaches, by layer, as JSON
+    /// Write the plan's results, layer by layer, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Plot wrong voxels and times by layer, doses, counts at 5% less and more light, and how the
-    /// search went: a file that ends in .svg or .png
+    /// Plot wrong voxels and times by layer, doses, counts at 5% less and more light, and the
+    /// course of the search: a file that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// Memory to work in, besides the layers' edges; with less, the search sees fewer pixels
-    /// [default: a quarter of available memory, or as much as helps]
+    /// Memory to work in, in addition to the layers' edges; with less memory, the search sees fewer
+    /// pixels [default: a quarter of available memory, or as much as helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 

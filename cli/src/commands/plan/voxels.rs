@@ -28,9 +28,9 @@ use lamp_plots as plots;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///
-/// Light that cures a layer also cures below it and to its sides. Given the wanted part, 1-bit or
-/// gray, this writes gray pages under which as few voxels as possible are cured wrongly, and prints
-/// how far from the best plan they can be at most. Pages must state thickness and resolution.
+/// Light that cures a layer also cures below it and to its sides. From the wanted part, 1-bit or
+/// gray, this writes gray pages that cure the fewest voxels wrongly, and prints how far at most
+/// they are from the best plan. Pages must state thickness and resolution.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,13 +48,13 @@ pub(super) struct VoxelsArgs {
 
     /// Quantity that the plan minimizes
     #[arg(long, default_value = "wrong", value_parser = one_of_described::<VoxelObjective>(&[
-        "How far doses lie on the wrong side of the critical one",
-        "The dose next to the part, while all that white light cures stays cured",
+        "How far doses are on the wrong side of the critical dose",
+        "The dose next to the part, while everything that white light cures stays cured",
     ]))]
     objective: VoxelObjective,
 
-    /// Pixels whose light is chosen: pixels of the part (lit), and 3 around it (grow:3px), or 1
-    /// along its outlines only, while others stay white (shell:1px)
+    /// Pixels to choose light for: the part's (lit), the part's and 3 around it (grow:3px), or only
+    /// 1 along its outlines, while others stay white (shell:1px)
     #[arg(long, value_name = "WHICH", default_value = "lit", value_parser = parse_sources)]
     sources: Sources,
 
@@ -62,11 +62,12 @@ pub(super) struct VoxelsArgs {
     #[arg(long, value_name = "LEVEL", default_value = "0")]
     min_level: u8,
 
-    /// Keep so many pixels along the part's outlines white, as wall:3px
+    /// Keep this many pixels along the part's outlines white, for example wall:3px
     #[arg(long, value_name = "WALL", value_parser = parse_wall)]
     keep: Option<u32>,
 
-    /// Count so many voxels around the images, too, as 0px [default: as far as light spreads]
+    /// Also count this many voxels around the images, for example 0px [default: as far as light
+    /// spreads]
     #[arg(long, value_name = "PIXELS", value_parser = parse_around)]
     around: Option<u32>,
 
@@ -74,17 +75,18 @@ pub(super) struct VoxelsArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
     exposure: Option<ExposureTime>,
 
-    /// Write what the plan reaches, by layer, as JSON
+    /// Write the plan's results, layer by layer, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Plot wrong voxels by layer, doses, counts at 5% less and more light, and how the search
-    /// went: a file that ends in .svg or .png
+    /// Plot wrong voxels by layer, doses, counts at 5% less and more light, and the course of the
+    /// search: a file that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// Memory to work in; with less, fewer layers are planned at a time, which takes longer and
-    /// moves gray levels a little [default: a quarter of available memory, or as much as helps]
+    /// Memory to work in. With less memory, fewer layers are planned at a time, which takes longer
+    /// and changes gray levels slightly [default: a quarter of available memory, or as much as
+    /// helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
     memory: Option<u64>,
 

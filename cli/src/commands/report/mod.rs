@@ -31,11 +31,11 @@ use gather::StackReport;
 pub(super) use page::document;
 pub(super) use pictures::{InlinePicture, of_layer};
 
-/// Write a page to send about a stack: warnings, numbers, curves, pictures
+/// Write a page about a stack, to send: warnings, numbers, curves, pictures
 ///
-/// The page is one HTML file that needs no network and no script, and prints on A4 and letter. Of a
-/// folder of stacks, -o names a folder, which gets a page for each stack and an index.html. Numbers
-/// equal the numbers of `lamp info` and, with its usual options, of `lamp check`.
+/// The page is one HTML file that needs no network and no script, and prints on A4 and letter. For
+/// a folder of stacks, -o names a folder, which gets a page for each stack and an index.html.
+/// Numbers equal the numbers from `lamp info` and from `lamp check` with its usual options.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -44,18 +44,18 @@ Examples:
   lamp report build.tif --json | jq .stacks[0].findings
   slice blade.stl | fix | lamp report --machine alpha -o report.html
 
-Exit status: 0 if all pages are written, whatever they warn of; 1 if a stack cannot be read.")]
+Exit status: 0 if all pages are written, even with warnings; 1 if a stack cannot be read.")]
 pub(crate) struct ReportArgs {
     /// A stack (a TIFF or picture file, a folder of pages, - for standard input) or a folder of stacks
     #[arg(value_name = "STACK|FOLDER", default_value = "-")]
     stack: PathBuf,
 
-    /// Where to write: an HTML file, or a folder of them with an index, as reports/
+    /// Where to write: an HTML file, or a folder of HTML files with an index, such as reports/
     #[arg(short, long, value_name = "OUT", required_unless_present = "json")]
     output: Option<PathBuf>,
 
-    /// Machine that builds it: its recoating counts in the build time, and its blade drags on what
-    /// floats: alpha, beta or a file (see lamp machine)
+    /// Machine that builds the stack: alpha, beta or a file (see lamp machine). Its recoating
+    /// counts in the build time, and its blade drags on floating features
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 

@@ -40,11 +40,11 @@ use report::SupportReport;
 
 /// Hold floating islands with the shortest supports to the part
 ///
-/// Supports stay in the mould and become features of the casting, so look at each before you build.
-/// From the middle of an island, directions over a cone below it are tried: the shortest one wins
-/// that meets the part where it is smooth, even and away from creases, and that can be built.
-/// Islands without such a way are left, and reported. The plan is a list of edits: delete or
-/// exchange supports in it, and let lamp edit draw it.
+/// Supports stay in the mold and become features of the casting, so look at each before you build.
+/// The command tries directions over a cone below the middle of an island. It takes the shortest
+/// support that can be built and meets the part where it is smooth, even and away from creases.
+/// Islands without such a support are left, and reported. The plan is a list of edits: delete or
+/// exchange supports in it, and draw it with lamp edit.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
@@ -59,12 +59,12 @@ pub(crate) struct SupportArgs {
     #[arg(value_name = "STACK", default_value = "-")]
     pub(crate) stack: PathBuf,
 
-    /// The part that the stack was sliced from; repeat it for several parts, as they were given to
-    /// slice
+    /// The part that the stack was sliced from; repeat it for several parts, in the same order as
+    /// to slice
     #[arg(long, value_name = "PART", required = true, value_parser = part_file())]
     pub(crate) part: Vec<PartFile>,
 
-    /// Write the supports as a list of edits, with alternatives, for people to change
+    /// Write the supports as a list of edits, with alternatives, for you to change
     #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
     plan: Option<PathBuf>,
 
@@ -76,15 +76,15 @@ pub(crate) struct SupportArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Give up with status 3 if islands are left, or if pages of a folder may be missing: no stack
-    /// is written, and the next stage of a pipe fails, too
+    /// Stop with status 3 if islands are left, or if pages of a folder may be missing: no stack is
+    /// written, and the next stage of a pipe fails, too
     #[arg(long)]
     strict: bool,
 
     #[command(flatten)]
     settings: Parsed<SupportStageArgs, SupportSettings>,
 
-    /// Machine whose blade drags on what floats: alpha, beta or a file (see lamp machine)
+    /// Machine whose blade drags on floating features: alpha, beta or a file (see lamp machine)
     #[arg(long, value_name = "M", default_value = "alpha")]
     pub(crate) machine: PathBuf,
 

@@ -12,8 +12,8 @@ use crate::streams::{progress, write_layers};
 
 /// Write a gray tile, and screens of it with squares of several sizes
 ///
-/// The cured films show up to which size of squares a screen cures evenly. The first tile is gray,
-/// for lamp dither to turn into dots; the others are black and white.
+/// The cured films show the largest squares with which a screen cures evenly. The first tile is
+/// gray, for lamp dither to turn into dots; the other tiles are black and white.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

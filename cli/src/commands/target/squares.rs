@@ -18,10 +18,10 @@ use crate::terminal::progress::Progress;
 
 /// Write squares of several sizes, each at several doses, to calibrate the cure width
 ///
-/// Writes a stack for each size, squares_00025px.tif and so on, and squares.csv, a table to fill in
-/// for lamp calibrate width. Expose all pages of a stack onto one layer, each for its exposure_ms:
-/// each page has one white square fewer, so that the k-th square, counted in rows from the top
-/// left, gets the k-th dose in total.
+/// It writes a stack for each size, squares_00025px.tif and so on, and squares.csv, a table to fill
+/// in for lamp calibrate width. Expose all pages of a stack onto one layer, each for its
+/// exposure_ms. Each page has one white square fewer than the page before, so that the k-th square,
+/// counted in rows from the top left, gets the k-th dose in total.
 #[derive(Args)]
 #[command(group = ArgGroup::new("light").required(true))]
 #[command(after_help = "\
@@ -39,7 +39,7 @@ pub(super) struct SquaresArgs {
     #[arg(default_value = "25,50,75,100,200,300,450,600,750,900")]
     sizes: Vec<u32>,
 
-    /// Doses: A..B for ten from A to B in equal steps, or a list in ascending order
+    /// Doses: A..B for ten doses from A to B in equal steps, or a list in ascending order
     #[arg(long, value_name = "A..BmJ/cm2|A,B,...mJ/cm2", value_parser = parse_doses)]
     doses: Doses,
 

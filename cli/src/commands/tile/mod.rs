@@ -40,14 +40,15 @@ use strips::StripArgs;
 
 /// Lay out copies of parts on a build area, in a mesh
 ///
-/// Copies of one part stand in rows from the top left, centered as a whole; --pack outline places
-/// them by their outlines if more fit. The first page records where they stand. Several stacks are
-/// matched by the heights of their layers; shorter parts end first. Gray layers make a gray build.
+/// Copies of one part are placed in rows from the top left, centered as a group; --pack outline
+/// places copies by their outlines if more fit. The first page records their positions. Several
+/// stacks are matched by the heights of their layers; shorter parts end first. Gray layers make a
+/// gray build.
 ///
-/// A mesh fills the rest of the area. A moat around each part stays free, also above it, and break
-/// lines cut through the mesh; the first layers are mesh alone. Pieces of mesh that would float or
-/// are small are left out. The default dimensions of the mesh are
-/// LAMP's own. --mesh none leaves the area black.
+/// A mesh fills the rest of the area. A moat around each part stays free, even above the part, and
+/// break lines cut through the mesh; the first layers are only mesh. Small or floating pieces of
+/// mesh are left out. The default dimensions of the mesh are LAMP's own. --mesh none leaves the
+/// area black.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
@@ -64,8 +65,8 @@ Examples:
   tile blade.tif --machine mine.toml --report report.json -o build.tif
   tile blade.tif --machine mine.toml --time")]
 pub(crate) struct TileArgs {
-    /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or -
-    /// for standard input [default count: as many as fit of one stack, one each of several]
+    /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or
+    /// - for standard input [default count: as many as fit for one stack, one each for several]
     #[arg(value_name = "STACK[:COPIES]", default_value = "-", value_parser = StackArg::parse)]
     stacks: Vec<StackArg>,
 
@@ -84,21 +85,21 @@ pub(crate) struct TileArgs {
     #[arg(long, value_name = "FILE")]
     layout_picture: Option<PathBuf>,
 
-    /// Write all that decides the build's pages but its parts' stacks, for lamp compose, which makes
-    /// any of them. Without -o, the build itself is not written
+    /// Write the recipe for the build's pages, without its parts' stacks; lamp compose makes any
+    /// page from it. Without -o, the build itself is not written
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     recipe: Option<PathBuf>,
 
-    /// Write areas and volumes of each copy and layer, and how long the build takes, as JSON
+    /// Write areas and volumes of each copy and layer, and the build time, as JSON
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Print how long the build takes on the machine, as far as its file says ([times] and
-    /// [recoating]). Without -o, the build itself is not written
+    /// Print how long the build takes, from [times] and [recoating] in the machine's file. Without
+    /// -o, the build itself is not written
     #[arg(long)]
     time: bool,
 
-    /// Give up with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
+    /// Stop with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
     /// folder may be missing: no build is written
     #[arg(long)]
     strict: bool,
@@ -116,7 +117,8 @@ pub(crate) struct TileArgs {
     #[arg(long)]
     classic: bool,
 
-    /// Write gray pages as PackBits, for readers without Deflate: several times the size
+    /// Compress gray pages with PackBits, for readers without Deflate; files are several times
+    /// larger
     #[arg(long)]
     packbits: bool,
 

@@ -17,8 +17,8 @@ const HEADING: &str = "Strips of a projector that scans";
 /// Options of the strips.
 #[derive(Args, Clone, Debug)]
 pub(super) struct StripArgs {
-    /// Cut each layer into the swaths that a scanning projector exposes: writes one stack per swath
-    /// and an index, strips.json, into this new folder. lamp join puts the build together again
+    /// Cut each layer into the swaths that a scanning projector exposes. This new folder gets one
+    /// stack per swath and an index, strips.json. lamp join puts the build together again
     #[arg(long, value_name = "DIR", help_heading = HEADING)]
     strips: Option<PathBuf>,
 
@@ -33,12 +33,12 @@ pub(super) struct StripArgs {
     #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
     overlap: Option<u32>,
 
-    /// Exposure of the columns that a swath and the next share; together it is always the build
+    /// Exposure of the columns that a swath and the next share; the sum is always the build
     #[arg(long, default_value_t, requires = "strips", help_heading = HEADING)]
     #[arg(value_parser = one_of_described::<Seam>(&[
-        "Each pixel belongs to one of the two: each row changes over at a column of its own, and in each \
-         layer at another. Black and white stay so",
-        "Levels fall in one as they rise in the other: gray pages, many times as large",
+        "Each pixel belongs to one swath: each row changes over at its own column, which differs in each \
+         layer. Black and white do not change",
+        "Levels fall in one swath as they rise in the other; gray pages are many times larger",
     ]))]
     seam: Seam,
 }

@@ -24,10 +24,11 @@ use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 use exposures::Exposures;
 
-/// Compute what bitmaps cure on a fixed glass, a plan's or any others
+/// Compute the part that bitmaps cure on fixed glass, from a plan or elsewhere
 ///
-/// Bitmaps are a stack whose pages state their exposure times, or discs and rings typed in. With
-/// --target, the cured part is compared with the wanted one. -o writes it all, with pictures.
+/// Bitmaps are a stack whose pages state their exposure times, or discs and rings that you type.
+/// With --target, the cured part is compared with the target. -o writes bitmaps, report and
+/// pictures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -36,8 +37,8 @@ Examples:
   lamp plan simulate 12:7.9s,11:0.8s,5-10:1.2s --model kinetics --projector jariwala \\
       --material tmpta --target hemisphere -o cured/")]
 pub(super) struct SimulateArgs {
-    /// Bitmaps in their order: a plan's bitmaps.tif, or discs and rings by their radius in mirrors
-    /// and their time, as 12:7.9s,5-11:0.8s
+    /// Bitmaps in their order: a plan's bitmaps.tif, or discs and rings with their radius in
+    /// mirrors and their time, such as 12:7.9s,5-11:0.8s
     #[arg(value_name = "BITMAPS")]
     bitmaps: OsString,
 
@@ -56,12 +57,12 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "NAME|FILE")]
     material: PathBuf,
 
-    /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions, as
-    /// 000 does with 9x15, instead of integrating light exactly
+    /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions,
+    /// instead of integrating light exactly; 000 uses 9x15
     #[arg(long, value_name = "POINTSxDIRECTIONS", value_parser = parse_rays)]
     rays: Option<Tracing>,
 
-    /// Target to compare with: as the target of lamp plan column-cure
+    /// Target to compare with, in any form that lamp plan column-cure accepts
     #[arg(long, value_name = "TARGET")]
     target: Option<PathBuf>,
 
