@@ -96,7 +96,7 @@ pub(crate) struct SlicingArgs {
 /// The part to slice, and the options of slicing.
 #[derive(Args, Clone)]
 pub(crate) struct SliceStageArgs {
-    /// The part: STL, STEP, 3MF or OBJ files, even gzipped, or - for standard input
+    /// The part: STL, STEP, 3MF or OBJ files, plain or gzipped, or - for standard input
     ///
     /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES first turns a file about z and
     /// moves it. Overlapping files are united; --subtract and --intersect cut them

@@ -74,7 +74,7 @@ pub(crate) struct PlacementArgs {
     #[arg(help_heading = PLACEMENT)]
     mirror: Vec<Axis>,
 
-    /// Rotate the part by degrees, for example x:90,z:-12.5
+    /// Rotate the part by degrees, as in x:90,z:-12.5
     ///
     /// The axis goes through the origin; rotation is counterclockwise as seen from the axis's tip.
     /// Several rotations apply in order. Quarter turns are exact
