@@ -328,7 +328,7 @@ f 2 3 4
             ("f -9 1 2", "no vertex -9"),
             ("f 1 -9223372036854775808 2", "no vertex -9223372036854775808"),
             ("f 1 2 a", "three numbers"),
-            ("\0\0 v 1 2 3", "bytes of zero"),
+            ("\0\0 v 1 2 3", "NUL bytes"),
             ("surf 0 1 0 1 1 2 3 4", "free-form"),
         ] {
             let message = read_text(&format!("{TETRA}\n{line}\n")).unwrap_err();
