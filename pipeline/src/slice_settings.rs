@@ -176,7 +176,7 @@ impl SliceSettings {
     fn grid(&self) -> GridRule {
         match self.frame {
             SliceFrame::At { origin: FiniteNumbers(origin_mm), size } => {
-                // A size of whole pixels may come out a hair above: that must not add a pixel.
+                // A size of whole pixels may be a hair above: that must not add a pixel.
                 let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
                 GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
             }

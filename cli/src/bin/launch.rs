@@ -26,7 +26,7 @@ pub(crate) fn launch(stage: &str) -> ExitCode {
 
 fn lamp() -> PathBuf {
     let name = format!("lamp{}", env::consts::EXE_SUFFIX);
-    // The `lamp` beside it was installed with it; another in PATH may be of another version.
+    // The `lamp` next to it was installed with it; another in PATH may be of another version.
     let beside = env::current_exe().map(|own| own.with_file_name(&name));
     beside.ok().filter(|path| path.exists()).unwrap_or_else(|| name.into())
 }

@@ -120,7 +120,7 @@ struct Attempts<'a> {
 
 impl<'a> Attempts<'a> {
     fn new(bytes: &'a [u8], read: ReadFn, chord_mm: f64) -> Self {
-        // A placeholder: `begin` or `settle_open` replaces it.
+        // Not known yet: `begin` or `settle_open` sets it.
         let none = Err(BrepError::Chord { chord_mm });
         Self { bytes, read, chord_mm, tries: Vec::new(), best: none, open: None, longest_mm: 0.0 }
     }
