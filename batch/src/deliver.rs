@@ -142,7 +142,7 @@ pub fn check_delivered(night: &Night, store: &Store) -> Result<(usize, Vec<Strin
                 whole += 1;
                 continue;
             }
-            Ok(_) => "it has other bytes than were delivered".to_owned(),
+            Ok(_) => "its bytes differ from the delivered ones".to_owned(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => "it is gone".to_owned(),
             Err(error) => error.to_string(),
         };

@@ -43,10 +43,10 @@ pub enum BatchError {
     #[error(transparent)]
     Begin(StoreError),
     /// The store does not have the task.
-    #[error("{}: the store knows no such task: run its batch again", .0.short())]
+    #[error("{}: the store has no such task: run its batch again", .0.short())]
     NoTask(Key),
     /// The task was planned by another version.
-    #[error("the task is of another version of lamp: run its batch again")]
+    #[error("the task is from a different lamp version: run its batch again")]
     OtherVersion(#[source] serde_json::Error),
     /// A file is not as it was when the task was planned.
     #[error("{}: it has changed since the batch was planned: run the batch again", .0.display())]

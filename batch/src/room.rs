@@ -43,8 +43,8 @@ impl DiskRoom {
         let [all, store, delivered, free] =
             [self.store + self.delivered, self.store, self.delivered, free].map(in_words);
         Some(format!(
-            "about {all} of disk are needed ({store} for the store, {delivered} for what is \
-             delivered), and {free} are free: make room, or name another [store] folder"
+            "about {all} of disk are needed ({store} for the store, {delivered} for \
+             deliveries), and {free} are free: make room, or name another [store] folder"
         ))
     }
 }

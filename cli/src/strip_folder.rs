@@ -61,7 +61,7 @@ pub(crate) fn write_stack_or_strips(
     let to = &output.output;
     if is_stream(to) || is_stack_name(to) {
         return Err(Exit::usage(format!(
-            "{}: what is made of strips is a folder of strips: name one with -o, or make one stack \
+            "{}: the result of strips is a folder of strips: name one with -o, or make one stack \
              of them with lamp join first",
             to.display()
         )));

@@ -293,7 +293,8 @@ impl FromStr for FiringShrinkage {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is not a shrinkage: write a share from 0% to 50%, as 2.1% or x:2.1%,y:1.8%"
+                "`{text}` is not a shrinkage: write a share from 0% to 50%, such as 2.1% or \
+                 x:2.1%,y:1.8%"
             )
         };
         let share = |text: &str| {

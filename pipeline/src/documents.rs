@@ -104,7 +104,7 @@ pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
     if digest.is_empty() || !found.starts_with(digest) {
         let name = name.display();
         return Err(Error::work(format!(
-            "{name} is not as it was: its digest begins with {found}, not with {digest}"
+            "{name} has changed: its digest begins with {found}, not with {digest}"
         )));
     }
     Ok(())
@@ -190,7 +190,7 @@ pub fn read_text(path: &Path, max: u64, what: &str) -> Result<String, Error> {
     };
     let bytes = read()?;
     if bytes.len() as u64 > max {
-        return Err(Error::work(format!("more than {} MiB is not {what}", max >> 20)));
+        return Err(Error::work(format!("more than {} MiB: this is not {what}", max >> 20)));
     }
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();

@@ -215,7 +215,7 @@ fn open_picture<E: From<Error> + Send + 'static>(
     };
     let (copy, bytes, digest) = copied().map_err(|error| Error::from(error).at(name.clone()))?;
     if bytes > max {
-        let why = format!("more than {} MiB is not a picture", max >> 20);
+        let why = format!("more than {} MiB: this is not a picture", max >> 20);
         return Err(Error::work(why).at(name));
     }
     let pages = Pages::from_file(copy).map_err(|error| Error::from(error).at(name.clone()))?;

@@ -87,7 +87,7 @@ impl ExposureSettings {
         let mut words = folders.iter().map(|folder| folder.join(&*path));
         *path = words.find(is_it).ok_or_else(|| {
             let name = path.display();
-            Error::work(format!("{name} is neither here nor beside the stack, as it was"))
+            Error::work(format!("no unchanged {name} is here or next to the stack"))
         })?;
         Ok(())
     }

@@ -77,7 +77,7 @@ impl Bridged {
             (!layers.is_empty()).then(|| format!("{} {what}: {}", counted(layers), ranges(layers)))
         };
         let parts = [
-            part("cut up to 10um beside their planes", nudged),
+            part("cut up to 10um next to their planes", nudged),
             part(&format!("taken from {name}"), borrowed),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();

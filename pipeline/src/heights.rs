@@ -134,7 +134,7 @@ impl HeightSettings {
             (false, true) => Err(Error::settings("--cusp needs --criterion cusp")),
             // A deviation is a share, which bounds no cusp: cusps are lengths.
             (true, false) if self.deviation.is_some() || !self.has_budget() => {
-                Err(Error::settings("--criterion cusp needs a bound, as --cusp 10um"))
+                Err(Error::settings("--criterion cusp needs a bound, such as --cusp 10um"))
             }
             _ => Ok(criterion),
         }

@@ -125,8 +125,11 @@ impl FromStr for PartPlacement {
 
     /// Parses `x,y`, `x,y,z` or `x,y,z,degrees`; lengths without a unit are in millimeters.
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no placement: write @X,Y,Z,DEGREES, as @50mm,0,0,90 or @2in,0");
+        let wrong = || {
+            format!(
+                "`{text}` is not a placement: write @X,Y,Z,DEGREES, such as @50mm,0,0,90 or @2in,0"
+            )
+        };
         let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
         let length = |text: &&str| {
             let mm = number(text.trim()).map(Length::from_mm);

@@ -103,7 +103,7 @@ impl FromStr for Rotation {
             Some(Self { axis: axis.trim().to_ascii_lowercase().parse().ok()?, degrees })
         };
         parse().ok_or_else(|| {
-            format!("`{text}` is not a rotation: write AXIS:DEGREES, as x:90 or z:-12.5")
+            format!("`{text}` is not a rotation: write AXIS:DEGREES, such as x:90 or z:-12.5")
         })
     }
 }
@@ -115,7 +115,7 @@ impl FromStr for Rotation {
 pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
     let one = text.parse().map(|FiniteNumbers([factor])| FiniteNumbers([factor; 3]));
     let factors = one.or_else(|_| text.parse()).map_err(|_| {
-        format!("`{text}` is not a scale: write a factor, or X,Y,Z, as 1.02,1.02,1.015")
+        format!("`{text}` is not a scale: write a factor, or X,Y,Z, such as 1.02,1.02,1.015")
     })?;
     match factors {
         FiniteNumbers(factors) if factors.contains(&0.0) => {
@@ -135,7 +135,7 @@ pub fn parse_scale(text: &str) -> Result<FiniteNumbers<3>, String> {
 /// Returns a sentence if the text is no move.
 pub fn parse_translation(text: &str) -> Result<FiniteNumbers<3>, String> {
     let wrong =
-        || format!("`{text}` is not a translation: write X,Y,Z in millimeters, as -5,0,12.7");
+        || format!("`{text}` is not a translation: write X,Y,Z in millimeters, such as -5,0,12.7");
     // Lengths of other options have units, so people add one here, too.
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }

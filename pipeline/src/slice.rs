@@ -248,8 +248,8 @@ impl SliceStage {
         let Self { parts, settings, .. } = self;
         // Before any file is opened: STEP parts can take minutes.
         if settings.gray == GrayRule::PrintThrough && self.fallback.is_some() {
-            let why = "--print-through looks at all layers above one, and --fallback mends single \
-                       ones: leave out one of them";
+            let why = "--print-through needs all layers above a layer, and --fallback repairs \
+                       single layers: leave out one";
             return Err(Error::settings(why));
         }
         let exposure = settings.exposure()?;
@@ -378,9 +378,7 @@ impl Slicing<'_> {
         let idle = self.bridged.borrow().slices.idle_cutters();
         let doubt = |file: usize| {
             let name = files[file].name();
-            format!(
-                "{name} cuts nothing: it shares no pixel with the part, so check where it stands"
-            )
+            format!("{name} cuts nothing: it shares no pixel with the part, so check where it is")
         };
         idle.into_iter().map(doubt).collect()
     }
@@ -426,8 +424,8 @@ impl Slicing<'_> {
             && pixels > 0
         {
             remarks.push(Remark::note(format!(
-                "{pixels} pixels in {layers} layers are not cured down to the underside, even by \
-                 white; their pages say how many (short_px), and more --overcure cures them"
+                "{pixels} pixels in {layers} layers are not cured down to the underside, even \
+                 with white; their pages state how many (short_px), and more --overcure cures them"
             )));
         }
         remarks.extend(stray_rows_text(self.counts(), report).map(Remark::note));
@@ -441,11 +439,11 @@ fn fill_doubt(doubt: &FillDoubt, name: &str) -> Vec<String> {
     let turned = format!(
         "{name}: facets are turned over in {unsigned_rows} rows of pixels: there every crossing \
          toggles, as with --fill even-odd, and shells that overlap cut each other; lamp mesh \
-         repair turns them back"
+         repair turns the facets back"
     );
     let repeated = format!(
         "{name}: {} mm³ lie in several shells whose facets face outwards: bodies that overlap, or \
-         stand twice, are filled; a void within another shell is cut out by --fill even-odd",
+         exist twice, are filled; --fill even-odd cuts out a void within another shell",
         short(repeated_mm3)
     );
     let inward = format!(

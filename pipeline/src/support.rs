@@ -109,7 +109,7 @@ impl FromStr for Degrees {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.trim_end_matches("deg").trim_end().parse() {
             Ok(degrees) if (0.0..=80.0).contains(&degrees) => Ok(Self(degrees)),
-            _ => Err(format!("`{text}` is no tilt: write an angle from 0deg to 80deg")),
+            _ => Err(format!("`{text}` is not a tilt: write an angle from 0deg to 80deg")),
         }
     }
 }
@@ -131,7 +131,7 @@ impl FromStr for Curvature {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.strip_suffix("/mm").and_then(|number| number.trim_end().parse().ok()) {
             Some(number) if (0.0..f64::INFINITY).contains(&number) => Ok(Self(number)),
-            _ => Err(format!("`{text}` is no curvature: write 1/mm for a radius of 1 mm")),
+            _ => Err(format!("`{text}` is not a curvature: write 1/mm for a radius of 1 mm")),
         }
     }
 }

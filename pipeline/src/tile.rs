@@ -118,7 +118,7 @@ impl FromStr for TileTurns {
             return Ok(Self::Images(turns));
         }
         if !text.starts_with(|first: char| first.is_ascii_digit()) {
-            return Err("write none, half, quarters or an angle, as 15deg".to_owned());
+            return Err("write none, half, quarters or an angle, such as 15deg".to_owned());
         }
         let free: FreeTurns = text.parse().map_err(|wrong| format!("{wrong}"))?;
         let is_right = free.degrees().is_empty();

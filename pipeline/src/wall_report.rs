@@ -124,7 +124,8 @@ impl WallReport {
         if let Some(place) = &self.first_loss {
             let (lost, broken, layers) = (self.lost, self.broken, self.layers_with_losses);
             lines.push(format!(
-                "{lost} piece{} lost and {broken} broken apart in {layers} layer{}, as --min-feature 0um keeps no walls; the first in {place}",
+                "{lost} piece{} lost and {broken} broken apart in {layers} layer{}, because \
+                 --min-feature 0um keeps no walls; the first in {place}",
                 s(lost),
                 s(layers),
             ));

@@ -11,13 +11,13 @@ use crate::light::{IntensityOf, Light, SampleHeight};
 #[non_exhaustive]
 pub enum NoLight {
     /// It does not state the sideways spread of light.
-    #[error("{0} does not say how far light spreads sideways: add [spread] to its file")]
+    #[error("{0} does not state how far light spreads sideways: add [spread] to its file")]
     Spread(String),
     /// It does not state the intensity of full white.
-    #[error("{0} does not say how bright full white is: add [intensity] to its file")]
+    #[error("{0} does not state how bright full white is: add [intensity] to its file")]
     Intensity(String),
     /// It does not state which dose cures to which depth.
-    #[error("{0} does not say which dose cures how deep: add [working-curve] to its file")]
+    #[error("{0} does not state which dose cures how deep: add [working-curve] to its file")]
     WorkingCurve(String),
     /// A number is impossible.
     #[error(transparent)]
@@ -91,7 +91,7 @@ mod tests {
         assert!(matches!(Light::of(&material, SampleHeight::Top), Err(NoLight::WorkingCurve(_))));
         material.intensity = None;
         let said = Light::of(&material, SampleHeight::Top).unwrap_err().to_string();
-        assert!(said.starts_with("zsg-amber does not say how bright"), "{said}");
+        assert!(said.starts_with("zsg-amber does not state how bright"), "{said}");
         material.spread = None;
         assert!(matches!(Light::of(&material, SampleHeight::Top), Err(NoLight::Spread(_))));
         let straight = Material::builtin("lamp-suspension").unwrap();

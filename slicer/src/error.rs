@@ -58,7 +58,7 @@ pub enum SliceError {
     #[error("it cannot be unpacked")]
     Packed(#[source] io::Error),
     /// A packed file contains far more than any mesh of its size.
-    #[error("it unpacks to more than {most} bytes, which is far more than a packed mesh does")]
+    #[error("it unpacks to more than {most} bytes, far more than a packed mesh does")]
     Inflated {
         /// The greatest amount that is unpacked.
         most: u64,
@@ -150,7 +150,7 @@ pub enum SliceError {
     #[error("the file holds no facets: there is nothing to slice")]
     NoFacets,
     /// There are more facets than a corner table has numbers.
-    #[error("{facets} facets are more than a corner table holds, which are 1431655764")]
+    #[error("{facets} facets are too many: a corner table holds at most 1431655764")]
     TooManyFacets {
         /// The number of facets of the part.
         facets: usize,
@@ -163,7 +163,7 @@ pub enum SliceError {
     Cut,
     /// A repair would drop all facets of a mesh.
     #[error(
-        "a repair would drop all of its last {facets} facets: none has an area, or they cancel each other out"
+        "a repair would drop all of its last {facets} facets: they have no area or cancel each other out"
     )]
     NothingLeft {
         /// The number of facets before the last step.
@@ -182,7 +182,7 @@ pub enum SliceError {
     },
     /// The part does not fit the space given for the images.
     #[error(
-        "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm, which sticks out of the frame of the images \
+        "the part spans x {:.3} to {:.3} and y {:.3} to {:.3} mm: it sticks out of the frame of the images \
          or leaves no black column on their right",
         part_mm[0][0], part_mm[1][0], part_mm[0][1], part_mm[1][1]
     )]
@@ -191,7 +191,7 @@ pub enum SliceError {
         part_mm: [[f64; 2]; 2],
     },
     /// The part would have too many layers.
-    #[error("the part is {height} high, {layers:.0} layers of {thickness}")]
+    #[error("the part is {height} high and needs {layers:.0} layers of {thickness}: too many")]
     TooManyLayers {
         /// The part's height.
         height: Length,
@@ -228,7 +228,8 @@ pub enum SliceError {
     },
     /// The sections of gray layers are not at their tops.
     #[error(
-        "gray layers are as deep as the part below their tops, so their sections must be there"
+        "gray layers are as deep as the part below their tops, so their sections must be at \
+         their tops"
     )]
     GrayPlane,
     /// A STEP file could not be read, or no facets could be made of it.
@@ -238,7 +239,7 @@ pub enum SliceError {
     #[error(
         "it is not sliced, because its sections would be wrong: {body}: {fault}{}{}",
         finding.as_ref().map_or_else(String::new, |it| format!(" (#{}: {})", it.entity, it.fault)),
-        if *more > 0 { format!(", and {more} faults more") } else { String::new() },
+        if *more > 0 { format!(", and {more} more faults") } else { String::new() },
     )]
     Faulty {
         /// The first body with a fault.
@@ -253,7 +254,7 @@ pub enum SliceError {
     /// Another kernel reads a STEP file differently.
     #[error(
         "the kernels disagree about {body}: {difference}{}",
-        if *more > 0 { format!(", and {more} differences more") } else { String::new() }
+        if *more > 0 { format!(", and {more} more differences") } else { String::new() }
     )]
     KernelsDisagree {
         /// The first body that differs.
@@ -302,7 +303,7 @@ pub enum FileChange {
     #[error("it was written to")]
     Content,
     /// Its name refers to another file now.
-    #[error("another file has its name now")]
+    #[error("a different file has its name now")]
     Replaced,
 }
 
@@ -311,22 +312,22 @@ pub enum FileChange {
 #[non_exhaustive]
 pub enum ObjFault {
     /// A vertex without three numbers, or a face with something other than numbers.
-    #[error("is no vertex of three numbers, and no face of numbers of vertices")]
+    #[error("is neither a vertex with three numbers nor a face with vertex numbers")]
     Number,
     /// A corner at a vertex that is not defined before it.
-    #[error("names a vertex that does not stand before it: there is no vertex {0}")]
+    #[error("names a vertex that is not defined before it: there is no vertex {0}")]
     NoVertex(i64),
     /// A face with too many corners for a real part.
-    #[error("is a face with more corners than 500000")]
+    #[error("is a face with more than 500000 corners")]
     ManyCorners,
     /// Bytes of zero before further words.
     #[error("has NUL bytes, so the file is damaged")]
     Zeros,
     /// Numbers with commas.
-    #[error("has commas in its numbers, which may be decimal points or stand between thousands")]
+    #[error("has commas in its numbers, which may be decimal points or thousands separators")]
     Comma,
     /// Curves and surfaces instead of faces.
-    #[error("is a free-form curve or surface, which is not read: only faces are")]
+    #[error("is a free-form curve or surface: only faces are read")]
     FreeForm,
 }
 
@@ -335,7 +336,7 @@ pub enum ObjFault {
 #[non_exhaustive]
 pub enum AsciiFault {
     /// The text ends within a facet.
-    #[error("the file ends within it: it was cut off")]
+    #[error("the file ends within this facet: it was cut off")]
     CutOff,
     /// A word where another one should be.
     #[error("found `{found}`, expected {expected}")]
@@ -346,10 +347,10 @@ pub enum AsciiFault {
         expected: &'static str,
     },
     /// Bytes of zero before further words.
-    #[error("bytes of zero stand before it: the file is damaged")]
+    #[error("bytes of zero come before it: the file is damaged")]
     Zeros,
     /// Numbers with commas.
-    #[error("commas in its numbers may be decimal points or stand between thousands")]
+    #[error("commas in its numbers may be decimal points or thousands separators")]
     Comma,
 }
 

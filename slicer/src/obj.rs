@@ -335,6 +335,6 @@ f 2 3 4
             assert!(message.starts_with("line 16 ") && message.contains(words), "{message}");
         }
         let long = format!("{TETRA}f{}", " 1".repeat(1 << 20));
-        assert!(read_text(&long).unwrap_err().contains("more corners"));
+        assert!(read_text(&long).unwrap_err().contains("more than 500000 corners"));
     }
 }

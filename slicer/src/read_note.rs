@@ -117,9 +117,9 @@ impl ReadNote {
 impl fmt::Display for ReadNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoSolids { items: 1 } => write!(f, "1 item is left out: it is no solid"),
+            Self::NoSolids { items: 1 } => write!(f, "1 item is left out: it is not a solid"),
             Self::NoSolids { items } => {
-                write!(f, "{items} items are left out: they are no solids")
+                write!(f, "{items} items are left out: they are not solids")
             }
             Self::NotPrintable { items: 1 } => {
                 write!(f, "1 item is left out: its file marks it as not printable")
@@ -152,12 +152,15 @@ impl fmt::Display for ReadNote {
             Self::StandIns { objects } => {
                 write!(
                     f,
-                    "the meshes of {objects} {} are left out: slices stand for more than such a mesh",
+                    "the meshes of {objects} {} are left out: slices hold more than such a mesh",
                     of_objects(*objects)
                 )
             }
             Self::Extension { name } => {
-                write!(f, "elements of the extension {name} are left out: it is not known")
+                write!(
+                    f,
+                    "elements of the extension {name} are left out: the extension is not known"
+                )
             }
             Self::ProjectData { what } => write!(f, "the project's {what} are left out"),
             Self::Plates { plates } => {
@@ -171,8 +174,8 @@ impl fmt::Display for ReadNote {
             }
             Self::WrongCount { declared, held } => write!(
                 f,
-                "the header declares {declared} facets, and the file holds {held}: all of these \
-                 are read"
+                "the header declares {declared} facets, but the file holds {held}: all facets \
+                 in the file are read"
             ),
             Self::NoEnd => write!(
                 f,

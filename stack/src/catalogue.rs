@@ -139,7 +139,7 @@ pub enum CatalogueError<E> {
         problem: String,
     },
     /// The name holds other characters than a name may.
-    #[error("name: `{name}` is not a name: write small letters, digits and -, as {example}")]
+    #[error("name: `{name}` is not a name: write small letters, digits and -, such as {example}")]
     Name {
         /// The name as it stands.
         name: String,
@@ -164,7 +164,7 @@ fn key_problem(message: &str) -> String {
 pub fn nonempty_text<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
     let text = String::deserialize(from)?;
     if text.trim().is_empty() {
-        return Err(D::Error::custom("this is empty: write what it is for the next reader"));
+        return Err(D::Error::custom("this is empty: describe it for the next reader"));
     }
     Ok(text)
 }

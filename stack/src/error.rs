@@ -75,10 +75,12 @@ pub enum StackError {
         down: f64,
     },
     /// No image of a TIFF is a layer.
-    #[error("it holds no layer, but {0}")]
+    #[error("it holds no layer, only {0}")]
     NoLayerImage(ImagesBeside),
     /// Two files of a folder have one page number.
-    #[error("{} and {} have one page number: keep one of them in the folder", files[0], files[1])]
+    #[error(
+        "{} and {} have the same page number: keep one of them in the folder", files[0], files[1]
+    )]
     SamePage {
         /// The files' names.
         files: [String; 2],
@@ -136,7 +138,7 @@ pub enum StackError {
         source: Box<StackError>,
     },
     /// The layer indices do not increase.
-    #[error("layer {layer} stands behind layer {before}: a stack's layers go up")]
+    #[error("layer {layer} comes after layer {before}: a stack's layers must go up")]
     Order {
         /// The layer that is out of order.
         layer: u32,
@@ -155,7 +157,7 @@ pub enum StackError {
         formats: [&'static str; 2],
     },
     /// A page is missing from a folder.
-    #[error("the folder lacks a page: layer {layer} does not follow what was before it")]
+    #[error("the folder lacks a page: layer {layer} does not follow the layer before it")]
     MissingPage {
         /// The layer after the gap.
         layer: u32,
@@ -184,15 +186,15 @@ pub enum StackError {
         name: String,
     },
     /// The output folder is not empty.
-    #[error("a folder is not written over what is there")]
+    #[error("it already exists and is not overwritten")]
     Exists,
     /// The folder to be replaced has no list of what this workspace wrote into it.
     #[error(
-        "only what an earlier run wrote is replaced, and this folder has no {FOLDER_LIST} of one"
+        "only files from an earlier run are replaced, and this folder has no {FOLDER_LIST} file"
     )]
     NotOurs,
     /// The folder to be replaced holds something that its list does not name.
-    #[error("only what an earlier run wrote is replaced, and this folder holds {name}")]
+    #[error("only files from an earlier run are replaced, and this folder holds {name}")]
     NotReplaceable {
         /// The name of such a file or folder.
         name: String,
@@ -232,7 +234,7 @@ pub enum PageFault {
     #[error("its directory claims {0} entries")]
     Entries(u64),
     /// The links of a TIFF's directories form a loop.
-    #[error("its directory was met before: the links form a loop")]
+    #[error("its directory was read before: the links form a loop")]
     Loop,
     /// A width or height, in pixels, is zero or exceeds the reader's limit.
     #[error("it claims a side of {0} pixels")]
@@ -244,7 +246,7 @@ pub enum PageFault {
     #[error("it claims {0} columns, too many to turn it upright")]
     TooWideToTurn(u32),
     /// The number of strips or tiles does not match the image's size.
-    #[error("it has {found} {pieces} where its size makes {wanted}")]
+    #[error("it has {found} {pieces}, but its size needs {wanted}")]
     PieceCount {
         /// `strips` or `tiles`.
         pieces: &'static str,
@@ -299,7 +301,7 @@ pub enum PageFault {
     PictureFileBytes(u64),
     /// A picture's pixels take more bytes than the reader's limit.
     #[error(
-        "its pixels take {0} bytes, which is too much for a picture that is decoded whole: save it as a PNG or a TIFF"
+        "its pixels take {0} bytes, too many for a format that is decoded at once: save it as a PNG or a TIFF"
     )]
     PictureBytes(u64),
     /// A PNG's palette lacks an entry that a pixel uses.
@@ -321,7 +323,7 @@ pub enum UnsupportedFeature {
     #[error("photometric interpretation {0}")]
     Photometric(u64),
     /// An unsupported number of samples or bits.
-    #[error("an image of {samples} x {bits} bits")]
+    #[error("an image with {samples} x {bits} bits")]
     PixelBits {
         /// Samples per pixel.
         samples: u64,
@@ -356,14 +358,14 @@ pub enum UnsupportedFeature {
     #[error("a picture in color")]
     Colour,
     /// A picture file with several images, such as an animation.
-    #[error("a picture file of several images")]
+    #[error("a picture file with several images")]
     SeveralImages,
 }
 
 fn last_whole_text(last_whole: Option<u32>) -> String {
     match last_whole {
         Some(layer) => format!("the last whole layer is {layer}"),
-        None => "not one layer is whole".to_owned(),
+        None => "no layer is whole".to_owned(),
     }
 }
 

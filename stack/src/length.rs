@@ -60,20 +60,22 @@ impl fmt::Display for Length {
 #[non_exhaustive]
 pub enum LengthError {
     /// The text does not start with a number.
-    #[error("`{0}` is not a length: write a number and a unit, as 100um, 0.1mm, 4mil or 0.004in")]
+    #[error(
+        "`{0}` is not a length: write a number and a unit, such as 100um, 0.1mm, 4mil or 0.004in"
+    )]
     NotALength(String),
     /// The number has no unit, or an unknown one.
-    #[error("`{text}` has no unit that is known: add um, mm, cm, m, mil or in")]
+    #[error("`{text}` has no known unit: add um, mm, cm, m, mil or in")]
     NoUnit {
         /// The given text.
         text: String,
     },
     /// The text is not two lengths with an `x` between them.
-    #[error("`{0}` is not a size: write width x height and a unit, as 4x4.5in or 100x80mm")]
+    #[error("`{0}` is not a size: write width x height and a unit, such as 4x4.5in or 100x80mm")]
     NotASize(String),
     /// The text is not a valid number of dots per inch.
     #[error(
-        "`{0}` is not a resolution: write dots per inch between 1 and 100000, as 1500, with at most four decimals"
+        "`{0}` is not a resolution: write dots per inch, such as 1500, between 1 and 100000 and with at most four decimals"
     )]
     NotAResolution(String),
 }

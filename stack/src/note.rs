@@ -79,8 +79,12 @@ impl fmt::Display for StackNote {
                 f.write_str(&listed(&gaps, "; "))
             }
             Self::OtherPictures(files) => {
-                let noun = if files.len() == 1 { "is no page" } else { "are no pages" };
-                write!(f, "{} {noun} by name and left out", listed(files, ", "))
+                let noun = if files.len() == 1 {
+                    "is left out: its name is not a page name"
+                } else {
+                    "are left out: their names are not page names"
+                };
+                write!(f, "{} {noun}", listed(files, ", "))
             }
             Self::Forms(files) => write!(
                 f,
@@ -89,12 +93,20 @@ impl fmt::Display for StackNote {
                 listed(files, ", ")
             ),
             Self::OtherFiles(files) => {
-                let noun = if files.len() == 1 { "is no picture" } else { "are no pictures" };
-                write!(f, "{} {noun} and left out", listed(files, ", "))
+                let noun = if files.len() == 1 {
+                    "is left out: it is not a picture"
+                } else {
+                    "are left out: they are not pictures"
+                };
+                write!(f, "{} {noun}", listed(files, ", "))
             }
             Self::Images(images) => {
-                let verb = if images.count() == 1 { "is no layer" } else { "are no layers" };
-                write!(f, "{images} {verb} and left out")
+                let verb = if images.count() == 1 {
+                    "is left out: it is not a layer"
+                } else {
+                    "are left out: they are not layers"
+                };
+                write!(f, "{images} {verb}")
             }
         }
     }
@@ -106,7 +118,7 @@ impl fmt::Display for PageGap {
         match missing {
             Some([first, last]) if first == last => write!(f, "page {first} is missing")?,
             Some([first, last]) => write!(f, "pages {first} to {last} are missing")?,
-            None => f.write_str("the numbers of the pages do not run on")?,
+            None => f.write_str("the page numbers do not continue")?,
         }
         write!(f, " ({after} follows {before})")
     }

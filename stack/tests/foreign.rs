@@ -319,7 +319,7 @@ fn what_is_not_read_is_named() {
         (page().with(257, 2), "ends before its rows do"),
         (page().tiled(16, 0), "a side of 0 pixels"),
         (page().with(256, 1 << 23).with(274, 5), "too many to turn it upright"),
-        (page().with(257, 17).tiled(16, 16), "it has 1 tiles where its size makes 2"),
+        (page().with(257, 17).tiled(16, 16), "it has 1 tiles, but its size needs 2"),
     ] {
         let error = read(page.bytes()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
@@ -521,7 +521,7 @@ fn images_that_are_no_layers_are_left_out_with_a_note() {
     };
     let wanted: Vec<Image> = (1..=4).map(|level| mask_of(&[vec![level]], 8)).collect();
     let note = "3 images of reduced resolution, 2 transparency masks, 1 image in a subdirectory are \
-                no layers and left out";
+                left out: they are not layers";
 
     let mut piped = Pages::from_stream(Cursor::new(bytes.clone())).unwrap();
     let layers: Result<Vec<_>, _> = piped.by_ref().map(|page| page?.decode()).collect();
@@ -552,7 +552,7 @@ fn images_that_are_no_layers_are_left_out_with_a_note() {
     assert!(pages.notes()[0].to_string().contains("1 image of reduced resolution, 1 transparency"));
 
     let error = read(tiff_of([image(1).with(254, 1), image(1).with(254, 4)])).unwrap_err();
-    let words = "holds no layer, but 1 image of reduced resolution, 1 transparency mask";
+    let words = "holds no layer, only 1 image of reduced resolution, 1 transparency mask";
     assert!(error.to_string().contains(words), "{error}");
 }
 

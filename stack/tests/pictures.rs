@@ -161,7 +161,7 @@ fn several_images_in_one_file_are_refused() {
     let pbm = b"P4\n3 2\n\x40\xC0";
     for file in [gif, [pbm, &pbm[..]].concat()] {
         let error = read(&file).unwrap_err().to_string();
-        assert!(error.contains("a picture file of several images"), "{error}");
+        assert!(error.contains("a picture file with several images"), "{error}");
     }
 }
 

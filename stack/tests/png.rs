@@ -129,7 +129,7 @@ fn what_is_not_read_is_named() {
         (png(1, eight(ColorType::Rgba), &[1, 3, 1, 255], 1, |_| {}), "a picture in color"),
         (png(1, eight(ColorType::Rgba), &[1, 1, 1, 254], 1, |_| {}), "transparency"),
         (png(1, eight(ColorType::GrayscaleAlpha), &[1, 1], 1, |_| {}), "transparency"),
-        (animated(), "a picture file of several images"),
+        (animated(), "a picture file with several images"),
         (png(1, BITS, &[0], 1, clear), "transparency"),
         (png(1, (ColorType::Grayscale, BitDepth::Sixteen), &[1, 1], 1, |_| {}), "16-bit"),
         (interlaced(), "an interlaced PNG"),

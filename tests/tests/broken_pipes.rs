@@ -50,7 +50,7 @@ fn a_stack_cut_anywhere_is_refused_and_leaves_nothing() {
     for cut in cuts(&ends) {
         // The first page is layer 1.
         let last_whole = match ends.iter().filter(|&&end| end <= cut).count() {
-            0 => "not one layer is whole".to_owned(),
+            0 => "no layer is whole".to_owned(),
             whole => format!("the last whole layer is {whole};"),
         };
         for stage in

@@ -72,7 +72,7 @@ fn a_truncated_file_is_refused() {
 fn another_file_of_that_name_is_refused() {
     let scratch = scratch();
     let other = scratch.path("other.stl");
-    is_refused(&scratch, "another file has its name", |part| fs::rename(other, part).unwrap());
+    is_refused(&scratch, "a different file has its name", |part| fs::rename(other, part).unwrap());
 }
 
 /// Times of the last write are what programs say they are.

@@ -180,9 +180,11 @@ fn images_lie_where_their_origins_say() {
     at("between.tif", [-0.35, 4.5], 254.0, BLOCK);
     at("fine.tif", [-0.3, 4.5], 508.0, BLOCK);
     at("far.tif", [500.0, 4.5], 254.0, BLOCK);
-    for (name, why) in
-        [("between", "no pixel of one lies on"), ("fine", "254 dpi"), ("far", "do not meet")]
-    {
+    for (name, why) in [
+        ("between", "the pixels of the two images do not line up"),
+        ("fine", "254 dpi"),
+        ("far", "do not overlap"),
+    ] {
         let ran = scratch.run(&format!("lamp compare a.tif {name}.tif"));
         assert!(
             status(&ran) == Some(2) && ran.stderr.contains(why) && ran.stdout.is_empty(),

@@ -90,11 +90,11 @@ fn what_cannot_be_composed_is_said() {
     let line = "tile tower.tif --area 120x110mm --recipe r.json";
     scratch.run(line).succeeds_quietly();
     for (line, words) in [
-        ("lamp compose -", &["give its file's name"][..]),
+        ("lamp compose -", &["give the recipe's file name"][..]),
         ("lamp compose r.json -o r.json", &["that is an input"]),
         ("tile - --recipe r.json", &["standard input has none"]),
         ("tile tower.tif --classic --recipe r.json", &["--classic is for a stack"]),
-        ("tile tower.tif --recipe -", &["name a file, as report.json"]),
+        ("tile tower.tif --recipe -", &["name a file, such as report.json"]),
         ("tile tower.tif --recipe tower.tif", &["tower.tif: no stack is written there"]),
         ("tile tower.tif --recipe r.json -o r.json", &["the stack is written there"]),
     ] {
@@ -113,14 +113,14 @@ fn what_cannot_be_composed_is_said() {
     said("missing.json", &["No such file"]);
     said("tower.tif", &["stream did not contain valid UTF-8"]);
     fs::write(scratch.path("half.json"), &recipe[..recipe.len() / 2]).unwrap();
-    said("half.json", &["this is not a recipe", "write it anew with tile --recipe"]);
+    said("half.json", &["this is not a recipe", "write it again with tile --recipe"]);
     changed("lamp-recipe-1", "lamp-recipe-9");
-    said("changed.json", &["lamp-recipe-9", "write it anew"]);
+    said("changed.json", &["lamp-recipe-9", "write it again"]);
     changed("\"code\": ", "\"code\": 1");
-    said("changed.json", &["by code 1", "would not be the same", "write it anew"]);
+    said("changed.json", &["by code 1", "would not be the same", "write it again"]);
     for (from, to) in [("tower.tif", "torus.tif"), ("120x110mm", "20x110mm")] {
         changed(from, to);
-        said("changed.json", &["not as tile wrote it", "write it anew with tile --recipe"]);
+        said("changed.json", &["changed since tile wrote it", "write it again with tile --recipe"]);
     }
     scratch.run("lamp compose r.json --layers 900").is_refused_with(&["it has layers 0 to 80"]);
     // A damaged part is not composed from.

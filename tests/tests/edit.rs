@@ -247,7 +247,7 @@ fn copies_have_the_serial_numbers_of_a_list() {
         ("A\nB\nC\nD\nE\nF\nG\n", &["art/serials.csv: line 7: there is no copy 7"]),
         (
             "A\nB\nA\nD\nE\nF\n",
-            &["all.toml", "edit 1", "art/serials.csv: line 3: A stands on line 1"],
+            &["all.toml", "edit 1", "art/serials.csv: line 3: A is also on line 1"],
         ),
     ] {
         scratch.write("art/serials.csv", list.as_bytes());

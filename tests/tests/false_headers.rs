@@ -86,7 +86,7 @@ fn stacks_that_lie(scratch: &Scratch) {
     let fields = [(256, 8), (257, all), (259, 4), (262, 1), (278, 1)];
     stack_is_refused(
         scratch,
-        "1 strips where its size makes 67108864",
+        "1 strips, but its size needs 67108864",
         classic_tiff(&fields, &black),
     );
     // Too many strips, and endless texts.

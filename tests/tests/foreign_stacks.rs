@@ -461,13 +461,16 @@ fn pictures_that_are_no_pages_are_left_out_of_a_folder() {
     folder_of(&scratch, "pages", &names);
     fs::write(scratch.path("pages/Thumbs.db"), b"x").unwrap();
     let said = scratch.run("lamp convert pages -o out.tif").succeeds().stderr;
-    assert!(said.contains("._00001.png, thumb.png are no pages by name and left out"), "{said}");
-    assert!(said.contains("Thumbs.db is no picture and left out"), "{said}");
+    assert!(
+        said.contains("._00001.png, thumb.png are left out: their names are not page names"),
+        "{said}"
+    );
+    assert!(said.contains("Thumbs.db is left out: it is not a picture"), "{said}");
     assert_eq!(scratch.layers("out.tif").len(), 3);
     assert_eq!(scratch.run("fix pages --strict -o x.tif").statuses, [Some(3)]);
 
     fs::rename(scratch.path("pages/thumb.png"), scratch.path("pages/2.png")).unwrap();
-    let words = ["pages: ", "00002.png", "2.png", "have one page number"];
+    let words = ["pages: ", "00002.png", "2.png", "have the same page number"];
     scratch.run("lamp convert pages -o x.tif").is_refused_with(&words);
 }
 

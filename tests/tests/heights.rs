@@ -192,7 +192,7 @@ fn what_cannot_be_is_said() {
     usage("slice tower.stl --adaptive --thickness 50um", "cannot be used with");
     usage("slice tower.stl --adaptive --min 50um --max 25um", "between 50um and 25um thick");
     usage("slice tower.stl --adaptive --cusp 9um --criterion volume", "--criterion cusp");
-    usage("lamp heights tower.stl --criterion cusp", "needs a bound, as --cusp");
+    usage("lamp heights tower.stl --criterion cusp", "needs a bound, such as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
     usage("lamp heights tower.stl --plot x.svg --report x.svg", "a table is CSV");

@@ -285,7 +285,7 @@ fn show_animates_layers() {
         let alone = read_png(scratch.run(&line).succeeds_quietly().stdout);
         assert!(rows[..height] == alone, "layer {layer}");
     }
-    scratch.run("lamp info blade.png").is_refused_with(&["a picture file of several images"]);
+    scratch.run("lamp info blade.png").is_refused_with(&["a picture file with several images"]);
     let alone = "lamp show blade.tif --layer 5 --animate";
     scratch.run(alone).is_wrong_usage(&["--animate", "cannot be used with", "--layer"]);
 }

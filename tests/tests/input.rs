@@ -78,7 +78,7 @@ fn parts_are_placed_each_by_itself() {
     assert!(masks(&layers) == masks(&expected));
     let command = &layers[0].info.stack.as_ref().unwrap().commands[0];
     assert!(command.starts_with("slice ring.stl ring.stl@12.7,-50.8,0,90 --dpi 100 "), "{command}");
-    scratch.run("slice ring.stl@1,x -o out.tif").is_wrong_usage(&["`1,x` is no placement"]);
+    scratch.run("slice ring.stl@1,x -o out.tif").is_wrong_usage(&["`1,x` is not a placement"]);
     // A section of the part needs it where it was.
     let cure = "lamp cure out.tif --material lamp-suspension --section y=0mm -o section.png";
     let placed = format!("{cure} --part ring.stl --part ring.stl@12.7,-50.8,0,90");

@@ -121,10 +121,10 @@ fn what_teaches_nothing_is_refused_and_changes_nothing() {
             "layer,over_px,under_px\n70,1,0\n",
             "line 2: there is no layer 70: the stack has layers 0 to 59",
         ),
-        ("layer,over_px,under_px\n7,1,0\n8,0,0\n7,0,3\n", "line 4: layer 7 stands in line 2, too"),
+        ("layer,over_px,under_px\n7,1,0\n8,0,0\n7,0,3\n", "line 4: layer 7 is also in line 2"),
         ("layer,over_px,under_px\n7,x,0\n", "line 2, column over_px: `x` is not a number"),
         ("layer,over_px,under_px\n7,,0\n", "line 2, column over_px: `` is not a number"),
-        ("layer,over_px,under_px\n7,-1,0\n", "line 2: there are no fewer than 0 wrong pixels"),
+        ("layer,over_px,under_px\n7,-1,0\n", "line 2: a number of wrong pixels must be 0 or more"),
         ("layer,over_px,under_px\n7.5,1,0\n", "line 2, column layer: 7.5 is not a layer"),
         ("layer,over_px,under_px\n", "there are no measurements below the header"),
         ("layer,over_px\n1,2\n", "there is no column under_px"),
@@ -157,7 +157,7 @@ fn what_teaches_nothing_is_refused_and_changes_nothing() {
         ("job/ --start timed.tif --material pegda-sudan", "is the job of timed.tif already"),
         (
             "new/ --start stairs.tif --material pegda-sudan",
-            "states no exposure, so that no profile was printed",
+            "states no exposure, so no profile was printed",
         ),
         ("new/ --start timed.tif --material pegda-mw700", "[spread]"),
     ] {
@@ -186,7 +186,7 @@ fn a_job_is_of_one_stack() {
     std::fs::copy(scratch.path("half.tif"), scratch.path("job/stack.tif")).unwrap();
     scratch
         .run("lamp learn job/ --measured good.csv -o next.csv")
-        .is_refused_with(&["this is not the stack that the job was begun with"]);
+        .is_refused_with(&["this stack differs from the stack of the job"]);
 }
 
 /// A job keeps the resin under the lamp that it was printed with.
@@ -195,7 +195,7 @@ fn a_job_keeps_the_lamp() {
     let scratch = with_job();
     let begin = "lamp learn aged/ --start timed.tif --material pegda-sudan --lamp-intensity 50%";
     let said = scratch.run(begin).succeeds().stderr;
-    assert!(said.contains("pegda-sudan does not say how its critical dose follows"), "{said}");
+    assert!(said.contains("pegda-sudan does not state how its critical dose follows"), "{said}");
     let of = |job: &str| {
         let text = String::from_utf8(scratch.bytes(&format!("{job}/material.toml"))).unwrap();
         let (_, light) = text.split_once("[intensity]\nvalue = \"").unwrap();

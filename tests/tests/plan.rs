@@ -287,7 +287,7 @@ fn what_cannot_be_planned_is_refused() {
         ("flat.tif", &["flat.tif", "layer 30", "a thickness that is not above zero"]),
         ("dark.tif", &["dark.tif", "layer 30", "an exposure that is not above zero"]),
         ("coarse.tif", &["coarse.tif", "layer 30", "does not state its resolution"]),
-        ("narrow.tif", &["narrow.tif", "layer 30", "not as large as the first"]),
+        ("narrow.tif", &["narrow.tif", "layer 30", "differs from the first layer in size"]),
         ("stairs.tif --layers 90..95", &["no layer is in that range"]),
         ("stairs.tif --map m.svg --map-layer 60", &["there is no layer 60"]),
     ] {

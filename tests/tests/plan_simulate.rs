@@ -112,7 +112,7 @@ fn bitmaps_that_no_display_shows_are_refused() {
     wide.push_black(8);
     page(&scratch, "wide.tif", wide.finish(), Some(5.0));
     for (bitmaps, words) in [
-        ("silent.tif", ["layer 0", "does not say how long"]),
+        ("silent.tif", ["layer 0", "does not state how long"]),
         ("short.tif", ["bitmap 1 is shown for 0.5 ms", "step is 1 ms"]),
         ("wide.tif", ["1025 x 8 pixels", "1024 x 768"]),
         ("none.tif", ["none.tif", "No such file"]),
@@ -187,7 +187,7 @@ fn targets_that_light_cannot_cure_are_refused_with_the_place() {
         ("nan.toml", &["line 5", "lens[0].sag", "not a length"]),
         ("ball.toml", &["lens 1: sag 600um", "overhang"]),
         ("map.png", &["map.png", "height map", "--pixel", "--full"]),
-        ("cut.png --pixel 10um --full 1mm", &["cut.png", "no whole PNG"]),
+        ("cut.png --pixel 10um --full 1mm", &["cut.png", "not a complete PNG"]),
         ("map.png --pixel 20mm --full 1mm", &["40mm x 40mm wide"]),
         ("junk.stl", &["junk.stl"]),
         ("nobody", &["nobody: there is no such file, nor a built-in target", "lens-array"]),

@@ -130,7 +130,7 @@ fn a_lamp_that_ages_takes_longer() {
     let time = |material: &str, options: &str| -> f64 {
         let line = format!("{plan} --material {material} {options} -o timed.tif");
         let said = scratch.run(&line).succeeds().stderr;
-        let is_told = said.contains("pegda-sudan does not say how its critical dose follows");
+        let is_told = said.contains("pegda-sudan does not state how its critical dose follows");
         assert_eq!(is_told, material == "pegda-sudan" && !options.is_empty(), "{said}");
         let layers = scratch.layers("timed.tif");
         let command = layers[0].info.stack.as_ref().unwrap().commands.last().unwrap();

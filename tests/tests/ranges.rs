@@ -115,7 +115,7 @@ fn stacks_that_say_nothing_of_themselves_split_and_join_too() {
     assert!(joined(&scratch, "parts") == scratch.bytes("gray.tif"));
     write_plain_stack(&scratch, "gap.tif", &[3, 4, 6, 7]);
     let ran = scratch.run("lamp split gap.tif --every 3 -o x/");
-    ran.is_refused_with(&["split: gap.tif: ", "layer 6 stands behind layer 4"]);
+    ran.is_refused_with(&["split: gap.tif: ", "layer 6 follows layer 4"]);
     assert_eq!(scratch.names(), ["gap.tif", "gray.tif", "parts"]);
 }
 

@@ -118,11 +118,12 @@ fn a_material_is_found_by_its_digest() {
     }
     // The file is another one now, or gone.
     own_material(&scratch, "140 mJ/cm2");
-    scratch.run(plan).is_refused_with(&["mine.toml@blake3:", "as it was"]);
+    scratch.run(plan).is_refused_with(&["mine.toml@blake3:", "no unchanged"]);
     let recorded = commands(&scratch, "plate.tif");
-    shell(&scratch, &format!("{} -q -o x.tif", recorded[0])).is_refused_with(&["not as it was"]);
+    shell(&scratch, &format!("{} -q -o x.tif", recorded[0]))
+        .is_refused_with(&["has changed: its digest"]);
     fs::remove_file(scratch.path("mine.toml")).unwrap();
-    scratch.run(plan).is_refused_with(&["mine.toml@blake3:", "as it was"]);
+    scratch.run(plan).is_refused_with(&["mine.toml@blake3:", "no unchanged"]);
 }
 
 /// Changes each byte of some in a file, and checks that a command refuses it or gives the same.

@@ -283,11 +283,11 @@ fn strips_that_do_not_belong_together_are_named() {
     with("strip_001.tif", &scratch.bytes("other/strip_001.tif"));
     refused(&["join: s", "strip_001.tif", "it has no layer where strip_000.tif has layer 65"]);
     with("strip_000.tif", &scratch.bytes("s/strip_001.tif"));
-    refused(&["strip_000.tif", "does not say that it is strip 0"]);
+    refused(&["strip_000.tif", "does not state that it is strip 0"]);
     with("strip_002.tif", &scratch.bytes("s/strip_001.tif")[..3000]);
     refused(&["s", "strip_002.tif", "cut off"]);
     with("strips.json", b"{}");
-    refused(&["strips.json", "no index of strips"]);
+    refused(&["strips.json", "not an index of strips"]);
     let index = String::from_utf8(scratch.bytes("other/strips.json")).unwrap();
     with("strips.json", index.as_bytes());
     refused(&["strip_000.tif", "which strips.json does not list"]);

@@ -204,7 +204,7 @@ fn the_part_must_be_that_of_the_stack() {
         ("core.tif --part core.stl --plan core.tif -o out.tif", "that is an input"),
         ("core.tif --part core.stl -o core.stl", "that is an input"),
         ("- --part - -o out.tif", "standard input"),
-        ("core.tif --part core.stl --max-tilt 90deg -o out.tif", "no tilt"),
+        ("core.tif --part core.stl --max-tilt 90deg -o out.tif", "not a tilt"),
         ("core.tif --part core.stl --stl struts.tif -o out.tif", "end in .stl"),
         ("core.tif -o out.tif", "--part"),
     ] {

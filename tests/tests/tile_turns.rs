@@ -192,7 +192,7 @@ fn plans_name_what_they_cannot_slice_again() {
     // The part has changed, or is not there.
     scratch.mesh("plate.stl", &Plate::Ring.mesh(4.0));
     let told = scratch.run(line).succeeds().stderr;
-    assert!(told.contains("plate.stl: not found beside its stack as it was sliced"), "{told}");
+    assert!(told.contains("plate.stl: not found next to its stack as it was sliced"), "{told}");
     scratch.write("cut.toml", b"[[edit]]\nrotate = 90\n");
     scratch.run("lamp edit plate.tif cut.toml -o cut.tif").succeeds();
     scratch
@@ -205,5 +205,5 @@ fn plans_name_what_they_cannot_slice_again() {
     scratch.stack("bare.tif", bare);
     scratch
         .run(&line.replace("plate.tif", "bare.tif"))
-        .is_refused_with(&["bare.tif: it does not say how it was sliced", "--turns quarters"]);
+        .is_refused_with(&["bare.tif: it does not state how it was sliced", "--turns quarters"]);
 }

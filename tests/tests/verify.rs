@@ -134,8 +134,8 @@ fn a_page_that_libtiff_left_out_is_missed_by_every_reader() {
     if !copy(7, "seven.tif") || !copy(19, "last.tif") || !copy(0, "first.tif") {
         return;
     }
-    let missing = "layer 19: the pages before it are not the pages that were written: there is nothing \
-                   between layer 6 and layer 8";
+    let missing = "layer 19: the pages before it differ from the pages that were written: layers \
+                   between 6 and 8 are missing";
     let ran = scratch.run("fix seven.tif | tile -o build.tif");
     assert_eq!(ran.statuses, [Some(1), Some(1)], "{ran:?}");
     assert!(ran.stderr.contains(missing), "{ran:?}");
@@ -143,9 +143,10 @@ fn a_page_that_libtiff_left_out_is_missed_by_every_reader() {
     let end = "the stack ends with layer 18, but was written with more layers";
     scratch.run("lamp verify last.tif").is_refused_with(&[]);
     scratch.run("fix last.tif -o fixed.tif").is_refused_with(&[end]);
-    scratch
-        .run("fix first.tif -o fixed.tif")
-        .is_refused_with(&["layer 19: the pages before it", "with it there are 19 instead of 20"]);
+    scratch.run("fix first.tif -o fixed.tif").is_refused_with(&[
+        "layer 19: the pages before it",
+        "with this page there are 19 instead of 20",
+    ]);
     let names = scratch.names();
     assert!(!names.contains(&"build.tif".to_owned()) && !names.contains(&"fixed.tif".to_owned()));
 }

@@ -53,7 +53,7 @@ pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>,
     let found = match report["schema"].as_str() {
         Some("lamp-check-1") => check_report(report, headers)?,
         Some("lamp-support-1") => support_report(report, headers),
-        _ => return Err("this is no report of lamp check or lamp support".to_owned()),
+        _ => return Err("this is not a report of lamp check or lamp support".to_owned()),
     };
     fitting(found, headers)
 }
@@ -62,7 +62,7 @@ fn fitting(found: Vec<Finding>, headers: &[PageHeader]) -> Result<Vec<Finding>, 
     if found.iter().all(|finding| finding.last_layer < headers.len()) {
         Ok(found)
     } else {
-        Err("the report is about a stack with other layers".to_owned())
+        Err("the report is about a stack with different layers".to_owned())
     }
 }
 
@@ -76,12 +76,12 @@ fn position(headers: &[PageHeader], index: u64) -> usize {
 fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
     let inputs = report["inputs"].as_array().map_or(&[][..], Vec::as_slice);
     let [input] = inputs else {
-        return Err(format!("the report is about {} stacks: check this one alone", inputs.len()));
+        return Err(format!("the report is about {} stacks: check only this one", inputs.len()));
     };
     let size = headers.first().map_or([0; 2], |first| first.size);
     // Pixels of findings fit only images of the same size.
     if [&input["width_px"], &input["height_px"]] != size.map(Value::from).each_ref() {
-        return Err("the report is about a stack of another size".to_owned());
+        return Err("the report is about a stack of a different size".to_owned());
     }
     let findings = report["findings"].as_array().into_iter().flatten().take(MOST);
     let read = |(number, json): (usize, &Value)| {
@@ -244,16 +244,18 @@ mod tests {
         assert_eq!(island.text, "0.5 mm2, joins in layer 8");
         assert_eq!((found[1].layer, found[1].last_layer), (0, 2));
         assert_eq!(found[2].bounds, Some([1, 3, 2, 4]));
-        assert!(of_report(&report, &headers(2)).unwrap_err().contains("other layers"));
+        assert!(of_report(&report, &headers(2)).unwrap_err().contains("different layers"));
     }
 
     #[test]
     fn reports_of_other_stacks_are_refused() {
         let with = |inputs| json!({"schema": "lamp-check-1", "inputs": inputs, "findings": []});
         let error = |report: &Value| of_report(report, &headers(3)).unwrap_err();
-        assert!(error(&json!({"schema": "lamp-plan-1"})).contains("no report"));
-        assert!(error(&json!([])).contains("no report"));
-        assert!(error(&with(json!([{"width_px": 61, "height_px": 40}]))).contains("another size"));
+        assert!(error(&json!({"schema": "lamp-plan-1"})).contains("not a report"));
+        assert!(error(&json!([])).contains("not a report"));
+        assert!(
+            error(&with(json!([{"width_px": 61, "height_px": 40}]))).contains("a different size")
+        );
         assert!(error(&with(json!([{}, {}]))).contains("2 stacks"));
     }
 

@@ -83,7 +83,7 @@ pub enum SchedulerError {
     },
     /// A path that schedulers do not accept.
     #[error(
-        "{path} is not UTF-8, and schedulers take no other names: rename it, or leave --engine out"
+        "{path} is not UTF-8, and schedulers accept only UTF-8: rename it, or leave out --engine"
     )]
     NoText {
         /// The path.
@@ -106,7 +106,7 @@ pub enum SchedulerError {
         why: String,
     },
     /// A program of the scheduler gave an answer of another form.
-    #[error("{program} gave an answer that is not understood: {answer}")]
+    #[error("{program} gave an answer that lamp cannot read: {answer}")]
     Answer {
         /// The program.
         program: &'static str,
@@ -248,7 +248,7 @@ impl Following<'_, '_, '_> {
         for key in std::mem::take(&mut self.pending) {
             // Other tasks wait for a task that failed: they had no turn, and so no failure.
             if ready.contains(&key) {
-                let why = "it ended without a word, as tasks do that are killed or run out of \
+                let why = "it ended without a message: it was probably killed, or ran out of \
                            memory or time";
                 self.end(key, End::Crashed(why.to_owned()));
             }

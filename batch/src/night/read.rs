@@ -112,7 +112,7 @@ impl Reader<'_> {
         // Results are delivered under these names: one would replace the other.
         if let Some((before, part)) = twice(&parts, |part| &part.name) {
             let problem = format!(
-                "two parts are called {}, {} and {}: give one of them a name of its own",
+                "two parts are called {}, {} and {}: give one of them a different name",
                 part.name,
                 before.file.display(),
                 part.file.display()
@@ -171,7 +171,7 @@ impl Reader<'_> {
                 DeValue::Array(values) => {
                     values.iter().map(|value| self.table(value).map(|_| value)).collect()
                 }
-                _ => Err(self.at(value, format!("write [[{key}]], for there may be several"))),
+                _ => Err(self.at(value, format!("write [[{key}]], because there may be several"))),
             },
         }
     }
@@ -182,7 +182,7 @@ impl Reader<'_> {
             DeValue::String(_) => {
                 Err(self.at(value, "this is empty: write a text, or leave the key out"))
             }
-            _ => Err(self.at(value, "this is no text: write it in quotes")),
+            _ => Err(self.at(value, "this is not text: write it in quotes")),
         }
     }
 
@@ -190,7 +190,7 @@ impl Reader<'_> {
         match value.get_ref() {
             DeValue::Array(values) => Ok(values.iter().collect()),
             DeValue::String(_) => Ok(vec![value]),
-            _ => Err(self.at(value, "this is no list of texts: write [\"a\", \"b\"]")),
+            _ => Err(self.at(value, "this is not a list of texts: write [\"a\", \"b\"]")),
         }
     }
 
@@ -303,7 +303,7 @@ impl Reader<'_> {
         // A closed folder may hold files: it becomes a part with a fault, and the others go on.
         if files.is_empty() && closed.is_empty() {
             return Err(
-                self.at(value, format!("no file matches {name}: check its folder and its end"))
+                self.at(value, format!("no file matches {name}: check its folder and its ending"))
             );
         }
         let from_here = |path: PathBuf| match path.strip_prefix(self.folder) {
@@ -332,15 +332,14 @@ impl Reader<'_> {
         for value in self.list(listed)? {
             let copy = self.copies(value, parts)?;
             if copies.iter().any(|(name, _)| *name == copy.0) {
-                return Err(self.at(
-                    value,
-                    format!("{} stands twice in this build: add its copies up", copy.0),
-                ));
+                return Err(
+                    self.at(value, format!("{} is in this build twice: add up its copies", copy.0))
+                );
             }
             copies.push(copy);
         }
         if copies.is_empty() {
-            return Err(self.at(listed, "this build has no parts: name some, as \"blade:20\""));
+            return Err(self.at(listed, "this build has no parts: name some, such as \"blade:20\""));
         }
         let tile = match table.get("tile") {
             Some(value) => self.command(value, &["tile"])?,
@@ -405,7 +404,7 @@ impl Reader<'_> {
                 "lamp" => NightFormat::Lamp,
                 "tif" => NightFormat::Tif,
                 other => {
-                    let problem = format!("{} is no format: write lamp or tif", one_line(other));
+                    let problem = format!("{} is not a format: write lamp or tif", one_line(other));
                     return Err(self.at(format, problem));
                 }
             };
@@ -450,7 +449,7 @@ fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
     for (name, options) in options {
         let is_it = |stage: &&mut Stage| stage.words.first() == Some(&name);
         if stages.iter_mut().filter(is_it).count() > 1 {
-            let problem = format!("{name} stands twice among the stages: write all stages anew");
+            let problem = format!("{name} is among the stages twice: write all stages again");
             return Err(NightError { place: options.place, problem });
         }
         let Some(stage) = stages.iter_mut().find(is_it) else {
@@ -493,7 +492,8 @@ fn bad_name(name: &str) -> Option<String> {
     let name = one_line(name);
     if name.contains(is_bad) || name.starts_with('.') || name.is_empty() || name.len() > 100 {
         return Some(format!(
-            "{name} is no name for a part or a build: give one of letters, digits, - and _, as name = \"blade-7\""
+            "{name} cannot name a part or a build: use letters, digits, - and _, such as name = \
+             \"blade-7\""
         ));
     }
     None

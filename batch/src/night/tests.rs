@@ -115,7 +115,7 @@ fn what_is_wrong_is_told_with_its_place() {
         ),
         ("dither = \"\"", "", ""),
         ("\"core\"\nstages", "\"a\"\nstages", "line 14, column 8: two parts are called a"),
-        ("name = \"core\"", "name = \"co/re\"", "line 15, column 8: co/re is no name"),
+        ("name = \"core\"", "name = \"co/re\"", "line 15, column 8: co/re cannot name a part"),
         ("'lamp'", "'lamp", "line 16, column 11: the quote ' is not closed"),
         ("a:20", "a:0", "line 21, column 10: a:0: write a whole number of copies, as a:20"),
         (
@@ -123,16 +123,16 @@ fn what_is_wrong_is_told_with_its_place() {
             "\"coer\"",
             "line 21, column 10: there is no part coer: did you mean core?",
         ),
-        ("\"core\"]", "\"a\"]", "line 21, column 18: a stands twice in this build"),
+        ("\"core\"]", "\"a\"]", "line 21, column 18: a is in this build twice"),
         (
             "machine =",
             "mashine =",
             "line 22, column 1: a build has no key mashine: did you mean machine?",
         ),
-        ("machine = \"beta\"", "machine = 1", "line 22, column 11: this is no text"),
-        ("\"tif\"", "\"tiff\"", "line 27, column 10: tiff is no format: write lamp or tif"),
+        ("machine = \"beta\"", "machine = 1", "line 22, column 11: this is not text"),
+        ("\"tif\"", "\"tiff\"", "line 27, column 10: tiff is not a format: write lamp or tif"),
         ("[[build]]", "[build]", "line 19, column 1: write [[build]]"),
-        ("parts = [", "parts = 5 # ", "line 21, column 9: this is no list"),
+        ("parts = [", "parts = 5 # ", "line 21, column 9: this is not a list"),
         ("name = \"alpha\"", "", "line 19, column 1: this build has no name"),
         (
             "[\"slice --dpi 1500 --thickness 100um\", \"fix\", \"dither\"]",
@@ -143,7 +143,7 @@ fn what_is_wrong_is_told_with_its_place() {
         (
             "\"fix\", \"dither\"]\n",
             "\"fix\", \"fix\", \"dither\"]\nfix = \"--max-width 3\"\n",
-            "line 5, column 1: fix stands twice among the stages: write all stages anew",
+            "line 5, column 1: fix is among the stages twice: write all stages again",
         ),
     ] {
         let plain = NIGHT.replace("dither = \"\"\n", "\n");

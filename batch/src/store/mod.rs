@@ -47,13 +47,13 @@ pub struct Store {
 #[non_exhaustive]
 pub enum StoreError {
     /// The folder holds something else.
-    #[error("{0} is a folder of other things: name an empty or a new folder as the store")]
+    #[error("{0} contains other things: name an empty or a new folder as the store")]
     Other(PathBuf),
     /// The store is of another version.
-    #[error("{0} is a store of another version of lamp: name a new folder as the store")]
+    #[error("{0} is a store of a different lamp version: name a new folder as the store")]
     Version(PathBuf),
     /// There is no store, where one is to be read.
-    #[error("{0} is no store: name the night file, or the store of one with --store")]
+    #[error("{0} is not a store: name the night file, or its store with --store")]
     None(PathBuf),
     /// A file cannot be read or written.
     #[error("{0}")]
@@ -91,7 +91,7 @@ pub enum Damage {
     #[error("its file is gone")]
     Gone,
     /// The result is not what the manifest says.
-    #[error("its file has other bytes than its manifest says")]
+    #[error("the bytes of its file differ from its manifest")]
     OtherBytes,
 }
 

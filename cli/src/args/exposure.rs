@@ -52,7 +52,7 @@ fn parse_overcure(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(layers) if (0.1..=100.0).contains(&layers) => Ok(layers),
         _ => Err(format!(
-            "`{text}` is not a depth in layers: write a number from 0.1 to 100, as 1.5"
+            "`{text}` is not a depth in layers: write a number from 0.1 to 100, such as 1.5"
         )),
     }
 }

@@ -84,7 +84,7 @@ impl Common {
         let most = (left / THREAD_BYTES) as usize;
         if most == 0 || asked > most {
             return Err(Exit::Failed(anyhow!(
-                "the limit of memory leaves {}, which is too little for {} threads: raise it \
+                "the memory limit leaves {}, too little for {} threads: raise the limit \
                  (ulimit -v), or give fewer --threads",
                 in_words(left),
                 asked.max(1),
@@ -252,7 +252,7 @@ pub(crate) fn parse_angle(text: &str) -> Result<f64, String> {
     let number = ["deg", "\u{b0}"].iter().find_map(|unit| text.strip_suffix(unit)).unwrap_or(text);
     match number.trim_end().parse::<f64>() {
         Ok(degrees) if (0.0..=180.0).contains(&degrees) => Ok(degrees),
-        _ => Err(format!("`{text}` is no angle from 0 to 180 degrees: write 45 or 45deg")),
+        _ => Err(format!("`{text}` is not an angle from 0 to 180 degrees: write 45 or 45deg")),
     }
 }
 

@@ -101,7 +101,7 @@ fn setting(
     value: &Spanned<DeValue<'_>>,
 ) -> Result<Option<Setting>, String> {
     if NOT_IN_FILES.contains(&key) {
-        return Err("it is for the command line alone".to_owned());
+        return Err("it is only for the command line".to_owned());
     }
     let runs = path.and_then(|path| {
         path.iter().try_fold(command, |command, name| command.find_subcommand(name))
@@ -233,7 +233,7 @@ fit = true
             ("plane = \"up\"", "line 1: plane: `up` is none of top, middle, bottom"),
             ("gray = \"yes\"", "line 1: gray: it is on or off: write true or false"),
             ("output = \"\"", "line 1: output: it needs a value"),
-            ("options = \"b.toml\"", "line 1: options: it is for the command line alone"),
+            ("options = \"b.toml\"", "line 1: options: it is only for the command line"),
             // The tables of other commands are checked, too.
             ("[tile]\ncell = \"5\"", "line 2: cell: `5` has no unit"),
             ("dpi 100", "line 1: "),

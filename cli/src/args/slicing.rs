@@ -198,6 +198,6 @@ fn parse_name(text: &str) -> Result<String, String> {
 
 /// Parses `X,Y` in millimeters.
 fn parse_origin(text: &str) -> Result<FiniteNumbers<2>, String> {
-    let wrong = || format!("`{text}` is not a point: write X,Y in millimeters, as -1,77.2");
+    let wrong = || format!("`{text}` is not a point: write X,Y in millimeters, such as -1,77.2");
     text.trim_end_matches("mm").parse().map_err(|_| wrong())
 }

@@ -174,5 +174,5 @@ fn parse_seconds(text: &str) -> Result<Duration, String> {
     let seconds = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     seconds
         .filter(|seconds| !seconds.is_zero())
-        .ok_or_else(|| format!("`{text}` is not a time: write seconds, as 60"))
+        .ok_or_else(|| format!("`{text}` is not a time: write seconds, such as 60"))
 }

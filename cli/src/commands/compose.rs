@@ -40,7 +40,7 @@ pub(crate) struct ComposeArgs {
 pub(crate) fn run(args: &ComposeArgs, common: &Common) -> Result<(), Exit> {
     if is_stream(&args.recipe) {
         return Err(Exit::usage(
-            "a recipe's stacks are named from its folder: give its file's name",
+            "a recipe names its stacks from its folder: give the recipe's file name",
         ));
     }
     check_not_input(&args.output.output, [&args.recipe])?;

@@ -205,7 +205,9 @@ impl ConvertArgs {
             (false, _) if named_png && *classic => Err(for_tiffs("--classic")),
             (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
             (false, _) if named_png => Ok(OutputKind::Png),
-            (false, true) => Err(Exit::usage("PNGs go into a folder: name it, as -o pictures/")),
+            (false, true) => {
+                Err(Exit::usage("PNGs go into a folder: name it, such as -o pictures/"))
+            }
             (true, false) => Ok(OutputKind::Tiff),
             (false, false) => check_stack_name(output).map(|()| OutputKind::Tiff),
         }

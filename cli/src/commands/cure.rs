@@ -183,7 +183,8 @@ fn outline(
 
 /// Parses `3mm..6mm`.
 fn parse_along(text: &str) -> Result<Range<f64>, String> {
-    let wrong = || format!("`{text}` is not a stretch of the section: write A..B, as 3mm..6mm");
+    let wrong =
+        || format!("`{text}` is not a stretch of the section: write A..B, such as 3mm..6mm");
     let (from, to) = text.split_once("..").ok_or_else(wrong)?;
     let mm = |text: &str| text.parse().map_err(|_| wrong()).map(Length::mm);
     let range = mm(from)?..mm(to)?;

@@ -151,7 +151,8 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
         // Counted before the pictures take their memory, by all threads together.
         if pixels.fetch_add(width * height, Ordering::Relaxed) + width * height > MAX_PIXELS {
             return Err(Exit::usage(format!(
-                "the pictures of the layers would have more than {MAX_PIXELS} pixels: choose fewer layers, as every 40th with --layers 0..1270/40, or a smaller --scale"
+                "the pictures of the layers would have more than {MAX_PIXELS} pixels: choose fewer \
+                 layers, such as every 40th with --layers 0..1270/40, or a smaller --scale"
             )));
         }
         Ok(Thumbnail::new(&layer, region, scale)?)

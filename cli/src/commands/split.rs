@@ -55,7 +55,7 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
         None if args.at.is_sorted_by(|a, b| a < b) => SplitPoints::At(args.at.clone()),
         None => {
             return Err(Exit::usage(
-                "the layers of --at must be in ascending order, as --at 500,900",
+                "the layers of --at must be in ascending order, such as --at 500,900",
             ));
         }
     };

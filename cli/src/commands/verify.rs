@@ -160,7 +160,7 @@ fn compare(totals: &StackTotals, digests: &[String]) -> anyhow::Result<()> {
         return Ok(());
     }
     let stack = totals.first.info.stack.as_ref().filter(|stack| !stack.digest.is_empty());
-    let stack = stack.context("it does not say what it was made from")?;
+    let stack = stack.context("it does not state what it was made from")?;
     if !stack.is_made_of(digests) {
         let (made_of, given) = (&stack.digest, digests.join(" and "));
         bail!("it was made from {made_of}, not from {given}");

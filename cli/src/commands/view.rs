@@ -202,6 +202,6 @@ fn read_json(path: &Path) -> Result<serde_json::Value, Exit> {
     let name = || path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(name)?;
     let report =
-        serde_json::from_str(&text).context("this is no report of lamp check or lamp support");
+        serde_json::from_str(&text).context("this is not a report of lamp check or lamp support");
     Ok(report.with_context(name)?)
 }

@@ -127,8 +127,8 @@ pub(crate) fn check_no_stack(path: &Path) -> Result<(), Exit> {
 /// Parses the name of a JSON file. Standard output is for the stack.
 pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
     match text {
-        "-" => Err("standard output is for the stack: name a file, as report.json".to_owned()),
-        "" => Err("name a file, as report.json".to_owned()),
+        "-" => Err("standard output is for the stack: name a file, such as report.json".to_owned()),
+        "" => Err("name a file, such as report.json".to_owned()),
         name => parse(name, &JSON),
     }
 }

@@ -38,15 +38,18 @@ const REFUSED: [(&str, &str); 18] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
-    ("force", "leave out --force: nothing that stands is replaced"),
-    ("report", "leave out --report: findings stand with the results"),
+    ("force", "leave out --force: no existing file is replaced"),
+    ("report", "leave out --report: findings are with the results"),
     ("evidence", "leave out --evidence: run this stage by hand for pictures of its findings"),
     ("strict", "leave out --strict: findings are reported, and decide the status at the end"),
     ("layers", "leave out --layers: a part is cut into ranges of layers by itself"),
     ("options", "leave out --options: write its options into the stage"),
     ("plan", "leave out --plan: run lamp support by hand for its plan"),
-    ("stl", "leave out --stl: run lamp support by hand for its supports alone"),
-    ("strips", "leave out --strips: cut strips from the finished build, by lamp tile or lamp join"),
+    ("stl", "leave out --stl: run lamp support by hand for only its supports"),
+    (
+        "strips",
+        "leave out --strips: cut strips from the finished build, with lamp tile or lamp join",
+    ),
     ("recipe", "leave out --recipe: run lamp tile by hand for the recipe"),
     ("time", "leave out --time: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
@@ -63,7 +66,7 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
         let refused = |why: String| StageError { stage, name: name.to_owned(), why };
         if !STAGES.contains(&name) {
             let stages = STAGES.join(", ");
-            return Err(refused(format!("it is no stage of a part: these are {stages}")));
+            return Err(refused(format!("it is not a stage of a part: these are {stages}")));
         }
         let reader = StageReader::new(name, words, folder).map_err(refused)?;
         if (name == "slice") != (stage == 0) {
@@ -89,7 +92,7 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
     let none = || StageError {
         stage: 0,
         name: "stages".to_owned(),
-        why: "there are none: a part needs slice at least".to_owned(),
+        why: "there are no stages: a part needs at least slice".to_owned(),
     };
     Ok(Stages { chain: StageChain { slice: slice.ok_or_else(none)?, stages: per_layer }, after })
 }

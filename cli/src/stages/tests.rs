@@ -288,12 +288,12 @@ fn the_same_options_have_one_text_whatever_their_form() {
 fn options_that_make_no_sense_in_a_night_are_refused_in_one_sentence() {
     let bench = Bench::with_tower();
     for (stages, why) in [
-        (&[][..], "0: stages: there are none"),
+        (&[][..], "0: stages: there are no stages"),
         (&["fix"], "0: fix: a part's first stage is slice"),
         (&["slice", "slice"], "1: slice: slice is a part's first stage"),
         (
             &["slice", "tile --machine beta"],
-            "1: tile: it is no stage of a part: these are slice, fix",
+            "1: tile: it is not a stage of a part: these are slice, fix",
         ),
         (&["slice", "fix --metod spline"], "similar argument exists: '--method'"),
         (&["slice --dpi fine"], "0: slice: invalid value 'fine' for '--dpi <DPI>'"),

@@ -92,10 +92,10 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::NotStep(format) => return other_format(*format),
         SliceError::NotStl { .. } => "export the part as STL, STEP, 3MF or OBJ",
         SliceError::WildVertex { .. } => {
-            "repair or export the part again, or give --trust-extent if it is like that"
+            "repair or export the part again, or give --trust-extent if the vertex is right"
         }
         SliceError::TooManyRows { .. } => {
-            "check --units, --dpi and --thickness, or give --trust-extent if the part is so large"
+            "check --units, --dpi and --thickness, or give --trust-extent if the part is this large"
         }
         SliceError::TooManyCrossings { .. } => "check it for facets that repeat, and --dpi",
         SliceError::ThreeMf(error) => match **error {
@@ -115,7 +115,7 @@ fn slicing(error: &SliceError) -> Option<String> {
         SliceError::GrayPlane => "slice them with --plane top",
         SliceError::Faulty { .. } => {
             return Some(format!(
-                "lamp brep reports more, {OTHER_KERNEL}, and gaps can be bridged with --fallback part.stl"
+                "lamp brep reports more, {OTHER_KERNEL}, and --fallback part.stl can bridge gaps"
             ));
         }
         SliceError::KernelsDisagree { .. } => {
@@ -137,19 +137,15 @@ fn slicing(error: &SliceError) -> Option<String> {
 fn other_format(format: FileFormat) -> Option<String> {
     let hint = match format {
         FileFormat::Layers(_) => {
-            "lamp info describes layers; slice the part that they were made of"
+            "lamp info describes layers; slice the part that the layers were made from"
         }
         FileFormat::Archive(_) => "unpack it first",
-        FileFormat::PrintJob(_) => "slice the part that it was made of",
+        FileFormat::PrintJob(_) => "slice the part that it was made from",
         FileFormat::WebPage => "download the file itself, not the page that shows it",
-        FileFormat::Pointer("a Git LFS pointer") => {
-            "it stands for the file: run git lfs pull to get that"
-        }
-        FileFormat::Pointer("a git-annex pointer") => {
-            "it stands for the file: run git annex get to get that"
-        }
-        FileFormat::Pointer("a DVC pointer") => "it stands for the file: run dvc pull to get that",
-        FileFormat::Pointer(_) => "name the file that it stands for",
+        FileFormat::Pointer("a Git LFS pointer") => "run git lfs pull to get the file itself",
+        FileFormat::Pointer("a git-annex pointer") => "run git annex get to get the file itself",
+        FileFormat::Pointer("a DVC pointer") => "run dvc pull to get the file itself",
+        FileFormat::Pointer(_) => "name the file that it points to",
         _ => "export the part as STL, STEP, 3MF or OBJ",
     };
     Some(hint.to_owned())
@@ -282,7 +278,7 @@ fn compensate(error: &CompensateError) -> Option<String> {
         CompensateProblem::TooFarForWalls { .. } => {
             "--min-feature 0um lets walls go and reports what is lost"
         }
-        CompensateProblem::Tiled => "make up for shrinkage before tile",
+        CompensateProblem::Tiled => "compensate for shrinkage before tile",
         _ => return None,
     };
     Some(hint.to_owned())
@@ -341,9 +337,9 @@ fn target(error: &TargetError) -> Option<String> {
     let hint = match error {
         // It is transparent, so that it is no cause of its own.
         TargetError::Part(error) => return slicing(error),
-        TargetError::NoScale => "give --pixel, as 10um, and --full, as 500um",
-        TargetError::Open { .. } => "lamp mesh repair mends what it can",
-        TargetError::NotOnGlass { .. } => "stand the part on its flat side",
+        TargetError::NoScale => "give --pixel, such as 10um, and --full, such as 500um",
+        TargetError::Open { .. } => "lamp mesh repair fixes what it can",
+        TargetError::NotOnGlass { .. } => "put the part on its flat side",
         TargetError::AboveChamber { .. } | TargetError::Wide { .. } => {
             "check the target's lengths, or take another --projector"
         }
@@ -389,12 +385,12 @@ fn recipe(error: &RecipeError) -> Option<String> {
         | RecipeError::Schema { .. }
         | RecipeError::Code { .. }
         | RecipeError::Changed
-        | RecipeError::NoPiece { .. } => "write it anew with tile --recipe",
+        | RecipeError::NoPiece { .. } => "write it again with tile --recipe",
         RecipeError::OtherPart { .. } => {
-            "bring that stack back, or write the recipe anew with tile --recipe"
+            "bring that stack back, or write the recipe again with tile --recipe"
         }
         RecipeError::NoPart { .. } => {
-            "a recipe names its parts from its own folder: put them there, or write it anew with \
+            "a recipe names its parts from its own folder: put them there, or write it again with \
              tile --recipe"
         }
         _ => return None,
@@ -430,7 +426,7 @@ fn no_solid(error: &NoSolid) -> String {
         NoSolid::Crossed { .. } | NoSolid::Wound { .. } => {
             "lamp mesh check --self-intersections lists the facets"
         }
-        _ => "lamp mesh check names the facets, and lamp mesh repair mends what it can",
+        _ => "lamp mesh check names the facets, and lamp mesh repair fixes what it can",
     };
     hint.to_owned()
 }
@@ -447,7 +443,7 @@ fn stack(error: &StackError) -> Option<String> {
         StackError::Check { .. }
         | StackError::EndedEarly { .. }
         | StackError::MissingPages { .. } => {
-            "make the stack again, or take it as it is with lamp convert --ignore-checks"
+            "make the stack again, or accept it with lamp convert --ignore-checks"
         }
         StackError::NotTiff {
             format: Some(FileFormat::Part(PartFormat::Zip | PartFormat::Gzip)),

@@ -53,8 +53,8 @@ pub(crate) fn print_note(path: &Path, note: &StackNote) {
 pub(crate) fn doubts() -> Option<String> {
     let is_doubtful = printed().as_ref().is_some_and(|printed| printed.is_doubtful);
     is_doubtful.then(|| {
-        "the pages that were read may not be one whole stack, as the message above says: mend the \
-         folder, or leave out --strict"
+        "the pages that were read may not be one whole stack, as the message above states: repair \
+         the folder, or leave out --strict"
             .to_owned()
     })
 }

@@ -30,7 +30,9 @@ pub(super) struct TableRow {
 #[non_exhaustive]
 pub enum TableError {
     /// There are only blank lines and comments.
-    #[error("the file is empty: write a header, as dose_mj_per_cm2,depth_um, and rows below it")]
+    #[error(
+        "the file is empty: write a header, such as dose_mj_per_cm2,depth_um, and rows below it"
+    )]
     Empty,
     /// The header's columns are not separated by commas.
     #[error("line {line}: separate columns by commas, and write 1.5 for one and a half")]
@@ -39,7 +41,7 @@ pub enum TableError {
         line: usize,
     },
     /// A column occurs twice.
-    #[error("line {line}: column {column} stands twice")]
+    #[error("line {line}: column {column} appears twice")]
     Twice {
         /// The header's line, from 1.
         line: usize,
@@ -143,7 +145,7 @@ mod tests {
             assert!(refused(text).starts_with("the file is empty"), "{text:?}");
         }
         assert!(refused("a;b\n1,5;2").contains("line 1: separate columns by commas"));
-        assert_eq!(refused("\na,b,a"), "line 2: column a stands twice");
+        assert_eq!(refused("\na,b,a"), "line 2: column a appears twice");
         assert_eq!(refused("a,b\n1,2\n1,2,3"), "line 3: 3 columns, where the header has 2");
         assert_eq!(refused("a,b\n1"), "line 2: 1 columns, where the header has 2");
     }

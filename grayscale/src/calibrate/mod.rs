@@ -189,7 +189,7 @@ pub enum FitError {
     NoCriticalDose(f64),
     /// Only the highest dose makes squares grow, which determines no line.
     #[error(
-        "squares grow at the highest dose alone, which does not show from which dose on: measure \
+        "squares grow at the highest dose only, which does not show from which dose on: measure \
          higher doses"
     )]
     LastDoseAlone,
@@ -207,7 +207,7 @@ pub enum FitError {
     /// A line over the gray level or the light falls by more than its interval.
     #[error(
         "{what} falls by {} +- {} {unit} towards more light, but the model takes no falling \
-         line, as more light might cure less: fit the working curve of one light",
+         line, because more light might cure less: fit the working curve of one light",
         short(*fall),
         short(*half)
     )]

@@ -57,7 +57,7 @@ pub enum LampLightError {
 #[non_exhaustive]
 pub enum LampError {
     /// The lamp's light is a part of the material's, which the material does not say.
-    #[error("{0} does not say how bright full white is")]
+    #[error("{0} does not state how bright full white is")]
     NoOwnLight(String),
     /// The numbers of the material's own light are impossible.
     #[error(transparent)]
@@ -120,8 +120,8 @@ fn doubt(material: &Material, lamp: Intensity) -> Option<String> {
     let name = &material.name;
     if !material.follows_lamp() {
         return Some(format!(
-            "{name} does not say how its critical dose follows the lamp ([dimmed-lamp]): doses stay, \
-             and times change"
+            "{name} does not state how its critical dose follows the lamp ([dimmed-lamp]): doses \
+             stay, and times change"
         ));
     }
     let lights = material.dimmed_lamp.as_ref()?.lights?;

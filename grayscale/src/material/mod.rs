@@ -161,10 +161,10 @@ pub enum ResinError {
     #[error("{0} has no cure model: add [working-curve], [gray] or [two-depth] to its file")]
     NoModel(String),
     /// It does not say the light of full white.
-    #[error("{0} does not say how bright full white is: add [intensity] to its file")]
+    #[error("{0} does not state how bright full white is: add [intensity] to its file")]
     NoLight(String),
     /// It does not say over which depth light fades.
-    #[error("{0} does not say how light fades: add [working-curve] or [gray] to its file")]
+    #[error("{0} does not state how light fades: add [working-curve] or [gray] to its file")]
     NoFading(String),
     /// Its numbers make no model.
     #[error(transparent)]

@@ -114,7 +114,7 @@ impl<T: Quantity> Visitor<'_> for TextOf<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number and its unit in quotes, as \"{}\"", T::EXAMPLE)
+        write!(f, "a number and its unit in quotes, such as \"{}\"", T::EXAMPLE)
     }
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {

@@ -126,7 +126,7 @@ pub enum CureError {
     },
     /// Even white does not cure as deep.
     #[error(
-        "no gray level cures {:.2} um, as full white cures {:.2} um: expose for longer",
+        "no gray level cures {:.2} um, because full white cures {:.2} um: expose for longer",
         depth.um(), deepest.um()
     )]
     TooDeep {
@@ -163,7 +163,7 @@ pub enum ModelError {
     #[error("{0} must begin above zero and not end before it begins")]
     NoRange(&'static str),
     /// There is no feature size, or one stands twice.
-    #[error("feature-size must be there, and another one in each entry")]
+    #[error("each entry must have a different feature-size")]
     NoSizes,
 }
 

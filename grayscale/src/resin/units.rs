@@ -42,7 +42,7 @@ impl Quantity for Length {
 
 /// Why a text is not a quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{text}` is not {what}: write a number of zero or more and a unit, as {example}")]
+#[error("`{text}` is not {what}: write a number of zero or more and a unit, such as {example}")]
 pub struct QuantityError {
     text: String,
     what: &'static str,

@@ -18,9 +18,10 @@ pub struct HeightCurve {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoHeights {
-    /// It does not say which dose cures how deep.
+    /// It does not state which dose cures how deep.
     #[error(
-        "{0} does not say which dose cures how deep: add [two-depth] or [working-curve] to its file"
+        "{0} does not state which dose cures how deep: add [two-depth] or [working-curve] to \
+         its file"
     )]
     Curve(String),
     /// A number is impossible.

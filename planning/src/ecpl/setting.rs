@@ -55,7 +55,7 @@ pub enum SettingError {
     #[error("its light spreads over a cone: kinetics need `sigma` in [spread]")]
     Cone,
     /// The projector has no chamber.
-    #[error("it does not say how high the resin is: add [chamber] to its file")]
+    #[error("it does not state how high the resin is: add [chamber] to its file")]
     NoChamber,
     /// The blur is below zero, or not finite.
     #[error("the blur must be zero or more")]

@@ -50,13 +50,13 @@ pub enum MeasuredError {
         layer: f64,
     },
     /// A count is below zero.
-    #[error("line {line}: there are no fewer than 0 wrong pixels")]
+    #[error("line {line}: a number of wrong pixels must be 0 or more")]
     Negative {
         /// The line, from 1.
         line: usize,
     },
     /// A layer is listed twice.
-    #[error("line {line}: layer {layer} stands in line {first}, too")]
+    #[error("line {line}: layer {layer} is also in line {first}")]
     SameLayer {
         /// The line, from 1.
         line: usize,
@@ -87,16 +87,16 @@ pub enum JobFileError {
     #[error("byte {0} is not UTF-8 text")]
     NotText(usize),
     /// It was changed after it was written.
-    #[error("{0} is not as lamp learn wrote it: bring it back, or begin another job")]
+    #[error("{0} differs from the file that lamp learn wrote: bring it back, or begin another job")]
     Changed(String),
     /// It is not TOML with the keys of a job.
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
     /// It is not the stack of the job.
-    #[error("this is not the stack that the job was begun with: begin another job")]
+    #[error("this stack differs from the stack of the job: begin another job")]
     OtherStack,
     /// It is not the material of the job.
-    #[error("this is not the resin that the job was begun with: begin another job")]
+    #[error("this resin differs from the resin of the job: begin another job")]
     OtherResin,
     /// It is not a material.
     #[error(transparent)]

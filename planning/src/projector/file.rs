@@ -30,7 +30,7 @@ pub enum ProjectorError {
     #[error("rays: points and directions must be between 1 and 99")]
     Rays,
     /// No projector has this light: a unit may be wrong.
-    #[error("the light of a wide white field is {0}: no projector has so little or so much")]
+    #[error("the light of a wide white field is {0}: no projector has this little or this much")]
     Implausible(Intensity),
     /// The shares of gray levels are invalid.
     #[error(

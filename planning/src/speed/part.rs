@@ -44,8 +44,8 @@ pub enum PartError {
     /// A thickness or an exposure time is not above zero.
     #[error("{0} states a thickness or an exposure that is not above zero")]
     NotPositive(String),
-    /// A page has another size or resolution than the first.
-    #[error("{0} has another size or resolution than the first")]
+    /// A page differs from the first in size or resolution.
+    #[error("{0} differs from the first in size or resolution")]
     Unlike(String),
     /// The model's numbers are impossible.
     #[error(transparent)]

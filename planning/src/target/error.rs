@@ -21,7 +21,7 @@ pub enum TargetError {
     #[error(transparent)]
     Part(#[from] SliceError),
     /// A picture that cannot be read.
-    #[error("it is no whole PNG: {0}")]
+    #[error("it is not a complete PNG: {0}")]
     Png(#[from] png::DecodingError),
     /// A file that cannot be read.
     #[error(transparent)]
@@ -48,7 +48,7 @@ pub enum TargetError {
         colour: ColorType,
     },
     /// A picture whose pixels have no scale yet.
-    #[error("a PNG is a height map, and says neither how wide a pixel is nor how high white is")]
+    #[error("a PNG height map does not state how wide a pixel is and how high white is")]
     NoScale,
     /// Pixels or heights that no target has.
     #[error(
@@ -71,8 +71,8 @@ pub enum TargetError {
     },
     /// A column does not begin on the glass.
     #[error(
-        "{place} begins {from} above the part's lowest point: the bottom must be flat, for light \
-         that comes through the glass cures from there up"
+        "{place} begins {from} above the part's lowest point: the bottom must be flat, because \
+         light through the glass cures from there up"
     )]
     NotOnGlass {
         /// The column.

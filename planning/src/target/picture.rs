@@ -106,7 +106,7 @@ mod tests {
         assert!(colour.contains("this has Rgb ones of 8 bits"), "{colour}");
         let whole = png(4, 4, ColorType::Grayscale, BitDepth::Eight, &[7; 16]);
         for end in [0, 8, 20, whole.len() - 20] {
-            assert!(read(&whole[..end]).unwrap_err().contains("no whole PNG"), "{end}");
+            assert!(read(&whole[..end]).unwrap_err().contains("not a complete PNG"), "{end}");
         }
         let scale = MapScale { full: Length::from_um(f64::NAN), ..SCALE };
         assert!(HeightPicture::read("map", Cursor::new(&whole), scale).is_err());

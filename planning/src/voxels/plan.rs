@@ -27,7 +27,7 @@ pub enum VoxelPlanError {
     #[error("there are no layers to plan")]
     NoLayers,
     /// A page has another size or resolution than the first.
-    #[error("{layer} is not as large as the first layer, or of another resolution")]
+    #[error("{layer} differs from the first layer in size or resolution")]
     Unlike {
         /// The layer's name.
         layer: String,

@@ -82,7 +82,7 @@ pub enum LayoutError {
         problem: String,
     },
     /// A number is no distance on a build area.
-    #[error("{place}: {value} is no length on a build area")]
+    #[error("{place}: {value} is not a length on a build area")]
     Number {
         /// The key, as `copies[3].x_mm`.
         place: String,
@@ -90,7 +90,7 @@ pub enum LayoutError {
         value: f64,
     },
     /// A turn is no multiple of 90 degrees below 360.
-    #[error("copies[{copy}].turn: {turn} is no turn: write 0, 90, 180 or 270")]
+    #[error("copies[{copy}].turn: {turn} is not a turn: write 0, 90, 180 or 270")]
     Turn {
         /// The copy's index, from 0.
         copy: usize,

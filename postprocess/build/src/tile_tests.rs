@@ -146,7 +146,7 @@ fn layouts_that_are_none_are_refused() {
         (copies(""), "no copy"),
         (copies(r#"{"part": "p.tif", "x_mm": 1}"#), "y_mm"),
         (copies(r#"{"part": "p.tif", "x_mm": 1, "y_mm": 1e300}"#), "copies[0].y_mm"),
-        (copies(r#"{"part": "p.tif", "x_mm": 1, "y_mm": 1, "turn": 45}"#), "45 is no turn"),
+        (copies(r#"{"part": "p.tif", "x_mm": 1, "y_mm": 1, "turn": 45}"#), "45 is not a turn"),
         (copies(r#"{"part": "q.tif", "x_mm": 1, "y_mm": 1}"#), "there is a/p.tif"),
         (copies(r#"{"part": "p.tif", "x_mm": 1, "y_mm": 1, "at": 1}"#), "unknown field"),
         (copies(r#"{"part": "p.tif", "x_mm": 37, "y_mm": 1}"#), "reaches 1mm beyond"),

@@ -256,11 +256,11 @@ mod tests {
         let error = |page: &PageInfo| {
             BuildCopy::all(&CopySelection::Any(true), page, &PLACE).unwrap_err().to_string()
         };
-        assert!(error(&PageInfo::default()).contains("where copies stand"));
+        assert!(error(&PageInfo::default()).contains("where copies are"));
         assert!(error(&info(json!({ "copies": 3 }))).contains("as builds do"));
         let mut lost = part(&[[1, 1]]);
         lost["part_origin_mm"] = Value::Null;
-        assert!(error(&info(lost)).contains("where the part lay"));
+        assert!(error(&info(lost)).contains("where the part was"));
     }
 
     proptest! {

@@ -96,7 +96,7 @@ pub enum EditProblem {
     #[error("pictures turn by 90, 180 or 270 degrees only, also in a pattern")]
     RepeatPicture,
     /// The list of copies is empty.
-    #[error("copies names no copy: write their numbers, as [1, 5], or true for all")]
+    #[error("copies names no copy: write copy numbers, such as [1, 5], or true for all")]
     NoCopyChosen,
     /// All but the shapes in the copies would go.
     #[error("intersect would take away all of the build but the shapes in these copies")]
@@ -130,15 +130,15 @@ pub enum EditProblem {
     Brace(String),
     /// Braces in a label's text hold something else than a number's place.
     #[error(
-        "`{{{0}}}` is no number's place: write {{n}}, {{n:04}} for four digits, or {{list}} for a \
-         serial number of a list"
+        "`{{{0}}}` is not a place for a number: write {{n}}, {{n:04}} for four digits, or {{list}} \
+         for a serial number of a list"
     )]
     NumberField(String),
     /// A label shows serial numbers, but has none.
     #[error("its text has {{list}}: write list = \"FILE.csv\", which has the serial numbers")]
     NoList,
     /// A label has serial numbers, but does not show them.
-    #[error("its text does not have {{list}}, where the list's serial numbers would stand")]
+    #[error("its text does not have {{list}}, where the list's serial numbers would be")]
     UnusedList,
     /// A label names the column of no list.
     #[error("column is the name of a list's column: write list = \"FILE.csv\", too")]
@@ -225,11 +225,11 @@ pub enum EditProblem {
 pub enum LayerProblem {
     /// A solid meets a layer of unknown height.
     #[error(
-        "it does not say at what height it is, so no strut, cone, sphere or lying cylinder can cross it"
+        "it does not state its height, so no strut, cone, sphere or lying cylinder can cross it"
     )]
     NoHeightForSolid,
     /// Layers are chosen by height, but this one does not say its own.
-    #[error("it does not say at what height it is: write layers = [first, end] instead of z")]
+    #[error("it does not state its height: write layers = [first, end] instead of z")]
     NoHeightForRange,
     /// The result has more runs than an image can hold.
     #[error("edit {edit} makes more runs than an image can hold")]
@@ -244,22 +244,22 @@ pub enum LayerProblem {
     #[error("its stray rows would become columns, which no stage mends")]
     StrayColumns,
     /// The first page is not a build's.
-    #[error("its page does not say where copies stand")]
+    #[error("its page does not state where copies are")]
     NoCopies,
     /// The first page describes copies in an unknown way.
-    #[error("its page does not say where copies stand as builds do ({0})")]
+    #[error("its page does not state where copies are, as builds do ({0})")]
     CopiesFormat(serde_json::Error),
     /// The first page turns a copy in an unknown way.
-    #[error("its page does not say how a copy is turned: {0}")]
+    #[error("its page does not state how a copy is turned: {0}")]
     CopyTurn(OrientationError),
-    /// The first page does not say where the part lay before it was copied.
-    #[error("its page does not say where the part lay")]
+    /// The first page does not state where the part was before it was copied.
+    #[error("its page does not state where the part was")]
     NoPartOrigin,
     /// The first page has copies beyond any image.
-    #[error("its page says that copies stand where no image reaches")]
+    #[error("its page states that copies are where no image reaches")]
     FarCopies,
     /// The build has several parts and none of them is named.
-    #[error("name one of the build's parts, as copies = \"NAME\": {}", parts.join(", "))]
+    #[error("name one of the build's parts, such as copies = \"NAME\": {}", parts.join(", "))]
     WhichPart {
         /// The parts there are.
         parts: Vec<String>,
@@ -280,10 +280,10 @@ pub enum LayerProblem {
     #[error("states its height, and the edited stack does not")]
     HeightUnlikeEdited,
     /// A layer of another stack does not say its height, which the edited stack's do.
-    #[error("does not say at what height it is, and the stack that is edited does")]
+    #[error("does not state its height, and the stack that is edited does")]
     NoHeightUnlikeEdited,
     /// A layer of another stack has no height that could be changed.
-    #[error("does not say at what height it is, so it cannot be moved up")]
+    #[error("does not state its height, so it cannot be moved up")]
     NoHeightToMove,
 }
 

@@ -565,7 +565,7 @@ fn what_would_be_lost_or_cannot_be_is_refused() {
         "[[edit]]\ncylinder = { at = [\"5mm\", \"1mm\"], diameter = \"1mm\", along = \"x\", between = [\"4mm\", \"9mm\"] }\n",
     ] {
         assert!(
-            error(foreign.clone(), list, vec![foreign.clone()]).contains("at what height"),
+            error(foreign.clone(), list, vec![foreign.clone()]).contains("not state its height"),
             "{list}"
         );
     }

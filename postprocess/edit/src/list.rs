@@ -118,7 +118,7 @@ impl Edits {
     ///     text: "A17\nA17\n".to_owned(),
     /// };
     /// let error = Edits::from_toml(edits)?.with_lists(vec![list]).unwrap_err();
-    /// assert_eq!(error.to_string(), "edit 1: sn.csv: line 2: A17 stands on line 1, too");
+    /// assert_eq!(error.to_string(), "edit 1: sn.csv: line 2: A17 is also on line 1");
     /// # Ok::<(), lamp_edit::EditError>(())
     /// ```
     ///

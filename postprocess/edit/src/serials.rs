@@ -97,7 +97,7 @@ pub enum ListProblem {
         letter: char,
     },
     /// A serial number stands twice.
-    #[error("line {line}: {serial} stands on line {first}, too")]
+    #[error("line {line}: {serial} is also on line {first}")]
     SerialTwice {
         /// The line, from 1.
         line: usize,
@@ -107,7 +107,7 @@ pub enum ListProblem {
         first: usize,
     },
     /// A row does not say which copy it is for.
-    #[error("line {line}: `{cell}` is no number of a copy: they count from 1")]
+    #[error("line {line}: `{cell}` is not the number of a copy: copies count from 1")]
     CopyNumber {
         /// The line, from 1.
         line: usize,
@@ -326,10 +326,10 @@ mod tests {
             ("id,sn\n1,A\n2,\" \"", Some("sn"), "line 3: the serial number is missing"),
             ("A\nB\u{e9}", None, "line 2: labels have no `\u{e9}`"),
             ("\"A\nB\"", None, "line 1: labels have no `\\n`"),
-            ("A\nB\nA", None, "line 3: A stands on line 1, too"),
-            ("copy,sn\nx,A", None, "line 2: `x` is no number of a copy"),
-            ("copy,sn\n0,A", None, "line 2: `0` is no number of a copy"),
-            ("copy,sn\n4294967295,A", None, "line 2: `4294967295` is no number"),
+            ("A\nB\nA", None, "line 3: A is also on line 1"),
+            ("copy,sn\nx,A", None, "line 2: `x` is not the number of a copy"),
+            ("copy,sn\n0,A", None, "line 2: `0` is not the number of a copy"),
+            ("copy,sn\n4294967295,A", None, "line 2: `4294967295` is not the number"),
             ("copy,sn\n2,A\n2,B", None, "line 3: copy 2 has its serial number on line 2"),
         ] {
             let error = error(text, column);

@@ -31,7 +31,7 @@ pub enum BodyFault {
     /// The volume of the facets differs from the volume of the surfaces.
     #[error(
         "its facets hold {facets_mm3:.6} mm³, its surfaces {surfaces_mm3:.6} mm³; \
-         a shorter chord may bring them together"
+         a shorter chord may bring the volumes together"
     )]
     Volumes {
         /// The volume of the facets, in cubic millimeters.

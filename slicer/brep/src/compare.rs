@@ -92,7 +92,7 @@ pub enum KernelDifference {
     },
     /// A measure differs.
     #[error(
-        "{} is {} by {}, but {} by {}", measured.what, measured.text(0), kernels[0],
+        "{} is {} with {}, but {} with {}", measured.what, measured.text(0), kernels[0],
         measured.text(1), kernels[1]
     )]
     Apart {
@@ -351,8 +351,8 @@ mod tests {
         assert_eq!(
             higher,
             [
-                "its greatest z is 5.000 mm by one, but 5.200 mm by two",
-                "its volume is 1000.000 mm³ by one, but 1040.000 mm³ by two",
+                "its greatest z is 5.000 mm with one, but 5.200 mm with two",
+                "its volume is 1000.000 mm³ with one, but 1040.000 mm³ with two",
             ]
         );
         assert_eq!(text(CAN, Block([[0.0; 3], [20.0, 10.0, 5.001]])), [""; 0]);

@@ -24,7 +24,7 @@ pub enum BrepError {
         chord_mm: f64,
     },
     /// A face has no size, or is too large to be built.
-    #[error("#{entity} is larger than anything that can be built, or has no size")]
+    #[error("#{entity} is too large to build, or has no size")]
     Size {
         /// The entity's number, or 0 if unknown.
         entity: u64,
@@ -37,7 +37,7 @@ pub enum BrepError {
     },
     /// The surfaces bend too much for facets within the chord.
     #[error(
-        "its faces take about {cells:.0} cells of facets, #{entity} alone {of_face:.0}; \
+        "its faces take about {cells:.0} cells of facets, #{entity} by itself {of_face:.0}; \
          give a longer chord"
     )]
     Fine {

@@ -177,13 +177,13 @@ pub struct BrepFinding {
 #[non_exhaustive]
 pub enum FaceFault {
     /// Its loops do not bound a region of its surface.
-    #[error("its loops bound nothing")]
+    #[error("its loops do not bound an area")]
     Unbounded,
     /// Its loops cross each other or themselves.
     #[error("its loops cross each other or themselves")]
     Crossing,
     /// It could not be tessellated, for another reason.
-    #[error("no facets could be made of it")]
+    #[error("no facets could be made from it")]
     Missing,
     /// A loop's edges do not follow each other.
     #[error("the edges of a loop do not follow each other")]
@@ -201,7 +201,7 @@ pub enum FaceFault {
         off_mm: f64,
     },
     /// Its loops go clockwise although they should not. The face was turned over to fit the loops.
-    #[error("its sense is against its loops; the loops were followed")]
+    #[error("its sense contradicts its loops; the loops were followed")]
     Sense,
     /// A loop ran along an edge in the same direction as a neighbor's loop.
     #[error("a loop ran against its neighbors; it was reversed")]
@@ -221,7 +221,7 @@ pub enum FaceFault {
     #[error("its shell points the wrong way; it was turned over")]
     Shell,
     /// All faces of its body point inward.
-    #[error("its body is inside out; all of it was turned over")]
+    #[error("its body is inside out; the whole body was turned over")]
     InsideOut,
     /// It is too large, or bends too much, for the chord.
     #[error("it takes about {cells:.0} cells of facets; give a longer chord")]

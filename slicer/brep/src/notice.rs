@@ -21,7 +21,7 @@ fn first_of(count: usize) -> String {
 #[non_exhaustive]
 pub enum Matter {
     /// A surface in a file that holds solids.
-    #[error("a surface beside solids")]
+    #[error("a surface next to solids")]
     Surface,
     /// A surface in a file without solids.
     #[error("a surface that belongs to no solid")]

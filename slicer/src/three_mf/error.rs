@@ -27,7 +27,7 @@ pub enum ThreeMfError {
         fault: ModelFault,
     },
     /// An item or a component refers to a missing object.
-    #[error("it builds object {id} of its {model}, which is not there")]
+    #[error("it builds object {id} of its {model}, but the object is missing")]
     NoObject {
         /// The name of the model in the package.
         model: String,
@@ -35,7 +35,7 @@ pub enum ThreeMfError {
         id: u32,
     },
     /// The shape of an object is defined in an unsupported way.
-    #[error("object {id} of its {model} is made by {feature}, which is not read")]
+    #[error("object {id} of its {model} uses {feature}, which is not read")]
     Unread {
         /// The name of the model in the package.
         model: String,
@@ -67,10 +67,10 @@ pub enum ThreeMfError {
         items: usize,
     },
     /// Items represent far more facets than the package's size explains.
-    #[error("its items stand for more than {0} facets, far more than a package of its size does")]
+    #[error("its items make more than {0} facets, far too many for a package of its size")]
     Copies(u64),
     /// A package contains far more than any mesh of its size.
-    #[error("its model unpacks to more than {0} bytes, which is far more than a packed mesh does")]
+    #[error("its model unpacks to more than {0} bytes, far more than a packed mesh does")]
     Inflated(u64),
 }
 
@@ -92,7 +92,7 @@ pub enum ModelFault {
     #[error("{}", start_of(.0))]
     Xml(#[source] quick_xml::Error),
     /// An attribute is missing or cannot be read.
-    #[error("<{element}> has no {attribute} that can be read")]
+    #[error("<{element}> has no readable {attribute}")]
     Attribute {
         /// The element's name.
         element: String,
@@ -119,7 +119,7 @@ pub enum ModelFault {
     #[error("it needs the extension {0}, which is not read")]
     Extension(String),
     /// The text ends before the model does.
-    #[error("the model breaks off")]
+    #[error("the model is cut off")]
     CutOff,
 }
 

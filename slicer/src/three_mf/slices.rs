@@ -128,7 +128,7 @@ impl Prisms {
                 // A prism of n sides has 2 n facets around it and n - 2 at each end.
                 self.facets += 4 * polygon.len() as u64;
                 if self.facets > most_facets.min(u64::from(u32::MAX)) {
-                    return Err("more slices than a package of its size explains");
+                    return Err("more slices than a package of its size can hold");
                 }
                 self.add_prism(slice, &polygon[1..], [bottom, slice.top]);
             }

@@ -233,14 +233,14 @@ fn a_3mf_that_cannot_be_read_says_why() {
         (good[..good.len() - 30].to_vec(), "ZIP"),
         (
             with("objectid=\"1\"", "objectid=\"9\""),
-            "object 9 of its 3D/3dmodel.model, which is not there",
+            "object 9 of its 3D/3dmodel.model, but the object is missing",
         ),
         (with("objectid=\"1\"", ""), "<item> has no objectid"),
-        (with("x=\"0\"", "x=\"zero\""), "<vertex> has no x that can be read"),
+        (with("x=\"0\"", "x=\"zero\""), "<vertex> has no readable x"),
         (with("v1=\"0\"", "v1=\"99\""), "a triangle names vertex 99 of 8"),
         (with("millimeter", "furlong"), "<model> has no unit"),
         (with("objectid=\"1\"", "objectid=\"1\" transform=\"1 0 0\""), "<item> has no transform"),
-        (with("</model>", ""), "breaks off"),
+        (with("</model>", ""), "is cut off"),
         (
             with("unit=", "requiredextensions=\"b\" xmlns:b=\"http://beams\" unit="),
             "needs the extension http://beams",

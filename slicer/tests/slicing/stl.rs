@@ -83,7 +83,7 @@ fn facets_that_are_not_counted_are_read() {
             if is_whole {
                 assert!(reads_as(&bytes, &mesh), "{count}");
                 let notes = notes_of(&bytes);
-                let says = format!("the header declares {count} facets, and the file holds 12");
+                let says = format!("the header declares {count} facets, but the file holds 12");
                 assert!(notes[0].starts_with(&says), "{notes:?}");
                 assert_eq!(notes.len(), 1 + after.len() / 2);
             }

@@ -29,7 +29,9 @@ pub enum JoinError {
     #[error(transparent)]
     Write(#[from] StackError),
     /// The stacks differ in their part, size, resolution or commands.
-    #[error("{} is no part of the same stack as {}: {difference}", path.display(), first.display())]
+    #[error(
+        "{} is not part of the same stack as {}: {difference}", path.display(), first.display()
+    )]
     Different {
         /// The first stack.
         first: PathBuf,

@@ -420,7 +420,7 @@ mod tests {
             ),
             (
                 &["10.png", "20.png", "30.png", "35.png"],
-                "the numbers of the pages do not run on (35.png follows 30.png)",
+                "the page numbers do not continue (35.png follows 30.png)",
             ),
             (
                 &["z0.05.png", "z0.10.png", "z0.20.png"],
@@ -438,7 +438,7 @@ mod tests {
             // Two stacks in one folder.
             (
                 &["p1_l1.png", "p1_l2.png", "p1_l3.png", "p2_l1.png", "p2_l2.png"],
-                "the numbers of the pages do not run on (p2_l1.png follows p1_l3.png)",
+                "the page numbers do not continue (p2_l1.png follows p1_l3.png)",
             ),
             (&["0.png", "00003.png", "1.png"], "page 2.png is missing (00003.png follows 1.png)"),
         ];
@@ -468,8 +468,8 @@ mod tests {
         assert_eq!(
             texts,
             [
-                "._2.png, cover.jpg, thumb.png are no pages by name and left out",
-                ".DS_Store, Thumbs.db are no pictures and left out",
+                "._2.png, cover.jpg, thumb.png are left out: their names are not page names",
+                ".DS_Store, Thumbs.db are left out: they are not pictures",
             ]
         );
         assert!(found.left_out[0].is_doubt() && !found.left_out[1].is_doubt());
@@ -492,7 +492,10 @@ mod tests {
         let notes: Vec<String> =
             found.left_out.iter().chain(&found.doubts).map(ToString::to_string).collect();
         assert_eq!(notes.len(), 2, "{notes:?}");
-        assert_eq!(notes[0], "3d.bmp, thumbnail400x400.bmp are no pages by name and left out");
+        assert_eq!(
+            notes[0],
+            "3d.bmp, thumbnail400x400.bmp are left out: their names are not page names"
+        );
         assert!(notes[1].contains("several forms (1.bmp, base_1.bmp)"), "{}", notes[1]);
     }
 

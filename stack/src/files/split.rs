@@ -20,7 +20,7 @@ use crate::ordered::map_in_order;
 #[non_exhaustive]
 pub enum SplitError {
     /// The stack lacks layers.
-    #[error("layer {layer} stands behind layer {before}: the stack lacks the layers between them")]
+    #[error("layer {layer} follows layer {before}: the stack lacks the layers between them")]
     Gap {
         /// The layer after the gap.
         layer: u32,

@@ -148,7 +148,7 @@ impl FileBeside {
         let Self { file, temporary, registered, path } = self;
         // Its lock lasts as long as this does.
         let _lock = file.try_clone()?;
-        close(Arc::into_inner(file).ok_or_else(|| io::Error::other("it is still written to"))?)?;
+        close(Arc::into_inner(file).ok_or_else(|| io::Error::other("it is still being written"))?)?;
         registered.rename(|| temporary.persist(path).map_err(|error| error.error))
     }
 }

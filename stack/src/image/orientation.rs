@@ -39,7 +39,7 @@ pub struct Orientation {
 
 /// An error in the text of an [`Orientation`].
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{0}` is no turn: write 0, 90, 180 or 270, and m behind it to mirror first")]
+#[error("`{0}` is not a turn: write 0, 90, 180 or 270, and m after it to mirror first")]
 pub struct OrientationError(String);
 
 impl Orientation {

@@ -109,7 +109,7 @@ pub enum CheckFault {
     Text,
     /// The pages before the last differ from the pages that its check was made of.
     #[error(
-        "the pages before it are not the pages that were written: {}",
+        "the pages before it differ from the pages that were written: {}",
         chain_text(*gap, *found, *written)
     )]
     Chain {
@@ -129,23 +129,25 @@ pub enum CheckFault {
         written: Option<f64>,
     },
     /// A page without a check follows pages that have checks.
-    #[error("it has no check, but the pages before it have")]
+    #[error("it has no check, but the pages before it have checks")]
     Without,
     /// A page with a check follows pages that have none.
     #[error("it has a check, but the pages before it have none")]
     AfterUnchecked,
     /// The page follows the stack's last page.
-    #[error("it stands behind the stack's last page")]
+    #[error("it comes after the stack's last page")]
     AfterLast,
 }
 
 fn chain_text(gap: Option<[u32; 2]>, found: u32, written: u32) -> String {
     match gap {
         Some([before, after]) => {
-            format!("there is nothing between layer {before} and layer {after}")
+            format!("layers between {before} and {after} are missing")
         }
-        None if found != written => format!("with it there are {found} instead of {written}"),
-        None => "one comes from another stack".to_owned(),
+        None if found != written => {
+            format!("with this page there are {found} instead of {written}")
+        }
+        None => "one page is from another stack".to_owned(),
     }
 }
 

@@ -71,7 +71,7 @@ pub enum PairingError {
     },
     /// The images lie parts of pixels apart.
     #[error(
-        "{layer}: the other image begins {:.3} columns and {:.3} rows away, so no pixel of one lies on a pixel of the other",
+        "{layer}: the other image begins {:.3} columns and {:.3} rows away, so the pixels of the two images do not line up",
         shift[0], shift[1]
     )]
     PartPixels {
@@ -82,7 +82,7 @@ pub enum PairingError {
     },
     /// The images do not meet.
     #[error(
-        "{layer}: the other image begins {:.0} columns and {:.0} rows away, so the images do not meet",
+        "{layer}: the other image begins {:.0} columns and {:.0} rows away, so the images do not overlap",
         shift[0], shift[1]
     )]
     Apart {

@@ -87,10 +87,10 @@ pub enum CheckError {
         first: [u32; 2],
     },
     /// A drain has a width, and pixels or layers have none.
-    #[error("the stack does not say how {0}, so nothing is known of narrow drains")]
+    #[error("the stack does not state how {0}, so nothing is known of narrow drains")]
     NoScale(&'static str),
     /// The images stand in different places.
-    #[error("{layer} has another origin than the first layer: layers are compared pixel by pixel")]
+    #[error("{layer} differs from the first layer in origin: layers are compared pixel by pixel")]
     Origins {
         /// The layer's name.
         layer: String,

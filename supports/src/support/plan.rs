@@ -25,10 +25,10 @@ pub enum SupportError {
     #[error("the stack has no resolution, so it cannot be compared with the part")]
     NoResolution,
     /// The pages do not say where the images lie in the part.
-    #[error("the stack does not say where its images lie in the part")]
+    #[error("the stack does not state where its images are in the part")]
     NoOrigin,
     /// A page does not say the layer's height and thickness.
-    #[error("layer {index} does not say at what height it is and how thick")]
+    #[error("layer {index} does not state its height and thickness")]
     NoHeight {
         /// The layer's index.
         index: u32,

@@ -44,7 +44,7 @@ fn a_flipped_bit_in_what_is_used_is_noticed_and_made_again() {
         let ended = night.run();
         assert_eq!(ended.status, Some(0), "{ended:?}");
         assert!(
-            ended.stderr.contains("its file has other bytes than its manifest says"),
+            ended.stderr.contains("the bytes of its file differ from its manifest"),
             "{ended:?}"
         );
         wanted.check(&night.outcome(&ended), &format!("a damaged {kind:?}"));
@@ -102,9 +102,9 @@ fn a_delivered_file_that_was_changed_is_delivered_again() {
     let verified = night.scratch.run("lamp batch verify night.toml");
     assert_eq!(verified.statuses, [Some(1)], "{verified:?}");
     for words in [
-        "ball.lamp: it has other bytes than were delivered: the next run delivers it again",
+        "ball.lamp: its bytes differ from the delivered ones: the next run delivers it again",
         "all.lamp: it is gone: the next run delivers it again",
-        "batch: 2 of 4 delivered files are not as they were",
+        "batch: 2 of 4 delivered files have changed or are gone",
     ] {
         assert!(verified.stderr.contains(words), "{verified:?}");
     }

@@ -49,7 +49,7 @@ fn check(night: &Night, wanted: &Outcome, ended: &Ended) {
     let [first, second, end] = [(); 3].map(|()| said.next().expect("two nights"));
     let needed = "kB of disk are needed (";
     assert_eq!(first.matches(needed).count(), 2, "by plan, and by the night: {ended:?}");
-    let (before, after) = first.split_once(": no task is started any more\n").expect("it is told");
+    let (before, after) = first.split_once(": no more tasks are started\n").expect("it is told");
     assert!(before.lines().last().is_some_and(|line| line.contains("No space left")), "{ended:?}");
     let last =
         "batch: the store's disk is full: make room, and run the same command again to go on\n";

@@ -134,9 +134,9 @@ fn pictures_go_to_an_empty_folder() {
     scratch.write("pictures/mine.txt", b"keep");
     let names = scratch.names();
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif");
-    ran.is_refused_with(&["pictures: a folder is not written over", "--force"]);
+    ran.is_refused_with(&["pictures: it already exists", "--force"]);
     let ran = scratch.run("fix stray.tif --evidence pictures -o fixed.tif --force");
-    ran.is_refused_with(&["pictures: only what an earlier run wrote", ".lamp-folder"]);
+    ran.is_refused_with(&["pictures: only files from an earlier run", ".lamp-folder"]);
     assert_eq!((scratch.names(), pictures(&scratch)), (names, vec!["mine.txt".to_owned()]));
 
     fs::remove_file(scratch.path("pictures/mine.txt")).unwrap();

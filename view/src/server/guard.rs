@@ -10,11 +10,11 @@ use super::connections::Trust;
 use super::ticket::{Ticket, TicketCheck, show};
 use super::token::Token;
 
-const NO_TOKEN: &str = "lamp view printed an address that opens this page, once; for another, end \
+const NO_TOKEN: &str = "lamp view printed an address that opens this page once; for a new one, end \
                         lamp view and start it again";
-const USED_TOKEN: &str = "this address was opened before, and is good for once; for another, end \
+const USED_TOKEN: &str = "this address was opened before, and works only once; for a new one, end \
                           lamp view and start it again";
-const AHEAD: &str = "this address is good for once, so it is not for loading ahead";
+const AHEAD: &str = "this address works only once, so do not load it ahead";
 
 /// Lets requests pass that may.
 pub(super) struct Guard {

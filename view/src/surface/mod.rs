@@ -75,13 +75,13 @@ impl StackSurface {
 #[non_exhaustive]
 pub enum SurfaceError {
     /// The heights of layers do not go up.
-    #[error("layer {layer}: by its z and thickness it does not stand above the layer before it")]
+    #[error("layer {layer}: its z and thickness do not place it above the layer before it")]
     Heights {
         /// The layer's index.
         layer: u32,
     },
     /// Images of layers do not lie above each other.
-    #[error("layer {layer} has another resolution or origin than the layers before it")]
+    #[error("layer {layer} differs in resolution or origin from the layers before it")]
     Unlike {
         /// The layer's index.
         layer: u32,

@@ -25,7 +25,7 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
                 damaged += 1;
                 let name = store.name_of(key);
                 let then = match store.forget(key) {
-                    Ok(()) => "taken away, the next run makes it again".to_owned(),
+                    Ok(()) => "removed: the next run makes it again".to_owned(),
                     Err(error) => Exit::from(anyhow::Error::new(error)).to_string(),
                 };
                 progress.warn(&format!("{name}: {damage}: {then}"));
@@ -43,7 +43,7 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
     }
     if !wrong.is_empty() {
         let all = delivered + wrong.len();
-        problems.push(format!("{} of {all} delivered files are not as they were", wrong.len()));
+        problems.push(format!("{} of {all} delivered files have changed or are gone", wrong.len()));
     }
     if !problems.is_empty() {
         return Err(Exit::Failed(anyhow!(problems.join(", "))));

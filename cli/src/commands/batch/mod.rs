@@ -171,7 +171,7 @@ pub(crate) fn run(args: &BatchArgs, common: &Common) -> Result<(), Exit> {
 
 /// Parses a time such as `12h` or `30d`.
 fn parse_age(text: &str) -> Result<Duration, String> {
-    let wrong = || format!("`{text}` is no time: write hours or days, as 12h or 30d");
+    let wrong = || format!("`{text}` is not a time: write hours or days, such as 12h or 30d");
     let (number, hours) = match text.strip_suffix('d') {
         Some(number) => (number, 24),
         None => (text.strip_suffix('h').ok_or_else(wrong)?, 1),

@@ -20,7 +20,9 @@ use crate::terminal::progress::Progress;
 
 pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let Some(night) = &args.night else {
-        return Err(Exit::usage("name a night file, as lamp batch night.toml (docs/batch.md)"));
+        return Err(Exit::usage(
+            "name a night file, such as lamp batch night.toml (docs/batch.md)",
+        ));
     };
     let progress = Progress::new("batch", common, true);
     let file = NightFile::open(night)?;
@@ -134,7 +136,7 @@ impl Running<'_> {
             }
             End::Bad(why) | End::Failed(why) | End::Damaged(why) => why,
             End::NoRoom(why) => {
-                let stop = "no task is started any more";
+                let stop = "no more tasks are started";
                 return self.progress.warn(&format!("{name}: {why}: {stop}"));
             }
             End::Crashed(why) => {

@@ -104,7 +104,8 @@ pub(super) fn levelled<T: Quantity>(
         [-rise.number(), line.rise.high.number(), line.at_zero.value.number()].map(short);
     progress.say(&format!(
         "{what} falls by {fall} {unit} towards more light, perhaps by chance (it might as well \
-         rise by {high}): the model takes no falling line, so it is kept level at {level} {unit}"
+         rise by {high}): the model takes no falling line, so the line is kept level at {level} \
+         {unit}"
     ));
 }
 

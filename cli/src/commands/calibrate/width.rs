@@ -63,7 +63,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("calibrate", common, true);
     if depths.is_none() {
         progress.say(
-            "there is no broadening depth, as no cure depth is known: name a material with \
+            "there is no broadening depth, because no cure depth is known: name a material with \
              --depth-material",
         );
     }

@@ -121,7 +121,7 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
     let tolerance = args.tolerance.unwrap_or(Tolerance::Pixels(0.0)).pixels(dpi);
     let tolerance = tolerance.ok_or_else(|| {
         let name = input_name(&args.a);
-        Exit::usage(format!("{name} states no resolution: give --tolerance in pixels, as 1px"))
+        Exit::usage(format!("{name} states no resolution: give --tolerance in pixels, such as 1px"))
     })?;
     let pairing = Pairing::of(a.headers(), b.headers());
     let names = paths.map(|path| input_name(path));

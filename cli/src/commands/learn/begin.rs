@@ -40,7 +40,7 @@ pub(super) fn begin(
         let layer = layer?;
         if layer.info.exposure_ms.is_none() {
             let silent = anyhow!(
-                "{} states no exposure, so that no profile was printed: lamp plan speed gives \
+                "{} states no exposure, so no profile was printed: lamp plan speed gives \
                  times",
                 layer.info.name()
             );

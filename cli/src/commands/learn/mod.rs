@@ -169,7 +169,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
         ));
     };
     if is_stream(output) {
-        return Err(Exit::usage("name a file for the next profile, as -o next.csv"));
+        return Err(Exit::usage("name a file for the next profile, such as -o next.csv"));
     }
     args.check_outputs(measured)?;
     let law = args.law()?;

@@ -14,7 +14,7 @@ pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
     let errors: Vec<_> = job.prints.iter().filter_map(error_of).map(PrintError::text).collect();
     let mut text = format!("errors of prints 0 to {print}: {}\n", errors.join(", "));
     if let Some(rms) = rms(&learned.deeper_um) {
-        text += &format!("heights are {} um off what the model says\n", significant(rms));
+        text += &format!("heights are {} um off the model\n", significant(rms));
     }
     for (share, shrink) in &learned.shrink {
         text += &format!(
@@ -24,7 +24,7 @@ pub(super) fn lines_of(job: &Job, print: usize, learned: &Learned) -> String {
         );
     }
     if learned.shrink.iter().any(|(_, shrink)| shrink.may_grow()) {
-        text += "warning: the norm is above 1, so that errors may grow from print to print";
+        text += "warning: the norm is above 1, so errors may grow from print to print";
         text += &match learned.safe_gain {
             Some(gain) if gain > 0.0 => {
                 format!("; the largest safe gain is {}\n", significant(gain))

@@ -29,7 +29,7 @@ pub(super) fn check_text(name: &str, findings: &MeshFindings) -> String {
     let mut found = faults(table, check);
     if let Some(crossings) = crossings.as_ref().filter(|it| it.count > 0 || it.is_partial) {
         let pairs = crossings.pairs.iter().map(|[a, b]| format!("{a} and {b}"));
-        let partial = if crossings.is_partial { "; too many overlap to look at all" } else { "" };
+        let partial = if crossings.is_partial { "; too many overlap to examine all" } else { "" };
         found.push(format!(
             "{} of facets pass through each other{}{partial}",
             count(crossings.count, "pair", "pairs"),
@@ -79,7 +79,7 @@ fn lumps(lumps: &[Lump]) -> String {
     let voids: usize = lumps.iter().map(|lump| lump.voids.len()).sum();
     let volume: f64 = lumps.iter().filter_map(|lump| lump.mass).map(|mass| mass.volume_mm3).sum();
     match lumps.len() {
-        0 => "none, for no shell is closed".to_owned(),
+        0 => "none, because no shell is closed".to_owned(),
         number => format!("{number} with {}, {volume:.6} mm3", count(voids, "void", "voids")),
     }
 }
@@ -178,8 +178,8 @@ fn shell_text(number: usize, shell: &ShellReport) -> String {
 
 fn not_closed(shell: &ShellReport) -> String {
     let why = match shell.open_sides {
-        0 if shell.is_one_sided => "none, it has one side only".to_owned(),
-        0 => "none, its numbers are too large".to_owned(),
+        0 if shell.is_one_sided => "none, because it has only one side".to_owned(),
+        0 => "none, because its numbers are too large".to_owned(),
         1 => "not closed: 1 side of a facet has no neighbor".to_owned(),
         sides => format!("not closed: {sides} sides of facets have no neighbor"),
     };

@@ -187,7 +187,7 @@ impl ColumnCureArgs {
             let name = self.projector.display();
             let most = projector.pitch.value.to_whole_nm();
             let text =
-                format!("{name} does not say how wide columns are: give --voxel, at most {most}");
+                format!("{name} does not state how wide columns are: give --voxel, at most {most}");
             return Err(Exit::Failed(anyhow!(text)));
         };
         let tracing = self.rays.unwrap_or_default();

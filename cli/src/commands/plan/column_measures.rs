@@ -51,8 +51,8 @@ pub(super) fn doubt(
     // Heights outside the model come first: an extrapolation within it is the lesser doubt.
     if low > 0 {
         return Some(format!(
-            "{low} columns of the target are lower than {}, from where on the numbers of {name} \
-             hold: they may be different",
+            "{low} columns of the target are lower than {}, where the numbers of {name} begin \
+             to hold: these columns may differ",
             Length::to_whole_nm(known.from),
         ));
     }
@@ -61,8 +61,8 @@ pub(super) fn doubt(
     (outside > 0).then(|| {
         let [from, to] = [measured.from, measured.to].map(Length::um);
         format!(
-            "{outside} columns of the target are not of the {from:.0} to {to:.0} um that {name} \
-             was measured at: its numbers are extrapolated"
+            "{outside} columns of the target are outside the {from:.0} to {to:.0} um at which \
+             {name} was measured: its numbers are extrapolated"
         )
     })
 }

@@ -40,7 +40,7 @@ pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
         line(&measures),
         format!(
             "the bitmaps' error is {:.2}% above the error of the best times, which is within {:.1e} of \
-             the least there is",
+             the least possible",
             100.0 * plan.excess(),
             plan.best.relative_gap()
         ),
@@ -55,7 +55,7 @@ pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
     let at_max = plan.best.at_most(reported.options.max_s);
     if at_max > 0 {
         lines.push(format!(
-            "{at_max} mirrors would be on for longer than --max-time {:.3}s if they could",
+            "{at_max} mirrors need more than --max-time {:.3}s",
             reported.options.max_s
         ));
     }

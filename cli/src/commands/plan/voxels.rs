@@ -116,7 +116,7 @@ fn parse_sources(text: &str) -> Result<Sources, String> {
         None if text == "lit" => Ok(Sources::Lit),
         Some(("grow", by)) => pixels(by).map(Sources::Grow),
         Some(("shell", by)) => pixels(by).map(Sources::Shell),
-        _ => Err(format!("`{text}` is none of lit, grow:3px, shell:1px")),
+        _ => Err(format!("`{text}` is not one of lit, grow:3px, shell:1px")),
     }
 }
 

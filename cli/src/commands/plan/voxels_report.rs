@@ -24,8 +24,8 @@ pub(super) fn lines_of(planned: &PlannedVoxels<'_>) -> Vec<String> {
     let [before, after] = [&outcome.before, &outcome.after];
     let targets: u64 = outcome.layers.iter().map(|layer| layer.targets).sum();
     let mut lines = vec![format!(
-        "{} to {} voxels overcured{}, {} to {} undercured; {} of {targets} are lost that white \
-         light cures",
+        "{} to {} voxels overcured{}, {} to {} undercured; {} of {targets} are lost although \
+         white light cures them",
         before.counts.overcured,
         after.counts.overcured,
         change(before.counts.overcured, after.counts.overcured),

@@ -94,7 +94,7 @@ impl StackReport {
         let totals = &self.totals;
         if totals.stray_rows > 0 {
             warnings.push(format!(
-                "{} stray rows are left in {} layers: correct them with fix, or mend the part.",
+                "{} stray rows are left in {} layers: correct them with fix, or repair the part.",
                 totals.stray_rows, totals.stray_layers
             ));
         }

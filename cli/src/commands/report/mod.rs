@@ -145,7 +145,8 @@ impl ReportWork<'_> {
         if output.extension().is_some_and(|end| end.eq_ignore_ascii_case("html")) {
             let (stacks, name) = (stacks.len(), output.display());
             return Err(Exit::usage(format!(
-                "{name}: there are {stacks} stacks: name a folder for their pages, as -o reports/"
+                "{name}: there are {stacks} stacks: name a folder for their pages, such as -o \
+                 reports/"
             )));
         }
         let folder = new_folder(output, args.force)?;

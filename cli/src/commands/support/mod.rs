@@ -170,7 +170,7 @@ impl SupportArgs {
         })?;
         if let Some(why) = moved(first) {
             return Err(Exit::Failed(anyhow!(
-                "{name} {why}, so it does not lie as its part: support it before"
+                "{name} {why}, so its position differs from its part: support it before that"
             )));
         }
         let part = sliced.open(&self.part, name, progress)?;

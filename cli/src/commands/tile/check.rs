@@ -22,7 +22,7 @@ impl TileArgs {
         }
         if self.settings.shares && self.stacks.len() < 2 {
             return Err(Exit::usage(
-                "--shares is for several stacks: of one, as many copies as fit are placed anyway",
+                "--shares is for several stacks: one stack is placed as often as it fits anyway",
             ));
         }
         self.check_plan()?;

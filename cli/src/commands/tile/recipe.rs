@@ -32,7 +32,8 @@ impl TileArgs {
                 .find_map(|(option, is_given)| is_given.then_some(option))
         {
             return Err(Exit::usage(format!(
-                "{option} is for a stack, and --recipe alone writes none: give it to lamp compose"
+                "{option} is for a stack, and --recipe by itself writes none: give it to lamp \
+                 compose"
             )));
         }
         for stack in &self.stacks {
@@ -46,7 +47,7 @@ impl TileArgs {
             if stack.path.is_dir() {
                 return Err(Exit::usage(format!(
                     "--recipe names stacks that are one file, and {name} is a folder: lamp convert \
-                     makes one of it"
+                     makes a file from it"
                 )));
             }
         }
@@ -76,7 +77,8 @@ fn part_of(stack: &Path, recipe: &Path) -> Result<RecipePart, Exit> {
     let named = || -> anyhow::Result<RecipePart> {
         let file = from_folder(folder_of(recipe), stack)?;
         let names: Option<Vec<&str>> = file.iter().map(|name| name.to_str()).collect();
-        let names = names.ok_or_else(|| anyhow!("its name is not UTF-8 text, as recipes are"))?;
+        let names =
+            names.ok_or_else(|| anyhow!("its name is not UTF-8 text, which recipes need"))?;
         Ok(RecipePart::new(names.join("/"), digest_of(File::open(stack)?)?))
     };
     Ok(named().with_context(|| input_name(stack))?)

@@ -212,7 +212,7 @@ impl MeshForm {
         let pattern = match &self.pattern {
             &PatternForm::Cells { shape, cell, wall } => MeshPattern::Cells { shape, cell, wall },
             PatternForm::Image { name, width, rows } => {
-                let no_image = || wrong("pattern.image", "these are no rows of an image");
+                let no_image = || wrong("pattern.image", "these are not rows of an image");
                 if *width > MAX_SIDE || rows.len() > MAX_SIDE as usize {
                     return Err(no_image());
                 }

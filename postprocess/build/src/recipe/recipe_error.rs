@@ -18,7 +18,7 @@ pub enum RecipeError {
         problem: String,
     },
     /// It has another form.
-    #[error("this is no recipe of the form {known} but {found:?}")]
+    #[error("this is not a recipe of the form {known}, but {found:?}")]
     Schema {
         /// The form that it names.
         found: String,
@@ -26,7 +26,7 @@ pub enum RecipeError {
         known: &'static str,
     },
     /// A value is not as it was written.
-    #[error("this recipe is not as tile wrote it: its digest does not match its values")]
+    #[error("this recipe has changed since tile wrote it: its digest does not match its values")]
     Changed,
     /// It was written by a version of `tile` that makes other pages.
     #[error(

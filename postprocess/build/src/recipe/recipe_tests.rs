@@ -295,7 +295,7 @@ fn what_is_no_recipe_is_refused_in_a_sentence() {
     }
     let code = format!("\"code\": {TILE_CODE}");
     for (from, to, said) in [
-        ("lamp-recipe-1", "lamp-recipe-2", "of the form lamp-recipe-1 but \"lamp-recipe-2\""),
+        ("lamp-recipe-1", "lamp-recipe-2", "of the form lamp-recipe-1, but \"lamp-recipe-2\""),
         (&*code, "\"code\": 2", "by code 2"),
         (&*code, "\"cod\": 3", "by code 0"),
         ("\"command\"", "\"comand\"", "comand"),

@@ -62,7 +62,7 @@ pub enum StripDifference {
         layer: String,
     },
     /// A page does not say that it is of this strip.
-    #[error("{layer} does not say that it is strip {number}")]
+    #[error("{layer} does not state that it is strip {number}")]
     Number {
         /// The layer's name.
         layer: String,
@@ -70,7 +70,7 @@ pub enum StripDifference {
         number: u32,
     },
     /// It was made of another input than the first strip.
-    #[error("it was made of another input")]
+    #[error("its input differs from the first strip's")]
     Input,
 }
 

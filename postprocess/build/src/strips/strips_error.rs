@@ -56,10 +56,10 @@ pub enum StripsError {
         layer: String,
     },
     /// The index is malformed.
-    #[error("{index}: this is no index of strips", index = super::INDEX)]
+    #[error("{index}: this is not an index of strips", index = super::INDEX)]
     Index(#[source] IndexError),
     /// A file has the name of a strip, and is of another build.
-    #[error("{file} is no strip of this build: {index} does not list it", index = super::INDEX)]
+    #[error("{file} is not a strip of this build: {index} does not list it", index = super::INDEX)]
     More {
         /// The file's name.
         file: String,

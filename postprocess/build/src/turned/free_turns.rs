@@ -25,8 +25,8 @@ pub struct FreeTurns {
 /// A text is no angle that divides a right angle.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "`{0}` is no number of degrees that divides a right angle into whole steps, at most 18: write \
-     5deg, 15deg, 22.5deg or 45deg"
+    "`{0}` is not a number of degrees that divides a right angle into whole steps, at most 18: \
+     write 5deg, 15deg, 22.5deg or 45deg"
 )]
 pub struct FreeTurnsError(String);
 

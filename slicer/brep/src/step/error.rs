@@ -19,13 +19,13 @@ pub enum StepError {
         offset: usize,
     },
     /// An entity is defined twice.
-    #[error("#{id} is given twice")]
+    #[error("#{id} is defined twice")]
     Twice {
         /// The entity's number.
         id: u64,
     },
     /// An entity is referenced but not defined.
-    #[error("#{id} is named, but not given")]
+    #[error("#{id} is referenced, but not defined")]
     Missing {
         /// The entity's number.
         id: u64,
@@ -39,7 +39,7 @@ pub enum StepError {
         expected: &'static str,
     },
     /// An attribute is missing or has the wrong type.
-    #[error("attribute {attribute} of #{id} is missing or not of its kind")]
+    #[error("attribute {attribute} of #{id} is missing or has the wrong type")]
     Attribute {
         /// The entity's number.
         id: u64,
@@ -69,7 +69,7 @@ pub enum StepError {
         id: u64,
     },
     /// There is no solid and no face.
-    #[error("it holds no solid and no face")]
+    #[error("it holds neither a solid nor a face")]
     Empty,
     /// There are only other contents.
     #[error("it holds nothing that can be sliced: #{id} is {matter}")]

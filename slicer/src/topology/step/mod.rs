@@ -33,9 +33,9 @@ pub enum NoSolid {
     },
     /// It is closed, but its facets contradict each other.
     #[error(
-        "the mesh bounds no solid: {turned} facets are turned over, {doubled} repeat others, \
-         {flat} have no area, {crowded} edges have three facets and more, and {shells} shells face \
-         inwards or have one side"
+        "the mesh does not bound a solid: {turned} facets are turned over, {doubled} repeat \
+         others, {flat} have no area, {crowded} edges have three or more facets, and {shells} \
+         shells face inward or have one side"
     )]
     Faulty {
         /// The number of facets that face the other way than their neighbors.
@@ -68,7 +68,7 @@ pub enum NoSolid {
     },
     /// Its surface passes through itself along edges.
     #[error(
-        "the surface passes through itself along edges of facets: beside facet {facet}, at \
+        "the surface passes through itself along edges of facets: next to facet {facet}, at \
          ({:.3}, {:.3}, {:.3}) mm, it encloses the same place twice; mend the part where it was \
          made, or slice the mesh itself",
         at_mm[0], at_mm[1], at_mm[2]

@@ -34,7 +34,7 @@ pub enum G4Fault {
     #[error("is missing: the codes end early")]
     EndsEarly,
     /// The bits are no code (uncompressed mode is not supported).
-    #[error("has bits that are no T.6 or T.4 code")]
+    #[error("has bits that are not a T.6 or T.4 code")]
     NotACode,
     /// A Group 3 row lacks the end of line that other rows have.
     #[error("has no end of line before it")]

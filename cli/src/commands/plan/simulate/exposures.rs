@@ -69,8 +69,8 @@ impl Exposures {
             let [width, height] = [layer.image.width(), layer.image.height()];
             if width > columns || height > rows {
                 return failed(format!(
-                    "it has {width} x {height} pixels, and the display of {} {columns} x {rows} \
-                     mirrors",
+                    "it has {width} x {height} pixels, and the display of {} has {columns} x \
+                     {rows} mirrors",
                     projector.name
                 ));
             }
@@ -80,7 +80,7 @@ impl Exposures {
                 return failed("its size differs from the first page's".to_owned());
             }
             let Some(ms) = layer.info.exposure_ms else {
-                return failed("it does not say how long it is shown (exposure_ms)".to_owned());
+                return failed("it does not state how long it is shown (exposure_ms)".to_owned());
             };
             bitmaps.push(ShownBitmap {
                 image: layer.image.into_image(),

@@ -26,8 +26,8 @@ impl TileArgs {
         let Some(turns) = self.settings.free_turns() else { return Ok(()) };
         if self.layout_out.is_none() {
             return Err(Exit::usage(format!(
-                "--turns {turns} takes stacks that are yet to be sliced: give --layout-out for where \
-                 they will stand"
+                "--turns {turns} takes stacks that are yet to be sliced: write their places with \
+                 --layout-out"
             )));
         }
         if self.stacks.iter().any(|stack| is_stream(&stack.path)) {
@@ -88,7 +88,7 @@ impl TileArgs {
         }
         if let Some(files) = &from.missing {
             progress.warn(&format!(
-                "{files}: not found beside its stack as it was sliced: write where it is into the \
+                "{files}: not found next to its stack as it was sliced: write its path into the \
                  script"
             ));
         }

@@ -40,19 +40,19 @@ impl SlicedFrom {
         let commands = stack.map_or(&[][..], |stack| &stack.commands);
         let record = stack.and_then(SlicingRecord::of);
         let (Some(stack), Some(mut record)) = (stack, record) else {
-            let why = "it does not say how it was sliced, so it cannot be sliced at other angles: \
-                       give --turns quarters";
+            let why = "it does not state how it was sliced, so it cannot be sliced at other \
+                       angles: give --turns quarters";
             return Err(refused(why.to_owned()));
         };
         if record.fallback.is_some() {
-            let why = "a fallback stood in for some of its layers, which is not done again at other \
+            let why = "a fallback replaced some of its layers, which is not repeated at other \
                        angles: give --turns quarters";
             return Err(refused(why.to_owned()));
         }
         if let Some(more) = commands.get(1) {
             let name = more.split(' ').next().unwrap_or_default();
             return Err(refused(format!(
-                "{name} changed it after it was sliced, which would be lost at other angles: give \
+                "{name} changed it after slicing, and other angles would lose this change: give \
                  the stack before it, or --turns quarters"
             )));
         }
