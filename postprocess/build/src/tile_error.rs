@@ -211,7 +211,7 @@ pub enum TileError {
     },
     /// A layer does not say its height or thickness.
     #[error(
-        "{name}: {layer} does not state its height and thickness, but other stacks do: heights join stacks"
+        "{name}: {layer} does not state its height and thickness, but other stacks do: stacks are joined by height"
     )]
     NoHeight {
         /// The part.

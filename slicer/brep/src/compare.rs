@@ -358,7 +358,7 @@ mod tests {
         assert_eq!(text(CAN, Block([[0.0; 3], [20.0, 10.0, 5.001]])), [""; 0]);
         let narrow = text(CAN, Block([[0.0; 3], [20.0, 9.9, 5.0]]));
         assert_eq!(narrow.len(), 7, "{narrow:?}");
-        assert!(narrow[2].starts_with("its section at z = 0.565 mm is 200.000 mm² by one"));
+        assert!(narrow[2].starts_with("its section at z = 0.565 mm is 200.000 mm² with one"));
     }
 
     #[test]
