@@ -74,7 +74,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
     for (line, words) in [
         ("slice cube.stl --frobnicate -o x.tif", &["--frobnicate"][..]),
         ("slice", &["<PART>"]),
-        ("slice cube.stl --thickness 100 -o x.tif", &["`100` has no unit", "add um"]),
+        ("slice cube.stl --thickness 100 -o x.tif", &["`100` has no known unit", "add um"]),
         ("slice cube.stl --thickness 0um -o x.tif", &["above zero"]),
         ("slice cube.stl --thickness -1um -o x.tif", &["below zero"]),
         ("slice cube.stl --thickness thick -o x.tif", &["`thick` is not a length", "100um"]),

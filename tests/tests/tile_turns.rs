@@ -197,7 +197,7 @@ fn plans_name_what_they_cannot_slice_again() {
     scratch.run("lamp edit plate.tif cut.toml -o cut.tif").succeeds();
     scratch
         .run(&line.replace("plate.tif", "cut.tif"))
-        .is_refused_with(&["cut.tif: edit", "sliced"]);
+        .is_refused_with(&["cut.tif: edit", "after slicing"]);
     let bare = scratch.layers("plate.tif").into_iter().map(|mut layer| {
         layer.info.stack = None;
         layer

@@ -235,7 +235,7 @@ fit = true
             ("output = \"\"", "line 1: output: it needs a value"),
             ("options = \"b.toml\"", "line 1: options: it is only for the command line"),
             // The tables of other commands are checked, too.
-            ("[tile]\ncell = \"5\"", "line 2: cell: `5` has no unit"),
+            ("[tile]\ncell = \"5\"", "line 2: cell: `5` has no known unit"),
             ("dpi 100", "line 1: "),
         ] {
             let said = words("slice", text).unwrap_err();

@@ -153,7 +153,7 @@ source = "notebook, page 3"
             ("9.5 mJ/cm2", "0 mJ/cm2", &["working-curve.critical-dose must be above zero"]),
             ("140 um", "-140 um", &["working-curve.penetration-depth must be above zero"]),
             ("140 um", "140 mJ/cm2", &["working-curve.penetration-depth.value", "140"]),
-            ("4um", "4", &["working-curve.penetration-depth.plus-minus", "has no unit"]),
+            ("4um", "4", &["working-curve.penetration-depth.plus-minus", "has no known unit"]),
             ("20 mW/cm2", "0 mW/cm2", &["intensity.value must be above zero"]),
             (
                 "source = \"radiometer\"",
@@ -270,7 +270,7 @@ source = "notebook, page 3"
         assert_eq!(spread("60 mm", "1 um"), "spread.sigma must be at most 2 mm");
         assert_eq!(spread("1 um", "0 um"), "spread.pixel must be above zero");
         let unit = spread("13", "1 um");
-        assert!(unit.contains("spread.sigma.value") && unit.contains("has no unit"), "{unit}");
+        assert!(unit.contains("spread.sigma.value") && unit.contains("has no known unit"), "{unit}");
         for gamma in ["0", "-1", "nan", "inf"] {
             let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
             assert_eq!(said, "gamma.value must be above zero");

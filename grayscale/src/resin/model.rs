@@ -163,7 +163,7 @@ pub enum ModelError {
     #[error("{0} must begin above zero and not end before it begins")]
     NoRange(&'static str),
     /// There is no feature size, or one stands twice.
-    #[error("each entry must have a different feature-size")]
+    #[error("feature-size must be given, and differ in each entry")]
     NoSizes,
 }
 

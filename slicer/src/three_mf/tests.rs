@@ -545,7 +545,7 @@ fn faults_of_slices_are_named() {
             "lines that are not closed",
         ),
         (good.replace("v2=\"7\"", "v2=\"8\""), "a segment names vertex 8 of 8"),
-        (good.replace("startv=\"4\"", ""), "has no startv"),
+        (good.replace("startv=\"4\"", ""), "has no readable startv"),
         (good.replace("id=\"5\"", "id=\"6\""), "slices that are not there"),
         (slices(5, 0.0, &[], 4.0), "slices without area"),
     ] {
