@@ -1,13 +1,14 @@
 //! Machine files.
 
 use std::fmt::Display;
+use std::path::PathBuf;
 use std::str::FromStr;
 
-use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size};
+use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size, nonempty_text};
 use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
-use super::{Machine, MachineLimit};
+use super::{Machine, MachineLimit, ScanError, Speed};
 
 /// Why a machine's numbers contradict each other.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -38,11 +39,29 @@ pub enum MachineError {
     #[error("times: swath_step_s needs swath_speed_mm_per_s")]
     StepWithoutSpeed,
     /// A speed along swaths that are not known.
-    #[error("times: swath_speed_mm_per_s needs [strips], which says how wide a swath is")]
+    #[error("times: swath_speed_mm_per_s needs [strips] or [scan], which say how wide a swath is")]
     SpeedWithoutStrips,
+    /// A speed along swaths that the scan does not allow.
+    #[error(
+        "times: swath_speed_mm_per_s: {speed}mm/s is not among the {least} to {most} of [scan]"
+    )]
+    SpeedBeyondScan {
+        /// The speed, in millimeters a second.
+        speed: f64,
+        /// The least speed of the scan.
+        least: Speed,
+        /// The greatest speed of the scan.
+        most: Speed,
+    },
     /// Swaths without a pixel of their own.
     #[error("strips: a swath shares less than half its mirrors with the next")]
     Strips,
+    /// Swaths that are described twice.
+    #[error("scan: the file has [strips], too: keep [strips] or [scan]")]
+    StripsAndScan,
+    /// Impossible numbers of a scan.
+    #[error("scan: {0}")]
+    Scan(#[from] ScanError),
 }
 
 macro_rules! builtin {
@@ -89,7 +108,14 @@ impl Catalogued for Machine {
         }
         self.check_defaults()?;
         if let Some(times) = &self.times {
-            times.check(self.strips.is_some())?;
+            times.check(self.strips.is_some() || self.scan.is_some())?;
+        }
+        if let Some(scan) = &self.scan {
+            if self.strips.is_some() {
+                return Err(MachineError::StripsAndScan);
+            }
+            scan.check()?;
+            self.check_speed(scan.speed)?;
         }
         match &self.strips {
             // A swath needs a column of its own between its two seams: a seam joins two swaths,
@@ -103,6 +129,15 @@ impl Catalogued for Machine {
 }
 
 impl Machine {
+    fn check_speed(&self, [least, most]: [Speed; 2]) -> Result<(), MachineError> {
+        match self.times.as_ref().and_then(|times| times.swath_speed_mm_per_s) {
+            Some(speed) if !(least.mm_per_s()..=most.mm_per_s()).contains(&speed) => {
+                Err(MachineError::SpeedBeyondScan { speed, least, most })
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(dpi) = self.defaults.dpi {
             let dpi = Dpi::new(dpi).ok_or(MachineError::NoResolution)?;
@@ -129,6 +164,10 @@ pub(super) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Er
 
 pub(super) fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
     length(from).map(Some)
+}
+
+pub(super) fn nonempty_path<'de, D: Deserializer<'de>>(from: D) -> Result<PathBuf, D::Error> {
+    nonempty_text(from).map(PathBuf::from)
 }
 
 fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {

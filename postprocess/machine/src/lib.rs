@@ -10,15 +10,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod display;
 mod file;
 mod limit;
+mod motion;
+mod scan;
 mod times;
 
 use lamp_stack::{Length, Size, nonempty_text};
 use serde::Deserialize;
 
+pub use display::{Display, DisplayError};
 pub use file::MachineError;
 pub use limit::MachineLimit;
+pub use motion::{Acceleration, MotionError, Speed};
+pub use scan::{MirrorFaults, Scan, ScanDirection, ScanError, ScanLight};
 pub use times::Times;
 
 /// The known data of a machine. A value that a source does not give is absent, and then anything
@@ -40,6 +46,8 @@ pub struct Machine {
     pub thickness: Option<ThicknessRange>,
     /// The swaths that a scanning projector exposes.
     pub strips: Option<Strips>,
+    /// How a display of mirrors scans a layer, in place of `strips`.
+    pub scan: Option<Scan>,
     /// How a blade spreads the next layer.
     pub recoating: Option<Recoating>,
     /// How long the steps of a layer take.
@@ -47,6 +55,15 @@ pub struct Machine {
     /// How it is usually sliced for.
     #[serde(default)]
     pub defaults: Defaults,
+}
+
+impl Machine {
+    /// Returns the mirrors across a swath and the number of pixels that a swath shares with the
+    /// next, of [`scan`](Self::scan) or of [`strips`](Self::strips).
+    pub fn swaths(&self) -> Option<(u32, u32)> {
+        let scan = self.scan.as_ref().map(|scan| (scan.mirrors()[0], scan.overlap));
+        scan.or_else(|| self.strips.as_ref().map(|strips| (strips.mirrors, strips.overlap)))
+    }
 }
 
 /// A build area, and where it comes from.
