@@ -13,7 +13,7 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-slicer"],
     &["lamp-adaptive", "lamp-grayscale", "lamp-fix", "lamp-offset", "lamp-machine"],
     &["lamp-build", "lamp-planning", "lamp-supports"],
-    &["lamp-edit", "lamp-view", "lamp-plots"],
+    &["lamp-edit", "lamp-view", "lamp-plots", "lamp-gantry"],
     &["lamp-pipeline"],
     &["lamp-batch"],
     &["lamp"],

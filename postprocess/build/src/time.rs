@@ -48,8 +48,7 @@ impl BuildTime {
             layers += 1;
             exposure_ms = exposure_ms.zip(of_layer.or(usual_ms)).map(|(sum, ms)| sum + ms);
         }
-        let blade = || Some(machine?.recoating.as_ref()?.seconds);
-        let recoat_s = times.and_then(|times| times.recoat_s).or_else(blade);
+        let recoat_s = machine.and_then(Machine::recoat_s);
         let swaths = machine.zip(dpi).and_then(|(machine, dpi)| swaths(machine, image, dpi));
         Self {
             layers,

@@ -163,6 +163,23 @@ pub struct Recoating {
     pub source: String,
 }
 
+impl Machine {
+    /// Returns the time from the end of a layer's exposure to the start of the next, in seconds, if it
+    /// is known: as the machine's times have it, or the blade's way over the area at its speed. The
+    /// blade goes along the longer side, and never less far than its travel (assumed; 002 section
+    /// 4.2.2 gives one travel and its time).
+    pub fn recoat_s(&self) -> Option<f64> {
+        let measured = || self.times.as_ref()?.recoat_s;
+        let by_blade = || {
+            let Recoating { travel, seconds, .. } = self.recoating.as_ref()?;
+            let area = self.area.value;
+            let way = area.width.mm().max(area.height.mm()).max(travel.mm());
+            Some(seconds * way / travel.mm())
+        };
+        measured().or_else(by_blade)
+    }
+}
+
 impl Recoating {
     /// Returns the shear stress on what the blade passes, in pascals, for the least and the
     /// greatest viscosity: viscosity times speed divided by the gap, as for a Newtonian liquid

@@ -1,0 +1,115 @@
+//! Errors of jobs, frames and their proof.
+
+use std::io;
+use std::path::PathBuf;
+
+use lamp_build::{StripsError, SwathsError};
+use lamp_machine::MachineLimit;
+use lamp_stack::StackError;
+use thiserror::Error;
+
+use crate::clock::ExposureLimit;
+use crate::mirrors::MirrorError;
+
+/// Why there is no job of a build, or why it cannot be shown.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum GantryError {
+    /// A page cannot be read.
+    #[error(transparent)]
+    Stack(#[from] StackError),
+    /// A folder of strips cannot be read.
+    #[error(transparent)]
+    Strips(#[from] StripsError),
+    /// There are no such swaths.
+    #[error(transparent)]
+    Swaths(#[from] SwathsError),
+    /// The machine does not build such layers.
+    #[error(transparent)]
+    Machine(#[from] MachineLimit),
+    /// Mirrors have no light.
+    #[error(transparent)]
+    Mirrors(#[from] MirrorError),
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// Pages are not of one build.
+    #[error("its pages have several sizes or resolutions, or its strips have other layers")]
+    UnlikePages,
+    /// The size of pixels is unknown.
+    #[error("its pages state no resolution, so no speed follows from their exposures")]
+    NoResolution,
+    /// The machine's file says nothing of a scan.
+    #[error("the machine {machine} has no [scan]: add it to its file (docs/gantry.md)")]
+    NoScan {
+        /// The machine's name.
+        machine: String,
+    },
+    /// Strips were cut for other mirrors.
+    #[error(
+        "its strips have {strips:?} mirrors and shared columns, and the machine {machine} has \
+         {scan:?}: cut the build for this machine (tile --strips)"
+    )]
+    OtherStrips {
+        /// The mirrors and the shared columns of the strips.
+        strips: [u32; 2],
+        /// The machine's name.
+        machine: String,
+        /// The machine's mirrors across, and shared columns.
+        scan: [u32; 2],
+    },
+    /// Strips have seams already.
+    #[error("its strips were cut with a {0} seam: give the build for another seam")]
+    CutSeam(&'static str),
+    /// A seam of gray levels is only in strips.
+    #[error("a gray seam is for strips (tile --seam gray): a job cuts a build with comb or time")]
+    GraySeam,
+    /// A layer states no exposure.
+    #[error(
+        "{layer} states no exposure: slice with --exposure, or add expose_s to [times] of the machine {machine}"
+    )]
+    NoExposure {
+        /// The layer's name.
+        layer: String,
+        /// The machine's name.
+        machine: String,
+    },
+    /// The machine cannot give an exposure.
+    #[error("{layer}: {limit}")]
+    Exposure {
+        /// The layer's name.
+        layer: String,
+        /// What the machine cannot do.
+        limit: ExposureLimit,
+    },
+    /// A layer has gray levels, and nothing shows them.
+    #[error(
+        "{layer} has gray levels: make dots of them with dither, or show them with --gray time"
+    )]
+    Gray {
+        /// The layer's name.
+        layer: String,
+    },
+    /// No layer is in the range.
+    #[error("no layer is in this range: the build has layers {first} to {last}")]
+    NoLayers {
+        /// The first layer's index.
+        first: u32,
+        /// The last layer's index.
+        last: u32,
+    },
+    /// A job's file is no job.
+    #[error("{}: {problem}", path.display())]
+    Job {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The build is not the job's.
+    #[error("{}: this is not the build that the job was made for: its digest differs", path.display())]
+    OtherBuild {
+        /// The build.
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,216 @@
+//! The pages of a build, as swaths are read from them.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use lamp_build::{Seam, StripForm, Swaths, check_number, is_strips, strip_files};
+use lamp_stack::{
+    Dpi, Frame, Image, IndexedStack, PageHeader, StackError, digest_of, digest_of_digests,
+};
+
+use crate::error::GantryError;
+use crate::job::{GrayBy, JobSeam};
+
+/// A build that can be read in any order: a stack, or a folder of strips.
+#[derive(Debug)]
+pub struct BuildPages {
+    path: PathBuf,
+    /// A stack, or one for each strip.
+    stacks: Vec<IndexedStack>,
+    /// The names of the strips' files; none of a stack.
+    files: Vec<String>,
+    form: Option<StripForm>,
+    size: [u32; 2],
+    dpi: Dpi,
+}
+
+impl BuildPages {
+    /// Opens a build: a stack as [`IndexedStack::open`] does, or a folder of strips.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be read whole, has pages of several sizes, or states no
+    /// resolution.
+    pub fn open(path: &Path) -> Result<Self, GantryError> {
+        let (files, form, width) = if is_strips(path) {
+            let strips = strip_files(path)?;
+            let width = strips.last().map_or(0, |strip| strip.columns.end);
+            let names: Vec<_> = strips.into_iter().map(|strip| strip.name).collect();
+            (names, Some(StripForm::of(path)?), Some(width))
+        } else {
+            (Vec::new(), None, None)
+        };
+        let open = |path: &Path| IndexedStack::open(path)?.into_whole();
+        let stacks = match form {
+            None => vec![open(path)?],
+            Some(_) => {
+                let opened = files.iter().map(|file| open(&path.join(file)));
+                opened.collect::<Result<_, _>>()?
+            }
+        };
+        for (strip, number) in stacks.iter().zip(0..) {
+            if form.is_some() {
+                for header in strip.headers() {
+                    let checked = check_number(&header.info, number);
+                    checked.map_err(|difference| lamp_build::StripsError::Unlike {
+                        file: files[number as usize].clone(),
+                        difference,
+                    })?;
+                }
+            }
+            let same = strip.headers().len() == stacks[0].headers().len()
+                && strip.headers().iter().zip(stacks[0].headers()).all(|(a, b)| {
+                    (a.info.index, a.size, a.dpi)
+                        == (b.info.index, stacks[0].headers()[0].size, stacks[0].headers()[0].dpi)
+                });
+            if !same {
+                return Err(GantryError::UnlikePages);
+            }
+        }
+        let first = &stacks[0].headers()[0];
+        let dpi = first.dpi.ok_or(GantryError::NoResolution)?;
+        let size = [width.unwrap_or(first.size[0]), first.size[1]];
+        Ok(Self { path: path.to_owned(), files, form, size, dpi, stacks })
+    }
+
+    /// Returns the width and the height of the build in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Returns the build's resolution.
+    pub fn dpi(&self) -> Dpi {
+        self.dpi
+    }
+
+    /// Returns the headers of the pages, bottom first; of strips, those of the first.
+    pub fn headers(&self) -> &[PageHeader] {
+        self.stacks[0].headers()
+    }
+
+    /// Returns how the build was cut into strips, if it was.
+    pub fn form(&self) -> Option<StripForm> {
+        self.form
+    }
+
+    /// Returns the name of a strip's file, if the build is a folder of strips.
+    pub fn strip(&self, swath: u32) -> Option<&str> {
+        self.files.get(swath as usize).map(String::as_str)
+    }
+
+    /// Returns the digest of the build's files: of one, or of all in the order of their names.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be read.
+    pub fn digest(&self) -> Result<String, GantryError> {
+        if !self.path.is_dir() {
+            return Ok(digest_of(File::open(&self.path)?)?);
+        }
+        let mut files = Vec::new();
+        for entry in fs::read_dir(&self.path)? {
+            let entry = entry?;
+            // Hidden files are lists and leftovers, which say nothing of the images.
+            if entry.file_type()?.is_file() && !entry.file_name().to_string_lossy().starts_with('.')
+            {
+                files.push(entry.path());
+            }
+        }
+        files.sort_unstable();
+        let digests: Result<Vec<String>, std::io::Error> =
+            files.iter().map(|file| digest_of(File::open(file)?)).collect();
+        Ok(digest_of_digests(digests?.iter().map(String::as_str)))
+    }
+
+    /// Returns the whole image of a page.
+    ///
+    /// # Errors
+    /// Returns an error if a page cannot be read, or if strips do not make a layer.
+    pub fn image(&self, page: usize) -> Result<Image, GantryError> {
+        let read = |stack: &IndexedStack| Ok(stack.layer(page)?.image.into_image());
+        let mut images: Vec<Image> =
+            self.stacks.iter().map(read).collect::<Result<_, StackError>>()?;
+        let Some(form) = self.form else { return Ok(images.swap_remove(0)) };
+        let swaths = Swaths::new(form.mirrors, form.overlap, self.size[0])?;
+        let joined = swaths.join(&images).map_err(|source| lamp_build::StripsError::Join {
+            layer: self.headers()[page].info.name(),
+            source,
+        })?;
+        Ok(match joined.to_mask() {
+            Some(mask) => mask.into(),
+            None => joined.into(),
+        })
+    }
+
+    /// Returns what each of some swaths of a page shows, from the left.
+    ///
+    /// # Errors
+    /// Returns an error if the page cannot be read, or has gray levels that nothing shows.
+    pub fn swaths(
+        &self,
+        page: usize,
+        of: std::ops::Range<u32>,
+        layout: &SwathLayout,
+    ) -> Result<Vec<Image>, GantryError> {
+        let images: Vec<Image> = if self.form.is_some() {
+            let strips = &self.stacks[of.start as usize..of.end as usize];
+            let read = strips.iter().map(|stack| Ok(stack.layer(page)?.image.into_image()));
+            read.collect::<Result<_, GantryError>>()?
+        } else {
+            let layer = self.stacks[0].layer(page)?;
+            let swaths = layout.swaths(self.size[0])?;
+            match layout.seam {
+                JobSeam::Comb | JobSeam::Gray => {
+                    swaths.cut(&layer.image, layer.info.index, of).collect()
+                }
+                JobSeam::Time => of
+                    .map(|swath| {
+                        let left = swaths.columns(swath).start.into();
+                        let height = layer.image.height();
+                        let frame = Frame { left, top: 0, width: layout.mirrors, height };
+                        match &*layer.image {
+                            Image::Mask(mask) => mask.framed(frame).into(),
+                            Image::Gray(gray) => gray.framed(frame).into(),
+                        }
+                    })
+                    .collect(),
+            }
+        };
+        if layout.gray == GrayBy::Dots
+            && images
+                .iter()
+                .any(|image| matches!(image, Image::Gray(gray) if gray.to_mask().is_none()))
+        {
+            return Err(GantryError::Gray { layer: self.headers()[page].info.name() });
+        }
+        Ok(images)
+    }
+}
+
+/// How layers are divided among swaths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SwathLayout {
+    /// The width of a swath in pixels.
+    pub mirrors: u32,
+    /// The columns that it shares with the next.
+    pub overlap: u32,
+    /// How they share them.
+    pub seam: JobSeam,
+    /// How gray levels are shown.
+    pub gray: GrayBy,
+}
+
+impl SwathLayout {
+    /// Returns the swaths of layers of a width.
+    ///
+    /// # Errors
+    /// Returns an error if they share half of their columns or more.
+    pub fn swaths(&self, width: u32) -> Result<Swaths, GantryError> {
+        let seam = if self.seam == JobSeam::Gray { Seam::Gray } else { Seam::Comb };
+        Ok(Swaths::new(self.mirrors, self.overlap, width)?.with_seam(seam))
+    }
+
+    /// Returns how many columns a swath shares in time with the one on its left, and on its right.
+    pub(crate) fn shared(&self, swath: u32, count: u32) -> [u32; 2] {
+        let overlap = if self.seam == JobSeam::Time { self.overlap } else { 0 };
+        [if swath > 0 { overlap } else { 0 }, if swath + 1 < count { overlap } else { 0 }]
+    }
+}
