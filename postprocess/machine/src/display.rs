@@ -35,9 +35,15 @@ pub enum DisplayError {
     NotAboveZero(&'static str),
 }
 
+macro_rules! builtin {
+    ($name:literal) => {
+        Builtin { name: $name, toml: include_str!(concat!("../displays/", $name, ".toml")) }
+    };
+}
+
 impl Catalogued for Display {
     const KIND: &'static str = "display";
-    const BUILTINS: &'static [Builtin] = &[];
+    const BUILTINS: &'static [Builtin] = &[builtin!("dlp7000")];
     type CheckError = DisplayError;
 
     fn name(&self) -> &str {
@@ -56,5 +62,40 @@ impl Catalogued for Display {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHOLE: &str = "name = \"mine\"\ndescription = \"\"\nmirrors = [8, 6]\npitch_um = 10.5\nbinary_rate_hz = 100\nsource = \"-\"\n";
+
+    #[test]
+    fn built_in_displays_are_whole_and_say_that_they_are_no_machines() {
+        for builtin in Display::BUILTINS {
+            let display = Display::from_toml(builtin.toml).unwrap();
+            assert_eq!(display.name, builtin.name);
+            assert!(display.description.contains("a display, no machine"));
+            assert!(display.source.contains("data sheet DLPS"), "{}", display.source);
+        }
+    }
+
+    #[test]
+    fn errors_name_the_key_and_what_to_do() {
+        assert_eq!(Display::from_toml(WHOLE).unwrap().mirrors, [8, 6]);
+        for (from, to, words) in [
+            ("[8, 6]", "[6, 8]", "mirrors: each side"),
+            ("[8, 6]", "[8, 0]", "mirrors: each side"),
+            ("[8, 6]", "[65536, 6]", "mirrors: each side"),
+            ("10.5", "0", "pitch_um: it must be above zero"),
+            ("10.5", "nan", "pitch_um: it must be above zero"),
+            ("= 100", "= inf", "binary_rate_hz: it must be above zero"),
+            ("\"-\"", "\"\"", "source: this is empty"),
+        ] {
+            assert!(WHOLE.contains(from), "{from}");
+            let error = Display::from_toml(&WHOLE.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 }

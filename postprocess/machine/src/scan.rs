@@ -437,6 +437,25 @@ source = "-"
     }
 
     #[test]
+    fn a_display_stands_in_for_mirrors_and_row_clock() {
+        let [mirrors, row_clock] = ["mirrors = [3, 1]", "row_clock_hz = 0.5"];
+        let with = |text: &str| format!("{text}display = \"dlp7000\"\n");
+        let bare = with(&LEAST.replacen(mirrors, "", 1).replacen(row_clock, "", 1));
+        assert_eq!((scan(&bare).mirrors(), scan(&bare).row_clock_hz()), ([1024, 768], 32_552.0));
+        assert_eq!(machine(&bare).unwrap().swaths(), Some((1024, 0)));
+        let own = scan(&with(LEAST));
+        assert_eq!((own.mirrors(), own.row_clock_hz()), ([3, 1], 0.5));
+        // A display may be turned, but not grow.
+        assert_eq!(scan(&with(&LEAST.replacen("[3, 1]", "[768, 1024]", 1))).mirrors(), [768, 1024]);
+        for more in ["[1025, 1]", "[769, 1024]"] {
+            let error = machine(&with(&LEAST.replacen("[3, 1]", more, 1))).unwrap_err();
+            assert!(error.contains("more than the 1024x768 of the display dlp7000"), "{error}");
+        }
+        let unknown = machine(&bare.replacen("dlp7000", "dlp1", 1)).unwrap_err();
+        assert!(unknown.contains("write one of dlp7000, or leave it out"), "{unknown}");
+    }
+
+    #[test]
     fn errors_name_the_key_and_what_to_do() {
         let both = "dead = [[512, 4], [7, 700]]";
         for (from, to, words) in [
