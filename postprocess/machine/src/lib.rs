@@ -12,6 +12,7 @@
 
 mod display;
 mod file;
+mod light;
 mod limit;
 mod motion;
 mod scan;
@@ -22,6 +23,7 @@ use serde::Deserialize;
 
 pub use display::{Display, DisplayError};
 pub use file::MachineError;
+pub use light::{LightError, LightTable};
 pub use limit::MachineLimit;
 pub use motion::{Acceleration, MotionError, Speed};
 pub use scan::{MirrorFaults, Scan, ScanDirection, ScanError, ScanLight};
