@@ -125,6 +125,7 @@ fn json_says_what_is_known_of_machines() {
             "thickness_um": [500.0, 1000.0],
             "mirrors": 64,
             "overlap": 8,
+            "scan": null,
             "recoating_pa": null,
             "times": {
                 "recoat_s": 8.0,
@@ -148,4 +149,119 @@ fn json_says_what_is_known_of_machines() {
     assert_eq!(list["machines"][1]["area_mm"], json!([584.2, 584.2]));
     assert_eq!(list["machines"][1]["height_mm"], Value::Null);
     assert_eq!(list["machines"][1]["sources"]["strips"], Value::Null);
+    assert_eq!(list["displays"][0]["name"], "dlp7000");
+    assert_eq!(list["displays"][0]["mirrors"], json!([1024, 768]));
+    let text = scratch.run("lamp machine list").succeeds_quietly().stdout;
+    let text = String::from_utf8(text).unwrap();
+    let (machines, displays) = text.split_once("\nDisplays").unwrap();
+    assert!(machines.contains("alpha") && !machines.contains("dlp7000"), "{text}");
+    assert!(displays.contains("1024x768") && displays.contains("no machine"), "{text}");
+}
+
+const SCAN: &str = r#"
+[scan]
+display = "dlp7000"
+mirrors = [64, 2]
+overlap = 8
+speed = ["1mm/s", "0.2m/s"]
+acceleration = "2000mm/s2"
+both_ways = true
+source = "data sheet"
+
+[scan.faults]
+dead = [[3, 1]]
+source = "camera"
+"#;
+
+/// Returns the machine with a scan in place of its strips and times.
+fn scanning() -> String {
+    let (limits, _) = MINE.split_once("[strips]").unwrap();
+    limits.to_owned() + SCAN
+}
+
+const LIGHT: &str = "[scan.light]\nfile = \"light.csv\"\nsource = \"camera\"\n";
+
+#[test]
+fn json_says_how_a_display_scans() {
+    let scratch = tower_and_machine();
+    scratch.write("scan.toml", scanning().as_bytes());
+    let stdout = scratch.run("lamp machine show scan.toml --json").succeeds_quietly().stdout;
+    let answer: Value = serde_json::from_slice(&stdout).unwrap();
+    let machine = &answer["machines"][0];
+    assert_eq!((&machine["mirrors"], &machine["overlap"]), (&json!(64), &json!(8)));
+    assert_eq!(
+        machine["scan"],
+        json!({
+            "display": "dlp7000",
+            "mirrors": [64, 2],
+            "overlap_px": 8,
+            "speed_mm_per_s": [1.0, 200.0],
+            "acceleration_mm_per_s2": 2000.0,
+            "row_clock_hz": 32552.0,
+            "both_ways": true,
+            "direction": "down",
+            "settle_s": 0.0,
+            "strobe": 1.0,
+            "passes": 1,
+            "tilt_deg": 0.0,
+            "irradiance_mw_per_cm2": null,
+            "light": null,
+            "faults": {"dead": [[3, 1]], "stuck": [], "source": "camera"},
+            "source": "data sheet",
+        })
+    );
+}
+
+#[test]
+fn a_build_is_cut_into_the_swaths_of_a_scan_as_into_strips() {
+    let scratch = tower_and_machine();
+    scratch.write("scan.toml", scanning().as_bytes());
+    scratch.run(&format!("{SLICE} --dpi 100 --thickness 1mm")).succeeds_quietly();
+    let tile = "tile tower.tif --copies 1 --mesh none";
+    for machine in ["mine", "scan"] {
+        scratch
+            .run(&format!("{tile} --machine {machine}.toml --strips {machine}"))
+            .succeeds_quietly();
+        scratch.run(&format!("lamp join {machine} -o {machine}.tif")).succeeds_quietly();
+    }
+    let images = |name| scratch.layers(name).into_iter().map(|layer| layer.image);
+    assert!(images("mine.tif").eq(images("scan.tif")));
+    let info = |folder| {
+        let stdout = scratch.run(&format!("lamp info {folder} --json")).succeeds_quietly().stdout;
+        serde_json::from_slice::<Value>(&stdout).unwrap()
+    };
+    for key in ["mirrors", "overlap"] {
+        assert_eq!(info("mine")[key], info("scan")[key]);
+    }
+}
+
+#[test]
+fn machine_files_are_checked_with_the_light_that_they_name() {
+    let scratch = tower_and_machine();
+    let folder = scratch.path("light");
+    std::fs::create_dir(&folder).unwrap();
+    let lit = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    lit("scan.toml", &(scanning() + LIGHT));
+    lit("light.csv", &format!("{}\n", ["1"; 64].join(",")).repeat(2));
+    let line = "lamp machine check mine.toml light/scan.toml";
+    assert_eq!(
+        String::from_utf8(scratch.run(line).succeeds_quietly().stdout).unwrap(),
+        "mine.toml: machine mine: whole\nlight/scan.toml: machine mine: whole\n"
+    );
+    for (light, words) in [
+        (Some("1\n"), "line 1: 1 number, and 64 mirrors lie across"),
+        (Some(""), "0 rows, and 2 mirrors lie along the scan"),
+        (None, "light/scan.toml: scan.light.file: light.csv: "),
+    ] {
+        match light {
+            Some(light) => lit("light.csv", light),
+            None => std::fs::remove_file(folder.join("light.csv")).unwrap(),
+        }
+        let output = scratch.run(line);
+        let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+        output.is_refused_with(&["1 of 2 machine files has a fault"]);
+        let lines: Vec<_> = stdout.lines().collect();
+        assert_eq!((lines.len(), lines[0]), (2, "mine.toml: machine mine: whole"), "{stdout}");
+        assert!(lines[1].contains(words), "{stdout}");
+    }
 }

@@ -1,10 +1,11 @@
-//! `lamp machine`: lists and shows machines.
+//! `lamp machine`: lists, shows and checks machines.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
-use lamp_machine::{Machine, Recoating};
-use lamp_pipeline::documents::document;
+use lamp_machine::{Display, Machine, Recoating, Scan, Speed};
+use lamp_pipeline::documents::{document, read_file};
 use lamp_stack::to_nm;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
@@ -12,14 +13,16 @@ use serde_json::{Value, json};
 use crate::catalogue::show;
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
-use crate::streams::print;
+use crate::streams::{input_name, print};
+use crate::terminal::progress::printable;
 
-/// List or show machines: build area, height, resolution and layer thickness
+/// List, show or check machines: build area, height, resolution, layer thickness and scan
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp machine list
   lamp machine show beta > mine.toml
+  lamp machine check mine.toml
   tile blade.tif --machine mine.toml -o build.tif")]
 pub(crate) struct MachineArgs {
     #[command(subcommand)]
@@ -28,7 +31,7 @@ pub(crate) struct MachineArgs {
 
 #[derive(Subcommand)]
 enum MachineAction {
-    /// List the built-in machines
+    /// List the built-in machines, and the built-in displays for the scans of your own
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -44,26 +47,78 @@ enum MachineAction {
         #[arg(long)]
         json: bool,
     },
+    /// Check machine files, and the light files that they name
+    ///
+    /// Each file gets one line.
+    #[command(after_help = "Exit status: 0 if no file has a fault, 1 otherwise.")]
+    Check {
+        /// Machine files, or - for standard input
+        #[arg(value_name = "FILE", required = true)]
+        files: Vec<PathBuf>,
+    },
 }
 
 pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
-        MachineAction::List { json: true } => answer(Machine::builtins()),
-        MachineAction::List { json: false } => print(&table()),
-        MachineAction::Show { machine, json: true } => answer([document(machine)?]),
+        MachineAction::List { json: true } => {
+            let machines: Vec<Value> = Machine::builtins().map(|it| fields(&it)).collect();
+            let displays: Vec<Value> = Display::builtins().map(|it| display_fields(&it)).collect();
+            answer(&json!({ "machines": machines, "displays": displays }))
+        }
+        MachineAction::List { json: false } => print(&(machine_table() + "\n" + &display_table())),
+        MachineAction::Show { machine, json: true } => {
+            answer(&json!({ "machines": [fields(&document(machine)?)] }))
+        }
         MachineAction::Show { machine, json: false } => show::<Machine>(machine),
+        MachineAction::Check { files } => check(files),
     }
 }
 
-fn answer(machines: impl IntoIterator<Item = Machine>) -> Result<(), Exit> {
-    let machines: Vec<Value> = machines.into_iter().map(|machine| fields(&machine)).collect();
-    print_answer("lamp-machine-1", &json!({ "machines": machines }))
+fn answer(fields: &Value) -> Result<(), Exit> {
+    print_answer("lamp-machine-1", fields)
+}
+
+/// Prints a line for each file: its machine, or its fault.
+fn check(files: &[PathBuf]) -> Result<(), Exit> {
+    let mut faulty = 0;
+    for path in files {
+        let line = match checked(path) {
+            Ok(machine) => format!("{}: machine {}: whole", input_name(path), machine.name),
+            Err(fault) => {
+                faulty += 1;
+                fault.to_string()
+            }
+        };
+        print(&format!("{}\n", printable(&line)))?;
+    }
+    let all = files.len();
+    match faulty {
+        0 => Ok(()),
+        1 => Err(Exit::Failed(anyhow!("1 of {all} machine files has a fault"))),
+        _ => Err(Exit::Failed(anyhow!("{faulty} of {all} machine files have faults"))),
+    }
+}
+
+/// Reads a machine's file, and the light that it names.
+fn checked(path: &Path) -> Result<Machine, Exit> {
+    let (machine, _) = read_file::<Machine>(path)?;
+    if let Some(scan) = &machine.scan
+        && let Some(light) = &scan.light
+    {
+        // A machine that is piped in stands in the current folder, as does a bare name: both have
+        // an empty parent.
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let place = format!("{}: scan.light.file: {}", input_name(path), light.file.display());
+        light.read(folder, scan.mirrors()).context(place).map_err(Exit::Failed)?;
+    }
+    Ok(machine)
 }
 
 /// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> Value {
     let Machine { name, description, area, height, dpi, thickness, .. } = machine;
-    let Machine { strips, recoating, times, defaults, .. } = machine;
+    let Machine { strips, scan, recoating, times, defaults, .. } = machine;
+    let swaths = machine.swaths();
     json!({
         "name": name,
         "description": description,
@@ -71,8 +126,9 @@ fn fields(machine: &Machine) -> Value {
         "height_mm": height.as_ref().map(|height| to_nm(height.value.mm())),
         "dpi": dpi.as_ref().map(|dpi| [dpi.least, dpi.most]),
         "thickness_um": thickness.as_ref().map(|limits| [limits.least.um(), limits.most.um()]),
-        "mirrors": strips.as_ref().map(|strips| strips.mirrors),
-        "overlap": strips.as_ref().map(|strips| strips.overlap),
+        "mirrors": swaths.map(|(mirrors, _)| mirrors),
+        "overlap": swaths.map(|(_, overlap)| overlap),
+        "scan": scan.as_ref().map(scan_fields),
         "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
         "times": times.as_ref().map(|times| json!({
             "recoat_s": times.recoat_s,
@@ -97,8 +153,65 @@ fn fields(machine: &Machine) -> Value {
     })
 }
 
+/// The fields of a scan, with the mirrors and the row clock of its display if it has none of its
+/// own.
+fn scan_fields(scan: &Scan) -> Value {
+    json!({
+        "display": scan.display,
+        "mirrors": scan.mirrors(),
+        "overlap_px": scan.overlap,
+        "speed_mm_per_s": scan.speed.map(Speed::mm_per_s),
+        "acceleration_mm_per_s2": scan.acceleration.mm_per_s2(),
+        "row_clock_hz": scan.row_clock_hz(),
+        "both_ways": scan.both_ways,
+        "direction": scan.direction.name(),
+        "settle_s": scan.settle_s,
+        "strobe": scan.strobe,
+        "passes": scan.passes,
+        "tilt_deg": scan.tilt_deg,
+        "irradiance_mw_per_cm2": scan.irradiance_mw_per_cm2,
+        "light": scan.light.as_ref().map(|light| json!({
+            "file": light.file.to_string_lossy(),
+            "source": light.source,
+        })),
+        "faults": scan.faults.as_ref().map(|faults| json!({
+            "dead": faults.dead,
+            "stuck": faults.stuck,
+            "source": faults.source,
+        })),
+        "source": scan.source,
+    })
+}
+
+fn display_fields(display: &Display) -> Value {
+    let Display { name, description, mirrors, pitch_um, binary_rate_hz, source } = display;
+    json!({
+        "name": name,
+        "description": description,
+        "mirrors": mirrors,
+        "pitch_um": pitch_um,
+        "binary_rate_hz": binary_rate_hz,
+        "source": source,
+    })
+}
+
+/// A line for each built-in display, under a heading.
+fn display_table() -> String {
+    let mut text = format!(
+        "Displays, for [scan] in machine files:\n{:<10}{:<12}{:<10}{:<14}description\n",
+        "name", "mirrors", "pitch", "pictures"
+    );
+    for Display { name, description, mirrors, pitch_um, binary_rate_hz, .. } in Display::builtins()
+    {
+        let mirrors = mirrors.map(|side| side.to_string()).join("x");
+        let [pitch, rate] = [format!("{pitch_um}um"), format!("{binary_rate_hz}/s")];
+        text += &format!("{name:<10}{mirrors:<12}{pitch:<10}{rate:<14}{description}\n");
+    }
+    text
+}
+
 /// A line for each built-in machine.
-fn table() -> String {
+fn machine_table() -> String {
     let mut text = format!(
         "{:<8}{:<18}{:<10}{:<14}{:<16}description\n",
         "name", "area", "height", "dpi", "layers"

@@ -71,8 +71,8 @@ impl BuildTime {
 /// Returns the swaths of one layer, if the machine's speed is known.
 fn swaths(machine: &Machine, image: PixelSize, dpi: Dpi) -> Option<SwathTime> {
     let times = machine.times.as_ref()?;
-    let strips = machine.strips.as_ref()?;
-    let count = Swaths::new(strips.mirrors, strips.overlap, image.width).ok()?.count();
+    let (mirrors, overlap) = machine.swaths()?;
+    let count = Swaths::new(mirrors, overlap, image.width).ok()?.count();
     let length_mm = f64::from(image.height) * dpi.pitch().mm();
     // There is at least one swath, also for an image without columns.
     let steps_s = f64::from(count - 1) * times.swath_step_s.unwrap_or(0.0);

@@ -57,18 +57,19 @@ impl StripArgs {
         force: bool,
     ) -> Result<Option<StripOutput>, Exit> {
         let Some(folder) = &self.strips else { return Ok(None) };
-        let of_machine = machine.and_then(|machine| machine.strips.as_ref());
-        let mirrors = self.mirrors.or(of_machine.map(|strips| strips.mirrors));
+        let of_machine = machine.and_then(Machine::swaths);
+        let mirrors = self.mirrors.or(of_machine.map(|(mirrors, _)| mirrors));
         let Some(mirrors) = mirrors else {
             return Err(Exit::usage(match machine {
-                None => "--strips needs --mirrors, or a --machine that has [strips]".to_owned(),
+                None => "--strips needs --mirrors, or a --machine that has [strips] or [scan]"
+                    .to_owned(),
                 Some(Machine { name, .. }) => format!(
-                    "--strips needs --mirrors: the machine {name} has no [strips] (docs/tile.md)"
+                    "--strips needs --mirrors: the machine {name} has no [strips] or [scan] (docs/tile.md)"
                 ),
             }));
         };
         let of_machine = of_machine.filter(|_| self.mirrors.is_none());
-        let overlap = self.overlap.or(of_machine.map(|strips| strips.overlap)).unwrap_or(0);
+        let overlap = self.overlap.or(of_machine.map(|(_, overlap)| overlap)).unwrap_or(0);
         let new = new_folder(folder, force)?;
         match StripWriter::new(new, mirrors, overlap, self.seam, format(classic)) {
             Ok(writer) => Ok(Some(StripOutput { folder: folder.to_owned(), writer })),
