@@ -224,8 +224,8 @@ pub enum ScanError {
 static DISPLAYS: LazyLock<Vec<Display>> = LazyLock::new(|| Display::builtins().collect());
 
 impl Scan {
-    /// Returns the mirrors in use across the scan and along it: those of the file, or the
-    /// display's.
+    /// Returns the mirrors in use across the scan and along it, from the file or else from the
+    /// display.
     ///
     /// A scan of a file that was read has one of both, because [`ScanError::NoMirrors`] refuses
     /// others. For a scan that was made by hand without either, a single mirror is returned.
@@ -233,7 +233,7 @@ impl Scan {
         self.given_mirrors().unwrap_or([1, 1])
     }
 
-    /// Returns the most rows by which the picture moves in a second: that of the file, or the
+    /// Returns the most rows by which the picture moves in a second, from the file or else the
     /// display's rate of black and white pictures.
     ///
     /// A scan of a file that was read has one of both, because [`ScanError::NoRowClock`] refuses
