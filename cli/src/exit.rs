@@ -6,6 +6,7 @@ use std::io;
 use lamp_batch::BatchError;
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
+use lamp_gantry::GantryError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::calibrate::{DataError, FitError};
 use lamp_grayscale::exposure::{ExposureError, LampError};
@@ -182,6 +183,7 @@ failures!(
     EditError,
     TileError,
     StripsError,
+    GantryError,
     LayoutError,
     RecipeError,
     MachineLimit,

@@ -5,7 +5,7 @@
 //! point sees its pixel for N rows: t = N p / v.
 //!
 //! - A [`Job`] has, for each layer of a build, the speed that gives its exposure and the swaths in the
-//!   order of the least way; [`BuildPages`] reads their images.
+//!   order of the least way; [`BuildPages`] reads their images, and a [`JobFolder`] keeps it.
 //! - [`Frames`] are what the mirrors show, row by row; [`FrameWriter`] and [`FrameReader`] put them into
 //!   files. A [`MirrorArray`] has the light of each mirror, and makes up for what is uneven or dead.
 //! - [`expose`] replays frames as a machine would and adds up the dose of every pixel. It shares no
@@ -20,6 +20,7 @@ mod error;
 mod frame_file;
 mod frames;
 mod job;
+mod job_folder;
 mod mirrors;
 mod motion;
 mod route;
@@ -31,6 +32,7 @@ pub use error::GantryError;
 pub use frame_file::{FrameFileError, FrameHeader, FrameReader, FrameWriter};
 pub use frames::{Frame, Frames, SwathImage};
 pub use job::{GrayBy, JOB_SCHEMA, Job, JobLayer, JobOptions, JobSeam, JobSums, JobSwath};
+pub use job_folder::{JobFolder, seen_from};
 pub use mirrors::{MirrorArray, MirrorError};
 pub use motion::move_s;
 pub use source::{BuildPages, SwathLayout};

@@ -117,6 +117,11 @@ impl MirrorArray {
         self.full_rows
     }
 
+    /// Returns the light of each mirror, row after row along the scan; empty if all are 1.
+    pub fn light(&self) -> &[f32] {
+        &self.light
+    }
+
     /// Returns whether all mirrors are alike.
     pub fn is_even(&self) -> bool {
         self.light.is_empty()

@@ -4,6 +4,7 @@ use lamp_adaptive::HeightsError;
 use lamp_batch::{BatchError, NightError, StoreError};
 use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
 use lamp_edit::EditError;
+use lamp_gantry::GantryError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::exposure::ExposureError;
 use lamp_machine::MachineLimit;
@@ -40,6 +41,7 @@ errors!(
     Dither(DitherError),
     Edit(EditError),
     Exposure(ExposureError),
+    Gantry(GantryError),
     Heights(HeightsError),
     Io(std::io::Error),
     Layout(LayoutError),

@@ -155,6 +155,7 @@ pub use lamp_batch as batch;
 pub use lamp_build as build;
 pub use lamp_edit as edit;
 pub use lamp_fix as fix;
+pub use lamp_gantry as gantry;
 pub use lamp_grayscale as grayscale;
 pub use lamp_machine as machine;
 pub use lamp_offset as offset;

@@ -13,10 +13,13 @@ mod cure;
 mod demo;
 mod dither;
 mod edit;
+mod expose;
 mod fix;
+mod frames;
 mod heights;
 mod info;
 mod info_strips;
+mod job;
 mod join;
 mod learn;
 mod machine;
@@ -67,6 +70,9 @@ pub(crate) enum Command {
     Pack(pack::PackArgs),
     Join(join::JoinArgs),
     Split(split::SplitArgs),
+    Job(job::JobArgs),
+    Frames(frames::FramesArgs),
+    Expose(expose::ExposeArgs),
     Machine(machine::MachineArgs),
     Material(material::MaterialArgs),
     Projector(projector::ProjectorArgs),
@@ -120,6 +126,9 @@ impl Command {
             Self::Pack(args) => pack::run(args, common),
             Self::Join(args) => join::run(args, common),
             Self::Split(args) => split::run(args, common),
+            Self::Job(args) => job::run(args, common),
+            Self::Frames(args) => frames::run(args, common),
+            Self::Expose(args) => expose::run(args, common),
             Self::Machine(args) => machine::run(args),
             Self::Material(args) => material::run(args, common),
             Self::Projector(args) => projector::run(args),

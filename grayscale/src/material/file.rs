@@ -270,7 +270,10 @@ source = "notebook, page 3"
         assert_eq!(spread("60 mm", "1 um"), "spread.sigma must be at most 2 mm");
         assert_eq!(spread("1 um", "0 um"), "spread.pixel must be above zero");
         let unit = spread("13", "1 um");
-        assert!(unit.contains("spread.sigma.value") && unit.contains("has no known unit"), "{unit}");
+        assert!(
+            unit.contains("spread.sigma.value") && unit.contains("has no known unit"),
+            "{unit}"
+        );
         for gamma in ["0", "-1", "nan", "inf"] {
             let said = refused(&format!("[gamma]\nvalue = {gamma}\nsource = \"a\"\n"));
             assert_eq!(said, "gamma.value must be above zero");

@@ -239,7 +239,10 @@ fn a_3mf_that_cannot_be_read_says_why() {
         (with("x=\"0\"", "x=\"zero\""), "<vertex> has no readable x"),
         (with("v1=\"0\"", "v1=\"99\""), "a triangle names vertex 99 of 8"),
         (with("millimeter", "furlong"), "<model> has no readable unit"),
-        (with("objectid=\"1\"", "objectid=\"1\" transform=\"1 0 0\""), "<item> has no readable transform"),
+        (
+            with("objectid=\"1\"", "objectid=\"1\" transform=\"1 0 0\""),
+            "<item> has no readable transform",
+        ),
         (with("</model>", ""), "is cut off"),
         (
             with("unit=", "requiredextensions=\"b\" xmlns:b=\"http://beams\" unit="),

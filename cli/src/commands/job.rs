@@ -1,0 +1,198 @@
+//! `lamp job`: what a machine that scans does for a build.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use lamp_gantry::{
+    BuildPages, GantryError, GrayBy, Job, JobFolder, JobOptions, JobSeam, MirrorArray, seen_from,
+};
+use lamp_machine::{LightTable, Machine};
+use lamp_pipeline::documents::document_and_text;
+use lamp_pipeline::heights::time_text;
+
+use crate::args::options::{Common, one_of_described, parse_layers};
+use crate::exit::Exit;
+use crate::output::json_report::print_answer;
+use crate::streams::{input_name, is_stream, new_folder, print};
+use crate::terminal::progress::say;
+
+/// Plan the scan of a build: speeds, swaths and times of each layer
+///
+/// A machine with [scan] in its file moves a display of mirrors over the resin. For each layer, the
+/// job has the speed and the row clock that give the layer's exposure, and the swaths that hold white,
+/// in the order of the least way. Black swaths are left out, and so are rows without white above and
+/// below. An exposure that the machine cannot give is refused, with the layer and the limit.
+///
+/// The folder gets job.json, layers.csv and swaths.csv, and a copy of the machine's file.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  lamp job build.tif --machine mine.toml -o job/
+  lamp job strips/ --machine mine.toml -o job/
+  lamp job build.tif --machine mine.toml --seam time --gray time -o job/
+  lamp frames job/ --layer 812 --swath 3 -o swath.frames
+  lamp expose job/ --layers 812")]
+pub(crate) struct JobArgs {
+    /// Build: a stack, or a folder of strips
+    #[arg(value_name = "BUILD")]
+    build: PathBuf,
+
+    #[command(flatten)]
+    scan: ScanArgs,
+
+    /// Plan only these layers: A..B is A to B - 1; A.. and ..B are open-ended
+    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    layers: Option<Range<u32>>,
+
+    /// Folder to write the job to
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long)]
+    force: bool,
+
+    /// Print the job's sums as JSON, as docs/json.md describes it
+    #[arg(long)]
+    json: bool,
+}
+
+/// How a machine scans a build.
+#[derive(Args, Clone, Debug)]
+pub(super) struct ScanArgs {
+    /// Machine: a file with [scan]
+    #[arg(long, value_name = "MACHINE")]
+    machine: Option<PathBuf>,
+
+    /// Exposure of the columns that a swath and the next share [default: comb, or as the strips
+    /// were cut]
+    #[arg(long)]
+    #[arg(value_parser = one_of_described::<JobSeam>(&[
+        "Each pixel belongs to one swath: each row changes over at its own column",
+        "Strips of tile --seam gray, whose levels fall as the next strip's rise",
+        "Each swath shows a pixel for its share of the rows of mirrors",
+    ]))]
+    seam: Option<JobSeam>,
+
+    /// How gray levels are exposed
+    #[arg(long, default_value_t)]
+    #[arg(value_parser = one_of_described::<GrayBy>(&[
+        "The build is dithered; gray layers are refused",
+        "A gray pixel is on for its level's share of the rows of mirrors, without dots",
+    ]))]
+    gray: GrayBy,
+}
+
+/// A machine that scans, as its file has it.
+struct Scanner {
+    machine: Machine,
+    text: String,
+    light: Option<LightTable>,
+    mirrors: MirrorArray,
+}
+
+impl ScanArgs {
+    /// Returns whether none of the options is given.
+    pub(super) fn is_default(&self) -> bool {
+        self.machine.is_none() && self.seam.is_none() && self.gray == GrayBy::default()
+    }
+
+    fn scanner(&self) -> Result<Scanner, Exit> {
+        let Some(path) = &self.machine else {
+            return Err(Exit::usage("--machine is missing: give a machine's file with [scan]"));
+        };
+        let (machine, text) = document_and_text::<Machine>(path)?;
+        let Some(scan) = &machine.scan else {
+            return Err(GantryError::NoScan { machine: machine.name }.into());
+        };
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let light = scan.light.as_ref().map(|light| {
+            light.read(folder, scan.mirrors()).map_err(|error| {
+                Exit::Failed(error.into()).at(folder.join(&light.file).display().to_string())
+            })
+        });
+        let light = light.transpose()?;
+        let mirrors = MirrorArray::of(scan, light.as_ref())
+            .map_err(|error| Exit::from(error).at(path.display().to_string()))?;
+        Ok(Scanner { machine, text, light, mirrors })
+    }
+
+    /// Plans layers of a build. `name` is the build's in the job.
+    pub(super) fn plan(
+        &self,
+        build: &Path,
+        name: String,
+        layers: Range<u32>,
+    ) -> Result<(Job, BuildPages, MirrorArray), Exit> {
+        let (job, pages, scanner) = self.planned(build, name, layers)?;
+        Ok((job, pages, scanner.mirrors))
+    }
+
+    fn planned(
+        &self,
+        build: &Path,
+        name: String,
+        layers: Range<u32>,
+    ) -> Result<(Job, BuildPages, Scanner), Exit> {
+        if is_stream(build) {
+            return Err(Exit::usage("a job names its build: give the build's file or folder"));
+        }
+        let scanner = self.scanner()?;
+        let at = |error: GantryError| Exit::from(error).at(input_name(build));
+        let pages = BuildPages::open(build).map_err(at)?;
+        let options = JobOptions { seam: self.seam, gray: self.gray, layers };
+        let job = Job::plan(&pages, name, &scanner.machine, &scanner.mirrors, &options);
+        Ok((job.map_err(at)?, pages, scanner))
+    }
+}
+
+pub(crate) fn run(args: &JobArgs, common: &Common) -> Result<(), Exit> {
+    let folder = new_folder(&args.output, args.force)?;
+    let name = seen_from(folder.path(), &args.build)
+        .map_err(|error| Exit::Failed(error.into()).at(input_name(&args.build)))?;
+    let layers = args.layers.clone().unwrap_or(0..u32::MAX);
+    let (job, _, scanner) = args.scan.planned(&args.build, name.display().to_string(), layers)?;
+    JobFolder::write(folder, &job, &scanner.text, scanner.light.as_ref())
+        .map_err(|error| Exit::from(error).at(args.output.display().to_string()))?;
+    if args.json {
+        return print_answer("lamp-job-sums-1", &job.sums);
+    }
+    if !common.quiet {
+        say(&format!("job: {}: written", args.output.display()));
+    }
+    print(&text(&job, scanner.machine.recoat_s().is_none()))
+}
+
+fn text(job: &Job, no_recoating: bool) -> String {
+    let sums = &job.sums;
+    let ends = |of: fn(&lamp_gantry::JobLayer) -> f64| {
+        let all = job.layers.iter().map(of);
+        let [least, most] = [all.clone().fold(f64::INFINITY, f64::min), all.fold(0.0, f64::max)];
+        if most - least < 0.005 {
+            format!("{least:.2}")
+        } else {
+            format!("{least:.2} to {most:.2}")
+        }
+    };
+    let mut text = format!(
+        "layers:     {}\nexposure:   {} ms\nspeed:      {} mm/s, {} rows/s\n\
+         swaths:     {} ({} black ones are left out), {} frames\n\
+         time:       {}: {} scanning, {} between swaths, {} between layers\n",
+        sums.layers,
+        ends(|layer| layer.exposure_ms),
+        ends(|layer| layer.speed_mm_per_s),
+        ends(|layer| layer.row_clock_hz),
+        sums.swaths,
+        sums.empty_swaths,
+        sums.frames,
+        time_text(sums.seconds),
+        time_text(sums.scan_s),
+        time_text(sums.steps_s),
+        time_text(sums.between_s),
+    );
+    if no_recoating {
+        text += "recoating is not in it: write recoat_s into [times] of the machine's file\n";
+    }
+    text
+}
