@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lamp_machine::{Machine, Scan, ScanDirection};
-use lamp_stack::{Image, Length, PageHeader};
+use lamp_stack::{Image, Length, PageHeader, PageInfo};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -262,12 +262,14 @@ impl Job {
             sums: JobSums::default(),
             layers: Vec::with_capacity(chosen.len()),
         };
-        let pitch = pages.dpi().pitch();
-        let mut head = None;
+        let mut planner = Planner::new(scan, layout, pages.dpi().pitch(), mirrors.size()[1]);
         for (((page, header), (exposure_ms, clock)), white) in chosen.iter().zip(clocks).zip(white)
         {
-            let plan = LayerPlan { pages, scan, layout, pitch, count, along: mirrors.size()[1] };
-            let mut layer = plan.layer(*page, header, exposure_ms, clock, &white, &mut head);
+            let mut layer = planner.layer(&header.info, exposure_ms, clock, &white);
+            layer.page = *page;
+            for pass in &mut layer.swaths {
+                pass.strip = pages.strip(pass.swath).map(str::to_owned);
+            }
             layer.recoat_s = machine.recoat_s();
             job.sums.add(&layer, u64::from(count));
             job.layers.push(layer);
@@ -404,7 +406,7 @@ impl Job {
 }
 
 impl JobSums {
-    fn add(&mut self, layer: &JobLayer, swaths: u64) {
+    pub(crate) fn add(&mut self, layer: &JobLayer, swaths: u64) {
         let scanned = layer.swaths.len() as u64;
         let between_s = layer.recoat_s.unwrap_or(0.0).max(layer.approach_s);
         self.layers += 1;
@@ -485,43 +487,47 @@ fn white_rows(
     count: u32,
     layout: &SwathLayout,
 ) -> Result<Vec<Option<[u32; 2]>>, GantryError> {
-    let of = |image: &Image| {
-        let is_white = |&row: &u32| image.runs(row).next().is_some();
-        let first = (0..image.height()).find(is_white)?;
-        Some([first, (first..image.height()).rfind(is_white)?])
-    };
-    Ok(pages.swaths(page, 0..count, layout)?.iter().map(of).collect())
+    Ok(pages.swaths(page, 0..count, layout)?.iter().map(rows_with_white).collect())
 }
 
-/// The parts of a job that all layers share.
-struct LayerPlan<'a> {
-    pages: &'a BuildPages,
-    scan: &'a Scan,
+/// Returns the first and the last row of an image that hold white, if any do.
+pub(crate) fn rows_with_white(image: &Image) -> Option<[u32; 2]> {
+    let is_white = |&row: &u32| image.runs(row).next().is_some();
+    let first = (0..image.height()).find(is_white)?;
+    Some([first, (first..image.height()).rfind(is_white)?])
+}
+
+/// Finds the way over the swaths of one layer after the other.
+#[derive(Debug)]
+pub(crate) struct Planner {
+    scan: Scan,
     layout: SwathLayout,
     pitch: Length,
-    /// The number of swaths.
-    count: u32,
     /// The mirrors along the scan.
     along: u32,
+    /// Where the head stands, once it has scanned something.
+    head: Option<[f64; 2]>,
 }
 
-impl LayerPlan<'_> {
-    /// Finds the order of a layer's swaths. `head` is where the head stands, if that is known.
-    fn layer(
-        &self,
-        page: usize,
-        header: &PageHeader,
+impl Planner {
+    pub(crate) fn new(scan: &Scan, layout: SwathLayout, pitch: Length, along: u32) -> Self {
+        Self { scan: scan.clone(), layout, pitch, along, head: None }
+    }
+
+    /// Plans a layer whose swaths hold white in some rows, from the left.
+    pub(crate) fn layer(
+        &mut self,
+        info: &PageInfo,
         exposure_ms: f64,
         clock: RowClock,
         white: &[Option<[u32; 2]>],
-        head: &mut Option<[f64; 2]>,
     ) -> JobLayer {
         let pitch_mm = self.pitch.mm();
         let step = f64::from(self.layout.mirrors - self.layout.overlap) * pitch_mm;
-        let motion = Motion::new(self.scan, clock.speed_mm_per_s);
+        let motion = Motion::new(&self.scan, clock.speed_mm_per_s);
         // Each pass is a swath of its own.
         let passes = || 0..clock.passes;
-        let places: Vec<(u32, [u32; 2], u32)> = (0..self.count)
+        let places: Vec<(u32, [u32; 2], u32)> = (0_u32..)
             .zip(white)
             .filter_map(|(swath, rows)| Some((swath, (*rows)?)))
             .flat_map(|(swath, rows)| passes().map(move |pass| (swath, rows, pass)))
@@ -539,8 +545,8 @@ impl LayerPlan<'_> {
         let stretches: Vec<_> = places.iter().map(stretch).collect();
         let both = [ScanDirection::Down, ScanDirection::Up];
         let directions = if self.scan.both_ways { &both[..] } else { &[self.scan.direction] };
-        let found = route(&stretches, *head, directions, &motion);
-        *head = found.end;
+        let found = route(&stretches, self.head, directions, &motion);
+        self.head = found.end;
         let mut passed = std::collections::HashMap::new();
         let swaths: Vec<JobSwath> = found
             .visits
@@ -551,7 +557,7 @@ impl LayerPlan<'_> {
                 let pass = passed.entry(swath).and_modify(|pass| *pass += 1).or_insert(0);
                 JobSwath {
                     swath,
-                    strip: self.pages.strip(swath).map(str::to_owned),
+                    strip: None,
                     pass: *pass,
                     x_mm: x_mm(swath),
                     direction,
@@ -563,10 +569,10 @@ impl LayerPlan<'_> {
             })
             .collect();
         JobLayer {
-            layer: header.info.index,
-            page,
-            z_um: header.info.z_um,
-            thickness_um: header.info.thickness_um,
+            layer: info.index,
+            page: 0,
+            z_um: info.z_um,
+            thickness_um: info.thickness_um,
             exposure_ms,
             passes: clock.passes,
             speed_mm_per_s: clock.speed_mm_per_s,

@@ -90,7 +90,7 @@ impl JobFolder {
             return Err(GantryError::NoScan { machine: machine.name });
         };
         if scan.mirrors() != job.mirrors {
-            return Err(failed(JOB, format!("its mirrors are not those of {MACHINE}")));
+            return Err(failed(JOB, format!("its mirrors differ from the mirrors of {MACHINE}")));
         }
         let light = match &scan.light {
             None => None,

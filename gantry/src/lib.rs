@@ -10,6 +10,7 @@
 //!   files. A [`MirrorArray`] has the light of each mirror, and makes up for what is uneven or dead.
 //! - [`expose`] replays frames as a machine would and adds up the dose of every pixel. It shares no
 //!   code with the frames but their form, so it is their referee.
+//! - A [`BuildClock`] adds up how long a build takes on a machine, whether it scans or not.
 //!
 //! Source: the model is this project's own. 002 states that the exposure scans continuously (section
 //! 3.4.2.1) with one source of fixed power (section 3.3.2).
@@ -25,6 +26,7 @@ mod mirrors;
 mod motion;
 mod route;
 mod source;
+mod time;
 
 pub use clock::{ExposureLimit, RowClock};
 pub use dose::{Dark, Disturbance, LayerDose, SeamDose, SwathDose, WorstPixel, expose};
@@ -36,3 +38,4 @@ pub use job_folder::{JobFolder, seen_from};
 pub use mirrors::{MirrorArray, MirrorError};
 pub use motion::move_s;
 pub use source::{BuildPages, SwathLayout};
+pub use time::{BuildClock, BuildTime, SwathTime};

@@ -121,7 +121,7 @@ fn a_cuboid_has_its_volume_and_each_copy_its_serial_number() {
     let beside = "--layout-out again.json --report r.json -o b.tif";
     scratch.run(&format!("{line} {beside}")).succeeds_quietly();
     let report = json_of(&scratch, "r.json");
-    assert_eq!(report["schema"], "lamp-build-report-1");
+    assert_eq!(report["schema"], "lamp-build-report-2");
     let copies = &report["copies"];
     for copy in [&copies[0], &copies[1]] {
         // 40 x 30 x 5 mm.
@@ -137,7 +137,7 @@ fn a_cuboid_has_its_volume_and_each_copy_its_serial_number() {
     assert_eq!(again["copies"][1].get("serial"), None);
 
     // Swaths begin at columns 0, 30, 60: three of 80 mm at 20 mm/s, two steps, 50 layers.
-    assert_eq!(report["swaths"], 3);
+    assert_eq!((&report["swaths"], &report["black_swaths"]), (&json!(150), &json!(0)));
     assert!(is_near(&report["swaths_s"], 50.0 * (3.0 * 4.0 + 2.0 * 0.5)), "{report}");
     assert!(is_near(&report["recoating_s"], 400.0) && is_near(&report["build_s"], 1050.0));
     assert!(is_near(&report["build_exposure_s"], 10.0));
@@ -158,7 +158,7 @@ fn the_time_is_told_in_words_with_what_is_missing() {
     let line = "tile box.tif --mesh none --area 100x80mm";
     let text = told(&format!("{line} --machine mine.toml --time"));
     let expected = "build time: 17.5min, 50 layers\n\
-                    swaths:     10.8min, 3 of 80.0 mm in each layer\n\
+                    swaths:     10.8min, 150 in all\n\
                     recoating:  6.67min\n";
     assert_eq!(text, expected);
     let text = told(&format!("{line} --time"));

@@ -25,6 +25,7 @@ mod errors;
 mod field_files;
 mod fix;
 mod foreign_stacks;
+mod gantry;
 mod golden;
 mod gray;
 mod heights;

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_gantry::{
-    BuildPages, GantryError, GrayBy, Job, JobFolder, JobOptions, JobSeam, MirrorArray, seen_from,
+    BuildClock, BuildPages, GantryError, GrayBy, Job, JobFolder, JobOptions, JobSeam, MirrorArray,
+    seen_from,
 };
-use lamp_machine::{LightTable, Machine};
-use lamp_pipeline::documents::document_and_text;
+use lamp_machine::{LightTable, Machine, Scan};
+use lamp_pipeline::documents::{document_and_text, without_digest};
 use lamp_pipeline::heights::time_text;
 
 use crate::args::options::{Common, one_of_described, parse_layers};
@@ -84,6 +85,35 @@ pub(super) struct ScanArgs {
     gray: GrayBy,
 }
 
+/// Reads the light across the mirrors of a machine, whose file is at `path`.
+pub(super) fn mirrors_of(
+    path: &Path,
+    scan: &Scan,
+) -> Result<(Option<LightTable>, MirrorArray), Exit> {
+    // A word of a record has a digest behind the name.
+    let (path, _) = without_digest(path);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let light = scan.light.as_ref().map(|light| {
+        light.read(folder, scan.mirrors()).map_err(|error| {
+            Exit::Failed(error.into()).at(folder.join(&light.file).display().to_string())
+        })
+    });
+    let light = light.transpose()?;
+    let mirrors = MirrorArray::of(scan, light.as_ref())
+        .map_err(|error| Exit::from(error).at(path.display().to_string()))?;
+    Ok((light, mirrors))
+}
+
+/// Starts the clock of a build on a machine, whose file is at `path`.
+pub(crate) fn build_clock(
+    path: Option<&Path>,
+    machine: Option<&Machine>,
+) -> Result<BuildClock, Exit> {
+    let scan = machine.and_then(|machine| machine.scan.as_ref());
+    let mirrors = path.zip(scan).map(|(path, scan)| mirrors_of(path, scan)).transpose()?;
+    Ok(BuildClock::new(machine, mirrors.map(|(_, mirrors)| mirrors)))
+}
+
 /// A machine that scans, as its file has it.
 struct Scanner {
     machine: Machine,
@@ -106,15 +136,7 @@ impl ScanArgs {
         let Some(scan) = &machine.scan else {
             return Err(GantryError::NoScan { machine: machine.name }.into());
         };
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let light = scan.light.as_ref().map(|light| {
-            light.read(folder, scan.mirrors()).map_err(|error| {
-                Exit::Failed(error.into()).at(folder.join(&light.file).display().to_string())
-            })
-        });
-        let light = light.transpose()?;
-        let mirrors = MirrorArray::of(scan, light.as_ref())
-            .map_err(|error| Exit::from(error).at(path.display().to_string()))?;
+        let (light, mirrors) = mirrors_of(path, scan)?;
         Ok(Scanner { machine, text, light, mirrors })
     }
 

@@ -10,7 +10,6 @@
 //! - A [`Composer`] makes any layer of a build by its [`Recipe`].
 //! - [`StripWriter`] cuts build layers into [`Swaths`] for a projector that scans, and
 //!   [`join_strips`] joins them again.
-//! - [`BuildTime`] adds up how long a build takes on a machine.
 //!
 //! Source: 002 section 2.4.2.
 
@@ -37,7 +36,6 @@ mod tile;
 mod tile_error;
 #[cfg(test)]
 mod tile_tests;
-mod time;
 mod turned;
 
 pub use areas::{CuredPixels, LayerAreas};
@@ -59,5 +57,4 @@ pub use strips::{
 };
 pub use tile::{BuildFinding, BuildWanted, TileOptions, tile};
 pub use tile_error::{CopyName, TileError};
-pub use time::{BuildTime, SwathTime};
 pub use turned::{FreeTurns, FreeTurnsError, PlannedStack, TurnedPlan, TurnedSlicing};

@@ -47,6 +47,8 @@ const WRITERS: &[&str] = &[
     "lamp heights ball.stl --report out.csv",
     "lamp orient ball.stl --directions 20 --plot out.svg",
     "lamp learn job --measured a.csv --law single -o out.csv",
+    "lamp job good.tif --machine scan.toml -o out/",
+    "lamp frames good.tif --machine scan.toml --layer 2 --swath 0 -o out.frames",
 ];
 
 /// Commands that write nothing by themselves, or only through those above; nights keep a store and
@@ -58,6 +60,7 @@ const OTHERS: &[&str] = &[
     "compare",
     "view",
     "machine",
+    "expose",
     "material",
     "projector",
     "calibrate",
@@ -110,6 +113,10 @@ fn scratch() -> Scratch {
     ] {
         scratch.run(line).succeeds();
     }
+    let scan = "name = \"scan\"\ndescription = \"\"\n[area]\nvalue = \"9x9in\"\nsource = \"-\"\n\
+                [scan]\nmirrors = [40, 8]\noverlap = 4\nspeed = [\"1mm/s\", \"900mm/s\"]\n\
+                acceleration = \"2000mm/s2\"\nrow_clock_hz = 22000\nboth_ways = true\nsource = \"-\"\n";
+    scratch.write("scan.toml", scan.as_bytes());
     let edit =
         "[[edit]]\nop = \"subtract\"\nbox = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n";
     scratch.write("edits.toml", edit.as_bytes());

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use lamp_build::{BuildTime, PixelSize};
+use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
 use lamp_pipeline::check::CheckSettings;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
@@ -50,6 +50,7 @@ impl StackReport {
         stack: &IndexedStack,
         name: &str,
         machine: Option<&Machine>,
+        clock: BuildClock,
         progress: &Progress,
     ) -> Result<Self, Exit> {
         let headers = stack.headers();
@@ -58,7 +59,13 @@ impl StackReport {
         headers[1..].iter().for_each(|header| totals.add(header));
         // The check draws the layers, and what they leave on the way is needed behind it.
         let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
-        let mut layers = measured(stack, &numbers, &sheet, progress);
+        let clock = RefCell::new(clock);
+        let mut layers = measured(stack, &numbers, &sheet, progress).inspect(|layer| {
+            if let Ok(layer) = layer {
+                let size = [layer.image.width(), layer.image.height()];
+                clock.borrow_mut().add(&layer.info, layer.dpi, size, &layer.image);
+            }
+        });
         let found = match CheckSettings::default().find(&mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             // A stack that cannot be checked still has numbers and pictures.
@@ -78,9 +85,7 @@ impl StackReport {
             Err(why) => Err(why),
         };
         let layers = numbers.into_inner();
-        let exposures = layers.iter().map(|layer| layer.exposure_ms);
-        let [width, height] = headers[0].size;
-        let time = BuildTime::new(machine, exposures, PixelSize { width, height }, headers[0].dpi);
+        let time = clock.into_inner().time();
         Ok(Self { name: name.to_owned(), totals, layers, found, sheet: sheet.into_inner(), time })
     }
 
@@ -104,7 +109,9 @@ impl StackReport {
         if totals.first.dpi.is_none() {
             warnings.push("It states no resolution: lengths are in pixels.".to_owned());
         }
-        if self.time.sum_s().is_none() {
+        if let Some(why) = &self.time.unscanned {
+            warnings.push(format!("The machine cannot scan it: {why}."));
+        } else if self.time.sum_s().is_none() {
             warnings.push(
                 "Not every layer states an exposure: the build time is not known.".to_owned(),
             );

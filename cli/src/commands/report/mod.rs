@@ -17,6 +17,7 @@ use lamp_stack::stacks_in;
 use serde_json::json;
 
 use crate::args::options::Common;
+use crate::commands::job::build_clock;
 use crate::exit::Exit;
 use crate::output::endings::{HTML, check_ending};
 use crate::output::json_report::print_answer;
@@ -78,7 +79,8 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     if stacks.is_empty() {
         return Err(Exit::Failed(anyhow!("{}: there is no stack in it", input_name(&args.stack))));
     }
-    let work = ReportWork { machine: machine.as_ref(), common };
+    let work =
+        ReportWork { machine: machine.as_ref(), machine_path: args.machine.as_deref(), common };
     match &args.output {
         Some(folder) if is_folder(folder) || stacks.len() > 1 => {
             work.write_folder(&stacks, folder, args)
@@ -89,6 +91,7 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
 
 struct ReportWork<'a> {
     machine: Option<&'a Machine>,
+    machine_path: Option<&'a Path>,
     common: &'a Common,
 }
 
@@ -98,7 +101,13 @@ impl ReportWork<'_> {
         let progress = Progress::new("report", self.common, true);
         let stack = open_indexed(path)?.into_whole();
         let stack = stack.map_err(|error| failed_at(input_name(path), error))?;
-        let report = StackReport::gather(&stack, &shown_name(path), self.machine, &progress);
+        let report = StackReport::gather(
+            &stack,
+            &shown_name(path),
+            self.machine,
+            build_clock(self.machine_path, self.machine)?,
+            &progress,
+        );
         progress.done();
         report.map_err(|error| error.at(input_name(path)))
     }

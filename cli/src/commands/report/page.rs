@@ -95,10 +95,15 @@ fn build_time(report: &StackReport) -> Markup {
     let time = &report.time;
     html! {
         @match time.sum_s() {
-            None => p { "Not known: not every layer states its exposure." },
+            None => p {
+                @match &time.unscanned {
+                    Some(why) => { "Not known: " (why) "." }
+                    None => { "Not known: not every layer states its exposure." }
+                }
+            },
             Some(sum) => table.facts {
                 @if let Some(swaths) = time.swaths {
-                    tr { th { "swaths" } td { (time_text(swaths.seconds)) ", " (swaths.count) " in each layer" } }
+                    tr { th { "swaths" } td { (time_text(swaths.seconds)) ", " (swaths.count) " in all" } }
                 } @else if let Some(exposure_s) = time.exposure_s {
                     tr { th { "exposures" } td { (time_text(exposure_s)) } }
                 }

@@ -25,6 +25,7 @@ use lamp_pipeline::tile::TileSettings;
 use crate::args::options::{Common, Output, parse_layers};
 use crate::args::parsed::Parsed;
 use crate::args::tile::TileStageArgs;
+use crate::commands::job::build_clock;
 use crate::exit::Exit;
 use crate::output::endings::parse_report;
 use crate::streams::Layers;
@@ -236,9 +237,13 @@ impl TileArgs {
         let bare = Rc::clone(&no_mesh);
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
         let told = recipe.clone();
-        let totals = Rc::new(RefCell::new(BuildTotals::new(&layout)));
+        let is_timed = self.time || self.report.is_some();
+        let clock =
+            build_clock(self.settings.machine.as_deref().filter(|_| is_timed), machine.as_ref())?;
+        let needs_images = self.needs_images() || clock.needs_images();
+        let totals = Rc::new(RefCell::new(BuildTotals::new(&layout, clock)));
         let added = Rc::clone(&totals);
-        let wanted = BuildWanted { images: self.needs_images(), areas: self.report.is_some() };
+        let wanted = BuildWanted { images: needs_images, areas: self.report.is_some() };
         let build = layout.build_telling(layers, heights, wanted, move |finding| match finding {
             BuildFinding::Stray(stray) => {
                 found.borrow_mut().add(&stray);
@@ -253,9 +258,10 @@ impl TileArgs {
             BuildFinding::Areas(areas) => added.borrow_mut().add(areas),
         });
         let timed = Rc::clone(&totals);
+        let size = [placed.pixels().width, placed.pixels().height];
         let layers = Box::new(within_height(build, machine).inspect(move |layer| {
             if let Ok(layer) = layer {
-                timed.borrow_mut().exposures_ms.push(layer.info.exposure_ms);
+                timed.borrow_mut().time(layer, size);
             }
         }));
         Ok(Build { layers, layout: placed, stray_rows, no_mesh, recipe, totals })

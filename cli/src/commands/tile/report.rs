@@ -1,9 +1,9 @@
 //! The contents of a build, and the report of it.
 
-use lamp_build::{BuildTime, CopyEntry, CuredPixels, LayerAreas, Layout};
+use lamp_build::{CopyEntry, CuredPixels, LayerAreas, Layout};
+use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
-use lamp_stack::Dpi;
-use lamp_stack::to_nm;
+use lamp_stack::{Dpi, Layer, to_nm};
 use serde_json::{Value, json};
 
 use super::TileArgs;
@@ -23,8 +23,8 @@ pub(super) struct BuildTotals {
     mesh: CuredPixels,
     all: CuredPixels,
     layers: Vec<LayerTotals>,
-    /// The exposure that each layer states.
-    pub(super) exposures_ms: Vec<Option<f64>>,
+    /// The time of the layers.
+    clock: BuildClock,
 }
 
 struct LayerTotals {
@@ -33,7 +33,7 @@ struct LayerTotals {
 }
 
 impl BuildTotals {
-    pub(super) fn new(layout: &Layout) -> Self {
+    pub(super) fn new(layout: &Layout, clock: BuildClock) -> Self {
         let parts = 0..layout.parts().len();
         Self {
             copies: parts.clone().map(|part| layout.copies_of(part) as u64).collect(),
@@ -41,8 +41,13 @@ impl BuildTotals {
             mesh: CuredPixels::default(),
             all: CuredPixels::default(),
             layers: Vec::new(),
-            exposures_ms: Vec::new(),
+            clock,
         }
+    }
+
+    /// Adds the time of the next layer, whose build is so large in pixels.
+    pub(super) fn time(&mut self, layer: &Layer, size: [u32; 2]) {
+        self.clock.add(&layer.info, layer.dpi, size, &layer.image);
     }
 
     /// Adds the next layer.
@@ -71,7 +76,7 @@ impl BuildTotals {
             })
         };
         let head = json!({
-            "schema": "lamp-build-report-1",
+            "schema": "lamp-build-report-2",
             "machine": machine.map(|machine| &machine.name),
             "area_mm": file.area().map(|area| [to_nm(area.width.mm()), to_nm(area.height.mm())]),
             "width_px": layout.pixels().width,
@@ -84,6 +89,7 @@ impl BuildTotals {
             "recoating_s": time.recoating_s.map(to_nm),
             "swaths_s": time.swaths.map(|swaths| to_nm(swaths.seconds)),
             "swaths": time.swaths.map(|swaths| swaths.count),
+            "black_swaths": time.swaths.map(|swaths| swaths.black),
             "build_s": time.sum_s().map(to_nm),
             "warnings": time::missing(time, machine),
         });
@@ -145,8 +151,7 @@ impl TileArgs {
         machine: Option<&Machine>,
         output: Option<&Output>,
     ) -> Result<(), Exit> {
-        let exposures = totals.exposures_ms.iter().copied();
-        let time = BuildTime::new(machine, exposures, layout.pixels(), Some(layout.dpi()));
+        let time = totals.clock.time();
         if let Some(path) = &self.report {
             totals.report(layout, machine, &time).write(path)?;
         }

@@ -1,6 +1,6 @@
 //! How long a build takes, in words.
 
-use lamp_build::BuildTime;
+use lamp_gantry::BuildTime;
 use lamp_machine::Machine;
 
 use lamp_pipeline::heights::time_text;
@@ -21,7 +21,11 @@ pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
         line("exposure", seconds, within);
     }
     if let Some(swaths) = time.swaths {
-        let how = format!(", {} of {:.1} mm in each layer", swaths.count, swaths.length_mm);
+        let black = match swaths.black {
+            0 => String::new(),
+            black => format!(", and {black} black ones are left out"),
+        };
+        let how = format!(", {} in all{black}", swaths.count);
         line("swaths", swaths.seconds, &how);
     }
     if let Some(seconds) = time.recoating_s {
@@ -41,7 +45,9 @@ pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String
     };
     let file = format!("[times] of {which} (lamp machine show {name} > mine.toml starts one)");
     let mut missing = Vec::new();
-    if time.sum_s().is_none() {
+    if let Some(why) = &time.unscanned {
+        missing.push(format!("the machine cannot scan the build: {why}"));
+    } else if time.sum_s().is_none() {
         missing.push(format!(
             "not every layer states an exposure: write expose_s, or swath_speed_mm_per_s for a \
              projector that scans, into {file}"

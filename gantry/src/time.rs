@@ -1,0 +1,285 @@
+//! How long a build takes on a machine.
+
+use lamp_build::{Swaths, SwathsError};
+use lamp_machine::{Machine, Scan};
+use lamp_stack::{Dpi, Image, PageInfo};
+
+use crate::clock::RowClock;
+use crate::job::{GrayBy, JobSeam, JobSums, Planner, rows_with_white};
+use crate::mirrors::MirrorArray;
+use crate::source::SwathLayout;
+
+/// How long a build takes, as far as that is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildTime {
+    /// The number of layers.
+    pub layers: u64,
+    /// The sum of all exposures in seconds, if every layer states one or the machine gives it.
+    pub exposure_s: Option<f64>,
+    /// The time for recoating in seconds, if the machine's is known.
+    pub recoating_s: Option<f64>,
+    /// The swaths of a projector that scans.
+    pub swaths: Option<SwathTime>,
+    /// Why the machine cannot scan the build, as a sentence.
+    pub unscanned: Option<String>,
+}
+
+/// How long the swaths of a build take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwathTime {
+    /// The number of swaths that are scanned, in all layers and passes.
+    pub count: u64,
+    /// The number of swaths that are left out, as they are black.
+    pub black: u64,
+    /// The time of these swaths, the moves between them, and waits for the head that recoating does
+    /// not cover, in seconds.
+    pub seconds: f64,
+}
+
+impl BuildTime {
+    /// Returns the time of the build in seconds, if the time of its light is known. Swaths take
+    /// their own time: the exposure of a place passes while a swath goes over it. Recoating counts
+    /// if it is known.
+    pub fn sum_s(&self) -> Option<f64> {
+        if self.unscanned.is_some() {
+            return None;
+        }
+        let light_s = self.swaths.map(|swaths| swaths.seconds).or(self.exposure_s);
+        Some(light_s? + self.recoating_s.unwrap_or(0.0))
+    }
+}
+
+/// Adds up the time of a build on a machine, layer by layer.
+///
+/// A layer is recoated once. On a machine with `[scan]`, its swaths take the times that
+/// [`Job::plan`](crate::Job::plan) finds, with a comb. On a machine with `[strips]` and a swath speed v,
+/// it is exposed in n swaths of the images' height L, which take n L / v and n - 1 steps.
+#[derive(Debug)]
+pub struct BuildClock {
+    machine: Option<Machine>,
+    mirrors: Option<MirrorArray>,
+    layers: u64,
+    exposure_ms: Option<f64>,
+    /// How the head moves, once a layer has said how large pixels are.
+    planner: Option<Planner>,
+    sums: JobSums,
+    /// Swaths of a machine without `[scan]`.
+    steady: Option<SwathTime>,
+    unscanned: Option<String>,
+}
+
+impl BuildClock {
+    /// Starts for a machine. `mirrors` are those of its `[scan]`; without them it does not scan.
+    pub fn new(machine: Option<&Machine>, mirrors: Option<MirrorArray>) -> Self {
+        Self {
+            machine: machine.cloned(),
+            mirrors,
+            layers: 0,
+            exposure_ms: Some(0.0),
+            planner: None,
+            sums: JobSums::default(),
+            steady: None,
+            unscanned: None,
+        }
+    }
+
+    /// Returns whether the images of layers decide the time, and not their size alone.
+    pub fn needs_images(&self) -> bool {
+        self.mirrors.is_some()
+    }
+
+    /// Adds a layer of so many columns and rows. Its image counts only if images are
+    /// [needed](Self::needs_images).
+    pub fn add(&mut self, info: &PageInfo, dpi: Option<Dpi>, size: [u32; 2], image: &Image) {
+        let times = self.machine.as_ref().and_then(|machine| machine.times.as_ref());
+        let usual_ms = times.and_then(|times| times.expose_s).map(|seconds| seconds * 1000.0);
+        let exposure_ms = info.exposure_ms.or(usual_ms);
+        self.layers += 1;
+        self.exposure_ms = self.exposure_ms.zip(exposure_ms).map(|(sum, ms)| sum + ms);
+        let Some(dpi) = dpi else { return };
+        match (&self.machine, self.mirrors.is_some()) {
+            (Some(machine), false) => {
+                let swaths = steady_swaths(machine, size, dpi);
+                let add = |a: SwathTime, b: SwathTime| SwathTime {
+                    count: a.count + b.count,
+                    black: 0,
+                    seconds: a.seconds + b.seconds,
+                };
+                self.steady = match (self.steady, swaths) {
+                    (Some(sum), Some(layer)) => Some(add(sum, layer)),
+                    (sum, layer) => sum.or(layer),
+                };
+            }
+            (Some(_), true) if self.unscanned.is_none() => {
+                self.unscanned = self.scan(info, exposure_ms, dpi, image).err();
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds a layer's scan, or says why there is none.
+    fn scan(
+        &mut self,
+        info: &PageInfo,
+        exposure_ms: Option<f64>,
+        dpi: Dpi,
+        image: &Image,
+    ) -> Result<(), String> {
+        let (Some(machine), Some(mirrors)) = (&self.machine, &self.mirrors) else { return Ok(()) };
+        let Some(scan) = &machine.scan else { return Ok(()) };
+        let Some(exposure_ms) = exposure_ms else { return Ok(()) };
+        let layout = layout_of(scan);
+        let swaths = layout.swaths(image.width()).map_err(|error| error.to_string())?;
+        let clock = RowClock::new(exposure_ms, mirrors.full_rows(), dpi.pitch(), scan)
+            .map_err(|limit| format!("{}: {limit}", info.name()))?;
+        let white: Vec<_> = swaths
+            .cut(image, info.index, 0..swaths.count())
+            .map(|image| rows_with_white(&image))
+            .collect();
+        let planner = self
+            .planner
+            .get_or_insert_with(|| Planner::new(scan, layout, dpi.pitch(), mirrors.size()[1]));
+        let mut layer = planner.layer(info, exposure_ms, clock, &white);
+        layer.recoat_s = machine.recoat_s();
+        self.sums.add(&layer, swaths.count().into());
+        Ok(())
+    }
+
+    /// Returns the time of the layers so far.
+    pub fn time(&self) -> BuildTime {
+        let recoat_s = self.machine.as_ref().and_then(Machine::recoat_s);
+        let recoating_s = recoat_s.map(|seconds| seconds * self.layers as f64);
+        let scanned = || {
+            let JobSums { layers, swaths, empty_swaths, scan_s, steps_s, between_s, .. } =
+                self.sums;
+            // The sum has the longer of recoating and the way to the first swath.
+            let waits_s = between_s - recoating_s.unwrap_or(0.0);
+            let seconds = scan_s + steps_s + waits_s;
+            // A layer without an exposure has no scan.
+            (layers == self.layers).then_some(SwathTime {
+                count: swaths,
+                black: empty_swaths,
+                seconds,
+            })
+        };
+        BuildTime {
+            layers: self.layers,
+            exposure_s: self.exposure_ms.map(|ms| ms / 1000.0),
+            recoating_s,
+            swaths: if self.needs_images() { scanned() } else { self.steady },
+            unscanned: self.unscanned.clone(),
+        }
+    }
+}
+
+fn layout_of(scan: &Scan) -> SwathLayout {
+    SwathLayout {
+        mirrors: scan.mirrors()[0],
+        overlap: scan.overlap,
+        seam: JobSeam::Comb,
+        gray: GrayBy::Time,
+    }
+}
+
+/// Returns the swaths of a layer on a machine with one speed for all, if that is known.
+fn steady_swaths(machine: &Machine, [width, height]: [u32; 2], dpi: Dpi) -> Option<SwathTime> {
+    let times = machine.times.as_ref()?;
+    let (mirrors, overlap) = machine.swaths()?;
+    let swaths: Result<Swaths, SwathsError> = Swaths::new(mirrors, overlap, width);
+    let count = swaths.ok()?.count();
+    let length_mm = f64::from(height) * dpi.pitch().mm();
+    // There is at least one swath, also for an image without columns.
+    let steps_s = f64::from(count - 1) * times.swath_step_s.unwrap_or(0.0);
+    let seconds = f64::from(count) * length_mm / times.swath_speed_mm_per_s? + steps_s;
+    Some(SwathTime { count: count.into(), black: 0, seconds })
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::{Catalogued, MaskBuilder};
+
+    use super::*;
+
+    fn machine(more: &str) -> Result<Machine, String> {
+        let text = format!(
+            "name = \"mine\"\ndescription = \"\"\n[area]\nvalue = \"100x40mm\"\nsource = \"-\"\n{more}"
+        );
+        Machine::from_toml(&text).map_err(|error| error.to_string())
+    }
+
+    fn time(more: &str, exposures_ms: &[Option<f64>]) -> BuildTime {
+        let machine = machine(more).unwrap();
+        let mirrors = machine.scan.as_ref().map(|scan| MirrorArray::of(scan, None).unwrap());
+        time_on(Some(&machine), mirrors, exposures_ms)
+    }
+
+    fn time_on(
+        machine: Option<&Machine>,
+        mirrors: Option<MirrorArray>,
+        exposures_ms: &[Option<f64>],
+    ) -> BuildTime {
+        let mut clock = BuildClock::new(machine, mirrors);
+        // White is a square of 100 pixels on the left, in rows 50 to 149.
+        let mut image = MaskBuilder::new(1000);
+        image.push_black(50);
+        (0..100).for_each(|_| image.push_row(&[0, 100]).unwrap());
+        image.push_black(250);
+        let image = Image::Mask(image.finish());
+        for &exposure_ms in exposures_ms {
+            // 10 pixels a millimeter.
+            let info = PageInfo { exposure_ms, ..PageInfo::default() };
+            clock.add(&info, Dpi::new(254.0), [1000, 400], &image);
+        }
+        clock.time()
+    }
+
+    #[test]
+    fn swaths_take_their_length_by_their_speed_and_the_steps_between() {
+        let strips = "[strips]\nmirrors = 400\noverlap = 100\nsource = \"-\"\n";
+        let times = "[times]\nrecoat_s = 7\nswath_speed_mm_per_s = 20\nswath_step_s = 0.5\nsource = \"-\"\n";
+        let time = time(&format!("{strips}{times}"), &[None, Some(100.0)]);
+        // Swaths begin at columns 0, 300 and 600: three of 40 mm at 20 mm/s, two steps.
+        let swaths = time.swaths.unwrap();
+        assert_eq!(swaths.count, 6);
+        assert!((swaths.seconds - 2.0 * (3.0 * 2.0 + 2.0 * 0.5)).abs() < 1e-9);
+        assert_eq!((time.exposure_s, time.recoating_s), (None, Some(14.0)));
+        assert!((time.sum_s().unwrap() - 28.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_machine_s_times_stand_in_and_the_blade_s_way_for_recoating() {
+        let blade = "[recoating]\nviscosity_cp = [1, 2]\ntravel = \"1cm\"\nseconds = 6\ngap = \"1mm\"\nsource = \"-\"\n";
+        let exposures = [Some(250.0), None];
+        assert_eq!(time(blade, &exposures).sum_s(), None);
+        // The blade goes 10 cm, the longer side of the area, at 1 cm in 6 s.
+        assert_eq!(time(blade, &exposures).recoating_s, Some(120.0));
+        let times = "[times]\nrecoat_s = 7.5\nexpose_s = 2\nsource = \"-\"\n";
+        let both = time(&format!("{blade}{times}"), &exposures);
+        assert_eq!((both.exposure_s, both.recoating_s), (Some(2.25), Some(15.0)));
+        assert_eq!(both.sum_s(), Some(17.25));
+        let none = time_on(None, None, &exposures);
+        assert_eq!((none.exposure_s, none.recoating_s, none.swaths), (None, None, None));
+    }
+    #[test]
+    fn scans_take_the_swaths_that_hold_white_at_the_speed_of_their_exposure() {
+        let scan = "[scan]\nmirrors = [400, 50]\noverlap = 100\nspeed = [\"1mm/s\", \"100mm/s\"]\n\
+                    acceleration = \"2000mm/s2\"\nrow_clock_hz = 22000\nboth_ways = true\nsource = \"-\"\n";
+        let both = time(scan, &[Some(100.0), Some(200.0)]);
+        // 50 rows of 0.1 mm in 0.1 s: 50 mm/s; 149 rows and both ramps of 25 ms. Then 25 mm/s.
+        let layer = |speed: f64| 14.9 / speed + 2.0 * speed / 2000.0;
+        let swaths = both.swaths.unwrap();
+        assert_eq!((swaths.count, swaths.black), (2, 4));
+        // The second layer begins near where the first ended: both have their run-up there.
+        let way = (50.0 * 50.0 - 25.0 * 25.0) / 4000.0;
+        let back = crate::move_s(way, 100.0, 2000.0);
+        assert!((swaths.seconds - (layer(50.0) + layer(25.0) + back)).abs() < 1e-9, "{swaths:?}");
+        // A blade that takes longer covers the way back.
+        let recoated =
+            time(&format!("{scan}[times]\nrecoat_s = 9\nsource = \"-\"\n"), &[Some(100.0); 3]);
+        assert!((recoated.swaths.unwrap().seconds - 3.0 * layer(50.0)).abs() < 1e-9);
+        assert!((recoated.sum_s().unwrap() - 27.0 - 3.0 * layer(50.0)).abs() < 1e-9);
+        let short = time(scan, &[Some(1.0)]);
+        assert!(short.unscanned.as_ref().unwrap().contains("at most 100 mm/s"), "{short:?}");
+        assert_eq!((short.sum_s(), time(scan, &[None]).sum_s()), (None, None));
+    }
+}

@@ -1,0 +1,255 @@
+//! Checks jobs of machines that scan: their frames give every pixel its exposure.
+
+use lamp_fixtures::Sample;
+use lamp_tests::Scratch;
+use serde_json::Value;
+
+/// A machine whose swaths are 100 pixels wide and share 10.
+const MACHINE: &str = r#"name = "mine"
+description = "A scanner"
+[area]
+value = "100x80mm"
+source = "-"
+[scan]
+mirrors = [100, 48]
+overlap = 10
+speed = ["1mm/s", "500mm/s"]
+acceleration = "2000mm/s2"
+row_clock_hz = 22000
+both_ways = true
+source = "-"
+[times]
+recoat_s = 8
+source = "-"
+"#;
+
+/// Four towers, 236 x 236 pixels.
+fn with_build() -> Scratch {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 5_000);
+    scratch.write("mine.toml", MACHINE.as_bytes());
+    scratch
+        .run("slice tower.stl --dpi 100 --thickness 1mm --material lamp-suspension -q -o tower.tif")
+        .succeeds();
+    scratch.run("tile tower.tif --area 60x60mm -o build.tif").succeeds();
+    scratch
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+#[test]
+fn every_white_pixel_of_a_build_gets_its_exposure() {
+    let scratch = with_build();
+    scratch.run("tile tower.tif --area 60x60mm --machine mine.toml --strips strips/").succeeds();
+    for (line, folder) in [
+        ("lamp job build.tif --machine mine.toml -o job/", "job"),
+        ("lamp job strips/ --machine mine.toml -o cut/", "cut"),
+        ("lamp job build.tif --machine mine.toml --seam time -o time/", "time"),
+    ] {
+        scratch.run(line).succeeds();
+        let said = scratch.run(&format!("lamp expose {folder}/ --layers 20..23 --json --strict"));
+        let found = json(&said.succeeds_quietly().stdout);
+        let layers = found["layers"].as_array().unwrap();
+        assert_eq!(layers.len(), 3);
+        for layer in layers {
+            let shares: Vec<f64> =
+                layer["shares"].as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+            assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.002), "{layer}");
+            assert!(layer["white_px"].as_u64().unwrap() > 1000 && layer["lit_px"] == 0, "{layer}");
+        }
+    }
+    // Strips were cut with the comb that a job cuts with.
+    let layers =
+        |folder: &str| json(&scratch.bytes(&format!("{folder}/job.json")))["layers"].clone();
+    let (job, mut cut) = (layers("job"), layers("cut"));
+    for layer in cut.as_array_mut().unwrap() {
+        for swath in layer["swaths"].as_array_mut().unwrap() {
+            let strip = swath.as_object_mut().unwrap().remove("strip").unwrap();
+            assert_eq!(strip, format!("strip_{:03}.tif", swath["swath"].as_u64().unwrap()));
+        }
+    }
+    assert_eq!(job, cut);
+}
+
+#[test]
+fn faults_of_a_job_are_named() {
+    let scratch = with_build();
+    scratch.run("lamp job build.tif --machine mine.toml -o job/").succeeds();
+    let text = String::from_utf8(scratch.bytes("job/job.json")).unwrap();
+    let job = json(text.as_bytes());
+    let layer = &job["layers"][20];
+    let swath =
+        layer["swaths"].as_array().unwrap().iter().find(|swath| swath["swath"] == 1).unwrap();
+    let pitch = job["pitch_um"].as_f64().unwrap() / 1000.0;
+    let faults = [
+        // A swath that is shifted by a pixel, a row that is dropped, a head that is twice as fast.
+        ("x_mm", Value::from(swath["x_mm"].as_f64().unwrap() + pitch), "seam of swaths"),
+        ("first_row", Value::from(swath["first_row"].as_u64().unwrap() + 1), "swath 1:"),
+        (
+            "speed_mm_per_s",
+            Value::from(2.0 * layer["speed_mm_per_s"].as_f64().unwrap()),
+            "swath 0:",
+        ),
+    ];
+    for (key, value, named) in faults {
+        let mut broken = job.clone();
+        let layer = &mut broken["layers"][20];
+        let place = if key == "speed_mm_per_s" {
+            layer
+        } else {
+            let swaths = layer["swaths"].as_array_mut().unwrap();
+            swaths.iter_mut().find(|swath| swath["swath"] == 1).unwrap()
+        };
+        place[key] = value;
+        scratch.write("job/job.json", broken.to_string().as_bytes());
+        let found = scratch.run("lamp expose job/ --layers 19..22 --strict");
+        assert_eq!(found.statuses, [Some(3)], "{found:?}");
+        let lines = String::from_utf8(found.stdout.clone()).unwrap();
+        let off: Vec<&str> = lines.lines().filter(|line| line.contains("are off by")).collect();
+        assert!(off.iter().any(|line| line.trim().starts_with(named)), "{key}: {lines}");
+        // The layers below and above are as they should be.
+        let wrong = lines.split("layer ").filter(|layer| layer.contains("are off by"));
+        assert!(wrong.into_iter().all(|layer| layer.starts_with("20:")), "{key}: {lines}");
+    }
+    // Another build under the same name is refused.
+    scratch.write("job/job.json", text.as_bytes());
+    scratch.run("lamp expose job/ --layers 20 --strict").succeeds();
+    scratch.run("tile tower.tif --area 60x60mm --copies 1 -o build.tif").succeeds();
+    for line in ["lamp expose job/ --layers 20", "lamp frames job/ --layer 20 --swath 1 -o f"] {
+        scratch.run(line).is_refused_with(&["build.tif", "its digest differs"]);
+    }
+}
+
+#[test]
+fn frames_have_the_rows_of_the_build() {
+    let scratch = with_build();
+    scratch.run("lamp job build.tif --machine mine.toml -o job/").succeeds();
+    let written = scratch.run("lamp frames job/ --layer 20 --swath 1").succeeds_quietly().stdout;
+    scratch
+        .run("lamp frames build.tif --machine mine.toml --layer 20 --swath 1 -o f.frames")
+        .succeeds_quietly();
+    // The layer's own job begins anywhere, so it may go the other way; the header says which.
+    let number =
+        |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let build = &scratch.layers("build.tif")[20].image;
+    for bytes in [written, scratch.bytes("f.frames")] {
+        assert_eq!(&bytes[..8], b"LAMPFRM1");
+        assert_eq!([8, 12, 16, 20, 24, 28].map(|at| number(&bytes, at)), [100, 48, 16, 20, 1, 90]);
+        let mut position = i64::from_le_bytes(bytes[32..40].try_into().unwrap());
+        let frames = u64::from_le_bytes(bytes[40..48].try_into().unwrap()) as usize;
+        let step = number(&bytes, 56).cast_signed();
+        assert_eq!(bytes.len(), 64 + frames * 48 * 16);
+        for frame in bytes[64..].chunks_exact(48 * 16) {
+            for (row, bits) in frame.chunks_exact(16).enumerate() {
+                let row = position - row as i64;
+                // Away from the seams, a mirror is bright where the build is white.
+                for column in 10..90_u32 {
+                    let bit = bits[column as usize / 8] >> (7 - column % 8) & 1 == 1;
+                    let is_within = (0..i64::from(build.height())).contains(&row);
+                    assert_eq!(bit, is_within && build.level(90 + column, row as u32) > 0);
+                }
+            }
+            position += i64::from(step);
+        }
+    }
+    scratch.run("lamp frames job/ --layer 20 --swath 1 --frames 60 -o one.png").succeeds_quietly();
+    scratch
+        .run("lamp frames job/ --layer 20 --swath 1 --frames ..20 -o few.png")
+        .succeeds_quietly();
+    assert_eq!(&scratch.bytes("one.png")[1..4], b"PNG");
+    let few = scratch.bytes("few.png");
+    assert!(few.windows(4).any(|four| four == b"acTL"));
+    scratch
+        .run("lamp expose job/ --layers 20 --columns 80..120 --rows 50..90 --picture d.png")
+        .succeeds();
+    assert_eq!(&scratch.bytes("d.png")[1..4], b"PNG");
+}
+
+#[test]
+fn gray_layers_are_shown_in_time() {
+    let scratch = Scratch::new();
+    scratch.part("torus.stl", Sample::Torus, 5_000);
+    scratch.write("mine.toml", MACHINE.as_bytes());
+    let slice = "slice torus.stl --dpi 100 --thickness 1mm --gray --material lamp-suspension -q -o gray.tif";
+    scratch.run(slice).succeeds();
+    let line = "lamp job gray.tif --machine mine.toml -o job/";
+    scratch.run(line).is_refused_with(&["gray.tif: layer", "--gray time"]);
+    scratch.run(&format!("{line} --gray time --seam time")).succeeds();
+    let found = scratch.run("lamp expose job/ --json --tolerance 100").succeeds_quietly();
+    let found = json(&found.stdout);
+    // Within half of 48 rows, also for the faintest level.
+    let worst = found["layers"].as_array().unwrap().iter().flat_map(|layer| {
+        layer["shares"].as_array().unwrap()[1..2]
+            .iter()
+            .filter_map(Value::as_f64)
+            .collect::<Vec<_>>()
+    });
+    assert!(worst.into_iter().all(|mean| (mean - 1.0).abs() < 0.02), "{found}");
+}
+
+#[test]
+fn times_of_a_build_are_those_of_its_job() {
+    let scratch = with_build();
+    let tile = "tile tower.tif --area 60x60mm --machine mine.toml --report r.json -o b.tif";
+    scratch.run(tile).succeeds();
+    let sums = scratch.run("lamp job b.tif --machine mine.toml -o job/ --json").succeeds_quietly();
+    let (sums, report) = (json(&sums.stdout), json(&scratch.bytes("r.json")));
+    let near = |a: &Value, b: f64| assert!((a.as_f64().unwrap() - b).abs() < 1e-6, "{a} and {b}");
+    near(&report["build_s"], sums["seconds"].as_f64().unwrap());
+    assert_eq!(
+        (&report["swaths"], &report["black_swaths"]),
+        (&sums["swaths"], &sums["empty_swaths"])
+    );
+    let told = scratch.run("lamp report b.tif --machine mine.toml --json").succeeds_quietly();
+    near(&json(&told.stdout)["stacks"][0]["build_s"], sums["seconds"].as_f64().unwrap());
+    let printed =
+        scratch.run("tile tower.tif --area 60x60mm --machine mine.toml --time").succeeds();
+    let printed = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.contains(&format!(", {} in all", sums["swaths"])), "{printed}");
+    // A machine that cannot scan a layer says so in place of a time.
+    scratch.write("slow.toml", MACHINE.replace("\"500mm/s\"", "\"1.2mm/s\"").as_bytes());
+    let slow = scratch.run("tile tower.tif --area 60x60mm --machine slow.toml --time").succeeds();
+    let slow = String::from_utf8(slow.stdout).unwrap();
+    assert!(slow.contains("not known") && slow.contains("at most 1.2 mm/s"), "{slow}");
+}
+
+#[test]
+fn impossible_jobs_are_refused_and_leave_nothing() {
+    let scratch = with_build();
+    let job = |more: &str| scratch.run(&format!("lamp job build.tif -o job/ {more}"));
+    job("").is_wrong_usage(&["--machine is missing"]);
+    job("--machine beta").is_refused_with(&["beta", "[scan]"]);
+    job("--machine mine.toml --layers 900..").is_refused_with(&["build.tif", "layers 0 to"]);
+    job("--machine mine.toml --seam gray").is_refused_with(&["comb or time"]);
+    for (from, to, words) in [
+        ("\"500mm/s\"", "\"1.2mm/s\"", &["layer 0", "at most 1.2 mm/s", "expose at least"][..]),
+        ("row_clock_hz = 22000", "row_clock_hz = 3", &["layer 0", "rows a second", "at most 3:"]),
+        ("\"1mm/s\"", "\"2mm/s\"", &["layer 0", "passes", "more passes"]),
+    ] {
+        assert!(MACHINE.contains(from));
+        scratch.write("other.toml", MACHINE.replace(from, to).as_bytes());
+        job("--machine other.toml").is_refused_with(words);
+    }
+    scratch.run("lamp job - --machine mine.toml -o job/").is_wrong_usage(&["names its build"]);
+    assert!(!scratch.path("job").exists());
+    job("--machine mine.toml").succeeds();
+    for (line, words) in [
+        ("lamp frames job/ --layer 20 --swath 9 -o f", &["swaths 0 to 2"][..]),
+        ("lamp frames job/ --layer 900 --swath 0 -o f", &["no layer 900"]),
+        ("lamp frames job/ --layer 20 --swath 0 --pass 1 -o f", &["1 passes, and no 1"]),
+    ] {
+        scratch.run(line).is_refused_with(words);
+    }
+    scratch
+        .run("lamp frames job/ --layer 20 --swath 0 --seam comb -o f")
+        .is_wrong_usage(&["a job has its machine"]);
+    scratch
+        .run("lamp frames job/ --layer 20 --swath 0 --frames 9000 -o f")
+        .is_wrong_usage(&["frames 0 to"]);
+    scratch.run("lamp expose job/ --columns 900..").is_wrong_usage(&["--columns", "236"]);
+    scratch.run("lamp expose job/ --layers 900").is_wrong_usage(&["no layer in this range"]);
+    scratch.run("lamp expose job/ --picture d.png").is_wrong_usage(&["one layer"]);
+    assert!(!scratch.path("f").exists());
+}
