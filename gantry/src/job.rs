@@ -134,6 +134,8 @@ pub struct JobLayer {
     pub thickness_um: Option<f64>,
     /// The time for which white has light, in all passes.
     pub exposure_ms: f64,
+    /// The dose of white in mJ/cm2, if the machine's irradiance is known.
+    pub dose_mj_per_cm2: Option<f64>,
     /// How often each swath is scanned.
     pub passes: u32,
     /// The speed of the head on swaths.
@@ -354,19 +356,20 @@ impl Job {
     /// Returns the layers as CSV, one a line.
     pub fn layers_csv(&self) -> String {
         let mut text =
-            "layer,page,z_um,thickness_um,exposure_ms,passes,speed_mm_per_s,row_clock_hz,\
+            "layer,page,z_um,thickness_um,exposure_ms,dose_mj_per_cm2,passes,speed_mm_per_s,row_clock_hz,\
                         recoat_s,approach_s,scan_s,steps_s,swaths\n"
                 .to_owned();
         let number =
             |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
         for layer in &self.layers {
             text += &format!(
-                "{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
                 layer.layer,
                 layer.page,
                 number(layer.z_um),
                 number(layer.thickness_um),
                 layer.exposure_ms,
+                number(layer.dose_mj_per_cm2),
                 layer.passes,
                 layer.speed_mm_per_s,
                 layer.row_clock_hz,
@@ -543,8 +546,12 @@ impl Planner {
             ],
         };
         let stretches: Vec<_> = places.iter().map(stretch).collect();
-        let both = [ScanDirection::Down, ScanDirection::Up];
-        let directions = if self.scan.both_ways { &both[..] } else { &[self.scan.direction] };
+        let other = match self.scan.direction {
+            ScanDirection::Down => ScanDirection::Up,
+            ScanDirection::Up => ScanDirection::Down,
+        };
+        let both = [self.scan.direction, other];
+        let directions = if self.scan.both_ways { &both[..] } else { &both[..1] };
         let found = route(&stretches, self.head, directions, &motion);
         self.head = found.end;
         let mut passed = std::collections::HashMap::new();
@@ -574,6 +581,8 @@ impl Planner {
             z_um: info.z_um,
             thickness_um: info.thickness_um,
             exposure_ms,
+            // Milliseconds of milliwatts are microjoules.
+            dose_mj_per_cm2: self.scan.irradiance_mw_per_cm2.map(|mw| exposure_ms * mw / 1000.0),
             passes: clock.passes,
             speed_mm_per_s: clock.speed_mm_per_s,
             row_clock_hz: clock.rows_hz,

@@ -38,8 +38,8 @@ pub(crate) struct Route {
     pub end: Option<[f64; 2]>,
 }
 
-/// Finds the route over swaths, which are given from the left. The head stands at `from`, unless
-/// that is anywhere.
+/// Finds the route over swaths, which are given from the left. The head stands at `from`; if that is
+/// unknown, the first swath takes the first of the directions.
 ///
 /// Swaths are scanned from the left or from the right: any other order goes further across. It could
 /// save time only where white lies at other heights in neighboring swaths, and then less than steps
@@ -75,7 +75,9 @@ fn one_way(
         let place = if leftward { swaths.len() - 1 - at } else { at };
         let mut next = Vec::new();
         let mut chosen = Vec::new();
-        for &direction in directions {
+        // The first swath of all has the machine's direction.
+        let first = at == 0 && from.is_none();
+        for &direction in if first { &directions[..1] } else { directions } {
             let [start, end] = swaths[place].rests(direction, run_up);
             let step = |at: Option<[f64; 2]>| at.map_or(0.0, |at| motion.step_s(at, start));
             let times = best.iter().map(|&(time, at)| time + step(at));
@@ -117,14 +119,16 @@ mod tests {
 
     const BOTH: [ScanDirection; 2] = [ScanDirection::Down, ScanDirection::Up];
 
-    /// Returns the least time over all directions of swaths in their order.
+    /// Returns the least time over all directions of swaths in their order; the first of all goes
+    /// down.
     fn least(rest: &[Stretch], at: Option<[f64; 2]>, motion: &Motion) -> f64 {
         let Some((swath, rest)) = rest.split_first() else { return 0.0 };
         let time = |direction| {
             let [start, end] = swath.rests(direction, motion.run_up_mm());
             at.map_or(0.0, |at| motion.step_s(at, start)) + least(rest, Some(end), motion)
         };
-        time(ScanDirection::Down).min(time(ScanDirection::Up))
+        let down = time(ScanDirection::Down);
+        if at.is_some() { down.min(time(ScanDirection::Up)) } else { down }
     }
 
     proptest! {

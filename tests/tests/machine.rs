@@ -203,7 +203,6 @@ fn json_says_how_a_display_scans() {
             "settle_s": 0.0,
             "strobe": 1.0,
             "passes": 1,
-            "tilt_deg": 0.0,
             "irradiance_mw_per_cm2": null,
             "light": null,
             "faults": {"dead": [[3, 1]], "stuck": [], "source": "camera"},

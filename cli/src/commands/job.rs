@@ -157,9 +157,7 @@ impl ScanArgs {
         name: String,
         layers: Range<u32>,
     ) -> Result<(Job, BuildPages, Scanner), Exit> {
-        if is_stream(build) {
-            return Err(Exit::usage("a job names its build: give the build's file or folder"));
-        }
+        check_file(build)?;
         let scanner = self.scanner()?;
         let at = |error: GantryError| Exit::from(error).at(input_name(build));
         let pages = BuildPages::open(build).map_err(at)?;
@@ -169,7 +167,16 @@ impl ScanArgs {
     }
 }
 
+/// Refuses standard input: a job names its build.
+fn check_file(build: &Path) -> Result<(), Exit> {
+    match is_stream(build) {
+        true => Err(Exit::usage("a job names its build: give the build's file or folder")),
+        false => Ok(()),
+    }
+}
+
 pub(crate) fn run(args: &JobArgs, common: &Common) -> Result<(), Exit> {
+    check_file(&args.build)?;
     let folder = new_folder(&args.output, args.force)?;
     let name = seen_from(folder.path(), &args.build)
         .map_err(|error| Exit::Failed(error.into()).at(input_name(&args.build)))?;

@@ -168,7 +168,6 @@ fn scan_fields(scan: &Scan) -> Value {
         "settle_s": scan.settle_s,
         "strobe": scan.strobe,
         "passes": scan.passes,
-        "tilt_deg": scan.tilt_deg,
         "irradiance_mw_per_cm2": scan.irradiance_mw_per_cm2,
         "light": scan.light.as_ref().map(|light| json!({
             "file": light.file.to_string_lossy(),

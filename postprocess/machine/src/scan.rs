@@ -57,9 +57,6 @@ pub struct Scan {
     /// The most passes over a swath, for exposures that one pass cannot give.
     #[serde(default = "one")]
     pub passes: u32,
-    /// The angle of the display in its plane, in degrees.
-    #[serde(default)]
-    pub tilt_deg: f64,
     /// The light of full white on the resin, in milliwatts a square centimeter.
     pub irradiance_mw_per_cm2: Option<f64>,
     /// The light across the mirrors; even if absent.
@@ -191,9 +188,6 @@ pub enum ScanError {
     /// No pass, or too many.
     #[error("passes: it must be between 1 and 1000")]
     Passes,
-    /// An angle that no mount has by mistake or on purpose.
-    #[error("tilt_deg: it must be between -5 and 5")]
-    Tilt,
     /// A fault that is on no mirror.
     #[error(
         "faults: {list}: there is no mirror {mirror:?} among {}x{}: count across, then along, from 0",
@@ -280,9 +274,6 @@ impl Scan {
         if !(1..=1000).contains(&self.passes) {
             return Err(ScanError::Passes);
         }
-        if !(-5.0..=5.0).contains(&self.tilt_deg) {
-            return Err(ScanError::Tilt);
-        }
         self.faults.as_ref().map_or(Ok(()), |faults| faults.check(mirrors))
     }
 
@@ -359,7 +350,6 @@ direction = "up"
 settle_s = 0.05
 strobe = 0.5
 passes = 4
-tilt_deg = -0.25
 irradiance_mw_per_cm2 = 20.0
 [scan.light]
 file = "light.png"
@@ -404,7 +394,6 @@ source = "-"
             settle_s: 0.05,
             strobe: 0.5,
             passes: 4,
-            tilt_deg: -0.25,
             irradiance_mw_per_cm2: Some(20.0),
             light: Some(ScanLight { file: "light.png".into(), source: source.clone() }),
             faults: Some(MirrorFaults { dead: vec![[512, 4]], stuck: vec![[7, 700]], source }),
@@ -418,10 +407,7 @@ source = "-"
     #[test]
     fn keys_that_may_be_left_out_have_their_defaults() {
         let least = scan(LEAST);
-        assert_eq!(
-            (least.direction, least.settle_s, least.tilt_deg),
-            (ScanDirection::Down, 0.0, 0.0)
-        );
+        assert_eq!((least.direction, least.settle_s), (ScanDirection::Down, 0.0));
         assert_eq!((least.strobe, least.passes), (1.0, 1));
         assert_eq!(
             (&least.light, &least.faults, least.irradiance_mw_per_cm2),
@@ -483,9 +469,6 @@ source = "-"
             ("strobe = 0.5", "strobe = nan", &["scan: strobe", "at most 1"]),
             ("passes = 4", "passes = 0", &["scan: passes", "between 1 and 1000"]),
             ("passes = 4", "passes = 1001", &["scan: passes", "between 1 and 1000"]),
-            ("-0.25", "5.1", &["scan: tilt_deg", "between -5 and 5"]),
-            ("-0.25", "-inf", &["scan: tilt_deg", "between -5 and 5"]),
-            ("-0.25", "nan", &["scan: tilt_deg", "between -5 and 5"]),
             ("20.0", "0", &["scan: irradiance_mw_per_cm2", "above zero"]),
             ("20.0", "inf", &["scan: irradiance_mw_per_cm2", "above zero"]),
             ("\"light.png\"", "\"\"", &["scan.light.file", "is empty"]),
@@ -516,8 +499,6 @@ source = "-"
             ("overlap = 32", "overlap = 511"),
             ("strobe = 0.5", "strobe = 1"),
             ("passes = 4", "passes = 1000"),
-            ("-0.25", "5"),
-            ("-0.25", "-5"),
             ("[[512, 4]]", "[[1023, 767], [0, 0]]"),
             ("settle_s = 0.05", "settle_s = 0"),
         ] {
