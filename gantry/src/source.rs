@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use lamp_build::{Seam, StripForm, Swaths, check_number, is_strips, strip_files};
+use lamp_build::{Seam, StripForm, StripsError, Swaths, check_number, is_strips, strip_files};
 use lamp_stack::{
     Dpi, Frame, Image, IndexedStack, PageHeader, StackError, digest_of, digest_of_digests,
 };
@@ -43,30 +43,29 @@ impl BuildPages {
         let stacks = match form {
             None => vec![open(path)?],
             Some(_) => {
-                let opened = files.iter().map(|file| open(&path.join(file)));
+                let opened = files.iter().map(|file| {
+                    let in_file = |source| StripsError::In { file: file.clone(), source };
+                    open(&path.join(file)).map_err(in_file)
+                });
                 opened.collect::<Result<_, _>>()?
             }
         };
+        let first = &stacks[0].headers()[0];
+        let is_alike = |(page, of_first): (&PageHeader, &PageHeader)| {
+            (page.info.index, page.size, page.dpi) == (of_first.info.index, first.size, first.dpi)
+        };
         for (strip, number) in stacks.iter().zip(0..) {
-            if form.is_some() {
-                for header in strip.headers() {
-                    let checked = check_number(&header.info, number);
-                    checked.map_err(|difference| lamp_build::StripsError::Unlike {
-                        file: files[number as usize].clone(),
-                        difference,
-                    })?;
-                }
-            }
-            let same = strip.headers().len() == stacks[0].headers().len()
-                && strip.headers().iter().zip(stacks[0].headers()).all(|(a, b)| {
-                    (a.info.index, a.size, a.dpi)
-                        == (b.info.index, stacks[0].headers()[0].size, stacks[0].headers()[0].dpi)
-                });
-            if !same {
+            let (pages, of_first) = (strip.headers(), stacks[0].headers());
+            if pages.len() != of_first.len() || !pages.iter().zip(of_first).all(is_alike) {
                 return Err(GantryError::UnlikePages);
             }
+            for page in pages.iter().filter(|_| form.is_some()) {
+                check_number(&page.info, number).map_err(|difference| StripsError::Unlike {
+                    file: files[number as usize].clone(),
+                    difference,
+                })?;
+            }
         }
-        let first = &stacks[0].headers()[0];
         let dpi = first.dpi.ok_or(GantryError::NoResolution)?;
         let size = [width.unwrap_or(first.size[0]), first.size[1]];
         Ok(Self { path: path.to_owned(), files, form, size, dpi, stacks })
@@ -130,7 +129,7 @@ impl BuildPages {
             self.stacks.iter().map(read).collect::<Result<_, StackError>>()?;
         let Some(form) = self.form else { return Ok(images.swap_remove(0)) };
         let swaths = Swaths::new(form.mirrors, form.overlap, self.size[0])?;
-        let joined = swaths.join(&images).map_err(|source| lamp_build::StripsError::Join {
+        let joined = swaths.join(&images).map_err(|source| StripsError::Join {
             layer: self.headers()[page].info.name(),
             source,
         })?;

@@ -1,7 +1,9 @@
 //! Checks jobs of machines that scan: their frames give every pixel its exposure.
 
 use lamp_fixtures::Sample;
-use lamp_tests::Scratch;
+use lamp_gantry::{Disturbance, Frame, Frames, GantryError, JobFolder, JobSwath, expose};
+use lamp_stack::Image;
+use lamp_tests::{Scratch, note};
 use serde_json::Value;
 
 /// A machine whose swaths are 100 pixels wide and share 10.
@@ -168,6 +170,43 @@ fn frames_have_the_rows_of_the_build() {
 }
 
 #[test]
+fn doses_are_a_stack_that_cures_as_the_build_does() {
+    let scratch = with_build();
+    scratch.run("lamp job build.tif --machine mine.toml -o job/").succeeds();
+    scratch.run("lamp expose job/ -o doses.tif -q").succeeds();
+    let (doses, build) = (scratch.layers("doses.tif"), scratch.layers("build.tif"));
+    assert_eq!(doses.len(), build.len());
+    for (doses, build) in doses.iter().zip(&build) {
+        // Level 200 of 255 is the exposure.
+        let ratio = doses.info.exposure_ms.unwrap() / build.info.exposure_ms.unwrap();
+        assert!((ratio - 1.275).abs() < 1e-12);
+        for row in 0..build.image.height() {
+            let white: Vec<_> = build.image.runs(row).map(|(a, b, _)| (a, b, 200)).collect();
+            assert_eq!(doses.image.runs(row).collect::<Vec<_>>(), white);
+        }
+    }
+    scratch.run("lamp verify doses.tif").succeeds();
+    let cured = |stack: &str| {
+        let line =
+            format!("lamp cure {stack} --material lamp-suspension --section y=20mm -q -o c.png");
+        String::from_utf8(scratch.run(&line).succeeds().stdout).unwrap()
+    };
+    // Gray stacks are drawn as white, too; their own line is the last.
+    let area = |text: &str| -> f64 {
+        let after = text.rsplit("cured ").next().unwrap().split_whitespace().next().unwrap();
+        after.parse().unwrap_or_else(|_| panic!("{text}"))
+    };
+    let (of_build, of_doses) = (area(&cured("build.tif")), area(&cured("doses.tif")));
+    assert!((of_build - of_doses).abs() < 0.01 * of_build, "{of_build} and {of_doses}");
+    // A swath beside its place leaves a gap in one row of pixels.
+    scratch.run("lamp expose job/ --offset 1:0.254mm,0mm -o shifted.tif -q").succeeds();
+    let shifted = &scratch.layers("shifted.tif")[0];
+    let commands = &shifted.info.stack.as_ref().unwrap().commands;
+    assert_eq!(commands.last().unwrap(), "expose --offset 1:254um,0um");
+    assert_ne!(shifted.image, doses[0].image);
+}
+
+#[test]
 fn gray_layers_are_shown_in_time() {
     let scratch = Scratch::new();
     scratch.part("torus.stl", Sample::Torus, 5_000);
@@ -252,4 +291,74 @@ fn impossible_jobs_are_refused_and_leave_nothing() {
     scratch.run("lamp expose job/ --layers 900").is_wrong_usage(&["no layer in this range"]);
     scratch.run("lamp expose job/ --picture d.png").is_wrong_usage(&["one layer"]);
     assert!(!scratch.path("f").exists());
+}
+
+/// Returns the root mean square and the greatest difference of the mean of windows of 4 x 4 pixels,
+/// 64 um wide, from what a gray layer wants there. Only windows that hold gray count.
+fn window_errors(wanted: &Image, got: impl Fn(u32, u32) -> f64) -> [f64; 2] {
+    let (mut squares, mut worst, mut count) = (0.0, 0.0_f64, 0);
+    for (row, column) in (0..wanted.height() / 4)
+        .flat_map(|row| (0..wanted.width() / 4).map(move |column| (4 * row, 4 * column)))
+    {
+        let places = || (0..16_u32).map(|at| (column + at % 4, row + at / 4));
+        let levels = places().map(|(column, row)| wanted.level(column, row));
+        if levels.clone().any(|level| (1..255).contains(&level)) {
+            let want = levels.map(|level| f64::from(level) / 255.0).sum::<f64>() / 16.0;
+            let error = places().map(|(column, row)| got(column, row)).sum::<f64>() / 16.0 - want;
+            squares += error * error;
+            worst = worst.max(error.abs());
+            count += 1;
+        }
+    }
+    assert!(count > 1000, "{count} gray windows");
+    [(squares / f64::from(count)).sqrt(), worst]
+}
+
+#[test]
+fn gray_in_time_has_no_grain() {
+    let scratch = Scratch::new();
+    scratch.part("sphere.stl", Sample::Sphere, 20_000);
+    let machine = MACHINE.replace("[100, 48]", "[1024, 768]");
+    scratch.write("mine.toml", machine.as_bytes());
+    // A pixel is 16 um.
+    let slice = "slice sphere.stl --dpi 1587.5 --layers 150 --gray --material lamp-suspension -q";
+    scratch.run(&format!("{slice} -o gray.tif")).succeeds();
+    scratch.run("dither gray.tif -q -o dots.tif").succeeds();
+    scratch.run("lamp job gray.tif --machine mine.toml --gray time -q -o job/").succeeds();
+    let folder = JobFolder::open(&scratch.path("job")).unwrap();
+    let (job, pages) = (&folder.job, folder.build().unwrap());
+    let (wanted, layer) = (pages.image(0).unwrap(), &job.layers[0]);
+    let count = job.layout().swaths(job.pixels[0]).unwrap().count();
+    let images = pages.swaths(0, 0..count, &job.layout()).unwrap();
+    let mut doses = vec![0.0_f64; wanted.width() as usize * wanted.height() as usize];
+    let show = |pass: &JobSwath, to: &mut dyn FnMut(&Frame<'_>)| {
+        let swath = job.swath(pass, &images[pass.swath as usize])?;
+        let mut frames = Frames::new(swath, &folder.mirrors);
+        while let Some(frame) = frames.next() {
+            to(&frame);
+        }
+        Ok::<_, GantryError>(())
+    };
+    let width = wanted.width() as usize;
+    expose(job, layer, &wanted, &Disturbance::none(job), show, |first, columns, band| {
+        for (row, band) in band.chunks(columns).enumerate() {
+            for (column, &dose) in band.iter().enumerate() {
+                doses[row * width + first as usize + column] = f64::from(dose) / layer.exposure_ms;
+            }
+        }
+    })
+    .unwrap();
+    let time = window_errors(&wanted, |column, row| doses[row as usize * width + column as usize]);
+    let dots = &scratch.layers("dots.tif")[0].image;
+    let dots = window_errors(&wanted, |column, row| f64::from(dots.level(column, row)) / 255.0);
+    let percent =
+        |errors: [f64; 2]| errors.map(|error| format!("{:.3} %", error * 100.0)).join(", at most ");
+    note(&format!(
+        "doses of 64 um windows of a gray sphere: in time {}, as dots {}",
+        percent(time),
+        percent(dots)
+    ));
+    // Half a row of 768, and the sum of single floats.
+    assert!(time[1] < 0.5 / 768.0 + 1e-4, "{time:?}");
+    assert!(dots[0] > 20.0 * time[0], "{dots:?} and {time:?}");
 }

@@ -88,6 +88,11 @@ fn no_facets_make_a_mesh_check_panic_or_a_repair_change_what_is_whole() {
 }
 
 #[test]
+fn no_frames_and_no_job_make_their_readers_panic_or_contradict_themselves() {
+    survives("scan", hostile::scan);
+}
+
+#[test]
 fn files_by_other_programs_hold_no_surprise() {
     for (kind, entry) in [("stl", hostile::stl as fn(&[u8])), ("tiff", hostile::tiff)] {
         let Some(folder) = shared_data(kind) else {

@@ -1,20 +1,22 @@
 //! `lamp expose`: a virtual machine shows a job and adds up the dose of every pixel.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use lamp_build::{ImageBounds, frame_page};
 use lamp_gantry::{
-    Disturbance, Frames, GantryError, JobFolder, JobLayer, LayerDose, SwathDose, expose,
+    BuildPages, Disturbance, Frame, Frames, GantryError, JobFolder, JobLayer, JobSwath, LayerDose,
+    SwathDose, expose,
 };
-use lamp_stack::{Length, write_gray_png};
+use lamp_stack::{GrayMask, Image, Layer, Length, StackInfo, write_gray_png};
 use serde::Serialize;
 
-use crate::args::options::{Common, parse_distance, parse_layers};
+use crate::args::options::{Common, Output, parse_distance, parse_layers};
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
 use crate::output::json_report::print_answer;
-use crate::streams::{input_name, print, write_file};
+use crate::streams::{check_stack_name, input_name, is_stream, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
 /// Prove a job: show its frames on a virtual machine and add up the dose of every pixel
@@ -22,14 +24,16 @@ use crate::terminal::progress::Progress;
 /// The virtual machine moves the head as the job says, shows each frame for its time, and adds up the
 /// light of each mirror at the centers of pixels. It compares the doses with the build: the least, the
 /// mean and the greatest dose of white pixels, light on black ones, swath by swath and seam by seam.
-/// Dead and stuck mirrors and the light across the mirrors are the machine's.
+/// Dead and stuck mirrors and the light across the mirrors are the machine's. With -o, the doses are a
+/// stack whose cured sections show the seams and faults.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp expose job/ --layers 812
   lamp expose job/ --layers 800..810 --strict
   lamp expose job/ --layers 812 --jitter 2um --blur 9um
-  lamp expose job/ --layers 812 --columns 900..1200 --rows 4000..4300 --picture dose.png")]
+  lamp expose job/ --layers 812 --columns 900..1200 --rows 4000..4300 --picture dose.png
+  lamp expose job/ --rows 4000..4001 -o doses.tif")]
 pub(crate) struct ExposeArgs {
     /// Folder of lamp job
     #[arg(value_name = "JOB")]
@@ -71,6 +75,15 @@ pub(crate) struct ExposeArgs {
     #[arg(long, value_name = "FILE.png")]
     picture: Option<PathBuf>,
 
+    /// Write the doses as a gray stack, to cure with lamp cure or lamp plan simulate: level 200 is
+    /// the layer's exposure
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    /// Replace a folder that an earlier run wrote, once the new one is complete
+    #[arg(long, requires = "output")]
+    force: bool,
+
     /// Print JSON, as docs/json.md describes it
     #[arg(long)]
     json: bool,
@@ -99,6 +112,12 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     if let Some(picture) = &args.picture {
         check_ending(picture, &PNG)?;
     }
+    if let Some(output) = &args.output {
+        if is_stream(output) {
+            return Err(Exit::usage("the report goes to standard output: name a file with -o"));
+        }
+        check_stack_name(output)?;
+    }
     let folder = JobFolder::open(&args.job)?;
     let job = &folder.job;
     let name = input_name(&args.job);
@@ -111,47 +130,44 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     if args.picture.is_some() && layers.len() > 1 {
         return Err(Exit::usage("--picture shows one layer: choose it with --layers"));
     }
-    let machine = args.machine(&folder)?;
-    let pages = folder.build()?;
-    let at = |error: GantryError| Exit::from(error).at(name.clone());
-    let count = job.layout().swaths(job.pixels[0]).map_err(at)?.count();
+    let exposing = Exposing {
+        args,
+        folder: &folder,
+        machine: args.machine(&folder)?,
+        pages: folder.build()?,
+        count: job.layout().swaths(job.pixels[0])?.count(),
+        layers: layers.len() as u32,
+    };
     let progress = Progress::new("expose", common, true);
     progress.expect(layers.len() as u64);
     let mut doses = Vec::with_capacity(layers.len());
-    for layer in layers {
-        let images = pages.swaths(layer.page, 0..count, &job.layout()).map_err(at)?;
-        let image = pages.image(layer.page).map_err(at)?;
-        let mut picture = DosePicture::new(args, &machine, layer.exposure_ms)?;
-        let dose = expose(
-            job,
-            layer,
-            &image,
-            &machine,
-            |pass, show| {
-                let mut frames =
-                    Frames::new(job.swath(pass, &images[pass.swath as usize])?, &folder.mirrors);
-                while let Some(frame) = frames.next() {
-                    show(&frame);
-                }
-                Ok(())
-            },
-            |first, columns, doses| {
-                if let Some(picture) = &mut picture {
-                    picture.add(first, columns, doses);
-                }
-            },
-        );
-        let dose = dose.map_err(at)?;
-        if let Some(picture) = picture {
-            picture.write()?;
-        }
+    let mut shown = layers.into_iter().map(|layer| {
+        let (dose, map) = exposing.layer(layer).map_err(|error| error.at(name.clone()))?;
         if !args.json {
             print(&text(&dose, layer, args.tolerance))?;
         }
-        progress.layer_done();
         doses.push(dose);
+        if let Some((picture, map)) = args.picture.as_ref().zip(map.as_ref()) {
+            map.write_picture(picture)?;
+        }
+        let is_first = doses.len() == 1;
+        Ok::<_, Exit>(map.map(|map| map.into_layer(&exposing, layer, is_first)))
+    });
+    match &args.output {
+        Some(output) => {
+            let (classic, packbits, force) = (false, false, args.force);
+            let output = Output { output: output.clone(), classic, packbits, force };
+            write_layers(shown.by_ref().filter_map(Result::transpose), &output, &progress)?;
+        }
+        None => {
+            shown.try_for_each(|layer| {
+                progress.layer_done();
+                layer.map(drop)
+            })?;
+            progress.done();
+        }
     }
-    progress.done();
+    drop(shown);
     if args.json {
         print_answer("lamp-expose-1", &json(&doses, args.tolerance))?;
     }
@@ -163,6 +179,62 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
         )));
     }
     Ok(())
+}
+
+/// A job that is shown on a machine.
+struct Exposing<'a> {
+    args: &'a ExposeArgs,
+    folder: &'a JobFolder,
+    machine: Disturbance,
+    pages: BuildPages,
+    /// The number of swaths.
+    count: u32,
+    /// The number of layers that are shown.
+    layers: u32,
+}
+
+impl Exposing<'_> {
+    /// Shows a layer, and returns its doses, with their map if that is wanted.
+    fn layer(&self, layer: &JobLayer) -> Result<(LayerDose, Option<DoseMap>), Exit> {
+        let job = &self.folder.job;
+        let images = self.pages.swaths(layer.page, 0..self.count, &job.layout())?;
+        let image = self.pages.image(layer.page)?;
+        let is_mapped = self.args.picture.is_some() || self.args.output.is_some();
+        let map = is_mapped.then(|| DoseMap::new(&self.machine.region, layer.exposure_ms));
+        let mut map = map.transpose()?;
+        let show = |pass: &JobSwath, to: &mut dyn FnMut(&Frame<'_>)| {
+            let swath = job.swath(pass, &images[pass.swath as usize])?;
+            let mut frames = Frames::new(swath, &self.folder.mirrors);
+            while let Some(frame) = frames.next() {
+                to(&frame);
+            }
+            Ok::<_, GantryError>(())
+        };
+        let dose = expose(job, layer, &image, &self.machine, show, |first, columns, doses| {
+            if let Some(map) = &mut map {
+                map.add(first, columns, doses);
+            }
+        });
+        Ok((dose?, map))
+    }
+
+    /// Returns the record of the stack of doses.
+    fn stack(&self) -> Option<StackInfo> {
+        let mut stack = self.pages.headers()[0].info.stack.clone()?;
+        stack.layers = Some(self.layers);
+        let ExposeArgs { jitter, blur, offset, .. } = self.args;
+        let mut command = "expose".to_owned();
+        for (option, length) in [("jitter", jitter), ("blur", blur)] {
+            if length.um() > 0.0 {
+                command += &format!(" --{option} {length}");
+            }
+        }
+        for (swath, [x, y]) in offset {
+            command += &format!(" --offset {swath}:{x},{y}");
+        }
+        stack.commands.push(command);
+        Some(stack)
+    }
 }
 
 impl ExposeArgs {
@@ -198,34 +270,27 @@ impl ExposeArgs {
     }
 }
 
-/// The doses of a region as a picture.
-struct DosePicture<'a> {
-    path: &'a PathBuf,
+/// The doses of a region as levels.
+struct DoseMap {
     region: [Range<u32>; 2],
     exposure_ms: f64,
     levels: Vec<u8>,
 }
 
-/// The most pixels of a picture.
-const MAX_PICTURE: u64 = 1 << 26;
+/// The most pixels of a map.
+const MAX_MAP: u64 = 1 << 28;
 
-impl<'a> DosePicture<'a> {
-    fn new(
-        args: &'a ExposeArgs,
-        machine: &Disturbance,
-        exposure_ms: f64,
-    ) -> Result<Option<Self>, Exit> {
-        let Some(path) = &args.picture else { return Ok(None) };
-        let region = machine.region.clone();
+impl DoseMap {
+    fn new(region: &[Range<u32>; 2], exposure_ms: f64) -> Result<Self, Exit> {
         let [columns, rows] = region.clone().map(|range| u64::from(range.end - range.start));
-        if columns * rows > MAX_PICTURE {
+        if columns * rows > MAX_MAP {
             return Err(Exit::usage(format!(
-                "a picture has at most {MAX_PICTURE} pixels, and these are {columns} x {rows}: choose \
-                 some with --columns and --rows"
+                "doses are written of at most {MAX_MAP} pixels, and these are {columns} x {rows}: \
+                 choose some with --columns and --rows"
             )));
         }
         let levels = vec![0; (columns * rows) as usize];
-        Ok(Some(Self { path, region, exposure_ms, levels }))
+        Ok(Self { region: region.clone(), exposure_ms, levels })
     }
 
     fn add(&mut self, first: u32, columns: usize, doses: &[f32]) {
@@ -239,10 +304,38 @@ impl<'a> DosePicture<'a> {
         }
     }
 
-    fn write(&self) -> Result<(), Exit> {
+    fn rows(&self) -> impl Iterator<Item = &[u8]> {
+        self.levels.chunks(self.region[0].len())
+    }
+
+    fn write_picture(&self, path: &Path) -> Result<(), Exit> {
         let [width, height] = self.region.clone().map(|range| range.end - range.start);
-        let rows = self.levels.chunks(width as usize).map(<[u8]>::to_vec);
-        write_file(self.path, |out| write_gray_png(out, width, height, rows))
+        let rows = self.rows().map(<[u8]>::to_vec);
+        write_file(path, |out| write_gray_png(out, width, height, rows))
+    }
+
+    /// Returns the doses as a gray layer. Its exposure is that of level 255, so that levels have
+    /// the doses as they are.
+    fn into_layer(self, exposing: &Exposing<'_>, layer: &JobLayer, is_first: bool) -> Layer {
+        let header = &exposing.pages.headers()[layer.page];
+        let [columns, rows] = self.region.clone();
+        let frame = lamp_stack::Frame {
+            left: columns.start.into(),
+            top: rows.start.into(),
+            width: columns.end - columns.start,
+            height: rows.end - rows.start,
+        };
+        let mut info = header.info.clone();
+        info.stack = exposing.stack().filter(|_| is_first);
+        let bounds = ImageBounds::of(&info, header.dpi, exposing.pages.size());
+        frame_page(&mut info, frame, &bounds.framed(frame));
+        info.exposure_ms = Some(layer.exposure_ms * 255.0 / LEVEL_OF_EXPOSURE);
+        let mut image = GrayMask::new(frame.width);
+        for row in self.rows() {
+            let runs = row.chunk_by(|a, b| a == b).map(|run| (run.len() as u32, run[0]));
+            image.push_runs(runs).expect("as long as the rows");
+        }
+        Layer { info, dpi: header.dpi, image: Image::Gray(image).into() }
     }
 }
 

@@ -85,6 +85,7 @@ const SIGNATURES: &[(&[u8], FileFormat)] = &[
     (b"MM\0+", Layers("a TIFF file")),
     (b"\x89PNG", Layers("a PNG file")),
     (&packed::SIGNATURE, Layers("a packed stack")),
+    (b"LAMPFRM1", PrintJob("a file of frames (lamp frames)")),
     (b"%PDF", Document("a PDF file")),
     (b"%!PS", Document("a PostScript file")),
     (b"8BPS", Document("a Photoshop file")),

@@ -13,6 +13,7 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 use fax::decoder::decode_g4;
+use lamp_gantry::{FrameReader, FrameWriter, Job};
 use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
 use lamp_slicer::{Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units};
 use lamp_stack::{
@@ -249,6 +250,39 @@ fn check_stack(layers: &[Layer]) {
             assert!((new - old).abs() < 1e-4, "{old} dpi became {new}");
             assert_eq!(Layer { dpi: layer.dpi, ..again }, *layer);
         }
+    }
+}
+
+/// Takes bytes as frames of a swath, and as a job. Frames that are read come as they were written, and
+/// a job that is read is one after it is written, too.
+///
+/// # Panics
+/// If that does not hold.
+pub fn scan(bytes: &[u8]) {
+    if let Ok(mut reader) = FrameReader::new(bytes) {
+        let header = reader.header();
+        let mut writer = FrameWriter::new(Vec::new(), header).expect("memory takes all");
+        let mut whole = true;
+        while let Some(frame) = reader.next() {
+            match frame {
+                Ok(frame) => writer.push(&frame).expect("memory takes all"),
+                Err(error) => {
+                    drop(one_line(&error));
+                    whole = false;
+                }
+            }
+        }
+        let written = writer.finish().expect("memory takes all");
+        assert!(!whole || written == bytes);
+    }
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let name = std::path::Path::new("job.json");
+    match Job::read(text, name) {
+        Ok(job) => {
+            let text = serde_json::to_string(&job).expect("jobs have text keys");
+            assert_eq!(Job::read(&text, name).expect("it was read"), job);
+        }
+        Err(error) => drop(one_line(&error)),
     }
 }
 

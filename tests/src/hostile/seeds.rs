@@ -9,6 +9,8 @@ use lamp_fixtures::{
     Defect, Mesh, Sample, SplitMix, StepDefect, StepSample, StepUnit, broken_step, build, inject,
     sphere, step, three_mf, three_mf_model, torus,
 };
+use lamp_gantry::{FrameHeader, FrameWriter, Frames, MirrorArray, SwathImage};
+use lamp_machine::ScanDirection;
 use lamp_slicer::{Part, SliceOptions, Slices};
 use lamp_stack::{
     Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder,
@@ -44,6 +46,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(g4_codes().into_iter().map(of("g4")))
         .chain(blocks().into_iter().map(of("check")))
         .chain(meshes().into_iter().map(of("mesh")))
+        .chain(scans().into_iter().map(of("scan")))
         .collect()
 }
 
@@ -401,5 +404,38 @@ fn meshes() -> Named {
         ("turned", mesh(&[&one[..27], &one[33..36], &one[30..33], &one[27..30]].concat())),
         ("unjoined", mesh(&[&one[..8], &[1], &one[9..]].concat())),
         ("not_finite", mesh(&[&one[..8], &[0xFF], &one[9..]].concat())),
+    ]
+}
+
+/// A swath's frames, and the job that they are of.
+fn scans() -> Named {
+    let image = Image::Mask(Mask::new(70, vec![0, 2, 2, 4], vec![1, 69, 3, 5]).expect("rows"));
+    let swath = SwathImage {
+        image: &image,
+        first_column: 60,
+        rows: [0, 2],
+        direction: ScanDirection::Up,
+        shared: [0, 0],
+    };
+    let mirrors = MirrorArray::even(70, 3);
+    let mut frames = Frames::new(swath, &mirrors);
+    let header = FrameHeader {
+        mirrors: mirrors.size(),
+        layer: 7,
+        swath: 1,
+        first_column: 60,
+        first_position: 4,
+        frames: frames.len(),
+        rows_hz: 5619.0,
+        is_upward: true,
+    };
+    let mut writer = FrameWriter::new(Vec::new(), header).expect("memory takes all");
+    while let Some(frame) = frames.next() {
+        writer.push(&frame).expect("memory takes all");
+    }
+    let job = include_str!("job.json");
+    vec![
+        ("swath.frames", writer.finish().expect("memory takes all")),
+        ("job.json", job.as_bytes().to_vec()),
     ]
 }
