@@ -88,6 +88,8 @@ pub struct WorstPixel {
 pub struct Dark {
     /// The number of such pixels with light.
     pub lit_px: u64,
+    /// The number of them with more light than the tolerance, as a share of the exposure.
+    pub over_px: u64,
     /// The greatest dose of them, in milliseconds.
     pub greatest_ms: f64,
     /// The sum of their doses.
@@ -126,7 +128,7 @@ impl SwathDose {
         off_px: 0,
         shares: [f64::INFINITY, 0.0, f64::NEG_INFINITY],
         worst: None,
-        dark: Dark { lit_px: 0, greatest_ms: 0.0, sum_ms: 0.0 },
+        dark: Dark { lit_px: 0, over_px: 0, greatest_ms: 0.0, sum_ms: 0.0 },
     };
 
     /// Adds a white pixel. The mean is a sum until the end.
@@ -141,8 +143,9 @@ impl SwathDose {
         }
     }
 
-    fn dark(&mut self, dose_ms: f64) {
+    fn dark(&mut self, dose_ms: f64, is_over: bool) {
         self.dark.lit_px += 1;
+        self.dark.over_px += u64::from(is_over);
         self.dark.greatest_ms = self.dark.greatest_ms.max(dose_ms);
         self.dark.sum_ms += dose_ms;
     }
@@ -151,7 +154,10 @@ impl SwathDose {
         let [least, sum, greatest] = self.shares;
         match self.white_px {
             0 => Self { shares: [1.0; 3], ..self },
-            px => Self { shares: [least, sum / px as f64, greatest], ..self },
+            // The sum is rounded; the mean lies between the two.
+            px => {
+                Self { shares: [least, (sum / px as f64).clamp(least, greatest), greatest], ..self }
+            }
         }
     }
 }
@@ -512,8 +518,9 @@ impl<'a> LayerSums<'a> {
         for column in columns {
             let dose = f64::from(doses[(column - first) as usize]);
             if dose > 0.0 {
-                self.all.dark(dose);
-                self.of(column).dark(dose);
+                let is_over = dose > self.machine.tolerance * self.exposure_ms;
+                self.all.dark(dose, is_over);
+                self.of(column).dark(dose, is_over);
             }
         }
     }

@@ -66,7 +66,7 @@ pub enum GantryError {
     GraySeam,
     /// A layer states no exposure.
     #[error(
-        "{layer} states no exposure: slice with --exposure, or add expose_s to [times] of the machine {machine}"
+        "{layer} states no exposure: slice with --material or --exposure-table, or add expose_s to [times] of the machine {machine}"
     )]
     NoExposure {
         /// The layer's name.
@@ -91,7 +91,9 @@ pub enum GantryError {
         layer: String,
     },
     /// No layer is in the range.
-    #[error("no layer is in this range: the build has layers {first} to {last}")]
+    #[error(
+        "no layer is in this range: the build begins with layer {first} and ends with layer {last}"
+    )]
     NoLayers {
         /// The first layer's index.
         first: u32,
@@ -105,6 +107,14 @@ pub enum GantryError {
         path: PathBuf,
         /// What is wrong with it.
         problem: String,
+    },
+    /// The build cannot be opened.
+    #[error("{}, the build of the job: {error}", path.display())]
+    Build {
+        /// The build.
+        path: PathBuf,
+        /// Why.
+        error: Box<GantryError>,
     },
     /// The build is not the job's.
     #[error("{}: this is not the build that the job was made for: its digest differs", path.display())]

@@ -348,6 +348,13 @@ impl Job {
                         layer.layer, swath.swath
                     )));
                 }
+                let rows = swath.last_row - swath.first_row;
+                if swath.frames != u64::from(rows) + u64::from(job.mirrors[1]) {
+                    return Err(failed(format!(
+                        "layer {}, swath {}: {} frames do not fit its rows",
+                        layer.layer, swath.swath, swath.frames
+                    )));
+                }
             }
         }
         Ok(job)

@@ -115,7 +115,8 @@ impl JobFolder {
     /// Returns an error if the build cannot be read, or is another one.
     pub fn build(&self) -> Result<BuildPages, GantryError> {
         let path = self.path.join(&self.job.build);
-        let pages = BuildPages::open(&path)?;
+        let pages = BuildPages::open(&path)
+            .map_err(|error| GantryError::Build { path: path.clone(), error: error.into() })?;
         match pages.digest()? == self.job.build_digest {
             true => Ok(pages),
             false => Err(GantryError::OtherBuild { path }),

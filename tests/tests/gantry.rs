@@ -105,6 +105,9 @@ fn faults_of_a_job_are_named() {
             swaths.iter_mut().find(|swath| swath["swath"] == 1).unwrap()
         };
         place[key] = value;
+        if key == "first_row" {
+            place["frames"] = Value::from(place["frames"].as_u64().unwrap() - 1);
+        }
         scratch.write("job/job.json", broken.to_string().as_bytes());
         let found = scratch.run("lamp expose job/ --layers 19..22 --strict");
         assert_eq!(found.statuses, [Some(3)], "{found:?}");
@@ -115,6 +118,11 @@ fn faults_of_a_job_are_named() {
         let wrong = lines.split("layer ").filter(|layer| layer.contains("are off by"));
         assert!(wrong.into_iter().all(|layer| layer.starts_with("20:")), "{key}: {lines}");
     }
+    // A row without its frame is no job.
+    let frames = swath["frames"].to_string();
+    let less = text.replacen(&format!("\"frames\":{frames}"), "\"frames\":1", 1);
+    scratch.write("job/job.json", less.as_bytes());
+    scratch.run("lamp expose job/").is_refused_with(&["1 frames do not fit its rows"]);
     // Another build under the same name is refused.
     scratch.write("job/job.json", text.as_bytes());
     scratch.run("lamp expose job/ --layers 20 --strict").succeeds();
@@ -277,7 +285,7 @@ fn impossible_jobs_are_refused_and_leave_nothing() {
     for (line, words) in [
         ("lamp frames job/ --layer 20 --swath 9 -o f", &["swaths 0 to 2"][..]),
         ("lamp frames job/ --layer 900 --swath 0 -o f", &["no layer 900"]),
-        ("lamp frames job/ --layer 20 --swath 0 --pass 1 -o f", &["1 passes, and no 1"]),
+        ("lamp frames job/ --layer 20 --swath 0 --pass 1 -o f", &["passes 0 to 0, and no 1"]),
     ] {
         scratch.run(line).is_refused_with(words);
     }

@@ -67,7 +67,8 @@ pub(crate) struct ExposeArgs {
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0, value_parser = parse_percent)]
     tolerance: f64,
 
-    /// Stop with status 3 if a white pixel misses its dose by more than the tolerance
+    /// Stop with status 3 if a white pixel misses its dose by more than the tolerance, or a black one
+    /// gets more light
     #[arg(long)]
     strict: bool,
 
@@ -172,9 +173,11 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
         print_answer("lamp-expose-1", &json(&doses, args.tolerance))?;
     }
     let off: u64 = doses.iter().map(|dose| dose.all.off_px).sum();
-    if args.strict && off > 0 {
+    let over: u64 = doses.iter().map(|dose| dose.all.dark.over_px).sum();
+    if args.strict && off + over > 0 {
         return Err(Exit::Findings(format!(
-            "{off} white pixels miss their dose by more than {} %",
+            "by more than {} % of the exposure, {off} white pixels miss their dose, and {over} black \
+             pixels get light",
             args.tolerance
         )));
     }
@@ -348,7 +351,10 @@ fn text(dose: &LayerDose, layer: &JobLayer, tolerance: f64) -> String {
     let all = &dose.all;
     let dark = match all.dark.lit_px {
         0 => "no light on black".to_owned(),
-        px => format!("light on {px} black pixels, up to {:.3} ms", all.dark.greatest_ms),
+        px => {
+            let pixels = if px == 1 { "pixel" } else { "pixels" };
+            format!("light on {px} black {pixels}, up to {:.3} ms", all.dark.greatest_ms)
+        }
     };
     let mut text = format!(
         "layer {}: {:.3} ms at {:.2} mm/s: {} white pixels get {}; {dark}\n",
@@ -394,6 +400,7 @@ struct DoseLine {
     worst_px: Option<[u32; 2]>,
     worst_share: Option<f64>,
     lit_px: u64,
+    lit_over_px: u64,
     lit_greatest_ms: f64,
     lit_sum_ms: f64,
 }
@@ -408,6 +415,7 @@ impl DoseLine {
             worst_px: dose.worst.map(|worst| [worst.column, worst.row]),
             worst_share: dose.worst.map(|worst| worst.share),
             lit_px: dose.dark.lit_px,
+            lit_over_px: dose.dark.over_px,
             lit_greatest_ms: dose.dark.greatest_ms,
             lit_sum_ms: dose.dark.sum_ms,
         }

@@ -154,7 +154,12 @@ impl FramesArgs {
                 format!("layer {} has swaths 0 to {}, and no {}", self.layer, count - 1, self.swath)
             }
             true if layer.swaths.iter().any(|pass| pass.swath == self.swath) => {
-                format!("swath {} has {} passes, and no {}", self.swath, layer.passes, self.pass)
+                format!(
+                    "swath {} has passes 0 to {}, and no {}",
+                    self.swath,
+                    layer.passes - 1,
+                    self.pass
+                )
             }
             true => format!(
                 "swath {} of layer {} is black: the job leaves it out",
