@@ -159,11 +159,11 @@ fn bodies() {
     assert_eq!(
         rest,
         json!({
-            "schema": "lamp-brep-1",
+            "schema": "lamp-brep-2",
             "part": "block.step",
             "unit": "inch",
             "facets": 12,
-            "chord_mm": 0.001,
+            "chordal_deviation_mm": 0.001,
             "heal_mm": 0.0,
             "notes": [],
             "tries": [],
@@ -180,5 +180,5 @@ fn bodies() {
 
     scratch.write("healed.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).as_bytes());
     let healed = answer(&scratch, "lamp brep healed.step --json");
-    assert_eq!(keys(&healed["tries"][0]), ["chord_mm", "heal_mm", "why"]);
+    assert_eq!(keys(&healed["tries"][0]), ["chordal_deviation_mm", "heal_mm", "why"]);
 }

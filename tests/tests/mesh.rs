@@ -10,7 +10,9 @@ use serde_json::{Value, json};
 
 fn check(scratch: &Scratch, words: &str) -> Value {
     let ran = scratch.run(&format!("lamp mesh check {words} --json")).succeeds();
-    serde_json::from_slice(&ran.stdout).unwrap()
+    let found: Value = serde_json::from_slice(&ran.stdout).unwrap();
+    assert_eq!(found["schema"], "lamp-mesh-2");
+    found
 }
 
 fn number(value: &Value) -> f64 {
@@ -59,7 +61,7 @@ fn a_check_speaks_of_shells_in_millimetres() {
     let mass = &found["lumps"][0]["mass"];
     let expected = 4.0 / 3.0 * PI * (1000.0 - 125.0) * 25.4f64.powi(3);
     assert!((number(&mass["volume_mm3"]) / expected - 1.0).abs() < 2e-3);
-    assert!((number(&mass["centre_mm"][2]) / 254.0 - 1.0).abs() < 1e-6);
+    assert!((number(&mass["center_mm"][2]) / 254.0 - 1.0).abs() < 1e-6);
 }
 
 #[test]
@@ -70,11 +72,21 @@ fn strict_ends_with_status_3_and_still_answers() {
     assert_eq!(ran.statuses, [Some(3)]);
     assert_eq!(ran.stderr, "mesh: hole.stl: its mesh has faults\n");
     for words in
-        ["2 loops of open edges; the longest has 3 edges, ", "  volume:   not closed: 6 sides"]
+        ["2 loops of boundary edges; the longest has 3 edges, ", "  volume:   not closed: 6 sides"]
     {
         assert!(text(&ran).contains(words), "{ran:?}");
     }
     scratch.run("lamp mesh check hole.stl").succeeds_quietly();
+    let found = check(&scratch, "hole.stl");
+    assert_eq!(found["counts"]["boundary_loops"], 2);
+    let mut loops = found["boundary_loops"].as_array().unwrap().iter();
+    assert!(loops.all(|it| it["boundary_edges"] == 3 && it["closed"] == true));
+    scratch.mesh("doubled.stl", &spoiled(&sphere(10.0, 2_000), Defect::Duplicate, 1));
+    let ran = scratch.run("lamp mesh check doubled.stl").succeeds_quietly();
+    assert!(text(&ran).contains("3 non-manifold edges; the first has 3 facets, from ("), "{ran:?}");
+    let found = check(&scratch, "doubled.stl");
+    assert_eq!(found["counts"]["non_manifold_edges"], 3);
+    assert_eq!(found["non_manifold_edges"][2]["facets"].as_array().unwrap().len(), 3);
 }
 
 #[test]
@@ -104,7 +116,7 @@ fn facets_through_each_other_are_found_on_request() {
 fn each_defect_is_repaired_and_reported() {
     let scratch = Scratch::new();
     let good = sphere(10.0, 4_000);
-    for (defect, deed) in [
+    for (defect, action) in [
         (Defect::Drop, "added"),
         (Defect::Flip, "turned"),
         (Defect::Duplicate, "dropped-doubled"),
@@ -118,11 +130,11 @@ fn each_defect_is_repaired_and_reported() {
         assert!(ran.stderr.starts_with("mesh repair: facets: "), "{ran:?}");
         scratch.run("lamp mesh check good.stl --strict").succeeds_quietly();
         let report: Value = serde_json::from_slice(&scratch.bytes("report.json")).unwrap();
-        assert_eq!(report["schema"], "lamp-mesh-repair-1");
+        assert_eq!(report["schema"], "lamp-mesh-repair-2");
         let touched = report["touched"].as_array().unwrap();
-        let of_deed = touched.iter().filter(|it| it["deed"] == deed).count();
-        assert_eq!(json!(of_deed), report["deeds"][deed], "{defect:?}");
-        assert!(of_deed >= 9, "{defect:?}");
+        let of_action = touched.iter().filter(|it| it["action"] == action).count();
+        assert_eq!(json!(of_action), report["repair_actions"][action], "{defect:?}");
+        assert!(of_action >= 9, "{defect:?}");
 
         let ran =
             scratch.run("lamp mesh repair good.stl -o again.stl --weld 5um --close 3mm").succeeds();
@@ -180,7 +192,7 @@ fn what_cannot_be_mended_is_told() {
     scratch.mesh("hole.stl", &spoiled(&sphere(10.0, 2_000), Defect::Drop, 1));
     let ran = scratch.run("lamp mesh repair hole.stl -o out.stl --close 10um --strict");
     assert_eq!(ran.statuses, [Some(3)]);
-    assert!(ran.stderr.contains("left: 1 loop of open edges; it has 3 edges, "), "{ran:?}");
+    assert!(ran.stderr.contains("left: 1 loop of boundary edges; it has 3 edges, "), "{ran:?}");
     assert!(scratch.bytes("out.stl") == scratch.bytes("hole.stl"));
 
     let nothing = Mesh { facets: vec![[[0.0; 3]; 3]; 2] };

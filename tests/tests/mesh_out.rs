@@ -66,10 +66,11 @@ fn a_blade_is_closed_and_slices_into_even_rows() {
     scratch.run("slice part.stl --dpi 100 --thickness 500um -q -o part.tif").succeeds_quietly();
     scratch.run("lamp mesh-out part.tif -o out.stl --cells 100").succeeds_quietly();
     let found = check(&scratch, "out.stl");
-    for fault in ["open_shells", "loops", "turned", "inside_out", "doubled", "not_finite"] {
+    for fault in ["open_shells", "boundary_loops", "turned", "inside_out", "doubled", "not_finite"]
+    {
         assert_eq!(found["counts"][fault], 0, "{fault}: {}", found["counts"]);
     }
-    let crowded = found["crowded"].as_array().unwrap();
+    let crowded = found["non_manifold_edges"].as_array().unwrap();
     assert!(crowded.iter().all(|edge| edge["facets"].as_array().unwrap().len() == 4));
     assert!((volume(&found) / blade.volume_mm3() - 1.0).abs() < 0.03, "{found}");
     scratch.run("slice out.stl --dpi 100 --thickness 500um -q -o again.tif").succeeds_quietly();

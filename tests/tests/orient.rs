@@ -12,12 +12,12 @@ fn with(name: &str, mesh: &Mesh) -> Scratch {
 
 fn answer(scratch: &Scratch, line: &str) -> Value {
     let answer: Value = serde_json::from_slice(&scratch.run(line).succeeds().stdout).unwrap();
-    assert_eq!(answer["schema"], "lamp-orient-1");
+    assert_eq!(answer["schema"], "lamp-orient-2");
     answer
 }
 
 fn poses(answer: &Value) -> &Vec<Value> {
-    answer["poses"].as_array().unwrap()
+    answer["orientations"].as_array().unwrap()
 }
 
 #[test]
@@ -88,7 +88,10 @@ fn threads_change_nothing_and_a_cone_holds_its_directions() {
     let three = scratch.run(&format!("{line} --threads 3")).succeeds().stdout;
     assert_eq!((one.clone(), drawn), (three, scratch.bytes("islands.svg")));
     let said = String::from_utf8(one).unwrap();
-    assert!(said.starts_with("mug.stl: 51 poses; ") && said.contains("(as it is)"), "{said}");
+    assert!(
+        said.starts_with("mug.stl: 51 orientations; ") && said.contains("(as it is)"),
+        "{said}"
+    );
     let answer = answer(&scratch, &format!("{line} --json"));
     let cosine = 30f64.to_radians().cos() - 1e-3;
     assert!(poses(&answer).iter().all(|pose| pose["up"][2].as_f64().unwrap() > cosine));

@@ -67,7 +67,7 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     };
     let second = second.transpose().map_err(|error| error.at(name.clone()))?;
     match args.json {
-        true => print_answer("lamp-brep-1", &answer(&name, &prepared, second.as_ref()))?,
+        true => print_answer("lamp-brep-2", &answer(&name, &prepared, second.as_ref()))?,
         false => print(&text(&name, &prepared, second.as_ref()))?,
     }
     // After the answer is printed: a difference is a finding, and no failure to read.
@@ -84,13 +84,13 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
 }
 
 fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value {
-    let attempt = |attempt: &PreparationAttempt| json!({"chord_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
+    let attempt = |attempt: &PreparationAttempt| json!({"chordal_deviation_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
     let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
     let mut answer = json!({
         "part": name,
         "unit": prepared.kernel.unit(),
         "facets": prepared.mesh.facets.len(),
-        "chord_mm": prepared.chord_mm,
+        "chordal_deviation_mm": prepared.chord_mm,
         "heal_mm": prepared.heal_mm,
         "notes": notes(prepared),
         "tries": prepared.tries.iter().map(attempt).collect::<Vec<_>>(),

@@ -30,8 +30,8 @@ pub(super) fn check_fields(name: &str, findings: &MeshFindings) -> Value {
         "counts": counts(check),
         "shells": check.shells.iter().take(MAX_LISTED).map(shell_fields).collect::<Vec<_>>(),
         "lumps": check.lumps.iter().take(MAX_LISTED).map(lump_fields).collect::<Vec<_>>(),
-        "loops": check.loops.iter().take(MAX_LISTED).map(loop_fields).collect::<Vec<_>>(),
-        "crowded": crowded.take(MAX_LISTED).collect::<Vec<_>>(),
+        "boundary_loops": check.loops.iter().take(MAX_LISTED).map(loop_fields).collect::<Vec<_>>(),
+        "non_manifold_edges": crowded.take(MAX_LISTED).collect::<Vec<_>>(),
         "turned": first(&check.turned),
         "inside_out": check.inside_out().take(MAX_LISTED).collect::<Vec<_>>(),
         "doubled": check.doubled.iter().take(MAX_LISTED).map(doubled_fields).collect::<Vec<_>>(),
@@ -58,8 +58,8 @@ pub(super) fn counts(check: &MeshCheck) -> Value {
         "open_shells": check.shells.iter().filter(|shell| shell.open_sides > 0).count(),
         "one_sided_shells": check.shells.iter().filter(|shell| shell.is_one_sided).count(),
         "lumps": check.lumps.len(),
-        "loops": check.loops.len(),
-        "crowded": check.crowded,
+        "boundary_loops": check.loops.len(),
+        "non_manifold_edges": check.crowded,
         "turned": check.turned.len(),
         "inside_out": check.inside_out().count(),
         "doubled": check.doubled.len(),
@@ -89,7 +89,7 @@ fn shell_fields(shell: &ShellReport) -> Value {
 fn mass_fields(mass: &Mass) -> Value {
     json!({
         "volume_mm3": mass.volume_mm3,
-        "centre_mm": mass.centre_mm,
+        "center_mm": mass.centre_mm,
         "inertia_mm5": mass.inertia_mm5,
     })
 }
@@ -103,11 +103,11 @@ fn lump_fields(lump: &Lump) -> Value {
 }
 
 fn loop_fields(rims: &RimLoop) -> Value {
-    // A hole may have as many edges as the mesh: its number is in `rims`.
+    // A hole may have as many edges as the mesh: their number is in `boundary_edges`.
     let facets = rims.corners.iter().take(MAX_LISTED).map(|&corner| facet_of(corner));
     json!({
         "facets": facets.collect::<Vec<_>>(),
-        "rims": rims.corners.len(),
+        "boundary_edges": rims.corners.len(),
         "closed": rims.is_closed,
         "length_mm": rims.length_mm,
         "width_mm": rims.width_mm(),
@@ -127,8 +127,8 @@ fn crossing_fields(crossings: &Crossings) -> Value {
     })
 }
 
-/// Returns how many facets had each deed done to them, in the order of [`Deed::ALL`], without those
-/// that nothing had.
+/// Returns the number of facets of each repair action, in the order of [`Deed::ALL`], without
+/// actions of no facet.
 pub(super) fn deeds(repaired: &Repaired) -> impl Iterator<Item = (&'static str, usize)> {
     let count = |deed| repaired.touched.iter().filter(|touched| touched.deed == deed).count();
     let counts = Deed::ALL.map(|deed| (deed.name(), count(deed)));

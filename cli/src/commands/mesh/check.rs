@@ -16,20 +16,20 @@ use crate::streams::print;
 /// Find faults in a mesh, and the volumes that its shells enclose
 ///
 /// It lists shells with their Euler numbers, areas, volumes, centers of mass and inertia, and the
-/// lumps of material that they form with their voids. It also lists holes, edges of three or more
-/// facets, overlapping shells, and facets that are flipped, doubled, without area or not finite.
+/// lumps of material that they form with their voids. It also lists holes, non-manifold
+/// edges, overlapping shells, and facets that are flipped, doubled, degenerate or not finite.
 /// Facets are numbered from 0.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp mesh check blade.stl
   lamp mesh check blade.stl --strict --self-intersections
-  lamp mesh check blade.stl --weld 5um --json | jq .loops")]
+  lamp mesh check blade.stl --weld 5um --json | jq .boundary_loops")]
 pub(super) struct MeshCheckArgs {
     #[command(flatten)]
     part: MeshPart,
 
-    /// Merge vertices of open edges that are no farther apart than this
+    /// Merge vertices of boundary edges that are no farther apart than this
     #[arg(long, value_name = "LENGTH", default_value = "0um", value_parser = parse_distance)]
     weld: Length,
 
@@ -78,7 +78,7 @@ pub(super) fn run(args: &MeshCheckArgs, common: &Common) -> Result<(), Exit> {
     let crossings = args.self_intersections.then(|| Crossings::new(&table, MAX_LISTED));
     let findings = MeshFindings { table, check, welded: welded.len(), crossings, overlaps };
     match args.json {
-        true => print_answer("lamp-mesh-1", &check_fields(&name, &findings))?,
+        true => print_answer("lamp-mesh-2", &check_fields(&name, &findings))?,
         false => print(&check_text(&name, &findings))?,
     }
     // After the answer: a script reads what was found, and the status.

@@ -23,9 +23,9 @@ use crate::terminal::progress::say;
 
 /// Repair a mesh: weld, drop, flip and add facets, and list each change
 ///
-/// It welds vertices of open edges, drops facets that are doubled or without area, turns facets the
-/// same way and shells outward (voids inward), and closes small holes. It writes a binary STL, in
-/// the units of the file. A mesh keeps its bytes if nothing can be repaired.
+/// It welds vertices of boundary edges, drops facets that are doubled or degenerate, turns facets
+/// the same way and shells outward (voids inward), and closes small holes. It writes a binary STL,
+/// in the units of the file. A mesh keeps its bytes if nothing can be repaired.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -40,9 +40,9 @@ pub(super) struct RepairArgs {
     #[arg(short, long, value_name = "OUT.stl")]
     output: PathBuf,
 
-    /// Merge vertices of open edges that are no farther apart than this [default: 1/20000 of the
-    /// part's diagonal, at most a quarter of the shortest open edge, at least the resolution of 32
-    /// bits]
+    /// Merge vertices of boundary edges that are no farther apart than this [default: 1/20000 of
+    /// the part's diagonal, at most a quarter of the shortest boundary edge, at least the
+    /// resolution of 32 bits]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     weld: Option<Length>,
 
@@ -146,23 +146,26 @@ fn tell(repaired: &Repaired, left: &[String], weld_mm: f64) {
         false => say(&format!("mesh repair: facets: {}", done.join(", "))),
     }
     if repaired.touched.iter().any(|it| it.deed == Deed::Moved) {
-        say(&format!("mesh repair: vertices of open edges within {:.3}um are one", weld_mm * 1e3));
+        say(&format!(
+            "mesh repair: vertices of boundary edges within {:.3}um are one",
+            weld_mm * 1e3
+        ));
     }
     left.iter().for_each(|fault| say(&format!("mesh repair: left: {fault}")));
 }
 
 fn write_report(report: &Path, name: &str, repaired: &Repaired) -> Result<(), Exit> {
-    let deeds: Map<String, Value> =
+    let actions: Map<String, Value> =
         deeds(repaired).map(|(deed, count)| (deed.to_owned(), count.into())).collect();
     let head = json!({
-        "schema": "lamp-mesh-repair-1",
+        "schema": "lamp-mesh-repair-2",
         "part": name,
         "facets": repaired.facets.len(),
-        "deeds": deeds,
+        "repair_actions": actions,
         "clean": repaired.left.is_clean(),
         "left": counts(&repaired.left),
     });
     let touched = repaired.touched.iter();
-    let touched = touched.map(|it| json!({"facet": it.facet, "deed": it.deed.name()}));
+    let touched = touched.map(|it| json!({"facet": it.facet, "action": it.deed.name()}));
     JsonReport::new(&head).list("touched", touched).write(report)
 }

@@ -100,7 +100,7 @@ pub(super) fn faults(table: &CornerTable, check: &MeshCheck) -> Vec<String> {
         shells(check.inside_out(), "facing into the material"),
         shells(one_sided(check), "with one side only"),
         of_facets(&doubled, "doubled"),
-        of_facets(&check.flat, "without area"),
+        of_facets(&check.flat, "without area (degenerate)"),
     ];
     kinds.into_iter().flatten().collect()
 }
@@ -129,7 +129,7 @@ fn loops(check: &MeshCheck) -> Option<String> {
     let which = if check.loops.len() == 1 { "it" } else { "the longest" };
     Some(format!(
         "{}; {which} has {}, {:.3} mm long, at facet {facet}, {}",
-        count(check.loops.len(), "loop of open edges", "loops of open edges"),
+        count(check.loops.len(), "loop of boundary edges", "loops of boundary edges"),
         count(longest.corners.len(), "edge", "edges"),
         longest.length_mm,
         box_text(longest.box_mm),
@@ -143,8 +143,8 @@ fn crowded(table: &CornerTable, check: &MeshCheck) -> Option<String> {
         .map(|vertex| table.points()[vertex as usize].map(|c| format!("{c:.3}")).join(", "));
     let which = if check.crowded == 1 { "it" } else { "the first" };
     Some(format!(
-        "{} of three facets and more; {which} has {}, from ({}) to ({})",
-        count(check.crowded, "edge", "edges"),
+        "{}; {which} has {} facets, from ({}) to ({})",
+        count(check.crowded, "non-manifold edge", "non-manifold edges"),
         first.len(),
         ends[0],
         ends[1],

@@ -1,4 +1,4 @@
-//! `lamp orient`: compares the poses in which a part can be built.
+//! `lamp orient`: compares the orientations in which a part can be built.
 
 mod images;
 mod report;
@@ -22,9 +22,9 @@ use lamp_plots::{self as plots, sphere_picture};
 
 /// Find rotations of a part that give few islands and little overhang
 ///
-/// The mesh gives the islands, pits, overhanging area and size of each pose. A pose is left out if
-/// another pose is better in every respect. The best remaining poses are sliced, and their islands
-/// counted on the images.
+/// The mesh gives the islands, pits, overhanging area and size of each orientation. An orientation
+/// is left out if another is better in every respect. The best remaining orientations are sliced,
+/// and their islands counted on the images.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -54,7 +54,7 @@ pub(crate) struct OrientArgs {
     #[arg(long, value_name = "LENGTH", default_value = "100um", value_parser = parse_thickness)]
     thickness: Length,
 
-    /// How many of the best poses to slice
+    /// How many of the best orientations to slice
     #[arg(long, value_name = "N", default_value = "5")]
     best: usize,
 

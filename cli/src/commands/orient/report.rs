@@ -1,4 +1,4 @@
-//! Reports the poses of a part, as a table or as JSON.
+//! Reports the orientations of a part, as a table or as JSON.
 
 use lamp_pipeline::heights::significant;
 use lamp_pipeline::solid::name_of_all;
@@ -39,9 +39,9 @@ impl OrientArgs {
             "max_overhang_deg": self.max_overhang_angle,
             "dpi": self.dpi.get(),
             "best": compared.rotations[compared.best()],
-            "poses": compared.poses.iter().enumerate().map(row).collect::<Vec<_>>(),
+            "orientations": compared.poses.iter().enumerate().map(row).collect::<Vec<_>>(),
         });
-        print_answer("lamp-orient-1", &answer)
+        print_answer("lamp-orient-2", &answer)
     }
 }
 
@@ -62,7 +62,7 @@ struct PoseRow<'a> {
 fn table(part: &str, compared: &ComparedPoses) -> String {
     let ComparedPoses { poses, pareto, image_islands, rotations } = compared;
     let mut text = format!(
-        "{part}: {} poses; of {} no other is better in every respect\n\
+        "{part}: {} orientations; of {} no other is better in every respect\n\
          {:<20}{:>9}{:>6}{:>16}{:>13}{:>18}{:>18}\n",
         poses.len(),
         pareto.len(),

@@ -112,11 +112,11 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
     };
     let lights = [1.0 - LIGHT, 1.0 + LIGHT];
     json!({
-        "schema": "lamp-plan-column-cure-1",
+        "schema": "lamp-plan-column-cure-2",
         "target": reported.target,
         "projector": reported.projector.name,
         "material": reported.material,
-        "optimise": options.objective.to_string(),
+        "optimize": options.objective.to_string(),
         "gray": options.gray.is_some(),
         "rays": match setup.tracing {
             Tracing::Exact => Value::Null,
