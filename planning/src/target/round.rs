@@ -107,12 +107,12 @@ impl Ring {
 
 /// Returns the shape that is not round about the axis, if any.
 fn why_not_round(shapes: &Shapes) -> Option<String> {
-    let off_axis = |centre: [lamp_stack::Length; 2]| centre.iter().any(|it| it.um() != 0.0);
+    let off_axis = |center: [lamp_stack::Length; 2]| center.iter().any(|it| it.um() != 0.0);
     for (base, of) in shapes.base.iter().zip(1..) {
         if base.diameter.is_none() {
             return Some(format!("base {of} is a rectangle"));
         }
-        if off_axis(base.centre) {
+        if off_axis(base.center) {
             return Some(format!("the middle of base {of} is not on the axis"));
         }
     }
@@ -120,7 +120,7 @@ fn why_not_round(shapes: &Shapes) -> Option<String> {
         if lens.count != [1, 1] {
             return Some(format!("lens {of} is an array"));
         }
-        if off_axis(lens.centre) {
+        if off_axis(lens.center) {
             return Some(format!("the middle of lens {of} is not on the axis"));
         }
     }
@@ -149,7 +149,7 @@ mod tests {
         }
         let aside = "name = 'a'\ndescription = 'b'\n[[lens]]\ndiameter = '1mm'\nsag = '9um'\n";
         for (more, why) in [
-            ("centre = ['1um', '0um']\n", "the middle of lens 1 is not on the axis"),
+            ("center = ['1um', '0um']\n", "the middle of lens 1 is not on the axis"),
             ("count = [1, 2]\npitch = ['1um', '1um']\n", "lens 1 is an array"),
         ] {
             let shapes = Shapes::from_toml(&format!("{aside}{more}")).unwrap();

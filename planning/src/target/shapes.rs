@@ -39,8 +39,8 @@ pub struct Base {
     #[serde(deserialize_with = "length")]
     pub height: Length,
     /// The x and y of its middle.
-    #[serde(default, deserialize_with = "lengths")]
-    pub centre: [Length; 2],
+    #[serde(default, alias = "centre", deserialize_with = "lengths")]
+    pub center: [Length; 2],
 }
 
 /// Spherical caps, one or several in rows.
@@ -60,8 +60,8 @@ pub struct LensShape {
     #[serde(default, deserialize_with = "lengths")]
     pub pitch: [Length; 2],
     /// The x and y of the middle of them all.
-    #[serde(default, deserialize_with = "lengths")]
-    pub centre: [Length; 2],
+    #[serde(default, alias = "centre", deserialize_with = "lengths")]
+    pub center: [Length; 2],
 }
 
 /// Channels side by side.
@@ -121,7 +121,7 @@ pub enum ShapesError {
         key: &'static str,
     },
     /// No projector reaches this place.
-    #[error("{shape} {of}: centre must be within 1 m of the axis")]
+    #[error("{shape} {of}: center must be within 1 m of the axis")]
     Far {
         /// The kind of the shape.
         shape: &'static str,
@@ -189,12 +189,12 @@ impl Shapes {
 
     /// Returns the sides of the rectangle around the axis that holds all bases and lenses.
     pub(super) fn size_um(&self) -> [f64; 2] {
-        let bases = self.base.iter().map(|base| (base.sides_um(), base.centre));
-        let lenses = self.lens.iter().map(|lens| (lens.sides_um(), lens.centre));
+        let bases = self.base.iter().map(|base| (base.sides_um(), base.center));
+        let lenses = self.lens.iter().map(|lens| (lens.sides_um(), lens.center));
         let mut size = [0.0_f64; 2];
-        for (sides, centre) in bases.chain(lenses) {
+        for (sides, center) in bases.chain(lenses) {
             for axis in 0..2 {
-                size[axis] = size[axis].max(sides[axis] + 2.0 * centre[axis].um().abs());
+                size[axis] = size[axis].max(sides[axis] + 2.0 * center[axis].um().abs());
             }
         }
         size
@@ -214,7 +214,7 @@ impl Shapes {
     fn top_um(&self) -> f64 {
         let bases = self.base.iter().map(|base| base.height.um());
         let sags = self.lens.iter().map(|lens| {
-            let [x, y] = lens.nearest_um(lens.centre.map(Length::um));
+            let [x, y] = lens.nearest_um(lens.center.map(Length::um));
             self.base_um(x, y) + lens.sag.um()
         });
         bases.chain(sags).fold(0.0, f64::max)
@@ -230,7 +230,7 @@ impl Base {
     }
 
     fn holds(&self, x: f64, y: f64) -> bool {
-        let [dx, dy] = [x - self.centre[0].um(), y - self.centre[1].um()];
+        let [dx, dy] = [x - self.center[0].um(), y - self.center[1].um()];
         let [width, height] = self.sides_um();
         match self.diameter {
             Some(diameter) => dx.hypot(dy) <= diameter.um() / 2.0,
@@ -244,7 +244,7 @@ impl Base {
         }
         let [width, height] = self.sides_um();
         possible("base", of, &[("size", width), ("size", height), ("height", self.height.um())])?;
-        near("base", of, self.centre)
+        near("base", of, self.center)
     }
 }
 
@@ -261,7 +261,7 @@ impl LensShape {
     fn nearest_um(&self, point: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|axis| {
             let (last, pitch) = (f64::from(self.count[axis] - 1), self.pitch[axis].um());
-            let first = self.centre[axis].um() - last / 2.0 * pitch;
+            let first = self.center[axis].um() - last / 2.0 * pitch;
             let number = if last > 0.0 { ((point[axis] - first) / pitch).round() } else { 0.0 };
             first + number.clamp(0.0, last) * pitch
         })
@@ -287,7 +287,7 @@ impl LensShape {
                 possible("lens", of, &[("pitch", pitch.um())])?;
             }
         }
-        near("lens", of, self.centre)
+        near("lens", of, self.center)
     }
 }
 
@@ -324,8 +324,8 @@ fn possible(
     }
 }
 
-fn near(shape: &'static str, of: usize, centre: [Length; 2]) -> Result<(), ShapesError> {
-    let is_near = centre.iter().all(|length| length.um().abs() <= MOST_UM);
+fn near(shape: &'static str, of: usize, center: [Length; 2]) -> Result<(), ShapesError> {
+    let is_near = center.iter().all(|length| length.um().abs() <= MOST_UM);
     if is_near { Ok(()) } else { Err(ShapesError::Far { shape, of }) }
 }
 
@@ -376,12 +376,14 @@ mod tests {
     #[test]
     fn the_nearest_lens_counts_and_stands_on_its_base() {
         let text = "name = 'a'\ndescription = 'b'\n\
-                    [[base]]\nsize = '1x1mm'\nheight = '10um'\ncentre = ['1mm', '0um']\n\
+                    [[base]]\nsize = '1x1mm'\nheight = '10um'\ncenter = ['1mm', '0um']\n\
                     [[lens]]\ndiameter = '200um'\nsag = '20um'\ncount = [3, 1]\npitch = ['1mm', '0um']\n";
         let shapes = Shapes::from_toml(text).unwrap();
         let at = |x: f64| shapes.height_um(x, 0.0).round();
         assert_eq!([-1000.0, 0.0, 1000.0, 1200.0, 1501.0].map(at), [20.0, 20.0, 30.0, 10.0, 0.0]);
         assert_eq!(shapes.size_um(), [3000.0, 1000.0]);
+        // The former spelling of the key.
+        assert_eq!(Shapes::from_toml(&text.replace("center", "centre")), Ok(shapes));
     }
 
     #[test]

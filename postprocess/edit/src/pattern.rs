@@ -26,7 +26,7 @@ enum RepeatWay {
     Step([Length; 3]),
     /// About an axis of length 1 through a point, counterclockwise as seen from its tip.
     Turn {
-        centre: [Length; 3],
+        center: [Length; 3],
         axis: [f64; 3],
         degrees: f64,
     },
@@ -39,8 +39,8 @@ struct RepeatTable {
     count: u32,
     #[serde(default, deserialize_with = "some_point")]
     step: Option<[Length; 3]>,
-    #[serde(default, deserialize_with = "some_point")]
-    centre: Option<[Length; 3]>,
+    #[serde(default, alias = "centre", deserialize_with = "some_point")]
+    center: Option<[Length; 3]>,
     axis: Option<PatternAxis>,
     /// From the first to the last, in degrees.
     angle: Option<f64>,
@@ -82,17 +82,17 @@ impl TryFrom<RepeatTable> for Repeat {
     type Error = String;
 
     fn try_from(keys: RepeatTable) -> Result<Self, String> {
-        let RepeatTable { count, step, centre, axis, angle, angle_step } = keys;
+        let RepeatTable { count, step, center, axis, angle, angle_step } = keys;
         if !(1..=MAX_REPEATS).contains(&u64::from(count)) {
             return Err(format!("count is {count}, and may be 1 to {MAX_REPEATS}"));
         }
         let has_turn = axis.is_some() || angle.is_some() || angle_step.is_some();
-        let centre = match (step, centre) {
+        let center = match (step, center) {
             (Some(step), None) if !has_turn => {
                 return Ok(Self { count, way: RepeatWay::Step(step) });
             }
-            (None, Some(centre)) => centre,
-            _ => return Err("write step, or centre with axis, angle or angle_step".to_owned()),
+            (None, Some(center)) => center,
+            _ => return Err("write step, or center with axis, angle or angle_step".to_owned()),
         };
         let axis = axis.unwrap_or(PatternAxis::Named(AxisName::Z));
         let axis = axis.direction().ok_or("the axis has no direction")?;
@@ -109,7 +109,7 @@ impl TryFrom<RepeatTable> for Repeat {
         if !widest.is_finite() || widest.abs() > 360.0 {
             return Err(format!("{widest} degrees are more than a circle"));
         }
-        Ok(Self { count, way: RepeatWay::Turn { centre, axis, degrees } })
+        Ok(Self { count, way: RepeatWay::Turn { center, axis, degrees } })
     }
 }
 
@@ -141,8 +141,8 @@ impl Repeat {
             RepeatWay::Step(step) => {
                 Motion { by_um: step.map(|part| f64::from(k) * part.um()), ..Motion::NONE }
             }
-            RepeatWay::Turn { centre, axis, degrees } => {
-                Motion::about(centre.map(Length::um), axis, f64::from(k) * degrees)
+            RepeatWay::Turn { center, axis, degrees } => {
+                Motion::about(center.map(Length::um), axis, f64::from(k) * degrees)
             }
         }
     }
@@ -310,24 +310,26 @@ mod tests {
     fn lines_step_and_circles_turn() {
         let line = places("repeat = { count = 3, step = [\"1mm\", \"0mm\", \"-0.5mm\"] }");
         assert_eq!(line, [[1.0, 0.0, 2.0], [2.0, 0.0, 1.5], [3.0, 0.0, 1.0]]);
-        let whole = places("repeat = { count = 4, centre = [\"0mm\", \"0mm\"] }");
+        let whole = places("repeat = { count = 4, center = [\"0mm\", \"0mm\"] }");
         let quarters = [[1.0, 0.0, 2.0], [0.0, 1.0, 2.0], [-1.0, 0.0, 2.0], [0.0, -1.0, 2.0]];
         assert_eq!(whole, quarters);
+        // The former spelling of the key.
+        assert_eq!(places("repeat = { count = 4, centre = [\"0mm\", \"0mm\"] }"), whole);
         assert_eq!(
-            places("repeat = { count = 4, centre = [\"0mm\", \"0mm\"], angle = 360 }"),
+            places("repeat = { count = 4, center = [\"0mm\", \"0mm\"], angle = 360 }"),
             quarters
         );
-        let arc = places("repeat = { count = 3, centre = [\"0mm\", \"0mm\"], angle = 60 }");
+        let arc = places("repeat = { count = 3, center = [\"0mm\", \"0mm\"], angle = 60 }");
         let half = 0.75f64.sqrt();
         assert!(near(&arc, &[[1.0, 0.0, 2.0], [half, 0.5, 2.0], [0.5, half, 2.0]]), "{arc:?}");
-        let back = places("repeat = { count = 2, centre = [\"0mm\", \"0mm\"], angle_step = -90 }");
+        let back = places("repeat = { count = 2, center = [\"0mm\", \"0mm\"], angle_step = -90 }");
         assert_eq!(back, [quarters[0], quarters[3]]);
         // About x through (0, 0, 1): up becomes back.
-        let keys = "count = 2, centre = [\"0mm\", \"0mm\", \"1mm\"], angle_step = 90";
+        let keys = "count = 2, center = [\"0mm\", \"0mm\", \"1mm\"], angle_step = 90";
         let lying = places(&format!("repeat = {{ {keys}, axis = \"x\" }}"));
         assert_eq!(lying, [[1.0, 0.0, 2.0], [1.0, -1.0, 1.0]]);
         // The diagonal of a cube takes x to y, y to z, z to x.
-        let third = places("repeat = { count = 3, centre = [\"0mm\", \"0mm\"], axis = [2, 2, 2] }");
+        let third = places("repeat = { count = 3, center = [\"0mm\", \"0mm\"], axis = [2, 2, 2] }");
         assert!(near(&third, &[[1.0, 0.0, 2.0], [2.0, 1.0, 0.0], [0.0, 2.0, 1.0]]), "{third:?}");
     }
 
@@ -338,7 +340,7 @@ mod tests {
         );
         assert_eq!(grid, [[1.0, 0.0, 2.0], [2.0, 0.0, 2.0], [1.0, 3.0, 2.0], [2.0, 3.0, 2.0]]);
         let ring = places(
-            "repeat = [{ count = 2, step = [\"1mm\", \"0mm\"] }, { count = 2, centre = [\"0mm\", \"0mm\"] }]",
+            "repeat = [{ count = 2, step = [\"1mm\", \"0mm\"] }, { count = 2, center = [\"0mm\", \"0mm\"] }]",
         );
         assert_eq!(ring, [[1.0, 0.0, 2.0], [2.0, 0.0, 2.0], [-1.0, 0.0, 2.0], [-2.0, 0.0, 2.0]]);
         assert_eq!(motions(&[]), [Motion::NONE]);
@@ -349,21 +351,21 @@ mod tests {
         for (keys, said) in [
             ("count = 0, step = [\"1mm\", \"0mm\"]", "count is 0, and may be 1 to 100000"),
             ("count = 100001, step = [\"1mm\", \"0mm\"]", "count is 100001"),
-            ("count = 2", "write step, or centre"),
-            ("count = 2, step = [\"1mm\", \"0mm\"], centre = [\"1mm\", \"0mm\"]", "write step, or"),
-            ("count = 2, step = [\"1mm\", \"0mm\"], angle = 3", "write step, or centre"),
+            ("count = 2", "write step, or center"),
+            ("count = 2, step = [\"1mm\", \"0mm\"], center = [\"1mm\", \"0mm\"]", "write step, or"),
+            ("count = 2, step = [\"1mm\", \"0mm\"], angle = 3", "write step, or center"),
             ("count = 2, step = [\"1mm\"]", "1 lengths where 2 or 3 are needed"),
             (
-                "count = 2, centre = [\"1mm\", \"0mm\"], axis = [0, 0, 0]",
+                "count = 2, center = [\"1mm\", \"0mm\"], axis = [0, 0, 0]",
                 "the axis has no direction",
             ),
             (
-                "count = 2, centre = [\"1mm\", \"0mm\"], axis = \"w\"",
+                "count = 2, center = [\"1mm\", \"0mm\"], axis = \"w\"",
                 "write \"x\", \"y\", \"z\" or",
             ),
-            ("count = 2, centre = [\"1mm\", \"0mm\"], angle = 3, angle_step = 1", "write one of"),
-            ("count = 2, centre = [\"1mm\", \"0mm\"], angle = 361", "361 degrees are more than"),
-            ("count = 2, centre = [\"1mm\", \"0mm\"], angle = nan", "NaN degrees are more than"),
+            ("count = 2, center = [\"1mm\", \"0mm\"], angle = 3, angle_step = 1", "write one of"),
+            ("count = 2, center = [\"1mm\", \"0mm\"], angle = 361", "361 degrees are more than"),
+            ("count = 2, center = [\"1mm\", \"0mm\"], angle = nan", "NaN degrees are more than"),
             ("count = 2, radius = 3", "unknown field `radius`"),
         ] {
             let error = read(&format!("repeat = {{ {keys} }}")).unwrap_err();

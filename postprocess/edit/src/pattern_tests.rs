@@ -167,7 +167,7 @@ proptest! {
         let Some(expected) = one_by_one(&before, op, &shapes) else { return Ok(()) };
         let list = format!(
             "[[edit]]\nop = \"{op}\"\n{}\n\
-             repeat = {{ count = {count}, centre = {}, angle_step = {degrees} }}\n",
+             repeat = {{ count = {count}, center = {}, angle_step = {degrees} }}\n",
             shapes[0], lengths(&centre)
         );
         prop_assert_eq!(edited(&before, &list).unwrap(), expected);
@@ -194,7 +194,7 @@ proptest! {
             ),
         };
         let Ok(one) = edited(&black(), &format!("[[edit]]\n{shape}\n")) else { return Ok(()) };
-        let ring = "repeat = { count = 4, centre = [\"0mm\", \"0mm\"] }";
+        let ring = "repeat = { count = 4, center = [\"0mm\", \"0mm\"] }";
         let ring = edited(&black(), &format!("[[edit]]\n{shape}\n{ring}\n")).unwrap();
         for (one, ring) in one.iter().zip(&ring) {
             let turned = (0..4).map(|quarters| one.oriented(Orientation::new(quarters, false)).unwrap());
@@ -284,8 +284,8 @@ fn ten_thousand_holes_are_as_many_as_one_a_hundred_times_a_hundred() {
 #[test]
 fn what_cannot_be_repeated_is_said() {
     let up = "repeat = { count = 2, step = [\"1mm\", \"0mm\", \"1mm\"] }";
-    let tilted = "repeat = { count = 2, centre = [\"0mm\", \"0mm\"], axis = \"x\" }";
-    let ring = "repeat = { count = 8, centre = [\"0mm\", \"0mm\"] }";
+    let tilted = "repeat = { count = 2, center = [\"0mm\", \"0mm\"], axis = \"x\" }";
+    let ring = "repeat = { count = 8, center = [\"0mm\", \"0mm\"] }";
     let block = "box = { x = [\"1mm\", \"2mm\"], y = [\"1mm\", \"2mm\"] }";
     let many = "repeat = [{ count = 400, step = [\"1mm\", \"0mm\"] }, { count = 400, step = [\"1mm\", \"0mm\"] }]";
     let picture = "picture = { file = \"logo.png\", at = [\"1mm\", \"1mm\"] }";
@@ -296,8 +296,8 @@ fn what_cannot_be_repeated_is_said() {
         (block, tilted, "edit 1: only struts"),
         (block, many, "edit 1: it repeats more than 100000 times"),
         (picture, ring, "edit 1: pictures turn by 90, 180 or 270 degrees only"),
-        (block, "repeat = { count = 2 }", "line 3: edit 1, repeat: write step, or centre"),
-        (block, "repeat = [{ count = 2 }]", "line 3: edit 1, repeat[0]: write step, or centre"),
+        (block, "repeat = { count = 2 }", "line 3: edit 1, repeat: write step, or center"),
+        (block, "repeat = [{ count = 2 }]", "line 3: edit 1, repeat[0]: write step, or center"),
         (block, "repeat = { count = 2, radius = 1 }", "line 3: edit 1, repeat.radius: unknown key"),
     ] {
         let error = edited(&black(), &format!("[[edit]]\n{shape}\n{repeat}\n")).unwrap_err();
