@@ -38,8 +38,8 @@ struct Lamp {
     command: Command,
 
     /// Print the licenses of all that is in the program
-    #[arg(long, alias = "licenses", help_heading = GENERAL)]
-    licences: bool,
+    #[arg(long, alias = "licences", help_heading = GENERAL)]
+    licenses: bool,
 
     #[command(flatten)]
     common: Common,
@@ -66,8 +66,8 @@ pub fn run_lamp() -> ExitCode {
         Err(error) => return finish("lamp", Err(error)),
     };
     let parsed = Lamp::from_arg_matches(&matches);
-    let Lamp { command, licences, common } = parsed.unwrap_or_else(|error| refuse(&error));
-    if licences {
+    let Lamp { command, licenses, common } = parsed.unwrap_or_else(|error| refuse(&error));
+    if licenses {
         return finish("lamp", print_licences());
     }
     let name = matches.subcommand_name().unwrap_or_default();

@@ -28,6 +28,7 @@ pub struct FixSettings {
     #[serde(with = "text")]
     pub min_confidence: f64,
     /// Uses the layers below and above to find where contours cross bands of three rows and more.
+    // Keys of stored results hold this name; the command line knows it as an alias.
     #[serde(skip_serializing_if = "is_default")]
     pub use_neighbours: bool,
 }

@@ -1,4 +1,4 @@
-//! `lamp --licences` has the notices of what is in the program: no crate is missing, and none is
+//! `lamp --licenses` has the notices of what is in the program: no crate is missing, and none is
 //! there that is not.
 
 use std::collections::BTreeSet;
@@ -50,7 +50,7 @@ fn noticed(text: &str) -> BTreeSet<String> {
 #[test]
 fn each_crate_in_the_program_has_its_notice() {
     let scratch = Scratch::new();
-    let printed = scratch.run("lamp --licences").succeeds();
+    let printed = scratch.run("lamp --licenses").succeeds();
     let text = String::from_utf8(printed.stdout).unwrap();
     let noticed = noticed(&text);
     assert!(noticed.len() > 100, "{noticed:?}");
@@ -69,8 +69,8 @@ fn each_crate_in_the_program_has_its_notice() {
 #[test]
 fn licences_are_printed_in_either_spelling() {
     let scratch = Scratch::new();
-    let printed = scratch.run("lamp --licences").succeeds().stdout;
-    for words in ["lamp --licenses", "lamp --licences info", "lamp --quiet --licenses man pages"] {
+    let printed = scratch.run("lamp --licenses").succeeds().stdout;
+    for words in ["lamp --licences", "lamp --licenses info", "lamp --quiet --licences man pages"] {
         assert!(scratch.run(words).succeeds().stdout == printed, "{words}");
     }
     let text = String::from_utf8(printed).unwrap();

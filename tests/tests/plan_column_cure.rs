@@ -20,6 +20,8 @@ fn one_command_plans_a_lens_array() {
     }
     let report = report(&scratch, "plan");
     let measures = &report["bitmaps"]["measures"];
+    assert_eq!(report["schema"], "lamp-plan-column-cure-2");
+    assert_eq!(report["optimize"], "dose");
     assert!(report["best"]["relative_gap"].as_f64().unwrap() <= 1e-6, "{report}");
     assert!(report["bitmaps"]["excess"].as_f64().unwrap() < 0.01, "{report}");
     assert!(measures["ra_um"].as_f64().unwrap() < 14.0, "{report}");
@@ -45,8 +47,9 @@ fn one_command_plans_a_lens_array() {
 #[test]
 fn threads_change_no_byte() {
     let scratch = Scratch::new();
-    for threads in [1, 2, 3] {
-        scratch.run(&format!("{LENSES}{threads} --optimise height --threads {threads}")).succeeds();
+    // The first in the option's former spelling.
+    for (threads, option) in [(1, "--optimise"), (2, "--optimize"), (3, "--optimize")] {
+        scratch.run(&format!("{LENSES}{threads} {option} height --threads {threads}")).succeeds();
     }
     for file in ["bitmaps.tif", "report.json", "residual.png"] {
         let [one, two, three] = [1, 2, 3].map(|k| scratch.bytes(&format!("plan{k}/{file}")));

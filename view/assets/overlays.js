@@ -39,13 +39,13 @@ export class Overlays {
     this.#app.state.set({ overlays: known.filter((id) => chosen.has(id)) });
   }
 
-  #row({ id, label, colour }, faded) {
+  #row({ id, label, color }, faded) {
     this.opacity[id] = OPACITY;
     const box = Object.assign(element("input"), { type: "checkbox", id: `overlay-${id}` });
     box.addEventListener("change", () => this.set(id, box.checked));
     const swatch = element("span");
     swatch.className = "swatch";
-    swatch.style.background = colour;
+    swatch.style.background = color;
     const name = element("label");
     name.className = "row";
     name.append(box, swatch, label);

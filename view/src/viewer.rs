@@ -131,7 +131,7 @@ impl Viewer {
             .map(|overlay| {
                 let [red, green, blue] = overlay.colour();
                 let colour = format!("#{red:02x}{green:02x}{blue:02x}");
-                json!({"id": overlay.name(), "label": overlay.label(), "colour": colour})
+                json!({"id": overlay.name(), "label": overlay.label(), "color": colour})
             })
             .collect();
         json!({

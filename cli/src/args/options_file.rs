@@ -24,9 +24,10 @@ pub(crate) struct Setting {
     pub(crate) words: Vec<OsString>,
 }
 
-/// Returns the command's option of a long name.
+/// Returns the command's option of a long name or an alias.
 pub(crate) fn option_of<'a>(command: &'a Command, key: &str) -> Option<&'a Arg> {
-    command.get_arguments().find(|option| option.get_long() == Some(key))
+    let has_alias = |option: &Arg| option.get_all_aliases().is_some_and(|all| all.contains(&key));
+    command.get_arguments().find(|option| option.get_long() == Some(key) || has_alias(option))
 }
 
 /// Reads the options that a file's text gives to the command of `lamp` at `path`, which is
@@ -109,6 +110,8 @@ fn setting(
     let Some(option) = option_of(runs.unwrap_or(command), key) else {
         return if is_below(command, key) { Ok(None) } else { Err(unknown(command)) };
     };
+    // An alias stands for the same option.
+    let key = option.get_long().unwrap_or(key);
     check(option, &words_of(option, ALONE, value.get_ref())?)?;
     let words = words_of(option, key, value.get_ref())?;
     Ok(runs.map(|_| Setting { key: key.to_owned(), words }))
@@ -217,6 +220,13 @@ fit = true
         assert_eq!(words("tile", text).unwrap(), "--quiet --fit");
         assert_eq!(words("target squares", text).unwrap(), "--dpi=600");
         assert_eq!(words("target screens", text).unwrap(), "--dpi=600 --quiet");
+    }
+
+    #[test]
+    fn an_alias_is_the_same_option() {
+        let text = "use-neighbours = true\n[fix]\nuse-neighbors = false";
+        assert_eq!(words("fix", text).unwrap(), "");
+        assert_eq!(words("fix", "[fix]\nuse-neighbours = true").unwrap(), "--use-neighbors");
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub(crate) struct FixStageArgs {
     min_confidence: f64,
 
     /// Use the layers below and above to find where contours cross bands of three or more rows
-    #[arg(long)]
+    #[arg(long = "use-neighbors", alias = "use-neighbours")]
     use_neighbours: bool,
 }
 

@@ -62,15 +62,15 @@ pub(crate) struct ViewArgs {
     memory: u64,
 
     /// Print the licenses of the libraries in the page
-    #[arg(long, alias = "licenses")]
-    licences: bool,
+    #[arg(long, alias = "licences")]
+    licenses: bool,
 
     #[command(flatten)]
     slicing: SlicingArgs,
 }
 
 pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
-    if args.licences {
+    if args.licenses {
         return print(&licences());
     }
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {

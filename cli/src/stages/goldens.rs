@@ -33,7 +33,7 @@ fn digests() -> BTreeMap<&'static str, String> {
         ("s.stl", &[adaptive]),
         ("t.step", &["slice --dpi 150 --thickness 500um"]),
     ]);
-    let fixes = ["fix", "fix --method nearest", "fix --use-neighbours --max-width 40"];
+    let fixes = ["fix", "fix --method nearest", "fix --use-neighbors --max-width 40"];
     let fixes = fixes.map(|fix| [COARSE, fix]);
     let fix = of(&fixes.each_ref().map(|stages| ("t.stl", &stages[..])));
     let dots = ["blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"];

@@ -149,7 +149,7 @@ fn ranges_of_any_cut_have_the_bytes_of_the_pipeline_by_hand() {
     let all = [
         vec![COARSE],
         vec![COARSE, "fix", "dither"],
-        vec![COARSE, "fix --use-neighbours --max-width 40 --min-confidence 0", "fix"],
+        vec![COARSE, "fix --use-neighbors --max-width 40 --min-confidence 0", "fix"],
         vec![COARSE, "fix", "compensate --uniform 80um --shrinkage x:2%,y:1%", "dither"],
         vec![
             COARSE,
@@ -250,6 +250,7 @@ fn the_same_options_have_one_text_whatever_their_form() {
     }
     for (a, b) in [
         ("fix", "fix --method spline --min-confidence 0.35"),
+        ("fix --use-neighbors", "fix --use-neighbours"),
         ("dither", "dither --method blue-noise"),
         ("compensate --uniform 25um", "compensate --uniform 0.025mm"),
         ("compensate --shrinkage 2%", "compensate --shrinkage x:2%,y:2%"),

@@ -1,4 +1,4 @@
-//! The licenses of all that is in the program: `lamp --licences`.
+//! The licenses of all that is in the program: `lamp --licenses`.
 
 /// The notices of the crates, as `licences/update` wrote them.
 const CRATES: &str = include_str!("../../licences/notices.txt");
@@ -12,7 +12,7 @@ const RULE: &str =
 pub(crate) fn are_asked_for() -> bool {
     let words: Vec<_> = std::env::args_os().skip(1).collect();
     // Alone only: behind a command, it is an option of that.
-    matches!(&words[..], [word] if word == "--licences" || word == "--licenses")
+    matches!(&words[..], [word] if word == "--licenses" || word == "--licences")
 }
 
 /// Returns the name, version, license and notice of all that is in the program.

@@ -26,7 +26,7 @@ fn changed_rows(a: &[Layer], b: &[Layer]) -> BTreeSet<(u32, u32)> {
 #[test]
 fn bands_are_where_the_stacks_differ_to_the_pixel() {
     for (seed, options) in
-        [(1, ""), (2, "--max-width 4"), (3, "--method nearest"), (4, "--use-neighbours")]
+        [(1, ""), (2, "--max-width 4"), (3, "--method nearest"), (4, "--use-neighbors")]
     {
         let (scratch, _) = broken_ball(5, seed, COARSE);
         let (report, ran) = report(&scratch, options);
@@ -87,10 +87,10 @@ fn millimetres_are_those_of_the_page() {
 fn kinds_outcomes_and_limits_are_named() {
     let kinds = ["ends white", "unbalanced", "paired", "sliver", "at edge", "touching"];
     let (scratch, _) = broken_ball(25, 1, COARSE);
-    let options = "--max-width 9 --min-confidence 0.95 --method nearest --use-neighbours";
+    let options = "--max-width 9 --min-confidence 0.95 --method nearest --use-neighbors";
     let (limited, _) = report(&scratch, options);
     let head = |report: &Value| {
-        ["method", "max_width", "min_confidence", "use_neighbours"].map(|key| report[key].clone())
+        ["method", "max_width", "min_confidence", "use_neighbors"].map(|key| report[key].clone())
     };
     assert_eq!(head(&limited), [json!("nearest"), json!(9), json!(0.95), json!(true)]);
     let stray = scratch.layers("stray.tif");

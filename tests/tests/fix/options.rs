@@ -10,7 +10,7 @@ fn threads_do_not_change_a_byte() {
     let (scratch, _) = broken_ball(20, 1, COARSE);
     let run = |threads: u32| {
         let folder = format!("pictures_{threads}");
-        let options = format!("--use-neighbours --threads {threads} --evidence {folder}");
+        let options = format!("--use-neighbors --threads {threads} --evidence {folder}");
         let (_, ran) = report(&scratch, &options);
         let mut pictures: Vec<_> = std::fs::read_dir(scratch.path(&folder))
             .unwrap()

@@ -69,7 +69,7 @@ fn slits_and_plates_stay_where_nothing_is_known_of_their_contours() {
                 let line = format!("slice whole.stl --dpi 300 --fill {fill} -o whole.tif");
                 scratch.run(&line).succeeds_quietly();
                 scratch.stack("bare.tif", stripped(&scratch.layers("whole.tif")));
-                scratch.run("fix bare.tif --use-neighbours -o fixed.tif").succeeds();
+                scratch.run("fix bare.tif --use-neighbors -o fixed.tif").succeeds();
                 assert!(scratch.bytes("bare.tif") == scratch.bytes("fixed.tif"));
             }
         }

@@ -40,7 +40,7 @@ Examples:
   lamp plan column-cure lens-array --projector zhao --material pegda-mw700 -o plan/
   lamp plan column-cure part.stl --projector mine.toml --material resin.toml --bitmaps 40 -o plan/
   lamp plan column-cure map.png --pixel 10um --full 450um --projector zhao \\
-      --material pegda-mw700 --optimise height --robust 3um -o plan/
+      --material pegda-mw700 --optimize height --robust 3um -o plan/
   lamp plan column-cure sphere --projector zhao --material pegda-mw700 --gray --bitmaps 5 -o plan/")]
 pub(super) struct ColumnCureArgs {
     #[command(flatten)]
@@ -64,11 +64,12 @@ pub(super) struct ColumnCureArgs {
     gray: bool,
 
     /// Quantity to bring nearest to the target's
-    #[arg(long, default_value = "dose", value_parser = one_of_described::<ColumnObjective>(&[
+    #[arg(long, alias = "optimise", default_value = "dose")]
+    #[arg(value_parser = one_of_described::<ColumnObjective>(&[
         "Doses",
         "Cured heights: light that cures nothing costs nothing",
     ]))]
-    optimise: ColumnObjective,
+    optimize: ColumnObjective,
 
     /// Longest time of a mirror [default: four times the flood exposure time of the highest column]
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
@@ -226,7 +227,7 @@ impl ColumnCureArgs {
             return Err(Exit::Failed(anyhow!(text)));
         }
         Ok(ColumnOptions {
-            objective: self.optimise,
+            objective: self.optimize,
             bitmaps: self.bitmaps.unwrap_or(BITMAPS),
             // A number that was asked for is kept. By default, fewer distinct times need fewer
             // bitmaps.
@@ -277,13 +278,13 @@ impl ColumnCureArgs {
     ) -> String {
         // Values that were used, not given: defaults may change, and the command must not.
         let mut command = format!(
-            "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimise {} \
+            "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimize {} \
              --max-time {:.3}s --gap {}",
             quoted(target.name()),
             quoted(projector),
             quoted(material),
             options.bitmaps,
-            self.optimise,
+            self.optimize,
             options.max_s,
             self.gap
         );
