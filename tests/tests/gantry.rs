@@ -1,5 +1,7 @@
 //! Checks jobs of machines that scan: their frames give every pixel its exposure.
 
+use std::fs;
+
 use lamp_fixtures::Sample;
 use lamp_gantry::{Disturbance, Frame, Frames, GantryError, JobFolder, JobSwath, expose};
 use lamp_stack::Image;
@@ -180,10 +182,13 @@ fn frames_have_the_rows_of_the_build() {
 #[test]
 fn doses_are_a_stack_that_cures_as_the_build_does() {
     let scratch = with_build();
+    scratch.run("lamp split build.tif --every 12 -o parts/").succeeds();
+    let part = scratch.names_in("parts").into_iter().find(|name| name.ends_with(".tif")).unwrap();
+    fs::rename(scratch.path("parts").join(part), scratch.path("build.tif")).unwrap();
     scratch.run("lamp job build.tif --machine mine.toml -o job/").succeeds();
     scratch.run("lamp expose job/ -o doses.tif -q").succeeds();
     let (doses, build) = (scratch.layers("doses.tif"), scratch.layers("build.tif"));
-    assert_eq!(doses.len(), build.len());
+    assert_eq!((doses.len(), build.len()), (12, 12));
     for (doses, build) in doses.iter().zip(&build) {
         // Level 200 of 255 is the exposure.
         let ratio = doses.info.exposure_ms.unwrap() / build.info.exposure_ms.unwrap();
@@ -268,7 +273,8 @@ fn impossible_jobs_are_refused_and_leave_nothing() {
     let job = |more: &str| scratch.run(&format!("lamp job build.tif -o job/ {more}"));
     job("").is_wrong_usage(&["--machine is missing"]);
     job("--machine beta").is_refused_with(&["beta", "[scan]"]);
-    job("--machine mine.toml --layers 900..").is_refused_with(&["build.tif", "layers 0 to"]);
+    job("--machine mine.toml --layers 900..")
+        .is_refused_with(&["build.tif", "begins with layer 0"]);
     job("--machine mine.toml --seam gray").is_refused_with(&["comb or time"]);
     for (from, to, words) in [
         ("\"500mm/s\"", "\"1.2mm/s\"", &["layer 0", "at most 1.2 mm/s", "expose at least"][..]),
@@ -329,7 +335,7 @@ fn gray_in_time_has_no_grain() {
     let machine = MACHINE.replace("[100, 48]", "[1024, 768]");
     scratch.write("mine.toml", machine.as_bytes());
     // A pixel is 16 um.
-    let slice = "slice sphere.stl --dpi 1587.5 --layers 150 --gray --material lamp-suspension -q";
+    let slice = "slice sphere.stl --dpi 1587.5 --layers 30 --gray --material lamp-suspension -q";
     scratch.run(&format!("{slice} -o gray.tif")).succeeds();
     scratch.run("dither gray.tif -q -o dots.tif").succeeds();
     scratch.run("lamp job gray.tif --machine mine.toml --gray time -q -o job/").succeeds();

@@ -114,7 +114,7 @@ fn scratch() -> Scratch {
         scratch.run(line).succeeds();
     }
     let scan = "name = \"scan\"\ndescription = \"\"\n[area]\nvalue = \"9x9in\"\nsource = \"-\"\n\
-                [scan]\nmirrors = [40, 8]\noverlap = 4\nspeed = [\"1mm/s\", \"900mm/s\"]\n\
+                [scan]\nmirrors = [40, 8]\noverlap = 4\nspeed = [\"0.001mm/s\", \"900mm/s\"]\n\
                 acceleration = \"2000mm/s2\"\nrow_clock_hz = 22000\nboth_ways = true\nsource = \"-\"\n";
     scratch.write("scan.toml", scan.as_bytes());
     let edit =
