@@ -58,8 +58,8 @@ pub(crate) struct HeightArgs {
     #[arg(long, help_heading = HEIGHTS)]
     snap: bool,
 
-    /// Distance between measured rows, used where parts of a layer lie above each other; thinner
-    /// features may be missed there [default: four pixels]
+    /// Distance between the rows in which the error is measured, where facets of one layer lie
+    /// above each other; thinner features may be missed there [default: four pixels]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEIGHTS)]
     row_pitch: Option<Length>,
 }

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use lamp_pipeline::words::optional;
 
-/// The present light of a lamp.
+/// The actual light of a lamp.
 #[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub(crate) struct LampOption {
-    /// Present light of full white, if the lamp has aged or has a filter: 1.2W/cm2, 75% of the
+    /// Actual intensity of full white, if the lamp has aged or has a filter: 1.2W/cm2, 75% of the
     /// material's, or od0.3 for a filter of that optical density. The material's [dimmed-lamp]
     /// gives the critical dose [default: the material's]
     #[arg(long, value_name = "LIGHT", requires = "material")]

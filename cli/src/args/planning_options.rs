@@ -39,7 +39,8 @@ pub(crate) struct PlanningOptions {
     #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = parse_margin)]
     pub(crate) margin: f64,
 
-    /// Stop this near the best, as a share of the error without a plan
+    /// Stop when the plan is proved to be this close to the best one, as a share of the error
+    /// without a plan
     #[arg(long, value_name = "SHARE", default_value = "0.1%", value_parser = parse_gap)]
     pub(crate) gap: f64,
 

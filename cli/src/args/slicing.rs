@@ -79,7 +79,7 @@ pub(crate) struct SlicingArgs {
     /// Write gray layers, which cure down to where the part ends
     ///
     /// Each pixel is just bright enough to cure down to where the part ends below it. It is white
-    /// if that is deeper than white cures
+    /// if the part goes deeper than white cures
     #[arg(long, requires = "material", conflicts_with = "exposure_table")]
     #[arg(help_heading = EXPOSURE)]
     gray: bool,
@@ -98,7 +98,7 @@ pub(crate) struct SlicingArgs {
 pub(crate) struct SliceStageArgs {
     /// The part: STL, STEP, 3MF or OBJ files, plain or gzipped, or - for standard input
     ///
-    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES first turns a file about z and
+    /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns a file about z and then
     /// moves it. Overlapping files are united; --subtract and --intersect cut them
     #[arg(value_name = "PART", required = true, value_parser = part_file())]
     parts: Vec<PartFile>,

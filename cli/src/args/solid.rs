@@ -30,13 +30,14 @@ pub(crate) struct SolidArgs {
     #[arg(long, value_parser = one_of::<Units>(), default_value_t)]
     units: Units,
 
-    /// Rule for the inside: everything that shells wind around, which unites overlapping shells,
-    /// bodies and files; or between odd and even crossings, where overlaps cut each other
+    /// Rule for what is inside. solid: everything that shells wind around, so overlapping shells,
+    /// bodies and files unite. even-odd: everything between odd and even crossings, so overlaps are
+    /// cut out
     #[arg(long, value_parser = one_of::<Fill>(), default_value_t)]
     fill: Fill,
 
-    /// How overlapping bodies of a STEP file, or items of a 3MF, join under --fill even-odd: as one
-    /// part, or cutting each other as files do
+    /// How overlapping bodies of a STEP file, or items of a 3MF, join under --fill even-odd:
+    /// united, or with the overlap cut out, as for files that overlap
     #[arg(long, value_parser = one_of::<Bodies>(), default_value_t)]
     bodies: Bodies,
 

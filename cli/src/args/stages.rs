@@ -97,11 +97,11 @@ pub(crate) struct CheckStageArgs {
     /// Kinds of findings to report
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     #[arg(value_parser = one_of_described::<FindingGroup>(&[
-        "White that rests on nothing",
-        "White that rests on little",
-        "Black without a way out",
-        "White far from the white below",
-        "Centers of gravity off their base",
+        "White areas that rest on nothing",
+        "White areas that rest on little",
+        "Black spaces without a way out",
+        "White areas far from the white below",
+        "Centers of gravity outside the part's base",
         "Stray rows, white at the border, empty layers",
     ]))]
     only: Vec<FindingGroup>,
@@ -119,8 +119,9 @@ pub(crate) struct CheckStageArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     max_overhang: Option<Length>,
 
-    /// Smallest width of a way out that drains a pocket. To find narrower ways, a ball of this size
-    /// is placed everywhere, which takes several times longer [default: a pixel and a layer]
+    /// Narrowest opening that drains a pocket. To find pockets with narrower openings, a ball of
+    /// this diameter is tried at every place, which takes several times longer [default: a pixel
+    /// and a layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_distance)]
     drain: Option<Length>,
 

@@ -50,12 +50,13 @@ pub(crate) struct TileStageArgs {
     /// Shape that keeps copies apart; outline implies --fit
     #[arg(long, default_value_t, value_parser = one_of_described::<PackBy>(&[
         "The boxes around the parts",
-        "The parts' outlines, one after another or, for one part, on a lattice, if boxes place fewer",
+        "The parts' outlines, if these place more copies than boxes: one after another or, for one \
+         part, on a lattice",
     ]))]
     pack: PackBy,
 
     /// Rotations that packing may use if more copies fit [default: none, or quarters with --pack
-    /// outline]. An angle below 90deg makes a plan, packed by outlines
+    /// outline]. An angle below 90deg packs outlines, and writes a script instead of a build
     #[arg(long, value_name = "TURNS", value_parser = TurnsParser)]
     turns: Option<TileTurns>,
 
@@ -68,8 +69,9 @@ pub(crate) struct TileStageArgs {
     #[arg(long)]
     settle: bool,
 
-    /// Accept layers that do not match: the build has the heights of the first stack. Each of its
-    /// layers takes, from every other stack, the layer that contains its top
+    /// Accept layers that do not match: the build has the heights of the first stack. For each
+    /// layer of the build, every other stack supplies the layer that contains the top of the
+    /// build's layer
     #[arg(long)]
     resample: bool,
 
@@ -123,7 +125,8 @@ pub(crate) struct MeshStageArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, help_heading = HEADING)]
     break_pitch: Option<Length>,
 
-    /// Number of layers of only mesh below the parts, which the parts break off from [default: 5]
+    /// Number of layers of pure mesh below the parts; finished parts break off from them [default:
+    /// 5]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..100_000))]
     #[arg(help_heading = HEADING)]
     base_layers: Option<u32>,
@@ -189,9 +192,9 @@ impl TypedValueParser for TurnsParser {
             ("quarters", "By 90, 180 and 270 degrees"),
             (
                 "15deg",
-                "By all multiples of this or another angle, by outlines. The angle must divide a \
-                 right angle into at most 18 parts. Instead of a build, this writes a script, \
-                 which slices the parts at the chosen angles and lays the build out",
+                "By all multiples of 15 degrees, or of another angle that divides a right angle \
+                 into at most 18 parts; packed by outlines. Instead of a build, this writes a \
+                 script, which slices the parts at the chosen angles and lays the build out",
             ),
         ];
         let values = values.map(|(name, help)| PossibleValue::new(name).help(help));

@@ -36,9 +36,9 @@ use lamp_plots::SectionPicture;
 /// the material's cure model. A stack with gray layers is drawn twice: on the left with every pixel
 /// that is not black exposed in full, on the right with its gray levels. Resin cured outside the
 /// part is red, uncured places of the part are blue, and the part's outline is yellow. The printed
-/// areas are exact over whole pixels. Next to them, `pixels` gives the areas for pixel columns that
-/// cure just the part at their centers, the limit of what pixels can do. Dots are drawn as they
-/// are, so use a stack from before `dither`.
+/// areas are exact over whole pixels. For comparison, `pixels` gives the areas for columns of
+/// pixels that cure exactly to the part's surface at their centers, the limit of what pixels can
+/// do. Dots are drawn as they are, so use a stack from before `dither`.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -79,8 +79,8 @@ pub(crate) struct CureArgs {
     #[arg(long)]
     alone: bool,
 
-    /// Cure complete layers, by the dose at this height in each layer, as planners do. By default,
-    /// cure may end at any height in a layer
+    /// Count each pixel of a layer as cured completely or not at all, by the dose at this height in
+    /// the layer, as planners do. By default, cure may end at any height in a layer
     #[arg(long, value_name = "HEIGHT", conflicts_with = "alone")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     at: Option<SampleHeight>,

@@ -17,8 +17,8 @@ use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 /// the same layer always becomes the same dots. Resin averages dots of 17 um, but not of 85 um, so
 /// pixels wider than 17 um cause a warning.
 ///
-/// For a folder of strips, their build is dithered and cut again with a comb: no pixel of a seam is
-/// white in two strips.
+/// The strips of a folder are joined into their build, which is dithered and cut into strips again
+/// with comb seams: no pixel of a seam is white in two strips.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -19,7 +19,7 @@ use crate::terminal::stack_notes::noting;
 /// mirrors and rotates all layers. Lengths and positions are in part coordinates, even in a build,
 /// where you can choose copies. Serial numbers of labels may come from a CSV file. A TOML file
 /// lists the edits, which are applied in order; docs/edit.md describes every key. Pages that no
-/// edit changes pass with their code and check, and are not decoded.
+/// edit changes are copied with their compressed images and checks, and are not decoded.
 #[derive(Args)]
 #[command(override_usage = "\
 lamp edit [OPTIONS] <STACK> <EDITS.toml>

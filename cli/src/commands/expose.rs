@@ -19,13 +19,14 @@ use crate::output::json_report::print_answer;
 use crate::streams::{check_stack_name, input_name, is_stream, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
-/// Prove a job: show its frames on a virtual machine and add up the dose of every pixel
+/// Check a job: show its frames on a virtual machine and add up the dose of every pixel
 ///
-/// The virtual machine moves the head as the job says, shows each frame for its time, and adds up the
-/// light of each mirror at the centers of pixels. It compares the doses with the build: the least, the
-/// mean and the greatest dose of white pixels, light on black ones, swath by swath and seam by seam.
-/// Dead and stuck mirrors and the light across the mirrors are the machine's. With -o, the doses are a
-/// stack whose cured sections show the seams and faults.
+/// The virtual machine is a simulation. It moves the head as the job says, shows each frame for its
+/// time, and adds up the light of each mirror at the centers of pixels. It compares the doses with
+/// the build: the least, the mean and the greatest dose of white pixels, light on black ones, swath
+/// by swath and seam by seam. Dead and stuck mirrors, and the light across the mirrors, are taken
+/// from the machine's file. With -o, the doses are a stack whose cured sections show the seams and
+/// faults.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -51,11 +52,12 @@ pub(crate) struct ExposeArgs {
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     rows: Option<Range<u32>>,
 
-    /// Standard deviation of the head's place along the scan, new for each frame
+    /// Standard deviation of the random error in the head's place along the scan, drawn anew for
+    /// each frame
     #[arg(long, value_name = "LENGTH", default_value = "0um", value_parser = parse_distance)]
     jitter: Length,
 
-    /// Standard deviation of a point of light: a Gaussian
+    /// Standard deviation of the Gaussian into which a point of light is blurred
     #[arg(long, value_name = "LENGTH", default_value = "0um", value_parser = parse_distance)]
     blur: Length,
 
@@ -63,7 +65,7 @@ pub(crate) struct ExposeArgs {
     #[arg(long, value_name = "SWATH:X,Y", value_parser = parse_offset)]
     offset: Vec<(u32, [Length; 2])>,
 
-    /// Part of its dose by which a white pixel may be off, in percent
+    /// How far a white pixel's dose may be off, in percent of this dose
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0, value_parser = parse_percent)]
     tolerance: f64,
 

@@ -21,15 +21,16 @@ use crate::terminal::stack_notes::doubts;
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
 ///
 /// A row is stray if it ends white (the last column of every part is black) or if `slice` found
-/// that its crossings do not balance. Where `slice` found that contours break off, a row is also
-/// stray if its neighbors above and below have crossings that it lacks, or lack a run that it has.
-/// Missing crossings are added; existing crossings stay unless they contradict the contours around
-/// them. A band of any width is corrected if the rows and layers around it show how; otherwise it
-/// is left and reported. Pages record their changes, and two lines sum them up; --verbose and
-/// --report list all changes. All other layers pass byte for byte. In gray layers, outlines are
-/// corrected.
+/// that it enters the part more or less often than it leaves it. Where `slice` found that contours
+/// break off, a row is also stray if its neighbors above and below have crossings that it lacks, or
+/// lack a run that it has. Missing crossings are added; existing crossings stay unless they
+/// contradict the contours around them. A band of any width is corrected if the rows and layers
+/// around it show how; otherwise it is left and reported. Pages record their changes, and two lines
+/// sum them up; --verbose and --report list all changes. All other layers are passed on unchanged,
+/// byte for byte. In gray layers, outlines are corrected.
 ///
-/// For a folder of strips, their build is corrected and cut again.
+/// The strips of a folder are joined into their build, which is corrected and cut into strips
+/// again.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

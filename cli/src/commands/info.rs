@@ -16,9 +16,9 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 
 /// Describe a stack: pages, size, resolution, heights, area, exposure, checks
 ///
-/// Only directories and texts are read, which takes a moment for any file. Area and volume are the
-/// numbers stated on the pages. lamp verify also decodes the images. For a folder of strips, it
-/// describes each strip and the totals.
+/// Only the directories and texts of pages are read, not their images: this takes a moment for a
+/// file of any size. Area and volume are the numbers stated on the pages. lamp verify also decodes
+/// the images. For a folder of strips, it describes each strip and the totals.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -21,9 +21,10 @@ use crate::terminal::progress::say;
 /// Plan the scan of a build: speeds, swaths and times of each layer
 ///
 /// A machine with [scan] in its file moves a display of mirrors over the resin. For each layer, the
-/// job has the speed and the row clock that give the layer's exposure, and the swaths that hold white,
-/// in the order of the least way. Black swaths are left out, and so are rows without white above and
-/// below. An exposure that the machine cannot give is refused, with the layer and the limit.
+/// job has the speed and the row clock (rows per second) that give the layer's exposure, and the
+/// swaths that contain white, in the order that takes the head the least time. Black swaths are
+/// left out, and so are the rows above the first and below the last white row of a swath. An
+/// exposure that the machine cannot give is refused, with the layer and the limit.
 ///
 /// The folder gets job.json, layers.csv and swaths.csv, and a copy of the machine's file.
 #[derive(Args)]
@@ -54,7 +55,7 @@ pub(crate) struct JobArgs {
     #[arg(long)]
     force: bool,
 
-    /// Print the job's sums as JSON, as docs/json.md describes it
+    /// Print the job's totals as JSON, as docs/json.md describes it
     #[arg(long)]
     json: bool,
 }
@@ -72,7 +73,7 @@ pub(super) struct ScanArgs {
     #[arg(value_parser = one_of_described::<JobSeam>(&[
         "Each pixel belongs to one swath: each row changes over at its own column",
         "Strips of tile --seam gray, whose levels fall as the next strip's rise",
-        "Each swath shows a pixel for its share of the rows of mirrors",
+        "Each swath exposes a pixel with only its share of the rows of mirrors that pass over it",
     ]))]
     seam: Option<JobSeam>,
 
@@ -80,7 +81,8 @@ pub(super) struct ScanArgs {
     #[arg(long, default_value_t)]
     #[arg(value_parser = one_of_described::<GrayBy>(&[
         "The build is dithered; gray layers are refused",
-        "A gray pixel is on for its level's share of the rows of mirrors, without dots",
+        "No dots: a gray pixel is on for a share of the rows of mirrors that pass over it, in \
+         proportion to its level",
     ]))]
     gray: GrayBy,
 }

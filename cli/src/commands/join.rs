@@ -18,10 +18,10 @@ use crate::terminal::stack_notes::print_note;
 /// Join stacks of consecutive layers into one stack
 ///
 /// Ranges made separately, with `slice --layers` and later stages or with `lamp split`, give the
-/// same bytes as a stack made at once. They must have the same part, size, resolution, commands and
-/// input, and each must start right after the last layer of the previous range: a build that lacks
-/// layers is scrap. Layers missing below the first or above the last are not noticed: `lamp info`
-/// shows how many layers there are.
+/// same bytes as a stack made in a single run. They must have the same part, size, resolution,
+/// commands and input, and each must start right after the last layer of the previous range: a
+/// build that lacks layers is scrap. Layers missing below the first or above the last are not
+/// noticed: `lamp info` shows how many layers there are.
 ///
 /// A folder of strips from `tile --strips` gives the build that they were cut from.
 #[derive(Args)]

@@ -31,7 +31,7 @@ pub(crate) struct MachineArgs {
 
 #[derive(Subcommand)]
 enum MachineAction {
-    /// List the built-in machines, and the built-in displays for the scans of your own
+    /// List the built-in machines, and the built-in displays that a machine's [scan] can name
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]

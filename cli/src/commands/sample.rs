@@ -44,7 +44,7 @@ pub(crate) struct SampleArgs {
     #[arg(long, value_name = "N", default_value = "10", value_parser = parse_count, requires = "defect")]
     count: usize,
 
-    /// Seed of the choice of facets: the same seed breaks the same facets
+    /// Random seed for the choice of facets: the same seed breaks the same facets
     #[arg(long, value_name = "N", default_value_t = 1, requires = "defect")]
     seed: u64,
 

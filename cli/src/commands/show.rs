@@ -55,7 +55,8 @@ pub(crate) struct ShowArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
     fps: u16,
 
-    /// Print the layer with characters, fuller for brighter pixels; a line shows two rows
+    /// Print the layer as text, with denser characters for brighter pixels; a line shows two rows
+    /// of pixels
     #[arg(long, conflicts_with_all = ["animate", "layers"])]
     ascii: bool,
 

@@ -19,8 +19,8 @@ use crate::streams::{check_beside, check_not_input, progress, unless_found, writ
 /// Slice a part into a stack of layer images
 ///
 /// A pixel is white (cured) exactly when its center is inside the part's section at the layer's
-/// plane. Gaps in the mesh leave rows whose crossings do not balance. Each page lists its
-/// unbalanced rows, and `fix` corrects them.
+/// plane. Gaps in the mesh leave unbalanced rows, which enter the part more or less often than they
+/// leave it. Each page lists them, and `fix` corrects them.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,8 +41,8 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Stop with status 3 for likely mistakes: a part below a few pixels or layers, or larger than
-    /// any machine, parts that overlap, or a stack without a white pixel
+    /// Stop with status 3 for likely mistakes: a part smaller than a few pixels or layers, or
+    /// larger than any machine, parts that overlap, or a stack without a white pixel
     #[arg(long)]
     strict: bool,
 

@@ -35,7 +35,7 @@ pub(crate) struct SplitArgs {
     #[arg(long, value_name = "LAYER,...", group = "cuts", value_delimiter = ',')]
     at: Vec<u32>,
 
-    /// Folder to write to; without --force it must not exist, or be empty
+    /// Folder to write to; without --force it must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 

@@ -22,11 +22,11 @@ use crate::terminal::progress::Progress;
 
 /// Look at layers in a browser
 ///
-/// It prints an address to open. The address has a secret and works once, so that nobody else on
-/// this machine can see the layers. Zoom and position stay while the layer changes. On demand, it
-/// shows white that is new over the layer below, pixels that a second stack adds or lacks, stray
-/// rows and changes by `fix`, findings of `lamp check`, and the part in 3D. A part is sliced first.
-/// Ctrl-C ends the viewer.
+/// It prints an address to open. The address contains a secret and works only once, so that nobody
+/// else on this machine can see the layers. Zoom and position stay while the layer changes. On
+/// demand, it shows white pixels that are black in the layer below, pixels that a second stack adds
+/// or lacks, stray rows and changes by `fix`, findings of `lamp check`, and the part in 3D. A part
+/// is sliced first. Ctrl-C ends the viewer.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -41,7 +41,8 @@ pub(crate) struct ViewArgs {
     #[arg(value_name = "STACK|PART", default_value = "-")]
     inputs: Vec<PathBuf>,
 
-    /// Open the page in the default browser, through a private file that leads to it
+    /// Open the page in the default browser. The browser gets a file that only you can read and
+    /// that leads to the page, so no list of processes shows the secret address
     #[arg(long)]
     open: bool,
 

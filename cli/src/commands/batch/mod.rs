@@ -18,7 +18,7 @@ use lamp_batch::Key;
 use crate::args::options::{Common, one_of_described, parse_memory};
 use crate::exit::Exit;
 
-/// Make all parts and builds of a night, even if tasks crash
+/// Make many parts and builds overnight, even if tasks crash
 ///
 /// The night file names parts, their stages and builds; docs/batch.md shows one. A store keeps
 /// complete results, identified by everything that decides their bytes. To resume a night that was

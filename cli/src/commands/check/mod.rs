@@ -34,11 +34,11 @@ pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
 
-/// Find features that would be swept away, trapped or bent as a stack is built
+/// Find features that would be swept away, trap resin or bend as a stack is built
 ///
-/// An island is white that rests on nothing: the recoating blade sweeps it away. Each island gets a
-/// line, as do weak joints, pockets that hold resin, overhangs, unbalanced bodies, white at the
-/// border and empty layers; the worst come first. A part is sliced first, with the options of
+/// An island is a white area that rests on nothing: the recoating blade sweeps it away. Each island
+/// gets a line, as do weak joints, pockets that hold resin, overhangs, unbalanced bodies, white at
+/// the border and empty layers; the worst come first. A part is sliced first, with the options of
 /// `slice`; its mesh also shows where islands must be. Only the report lists effects of rounding to
 /// pixels, and islands too small for a square of --speck pixels.
 #[derive(Args, Clone)]

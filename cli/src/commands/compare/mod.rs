@@ -47,9 +47,9 @@ pub(crate) struct CompareArgs {
 
     /// Forgive edges up to this far apart, for example 1px or 20um [default: 0px]
     ///
-    /// A different pixel is forgiven if two colors occur within this distance: B's color at the
-    /// pixel in A, and A's color in B. Gaps that close and walls that appear or vanish are still
-    /// reported
+    /// A pixel that differs is forgiven if, within this distance, A also has the color that B has
+    /// at the pixel, and B also has the color that A has there. Gaps that close and walls that
+    /// appear or vanish are still reported
     #[arg(long, value_name = "DISTANCE")]
     tolerance: Option<Tolerance>,
 

@@ -70,7 +70,7 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "S/PX", value_parser = parse_gain)]
     gain: Option<f64>,
 
-    /// Share of the full correction that measured heights make to the doses
+    /// Share of the full correction by which measured heights change the doses
     #[arg(long, value_name = "SHARE", default_value = "0.5", value_parser = parse_step)]
     step: f64,
 
@@ -110,7 +110,7 @@ struct KeptOptions {
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     at: Option<SampleHeight>,
 
-    /// How far from the critical dose plans keep voxels [default: 5%]
+    /// Margin to the critical dose: plans keep voxels this far from it [default: 5%]
     #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_margin)]
     margin: Option<f64>,
 

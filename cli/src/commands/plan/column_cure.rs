@@ -31,8 +31,8 @@ use crate::terminal::progress::Progress;
 /// Choose bitmaps and times that cure a part through glass, without layers
 ///
 /// The total light on each column of resin cures it from the glass up to its height. This command
-/// finds mirror times that give doses nearest to the wanted doses, proves how near the best they
-/// are, and groups mirrors into bitmaps, each within the previous bitmap. The folder gets
+/// finds mirror times that give doses nearest to the wanted doses, proves how close they are to the
+/// best times, and groups mirrors into bitmaps, each within the previous bitmap. The folder gets
 /// bitmaps.tif, report.json and pictures.
 #[derive(Args)]
 #[command(after_help = "\
@@ -92,7 +92,7 @@ pub(super) struct ColumnCureArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
     voxel: Option<Length>,
 
-    /// Stop this near the best, as a share of the error
+    /// Stop when the times are proved to be this close to the best ones, as a share of the error
     #[arg(long, value_name = "SHARE", default_value = "1e-6", value_parser = parse_gap)]
     gap: f64,
 

@@ -28,9 +28,9 @@ use lamp_plots as plots;
 
 /// Choose the gray level of each pixel from the doses of all layers together
 ///
-/// Light that cures a layer also cures below it and to its sides. From the wanted part, 1-bit or
-/// gray, this writes gray pages that cure the fewest voxels wrongly, and prints how far at most
-/// they are from the best plan. Pages must state thickness and resolution.
+/// Light that cures a layer also cures below it and to its sides. From a stack of the wanted part,
+/// 1-bit or gray, this writes gray pages that cure as few voxels wrongly as possible, and prints a
+/// bound on their distance from the best plan. Pages must state thickness and resolution.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

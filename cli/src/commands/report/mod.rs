@@ -32,7 +32,7 @@ use gather::StackReport;
 pub(super) use page::document;
 pub(super) use pictures::{InlinePicture, of_layer};
 
-/// Write a page about a stack, to send: warnings, numbers, curves, pictures
+/// Write a page about a stack to send to others: warnings, numbers, curves, pictures
 ///
 /// The page is one HTML file that needs no network and no script, and prints on A4 and letter. For
 /// a folder of stacks, -o names a folder, which gets a page for each stack and an index.html.

@@ -38,13 +38,13 @@ use crate::terminal::stack_notes::doubts;
 use plan_file::plan_text;
 use report::SupportReport;
 
-/// Hold floating islands with the shortest supports to the part
+/// Connect floating islands to the part by the shortest supports
 ///
 /// Supports stay in the mold and become features of the casting, so look at each before you build.
 /// The command tries directions over a cone below the middle of an island. It takes the shortest
 /// support that can be built and meets the part where it is smooth, even and away from creases.
 /// Islands without such a support are left, and reported. The plan is a list of edits: delete or
-/// exchange supports in it, and draw it with lamp edit.
+/// exchange supports in it, and apply it with lamp edit.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:

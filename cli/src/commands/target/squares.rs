@@ -55,7 +55,7 @@ pub(super) struct SquaresArgs {
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_gap)]
     gap: Length,
 
-    /// Folder to write to; without --force it must not exist, or be empty
+    /// Folder to write to; without --force it must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 

@@ -33,7 +33,8 @@ pub(super) struct StripArgs {
     #[arg(long, value_name = "N", requires = "strips", help_heading = HEADING)]
     overlap: Option<u32>,
 
-    /// Exposure of the columns that a swath and the next share; the sum is always the build
+    /// Exposure of the columns that a swath and the next share; the exposures of both always add up
+    /// to the build's
     #[arg(long, default_value_t, requires = "strips", help_heading = HEADING)]
     #[arg(value_parser = one_of_described::<Seam>(&[
         "Each pixel belongs to one swath: each row changes over at its own column, which differs in each \
