@@ -56,7 +56,7 @@ pub enum FrameFileError {
     #[error(transparent)]
     Io(#[from] io::Error),
     /// It begins with something else.
-    #[error("this is no file of frames: it does not begin with LAMPFRM1")]
+    #[error("this is not a file of frames: it does not begin with LAMPFRM1")]
     NoFrames,
     /// Its header contradicts itself.
     #[error("the header of the frames is damaged: {0}")]

@@ -17,7 +17,7 @@ pub enum NoLight {
     #[error("{0} does not state how bright full white is: add [intensity] to its file")]
     Intensity(String),
     /// It does not state which dose cures to which depth.
-    #[error("{0} does not state which dose cures how deep: add [working-curve] to its file")]
+    #[error("{0} does not state how deep a dose cures: add [working-curve] to its file")]
     WorkingCurve(String),
     /// A number is impossible.
     #[error(transparent)]

@@ -327,7 +327,7 @@ pub enum ObjFault {
     #[error("has commas in its numbers, which may be decimal points or thousands separators")]
     Comma,
     /// Curves and surfaces instead of faces.
-    #[error("is a free-form curve or surface: only faces are read")]
+    #[error("is a free-form curve or surface: only polygonal faces are read")]
     FreeForm,
 }
 

@@ -60,7 +60,7 @@ fn a_job_keeps_every_print() {
     assert_eq!(scratch.bytes("next.csv"), bytes);
     scratch
         .run("lamp learn job/ --measured a.csv -o next.csv")
-        .is_refused_with(&["with other options: print-001.csv is there already"]);
+        .is_refused_with(&["with other options: print-001.csv exists"]);
     // The same table does not fit the next print.
     scratch
         .run("lamp learn job/ --measured a.csv --print 1 -o next.csv")

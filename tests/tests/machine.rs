@@ -248,8 +248,8 @@ fn machine_files_are_checked_with_the_light_that_they_name() {
         "mine.toml: machine mine: whole\nlight/scan.toml: machine mine: whole\n"
     );
     for (light, words) in [
-        (Some("1\n"), "line 1: 1 number, and 64 mirrors lie across"),
-        (Some(""), "0 rows, and 2 mirrors lie along the scan"),
+        (Some("1\n"), "line 1 has 1 number, but 64 mirrors lie across"),
+        (Some(""), "this table has 0 rows, but 2 mirrors lie along the scan"),
         (None, "light/scan.toml: scan.light.file: light.csv: "),
     ] {
         match light {

@@ -278,7 +278,7 @@ fn what_cannot_be_planned_is_refused() {
     without("curveless.toml", "[working-curve");
     for (line, words) in [
         ("stairs.tif --material lamp-suspension", &["how far light spreads", "[spread]"][..]),
-        ("stairs.tif --material curveless.toml", &["which dose cures", "[working-curve]"]),
+        ("stairs.tif --material curveless.toml", &["how deep a dose cures", "[working-curve]"]),
         ("stairs.tif --material dim.toml", &["how bright", "[intensity]"]),
         ("stairs.tif --material none.toml", &["none.toml"]),
         ("stairs.tif --material wide.toml", &["wide.toml", "at most 2 mm"]),

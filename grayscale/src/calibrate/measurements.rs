@@ -68,7 +68,7 @@ pub enum DataError {
     #[error("columns {0} and {1} say the same thing twice: keep one")]
     Both(&'static str, &'static str),
     /// A column is not known.
-    #[error("column `{column}` is not known: the columns are {}, and note for remarks", known.join(", "))]
+    #[error("column `{column}` is not known: the possible columns are {}, and `note` for remarks", known.join(", "))]
     Unknown {
         /// Its name.
         column: String,
@@ -76,7 +76,7 @@ pub enum DataError {
         known: &'static [&'static str],
     },
     /// There are exposure times but no light.
-    #[error("exposure_ms makes doses only with the light of full white, which is not known")]
+    #[error("exposure_ms gives doses only if the intensity of full white is known, and it is not")]
     NoLight,
     /// A cell is not a number.
     #[error("line {line}, column {column}: `{text}` is not a number")]

@@ -136,7 +136,7 @@ pub enum CureError {
         deepest: Length,
     },
     /// The dose overflows.
-    #[error("no dose that can be written down cures {0}")]
+    #[error("the dose that would cure {0} is too large a number")]
     NoDose(Length),
 }
 

@@ -20,7 +20,7 @@ pub struct HeightCurve {
 pub enum NoHeights {
     /// It does not state which dose cures how deep.
     #[error(
-        "{0} does not state which dose cures how deep: add [two-depth] or [working-curve] to \
+        "{0} does not state how deep a dose cures: add [two-depth] or [working-curve] to \
          its file"
     )]
     Curve(String),

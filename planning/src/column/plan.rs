@@ -58,7 +58,7 @@ pub enum ColumnError {
     #[error("no ray reaches {0}: count more rays of each mirror")]
     NoRay(Place),
     /// A height that no dose cures.
-    #[error("no dose that can be written down cures {0}")]
+    #[error("the dose that would cure {0} is too large a number")]
     NoDose(Length),
     /// More bitmaps than there are times.
     #[error(transparent)]

@@ -37,8 +37,8 @@ impl RingExposure {
 /// Why a text is not a disc or ring.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "`{0}` is neither a disc nor a ring: write the mirrors of its radius and its time, such \
-     as 12:7.9s, and 5-12:7.9s for a ring"
+    "`{0}` is neither a disc nor a ring: write a disc as its radius in mirrors and its time, such \
+     as 12:7.9s, and a ring as 5-12:7.9s"
 )]
 pub struct NoExposure(String);
 

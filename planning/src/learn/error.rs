@@ -189,8 +189,8 @@ pub enum JobError {
     },
     /// The same measurements were used before with other options.
     #[error(
-        "{}: print {print} was used with other options: {name} is there already, and print \
-         {} is the next to be measured",
+        "{}: the measurements of print {print} were used before, with other options: {name} \
+         exists; measure print {} next",
         folder.display(),
         print + 1
     )]

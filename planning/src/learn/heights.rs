@@ -33,7 +33,7 @@ pub enum FaceError {
     #[error("the part has no face there that looks down")]
     NoFace,
     /// By the model, nothing is cured above the face.
-    #[error("by the model nothing is cured above that face")]
+    #[error("according to the model, nothing above that face is cured")]
     NothingCured,
 }
 

@@ -52,7 +52,8 @@ pub enum ProjectorError {
     /// The lens is out of focus.
     #[error(
         "lens: it is out of focus by {off}: it images mirrors {object} away at {image}, not at \
-         {wanted}, where a point's light would be {blur} wide and a mirror's image is {mirror}"
+         {wanted}; there, the light of a point would be {blur} wide, wider than a mirror's image \
+         ({mirror})"
     )]
     OutOfFocus {
         /// The distance by which the image is off.

@@ -75,7 +75,7 @@ pub enum EditProblem {
     #[error("it holds for all layers: take op, z and layers out")]
     WholeStack,
     /// Layers are chosen both by height and by number.
-    #[error("z and layers say the same: write one of them")]
+    #[error("z and layers both choose layers: write one of them")]
     TwoRanges,
     /// Copies are chosen for something that is not drawn.
     #[error("copies are for shapes, labels and pictures: take it out")]
@@ -93,7 +93,9 @@ pub enum EditProblem {
     )]
     RepeatUp,
     /// A pattern turns a picture by other angles than quarters.
-    #[error("pictures turn by 90, 180 or 270 degrees only, also in a pattern")]
+    #[error(
+        "pictures can be turned only by 90, 180 or 270 degrees, even where a pattern repeats them"
+    )]
     RepeatPicture,
     /// The list of copies is empty.
     #[error("copies names no copy: write copy numbers, such as [1, 5], or true for all")]
@@ -168,7 +170,7 @@ pub enum EditProblem {
         image: ImageBounds,
     },
     /// A file of a picture has more than one.
-    #[error("{picture} has several pages, and a picture is one")]
+    #[error("{picture} has several pages, but a picture must have one")]
     SeveralPages {
         /// The picture's file.
         picture: String,

@@ -520,7 +520,7 @@ fn a_picture_may_fill_the_image_but_not_reach_beside_it() {
     let at = "at = [\"5mm\", \"0mm\"]";
     assert_eq!(
         error(at, vec![logo(), logo()]),
-        "edit 1: art/logo.png has several pages, and a picture is one"
+        "edit 1: art/logo.png has several pages, but a picture must have one"
     );
     assert_eq!(error(at, vec![]), "edit 1: art/logo.png has no layers");
     let after = stamped(black(), &list(at), vec![logo()]).unwrap();

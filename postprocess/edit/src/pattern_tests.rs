@@ -295,7 +295,7 @@ fn what_cannot_be_repeated_is_said() {
         (block, up, "edit 1: only struts, cones, spheres and lying cylinders step up"),
         (block, tilted, "edit 1: only struts"),
         (block, many, "edit 1: it repeats more than 100000 times"),
-        (picture, ring, "edit 1: pictures turn by 90, 180 or 270 degrees only"),
+        (picture, ring, "edit 1: pictures can be turned only by 90, 180 or 270 degrees"),
         (block, "repeat = { count = 2 }", "line 3: edit 1, repeat: write step, or center"),
         (block, "repeat = [{ count = 2 }]", "line 3: edit 1, repeat[0]: write step, or center"),
         (block, "repeat = { count = 2, radius = 1 }", "line 3: edit 1, repeat.radius: unknown key"),

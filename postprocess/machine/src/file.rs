@@ -54,7 +54,7 @@ pub enum MachineError {
         most: Speed,
     },
     /// Swaths without a pixel of their own.
-    #[error("strips: a swath shares less than half its mirrors with the next")]
+    #[error("strips: a swath must share less than half its mirrors with the next")]
     Strips,
     /// Swaths that are described twice.
     #[error("scan: the file has [strips], too: keep [strips] or [scan]")]

@@ -34,7 +34,10 @@ pub enum LightError {
     #[error("this is no file: name a gray picture or a .csv table")]
     NotAFile,
     /// A display with too many mirrors to hold their light.
-    #[error("{mirrors} mirrors are too many for a light: leave it out above {MAX_MIRRORS}")]
+    #[error(
+        "{mirrors} mirrors are too many for a light file: leave [scan.light] out \
+         above {MAX_MIRRORS} mirrors"
+    )]
     TooManyMirrors {
         /// The number of mirrors.
         mirrors: u64,
@@ -49,7 +52,7 @@ pub enum LightError {
         samples: String,
     },
     /// The picture has another size than the display.
-    #[error("this picture is {}x{}, and the mirrors are {}x{}", found[0], found[1], mirrors[0], mirrors[1])]
+    #[error("this picture is {}x{}, but the mirrors are {}x{}", found[0], found[1], mirrors[0], mirrors[1])]
     Size {
         /// The width and the height of the picture.
         found: [u32; 2],
@@ -71,7 +74,7 @@ pub enum LightError {
         at: usize,
     },
     /// A row of the table has another number of cells than mirrors lie across.
-    #[error("line {line}: {cells} {}, and {across} mirrors lie across", numbers(*cells))]
+    #[error("line {line} has {cells} {}, but {across} mirrors lie across", numbers(*cells))]
     Cells {
         /// The line, from 1.
         line: usize,
@@ -81,7 +84,7 @@ pub enum LightError {
         across: u32,
     },
     /// The table has another number of rows than mirrors lie along the scan.
-    #[error("{rows} {}, and {along} mirrors lie along the scan", if *rows == 1 { "row" } else { "rows" })]
+    #[error("this table has {rows} {}, but {along} mirrors lie along the scan", if *rows == 1 { "row" } else { "rows" })]
     Rows {
         /// The number of rows, at most one more than there are mirrors.
         rows: usize,
@@ -296,12 +299,12 @@ mod tests {
     #[test]
     fn tables_that_are_no_light_are_refused_with_their_line() {
         for (text, words) in [
-            ("", "0 rows, and 2 mirrors"),
-            ("1,1,1\n", "1 row, and 2 mirrors"),
-            ("1,1,1\n1,1,1\n1,1,1\n", "3 rows, and 2 mirrors"),
-            ("# light\n1,1\n1,1,1\n", "line 2: 2 numbers, and 3 mirrors"),
-            ("1,1,1\n1,1,1,1\n", "line 2: 4 numbers"),
-            ("1;1;1\n1;1;1\n", "line 1: 1 number, and 3 mirrors lie across"),
+            ("", "this table has 0 rows, but 2 mirrors"),
+            ("1,1,1\n", "1 row, but 2 mirrors"),
+            ("1,1,1\n1,1,1\n1,1,1\n", "3 rows, but 2 mirrors"),
+            ("# light\n1,1\n1,1,1\n", "line 2 has 2 numbers, but 3 mirrors"),
+            ("1,1,1\n1,1,1,1\n", "line 2 has 4 numbers"),
+            ("1;1;1\n1;1;1\n", "line 1 has 1 number, but 3 mirrors lie across"),
             ("1,1,1\n1,nan,1\n", "line 2, column 2: `nan` is not a number from 0 to 1"),
             ("1,1,1\n1,1,inf\n", "line 2, column 3"),
             ("-0.1,1,1\n1,1,1\n", "line 1, column 1: `-0.1`"),
@@ -323,7 +326,7 @@ mod tests {
     #[test]
     fn pictures_that_are_no_light_are_refused() {
         let error = of_gray("light.png", 2, &[255_u8; 6]).unwrap_err();
-        assert!(error.contains("is 2x3, and the mirrors are 3x2"), "{error}");
+        assert!(error.contains("is 2x3, but the mirrors are 3x2"), "{error}");
         assert!(of_gray("light.png", 3, &[0_u8; 6]).unwrap_err().contains("dark"));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("light.png");
@@ -360,7 +363,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("light.pgm"), "P5 65535 65535 255\n").unwrap();
         let error = read(&folder, "light.pgm").unwrap_err();
-        assert!(error.contains("65535x65535, and the mirrors are 3x2"), "{error}");
+        assert!(error.contains("65535x65535, but the mirrors are 3x2"), "{error}");
         let light = ScanLight { file: "light.pgm".into(), source: "-".to_owned() };
         let error = light.read(folder.path(), [65_535; 2]).unwrap_err();
         assert!(error.to_string().contains("4294836225 mirrors are too many"), "{error}");

@@ -63,8 +63,8 @@ pub enum BodyFault {
     },
     /// A face on a closed surface contradicts its neighbors.
     #[error(
-        "the side of #{entity} cannot be determined: its loop runs against its neighbors, \
-         and its surface is closed"
+        "on which side of its loop face #{entity} lies cannot be determined: the loop runs against \
+         its neighbors, and the surface is closed"
     )]
     Side {
         /// The entity of the face.

@@ -37,8 +37,8 @@ pub enum BrepError {
     },
     /// The surfaces bend too much for facets within the chord.
     #[error(
-        "its faces take about {cells:.0} cells of facets, #{entity} by itself {of_face:.0}; \
-         give a longer chord"
+        "its faces would be divided into about {cells:.0} cells, {of_face:.0} of them for \
+         #{entity} alone: these are too many; give a longer chord"
     )]
     Fine {
         /// The number of cells.

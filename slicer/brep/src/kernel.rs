@@ -224,7 +224,9 @@ pub enum FaceFault {
     #[error("its body is inside out; the whole body was turned over")]
     InsideOut,
     /// It is too large, or bends too much, for the chord.
-    #[error("it takes about {cells:.0} cells of facets; give a longer chord")]
+    #[error(
+        "it would be divided into about {cells:.0} cells, which are too many; give a longer chord"
+    )]
     Fine {
         /// The number of cells.
         cells: f64,

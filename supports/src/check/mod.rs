@@ -87,7 +87,7 @@ pub enum CheckError {
         first: [u32; 2],
     },
     /// A drain has a width, and pixels or layers have none.
-    #[error("the stack does not state how {0}, so nothing is known of narrow drains")]
+    #[error("the stack does not state how {0}, so narrow drains cannot be found")]
     NoScale(&'static str),
     /// The images stand in different places.
     #[error("{layer} differs from the first layer in origin: layers are compared pixel by pixel")]
