@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use crate::frames::Frame;
 use crate::job::{Job, JobLayer, JobSwath};
 
-/// What is wrong with a machine, and where its dose is read.
+/// The faults of a machine, and the places at which its dose is read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbance {
     /// The light of each mirror, row after row along the scan; empty if all are 1.
@@ -425,7 +425,7 @@ impl Band {
         (self.columns, self.doses) = (columns, doses);
     }
 
-    /// Gives away the columns left of `end`, as far as they are of the region.
+    /// Gives away the columns of the region that are left of `end`.
     fn flush(&mut self, end: i64, region: &Range<u32>, mut to: impl FnMut(u32, usize, &[f32])) {
         let end = end.min(region.end.into());
         let width = (end - self.first).max(0) as usize;
@@ -447,7 +447,7 @@ impl Band {
     }
 }
 
-/// What a layer's doses add up to.
+/// The sums over a layer's doses.
 struct LayerSums<'a> {
     job: &'a Job,
     machine: &'a Disturbance,

@@ -79,7 +79,7 @@ pub enum GantryError {
     Exposure {
         /// The layer's name.
         layer: String,
-        /// What the machine cannot do.
+        /// The limit of the machine.
         limit: ExposureLimit,
     },
     /// A layer has gray levels, and nothing shows them.
@@ -105,7 +105,7 @@ pub enum GantryError {
     Job {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem, as a sentence.
         problem: String,
     },
     /// The build cannot be opened.

@@ -189,7 +189,7 @@ impl<R: Read> FrameReader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// Returns an error if there is none, or if it contradicts itself.
+    /// Returns an error if the header is missing or contradicts itself.
     pub fn new(mut from: R) -> Result<Self, FrameFileError> {
         let mut bytes = [0; HEADER_BYTES];
         from.read_exact(&mut bytes).map_err(|error| match error.kind() {

@@ -1,4 +1,4 @@
-//! The frames of a swath: what the mirrors show, one row of the image after the other.
+//! The frames of a swath: the pictures on the mirrors, one row of the image after the other.
 
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
@@ -30,7 +30,7 @@ pub struct SwathImage<'a> {
     pub shared: [u32; 2],
 }
 
-/// What the mirrors show while the head moves on by one row.
+/// The picture on the mirrors while the head moves on by one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// The row of the image below mirror row 0. Mirror row j is over the row j above it, which has
@@ -279,7 +279,7 @@ impl Tables {
                     break;
                 };
                 let share = match () {
-                    // What the swath on the left has left over.
+                    // The rest of the dose: the swath on the left gave its share.
                     () if column < left => {
                         white - earlier_share(mirrors, swath, column, pixel, white)
                     }

@@ -62,7 +62,7 @@ macro_rules! as_name {
 
 as_name!(JobSeam, GrayBy);
 
-/// What a machine does for a build. Lengths along the scan are in rows of the image, from the top.
+/// The work of a machine for a build. Lengths along the scan are in rows of the image, from the top.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
@@ -98,7 +98,7 @@ pub struct Job {
     pub layers: Vec<JobLayer>,
 }
 
-/// What a job adds up to.
+/// The times and counts of a whole job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobSums {
@@ -198,7 +198,7 @@ mod direction_name {
     }
 }
 
-/// What a job is made for.
+/// The choices in planning a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobOptions {
     /// How shared columns get their dose; of strips, as they were cut.

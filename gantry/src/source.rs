@@ -81,7 +81,7 @@ impl BuildPages {
         self.dpi
     }
 
-    /// Returns the headers of the pages, bottom first; of strips, those of the first.
+    /// Returns the headers of the pages, bottom first; of strips, the pages of the first.
     pub fn headers(&self) -> &[PageHeader] {
         self.stacks[0].headers()
     }

@@ -69,7 +69,7 @@ pub struct BuildClock {
 }
 
 impl BuildClock {
-    /// Starts for a machine. `mirrors` are those of its `[scan]`; without them it does not scan.
+    /// Starts for a machine. `mirrors` are the mirrors of its `[scan]`; without them it does not scan.
     pub fn new(machine: Option<&Machine>, mirrors: Option<MirrorArray>) -> Self {
         Self {
             machine: machine.cloned(),
@@ -117,7 +117,7 @@ impl BuildClock {
         }
     }
 
-    /// Adds a layer's scan, or says why there is none.
+    /// Adds a layer's scan, or says why the machine cannot scan it.
     fn scan(
         &mut self,
         info: &PageInfo,

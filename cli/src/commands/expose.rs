@@ -319,7 +319,7 @@ impl DoseMap {
         write_file(path, |out| write_gray_png(out, width, height, rows))
     }
 
-    /// Returns the doses as a gray layer. Its exposure is that of level 255, so that levels have
+    /// Returns the doses as a gray layer. Its exposure is the exposure of level 255, so that levels have
     /// the doses as they are.
     fn into_layer(self, exposing: &Exposing<'_>, layer: &JobLayer, is_first: bool) -> Layer {
         let header = &exposing.pages.headers()[layer.page];

@@ -1,4 +1,4 @@
-//! `lamp frames`: what the mirrors show while a swath is scanned.
+//! `lamp frames`: the pictures on the mirrors while a swath is scanned.
 
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;

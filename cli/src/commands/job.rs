@@ -1,4 +1,4 @@
-//! `lamp job`: what a machine that scans does for a build.
+//! `lamp job`: the work of a machine that scans, for a build.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
