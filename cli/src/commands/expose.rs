@@ -65,12 +65,12 @@ pub(crate) struct ExposeArgs {
     #[arg(long, value_name = "SWATH:X,Y", value_parser = parse_offset)]
     offset: Vec<(u32, [Length; 2])>,
 
-    /// How far a white pixel's dose may be off, in percent of this dose
+    /// How far a white pixel's dose may be off, in percent of the dose that it should get
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0, value_parser = parse_percent)]
     tolerance: f64,
 
-    /// Stop with status 3 if a white pixel misses its dose by more than the tolerance, or a black one
-    /// gets more light
+    /// Stop with status 3 if a white pixel misses its dose by more than the tolerance, or a black
+    /// one gets more light
     #[arg(long)]
     strict: bool,
 
@@ -319,8 +319,8 @@ impl DoseMap {
         write_file(path, |out| write_gray_png(out, width, height, rows))
     }
 
-    /// Returns the doses as a gray layer. Its exposure is the exposure of level 255, so that levels have
-    /// the doses as they are.
+    /// Returns the doses as a gray layer. Its exposure is the exposure of level 255, so that levels
+    /// have the doses as they are.
     fn into_layer(self, exposing: &Exposing<'_>, layer: &JobLayer, is_first: bool) -> Layer {
         let header = &exposing.pages.headers()[layer.page];
         let [columns, rows] = self.region.clone();

@@ -20,9 +20,9 @@ use crate::streams::{extension, input_name, is_stream, write_file};
 
 /// Write the frames of a swath: what the mirrors show, row after row of the scan
 ///
-/// While the head moves on by one pixel, the mirrors show one frame. Mirror row j of a frame is over
-/// the image row that is j above the frame's position. Frames are packed, 1 bit a mirror, after a
-/// header of 64 bytes (docs/gantry.md). A .png shows one frame, or several as an animation.
+/// While the head moves on by one pixel, the mirrors show one frame. Mirror row j of a frame is
+/// over the image row that is j rows above the frame's position. Frames are packed, 1 bit a mirror,
+/// after a header of 64 bytes (docs/gantry.md). A .png shows one frame, or several as an animation.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -96,8 +96,8 @@ fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
 /// The result of checking a stack.
 struct Verdict {
     name: String,
-    /// The facts of a stack without fault (a folder of strips has none of its own), or a sentence
-    /// that names the stack and the fault.
+    /// For a stack without fault, its facts (a folder of strips has no facts of its own); otherwise
+    /// a sentence that names the stack and the fault.
     result: Result<Option<StackTotals>, String>,
     /// Whether it was compared with parts.
     compared: bool,

@@ -52,7 +52,8 @@ pub enum TargetError {
     NoScale,
     /// Pixels or heights that no target has.
     #[error(
-        "a height map's pixels and its white must be above zero and at most 1 m: {pixel}, {full}"
+        "the width of a height map's pixels and the height of its white must be above zero and at \
+         most 1 m: {pixel}, {full}"
     )]
     Scale {
         /// The side of a pixel.

@@ -140,7 +140,9 @@ pub enum EditProblem {
     #[error("its text has {{list}}: write list = \"FILE.csv\", which has the serial numbers")]
     NoList,
     /// A label has serial numbers, but does not show them.
-    #[error("its text does not have {{list}}, where the list's serial numbers would be")]
+    #[error(
+        "a list of serial numbers is given, but the text has no {{list}} to show where they go"
+    )]
     UnusedList,
     /// A label names the column of no list.
     #[error("column is the name of a list's column: write list = \"FILE.csv\", too")]

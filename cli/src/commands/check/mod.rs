@@ -63,8 +63,8 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Write pictures of the worst findings to a new folder: findings in red, other white without
-    /// white below in yellow, the layer below in gray
+    /// Write pictures of the worst findings to a new folder: findings in red, other white pixels
+    /// that rest on nothing white in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 
