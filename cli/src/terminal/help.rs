@@ -8,26 +8,26 @@ use crate::args::options::GENERAL;
 const LAMP: &str = "\
 Turn parts into images for photopolymerization. Usage: lamp COMMAND [OPTIONS]
 From part to build:        slice blade.stl | fix | dither | tile > build.tif
-  slice       cut a part into layers         fix         correct stray rows
-  dither      turn gray levels into dots     tile        lay out copies
-  compensate  narrow by what light adds      edit        change a design
-  compose     make layers by a recipe        batch       do that for many parts
+  slice       cut a part into layers        fix           correct stray rows
+  dither      turn gray levels into dots    tile          lay out copies
+  compensate  offset edges for cure width   edit          change a design
+  compose     make layers from a recipe     batch         run jobs overnight
+  job         plan the scan of a build      frames        write what is shown
 Stacks:
-  view        look at layers in a browser    show        draw layers
-  check       find islands and pockets       support     hold islands
-  info        describe a stack               report      write a page to send
-  verify      check it for damage            compare     show where two differ
-  join        join ranges of layers          split       split into ranges
-  convert     write in another form          pack        make it small
-Parts, resins and machines:
-  mesh        check and repair a mesh        orient      find how to build it
-  brep        check a STEP part              heights     find layer thicknesses
-  sample      write a sample part            demo        try all on a sample
-  mesh-out    write a stack's surface        cure        draw what a stack cures
-  material    list and check resins          machine     list and check machines
-  calibrate   make a material                target      make images to measure
-  plan        plan exposures                 learn       correct them by prints
-  projector   list and check projectors      completions man   for the shell
+  view        look at layers in a browser   show          draw layers
+  check       find islands and pockets      support       hold islands
+  info        describe a stack              report        write a page to send
+  verify      check for damage              compare       show differences
+  join split  join or split layer ranges    convert pack  change the format
+Parts, resins and machines; completions and man are for shells:
+  mesh        check and repair a mesh       orient        find an orientation
+  brep        check a STEP part             heights       find thicknesses
+  sample      write a sample part           demo          run all on a sample
+  mesh-out    write a stack's surface       cure          draw what is cured
+  material    list and check resins         machine       check machines
+  calibrate   make a resin file             target        make test images
+  plan        plan exposures                learn         correct exposures
+  projector   list and check projectors     expose        check doses of a job
 -h lists the usual options of a command, --help all; all have --quiet, --options
 ";
 

@@ -321,7 +321,7 @@ mod tests {
             assert!(error.contains(words), "{error} for {text:?}");
         }
         let error = widths("feature_px,exposure_ms,width_um\n25,1,1").unwrap_err().to_string();
-        assert!(error.contains("light of full white"), "{error}");
+        assert!(error.contains("intensity of full white"), "{error}");
         let error = widths("feature_px,dose_mj_per_cm2,width_um\n0,1,1").unwrap_err();
         assert!(error.to_string().contains("column feature_px: 0 is not a size"), "{error}");
         let error = widths("feature_um,dose_mj_per_cm2,cured_um\n9,1,1e9").unwrap_err();
