@@ -57,6 +57,22 @@ pub enum ExposureLimit {
         /// The exposure at the greatest speed and row clock.
         least_ms: f64,
     },
+    /// One number of passes is too slow, and the next is too fast.
+    #[error(
+        "{exposure_ms} ms lies between {below} and {} passes: expose at most {most_ms:.3} ms, or at \
+         least {least_ms:.3} ms",
+        below + 1
+    )]
+    Between {
+        /// The exposure.
+        exposure_ms: f64,
+        /// The passes that are too few.
+        below: u32,
+        /// The longest exposure of these.
+        most_ms: f64,
+        /// The shortest exposure of one pass more.
+        least_ms: f64,
+    },
     /// The head would have to move slower than it can.
     #[error(
         "{exposure_ms} ms needs {passes} passes at {slowest} mm/s, the machine's least speed, and \
@@ -109,7 +125,12 @@ impl RowClock {
         let speed = passes * one_pass;
         let rows = speed / pitch.mm();
         let most = scan.row_clock_hz();
-        let least_ms = way_mm / fastest.min(most * pitch.mm()) * 1000.0;
+        let least_ms = passes * way_mm / fastest.min(most * pitch.mm()) * 1000.0;
+        if passes > 1.0 && exposure_ms < least_ms * (1.0 - 1e-6) {
+            let below = passes as u32 - 1;
+            let most_ms = f64::from(below) * way_mm / slowest * 1000.0;
+            return Err(ExposureLimit::Between { exposure_ms, below, most_ms, least_ms });
+        }
         if speed > fastest * (1.0 + 1e-6) {
             return Err(ExposureLimit::Speed { exposure_ms, speed, most: fastest, least_ms });
         }

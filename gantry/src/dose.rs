@@ -274,7 +274,8 @@ impl Head<'_> {
             let [a, b] =
                 [dark_half, 1.0 - dark_half].map(|time| shaken + speed * (frame_number + time));
             frame_number += 1.0;
-            let weights = row_weights(a.min(b), a.max(b), machine.samples);
+            let reached = top..top + height as i64 + along as i64;
+            let weights = row_weights(a.min(b), a.max(b), machine.samples, reached);
             for (mirror_row, words) in frame.words.chunks_exact(stride / 64).enumerate() {
                 for &(row, weight) in &weights {
                     let row = row - mirror_row as i64 - top;
@@ -306,9 +307,11 @@ impl Head<'_> {
 }
 
 /// Returns the rows that a mirror lights whose center moves from `low` to `high`, and for which share
-/// of the time, on average over the samples of a pixel.
-fn row_weights(low: f64, high: f64, samples: u32) -> Vec<(i64, f32)> {
-    let rows = (low - 1.0).floor() as i64..=(high + 1.0).ceil() as i64;
+/// of the time, on average over the samples of a pixel. Rows outside of `within` do not count: a head
+/// that is faster than any may pass over all of them in a frame.
+fn row_weights(low: f64, high: f64, samples: u32, within: Range<i64>) -> Vec<(i64, f32)> {
+    let first = ((low - 1.0).floor() as i64).max(within.start);
+    let rows = first..((high + 1.0).ceil() as i64).saturating_add(1).min(within.end);
     let covered = |point: f64| {
         let way = (high.min(point + 0.5) - low.max(point - 0.5)).max(0.0);
         if high > low { way / (high - low) } else { f64::from(u8::from((point - low).abs() < 0.5)) }

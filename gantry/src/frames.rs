@@ -61,7 +61,7 @@ pub struct Frame<'a> {
 /// let mirrors = MirrorArray::even(4, 2);
 /// let mut frames = Frames::new(swath, &mirrors);
 /// assert_eq!(frames.len(), 2);
-/// let bits = |frames: &mut Frames| frames.next().unwrap().words.iter().map(|w| w >> 60).collect();
+/// let bits = |frames: &mut Frames| frames.next().unwrap().words.iter().map(|w| w >> 60).collect::<Vec<_>>();
 /// assert_eq!([bits(&mut frames), bits(&mut frames)], [vec![0b0100, 0], vec![0, 0b0100]]);
 /// assert!(frames.next().is_none());
 /// ```

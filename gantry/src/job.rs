@@ -329,6 +329,9 @@ impl Job {
         }
         let swaths = job.layout().swaths(job.pixels[0]);
         let count = swaths.map_err(|error| failed(error.to_string()))?.count();
+        if !job.layers.is_sorted_by(|below, above| below.layer < above.layer) {
+            return Err(failed("its layers are not in their order".to_owned()));
+        }
         for layer in &job.layers {
             let numbers = [layer.exposure_ms, layer.speed_mm_per_s, layer.row_clock_hz];
             if !numbers.into_iter().all(positive) {
@@ -595,7 +598,8 @@ impl Planner {
             row_clock_hz: clock.rows_hz,
             recoat_s: None,
             approach_s: found.approach_s,
-            scan_s: swaths.iter().map(|swath| swath.seconds).sum(),
+            // The sum of nothing is -0.
+            scan_s: swaths.iter().map(|swath| swath.seconds).sum::<f64>() + 0.0,
             steps_s: found.steps_s,
             swaths,
         }

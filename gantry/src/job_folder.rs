@@ -8,7 +8,7 @@ use lamp_machine::{LightTable, Machine, Scan, ScanLight};
 use lamp_stack::{Catalogued, FolderBeside};
 
 use crate::error::GantryError;
-use crate::job::Job;
+use crate::job::{Job, JobLayer};
 use crate::mirrors::MirrorArray;
 use crate::source::BuildPages;
 
@@ -73,6 +73,10 @@ impl JobFolder {
     pub fn open(path: &Path) -> Result<Self, GantryError> {
         let failed =
             |name: &str, problem: String| GantryError::Job { path: path.join(name), problem };
+        if !Self::is_job(path) {
+            let problem = "this is no folder of lamp job: it has no job.json".to_owned();
+            return Err(GantryError::Job { path: path.to_owned(), problem });
+        }
         let text = |name: &str, most: u64| -> Result<String, GantryError> {
             let mut text = String::new();
             let read = fs::File::open(path.join(name))
@@ -117,10 +121,49 @@ impl JobFolder {
         let path = self.path.join(&self.job.build);
         let pages = BuildPages::open(&path)
             .map_err(|error| GantryError::Build { path: path.clone(), error: error.into() })?;
-        match pages.digest()? == self.job.build_digest {
-            true => Ok(pages),
-            false => Err(GantryError::OtherBuild { path }),
+        if pages.digest()? != self.job.build_digest {
+            return Err(GantryError::OtherBuild { path });
         }
+        match self.difference(&pages) {
+            None => Ok(pages),
+            Some(problem) => Err(GantryError::Job { path: self.path.join(JOB), problem }),
+        }
+    }
+
+    /// Returns how the job's facts of the build differ from the build, if they do.
+    fn difference(&self, pages: &BuildPages) -> Option<String> {
+        let job = &self.job;
+        if job.pixels != pages.size() {
+            return Some(format!(
+                "its pixels are {:?}, and the build has {:?}",
+                job.pixels,
+                pages.size()
+            ));
+        }
+        let pitch_um = pages.dpi().pitch().um();
+        if (job.pitch_um - pitch_um).abs() > 1e-6 * pitch_um {
+            return Some(format!(
+                "its pitch is {} um, and the build has {pitch_um} um",
+                job.pitch_um
+            ));
+        }
+        let usual_ms = self
+            .machine
+            .times
+            .as_ref()
+            .and_then(|times| times.expose_s)
+            .map(|seconds| seconds * 1000.0);
+        job.layers.iter().find_map(|layer| {
+            let JobLayer { layer: index, page, exposure_ms, .. } = *layer;
+            let header = pages.headers().get(page).filter(|header| header.info.index == index);
+            let Some(header) = header else {
+                return Some(format!("page {page} of the build is not layer {index}"));
+            };
+            let wanted_ms = header.info.exposure_ms.or(usual_ms);
+            wanted_ms.filter(|wanted| (wanted - exposure_ms).abs() > 1e-6 * wanted).map(|wanted| {
+                format!("layer {index} has {exposure_ms} ms, and the build states {wanted} ms")
+            })
+        })
     }
 }
 

@@ -46,8 +46,11 @@ struct MirrorColumn {
 #[non_exhaustive]
 pub enum MirrorError {
     /// A column of mirrors has no light.
-    #[error("column {0} of the mirrors gives no light: a pixel below it would stay uncured")]
+    #[error("column {0} of the mirrors has no light that can be switched")]
     DarkColumn(u32),
+    /// Stuck mirrors of a column give more light than the weakest column has.
+    #[error("the stuck mirrors of column {0} alone give more light than the weakest column has")]
+    StuckColumn(u32),
 }
 
 impl MirrorArray {
@@ -98,12 +101,15 @@ impl MirrorArray {
             }
             full_rows = f64::min(full_rows, doses.iter().sum());
         }
-        let columns = (0..across)
+        let columns: Vec<MirrorColumn> = (0..across)
             .map(|column| {
                 let (doses, stuck) = of_column(column);
                 MirrorColumn::new(&doses, &stuck, full_rows)
             })
             .collect();
+        if let Some(column) = columns.iter().position(|column| column.stuck > full_rows + 0.5) {
+            return Err(MirrorError::StuckColumn(column as u32));
+        }
         Ok(Self { across, along, light, full_rows, columns })
     }
 
@@ -280,5 +286,9 @@ mod tests {
         assert_eq!(mirrors.rows_of(0, [0, 0], 0.0).1, 1.0);
         let dark = MirrorArray::uneven([2, 1], &[1.0; 2], &[[1, 0]], &[]);
         assert_eq!(dark, Err(MirrorError::DarkColumn(1)));
+        let light: Vec<f32> = [[1.0, 0.5]; 8].concat();
+        let stuck: Vec<_> = (0..6).map(|row| [0, row]).collect();
+        let bright = MirrorArray::uneven([2, 8], &light, &[], &stuck);
+        assert_eq!(bright, Err(MirrorError::StuckColumn(0)));
     }
 }

@@ -49,6 +49,16 @@ fn exposures_beyond_the_machine_name_the_limit() {
     let fast = clock(50.0, "").unwrap_err();
     assert!(fast.contains("200.00 mm/s") && fast.contains("at most 100 mm/s"), "{fast}");
     assert!(fast.contains("at least 100.000 ms"), "{fast}");
+    // Two passes of at least 90 mm/s and at most 100 mm/s take 200 to 222 ms.
+    let scanner = |exposure| {
+        let mut scanner = text("passes = 4\n");
+        let scan = scanner.scan.as_mut().unwrap();
+        scan.speed[0] = "90mm/s".parse().unwrap();
+        RowClock::new(exposure, 100.0, pitch, scan).map_err(|error| error.to_string())
+    };
+    let between = scanner(150.0).unwrap_err();
+    assert!(between.contains("at most 111.111 ms, or at least 200.000 ms"), "{between}");
+    assert_eq!(scanner(210.0).unwrap().passes, 2);
     for impossible in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(clock(impossible, "").unwrap_err().contains("above zero"));
     }

@@ -125,6 +125,35 @@ fn faults_of_a_job_are_named() {
     let less = text.replacen(&format!("\"frames\":{frames}"), "\"frames\":1", 1);
     scratch.write("job/job.json", less.as_bytes());
     scratch.run("lamp expose job/").is_refused_with(&["1 frames do not fit its rows"]);
+    // Nor is a job of other pages, sizes or exposures than the build's, or with a head beyond reason.
+    for (key, value, words) in [
+        ("page", Value::from(999), "page 999 of the build is not layer 20"),
+        ("exposure_ms", Value::from(1.0), "layer 20 has 1 ms, and the build states"),
+        ("layer", Value::from(21), "not in their order"),
+    ] {
+        let mut other = job.clone();
+        other["layers"][20][key] = value;
+        scratch.write("job/job.json", other.to_string().as_bytes());
+        for line in
+            ["lamp expose job/ --layers 20..22", "lamp frames job/ --layer 19 --swath 1 -o f"]
+        {
+            scratch.run(line).is_refused_with(&[words]);
+        }
+    }
+    let narrow = text.replacen("\"pixels\":[236,", "\"pixels\":[235,", 1);
+    scratch.write("job/job.json", narrow.as_bytes());
+    scratch.run("lamp expose job/").is_refused_with(&["its pixels are [235, 236]"]);
+    let mut wild = job.clone();
+    wild["layers"][20]["speed_mm_per_s"] = Value::from(1e300);
+    scratch.write("job/job.json", wild.to_string().as_bytes());
+    assert_eq!(scratch.run("lamp expose job/ --layers 20 --strict").statuses, [Some(3)]);
+    for line in [
+        "lamp expose job/ --offset 9:1um,1um",
+        "lamp expose job/ --offset 1:1um,1um --offset 1:2um,1um",
+    ] {
+        scratch.run(line).is_wrong_usage(&["--offset", "0 to 2 at most once"]);
+    }
+    scratch.run("lamp expose strips/").is_refused_with(&["no folder of lamp job"]);
     // Another build under the same name is refused.
     scratch.write("job/job.json", text.as_bytes());
     scratch.run("lamp expose job/ --layers 20 --strict").succeeds();

@@ -150,7 +150,12 @@ pub(crate) fn one_of_described<T: Named>(
 
 /// Parses `A..B`, `A..`, `..B` or a single layer.
 pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
-    let wrong = |_| format!("`{text}` is not a range of layers: write A..B, A.. or ..B");
+    parse_range(text, "layer")
+}
+
+/// Parses a range of things that are counted from 0, such as `12..40`, or one of them.
+pub(crate) fn parse_range(text: &str, thing: &str) -> Result<Range<u32>, String> {
+    let wrong = |_| format!("`{text}` is not a range of {thing}s: write A..B, A.. or ..B");
     let (start, end) = match text.split_once("..") {
         Some((start, end)) => {
             let start = if start.is_empty() { 0 } else { start.parse().map_err(wrong)? };
@@ -163,7 +168,7 @@ pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
         }
     };
     if start >= end {
-        return Err(format!("`{text}` contains no layer: the end must be above the start"));
+        return Err(format!("`{text}` contains no {thing}: the end must be above the start"));
     }
     Ok(start..end)
 }

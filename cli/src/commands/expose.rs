@@ -12,7 +12,7 @@ use lamp_gantry::{
 use lamp_stack::{GrayMask, Image, Layer, Length, StackInfo, write_gray_png};
 use serde::Serialize;
 
-use crate::args::options::{Common, Output, parse_distance, parse_layers};
+use crate::args::options::{Common, Output, parse_distance, parse_layers, parse_range};
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
 use crate::output::json_report::print_answer;
@@ -45,11 +45,11 @@ pub(crate) struct ExposeArgs {
     layers: Option<Range<u32>>,
 
     /// Add up only the doses of these columns of the build
-    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    #[arg(long, value_name = "A..B", value_parser = |text: &str| parse_range(text, "column"))]
     columns: Option<Range<u32>>,
 
     /// Add up only the doses of these rows of the build
-    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    #[arg(long, value_name = "A..B", value_parser = |text: &str| parse_range(text, "row"))]
     rows: Option<Range<u32>>,
 
     /// Standard deviation of the random error in the head's place along the scan, drawn anew for
@@ -253,6 +253,15 @@ impl ExposeArgs {
         };
         let columns = within("--columns", &self.columns, job.pixels[0])?;
         let rows = within("--rows", &self.rows, job.pixels[1])?;
+        let count = job.layout().swaths(job.pixels[0])?.count();
+        for (at, (swath, _)) in self.offset.iter().enumerate() {
+            if *swath >= count || self.offset[..at].iter().any(|(other, _)| other == swath) {
+                return Err(Exit::usage(format!(
+                    "--offset {swath}: give each of the swaths 0 to {} at most once",
+                    count - 1
+                )));
+            }
+        }
         let faults = folder.machine.scan.as_ref().and_then(|scan| scan.faults.as_ref());
         let blur_px = self.blur.um() / pitch_um;
         if blur_px > 100.0 {
@@ -358,13 +367,13 @@ fn text(dose: &LayerDose, layer: &JobLayer, tolerance: f64) -> String {
             format!("light on {px} black {pixels}, up to {:.3} ms", all.dark.greatest_ms)
         }
     };
+    let white = match all.white_px {
+        0 => "no white pixels".to_owned(),
+        px => format!("{px} white pixels get {}", spread(all.shares)),
+    };
     let mut text = format!(
-        "layer {}: {:.3} ms at {:.2} mm/s: {} white pixels get {}; {dark}\n",
-        dose.layer,
-        layer.exposure_ms,
-        layer.speed_mm_per_s,
-        all.white_px,
-        spread(all.shares),
+        "layer {}: {:.3} ms at {:.2} mm/s: {white}; {dark}\n",
+        dose.layer, layer.exposure_ms, layer.speed_mm_per_s,
     );
     if all.white_px > 0 {
         let ends = |[least, most]: [f64; 2]| format!("{} to {} %", percent(least), percent(most));

@@ -13,9 +13,10 @@ use lamp_gantry::{
 use lamp_machine::ScanDirection;
 use lamp_stack::{write_gray_animation, write_gray_png};
 
-use crate::args::options::{Common, parse_layers};
+use crate::args::options::{Common, parse_range};
 use crate::commands::job::ScanArgs;
 use crate::exit::Exit;
+use crate::output::endings::{FRAMES, check_ending};
 use crate::streams::{extension, input_name, is_stream, write_file};
 
 /// Write the frames of a swath: what the mirrors show, row after row of the scan
@@ -51,7 +52,7 @@ pub(crate) struct FramesArgs {
     pass: u32,
 
     /// Write only these frames: A..B is A to B - 1; A.. and ..B are open-ended
-    #[arg(long, value_name = "A..B", value_parser = parse_layers)]
+    #[arg(long, value_name = "A..B", value_parser = |text: &str| parse_range(text, "frame"))]
     frames: Option<Range<u32>>,
 
     /// File of frames, a .png to look at, or - for standard output
@@ -66,6 +67,9 @@ const PICTURES_PER_SECOND: u16 = 12;
 const MAX_PICTURES: u64 = 2000;
 
 pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
+    if !is_stream(&args.output) {
+        check_ending(&args.output, &FRAMES)?;
+    }
     let (job, pages, mirrors) = args.job()?;
     let at = |error: GantryError| Exit::from(error).at(input_name(&args.input));
     let (layer, pass) = args.pass(&job)?;

@@ -182,20 +182,26 @@ pub(crate) fn run(args: &JobArgs, common: &Common) -> Result<(), Exit> {
     let folder = new_folder(&args.output, args.force)?;
     let name = seen_from(folder.path(), &args.build)
         .map_err(|error| Exit::Failed(error.into()).at(input_name(&args.build)))?;
+    let name = name.into_os_string().into_string().map_err(|name| {
+        Exit::usage(format!("{}: a job names its build, and this name is no text", name.display()))
+    })?;
     let layers = args.layers.clone().unwrap_or(0..u32::MAX);
-    let (job, _, scanner) = args.scan.planned(&args.build, name.display().to_string(), layers)?;
+    let (job, _, scanner) = args.scan.planned(&args.build, name, layers)?;
     JobFolder::write(folder, &job, &scanner.text, scanner.light.as_ref())
         .map_err(|error| Exit::from(error).at(args.output.display().to_string()))?;
     if args.json {
         return print_answer("lamp-job-sums-1", &job.sums);
     }
-    if !common.quiet {
+    if !common.quiet && !args.json {
         say(&format!("job: {}: written", args.output.display()));
     }
-    print(&text(&job, scanner.machine.recoat_s().is_none()))
+    if common.quiet {
+        return Ok(());
+    }
+    print(&text(&job, &scanner))
 }
 
-fn text(job: &Job, no_recoating: bool) -> String {
+fn text(job: &Job, scanner: &Scanner) -> String {
     let sums = &job.sums;
     let ends = |of: fn(&lamp_gantry::JobLayer) -> f64| {
         let all = job.layers.iter().map(of);
@@ -222,7 +228,14 @@ fn text(job: &Job, no_recoating: bool) -> String {
         time_text(sums.steps_s),
         time_text(sums.between_s),
     );
-    if no_recoating {
+    if !scanner.mirrors.is_even() {
+        text += &format!(
+            "light:      white is within {:.2} % of its exposure: half a row of {:.1}\n",
+            50.0 / job.full_rows,
+            job.full_rows
+        );
+    }
+    if scanner.machine.recoat_s().is_none() {
         text += "recoating is not in it: write recoat_s into [times] of the machine's file\n";
     }
     text

@@ -28,6 +28,12 @@ pub(crate) const PACKED_STACK: Writes =
 pub(crate) const PNG: Writes =
     Writes { sentence: "the picture is a PNG: end its name in .png", endings: &["png"] };
 
+/// The frames of a swath, or a picture of them.
+pub(crate) const FRAMES: Writes = Writes {
+    sentence: "frames are written to a file without a known ending, or as a PNG to look at",
+    endings: &["png", "apng"],
+};
+
 /// A mesh.
 pub(crate) const STL: Writes =
     Writes { sentence: "meshes are written as STL: name a .stl file", endings: &["stl"] };

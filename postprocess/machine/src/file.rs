@@ -61,7 +61,14 @@ pub enum MachineError {
     StripsAndScan,
     /// Impossible numbers of a scan.
     #[error("scan: {0}")]
-    Scan(#[from] ScanError),
+    Scan(ScanError),
+}
+
+// Its text is in the message already, so it is no source.
+impl From<ScanError> for MachineError {
+    fn from(error: ScanError) -> Self {
+        Self::Scan(error)
+    }
 }
 
 macro_rules! builtin {

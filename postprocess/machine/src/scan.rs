@@ -48,7 +48,7 @@ pub struct Scan {
     /// The direction of the first swath, and of all swaths unless they go both ways.
     #[serde(default)]
     pub direction: ScanDirection,
-    /// The wait after each move across, before the light goes on, in seconds.
+    /// The wait before each swath and pass, before the light goes on, in seconds.
     #[serde(default)]
     pub settle_s: f64,
     /// The share of each row's time in which the light is on: above 0, at most 1.

@@ -51,6 +51,8 @@ const READERS: &[&str] = &[
     "lamp learn out/ --start S --material pegda-sudan",
     "lamp cure S --material lamp-suspension --section y=0mm -o out.png",
     "lamp mesh-out S -o out.stl",
+    "lamp job S --machine scan.toml -o out/",
+    "lamp frames S --machine scan.toml --layer 2 --swath 0 -o out.frames",
 ];
 
 /// Commands that read no stack, or read it through a command above, or serve one (`view` states
@@ -61,6 +63,7 @@ const OTHERS: &[&str] = &[
     "sample",
     "demo",
     "view",
+    "expose",
     "compose",
     "batch",
     "machine",
@@ -84,6 +87,11 @@ fn scratch() -> Scratch {
     let edit = "[[edit]]\nop = \"subtract\"\nz = [\"2mm\", \"6mm\"]\n\
                 box = { x = [\"-1mm\", \"1mm\"], y = [\"-1mm\", \"1mm\"] }\n";
     scratch.write("edits.toml", edit.as_bytes());
+    let scan = "name = \"scan\"\ndescription = \"\"\n[area]\nvalue = \"9x9in\"\nsource = \"-\"\n\
+                [scan]\nmirrors = [20, 8]\noverlap = 0\nspeed = [\"0.001mm/s\", \"900mm/s\"]\n\
+                acceleration = \"2000mm/s2\"\nrow_clock_hz = 22000\nboth_ways = true\nsource = \"-\"\n\
+                [times]\nexpose_s = 1\nsource = \"-\"\n";
+    scratch.write("scan.toml", scan.as_bytes());
     let line = "slice ball.stl --dpi 40 --thickness 2mm --material lamp-suspension -q -o good.tif";
     scratch.run(line).succeeds_quietly();
     assert_eq!(scratch.layers("good.tif").len(), 6);
