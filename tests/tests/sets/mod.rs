@@ -101,7 +101,8 @@ fn scratch() -> Scratch {
 
 /// Runs a command on a stack. Returns its status, messages, and output or answer.
 fn outcome(folder: &Scratch, line: &str, form: Form) -> (Option<i32>, String, Option<Vec<u8>>) {
-    for name in ["out.tif", "out.json", "out.png", "out.html", "out.lamp", "out.stl"] {
+    for name in ["out.tif", "out.json", "out.png", "out.html", "out.lamp", "out.stl", "out.frames"]
+    {
         let _ = fs::remove_file(folder.path(name));
     }
     let _ = fs::remove_dir_all(folder.path("out"));
