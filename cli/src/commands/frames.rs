@@ -19,7 +19,7 @@ use crate::exit::Exit;
 use crate::output::endings::{FRAMES, check_ending};
 use crate::streams::{extension, input_name, is_stream, write_file};
 
-/// Write the frames of a swath: what the mirrors show, row after row of the scan
+/// Write the frames of a swath: a picture of the mirrors for each row of the scan
 ///
 /// While the head moves on by one pixel, the mirrors show one frame. Mirror row j of a frame is
 /// over the image row that is j rows above the frame's position. Frames are packed, 1 bit a mirror,
@@ -129,7 +129,8 @@ impl FramesArgs {
     fn job(&self) -> Result<(Job, BuildPages, MirrorArray), Exit> {
         if !JobFolder::is_job(&self.input) {
             let layers = self.layer..self.layer.saturating_add(1);
-            return self.scan.plan(&self.input, String::new(), layers);
+            let (job, pages, scanner) = self.scan.plan(&self.input, String::new(), layers)?;
+            return Ok((job, pages, scanner.mirrors));
         }
         if !self.scan.is_default() {
             return Err(Exit::usage(

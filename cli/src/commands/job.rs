@@ -117,11 +117,11 @@ pub(crate) fn build_clock(
 }
 
 /// A machine that scans, as its file has it.
-struct Scanner {
+pub(super) struct Scanner {
     machine: Machine,
     text: String,
     light: Option<LightTable>,
-    mirrors: MirrorArray,
+    pub(super) mirrors: MirrorArray,
 }
 
 impl ScanArgs {
@@ -144,16 +144,6 @@ impl ScanArgs {
 
     /// Plans layers of a build. `name` is the build's in the job.
     pub(super) fn plan(
-        &self,
-        build: &Path,
-        name: String,
-        layers: Range<u32>,
-    ) -> Result<(Job, BuildPages, MirrorArray), Exit> {
-        let (job, pages, scanner) = self.planned(build, name, layers)?;
-        Ok((job, pages, scanner.mirrors))
-    }
-
-    fn planned(
         &self,
         build: &Path,
         name: String,
@@ -186,7 +176,7 @@ pub(crate) fn run(args: &JobArgs, common: &Common) -> Result<(), Exit> {
         Exit::usage(format!("{}: a job names its build, and this name is no text", name.display()))
     })?;
     let layers = args.layers.clone().unwrap_or(0..u32::MAX);
-    let (job, _, scanner) = args.scan.planned(&args.build, name, layers)?;
+    let (job, _, scanner) = args.scan.plan(&args.build, name, layers)?;
     JobFolder::write(folder, &job, &scanner.text, scanner.light.as_ref())
         .map_err(|error| Exit::from(error).at(args.output.display().to_string()))?;
     if args.json {

@@ -8,7 +8,7 @@ use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size, nonempty_text};
 use serde::de::{self, Deserialize, Deserializer};
 use thiserror::Error;
 
-use super::{Machine, MachineLimit, ScanError, Speed};
+use super::{Machine, MachineLimit, ScanError};
 
 /// Why a machine's numbers contradict each other.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -39,20 +39,13 @@ pub enum MachineError {
     #[error("times: swath_step_s needs swath_speed_mm_per_s")]
     StepWithoutSpeed,
     /// A speed along swaths that are not known.
-    #[error("times: swath_speed_mm_per_s needs [strips] or [scan], which say how wide a swath is")]
+    #[error("times: swath_speed_mm_per_s needs [strips], which say how wide a swath is")]
     SpeedWithoutStrips,
-    /// A speed along swaths that the scan does not allow.
+    /// One speed of all swaths beside a scan, whose speed follows from each exposure.
     #[error(
-        "times: swath_speed_mm_per_s: {speed}mm/s is not among the {least} to {most} of [scan]"
+        "times: swath_speed_mm_per_s is for [strips]: leave it out, as [scan] has its own speeds"
     )]
-    SpeedBeyondScan {
-        /// The speed, in millimeters a second.
-        speed: f64,
-        /// The least speed of the scan.
-        least: Speed,
-        /// The greatest speed of the scan.
-        most: Speed,
-    },
+    SpeedBesideScan,
     /// Swaths without a pixel of their own.
     #[error("strips: a swath must share less than half its mirrors with the next")]
     Strips,
@@ -122,7 +115,9 @@ impl Catalogued for Machine {
                 return Err(MachineError::StripsAndScan);
             }
             scan.check()?;
-            self.check_speed(scan.speed)?;
+            if self.times.as_ref().is_some_and(|times| times.swath_speed_mm_per_s.is_some()) {
+                return Err(MachineError::SpeedBesideScan);
+            }
         }
         match &self.strips {
             // A swath needs a column of its own between its two seams: a seam joins two swaths,
@@ -136,15 +131,6 @@ impl Catalogued for Machine {
 }
 
 impl Machine {
-    fn check_speed(&self, [least, most]: [Speed; 2]) -> Result<(), MachineError> {
-        match self.times.as_ref().and_then(|times| times.swath_speed_mm_per_s) {
-            Some(speed) if !(least.mm_per_s()..=most.mm_per_s()).contains(&speed) => {
-                Err(MachineError::SpeedBeyondScan { speed, least, most })
-            }
-            _ => Ok(()),
-        }
-    }
-
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(dpi) = self.defaults.dpi {
             let dpi = Dpi::new(dpi).ok_or(MachineError::NoResolution)?;

@@ -48,10 +48,13 @@ pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String
     if let Some(why) = &time.unscanned {
         missing.push(format!("the machine cannot scan the build: {why}"));
     } else if time.sum_s().is_none() {
-        missing.push(format!(
-            "not every layer states an exposure: write expose_s, or swath_speed_mm_per_s for a \
-             projector that scans, into {file}"
-        ));
+        let scans = machine.is_some_and(|machine| machine.scan.is_some());
+        let speed = match scans {
+            true => "",
+            false => ", or swath_speed_mm_per_s for a projector that scans,",
+        };
+        missing
+            .push(format!("not every layer states an exposure: write expose_s{speed} into {file}"));
     }
     if time.recoating_s.is_none() {
         missing.push(format!("recoating is not in it: write recoat_s into {file}"));
