@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use crate::frames::Frame;
 use crate::job::{Job, JobLayer, JobSwath};
+use crate::tilted_dose::{EdgeWindow, TiltedHead};
 
 /// The faults of a machine, and the places at which its dose is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,6 +117,8 @@ pub struct LayerDose {
     pub swaths: Vec<(u32, SwathDose)>,
     /// The seams.
     pub seams: Vec<SeamDose>,
+    /// The white pixels that are not counted: a tilted mirror at an edge is over white and black.
+    pub edge_px: u64,
     /// The least and the greatest mean share of a row's white pixels.
     pub rows: [f64; 2],
     /// The least and the greatest mean share of a column's white pixels.
@@ -183,7 +186,8 @@ pub fn expose<E: Send>(
     let [columns, rows] = &machine.region;
     assert!(columns.end <= wanted.width() && rows.end <= wanted.height());
     assert!([0, job.mirrors[0] as usize * job.mirrors[1] as usize].contains(&machine.light.len()));
-    let head = Head { job, layer, machine };
+    let tilted = job.tilt.map(|tilt| TiltedHead::new(job.mirrors, tilt, job.pitch_um));
+    let head = Head { job, layer, machine, tilted };
     // From the left, whatever the order of the scan.
     let mut swaths: Vec<&JobSwath> =
         layer.swaths.iter().filter(|swath| head.reaches(swath)).collect();
@@ -216,6 +220,7 @@ struct Head<'a> {
     job: &'a Job,
     layer: &'a JobLayer,
     machine: &'a Disturbance,
+    tilted: Option<TiltedHead>,
 }
 
 impl Head<'_> {
@@ -224,12 +229,26 @@ impl Head<'_> {
         of.map_or([0.0; 2], |(_, offset)| *offset)
     }
 
-    /// The column of the build below the first mirror: the nearest, as a mirror lights the center of
-    /// one pixel across.
-    fn first_column(&self, swath: &JobSwath) -> i64 {
+    /// The column of the build below the corner of the first mirror.
+    fn corner_px(&self, swath: &JobSwath) -> f64 {
         let pitch_mm = self.job.pitch_um / 1000.0;
         // A place that no build reaches stays within 64 bits.
-        (swath.x_mm / pitch_mm + self.offset(swath)[0]).round().clamp(-1e12, 1e12) as i64
+        (swath.x_mm / pitch_mm + self.offset(swath)[0]).clamp(-1e12, 1e12)
+    }
+
+    /// The first column that a swath lights: below the first mirror, the nearest, as a mirror lights
+    /// the center of one pixel across; below the leftmost of tilted mirrors.
+    fn first_column(&self, swath: &JobSwath) -> i64 {
+        let corner = self.corner_px(swath);
+        match &self.tilted {
+            Some(tilted) => (corner + tilted.left_px()).floor() as i64,
+            None => corner.round() as i64,
+        }
+    }
+
+    /// The number of columns that a swath lights.
+    fn columns(&self) -> usize {
+        self.tilted.as_ref().map_or(self.job.mirrors[0] as usize, TiltedHead::columns)
     }
 
     /// How far blurred light reaches, in pixels.
@@ -240,7 +259,7 @@ impl Head<'_> {
     fn reaches(&self, swath: &JobSwath) -> bool {
         let [columns, _] = &self.machine.region;
         let first = self.first_column(swath) - self.margin();
-        let end = first + i64::from(self.job.mirrors[0]) + 2 * self.margin();
+        let end = first + self.columns() as i64 + 2 * self.margin();
         first < columns.end.into() && end > columns.start.into()
     }
 
@@ -250,30 +269,39 @@ impl Head<'_> {
         swath: &JobSwath,
         show: &impl Fn(&JobSwath, &mut dyn FnMut(&Frame<'_>)) -> Result<(), E>,
     ) -> Result<Band, E> {
-        let Self { job, layer, machine } = *self;
+        let Self { job, layer, machine, ref tilted } = *self;
         let [across, along] = job.mirrors.map(|side| side as usize);
+        let columns = self.columns();
         let (margin, pad) = (self.margin() as usize, self.margin());
         let rows = &machine.region[1];
         // Blur needs the doses beside the region, too.
         let (top, height) = (i64::from(rows.start) - pad, rows.len() + 2 * margin);
-        let stride = across.next_multiple_of(64);
+        let stride = columns.next_multiple_of(64);
         let mut sums = vec![0.0_f32; height * stride];
         // From here on lengths are in pixels and times in rows' times.
         let speed = layer.speed_mm_per_s / layer.row_clock_hz / (job.pitch_um / 1000.0);
+        // The head begins where no mirror reaches the first row, and ends beyond the last.
+        let reach = tilted.as_ref().map_or([0.0, along as f64], TiltedHead::rows);
         let (start, speed) = match swath.direction {
-            ScanDirection::Down => (f64::from(swath.first_row) - 0.5, speed),
-            ScanDirection::Up => (f64::from(swath.last_row) + along as f64 - 0.5, -speed),
+            ScanDirection::Down => (f64::from(swath.first_row) - reach[0] - 0.5, speed),
+            ScanDirection::Up => (f64::from(swath.last_row) + reach[1] - 0.5, -speed),
         };
         let start = start + self.offset(swath)[1];
         let dark_half = (1.0 - job.strobe) / 2.0;
         let mut jitter = Jitter::new(layer.layer, swath.swath, swath.pass);
         let stuck = stuck_words(&machine.stuck, across, along);
         let mut frame_number = 0.0;
+        let corner = self.corner_px(swath) - self.first_column(swath) as f64;
+        let mut below = tilted.as_ref().map(|tilted| tilted.below(corner, columns));
         show(swath, &mut |frame| {
             let shaken = start + machine.jitter_px * jitter.next();
             let [a, b] =
                 [dark_half, 1.0 - dark_half].map(|time| shaken + speed * (frame_number + time));
             frame_number += 1.0;
+            if let Some(below) = &mut below {
+                below.light(frame.words, [a.min(b), a.max(b)], top, &mut sums, stride);
+                return;
+            }
             let reached = top..top + height as i64 + along as i64;
             let weights = row_weights(a.min(b), a.max(b), machine.samples, reached);
             for (mirror_row, words) in frame.words.chunks_exact(stride / 64).enumerate() {
@@ -290,13 +318,13 @@ impl Head<'_> {
             }
         })?;
         let row_ms = (job.strobe * 1000.0 / layer.row_clock_hz) as f32;
-        let mut doses = Vec::with_capacity(height * (across + 2 * margin));
+        let mut doses = Vec::with_capacity(height * (columns + 2 * margin));
         for row in sums.chunks_exact(stride) {
             doses.extend(std::iter::repeat_n(0.0, margin));
-            doses.extend(row[..across].iter().map(|sum| sum * row_ms));
+            doses.extend(row[..columns].iter().map(|sum| sum * row_ms));
             doses.extend(std::iter::repeat_n(0.0, margin));
         }
-        let columns = across + 2 * margin;
+        let columns = columns + 2 * margin;
         if margin > 0 {
             blur(&mut doses, columns, machine.blur_px, margin);
             doses.truncate((height - margin) * columns);
@@ -462,6 +490,8 @@ struct LayerSums<'a> {
     /// For each row of the region: the sum of the shares, and the number of white pixels.
     rows: Vec<(f64, u64)>,
     columns: [f64; 2],
+    tilted: Option<TiltedHead>,
+    edge_px: u64,
 }
 
 impl<'a> LayerSums<'a> {
@@ -476,11 +506,16 @@ impl<'a> LayerSums<'a> {
             seams: BTreeMap::new(),
             rows: vec![(0.0, 0); machine.region[1].len()],
             columns: [f64::INFINITY, f64::NEG_INFINITY],
+            tilted: job.tilt.map(|tilt| TiltedHead::new(job.mirrors, tilt, job.pitch_um)),
+            edge_px: 0,
         }
     }
 
     /// Returns the place in the layout of a column: its swath, and whether the next one reaches it.
     fn place(&self, column: u32) -> (u32, bool) {
+        if let Some(tilted) = &self.tilted {
+            return tilted.place(column);
+        }
         let [mirrors, overlap] = [self.job.mirrors[0], self.job.overlap];
         let step = mirrors - overlap;
         let swath = column / step;
@@ -492,12 +527,26 @@ impl<'a> LayerSums<'a> {
         let mut columns = vec![(0.0, 0_u64); width];
         let end = first + width as u32;
         let rows = self.machine.region[1].clone();
+        let mut edges = self
+            .tilted
+            .as_ref()
+            .map(|tilted| EdgeWindow::new(self.wanted, tilted.edge_px(), first..end, rows.start));
         for ((row, doses), at) in rows.zip(doses.chunks_exact(width)).zip(0..) {
+            if let Some(edges) = &mut edges {
+                edges.advance();
+            }
+            let is_judged = |column: u32, is_white: bool| {
+                edges.as_ref().is_none_or(|edges| edges.is_judged(column - first, is_white))
+            };
             let mut column = first;
             for (from, to, level) in self.wanted.runs(row) {
                 let (from, to) = (from.clamp(first, end), to.clamp(first, end));
-                self.dark(column..from, first, doses);
+                self.dark((column..from).filter(|&at| is_judged(at, false)), first, doses);
                 for column in from..to {
+                    if !is_judged(column, true) {
+                        self.edge_px += 1;
+                        continue;
+                    }
                     let dose = f64::from(doses[(column - first) as usize]);
                     let share = dose / (self.exposure_ms * f64::from(level) / 255.0);
                     let tolerance = self.machine.tolerance;
@@ -509,7 +558,7 @@ impl<'a> LayerSums<'a> {
                 }
                 column = to.max(column);
             }
-            self.dark(column..end, first, doses);
+            self.dark((column..end).filter(|&at| is_judged(at, false)), first, doses);
         }
         let means = columns.iter().filter(|sum| sum.1 > 0).map(|(sum, px)| sum / *px as f64);
         for mean in means {
@@ -517,7 +566,7 @@ impl<'a> LayerSums<'a> {
         }
     }
 
-    fn dark(&mut self, columns: Range<u32>, first: u32, doses: &[f32]) {
+    fn dark(&mut self, columns: impl Iterator<Item = u32>, first: u32, doses: &[f32]) {
         for column in columns {
             let dose = f64::from(doses[(column - first) as usize]);
             if dose > 0.0 {
@@ -544,6 +593,7 @@ impl<'a> LayerSums<'a> {
         LayerDose {
             layer,
             all: self.all.finished(),
+            edge_px: self.edge_px,
             swaths: self.swaths.into_iter().map(|(swath, dose)| (swath, dose.finished())).collect(),
             seams: seams.map(|(left, dose)| SeamDose { left, dose: dose.finished() }).collect(),
             rows: ends(rows),

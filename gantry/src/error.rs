@@ -64,6 +64,25 @@ pub enum GantryError {
     /// A seam of gray levels is only in strips.
     #[error("a gray seam is for strips (tile --seam gray): a job cuts a build with comb or time")]
     GraySeam,
+    /// Strips are cut along the scan, and the swaths of a tilted display are slanted.
+    #[error("a tilted display scans slanted swaths: give the build before tile --strips cut it")]
+    TiltedStrips,
+    /// Tilted mirrors show no shares in time.
+    #[error(
+        "a tilted display shows neither gray nor seams in time: use --seam comb, and dither the build"
+    )]
+    TiltedShares,
+    /// The mirrors of a tilted display are far from the build's pixels.
+    #[error(
+        "scan: tilt: mirror_pitch: mirrors of {mirror_um} um do not show pixels of {pixel_um} um: they \
+         must be at most 1000 times as large"
+    )]
+    MirrorPitch {
+        /// The distance of mirrors.
+        mirror_um: f64,
+        /// The distance of pixels.
+        pixel_um: f64,
+    },
     /// A layer states no exposure.
     #[error(
         "{layer} states no exposure: slice with --material or --exposure-table, or add expose_s to [times] of the machine {machine}"

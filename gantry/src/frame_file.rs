@@ -8,7 +8,7 @@
 //! | 8, 12 | mirrors across the scan, along it (u32) |
 //! | 16 | bytes of a row of mirrors, a multiple of 8 (u32) |
 //! | 20, 24 | the layer's index, the swath's number (u32) |
-//! | 28 | the build's column below the first mirror (u32) |
+//! | 28 | the build's column below the first mirror (i32) |
 //! | 32 | the row of the image below mirror row 0 in the first frame (i64) |
 //! | 40 | the number of frames (u64) |
 //! | 48 | rows per second (f64) |
@@ -37,7 +37,7 @@ pub struct FrameHeader {
     /// The swath's number, from the left.
     pub swath: u32,
     /// The build's column below the first mirror.
-    pub first_column: u32,
+    pub first_column: i32,
     /// The row of the image below mirror row 0 in the first frame.
     pub first_position: i64,
     /// The number of frames.
@@ -93,9 +93,10 @@ impl FrameHeader {
         put(MAGIC);
         let row_bytes = self.row_bytes() as u32;
         let [across, along] = self.mirrors;
-        for number in [across, along, row_bytes, self.layer, self.swath, self.first_column] {
+        for number in [across, along, row_bytes, self.layer, self.swath] {
             put(&number.to_le_bytes());
         }
+        put(&self.first_column.to_le_bytes());
         put(&self.first_position.to_le_bytes());
         put(&self.frames.to_le_bytes());
         put(&self.rows_hz.to_le_bytes());
@@ -115,7 +116,7 @@ impl FrameHeader {
             mirrors: [number(8), number(12)],
             layer: number(20),
             swath: number(24),
-            first_column: number(28),
+            first_column: i32::from_le_bytes(take(bytes, 28)),
             first_position: i64::from_le_bytes(take(bytes, 32)),
             frames: u64::from_le_bytes(take(bytes, 40)),
             rows_hz: f64::from_le_bytes(take(bytes, 48)),

@@ -7,6 +7,7 @@ use lamp_machine::ScanDirection;
 use lamp_stack::Image;
 
 use crate::mirrors::{MirrorArray, PHASES};
+use crate::tilt::{TiltedMirrors, TiltedWindow};
 
 /// The bits of a word.
 const WORD: u32 = 64;
@@ -17,17 +18,21 @@ const TABLE_BYTES: usize = 128 << 20;
 /// A swath of a layer, as it is shown.
 #[derive(Clone, Debug)]
 pub struct SwathImage<'a> {
-    /// The columns of the layer below the mirrors, as wide as the mirrors. A gray level is a share of
-    /// white's dose.
+    /// The columns of the layer below the mirrors: as wide as the mirrors, unless they are tilted. A
+    /// gray level is a share of white's dose.
     pub image: &'a Image,
-    /// The first column, of the build.
-    pub first_column: u32,
+    /// The swath's number, from the left.
+    pub swath: u32,
+    /// The column of the build that is the image's first.
+    pub first_column: i64,
     /// The first and the last row that are shown.
     pub rows: [u32; 2],
     /// The direction of the scan.
     pub direction: ScanDirection,
     /// The columns that this swath shares in time with the one on its left, and on its right.
     pub shared: [u32; 2],
+    /// The mirrors, if the display is tilted. They show what is white, and share no columns in time.
+    pub tilt: Option<TiltedMirrors>,
 }
 
 /// The picture on the mirrors while the head moves on by one row.
@@ -35,6 +40,7 @@ pub struct SwathImage<'a> {
 pub struct Frame<'a> {
     /// The row of the image below mirror row 0. Mirror row j is over the row j above it, which has
     /// the index `position - j`; outside the image that may be negative, or at the height and beyond.
+    /// If the display is tilted, the corner of its first mirror is over the row's lower edge.
     pub position: i64,
     /// The bits of the mirrors, 1 for bright: for each row along the scan, whole words from the left,
     /// the highest bit first.
@@ -53,10 +59,12 @@ pub struct Frame<'a> {
 /// let image = Image::Mask(Mask::new(4, vec![0, 2], vec![1, 2]).unwrap());
 /// let swath = SwathImage {
 ///     image: &image,
+///     swath: 0,
 ///     first_column: 0,
 ///     rows: [0, 0],
 ///     direction: ScanDirection::Down,
 ///     shared: [0, 0],
+///     tilt: None,
 /// };
 /// let mirrors = MirrorArray::even(4, 2);
 /// let mut frames = Frames::new(swath, &mirrors);
@@ -78,6 +86,8 @@ pub struct Frames<'a> {
     /// The number of them.
     partial_count: usize,
     tables: Tables,
+    /// The pixels below tilted mirrors, in place of all of these.
+    tilted: Option<TiltedWindow>,
     position: i64,
     left: u64,
     /// The frame, where it is not the window itself.
@@ -97,22 +107,30 @@ impl<'a> Frames<'a> {
     /// Returns the frames of a swath.
     ///
     /// # Panics
-    /// Panics if the image is not as wide as the mirrors, or the rows are not within it.
+    /// Panics if the image is not as wide as mirrors that stand upright, or the rows are not within it.
     pub fn new(swath: SwathImage<'a>, mirrors: &'a MirrorArray) -> Self {
         let [across, along] = mirrors.size();
         let [first, last] = swath.rows;
-        assert_eq!(swath.image.width(), across);
+        assert!(swath.image.width() == across || swath.tilt.is_some());
         assert!(first <= last && last < swath.image.height());
+        let ends = match &swath.tilt {
+            Some(tilt) => tilt.positions(swath.rows),
+            None => [first.into(), i64::from(last) + i64::from(along) - 1],
+        };
         let row_words = across.div_ceil(WORD) as usize;
         let white = match mirrors.is_even() {
             true => Vec::new(),
             false => words_of(&mirrors.white(), across),
         };
         let before_first = match swath.direction {
-            ScanDirection::Down => i64::from(first) - 1,
-            ScanDirection::Up => i64::from(last) + i64::from(along),
+            ScanDirection::Down => ends[0] - 1,
+            ScanDirection::Up => ends[1] + 1,
         };
         Self {
+            tilted: swath
+                .tilt
+                .as_ref()
+                .map(|tilt| TiltedWindow::new(tilt, swath.swath, swath.image)),
             row_words,
             white,
             window: Window::new(along as usize, row_words, swath.direction),
@@ -120,7 +138,7 @@ impl<'a> Frames<'a> {
             partial_count: 0,
             tables: Tables::default(),
             position: before_first,
-            left: u64::from(last - first) + u64::from(along),
+            left: (ends[1] - ends[0] + 1) as u64,
             frame: Vec::new(),
             swath,
             mirrors,
@@ -130,6 +148,14 @@ impl<'a> Frames<'a> {
     /// Returns the number of frames to come. A swath of R rows has R + N - 1, with N rows of mirrors.
     pub fn len(&self) -> u64 {
         self.left
+    }
+
+    /// Returns the position of the next frame.
+    pub fn next_position(&self) -> i64 {
+        match self.swath.direction {
+            ScanDirection::Down => self.position + 1,
+            ScanDirection::Up => self.position - 1,
+        }
     }
 
     /// Returns whether all frames have been shown.
@@ -142,16 +168,17 @@ impl<'a> Frames<'a> {
     #[expect(clippy::should_implement_trait, reason = "a frame borrows from its iterator")]
     pub fn next(&mut self) -> Option<Frame<'_>> {
         self.left = self.left.checked_sub(1)?;
-        let along = i64::from(self.mirrors.size()[1]);
+        self.position = self.next_position();
+        let position = self.position;
+        if let Some(tilted) = &mut self.tilted {
+            let words = tilted.frame(position, self.swath.image, self.swath.rows);
+            return Some(Frame { position, words });
+        }
         // The row that comes below the mirrors, and the list of what leaves.
         let (row, mut partials) = match self.swath.direction {
-            ScanDirection::Down => {
-                self.position += 1;
-                (self.position, self.partials.pop_back())
-            }
+            ScanDirection::Down => (position, self.partials.pop_back()),
             ScanDirection::Up => {
-                self.position -= 1;
-                (self.position - along + 1, self.partials.pop_front())
+                (position + 1 - i64::from(self.mirrors.size()[1]), self.partials.pop_front())
             }
         };
         let mut list = partials.take().unwrap_or_default();
@@ -168,7 +195,6 @@ impl<'a> Frames<'a> {
             ScanDirection::Down => self.partials.push_front(list),
             ScanDirection::Up => self.partials.push_back(list),
         }
-        let position = self.position;
         let window = self.window.words();
         if self.white.is_empty() && self.partial_count == 0 {
             return Some(Frame { position, words: window });
@@ -225,7 +251,7 @@ fn draw(
 }
 
 /// Returns the bits of a word from one column to another, the highest first.
-fn bits(from: u32, to: u32) -> u64 {
+pub(crate) fn bits(from: u32, to: u32) -> u64 {
     (u64::MAX >> from) & !u64::MAX.checked_shr(to).unwrap_or(0)
 }
 
@@ -270,7 +296,7 @@ impl Tables {
         let white = mirrors.full_rows() * f64::from(level) / 255.0;
         for column in first..first + WORD {
             for phase in 0..PHASES[1] {
-                let pixel = [swath.first_column + column, phase];
+                let pixel = [swath.first_column as u32 + column, phase];
                 let column = if is_alike {
                     0
                 } else if column < across {
@@ -289,7 +315,7 @@ impl Tables {
                     () => white,
                 };
                 for row in mirrors.rows_of(column, pixel, share).0.iter() {
-                    let bit = 1 << (63 - (pixel[0] - swath.first_column - first));
+                    let bit = 1 << (63 - (pixel[0] - swath.first_column as u32 - first));
                     rows[usize::from(row) * PHASES[1] as usize + phase as usize] |= bit;
                 }
             }

@@ -14,6 +14,7 @@ use crate::mirrors::MirrorArray;
 use crate::motion::Motion;
 use crate::route::{Stretch, route};
 use crate::source::{BuildPages, SwathLayout};
+use crate::tilt::TiltedMirrors;
 
 /// The name of this form of a job.
 pub const JOB_SCHEMA: &str = "lamp-job-1";
@@ -92,10 +93,24 @@ pub struct Job {
     pub full_rows: f64,
     /// The share of a row's time in which the light is on.
     pub strobe: f64,
+    /// How the display is turned against the scan; upright if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt: Option<JobTilt>,
     /// Times of the whole job.
     pub sums: JobSums,
     /// The layers, bottom first.
     pub layers: Vec<JobLayer>,
+}
+
+/// How a display is turned against the scan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JobTilt {
+    /// The angle from the image's rows to the rows of mirrors, in degrees: above zero if the right end
+    /// of a row of mirrors is over later rows of the image.
+    pub degrees: f64,
+    /// The distance of mirrors on the resin, in micrometers.
+    pub mirror_pitch_um: f64,
 }
 
 /// The times and counts of a whole job.
@@ -165,7 +180,7 @@ pub struct JobSwath {
     pub strip: Option<String>,
     /// The number of the pass.
     pub pass: u32,
-    /// The left edge of its first column, from the left edge of the build.
+    /// The corner of its first mirror, from the left edge of the build.
     pub x_mm: f64,
     /// The direction of the scan.
     #[serde(with = "direction_name")]
@@ -209,6 +224,12 @@ pub struct JobOptions {
     pub layers: std::ops::Range<u32>,
 }
 
+impl Default for JobOptions {
+    fn default() -> Self {
+        Self { seam: None, gray: GrayBy::default(), layers: 0..u32::MAX }
+    }
+}
+
 impl Job {
     /// Plans the swaths of a build's layers: where they hold white, how fast they are scanned, in
     /// which order. Black swaths are left out, and rows without white above and below the others.
@@ -242,9 +263,9 @@ impl Job {
         // Exposures are checked before any image is read.
         let clocks = chosen
             .iter()
-            .map(|(_, header)| clock(header, pages, machine, scan, mirrors))
+            .map(|(_, header)| clock(header, pages, machine, scan, layout.full_rows(mirrors)))
             .collect::<Result<Vec<_>, _>>()?;
-        let count = layout.swaths(pages.size()[0])?.count();
+        let count = layout.count(pages.size()[0])?;
         let white = chosen.par_iter().map(|&(page, _)| white_rows(pages, page, count, &layout));
         let white = white.collect::<Result<Vec<_>, GantryError>>()?;
         let mut job = Self {
@@ -259,8 +280,9 @@ impl Job {
             gray: layout.gray,
             pixels: pages.size(),
             pitch_um: pages.dpi().pitch().um(),
-            full_rows: mirrors.full_rows(),
+            full_rows: layout.full_rows(mirrors),
             strobe: scan.strobe,
+            tilt: TiltedMirrors::of(scan, pages.dpi().pitch()),
             sums: JobSums::default(),
             layers: Vec::with_capacity(chosen.len()),
         };
@@ -282,7 +304,8 @@ impl Job {
     /// Returns the way in which the job's swaths are cut.
     pub fn layout(&self) -> SwathLayout {
         let Self { mirrors, overlap, seam, gray, .. } = *self;
-        SwathLayout { mirrors: mirrors[0], overlap, seam, gray }
+        let tilt = self.tilt.and_then(|tilt| TiltedMirrors::new(mirrors, tilt, self.pitch_um));
+        SwathLayout { mirrors: mirrors[0], overlap, seam, gray, tilt }
     }
 
     /// Returns what a pass shows, given its swath's image as [`BuildPages::swaths`] has it.
@@ -295,13 +318,14 @@ impl Job {
         image: &'a Image,
     ) -> Result<SwathImage<'a>, GantryError> {
         let layout = self.layout();
-        let swaths = layout.swaths(self.pixels[0])?;
         Ok(SwathImage {
             image,
-            first_column: swaths.columns(pass.swath).start,
+            swath: pass.swath,
+            first_column: layout.first_column(pass.swath),
             rows: [pass.first_row, pass.last_row],
             direction: pass.direction,
-            shared: layout.shared(pass.swath, swaths.count()),
+            shared: layout.shared(pass.swath, layout.count(self.pixels[0])?),
+            tilt: layout.tilt,
         })
     }
 
@@ -327,8 +351,12 @@ impl Job {
         if !fits {
             return Err(failed("its mirrors, pixels, pitch, rows or strobe cannot be".to_owned()));
         }
-        let swaths = job.layout().swaths(job.pixels[0]);
-        let count = swaths.map_err(|error| failed(error.to_string()))?.count();
+        let layout = job.layout();
+        // A tilt that cannot be makes no layout.
+        if job.tilt.is_some() && (layout.tilt.is_none() || !layout.is_plain()) {
+            return Err(failed("its tilt cannot be, or does not go with its seam".to_owned()));
+        }
+        let count = layout.count(job.pixels[0]).map_err(|error| failed(error.to_string()))?;
         if !job.layers.is_sorted_by(|below, above| below.layer < above.layer) {
             return Err(failed("its layers are not in their order".to_owned()));
         }
@@ -351,8 +379,8 @@ impl Job {
                         layer.layer, swath.swath
                     )));
                 }
-                let rows = swath.last_row - swath.first_row;
-                if swath.frames != u64::from(rows) + u64::from(job.mirrors[1]) {
+                let rows = [swath.first_row, swath.last_row];
+                if swath.frames != frame_count(layout.positions(rows, job.mirrors[1])) {
                     return Err(failed(format!(
                         "layer {}, swath {}: {} frames do not fit its rows",
                         layer.layer, swath.swath, swath.frames
@@ -447,11 +475,11 @@ fn layout(
     let (mirrors, overlap, gray) = (scan.mirrors()[0], scan.overlap, options.gray);
     let Some(form) = pages.form() else {
         let seam = options.seam.unwrap_or_default();
-        return match seam {
-            JobSeam::Gray => Err(GantryError::GraySeam),
-            JobSeam::Comb | JobSeam::Time => Ok(SwathLayout { mirrors, overlap, seam, gray }),
-        };
+        return SwathLayout::uncut(scan, pages.dpi().pitch(), seam, gray);
     };
+    if scan.tilt.is_some() {
+        return Err(GantryError::TiltedStrips);
+    }
     if [form.mirrors, form.overlap] != [mirrors, overlap] {
         return Err(GantryError::OtherStrips {
             strips: [form.mirrors, form.overlap],
@@ -466,7 +494,45 @@ fn layout(
     if options.seam.is_some_and(|wanted| wanted != seam) {
         return Err(GantryError::CutSeam(seam.name()));
     }
-    Ok(SwathLayout { mirrors, overlap, seam, gray })
+    Ok(SwathLayout { mirrors, overlap, seam, gray, tilt: None })
+}
+
+impl SwathLayout {
+    /// Returns how a machine divides layers that are not cut into strips.
+    pub(crate) fn uncut(
+        scan: &Scan,
+        pitch: Length,
+        seam: JobSeam,
+        gray: GrayBy,
+    ) -> Result<Self, GantryError> {
+        let mirrors = scan.mirrors();
+        let mut layout =
+            Self { mirrors: mirrors[0], overlap: scan.overlap, seam, gray, tilt: None };
+        if seam == JobSeam::Gray {
+            return Err(GantryError::GraySeam);
+        }
+        if let Some(tilt) = TiltedMirrors::of(scan, pitch) {
+            if !layout.is_plain() {
+                return Err(GantryError::TiltedShares);
+            }
+            let tilted = TiltedMirrors::new(mirrors, tilt, pitch.um());
+            layout.tilt = Some(tilted.ok_or(GantryError::MirrorPitch {
+                mirror_um: tilt.mirror_pitch_um,
+                pixel_um: pitch.um(),
+            })?);
+        }
+        Ok(layout)
+    }
+
+    /// Returns whether mirrors show pixels as they are, without shares in time.
+    fn is_plain(&self) -> bool {
+        self.overlap == 0 && self.seam == JobSeam::Comb && self.gray == GrayBy::Dots
+    }
+}
+
+/// Returns the number of frames between two positions.
+fn frame_count([first, last]: [i64; 2]) -> u64 {
+    (last - first + 1) as u64
 }
 
 /// Returns the exposure of a layer, and the speed that gives it.
@@ -475,7 +541,7 @@ fn clock(
     pages: &BuildPages,
     machine: &Machine,
     scan: &Scan,
-    mirrors: &MirrorArray,
+    full_rows: f64,
 ) -> Result<(f64, RowClock), GantryError> {
     let usual = || Some(machine.times.as_ref()?.expose_s? * 1000.0);
     let Some(exposure_ms) = header.info.exposure_ms.or_else(usual) else {
@@ -487,7 +553,7 @@ fn clock(
     if let Some(um) = header.info.thickness_um {
         machine.check_thickness(Length::from_um(um), &header.info.name())?;
     }
-    let clock = RowClock::new(exposure_ms, mirrors.full_rows(), pages.dpi().pitch(), scan);
+    let clock = RowClock::new(exposure_ms, full_rows, pages.dpi().pitch(), scan);
     let clock =
         clock.map_err(|limit| GantryError::Exposure { layer: header.info.name(), limit })?;
     Ok((exposure_ms, clock))
@@ -536,7 +602,6 @@ impl Planner {
         white: &[Option<[u32; 2]>],
     ) -> JobLayer {
         let pitch_mm = self.pitch.mm();
-        let step = f64::from(self.layout.mirrors - self.layout.overlap) * pitch_mm;
         let motion = Motion::new(&self.scan, clock.speed_mm_per_s);
         // Each pass is a swath of its own.
         let passes = || 0..clock.passes;
@@ -545,15 +610,15 @@ impl Planner {
             .filter_map(|(swath, rows)| Some((swath, (*rows)?)))
             .flat_map(|(swath, rows)| passes().map(move |pass| (swath, rows, pass)))
             .collect();
-        let x_mm = |swath: u32| f64::from(swath) * step;
-        // Frame s is shown while mirror row 0 goes from half a row before row `first + s` to half a
-        // row after it.
-        let stretch = |&(swath, [first, last], _): &(u32, [u32; 2], u32)| Stretch {
-            x_mm: x_mm(swath),
-            y_mm: [
-                (f64::from(first) - 0.5) * pitch_mm,
-                (f64::from(last) + f64::from(self.along) - 0.5) * pitch_mm,
-            ],
+        let x_mm = |swath: u32| self.layout.corner_px(swath) * pitch_mm;
+        // A frame is shown while mirror row 0 goes from half a row before its position to half a row
+        // after it.
+        let stretch = |&(swath, rows, _): &(u32, [u32; 2], u32)| {
+            let [first, last] = self.layout.positions(rows, self.along);
+            Stretch {
+                x_mm: x_mm(swath),
+                y_mm: [(first as f64 - 0.5) * pitch_mm, (last as f64 + 0.5) * pitch_mm],
+            }
         };
         let stretches: Vec<_> = places.iter().map(stretch).collect();
         let other = match self.scan.direction {
@@ -569,8 +634,9 @@ impl Planner {
             .visits
             .iter()
             .map(|&(place, direction)| {
-                let (swath, [first_row, last_row], _) = places[place];
-                let frames = u64::from(last_row - first_row) + u64::from(self.along);
+                let (swath, rows, _) = places[place];
+                let [first_row, last_row] = rows;
+                let frames = frame_count(self.layout.positions(rows, self.along));
                 let pass = passed.entry(swath).and_modify(|pass| *pass += 1).or_insert(0);
                 JobSwath {
                     swath,

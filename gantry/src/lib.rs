@@ -26,6 +26,8 @@ mod mirrors;
 mod motion;
 mod route;
 mod source;
+mod tilt;
+mod tilted_dose;
 mod time;
 
 pub use clock::{ExposureLimit, RowClock};
@@ -33,9 +35,10 @@ pub use dose::{Dark, Disturbance, LayerDose, SeamDose, SwathDose, WorstPixel, ex
 pub use error::GantryError;
 pub use frame_file::{FrameFileError, FrameHeader, FrameReader, FrameWriter};
 pub use frames::{Frame, Frames, SwathImage};
-pub use job::{GrayBy, JOB_SCHEMA, Job, JobLayer, JobOptions, JobSeam, JobSums, JobSwath};
+pub use job::{GrayBy, JOB_SCHEMA, Job, JobLayer, JobOptions, JobSeam, JobSums, JobSwath, JobTilt};
 pub use job_folder::{JobFolder, seen_from};
 pub use mirrors::{MirrorArray, MirrorError};
 pub use motion::move_s;
 pub use source::{BuildPages, SwathLayout};
+pub use tilt::TiltedMirrors;
 pub use time::{BuildClock, BuildTime, SwathTime};

@@ -10,6 +10,8 @@ use lamp_stack::{
 
 use crate::error::GantryError;
 use crate::job::{GrayBy, JobSeam};
+use crate::mirrors::MirrorArray;
+use crate::tilt::TiltedMirrors;
 
 /// A build that can be read in any order: a stack, or a folder of strips.
 #[derive(Debug)]
@@ -155,23 +157,7 @@ impl BuildPages {
             read.collect::<Result<_, GantryError>>()?
         } else {
             let layer = self.stacks[0].layer(page)?;
-            let swaths = layout.swaths(self.size[0])?;
-            match layout.seam {
-                JobSeam::Comb | JobSeam::Gray => {
-                    swaths.cut(&layer.image, layer.info.index, of).collect()
-                }
-                JobSeam::Time => of
-                    .map(|swath| {
-                        let left = swaths.columns(swath).start.into();
-                        let height = layer.image.height();
-                        let frame = Frame { left, top: 0, width: layout.mirrors, height };
-                        match &*layer.image {
-                            Image::Mask(mask) => mask.framed(frame).into(),
-                            Image::Gray(gray) => gray.framed(frame).into(),
-                        }
-                    })
-                    .collect(),
-            }
+            layout.cut(&layer.image, layer.info.index, of)?
         };
         if layout.gray == GrayBy::Dots
             && images
@@ -185,7 +171,7 @@ impl BuildPages {
 }
 
 /// How layers are divided among swaths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwathLayout {
     /// The width of a swath in pixels.
     pub mirrors: u32,
@@ -195,10 +181,77 @@ pub struct SwathLayout {
     pub seam: JobSeam,
     /// How gray levels are shown.
     pub gray: GrayBy,
+    /// The mirrors, if the display is tilted: its swaths are slanted, and their ends add up.
+    pub tilt: Option<TiltedMirrors>,
 }
 
 impl SwathLayout {
-    /// Returns the swaths of layers of a width.
+    /// Returns the number of swaths of layers of a width.
+    ///
+    /// # Errors
+    /// Returns an error if they share half of their columns or more.
+    pub fn count(&self, width: u32) -> Result<u32, GantryError> {
+        match &self.tilt {
+            Some(tilt) => Ok(tilt.count(width)),
+            None => Ok(self.swaths(width)?.count()),
+        }
+    }
+
+    /// Returns the column of the first mirror's corner.
+    pub(crate) fn corner_px(&self, swath: u32) -> f64 {
+        match &self.tilt {
+            Some(tilt) => tilt.corner_px(swath),
+            None => f64::from(swath) * f64::from(self.mirrors - self.overlap),
+        }
+    }
+
+    /// Returns the first column of a swath's image.
+    pub(crate) fn first_column(&self, swath: u32) -> i64 {
+        match &self.tilt {
+            Some(tilt) => tilt.columns(swath).start,
+            None => i64::from(swath) * i64::from(self.mirrors - self.overlap),
+        }
+    }
+
+    /// Returns how many rows of full light white gets in every column.
+    pub(crate) fn full_rows(&self, mirrors: &MirrorArray) -> f64 {
+        self.tilt.as_ref().map_or(mirrors.full_rows(), TiltedMirrors::full_rows)
+    }
+
+    /// Returns the positions of the first and the last frame of a scan down over some rows, with so
+    /// many rows of mirrors.
+    pub(crate) fn positions(&self, rows: [u32; 2], along: u32) -> [i64; 2] {
+        match &self.tilt {
+            Some(tilt) => tilt.positions(rows),
+            None => [rows[0].into(), i64::from(rows[1]) + i64::from(along) - 1],
+        }
+    }
+
+    /// Returns what each of some swaths shows of a layer: its columns, without the pixels of others.
+    pub(crate) fn cut(
+        &self,
+        image: &Image,
+        layer: u32,
+        of: std::ops::Range<u32>,
+    ) -> Result<Vec<Image>, GantryError> {
+        let framed = |columns: std::ops::Range<i64>| {
+            let width = (columns.end - columns.start) as u32;
+            image.framed(Frame { left: columns.start, top: 0, width, height: image.height() })
+        };
+        if let Some(tilt) = &self.tilt {
+            return Ok(of.map(|swath| framed(tilt.columns(swath))).collect());
+        }
+        let swaths = self.swaths(image.width())?;
+        Ok(match self.seam {
+            JobSeam::Comb | JobSeam::Gray => swaths.cut(image, layer, of).collect(),
+            JobSeam::Time => {
+                let left = |swath| self.first_column(swath);
+                of.map(|swath| framed(left(swath)..left(swath) + i64::from(self.mirrors))).collect()
+            }
+        })
+    }
+
+    /// Returns the upright swaths of layers of a width.
     ///
     /// # Errors
     /// Returns an error if they share half of their columns or more.

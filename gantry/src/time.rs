@@ -1,10 +1,11 @@
 //! How long a build takes on a machine.
 
 use lamp_build::{Swaths, SwathsError};
-use lamp_machine::{Machine, Scan};
+use lamp_machine::Machine;
 use lamp_stack::{Dpi, Image, PageInfo};
 
 use crate::clock::RowClock;
+use crate::error::GantryError;
 use crate::job::{GrayBy, JobSeam, JobSums, Planner, rows_with_white};
 use crate::mirrors::MirrorArray;
 use crate::source::SwathLayout;
@@ -128,20 +129,20 @@ impl BuildClock {
         let (Some(machine), Some(mirrors)) = (&self.machine, &self.mirrors) else { return Ok(()) };
         let Some(scan) = &machine.scan else { return Ok(()) };
         let Some(exposure_ms) = exposure_ms else { return Ok(()) };
-        let layout = layout_of(scan);
-        let swaths = layout.swaths(image.width()).map_err(|error| error.to_string())?;
-        let clock = RowClock::new(exposure_ms, mirrors.full_rows(), dpi.pitch(), scan)
+        let text = |error: GantryError| error.to_string();
+        let layout =
+            SwathLayout::uncut(scan, dpi.pitch(), JobSeam::Comb, GrayBy::Time).map_err(text)?;
+        let count = layout.count(image.width()).map_err(text)?;
+        let clock = RowClock::new(exposure_ms, layout.full_rows(mirrors), dpi.pitch(), scan)
             .map_err(|limit| format!("{}: {limit}", info.name()))?;
-        let white: Vec<_> = swaths
-            .cut(image, info.index, 0..swaths.count())
-            .map(|image| rows_with_white(&image))
-            .collect();
+        let images = layout.cut(image, info.index, 0..count).map_err(text)?;
+        let white: Vec<_> = images.iter().map(rows_with_white).collect();
         let planner = self
             .planner
             .get_or_insert_with(|| Planner::new(scan, layout, dpi.pitch(), mirrors.size()[1]));
         let mut layer = planner.layer(info, exposure_ms, clock, &white);
         layer.recoat_s = machine.recoat_s();
-        self.sums.add(&layer, swaths.count().into());
+        self.sums.add(&layer, count.into());
         Ok(())
     }
 
@@ -169,15 +170,6 @@ impl BuildClock {
             swaths: if self.needs_images() { scanned() } else { self.steady },
             unscanned: self.unscanned.clone(),
         }
-    }
-}
-
-fn layout_of(scan: &Scan) -> SwathLayout {
-    SwathLayout {
-        mirrors: scan.mirrors()[0],
-        overlap: scan.overlap,
-        seam: JobSeam::Comb,
-        gray: GrayBy::Time,
     }
 }
 

@@ -125,10 +125,12 @@ proptest! {
         let direction = if up { ScanDirection::Up } else { ScanDirection::Down };
         let swath = SwathImage {
             image: &image,
+            swath: 0,
             first_column: 0,
             rows: [0, height - 1],
             direction,
             shared: [0, 0],
+            tilt: None,
         };
         let array = MirrorArray::even(across, along);
         let mut frames = Frames::new(swath, &array);
@@ -162,7 +164,7 @@ proptest! {
         let bytes = writer.finish().unwrap();
         let mut reader = FrameReader::new(&bytes[..]).unwrap();
         prop_assert_eq!(reader.header(), header);
-        let swath = SwathImage { image: &image, first_column: 0, rows: [0, height - 1], direction, shared: [0, 0] };
+        let swath = SwathImage { image: &image, swath: 0, first_column: 0, rows: [0, height - 1], direction, shared: [0, 0], tilt: None };
         let mut frames = Frames::new(swath, &array);
         while let Some(frame) = frames.next() {
             prop_assert_eq!(reader.next().unwrap().unwrap(), frame);

@@ -3,3 +3,4 @@
 mod doses;
 mod limits;
 mod scratch;
+mod tilt;

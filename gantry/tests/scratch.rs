@@ -69,7 +69,7 @@ impl Build {
         map: impl FnMut(u32, usize, &[f32]),
     ) -> LayerDose {
         let layer = &job.layers[0];
-        let count = job.layout().swaths(job.pixels[0]).unwrap().count();
+        let count = job.layout().count(job.pixels[0]).unwrap();
         let images = self.pages.swaths(layer.page, 0..count, &job.layout()).unwrap();
         let show = |pass: &lamp_gantry::JobSwath, to: &mut dyn FnMut(&lamp_gantry::Frame<'_>)| {
             let image = &images[pass.swath as usize];

@@ -78,6 +78,33 @@ fn every_white_pixel_of_a_build_gets_its_exposure() {
 }
 
 #[test]
+fn a_tilted_display_gives_wide_white_its_exposure() {
+    let scratch = with_build();
+    // Mirrors of 4 pixels of 254 um, which pass about a pixel apart.
+    let tilt = "[scan.tilt]\ndegrees = 14.036\nmirror_pitch = \"1016um\"\nsource = \"-\"\n";
+    let tilted =
+        MACHINE.replace("overlap = 10", "overlap = 0").replace("[100, 48]", "[30, 20]") + tilt;
+    scratch.write("tilted.toml", tilted.as_bytes());
+    scratch.run("lamp machine check tilted.toml").succeeds();
+    let job = scratch.run("lamp job build.tif --machine tilted.toml -o job").succeeds();
+    let text = String::from_utf8(job.stdout).unwrap();
+    assert!(text.contains("mirrors of 1016.00 um pass every 246.3"), "{text}");
+    let exposed = scratch.run("lamp expose job --layers 5..8 --json --strict").succeeds_quietly();
+    let exposed = json(&exposed.stdout);
+    for layer in exposed["layers"].as_array().unwrap() {
+        assert!(layer["white_px"].as_u64().unwrap() > 1000, "{layer}");
+        assert!(layer["edge_px"].as_u64().unwrap() > 0 && layer["lit_px"] == 0, "{layer}");
+        let shares = layer["shares"].as_array().unwrap();
+        assert!(shares.iter().all(|share| (share.as_f64().unwrap() - 1.0).abs() < 2e-4));
+    }
+    scratch.run("tile tower.tif --area 60x60mm --machine mine.toml --strips strips/").succeeds();
+    let job =
+        |words: &str| scratch.run(&format!("lamp job {words} --machine tilted.toml -o other"));
+    job("strips/").is_refused_with(&["slanted swaths"]);
+    job("build.tif --gray time").is_refused_with(&["neither gray nor seams"]);
+}
+
+#[test]
 fn faults_of_a_job_are_named() {
     let scratch = with_build();
     scratch.run("lamp job build.tif --machine mine.toml -o job/").succeeds();

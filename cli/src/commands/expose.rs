@@ -138,7 +138,7 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
         folder: &folder,
         machine: args.machine(&folder)?,
         pages: folder.build()?,
-        count: job.layout().swaths(job.pixels[0])?.count(),
+        count: job.layout().count(job.pixels[0])?,
         layers: layers.len() as u32,
     };
     let progress = Progress::new("expose", common, true);
@@ -253,7 +253,7 @@ impl ExposeArgs {
         };
         let columns = within("--columns", &self.columns, job.pixels[0])?;
         let rows = within("--rows", &self.rows, job.pixels[1])?;
-        let count = job.layout().swaths(job.pixels[0])?.count();
+        let count = job.layout().count(job.pixels[0])?;
         for (at, (swath, _)) in self.offset.iter().enumerate() {
             if *swath >= count || self.offset[..at].iter().any(|(other, _)| other == swath) {
                 return Err(Exit::usage(format!(
@@ -380,6 +380,12 @@ fn text(dose: &LayerDose, layer: &JobLayer, tolerance: f64) -> String {
         text +=
             &format!("  rows get {} on average, columns {}\n", ends(dose.rows), ends(dose.columns));
     }
+    if dose.edge_px > 0 {
+        text += &format!(
+            "  {} more white pixels are beside black, where tilted mirrors are over both\n",
+            dose.edge_px
+        );
+    }
     let mut line = |place: String, dose: &SwathDose| {
         let Some(worst) = dose.worst.filter(|_| dose.off_px > 0) else { return };
         text += &format!(
@@ -444,6 +450,7 @@ fn json(doses: &[LayerDose], tolerance: f64) -> impl Serialize {
         layer: u32,
         #[serde(flatten)]
         all: DoseLine,
+        edge_px: u64,
         row_shares: [f64; 2],
         column_shares: [f64; 2],
         swaths: Vec<DoseLine>,
@@ -452,6 +459,7 @@ fn json(doses: &[LayerDose], tolerance: f64) -> impl Serialize {
     let line = |dose: &LayerDose| LayerLine {
         layer: dose.layer,
         all: DoseLine::of(&dose.all, None),
+        edge_px: dose.edge_px,
         row_shares: dose.rows,
         column_shares: dose.columns,
         swaths: dose.swaths.iter().map(|(swath, dose)| DoseLine::of(dose, Some(*swath))).collect(),

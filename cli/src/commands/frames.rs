@@ -75,7 +75,8 @@ pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
     let (layer, pass) = args.pass(&job)?;
     let image = pages.swaths(layer.page, pass.swath..pass.swath + 1, &job.layout()).map_err(at)?;
     let swath = job.swath(pass, &image[0]).map_err(at)?;
-    let first_column = swath.first_column;
+    // Builds have less than 2^31 columns.
+    let first_column = swath.first_column as i32;
     let mut frames = Frames::new(swath, &mirrors);
     let all = 0..frames.len();
     let wanted =
@@ -84,19 +85,19 @@ pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
     if wanted.is_empty() {
         return Err(Exit::usage(format!("--frames: the swath has frames 0 to {}", all.end - 1)));
     }
+    for _ in 0..wanted.start {
+        frames.next();
+    }
     let header = FrameHeader {
         mirrors: job.mirrors,
         layer: layer.layer,
         swath: pass.swath,
         first_column,
-        first_position: position(pass, job.mirrors[1], wanted.start),
+        first_position: frames.next_position(),
         frames: wanted.end - wanted.start,
         rows_hz: layer.row_clock_hz,
         is_upward: pass.direction == ScanDirection::Up,
     };
-    for _ in 0..wanted.start {
-        frames.next();
-    }
     if ["png", "apng"].contains(&extension(&args.output).as_str()) {
         return args.write_picture(&mut frames, &header);
     }
@@ -114,14 +115,6 @@ pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
     let mut out = BufWriter::with_capacity(1 << 20, io::stdout().lock());
     let written = write(&mut out).and_then(|()| out.flush());
     written.map_err(|error| Exit::output(error, "standard output"))
-}
-
-/// Returns the image row below mirror row 0 in a frame.
-fn position(pass: &JobSwath, along: u32, frame: u64) -> i64 {
-    match pass.direction {
-        ScanDirection::Down => i64::from(pass.first_row) + frame as i64,
-        ScanDirection::Up => i64::from(pass.last_row) + i64::from(along) - 1 - frame as i64,
-    }
 }
 
 impl FramesArgs {
@@ -152,8 +145,7 @@ impl FramesArgs {
         if let Some(pass) = layer.swaths.iter().find(is_wanted) {
             return Ok((layer, pass));
         }
-        let count =
-            job.layout().swaths(job.pixels[0]).map_err(|error| failed(error.to_string()))?.count();
+        let count = job.layout().count(job.pixels[0]).map_err(|error| failed(error.to_string()))?;
         Err(failed(match self.swath < count {
             false => {
                 format!("layer {} has swaths 0 to {}, and no {}", self.layer, count - 1, self.swath)

@@ -225,6 +225,16 @@ fn text(job: &Job, scanner: &Scanner) -> String {
             job.full_rows
         );
     }
+    if let (Some(tilt), Some(mirrors)) = (job.tilt, job.layout().tilt) {
+        text += &format!(
+            "tilt:       {} degrees: mirrors of {:.2} um pass every {:.2} um, and white is even beyond \
+             {} pixels from an edge\n",
+            tilt.degrees,
+            tilt.mirror_pitch_um,
+            mirrors.address_px() * job.pitch_um,
+            mirrors.edge_px(),
+        );
+    }
     if scanner.machine.recoat_s().is_none() {
         text += "recoating is not in it: write recoat_s into [times] of the machine's file\n";
     }

@@ -178,6 +178,11 @@ fn scan_fields(scan: &Scan) -> Value {
             "stuck": faults.stuck,
             "source": faults.source,
         })),
+        "tilt": scan.tilt.as_ref().map(|tilt| json!({
+            "degrees": tilt.degrees,
+            "mirror_pitch_um": tilt.mirror_pitch.map(Length::um),
+            "source": tilt.source,
+        })),
         "source": scan.source,
     })
 }

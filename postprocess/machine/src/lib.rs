@@ -26,7 +26,7 @@ pub use file::MachineError;
 pub use light::{LightError, LightTable};
 pub use limit::MachineLimit;
 pub use motion::{Acceleration, MotionError, Speed};
-pub use scan::{MirrorFaults, Scan, ScanDirection, ScanError, ScanLight};
+pub use scan::{MirrorFaults, Scan, ScanDirection, ScanError, ScanLight, ScanTilt};
 pub use times::Times;
 
 /// The known data of a machine. A value that a source does not give is absent, and then anything
@@ -61,9 +61,11 @@ pub struct Machine {
 
 impl Machine {
     /// Returns the mirrors across a swath and the number of pixels that a swath shares with the
-    /// next, of [`scan`](Self::scan) or of [`strips`](Self::strips).
+    /// next, of [`scan`](Self::scan) or of [`strips`](Self::strips). A tilted display has slanted
+    /// swaths, which no strip fits.
     pub fn swaths(&self) -> Option<(u32, u32)> {
-        let scan = self.scan.as_ref().map(|scan| (scan.mirrors()[0], scan.overlap));
+        let scan = self.scan.as_ref().filter(|scan| scan.tilt.is_none());
+        let scan = scan.map(|scan| (scan.mirrors()[0], scan.overlap));
         scan.or_else(|| self.strips.as_ref().map(|strips| (strips.mirrors, strips.overlap)))
     }
 }

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use lamp_stack::{Catalogued, nonempty_text, one_line};
+use lamp_stack::{Catalogued, Length, nonempty_text, one_line};
 use serde::{Deserialize, Deserializer, de};
 use thiserror::Error;
 
-use super::file::nonempty_path;
+use super::file::{nonempty_path, some_length};
 use super::{Acceleration, Display, Speed};
 
 /// How a display of mirrors scans a layer in swaths.
@@ -63,6 +63,8 @@ pub struct Scan {
     pub light: Option<ScanLight>,
     /// Mirrors that do not move; none if absent.
     pub faults: Option<MirrorFaults>,
+    /// How the display is turned against the scan; upright if absent.
+    pub tilt: Option<ScanTilt>,
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
@@ -117,6 +119,22 @@ pub struct MirrorFaults {
     #[serde(default)]
     pub stuck: Vec<[u32; 2]>,
     /// The section, table or data sheet, or how they were found.
+    #[serde(deserialize_with = "nonempty_text")]
+    pub source: String,
+}
+
+/// A display that is turned against the scan, so that its mirrors pass between each other and address
+/// more finely than they are.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScanTilt {
+    /// The angle from the image's rows to the display's rows, in degrees: above zero if the right end
+    /// of a row of mirrors is over later rows of the image.
+    pub degrees: f64,
+    /// The distance of mirrors on the resin, as `16.93um`; the build's pitch if absent.
+    #[serde(default, deserialize_with = "some_length")]
+    pub mirror_pitch: Option<Length>,
+    /// The section, table or data sheet, or how it was measured.
     #[serde(deserialize_with = "nonempty_text")]
     pub source: String,
 }
@@ -212,6 +230,28 @@ pub enum ScanError {
     /// A mirror that is dark and bright.
     #[error("faults: the mirror {0:?} is both dead and stuck: keep one")]
     DeadAndStuck([u32; 2]),
+    /// A display that is turned too far.
+    #[error(
+        "tilt: degrees: {degrees} is too far for {}x{} mirrors: write a number from -{most:.3} to {most:.3}",
+        mirrors[0], mirrors[1]
+    )]
+    Tilt {
+        /// The angle.
+        degrees: f64,
+        /// The mirrors across and along.
+        mirrors: [u32; 2],
+        /// The greatest angle.
+        most: f64,
+    },
+    /// Mirrors of no size.
+    #[error("tilt: mirror_pitch: it must be above zero")]
+    MirrorPitch,
+    /// A tilted display whose swaths share columns of their own.
+    #[error("overlap: tilted swaths share the columns of their slanted ends: write 0")]
+    TiltOverlap,
+    /// A tilted display whose mirrors are not all alike.
+    #[error("{0}: a tilted display does not make up for uneven mirrors: leave it out")]
+    TiltUneven(&'static str),
 }
 
 /// The built-in displays. A scan may ask for its mirrors often, and a file takes time to read.
@@ -274,7 +314,29 @@ impl Scan {
         if !(1..=1000).contains(&self.passes) {
             return Err(ScanError::Passes);
         }
-        self.faults.as_ref().map_or(Ok(()), |faults| faults.check(mirrors))
+        self.faults.as_ref().map_or(Ok(()), |faults| faults.check(mirrors))?;
+        self.tilt.as_ref().map_or(Ok(()), |tilt| self.check_tilt(tilt, mirrors))
+    }
+
+    /// Checks that a point is below at most two neighboring swaths, so that their slanted ends add up.
+    fn check_tilt(&self, tilt: &ScanTilt, mirrors: [u32; 2]) -> Result<(), ScanError> {
+        let [across, along] = mirrors.map(f64::from);
+        let most = 45.0_f64.min((across / along).atan().to_degrees());
+        // NaN is in no range.
+        if !(-most..=most).contains(&tilt.degrees) {
+            return Err(ScanError::Tilt { degrees: tilt.degrees, mirrors, most });
+        }
+        if tilt.mirror_pitch.is_some_and(|pitch| pitch.mm() <= 0.0) {
+            return Err(ScanError::MirrorPitch);
+        }
+        if self.overlap > 0 {
+            return Err(ScanError::TiltOverlap);
+        }
+        let uneven = [("light", self.light.is_some()), ("faults", self.faults.is_some())];
+        match uneven.into_iter().find(|(_, is_there)| *is_there) {
+            Some((key, _)) => Err(ScanError::TiltUneven(key)),
+            None => Ok(()),
+        }
     }
 
     /// Checks the display, the mirrors and the pixels that swaths share, and returns the mirrors.
@@ -397,6 +459,7 @@ source = "-"
             irradiance_mw_per_cm2: Some(20.0),
             light: Some(ScanLight { file: "light.png".into(), source: source.clone() }),
             faults: Some(MirrorFaults { dead: vec![[512, 4]], stuck: vec![[7, 700]], source }),
+            tilt: None,
             source: "data sheet".to_owned(),
         };
         assert_eq!(scan(WHOLE), whole);
@@ -503,6 +566,31 @@ source = "-"
             ("settle_s = 0.05", "settle_s = 0"),
         ] {
             scan(&WHOLE.replacen(from, to, 1));
+        }
+    }
+
+    #[test]
+    fn a_tilted_display_is_even_and_shares_no_columns_of_its_own() {
+        let tilted =
+            |scan: &str, more: &str| machine(&format!("{scan}[scan.tilt]\nsource = \"-\"\n{more}"));
+        let found = tilted(LEAST, "degrees = -14\nmirror_pitch = \"16.93um\"\n").unwrap();
+        // Strips are cut along the scan, and these swaths are slanted.
+        assert_eq!(found.swaths(), None);
+        let tilt = found.scan.unwrap().tilt.unwrap();
+        assert_eq!((tilt.degrees, tilt.mirror_pitch), (-14.0, Some(Length::from_um(16.93))));
+        let whole = WHOLE.replacen("overlap = 32", "overlap = 0", 1);
+        let even = whole.split_once("[scan.light]").unwrap().0;
+        assert!(tilted(even, "degrees = 45\n").is_ok());
+        for (scan, more, words) in [
+            (LEAST, "degrees = nan\n", "scan: tilt: degrees: NaN is too far for 3x1"),
+            (LEAST, "degrees = 45.1\n", "from -45.000 to 45.000"),
+            (&LEAST.replacen("[3, 1]", "[3, 6]", 1), "degrees = 30\n", "from -26.565 to 26.565"),
+            (LEAST, "degrees = 1\nmirror_pitch = \"0um\"\n", "tilt: mirror_pitch: it must"),
+            (WHOLE, "degrees = 1\n", "scan: overlap: tilted swaths"),
+            (&whole, "degrees = 1\n", "scan: light: a tilted display"),
+        ] {
+            let error = tilted(scan, more).unwrap_err();
+            assert!(error.contains(words), "{error}");
         }
     }
 

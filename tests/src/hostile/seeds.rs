@@ -412,10 +412,12 @@ fn scans() -> Named {
     let image = Image::Mask(Mask::new(70, vec![0, 2, 2, 4], vec![1, 69, 3, 5]).expect("rows"));
     let swath = SwathImage {
         image: &image,
+        swath: 1,
         first_column: 60,
         rows: [0, 2],
         direction: ScanDirection::Up,
         shared: [0, 0],
+        tilt: None,
     };
     let mirrors = MirrorArray::even(70, 3);
     let mut frames = Frames::new(swath, &mirrors);
@@ -434,8 +436,12 @@ fn scans() -> Named {
         writer.push(&frame).expect("memory takes all");
     }
     let job = include_str!("job.json");
+    // Turned by nothing, so that all its numbers hold.
+    let tilt = "\"tilt\":{\"degrees\":0,\"mirror_pitch_um\":42.333333333333336},\"sums\"";
+    let tilted = job.replace("\"overlap\":32", "\"overlap\":0").replace("\"sums\"", tilt);
     vec![
         ("swath.frames", writer.finish().expect("memory takes all")),
         ("job.json", job.as_bytes().to_vec()),
+        ("tilted.json", tilted.into_bytes()),
     ]
 }
