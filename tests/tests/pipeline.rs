@@ -213,8 +213,8 @@ fn the_demo_is_what_the_four_binaries_make() {
     assert!(said.contains("24016 facets") && said.contains("1270 layers of 6000 x 6750"), "{said}");
     let names = scratch.names_in("shown");
     let pictures = ["layer_00050.png", "layer_00449.png", "layer_00965.png", "layer_01174.png"];
-    let stacks = ["alpha.png", "alpha.tif", "blade.stl", "build.tif"];
-    assert_eq!(names, [&stacks, &pictures[..], &["layers.png"]].concat());
+    let stacks = ["alpha.png", "alpha.tif", "blade.stl", "build.tif", "job"];
+    assert_eq!(names, [&stacks, &pictures[..], &["layers.png", "scanner.toml"]].concat());
     for name in pictures.iter().chain(&["layers.png", "alpha.png"]) {
         let picture = scratch.bytes(&format!("shown/{name}"));
         let mut reader = png::Decoder::new(std::io::Cursor::new(picture)).read_info().unwrap();
@@ -231,6 +231,8 @@ fn the_demo_is_what_the_four_binaries_make() {
     let (line, _) = line.rsplit_once("> shown/alpha.tif").expect("it says how");
     let in_mesh = scratch.run(&format!("slice {line}")).succeeds_quietly().stdout;
     assert!(scratch.bytes("shown/alpha.tif") == in_mesh);
+    scratch.run("lamp job shown/alpha.tif --machine shown/scanner.toml -o shown/again").succeeds();
+    assert!(scratch.bytes("shown/job/job.json") == scratch.bytes("shown/again/job.json"));
     let in_mesh = read_stack(in_mesh);
     assert_eq!((in_mesh.len(), in_mesh[0].info.index), (20, 444));
 }

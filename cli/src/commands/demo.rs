@@ -10,17 +10,18 @@ use clap::Args;
 use lamp_build::{HeightOptions, Layout, MeshOptions, Pack, PartStack, TileOptions, tile};
 use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Sample, build};
+use lamp_gantry::{BuildPages, Job, JobFolder, JobOptions, MirrorArray, seen_from};
 use lamp_grayscale::DitherMethod;
 use lamp_machine::Machine;
 use lamp_pipeline::SliceSettings;
 use lamp_pipeline::documents::document_and_word;
 use lamp_pipeline::part_file::PartFile;
 use lamp_slicer::{OpenOptions, Part};
-use lamp_stack::{Layer, Pages, StackError};
+use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
 use crate::args::options::{Common, Output, parse_count};
 use crate::exit::Exit;
-use crate::streams::{failed_at, print, write_file, write_layers};
+use crate::streams::{failed_at, new_folder, print, write_file, write_layers};
 use crate::terminal::progress::Progress;
 use lamp_plots::{Picture, PictureRegion, PictureScale};
 
@@ -55,6 +56,28 @@ const IN_MESH: usize = 1;
 /// How many layers are made on either side of it.
 const AROUND: u32 = 10;
 
+/// A machine that scans, as an example.
+const SCANNER: &str = r#"name = "demo-scanner"
+description = "An example of a display on a gantry, no LAMP machine"
+
+[area]
+value = "23x23in"
+source = "example"
+
+[scan]
+display = "dlp7000"
+overlap = 32
+speed = ["1mm/s", "100mm/s"]
+acceleration = "2000mm/s2"
+both_ways = true
+source = "example"
+
+[times]
+recoat_s = 9
+expose_s = 0.2
+source = "example"
+"#;
+
 pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
     let part = Sample::Blade;
     let mesh = build(part, args.facets).map_err(Exit::wrong_options)?;
@@ -76,12 +99,15 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
     // The part stands on layers of build mesh alone.
     let shown = middle + MeshOptions::default().base_layers;
     draw_in_mesh(&meshed, &in_mesh, shown)?;
+    let [scanner, scan] = ["scanner.toml", "job"].map(|name| args.folder.join(name));
+    write_file(&scanner, |out| out.write_all(SCANNER.as_bytes()))?;
+    let job = plan_scan(&meshed, &scan)?;
     if common.quiet {
         return Ok(());
     }
     let megabytes = fs::metadata(&stack).context("build.tif")?.len() as f64 / 1e6;
-    let [stl, stack, sheet, meshed, in_mesh] =
-        [stl, stack, sheet, meshed, in_mesh].map(|path| path.display().to_string());
+    let [stl, stack, sheet, meshed, in_mesh, scanner, scan] =
+        [stl, stack, sheet, meshed, in_mesh, scanner, scan].map(|path| path.display().to_string());
     let StackSize { layers, width, height } = size;
     let facets = mesh.facets.len();
     let range = range.map(|range| format!(" --layers {}..{}", range.start, range.end));
@@ -93,9 +119,11 @@ pub(crate) fn run(args: &DemoArgs, common: &Common) -> Result<(), Exit> {
 {sheet}: layers {pictures}, one pixel for 8 x 8
 {meshed}: {made} layers of the build on the alpha machine, in its mesh, made in {mesh_seconds:.2} s
 {in_mesh}: layer {shown} of them, one pixel for 8 x 8
+{scan}: the job of a projector that scans them: {swaths} swaths at {speed:.2} mm/s
 The same by hand: slice {stl} | fix | dither | tile --mesh none > {stack}
                   slice {stl}{range} | fix | dither | tile --machine alpha > {meshed}
-"
+                  lamp job {meshed} --machine {scanner} -o {scan}
+", swaths = job.sums.swaths, speed = job.layers[0].speed_mm_per_s,
     ))
 }
 
@@ -165,6 +193,19 @@ fn build_in_mesh(
     let mut made = 0;
     write(build.inspect(|_| made += 1), stack, progress)?;
     Ok(made)
+}
+
+/// The job of a projector that scans a build.
+fn plan_scan(stack: &Path, folder: &Path) -> Result<Job, Exit> {
+    let machine = Machine::from_toml(SCANNER).map_err(|error| Exit::Failed(error.into()))?;
+    let [across, along] = machine.scan.as_ref().context("the demo's machine scans")?.mirrors();
+    let mirrors = MirrorArray::even(across, along);
+    let pages = BuildPages::open(stack)?;
+    let written = new_folder(folder, true)?;
+    let name = seen_from(written.path(), stack).context("build")?.display().to_string();
+    let job = Job::plan(&pages, name, &machine, &mirrors, &JobOptions::default())?;
+    JobFolder::write(written, &job, SCANNER, None)?;
+    Ok(job)
 }
 
 fn write(
