@@ -16,6 +16,7 @@ use lamp_machine::ScanDirection;
 use lamp_stack::Image;
 use rayon::prelude::*;
 
+use crate::bit_counts::BitCounts;
 use crate::frames::Frame;
 use crate::job::{Job, JobLayer, JobSwath};
 use crate::tilted_dose::{EdgeWindow, TiltedHead};
@@ -289,7 +290,8 @@ impl Head<'_> {
         let start = start + self.offset(swath)[1];
         let dark_half = (1.0 - job.strobe) / 2.0;
         let mut jitter = Jitter::new(layer.layer, swath.swath, swath.pass);
-        let stuck = stuck_words(&machine.stuck, across, along);
+        let mirrors = Mirrors::new(machine, across, along);
+        let mut counts = BitCounts::new(height, stride / 64, swath.frames);
         let mut frame_number = 0.0;
         let corner = self.corner_px(swath) - self.first_column(swath) as f64;
         let mut below = tilted.as_ref().map(|tilted| tilted.below(corner, columns));
@@ -304,19 +306,27 @@ impl Head<'_> {
             }
             let reached = top..top + height as i64 + along as i64;
             let weights = row_weights(a.min(b), a.max(b), machine.samples, reached);
+            // A steady head is over each row for a whole frame, so light that is on or off is counted.
+            let is_whole = weights.len() == 1 && (weights[0].1 - 1.0).abs() < 1e-6;
             for (mirror_row, words) in frame.words.chunks_exact(stride / 64).enumerate() {
                 for &(row, weight) in &weights {
                     let row = row - mirror_row as i64 - top;
                     if (0..height as i64).contains(&row) {
-                        let sums = &mut sums[row as usize * stride..][..stride];
-                        let light = machine.light.get(mirror_row * across..).unwrap_or(&[]);
-                        let light = &light[..light.len().min(across)];
-                        let stuck = stuck.get(&mirror_row).map_or(&[][..], Vec::as_slice);
-                        add_row(sums, words, light, stuck, weight);
+                        let row = row as usize;
+                        match &mirrors.rows[mirror_row] {
+                            MirrorRow::OnOff(mask) if is_whole => counts.add(row, words, mask),
+                            _ => {
+                                let sums = &mut sums[row * stride..][..stride];
+                                mirrors.add_row(mirror_row, sums, words, weight);
+                            }
+                        }
                     }
                 }
             }
         })?;
+        for (row, sums) in sums.chunks_exact_mut(stride).enumerate() {
+            counts.add_to(row, sums);
+        }
         let row_ms = (job.strobe * 1000.0 / layer.row_clock_hz) as f32;
         let mut doses = Vec::with_capacity(height * (columns + 2 * margin));
         for row in sums.chunks_exact(stride) {
@@ -353,35 +363,71 @@ fn row_weights(low: f64, high: f64, samples: u32, within: Range<i64>) -> Vec<(i6
     rows.map(weight).filter(|(_, weight)| *weight > 1e-6).collect()
 }
 
-/// Adds the light of a row of mirrors to the row below it.
-fn add_row(sums: &mut [f32], words: &[u64], light: &[f32], stuck: &[u64], weight: f32) {
-    for (number, (sums, &word)) in sums.chunks_exact_mut(64).zip(words).enumerate() {
-        let word = word | stuck.get(number).copied().unwrap_or(0);
-        if word == 0 {
-            continue;
-        }
-        let light = light.get(number * 64..).unwrap_or(&[]);
-        for (byte, sums) in word.to_be_bytes().into_iter().zip(sums.chunks_exact_mut(8)) {
-            let on: [f32; 8] = std::array::from_fn(|bit| f32::from(byte >> (7 - bit) & 1) * weight);
-            sums.iter_mut().zip(on).for_each(|(sum, on)| *sum += on);
-        }
-        // Even light is 1. Uneven light takes off what is missing of it.
-        for (at, (sum, &light)) in sums.iter_mut().zip(light).enumerate() {
-            *sum -= f32::from((word >> (63 - at) & 1) as u8) * weight * (1.0 - light);
-        }
-    }
+/// The light of the mirrors, row by row along the scan.
+struct Mirrors<'a> {
+    light: &'a [f32],
+    across: usize,
+    rows: Vec<MirrorRow>,
 }
 
-/// Returns the words of mirrors that always shine, by their row.
-fn stuck_words(stuck: &[[u32; 2]], across: usize, along: usize) -> BTreeMap<usize, Vec<u64>> {
-    let mut rows = BTreeMap::new();
-    for &[column, row] in stuck {
-        let (column, row) = (column as usize, row as usize);
-        assert!(column < across && row < along);
-        let words = rows.entry(row).or_insert_with(|| vec![0_u64; across.div_ceil(64)]);
-        words[column / 64] |= 1 << (63 - column % 64);
+/// A row of mirrors.
+enum MirrorRow {
+    /// Each has full light or none: the words of mirrors with light, none if that is all of them.
+    OnOff(Vec<u64>),
+    /// Some have less than full light, or always shine: the words of these.
+    Uneven(Vec<u64>),
+}
+
+impl<'a> Mirrors<'a> {
+    fn new(machine: &'a Disturbance, across: usize, along: usize) -> Self {
+        let words = |on: &mut dyn Iterator<Item = usize>| {
+            let mut words = vec![0_u64; across.div_ceil(64)];
+            on.for_each(|column| words[column / 64] |= 1 << (63 - column % 64));
+            words
+        };
+        let mut stuck: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for &[column, row] in &machine.stuck {
+            assert!((column as usize) < across && (row as usize) < along);
+            stuck.entry(row as usize).or_default().push(column as usize);
+        }
+        let row = |row: usize| {
+            let light = machine.light.get(row * across..(row + 1) * across).unwrap_or(&[]);
+            let stuck = stuck.get(&row);
+            if stuck.is_some() || light.iter().any(|&light| light != 0.0 && light != 1.0) {
+                let stuck = stuck.map_or(&[][..], Vec::as_slice);
+                return MirrorRow::Uneven(words(&mut stuck.iter().copied()));
+            }
+            let lit = light.iter().enumerate().filter(|(_, light)| **light == 1.0);
+            let all = light.iter().all(|&light| light == 1.0);
+            MirrorRow::OnOff(if all { Vec::new() } else { words(&mut lit.map(|(at, _)| at)) })
+        };
+        Self { light: &machine.light, across, rows: (0..along).map(row).collect() }
     }
-    rows
+
+    /// Adds the light of a row of mirrors to the row below it.
+    fn add_row(&self, row: usize, sums: &mut [f32], words: &[u64], weight: f32) {
+        let stuck = match &self.rows[row] {
+            MirrorRow::Uneven(stuck) => &stuck[..],
+            MirrorRow::OnOff(_) => &[],
+        };
+        let light = self.light.get(row * self.across..(row + 1) * self.across).unwrap_or(&[]);
+        for (number, (sums, &word)) in sums.chunks_exact_mut(64).zip(words).enumerate() {
+            let word = word | stuck.get(number).copied().unwrap_or(0);
+            if word == 0 {
+                continue;
+            }
+            let light = light.get(number * 64..).unwrap_or(&[]);
+            for (byte, sums) in word.to_be_bytes().into_iter().zip(sums.chunks_exact_mut(8)) {
+                let on: [f32; 8] =
+                    std::array::from_fn(|bit| f32::from(byte >> (7 - bit) & 1) * weight);
+                sums.iter_mut().zip(on).for_each(|(sum, on)| *sum += on);
+            }
+            // Even light is 1. Uneven light takes off what is missing of it.
+            for (at, (sum, &light)) in sums.iter_mut().zip(light).enumerate() {
+                *sum -= f32::from((word >> (63 - at) & 1) as u8) * weight * (1.0 - light);
+            }
+        }
+    }
 }
 
 /// Normally distributed numbers, the same for the same swath (Box and Muller 1958).

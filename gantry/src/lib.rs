@@ -15,6 +15,7 @@
 //! Source: the model is this project's own. 002 states that the exposure scans continuously (section
 //! 3.4.2.1) with one source of fixed power (section 3.3.2).
 
+mod bit_counts;
 mod clock;
 mod dose;
 mod error;
