@@ -386,19 +386,26 @@ fn window_errors(wanted: &Image, got: impl Fn(u32, u32) -> f64) -> [f64; 2] {
 
 #[test]
 fn gray_in_time_has_no_grain() {
+    // Layers of each part with much gray.
+    for (part, layer) in [(Sample::Sphere, 30), (Sample::Blade, 905)] {
+        compare_with_dots(part, layer);
+    }
+}
+
+fn compare_with_dots(part: Sample, layer: u32) {
     let scratch = Scratch::new();
-    scratch.part("sphere.stl", Sample::Sphere, 20_000);
+    scratch.part("part.stl", part, 24_000);
     let machine = MACHINE.replace("[100, 48]", "[1024, 768]");
     scratch.write("mine.toml", machine.as_bytes());
     // A pixel is 16 um.
-    let slice = "slice sphere.stl --dpi 1587.5 --layers 30 --gray --material lamp-suspension -q";
-    scratch.run(&format!("{slice} -o gray.tif")).succeeds();
+    let slice = "slice part.stl --dpi 1587.5 --gray --material lamp-suspension -q";
+    scratch.run(&format!("{slice} --layers {layer} -o gray.tif")).succeeds();
     scratch.run("dither gray.tif -q -o dots.tif").succeeds();
     scratch.run("lamp job gray.tif --machine mine.toml --gray time -q -o job/").succeeds();
     let folder = JobFolder::open(&scratch.path("job")).unwrap();
     let (job, pages) = (&folder.job, folder.build().unwrap());
     let (wanted, layer) = (pages.image(0).unwrap(), &job.layers[0]);
-    let count = job.layout().swaths(job.pixels[0]).unwrap().count();
+    let count = job.layout().count(job.pixels[0]).unwrap();
     let images = pages.swaths(0, 0..count, &job.layout()).unwrap();
     let mut doses = vec![0.0_f64; wanted.width() as usize * wanted.height() as usize];
     let show = |pass: &JobSwath, to: &mut dyn FnMut(&Frame<'_>)| {
@@ -424,7 +431,8 @@ fn gray_in_time_has_no_grain() {
     let percent =
         |errors: [f64; 2]| errors.map(|error| format!("{:.3} %", error * 100.0)).join(", at most ");
     note(&format!(
-        "doses of 64 um windows of a gray sphere: in time {}, as dots {}",
+        "doses of 64 um windows of a gray {}: in time {}, as dots {}",
+        part.name(),
         percent(time),
         percent(dots)
     ));
