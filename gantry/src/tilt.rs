@@ -68,7 +68,7 @@ impl TiltedMirrors {
         (count * (1.0 - 1e-12)).ceil().max(1.0) as u32
     }
 
-    /// Returns the column of the corner of mirror (0, 0). That of the leftmost mirror is
+    /// Returns the column of the corner of mirror (0, 0). The leftmost mirror is
     /// [`overhang_px`](Self::overhang_px) further left.
     pub(crate) fn corner_px(&self, swath: u32) -> f64 {
         f64::from(swath) * self.step_px() - self.ramp_px() + self.overhang_px()

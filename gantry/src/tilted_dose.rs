@@ -44,7 +44,7 @@ impl TiltedHead {
         self.ends(0)[0]
     }
 
-    /// Returns how many columns hold the display, wherever its corner lies within a pixel.
+    /// Returns how many columns hold the display, whatever the place of its corner in a pixel.
     pub(crate) fn columns(&self) -> usize {
         let [left, right] = self.ends(0);
         (right - left).ceil() as usize + 1
