@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::words::{list, optional, path, text, words_of};
 
 /// Changes when other findings come of the same settings and stack.
-pub const CODE: u32 = 1;
+pub const CODE: u32 = 2;
 
 /// The findings to look for, and their limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,9 +24,12 @@ pub struct CheckSettings {
     /// Groups of findings; none means all.
     #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
     pub only: Vec<FindingGroup>,
-    /// Side of the square that a finding must hold, in pixels.
+    /// Side of the square that an island must hold.
     #[serde(with = "text")]
-    pub speck: NonZeroU32,
+    pub speck: Length,
+    /// Layers for which a thinner island must float.
+    #[serde(with = "text")]
+    pub speck_layers: NonZeroU32,
     /// Share of white that must rest on white.
     #[serde(with = "text")]
     pub least_support: f64,
@@ -46,10 +49,17 @@ pub struct CheckSettings {
 
 impl Default for CheckSettings {
     fn default() -> Self {
-        let CheckOptions { threshold, speck, least_support, max_overhang, drain } =
-            CheckOptions::default();
-        let (only, machine) = (Vec::new(), PathBuf::from("alpha"));
-        Self { only, speck, least_support, max_overhang, drain, threshold, machine }
+        let options = CheckOptions::default();
+        Self {
+            only: Vec::new(),
+            speck: options.speck,
+            speck_layers: options.speck_layers,
+            least_support: options.least_support,
+            max_overhang: options.max_overhang,
+            drain: options.drain,
+            threshold: options.threshold,
+            machine: PathBuf::from("alpha"),
+        }
     }
 }
 
@@ -79,9 +89,11 @@ impl CheckSettings {
         CheckOptions {
             threshold: self.threshold,
             speck: self.speck,
+            speck_layers: self.speck_layers,
             least_support: self.least_support,
             max_overhang: self.max_overhang,
             drain: self.drain,
+            ..CheckOptions::default()
         }
     }
 

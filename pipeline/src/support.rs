@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::words::{text, words_of};
 
 /// Changes when other bytes come of the same settings, stack and part.
-pub const CODE: u32 = 3;
+pub const CODE: u32 = 4;
 
 /// How islands are held.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,9 +39,15 @@ pub struct SupportSettings {
     pub candidates: NonZeroU32,
     /// Supports to list for each place, at least one.
     pub keep: u16,
-    /// Side of the square that an island must hold, in pixels.
+    /// Share of an island that its supports must hold.
     #[serde(with = "text")]
-    pub speck: NonZeroU32,
+    pub least_support: f64,
+    /// Side of the square that an island must hold.
+    #[serde(with = "text")]
+    pub speck: Length,
+    /// Layers for which a thinner island must float.
+    #[serde(with = "text")]
+    pub speck_layers: NonZeroU32,
     /// Level from which a gray pixel is white.
     #[serde(with = "text")]
     pub threshold: NonZeroU8,
@@ -59,7 +65,9 @@ impl Default for SupportSettings {
             hold: options.hold,
             candidates: options.candidates,
             keep: options.keep.try_into().unwrap_or(u16::MAX),
+            least_support: options.least_support,
             speck: CheckOptions::default().speck,
+            speck_layers: CheckOptions::default().speck_layers,
             threshold: options.threshold,
         }
     }
@@ -82,13 +90,20 @@ impl SupportSettings {
             keep: self.keep.into(),
             radius: self.radius,
             hold: self.hold,
+            least_support: self.least_support,
             threshold: self.threshold,
         }
     }
 
     /// Returns the options of the search for islands.
     pub fn check_options(&self) -> CheckOptions {
-        CheckOptions { threshold: self.threshold, speck: self.speck, ..CheckOptions::default() }
+        CheckOptions {
+            threshold: self.threshold,
+            speck: self.speck,
+            speck_layers: self.speck_layers,
+            least_support: self.least_support,
+            ..CheckOptions::default()
+        }
     }
 }
 

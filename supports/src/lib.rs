@@ -29,8 +29,8 @@ mod support;
 
 pub use check::{
     CheckError, CheckOptions, Disagreements, Findings, Island, IslandEnd, IslandMinimum,
-    LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketKind, Region, WeakJoint,
-    check, component_at, inner_components,
+    LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketEffect, PocketKind,
+    Region, WeakJoint, check, component_at, inner_components,
 };
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{

@@ -47,7 +47,7 @@ fn a_stack_and_its_part_have_the_same_findings() {
     // The greatest viscosity of 002 section 4.2.2: 97.5 Pa.
     assert!(near(&island["drag_mn"], 9.0 * 97.5 / 1000.0), "{island}");
     assert_eq!(of_kind(&stack, "cup").len(), 1);
-    for word in ["layer 80 (z 8.00 mm)", "joins the part in layer 140", "opens at the top only"] {
+    for word in ["layer 80 (z 8.00 mm)", "joins the part in layer 140", "of resin stay when"] {
         assert!(text.contains(word), "no `{word}` in {text}");
     }
 }
@@ -196,9 +196,8 @@ fn a_chamber_behind_a_narrow_hole_drains_through_it_only_if_that_may_be_narrow()
     // The gate is 2 x 2 mm.
     assert_eq!(["", "--drain 1.9mm", "--drain 2.2mm"].map(narrow), [0, 0, 1]);
     // A channel in which no such ball fits is no room.
-    scratch.mesh("serpentine.stl", &serpentine(2000));
-    let line = format!("lamp check serpentine.stl {SLICE} --only pockets --strict --drain 3mm");
-    scratch.run(&line).succeeds_quietly();
+    scratch.mesh("core.stl", &serpentine(2000));
+    assert_eq!(narrow("--drain 3mm"), 0);
 }
 
 #[test]
@@ -206,7 +205,7 @@ fn minima_that_pixels_miss_and_islands_that_the_mesh_lacks_are_told() {
     // No center of a pixel of 5 mm lies in the needle, which is 4 mm wide.
     let scratch = with("needle.stl", &needle(2000));
     let frame = "--dpi 5.08 --origin -50,50 --size 100x100mm";
-    let line = format!("lamp check needle.stl {frame} --only islands --speck 1 --report n.json");
+    let line = format!("lamp check needle.stl {frame} --only islands --speck 0 --report n.json");
     scratch.run(&line).succeeds_quietly();
     let found = report(&scratch, "n.json");
     let [lone] = of_kind(&found, "minimum-without-island")[..] else { panic!("{found}") };

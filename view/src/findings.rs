@@ -51,7 +51,7 @@ pub fn of_records(
 /// Returns a sentence if it is no such report, or a report about another stack.
 pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
     let found = match report["schema"].as_str() {
-        Some("lamp-check-1") => check_report(report, headers)?,
+        Some("lamp-check-1" | "lamp-check-2") => check_report(report, headers)?,
         Some("lamp-support-1") => support_report(report, headers),
         _ => return Err("this is not a report of lamp check or lamp support".to_owned()),
     };

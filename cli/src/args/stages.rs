@@ -14,7 +14,7 @@ use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
 use lamp_stack::{Length, LengthError, Op};
-use lamp_supports::{FindingGroup, SupportOptions};
+use lamp_supports::{CheckOptions, FindingGroup, SupportOptions};
 
 use crate::args::lamp_option::LampOption;
 use crate::args::options::{one_of_described, parse_distance, parse_thickness};
@@ -106,9 +106,14 @@ pub(crate) struct CheckStageArgs {
     ]))]
     only: Vec<FindingGroup>,
 
-    /// Side of the square that must fit in a finding, in pixels
-    #[arg(long, value_name = "PIXELS", default_value = "3")]
-    speck: NonZeroU32,
+    /// Side of the square that must fit in an island
+    #[arg(long, value_name = "LENGTH", default_value_t = CheckOptions::default().speck)]
+    #[arg(value_parser = parse_distance)]
+    speck: Length,
+
+    /// Number of layers for which a thinner island must float
+    #[arg(long, value_name = "N", default_value = "10")]
+    speck_layers: NonZeroU32,
 
     /// Share of white that must rest on white
     #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
@@ -182,9 +187,18 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
     keep: u16,
 
-    /// Side of the square that must fit in an island, in pixels
-    #[arg(long, value_name = "PIXELS", default_value = "3")]
-    speck: NonZeroU32,
+    /// Share of an island's first layer that its supports must hold
+    #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
+    least_support: f64,
+
+    /// Side of the square that must fit in an island
+    #[arg(long, value_name = "LENGTH", default_value_t = CheckOptions::default().speck)]
+    #[arg(value_parser = parse_distance)]
+    speck: Length,
+
+    /// Number of layers for which a thinner island must float
+    #[arg(long, value_name = "N", default_value = "10")]
+    speck_layers: NonZeroU32,
 
     /// Lowest gray level that counts as white
     #[arg(long, value_name = "LEVEL", default_value = "1")]
@@ -245,9 +259,16 @@ impl From<&DitherStageArgs> for DitherSettings {
 
 impl From<CheckStageArgs> for CheckSettings {
     fn from(args: CheckStageArgs) -> Self {
-        let CheckStageArgs { only, speck, least_support, max_overhang, drain, threshold, machine } =
-            args;
-        Self { only, speck, least_support, max_overhang, drain, threshold, machine }
+        Self {
+            only: args.only,
+            speck: args.speck,
+            speck_layers: args.speck_layers,
+            least_support: args.least_support,
+            max_overhang: args.max_overhang,
+            drain: args.drain,
+            threshold: args.threshold,
+            machine: args.machine,
+        }
     }
 }
 
@@ -262,7 +283,9 @@ impl From<SupportStageArgs> for SupportSettings {
             hold: args.hold,
             candidates: NonZeroU32::new(args.candidates).expect("its range is above zero"),
             keep: args.keep,
+            least_support: args.least_support,
             speck: args.speck,
+            speck_layers: args.speck_layers,
             threshold: args.threshold,
         }
     }

@@ -1,9 +1,9 @@
 //! Pockets whose ways out are narrower than a drain must be.
 //!
 //! A ball's center fits where black is nowhere nearer to white than the ball's radius. These places
-//! are checked like the black of the layers: a part of them without a way to the frame is a pocket
-//! whose ways out, if any, are too narrow. The platform is no obstacle: parts drain after they are
-//! taken off it.
+//! are checked like the black of the layers: a part of them without a way out is a pocket whose ways
+//! out, if any, are too narrow. The platform is no obstacle: parts drain after they are taken off
+//! it. Nor is gravity: parts are turned while they drain.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -46,7 +46,7 @@ struct NearLayer {
 }
 
 impl Drain {
-    pub(super) fn new(diameter_um: f64, pitch_um: f64, speck: u32) -> Self {
+    pub(super) fn new(diameter_um: f64, pitch_um: f64, rounding: u32) -> Self {
         Self {
             radius_um: diameter_um / 2.0,
             pitch_um,
@@ -55,7 +55,7 @@ impl Drain {
             next: 0,
             top_um: 0.0,
             last: None,
-            rooms: Hollows::new(speck),
+            rooms: Hollows::new(rounding),
             within: Vec::new(),
         }
     }
@@ -107,10 +107,11 @@ impl Drain {
     }
 
     /// Returns the pockets whose ways out are all too narrow; `hollows` has all black.
-    pub(super) fn finish(mut self, hollows: &mut Hollows) -> Listed<Pocket> {
+    pub(super) fn finish(mut self, mut hollows: Hollows) -> Listed<Pocket> {
+        hollows.finish();
         self.advance(true);
         self.rooms.finish();
-        let Listed { mut list, left_out } = self.rooms.pockets;
+        let Listed { mut list, left_out } = self.rooms.closed;
         list.retain(|pocket| {
             // Places were added by layer and first pixel, so they are in order.
             let body = self.within.binary_search_by_key(&pocket.born(), |(born, _)| *born);

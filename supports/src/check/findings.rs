@@ -48,7 +48,8 @@ pub struct Island {
     pub centroid: [f64; 2],
     /// The rectangle around them.
     pub region: Region,
-    /// The pixels of the layers until it joins. Where two islands join, the elder goes on.
+    /// The pixels of the layers until it joins. Where islands join, the one of the largest volume
+    /// so far goes on.
     pub floating_pixels: u64,
     /// The sum of floating pixels times the thickness of their layers, in micrometers.
     pub floating_pixels_um: f64,
@@ -70,11 +71,11 @@ pub enum IslandEnd {
         /// The first layer that joins them.
         layer: u32,
     },
-    /// It joins an elder island.
+    /// It joins a larger island.
     JoinsIsland {
         /// The first layer that joins them.
         layer: u32,
-        /// The elder's number.
+        /// The larger one's number.
         number: u64,
     },
 }
@@ -121,24 +122,52 @@ impl Overhang {
 }
 
 /// How a pocket is closed.
+///
+/// A way out is one to the border of an image, above the last layer, or below the first one, where
+/// the platform is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PocketKind {
-    /// It has no way out: its content stays in.
+    /// It has no way out.
     Trap,
-    /// It opens at the top only, also off the platform.
+    /// Each way out leads over a rim: higher than all of the pocket.
     Cup,
-    /// The platform closes it below; it may also open at the top.
+    /// It has no way out but the one that the platform closes.
     Sealed,
     /// It has ways out, all too narrow.
     Narrow,
 }
 
-/// Black without a way to the image's frame.
+/// The effect of a pocket on a build.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PocketEffect {
+    /// Resin stays in it when the part is lifted out of the resin and taken off the platform:
+    /// forever, or until the part is turned.
+    #[default]
+    Stays,
+    /// Suction holds the part when it is pulled off the platform: neither resin nor air can take
+    /// the place of what is pulled up. It drains after that.
+    Suction,
+}
+
+lamp_stack::named!(PocketEffect { Stays = "stays", Suction = "suction" });
+
+impl PocketKind {
+    /// Returns the effect of pockets of this kind.
+    pub fn effect(self) -> PocketEffect {
+        match self {
+            Self::Trap | Self::Cup | Self::Narrow => PocketEffect::Stays,
+            Self::Sealed => PocketEffect::Suction,
+        }
+    }
+}
+
+/// Black that holds resin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pocket {
     /// How it is closed.
     pub kind: PocketKind,
-    /// The first and the last layer.
+    /// The first and the last layer. The layer above the last has the rim of a cup, if there is
+    /// one; or else the stack ends at its rim.
     pub layers: [u32; 2],
     /// Its pixels, in all layers.
     pub pixels: u64,
@@ -228,7 +257,7 @@ pub struct Findings {
     pub size: [u32; 2],
     /// Islands, by what floats.
     pub islands: Listed<Island>,
-    /// Islands that never hold a square of the size of a speck, as they begin.
+    /// Islands that never hold a square of the size of a speck nor float for long, as they begin.
     pub specks: Listed<Island>,
     /// Weak joints, the weakest first.
     pub weak_joints: Listed<WeakJoint>,

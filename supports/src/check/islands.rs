@@ -10,10 +10,19 @@ use super::live::{Group, Live, Next};
 pub(super) struct Growth {
     live: Live<ImageBody>,
     begun: u64,
-    speck: u32,
+    speck: Speck,
     pub(super) islands: Listed<Island>,
     pub(super) specks: Listed<Island>,
     pub(super) off_balance: Listed<OffBalance>,
+}
+
+/// The size up to which an island is a speck.
+#[derive(Clone, Copy)]
+pub(super) struct Speck {
+    /// The side in pixels of the square that it may not hold in a layer.
+    pub(super) side: u32,
+    /// The layers that it may not float for.
+    pub(super) layers: u32,
 }
 
 /// White that is joined so far.
@@ -26,13 +35,15 @@ enum ImageBody {
 struct Floating {
     /// The island as known so far.
     island: Island,
-    holds_square: bool,
+    layers: u32,
+    /// Whether it is more than a speck.
+    counts: bool,
     /// The weight that it adds to a body that it joins.
     weight: Weight,
 }
 
 impl Growth {
-    pub(super) fn new(speck: u32) -> Self {
+    pub(super) fn new(speck: Speck) -> Self {
         Self {
             live: Live::new(true),
             begun: 0,
@@ -95,10 +106,15 @@ impl Growth {
             largest_layer: layer,
             end: IslandEnd::Loose,
         };
-        ImageBody::Floating(Floating { island, holds_square: false, weight: Weight::default() })
+        ImageBody::Floating(Floating {
+            island,
+            layers: 0,
+            counts: false,
+            weight: Weight::default(),
+        })
     }
 
-    /// Makes one body of several: one that stands, or else the eldest island.
+    /// Makes one body of several: one that stands, or else the largest island.
     fn unite(&mut self, bodies: Vec<ImageBody>, layer: u32) -> ImageBody {
         let (mut base, mut floating) = (None::<Base>, Vec::new());
         for body in bodies {
@@ -117,15 +133,19 @@ impl Growth {
             }
             return ImageBody::Standing(base);
         }
-        floating.sort_by_key(|floating| floating.island.number);
+        // A sliver that began earlier does not give a large body its name. Equals go by age.
+        floating.sort_by(|Floating { island: a, .. }, Floating { island: b, .. }| {
+            let by_size = b.floating_pixels_um.total_cmp(&a.floating_pixels_um);
+            by_size.then(a.number.cmp(&b.number))
+        });
         let mut floating = floating.into_iter();
-        let mut elder = floating.next().expect("a group has a body");
-        let end = IslandEnd::JoinsIsland { layer, number: elder.island.number };
+        let mut largest = floating.next().expect("a group has a body");
+        let end = IslandEnd::JoinsIsland { layer, number: largest.island.number };
         for island in floating {
-            elder.weight.unite(&island.weight);
+            largest.weight.unite(&island.weight);
             self.list(island, end);
         }
-        ImageBody::Floating(elder)
+        ImageBody::Floating(largest)
     }
 
     fn end(&mut self, body: ImageBody) {
@@ -139,7 +159,7 @@ impl Growth {
 
     fn list(&mut self, floating: Floating, end: IslandEnd) {
         let island = Island { end, ..floating.island };
-        let list = if floating.holds_square { &mut self.islands } else { &mut self.specks };
+        let list = if floating.counts { &mut self.islands } else { &mut self.specks };
         list.push(island);
     }
 }
@@ -151,7 +171,7 @@ impl Floating {
         components: &[u32],
         number: u32,
         thickness_um: f64,
-        speck: u32,
+        speck: Speck,
     ) {
         self.weight.grow(layer, components, thickness_um);
         let area: u64 = components.iter().map(|&c| layer.components.all[c as usize].area).sum();
@@ -161,8 +181,10 @@ impl Floating {
         if area > island.largest_area {
             (island.largest_area, island.largest_layer) = (area, number);
         }
+        self.layers += 1;
         // One square is enough, and the search reads all runs.
-        self.holds_square = self.holds_square || layer.hold_square(components, speck);
+        self.counts =
+            self.counts || self.layers >= speck.layers || layer.hold_square(components, speck.side);
     }
 }
 

@@ -11,6 +11,7 @@ mod contact;
 mod drain;
 mod findings;
 mod islands;
+mod liquid;
 mod live;
 mod overhang;
 mod overhangs;
@@ -29,10 +30,11 @@ use components::Components;
 use contact::{Labelled, LayerContact};
 use drain::Drain;
 pub use findings::{
-    Findings, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketKind,
-    Region, WeakJoint,
+    Findings, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketEffect,
+    PocketKind, Region, WeakJoint,
 };
-use islands::Growth;
+use islands::{Growth, Speck};
+use liquid::Liquid;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
@@ -42,9 +44,14 @@ use pockets::Hollows;
 pub struct CheckOptions {
     /// The level from which a gray pixel is white.
     pub threshold: NonZeroU8,
-    /// The side in pixels of the square that a finding must hold, so that rounding to pixels is
-    /// none.
-    pub speck: NonZeroU32,
+    /// The side of the square that an island must hold in a layer, or else it is a speck. At least
+    /// two pixels, unless it is zero; in stacks without a resolution, [`rounding`](Self::rounding).
+    pub speck: Length,
+    /// The number of layers for which an island must float to be no speck, however thin it is.
+    pub speck_layers: NonZeroU32,
+    /// The side in pixels of the square that any other finding must hold, so that rounding to
+    /// pixels is none.
+    pub rounding: NonZeroU32,
     /// The share of a component's area that must rest on white.
     pub least_support: f64,
     /// How far white may reach beyond the white below; if `None`, as far as the layer is thick
@@ -58,11 +65,25 @@ impl Default for CheckOptions {
     fn default() -> Self {
         Self {
             threshold: NonZeroU8::MIN,
-            speck: NonZeroU32::new(3).expect("it is not zero"),
+            // Half of the smallest feature (002 section 2.4.1).
+            speck: Length::from_um(250.0),
+            speck_layers: NonZeroU32::new(10).expect("it is not zero"),
+            rounding: NonZeroU32::new(3).expect("it is not zero"),
             least_support: 0.25,
             max_overhang: None,
             drain: None,
         }
+    }
+}
+
+impl CheckOptions {
+    /// Returns the side of the square that an island must hold, in pixels.
+    fn speck_pixels(&self, dpi: Option<Dpi>) -> u32 {
+        // Where slopes begin, rounding makes islands of a pixel at any resolution.
+        let least = if self.speck == Length::default() { 1.0 } else { 2.0 };
+        // A hair less: a length of whole pixels may be rounded up.
+        let pixels = |dpi| (self.speck.pixels(dpi) - 1e-6).ceil().clamp(least, 1e9) as u32;
+        dpi.map_or(self.rounding.get(), pixels)
     }
 }
 
@@ -142,15 +163,15 @@ where
         let below: Vec<_> = last.is_none().then_some(None).into_iter().chain(below).collect();
         let contacts = batch.par_iter().zip(below).map(|(layer, below)| {
             let limit = checker.limit(&layer.facts);
-            let speck = options.speck.get();
-            below.map(|below| LayerContact::new(&below.labelled, &layer.labelled, limit, speck))
+            let rounding = options.rounding.get();
+            below.map(|below| LayerContact::new(&below.labelled, &layer.labelled, limit, rounding))
         });
         let contacts: Vec<_> = contacts.collect();
         // Bodies pass from layer to layer, so this part goes in order.
         for (layer, contact) in batch.iter().zip(&contacts) {
             checker.add(layer, contact.as_ref())?;
         }
-        if let Some(drain) = &mut checker.drain {
+        if let Some((drain, _)) = &mut checker.drain {
             drain.advance(false);
         }
         last = batch.into_iter().next_back();
@@ -228,24 +249,21 @@ struct Checker {
     origin_mm: Option<[f64; 2]>,
     size: [u32; 2],
     growth: Growth,
-    hollows: Hollows,
-    drain: Option<Drain>,
+    liquid: Liquid,
+    drain: Option<(Drain, Hollows)>,
     overhangs: Overhangs,
     weak_joints: Listed<WeakJoint>,
 }
 
 impl Checker {
     fn new(first: &LabeledLayer, options: &CheckOptions) -> Result<Self, CheckError> {
-        let speck = options.speck.get();
-        let mut hollows = Hollows::new(speck);
+        let rounding = options.rounding.get();
         let drain = options.drain.map(|drain| {
             let dpi = first.dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
-            Ok(Drain::new(drain.um(), dpi.pitch().um(), speck))
+            Ok((Drain::new(drain.um(), dpi.pitch().um(), rounding), Hollows::new(rounding)))
         });
-        let drain: Option<Drain> = drain.transpose()?;
-        if drain.is_some() {
-            hollows = hollows.with_numbers();
-        }
+        let speck =
+            Speck { side: options.speck_pixels(first.dpi), layers: options.speck_layers.get() };
         Ok(Self {
             options: options.clone(),
             layers: Vec::new(),
@@ -253,8 +271,8 @@ impl Checker {
             origin_mm: first.origin_mm,
             size: first.size(),
             growth: Growth::new(speck),
-            hollows,
-            drain,
+            liquid: Liquid::new(rounding),
+            drain: drain.transpose()?,
             overhangs: Overhangs::default(),
             weak_joints: Listed::default(),
         })
@@ -289,17 +307,18 @@ impl Checker {
         // Without thicknesses, all layers weigh the same.
         let thickness_um = layer.facts.thickness_um.unwrap_or(1.0);
         self.growth.add(&layer.labelled, contact, number, thickness_um);
-        self.hollows.add(&layer.labelled, contact, number, thickness_um);
+        self.liquid.add(&layer.labelled, contact, number, thickness_um);
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);
             // On a slope, patches of neighboring layers may be a limit and a pixel apart.
             let near = self.limit(&layer.facts).map_or(0, |limit| limit.ceil().min(1e9) as u32 + 1);
             self.overhangs.add(&contact.patches, number, near);
         }
-        if let Some(drain) = &mut self.drain {
+        if let Some((drain, hollows)) = &mut self.drain {
             let thickness_um = layer.facts.thickness_um;
             let thickness_um = thickness_um.ok_or(CheckError::NoScale("thick its layers are"))?;
-            drain.add(layer.clone(), thickness_um, self.hollows.numbers());
+            hollows.add(&layer.labelled, contact, number, thickness_um);
+            drain.add(layer.clone(), thickness_um, hollows.numbers());
         }
         self.layers.push(layer.facts);
         Ok(())
@@ -312,7 +331,7 @@ impl Checker {
             let is_weak = (support as f64) < self.options.least_support * component.area as f64;
             if component.is_white
                 && is_weak
-                && layer.hold_square(&[joints[0].component], self.options.speck.get())
+                && layer.hold_square(&[joints[0].component], self.options.rounding.get())
             {
                 self.weak_joints.push(WeakJoint {
                     layer: number,
@@ -328,10 +347,10 @@ impl Checker {
 
     fn finish(mut self) -> Findings {
         self.growth.finish();
-        self.hollows.finish();
+        self.liquid.finish();
         self.overhangs.finish();
-        let narrow = self.drain.map(|drain| drain.finish(&mut self.hollows)).unwrap_or_default();
-        let mut pockets = self.hollows.pockets;
+        let narrow = self.drain.map(|(drain, hollows)| drain.finish(hollows)).unwrap_or_default();
+        let mut pockets = self.liquid.pockets;
         narrow.list.into_iter().for_each(|pocket| pockets.push(pocket));
         pockets.left_out += narrow.left_out;
         let mut findings = Findings {

@@ -107,11 +107,16 @@ fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> JointRecord {
 }
 
 fn of_pocket(pocket: &Pocket, scale: &Scale<'_>) -> FindingRecord {
+    let rim = (pocket.kind == PocketKind::Cup).then_some(pocket.layers);
     let record = PocketRecord {
         layers: scale.span(pocket.layers),
         bounds: scale.bounds(&pocket.region),
         volume_px: pocket.pixels,
         volume_mm3: scale.volume_mm3(pocket.pixels_um),
+        effect: pocket.kind.effect(),
+        depth_mm: rim.and_then(|[first, last]| scale.height_mm(first..=last)),
+        rim_mm: rim.and_then(|[_, last]| scale.top_mm(last)),
+        rim_layer: rim.and_then(|[_, last]| scale.index(last + 1)),
         middle: scale.middle(&pocket.region),
         shown: shown(pocket.layers[0], &pocket.region, Some(pocket.first), scale),
     };

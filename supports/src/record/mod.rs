@@ -7,9 +7,10 @@ mod places;
 mod scale;
 mod texts;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::check::Region;
+use crate::check::{PocketEffect, Region};
 
 pub use makes::records;
 pub use places::{AreaRecord, BoxRecord, LayerPlace, LayerSpan, PointRecord};
@@ -36,9 +37,9 @@ pub enum FindingRecord {
     WeakJoint(JointRecord),
     /// Black that nothing leads out of.
     Trap(PocketRecord),
-    /// Black that opens at the top only.
+    /// Black that leads out over a rim only.
     Cup(PocketRecord),
-    /// Black that the platform closes.
+    /// Black that opens at the platform only.
     Sealed(PocketRecord),
     /// Black with ways out that are too narrow.
     Narrow(PocketRecord),
@@ -59,7 +60,7 @@ pub enum FindingGroup {
     Islands,
     /// White that rests on little.
     Joints,
-    /// Black without a way out.
+    /// Black that holds resin.
     Pockets,
     /// White far from the white below.
     Overhangs,
@@ -160,7 +161,7 @@ pub struct IslandRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Joined {
-    /// An elder island, by its number.
+    /// A larger island, by its number.
     Island(u64),
     /// The part on the platform.
     Part(PartWord),
@@ -230,7 +231,7 @@ pub struct JointRecord {
     pub shown: Shown,
 }
 
-/// Black without a way to the image's frame.
+/// Black that holds resin.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PocketRecord {
@@ -244,6 +245,16 @@ pub struct PocketRecord {
     pub volume_px: u64,
     /// Their volume.
     pub volume_mm3: Option<f64>,
+    /// Whether resin stays in it, or suction pulls at it.
+    #[serde(serialize_with = "name_of", deserialize_with = "named")]
+    pub effect: PocketEffect,
+    /// The height of a cup's rim above its lowest layer's bottom.
+    pub depth_mm: Option<f64>,
+    /// The height of a cup's rim.
+    pub rim_mm: Option<f64>,
+    /// The index of the layer in which a cup gets out over its rim; `None` also if the stack ends
+    /// there.
+    pub rim_layer: Option<u32>,
     /// The middle of the rectangle, which JSON does not have.
     #[serde(skip)]
     pub middle: PointRecord,
@@ -332,6 +343,15 @@ pub enum EmptyPlace {
     Above,
     /// Everywhere.
     Everywhere,
+}
+
+fn name_of<S: Serializer>(effect: &PocketEffect, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(effect.name())
+}
+
+fn named<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PocketEffect, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    name.parse().map_err(D::Error::custom)
 }
 
 fn to_nm<S: Serializer>(mm: &f64, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,6 +1,6 @@
 //! Pixels as millimeters, where a stack says how large they are.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use lamp_stack::to_nm;
 
@@ -73,6 +73,24 @@ impl<'a> Scale<'a> {
     pub fn layer(&self, layer: u32) -> LayerPlace {
         let facts = &self.findings.layers[layer as usize];
         LayerPlace { layer: facts.index, z_mm: facts.z_um.map(|um| to_nm(um / 1000.0)) }
+    }
+
+    /// Returns the index of a layer, if there is one.
+    pub(super) fn index(&self, layer: u32) -> Option<u32> {
+        self.findings.layers.get(layer as usize).map(|facts| facts.index)
+    }
+
+    /// Returns the height of a layer's top.
+    pub(super) fn top_mm(&self, layer: u32) -> Option<f64> {
+        let facts = &self.findings.layers[layer as usize];
+        Some(to_nm((facts.z_um? + facts.thickness_um?) / 1000.0))
+    }
+
+    /// Returns how thick layers are together, if each has a thickness.
+    pub(super) fn height_mm(&self, layers: RangeInclusive<u32>) -> Option<f64> {
+        let layers = &self.findings.layers[*layers.start() as usize..=*layers.end() as usize];
+        let um: Option<f64> = layers.iter().map(|layer| layer.thickness_um).sum();
+        Some(to_nm(um? / 1000.0))
     }
 
     pub(super) fn span(&self, layers: [u32; 2]) -> LayerSpan {

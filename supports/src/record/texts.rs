@@ -189,10 +189,17 @@ impl fmt::Display for FindingRecord {
                  wall too thin for the pixels"
             ),
             Self::WeakJoint(joint) => joint.fmt(f),
-            Self::Trap(pocket) => pocket.write(f, "has no way out"),
-            Self::Cup(pocket) => pocket.write(f, "opens at the top only"),
-            Self::Sealed(pocket) => pocket.write(f, "is closed by the platform"),
-            Self::Narrow(pocket) => pocket.write(f, "has only narrow ways out"),
+            Self::Trap(pocket) => pocket.write(f, "of resin stay in the part: there is no way out"),
+            Self::Cup(pocket) => {
+                pocket.write(f, "of resin stay when the part is lifted out")?;
+                pocket.write_rim(f)
+            }
+            Self::Sealed(pocket) => {
+                pocket.write(f, "open at the platform only: suction when the part is pulled off")
+            }
+            Self::Narrow(pocket) => {
+                pocket.write(f, "of resin stay behind ways out that are narrow")
+            }
             Self::Overhang(overhang) => overhang.fmt(f),
             Self::OffBalance(off) => off.fmt(f),
             Self::Border(border) => {
@@ -253,6 +260,19 @@ impl PocketRecord {
     fn write(&self, f: &mut fmt::Formatter<'_>, closed: &str) -> fmt::Result {
         let volume = volume_text(self.volume_px, self.volume_mm3);
         write!(f, "{} around {}: {volume} {closed}", self.layers, self.middle)
+    }
+
+    fn write_rim(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.depth_mm, self.rim_mm) {
+            (Some(depth), Some(rim)) => {
+                let depth = length_text(0.0, Some(depth));
+                write!(f, ", {depth} deep up to the rim at z {rim:.2} mm")
+            }
+            _ => match self.rim_layer {
+                Some(layer) => write!(f, ", up to the rim in layer {layer}"),
+                None => f.write_str(", up to the rim"),
+            },
+        }
     }
 }
 

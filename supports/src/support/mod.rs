@@ -42,6 +42,9 @@ pub struct SupportOptions {
     pub radius: Length,
     /// The widest piece of an island that one support holds.
     pub hold: Length,
+    /// The share of an island's first layer that its supports must hold. More than one support in
+    /// a piece may be needed for that.
+    pub least_support: f64,
     /// The level from which a gray pixel is white.
     pub threshold: NonZeroU8,
 }
@@ -57,6 +60,7 @@ impl Default for SupportOptions {
             keep: 3,
             radius: Length::from_um(250.0),
             hold: Length::from_mm(2.0),
+            least_support: 0.25,
             threshold: NonZeroU8::MIN,
         }
     }

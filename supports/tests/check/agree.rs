@@ -43,9 +43,16 @@ pub(crate) fn agree_as(layers: Vec<Layer>, block: &Block, limits: &Limits) {
 
 /// Checks layers.
 pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
+    let pitch_um = layers[0].dpi.unwrap().pitch().um();
     let options = CheckOptions {
         threshold: THRESHOLD,
-        speck: NonZeroU32::new(limits.speck as u32).unwrap(),
+        // Half a pixel less, so that no length is rounded up to one pixel more.
+        speck: match limits.speck.0 {
+            1 => Length::default(),
+            side => Length::from_um((side as f64 - 0.5) * pitch_um),
+        },
+        speck_layers: NonZeroU32::new(limits.speck.1 as u32).unwrap(),
+        rounding: NonZeroU32::new(limits.rounding as u32).unwrap(),
         least_support: limits.least_support,
         max_overhang: limits.max_overhang_um.map(Length::from_um),
         drain: limits.drain_um.map(Length::from_um),
@@ -72,7 +79,8 @@ pub(crate) fn layers(block: &Block, image: &dyn Fn(usize) -> Image) -> Vec<Layer
     (0..block.size[2]).map(layer).collect()
 }
 
-fn mask(block: &Block, layer: usize) -> Mask {
+/// Returns the image of a layer of a block.
+pub(crate) fn mask(block: &Block, layer: usize) -> Mask {
     let [columns, rows, _] = block.size;
     let mut builder = MaskBuilder::new(columns as u32);
     for row in 0..rows {

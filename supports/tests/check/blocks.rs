@@ -3,9 +3,10 @@
 use proptest::prelude::*;
 
 use lamp_stack::GrayMask;
+use lamp_supports::{Pocket, PocketKind};
 
-use super::agree::{THRESHOLD, agree, agree_as, layers};
-use super::referee::{Block, Limits};
+use super::agree::{THRESHOLD, agree, agree_as, check, layers, mask};
+use super::referee::{Block, Limits, holes};
 
 /// Returns blocks of a size: boxes painted over each other, the first one white and from the
 /// platform up, then single voxels turned over.
@@ -44,9 +45,11 @@ fn blocks(size: [usize; 3], noise: usize) -> impl Strategy<Value = Block> {
 fn limits() -> impl Strategy<Value = Limits> {
     let overhang_um = proptest::option::of(20.0..400.0);
     let drain_um = proptest::option::of(50.0..500.0);
-    let limits = (1..4usize, 0.0..1.0, overhang_um, drain_um);
-    limits.prop_map(|(speck, least_support, max_overhang_um, drain_um)| Limits {
+    let speck = (1..4usize, 1..6usize);
+    let limits = (speck, 1..4usize, 0.0..1.0, overhang_um, drain_um);
+    limits.prop_map(|(speck, rounding, least_support, max_overhang_um, drain_um)| Limits {
         speck,
+        rounding,
         least_support,
         max_overhang_um,
         drain_um,
@@ -59,6 +62,25 @@ proptest! {
     #[test]
     fn blocks_of_boxes_agree(block in blocks([12, 10, 8], 6), limits in limits()) {
         agree(&block, &limits);
+    }
+
+    #[test]
+    fn no_hole_is_called_sealed(block in blocks([10, 9, 7], 60)) {
+        let limits = Limits {
+            speck: (1, 1),
+            rounding: 1,
+            least_support: 0.0,
+            max_overhang_um: None,
+            drain_um: None,
+        };
+        let found = check(layers(&block, &|layer| mask(&block, layer).into()), &limits);
+        let sealed = found.pockets.list.iter().filter(|it| it.kind == PocketKind::Sealed);
+        let first = |it: &Pocket| block.at([it.first[0] as usize, it.first[1] as usize, 0]);
+        let mut sealed: Vec<usize> = sealed.map(first).collect();
+        let mut holes = holes(&block).concat();
+        holes.sort_unstable();
+        sealed.retain(|voxel| holes.binary_search(voxel).is_ok());
+        prop_assert!(sealed.is_empty(), "{sealed:?}");
     }
 
     #[test]

@@ -11,8 +11,13 @@ use lamp_supports::{Findings, IslandEnd, PocketKind};
 use super::agree::{agree_as, check};
 use super::referee::{Block, Limits};
 
-const LIMITS: Limits =
-    Limits { speck: 3, least_support: 0.25, max_overhang_um: None, drain_um: None };
+const LIMITS: Limits = Limits {
+    speck: (3, 10),
+    rounding: 3,
+    least_support: 0.25,
+    max_overhang_um: None,
+    drain_um: None,
+};
 
 /// A tenth of a millimeter.
 const FINE_DPI: f64 = 254.0;
@@ -189,10 +194,17 @@ fn an_arch_hangs_over_by_half_its_span() {
 
 /// One pass up the layers and one down, as others make, call it a trap.
 #[test]
-fn a_serpentine_drains_through_its_one_opening_where_that_is_at_the_side() {
-    for placement in [upright(), upside_down()] {
-        assert_eq!(pockets(&finely(serpentine(1000), placement)), []);
+fn a_serpentine_holds_what_its_bends_hold() {
+    // Two bends open to the next leg at their top, 16 mm above their floor.
+    for (placement, bend) in [(upright(), [20, 179]), (upside_down(), [40, 199])] {
+        let found = pockets(&finely(serpentine(1000), placement));
+        for (kind, layers, mm3) in &found {
+            assert_eq!((*kind, *layers), (PocketKind::Cup, bend));
+            near(*mm3, 136.0, 1e-12);
+        }
+        assert_eq!(found.len(), 2);
     }
+    // Lying, it is level: all of it opens upward, or downward to the platform.
     for (degrees, kind) in [(90.0, PocketKind::Cup), (-90.0, PocketKind::Sealed)] {
         let found = finely(serpentine(1000), upright().rotated(Axis::Y, degrees));
         let [(found, _, mm3)] = pockets(&found)[..] else { panic!("{:?}", found.pockets) };

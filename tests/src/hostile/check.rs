@@ -1,12 +1,12 @@
 //! Checks of arbitrary stacks.
 
-use lamp_stack::{Dpi, Layer, Mask, MaskBuilder, Orientation, PageInfo, Pages};
+use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Pages};
 use lamp_supports::{CheckError, CheckOptions, Findings, IslandEnd};
 
 use super::{MAX_ROWS, decoded, file_of, one_line};
 
-/// Checks bytes as a stack, and as the pixels of a small one: columns, rows and the side of a
-/// speck, then eight pixels a byte. The findings fit the images, and mirrored or turned images have
+/// Checks bytes as a stack, and as the pixels of a small one: columns, rows and the side of
+/// squares, then eight pixels a byte. The findings fit the images, and mirrored or turned images have
 /// the same findings.
 ///
 /// # Panics
@@ -18,11 +18,12 @@ pub fn check(bytes: &[u8]) {
     {
         find(&layers, &CheckOptions::default());
     }
-    if let [columns, rows, speck, pixels @ ..] = bytes {
+    if let [columns, rows, side, pixels @ ..] = bytes {
         let size = [columns, rows].map(|size| u32::from(size % 24 + 1));
-        let speck = u32::from(speck % 4 + 1).try_into().expect("it is not zero");
+        let rounding = u32::from(side % 4 + 1).try_into().expect("it is not zero");
+        let speck = Length::from_um(63.5 * f64::from(side % 4));
         let layers = block(size, pixels);
-        find(&layers, &CheckOptions { speck, ..CheckOptions::default() });
+        find(&layers, &CheckOptions { speck, rounding, ..CheckOptions::default() });
     }
 }
 
@@ -101,7 +102,7 @@ fn fits(found: &Findings, layers: &[Layer]) {
             IslandEnd::Loose => layers,
             IslandEnd::JoinsPart { layer } => layer,
             IslandEnd::JoinsIsland { layer, number } => {
-                assert!(number < island.number);
+                assert!(number != island.number);
                 layer
             }
         };
@@ -119,7 +120,7 @@ fn white_pixels(layer: &Layer) -> u64 {
 
 /// Returns the findings that do not depend on where rows and columns begin.
 fn counts(found: &Findings) -> String {
-    // Which of two islands born in one layer is the elder, and so which is a speck, depends.
+    // Which of two equal islands born in one layer goes on, and so which is a speck, depends.
     let islands = found.islands.count() + found.specks.count();
     let mut joints: Vec<_> = found
         .weak_joints

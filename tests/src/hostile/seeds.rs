@@ -363,7 +363,7 @@ fn g4_codes() -> Named {
     ]
 }
 
-/// Stacks to check, and blocks of pixels: columns, rows and speck, each less one, then bits.
+/// Stacks to check, and blocks of pixels: columns, rows and squares, each less one, then bits.
 fn blocks() -> Named {
     let block = |solid: fn(i32, i32, i32) -> bool| {
         let voxels =

@@ -40,7 +40,7 @@ use report::write_report;
 /// gets a line, as do weak joints, pockets that hold resin, overhangs, unbalanced bodies, white at
 /// the border and empty layers; the worst come first. A part is sliced first, with the options of
 /// `slice`; its mesh also shows where islands must be. Only the report lists effects of rounding to
-/// pixels, and islands too small for a square of --speck pixels.
+/// pixels, and islands that are neither as wide as --speck nor float for --speck-layers.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:

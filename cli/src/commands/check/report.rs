@@ -12,7 +12,7 @@ use crate::exit::Exit;
 use crate::output::json_report::JsonReport;
 
 /// The form of the report.
-const SCHEMA: &str = "lamp-check-1";
+const SCHEMA: &str = "lamp-check-2";
 
 /// Writes the findings in all inputs, and the specks.
 pub(super) fn write_report(

@@ -149,7 +149,7 @@ fn findings(found: &Found) -> Markup {
                 }
             }
         }
-        @if specks > 0 { p.note { (specks) " specks: islands that never hold a square of 3 x 3 pixels." } }
+        @if specks > 0 { p.note { (specks) " specks: islands too small to count." } }
     }
 }
 

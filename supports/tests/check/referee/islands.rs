@@ -16,7 +16,7 @@ pub(crate) struct Island {
     pub(crate) centroid: [f64; 2],
     /// Of the component it was born as.
     pub(crate) frame: Frame,
-    /// The layer where it joined an elder body, and that body's number among all islands;
+    /// The layer where it joined a larger body, and that body's number among all islands;
     /// `None` for the part.
     pub(crate) joins: Option<(usize, Option<usize>)>,
     /// The pixels of its floating layers.
@@ -27,7 +27,9 @@ pub(crate) struct Island {
     pub(crate) largest_area: usize,
     /// The first layer with that area.
     pub(crate) largest_layer: usize,
-    /// True if no component of a floating layer holds a square.
+    /// The number of floating layers.
+    pub(crate) floating_layers: usize,
+    /// True if no component of a floating layer holds a square, and there are few such layers.
     pub(crate) is_speck: bool,
 }
 
@@ -122,9 +124,19 @@ pub(crate) fn islands(block: &Block, limits: &Limits) -> Vec<Island> {
     let mut growth = Growth::new(block);
     let mut found: Vec<Option<Island>> = Vec::new();
     for layer in 0..block.size[2] {
-        for (birth, elder) in growth.grow(layer) {
-            if let Some(island) = &mut found[birth] {
-                island.joins = Some((layer, (!growth.stands(elder)).then_some(elder)));
+        growth.grow(layer);
+        for eldest in (0..found.len()).filter(|&birth| growth.is_eldest(birth)) {
+            let its = (0..found.len()).filter(|&birth| growth.name(birth) == eldest);
+            let floats =
+                |&birth: &usize| found[birth].as_ref().is_some_and(|it| it.joins.is_none());
+            let floating: Vec<usize> = its.filter(floats).collect();
+            let volume = |birth: usize| found[birth].as_ref().unwrap().floating_mm3;
+            // The part, or the largest one; of equals the first.
+            let larger =
+                |a: usize, b: usize| if volume(b) > volume(a) * (1.0 + 1e-9) { b } else { a };
+            let stays = floating.iter().copied().reduce(larger).filter(|_| !growth.stands(eldest));
+            for birth in floating.into_iter().filter(|&birth| Some(birth) != stays) {
+                found[birth].as_mut().unwrap().joins = Some((layer, stays));
             }
         }
         for birth in found.len()..growth.births.len() {
@@ -159,6 +171,7 @@ fn born(growth: &Growth, birth: usize) -> Island {
         floating_mm3: 0.0,
         largest_area: 0,
         largest_layer: layer,
+        floating_layers: 0,
         is_speck: true,
     }
 }
@@ -170,14 +183,18 @@ fn float(growth: &Growth, layer: usize, limits: &Limits, found: &mut [Option<Isl
         let Some(island) = island.as_mut().filter(|island| island.joins.is_none()) else {
             continue;
         };
+        let name = growth.name(birth);
         let its: Vec<usize> =
-            block.layer(layer).filter(|&voxel| growth.names[voxel] == Some(birth)).collect();
+            block.layer(layer).filter(|&voxel| growth.names[voxel] == Some(name)).collect();
+        // A body that has ended floats no more.
+        island.floating_layers += usize::from(!its.is_empty());
         island.floating_pixels += its.len();
         island.floating_mm3 += block.mm3(layer, its.len());
         if its.len() > island.largest_area {
             (island.largest_area, island.largest_layer) = (its.len(), layer);
         }
-        island.is_speck &= !block.hold_square(&its, limits.speck);
+        island.is_speck &= !block.hold_square(&its, limits.speck.0);
+        island.is_speck &= island.floating_layers < limits.speck.1;
     }
 }
 
@@ -198,7 +215,7 @@ pub(crate) fn weak_joints(block: &Block, limits: &Limits) -> Vec<Joint> {
                 support,
                 centroid: block.centroid(&component),
                 frame: Frame::around(block, &component),
-                is_speck: !block.hold_square(&component, limits.speck),
+                is_speck: !block.hold_square(&component, limits.rounding),
             });
         }
     }

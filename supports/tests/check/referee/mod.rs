@@ -15,7 +15,7 @@ use std::ops::Range;
 pub(crate) use balance::tilts;
 pub(crate) use islands::{islands, weak_joints};
 pub(crate) use overhangs::{overhangs, patches};
-pub(crate) use pockets::{Kind, narrow_pockets, pockets};
+pub(crate) use pockets::{Kind, holes, narrow_pockets, pockets};
 
 /// A block of voxels: layer after layer from the bottom, each row after row from the top.
 #[derive(Clone)]
@@ -49,8 +49,11 @@ impl fmt::Debug for Block {
 /// Limits of the findings.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
-    /// The side in pixels of the square that more than a speck holds.
-    pub(crate) speck: usize,
+    /// The side in pixels of the square that more than a speck holds, and the number of layers that
+    /// it floats for.
+    pub(crate) speck: (usize, usize),
+    /// The side in pixels of the square that any other finding holds.
+    pub(crate) rounding: usize,
     /// The least part of a component's area that must be supported.
     pub(crate) least_support: f64,
     /// How far an overhang may reach, in µm; `None` for the layer's thickness.

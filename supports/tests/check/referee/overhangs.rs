@@ -48,7 +48,7 @@ pub(crate) fn patches(block: &Block, limits: &Limits) -> Vec<Patch> {
                 area: patch.len(),
                 reach_um: patch.iter().map(|voxel| reach_um[voxel]).fold(0.0, f64::max),
                 frame: Frame::around(block, &patch),
-                is_speck: !block.hold_square(&patch, limits.speck),
+                is_speck: !block.hold_square(&patch, limits.rounding),
             });
         }
     }
