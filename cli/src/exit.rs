@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 
 use lamp_batch::BatchError;
-use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
+use lamp_build::{FieldsError, LayoutError, RecipeError, TileError};
 use lamp_edit::EditError;
 use lamp_gantry::GantryError;
 use lamp_grayscale::DitherError;
@@ -182,7 +182,7 @@ failures!(
     DitherError,
     EditError,
     TileError,
-    StripsError,
+    FieldsError,
     GantryError,
     LayoutError,
     RecipeError,

@@ -7,12 +7,13 @@ mod args;
 mod catalogue;
 mod commands;
 mod exit;
+mod field_folder;
 mod kept_stack;
 mod output;
 mod second_opinion;
 mod stages;
 mod streams;
-mod strip_folder;
+
 mod terminal;
 
 use std::process::ExitCode;

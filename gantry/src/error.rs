@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use lamp_build::{StripsError, SwathsError};
+use lamp_build::{FieldsError, SwathsError};
 use lamp_machine::MachineLimit;
 use lamp_stack::StackError;
 use thiserror::Error;
@@ -20,7 +20,7 @@ pub enum GantryError {
     Stack(#[from] StackError),
     /// A folder of strips cannot be read.
     #[error(transparent)]
-    Strips(#[from] StripsError),
+    Strips(#[from] FieldsError),
     /// There are no such swaths.
     #[error(transparent)]
     Swaths(#[from] SwathsError),
@@ -58,6 +58,12 @@ pub enum GantryError {
         /// The machine's mirrors across, and shared columns.
         scan: [u32; 2],
     },
+    /// The build was cut for a projector that steps.
+    #[error(
+        "its fields are for a projector that steps, and a job plans a scan: put the build together \
+         first (lamp join)"
+    )]
+    Fields,
     /// Strips have seams already.
     #[error("its strips were cut with a {0} seam: give the build for another seam")]
     CutSeam(&'static str),

@@ -480,9 +480,9 @@ fn layout(
     if scan.tilt.is_some() {
         return Err(GantryError::TiltedStrips);
     }
-    if [form.mirrors, form.overlap] != [mirrors, overlap] {
+    if [form.width, form.overlap] != [mirrors, overlap] {
         return Err(GantryError::OtherStrips {
-            strips: [form.mirrors, form.overlap],
+            strips: [form.width, form.overlap],
             machine: machine.name.clone(),
             scan: [mirrors, overlap],
         });

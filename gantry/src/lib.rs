@@ -42,4 +42,4 @@ pub use mirrors::{MirrorArray, MirrorError};
 pub use motion::move_s;
 pub use source::{BuildPages, SwathLayout};
 pub use tilt::TiltedMirrors;
-pub use time::{BuildClock, BuildTime, SwathTime};
+pub use time::{BuildClock, BuildTime, FieldTime, SwathTime};

@@ -3,7 +3,9 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use lamp_build::{Seam, StripForm, StripsError, Swaths, check_number, is_strips, strip_files};
+use lamp_build::{
+    FieldFile, FieldForm, FieldKind, FieldsError, Seam, Swaths, field_files, is_fields,
+};
 use lamp_stack::{
     Dpi, Frame, Image, IndexedStack, PageHeader, StackError, digest_of, digest_of_digests,
 };
@@ -19,9 +21,9 @@ pub struct BuildPages {
     path: PathBuf,
     /// A stack, or one for each strip.
     stacks: Vec<IndexedStack>,
-    /// The names of the strips' files; none of a stack.
-    files: Vec<String>,
-    form: Option<StripForm>,
+    /// The strips' files; none of a stack.
+    files: Vec<FieldFile>,
+    form: Option<FieldForm>,
     size: [u32; 2],
     dpi: Dpi,
 }
@@ -30,14 +32,17 @@ impl BuildPages {
     /// Opens a build: a stack as [`IndexedStack::open`] does, or a folder of strips.
     ///
     /// # Errors
-    /// Returns an error if it cannot be read whole, has pages of several sizes, or states no
-    /// resolution.
+    /// Returns an error if it cannot be read whole, has pages of several sizes, states no
+    /// resolution, or is a folder of fields of a projector that steps.
     pub fn open(path: &Path) -> Result<Self, GantryError> {
-        let (files, form, width) = if is_strips(path) {
-            let strips = strip_files(path)?;
+        let (files, form, width) = if is_fields(path) {
+            let form = FieldForm::of(path)?;
+            if form.kind() == FieldKind::Field {
+                return Err(GantryError::Fields);
+            }
+            let strips = field_files(path)?;
             let width = strips.last().map_or(0, |strip| strip.columns.end);
-            let names: Vec<_> = strips.into_iter().map(|strip| strip.name).collect();
-            (names, Some(StripForm::of(path)?), Some(width))
+            (strips, Some(form), Some(width))
         } else {
             (Vec::new(), None, None)
         };
@@ -46,8 +51,8 @@ impl BuildPages {
             None => vec![open(path)?],
             Some(_) => {
                 let opened = files.iter().map(|file| {
-                    let in_file = |source| StripsError::In { file: file.clone(), source };
-                    open(&path.join(file)).map_err(in_file)
+                    let in_file = |source| FieldsError::In { file: file.name.clone(), source };
+                    open(&path.join(&file.name)).map_err(in_file)
                 });
                 opened.collect::<Result<_, _>>()?
             }
@@ -56,16 +61,13 @@ impl BuildPages {
         let is_alike = |(page, of_first): (&PageHeader, &PageHeader)| {
             (page.info.index, page.size, page.dpi) == (of_first.info.index, first.size, first.dpi)
         };
-        for (strip, number) in stacks.iter().zip(0..) {
+        for (number, strip) in stacks.iter().enumerate() {
             let (pages, of_first) = (strip.headers(), stacks[0].headers());
             if pages.len() != of_first.len() || !pages.iter().zip(of_first).all(is_alike) {
                 return Err(GantryError::UnlikePages);
             }
-            for page in pages.iter().filter(|_| form.is_some()) {
-                check_number(&page.info, number).map_err(|difference| StripsError::Unlike {
-                    file: files[number as usize].clone(),
-                    difference,
-                })?;
+            if let Some(file) = files.get(number) {
+                pages.iter().try_for_each(|page| file.check(&page.info))?;
             }
         }
         let dpi = first.dpi.ok_or(GantryError::NoResolution)?;
@@ -89,13 +91,13 @@ impl BuildPages {
     }
 
     /// Returns how the build was cut into strips, if it was.
-    pub fn form(&self) -> Option<StripForm> {
+    pub fn form(&self) -> Option<FieldForm> {
         self.form
     }
 
     /// Returns the name of a strip's file, if the build is a folder of strips.
     pub fn strip(&self, swath: u32) -> Option<&str> {
-        self.files.get(swath as usize).map(String::as_str)
+        self.files.get(swath as usize).map(|file| file.name.as_str())
     }
 
     /// Returns the digest of the build's files: of one, or of all in the order of their names.
@@ -130,8 +132,8 @@ impl BuildPages {
         let mut images: Vec<Image> =
             self.stacks.iter().map(read).collect::<Result<_, StackError>>()?;
         let Some(form) = self.form else { return Ok(images.swap_remove(0)) };
-        let swaths = Swaths::new(form.mirrors, form.overlap, self.size[0])?;
-        let joined = swaths.join(&images).map_err(|source| StripsError::Join {
+        let swaths = Swaths::new(form.width, form.overlap, self.size[0])?;
+        let joined = swaths.join(&images).map_err(|source| FieldsError::Join {
             layer: self.headers()[page].info.name(),
             source,
         })?;

@@ -1,6 +1,6 @@
 //! How long a build takes on a machine.
 
-use lamp_build::{Swaths, SwathsError};
+use lamp_build::{FieldForm, FieldsError, Seam, Swaths, SwathsError};
 use lamp_machine::Machine;
 use lamp_stack::{Dpi, Image, PageInfo};
 
@@ -21,7 +21,9 @@ pub struct BuildTime {
     pub recoating_s: Option<f64>,
     /// The swaths of a projector that scans.
     pub swaths: Option<SwathTime>,
-    /// Why the machine cannot scan the build, as a sentence.
+    /// The fields of a projector that steps.
+    pub fields: Option<FieldTime>,
+    /// Why the machine cannot expose the build, as a sentence.
     pub unscanned: Option<String>,
 }
 
@@ -37,6 +39,27 @@ pub struct SwathTime {
     pub seconds: f64,
 }
 
+/// How long the fields of a build take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldTime {
+    /// The number of fields that hold white, in all layers.
+    pub count: u64,
+    /// The number of fields that are left out, as they are black.
+    pub black: u64,
+    /// The exposures of these fields in seconds, if each layer's is known.
+    pub exposure_s: Option<f64>,
+    /// The steps between fields of a layer in seconds, if the machine's are known.
+    pub steps_s: Option<f64>,
+}
+
+impl FieldTime {
+    /// Returns the time of exposures and steps in seconds, if the exposures are known. Steps count if
+    /// they are known.
+    pub fn seconds(&self) -> Option<f64> {
+        Some(self.exposure_s? + self.steps_s.unwrap_or(0.0))
+    }
+}
+
 impl BuildTime {
     /// Returns the time of the build in seconds, if the time of its light is known. Swaths take
     /// their own time: the exposure of a place passes while a swath goes over it. Recoating counts
@@ -45,7 +68,11 @@ impl BuildTime {
         if self.unscanned.is_some() {
             return None;
         }
-        let light_s = self.swaths.map(|swaths| swaths.seconds).or(self.exposure_s);
+        let light_s = match (self.fields, self.swaths) {
+            (Some(fields), _) => fields.seconds(),
+            (None, Some(swaths)) => Some(swaths.seconds),
+            (None, None) => self.exposure_s,
+        };
         Some(light_s? + self.recoating_s.unwrap_or(0.0))
     }
 }
@@ -54,7 +81,8 @@ impl BuildTime {
 ///
 /// A layer is recoated once. On a machine with `[scan]`, its swaths take the times that
 /// [`Job::plan`](crate::Job::plan) finds, with a comb. On a machine with `[strips]` and a swath speed v,
-/// it is exposed in n swaths of the images' height L, which take n L / v and n - 1 steps.
+/// it is exposed in n swaths of the images' height L, which take n L / v and n - 1 steps. Where a
+/// layer is cut into fields, its n fields that hold white take n exposures and n - 1 steps.
 #[derive(Debug)]
 pub struct BuildClock {
     machine: Option<Machine>,
@@ -66,7 +94,20 @@ pub struct BuildClock {
     sums: JobSums,
     /// Swaths of a machine without `[scan]`.
     steady: Option<SwathTime>,
+    /// How layers are cut into fields, and the sums of these.
+    form: Option<FieldForm>,
+    fields: FieldSums,
     unscanned: Option<String>,
+}
+
+/// The sums of the fields of all layers.
+#[derive(Debug, Default)]
+struct FieldSums {
+    count: u64,
+    black: u64,
+    steps: u64,
+    /// None once a layer that holds white states no exposure.
+    exposure_ms: Option<f64>,
 }
 
 impl BuildClock {
@@ -80,13 +121,24 @@ impl BuildClock {
             planner: None,
             sums: JobSums::default(),
             steady: None,
+            form: machine.and_then(|machine| machine.fields.as_ref()).map(|fields| {
+                let ([width, height], overlap) = (fields.pixels, fields.overlap);
+                FieldForm { width, height: Some(height), overlap, seam: Seam::default() }
+            }),
+            fields: FieldSums { exposure_ms: Some(0.0), ..FieldSums::default() },
             unscanned: None,
         }
     }
 
+    /// Counts such fields, in place of the swaths or the fields of the machine.
+    #[must_use]
+    pub fn with_fields(self, form: FieldForm) -> Self {
+        Self { form: Some(form), ..self }
+    }
+
     /// Returns whether the images of layers decide the time, and not their size alone.
     pub fn needs_images(&self) -> bool {
-        self.mirrors.is_some()
+        self.form.is_some() || self.mirrors.is_some()
     }
 
     /// Adds a layer of so many columns and rows. Its image counts only if images are
@@ -97,6 +149,13 @@ impl BuildClock {
         let exposure_ms = info.exposure_ms.or(usual_ms);
         self.layers += 1;
         self.exposure_ms = self.exposure_ms.zip(exposure_ms).map(|(sum, ms)| sum + ms);
+        if let Some(form) = self.form {
+            if self.unscanned.is_none() {
+                let added = self.fields.add(&form, info.index, exposure_ms, image);
+                self.unscanned = added.err().map(|error| error.to_string());
+            }
+            return;
+        }
         let Some(dpi) = dpi else { return };
         match (&self.machine, self.mirrors.is_some()) {
             (Some(machine), false) => {
@@ -167,8 +226,47 @@ impl BuildClock {
             layers: self.layers,
             exposure_s: self.exposure_ms.map(|ms| ms / 1000.0),
             recoating_s,
-            swaths: if self.needs_images() { scanned() } else { self.steady },
+            swaths: if self.mirrors.is_some() && self.form.is_none() {
+                scanned()
+            } else {
+                self.steady
+            },
+            fields: self.form.map(|_| self.fields.time(self.machine.as_ref())),
             unscanned: self.unscanned.clone(),
+        }
+    }
+}
+
+impl FieldSums {
+    /// Adds a layer's fields.
+    fn add(
+        &mut self,
+        form: &FieldForm,
+        layer: u32,
+        exposure_ms: Option<f64>,
+        image: &Image,
+    ) -> Result<(), FieldsError> {
+        let fields = form.fields([image.width(), image.height()])?;
+        let cut = fields.cut(image, layer, 0..fields.count());
+        let white = cut.iter().filter(|field| field.change_count() > 0).count() as u64;
+        self.count += white;
+        self.black += u64::from(fields.count()) - white;
+        // The way to a layer's first field is within its recoating.
+        self.steps += white.saturating_sub(1);
+        if white > 0 {
+            let fields_ms = exposure_ms.map(|ms| ms * white as f64);
+            self.exposure_ms = self.exposure_ms.zip(fields_ms).map(|(sum, ms)| sum + ms);
+        }
+        Ok(())
+    }
+
+    fn time(&self, machine: Option<&Machine>) -> FieldTime {
+        let step_s = machine.and_then(|machine| machine.fields.as_ref()?.step_s);
+        FieldTime {
+            count: self.count,
+            black: self.black,
+            exposure_s: self.exposure_ms.map(|ms| ms / 1000.0),
+            steps_s: step_s.map(|seconds| seconds * self.steps as f64),
         }
     }
 }
@@ -252,6 +350,27 @@ mod tests {
         let none = time_on(None, None, &exposures);
         assert_eq!((none.exposure_s, none.recoating_s, none.swaths), (None, None, None));
     }
+
+    #[test]
+    fn fields_that_hold_white_take_an_exposure_each_and_the_steps_between() {
+        // White is in columns 0 to 99 and rows 50 to 149: in 2 x 2 fields of 60 x 100 of 17 x 4.
+        let fields = "[fields]\npixels = [60, 100]\noverlap = 0\nstep_s = 0.5\nsource = \"-\"\n";
+        let blade = "[times]\nrecoat_s = 7\nsource = \"-\"\n";
+        let both = time(&format!("{fields}{blade}"), &[Some(100.0), Some(200.0)]);
+        let of = both.fields.unwrap();
+        assert_eq!((of.count, of.black), (8, 2 * (17 * 4 - 4)));
+        assert!((of.exposure_s.unwrap() - 4.0 * 0.3).abs() < 1e-9);
+        assert_eq!((of.steps_s, both.swaths), (Some(2.0 * 3.0 * 0.5), None));
+        assert!((both.sum_s().unwrap() - (1.2 + 3.0 + 14.0)).abs() < 1e-9);
+        let unknown = time(fields, &[Some(100.0), None]);
+        assert_eq!((unknown.fields.unwrap().exposure_s, unknown.sum_s()), (None, None));
+        let no_step = time(&fields.replace("step_s = 0.5\n", ""), &[Some(100.0)]);
+        assert_eq!((no_step.fields.unwrap().steps_s, no_step.sum_s()), (None, Some(0.4)));
+        let tiny = time(&fields.replace("[60, 100]", "[1, 1]"), &[Some(100.0)]);
+        assert!(tiny.unscanned.as_ref().unwrap().contains("at most 512"), "{tiny:?}");
+        assert_eq!(tiny.sum_s(), None);
+    }
+
     #[test]
     fn scans_take_the_swaths_that_hold_white_at_the_speed_of_their_exposure() {
         let scan = "[scan]\nmirrors = [400, 50]\noverlap = 100\nspeed = [\"1mm/s\", \"100mm/s\"]\n\

@@ -2,7 +2,7 @@
 
 use lamp_adaptive::HeightsError;
 use lamp_batch::{BatchError, NightError, StoreError};
-use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
+use lamp_build::{FieldsError, LayoutError, RecipeError, TileError};
 use lamp_edit::EditError;
 use lamp_gantry::GantryError;
 use lamp_grayscale::DitherError;
@@ -56,7 +56,7 @@ errors!(
     SpeedPlan(SpeedPlanError),
     Stack(StackError),
     Store(StoreError),
-    Strips(StripsError),
+    Strips(FieldsError),
     Support(SupportError),
     Tile(TileError),
     View(ViewError),

@@ -97,8 +97,8 @@ pub use note::{ImagesBeside, PageGap, StackNote};
 pub use ordered::{MemorySize, map_in_order, take_batch};
 pub use plain_text::PlainText;
 pub use record::{
-    BuildRecord, BuiltPart, BuiltParts, CompensateRecord, DitherRecord, FixRecord, FixedBand,
-    PageRecord, SliceRecord, StripRecord,
+    BuildRecord, BuiltPart, BuiltParts, CompensateRecord, DitherRecord, FieldRecord, FixRecord,
+    FixedBand, PageRecord, SliceRecord, StripRecord,
 };
 pub use shell::{file_word, quoted, words};
 pub use significant::{format_significant, round_significant, to_nm};

@@ -126,6 +126,7 @@ fn json_says_what_is_known_of_machines() {
             "mirrors": 64,
             "overlap": 8,
             "scan": null,
+                "fields": null,
             "recoating_pa": null,
             "times": {
                 "recoat_s": 8.0,

@@ -23,6 +23,7 @@ mod dither;
 mod edit;
 mod errors;
 mod field_files;
+mod fields;
 mod fix;
 mod foreign_stacks;
 mod gantry;

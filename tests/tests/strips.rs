@@ -303,7 +303,7 @@ fn strips_that_do_not_belong_together_are_named() {
     with("strip_001.tif", &scratch.bytes("dots.tif"));
     refused(&["layer 0"]);
     let both = scratch.run("lamp join s other -o x.tif");
-    both.is_wrong_usage(&["s holds the strips of one build"]);
+    both.is_wrong_usage(&["s holds the strips or fields of one build"]);
 }
 
 #[test]

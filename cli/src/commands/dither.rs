@@ -1,14 +1,14 @@
 //! `lamp dither`: turns gray layers into dots.
 
 use clap::Args;
-use lamp_build::{Seam, StripForm};
+use lamp_build::{FieldForm, Seam};
 use lamp_pipeline::dither::DitherSettings;
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::DitherStageArgs;
 use crate::exit::Exit;
+use crate::field_folder::{read_stack_or_fields, write_stack_or_fields};
 use crate::streams::progress;
-use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 
 /// Turn gray layers into dots; 1-bit layers pass unchanged
 ///
@@ -17,8 +17,8 @@ use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 /// the same layer always becomes the same dots. Resin averages dots of 17 um, but not of 85 um, so
 /// pixels wider than 17 um cause a warning.
 ///
-/// The strips of a folder are joined into their build, which is dithered and cut into strips again
-/// with comb seams: no pixel of a seam is white in two strips.
+/// The strips or fields of a folder are joined into their build, which is dithered and cut again
+/// with comb seams: no pixel of a seam is white twice.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -40,10 +40,10 @@ pub(crate) struct DitherArgs {
 
 pub(crate) fn run(args: &DitherArgs, common: &Common) -> Result<(), Exit> {
     let progress = progress("dither", common, &args.output);
-    let layers = read_stack_or_strips(&args.input, &progress)?;
+    let layers = read_stack_or_fields(&args.input, &progress)?;
     let settings = DitherSettings::from(&args.settings);
     let dots = settings.layers(layers, &progress);
     // Dots on ramps would be dots of each side alone.
-    let by_comb = |form| StripForm { seam: Seam::Comb, ..form };
-    write_stack_or_strips(dots, &args.input, by_comb, &args.output, &progress)
+    let by_comb = |form| FieldForm { seam: Seam::Comb, ..form };
+    write_stack_or_fields(dots, &args.input, by_comb, &args.output, &progress)
 }

@@ -11,11 +11,11 @@ use lamp_stack::PageInfo;
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::FixStageArgs;
 use crate::exit::Exit;
+use crate::field_folder::{read_stack_or_fields, write_stack_or_fields};
 use crate::output::band_pictures::BandPictures;
 use crate::output::endings::parse_report;
 use crate::output::json_report::JsonReport;
 use crate::streams::{check_beside, progress, unless_found};
-use crate::strip_folder::{read_stack_or_strips, write_stack_or_strips};
 use crate::terminal::stack_notes::doubts;
 
 /// Find and correct stray rows, where a gap in the mesh lets white run across the image
@@ -29,8 +29,7 @@ use crate::terminal::stack_notes::doubts;
 /// sum them up; --verbose and --report list all changes. All other layers are passed on unchanged,
 /// byte for byte. In gray layers, outlines are corrected.
 ///
-/// The strips of a folder are joined into their build, which is corrected and cut into strips
-/// again.
+/// The strips or fields of a folder are joined into their build, which is corrected and cut again.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -75,7 +74,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     let mut evidence =
         evidence.map(|folder| BandPictures::new(folder, args.output.force)).transpose()?;
     let mut layer_count = 0;
-    let layers = read_stack_or_strips(&args.input, &progress)?.inspect(|_| layer_count += 1);
+    let layers = read_stack_or_fields(&args.input, &progress)?.inspect(|_| layer_count += 1);
     let fixed = fixing.layers(layers, 0..u32::MAX, |fixed| {
         for line in describe(fixed, &options) {
             progress.detail(&line);
@@ -89,7 +88,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         left.filter(|_| args.strict).map(Exit::Findings)
     };
     let fixed = unless_found(fixed, finding);
-    let written = write_stack_or_strips(fixed, &args.input, |form| form, &args.output, &progress);
+    let written = write_stack_or_fields(fixed, &args.input, |form| form, &args.output, &progress);
     // After a finding, the report and the pictures still show it.
     if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
         return written;

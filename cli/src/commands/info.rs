@@ -1,13 +1,13 @@
 //! `lamp info`: describes a stack.
 
 use clap::Args;
-use lamp_build::is_strips;
+use lamp_build::is_fields;
 use lamp_stack::{
     NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
 };
 use serde::Serialize;
 
-use super::info_strips::print_strips;
+use super::info_fields::print_fields;
 use crate::args::options::InputArgs;
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
@@ -18,7 +18,7 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 ///
 /// Only the directories and texts of pages are read, not their images: this takes a moment for a
 /// file of any size. Area and volume are the numbers stated on the pages. lamp verify also decodes
-/// the images. For a folder of strips, it describes each strip and the totals.
+/// the images. For a folder of strips or fields, it describes each and the totals.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -39,14 +39,14 @@ pub(crate) struct InfoArgs {
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
-    if is_strips(&args.input.stack) {
+    if is_fields(&args.input.stack) {
         if args.runs || args.input.layers.is_some() {
             return Err(Exit::usage(
-                "--runs and --layers are for one stack: name the file of a strip, or make one stack \
-                 of all with lamp join",
+                "--runs and --layers are for one stack: name the file of a strip or field, or make \
+                 one stack of all with lamp join",
             ));
         }
-        return print_strips(&args.input.stack, args.json);
+        return print_fields(&args.input.stack, args.json);
     }
     let pages = open_pages(&args.input.stack)?;
     let facts = if args.runs {

@@ -1,9 +1,9 @@
-//! `lamp join`: joins ranges of layers, or the strips of a build.
+//! `lamp join`: joins ranges of layers, or the strips or fields of a build.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_build::{is_strips, join_strips};
+use lamp_build::{is_fields, join_fields};
 use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
 
 use crate::args::options::{Common, Output};
@@ -23,7 +23,7 @@ use crate::terminal::stack_notes::print_note;
 /// build that lacks layers is scrap. Layers missing below the first or above the last are not
 /// noticed: `lamp info` shows how many layers there are.
 ///
-/// A folder of strips from `tile --strips` gives the build that they were cut from.
+/// A folder of strips or fields from `tile` gives the build that they were cut from.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +31,8 @@ Examples:
   slice blade.stl --layers 600.. | fix > high.tif
   lamp join low.tif high.tif -o blade.tif
   lamp join ranges/*.tif | tile > build.tif
-  lamp join strips/ -o build.tif")]
+  lamp join strips/ -o build.tif
+  lamp join fields/ -o build.tif")]
 pub(crate) struct JoinArgs {
     /// Stacks to join, files or folders of pages, in the order of their layers
     #[arg(value_name = "STACK", required = true)]
@@ -50,13 +51,13 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
     }
     let progress = progress("join", common, &args.output);
     match &args.stacks[..] {
-        // Strips are joined side by side, ranges of layers one above the other.
-        [folder] if is_strips(folder) => return join_one(folder, &args.output, &progress),
+        // Strips and fields are joined side by side, ranges of layers one above the other.
+        [folder] if is_fields(folder) => return join_one(folder, &args.output, &progress),
         stacks => {
-            if let Some(folder) = stacks.iter().find(|stack| is_strips(stack)) {
+            if let Some(folder) = stacks.iter().find(|stack| is_fields(stack)) {
                 let folder = folder.display();
                 return Err(Exit::usage(format!(
-                    "{folder} holds the strips of one build: join it by itself first"
+                    "{folder} holds the strips or fields of one build: join it by itself first"
                 )));
             }
         }
@@ -81,11 +82,11 @@ fn join_frames(stacks: &[PathBuf], output: &Output, progress: &Progress) -> Resu
     written_to(&output.output, joined.map_err(Exit::from), progress)
 }
 
-/// Puts the strips of a folder back together.
+/// Puts the strips or fields of a folder back together.
 fn join_one(folder: &Path, output: &Output, progress: &Progress) -> Result<(), Exit> {
     let name = input_name(folder);
     let failed = |error| Exit::from(error).at(name.clone());
-    let layers = join_strips(folder).map_err(failed)?;
+    let layers = join_fields(folder).map_err(failed)?;
     write_layers(counted(layers.map(|layer| layer.map_err(failed)), progress), output, progress)
 }
 

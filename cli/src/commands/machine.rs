@@ -117,7 +117,7 @@ fn checked(path: &Path) -> Result<Machine, Exit> {
 /// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> Value {
     let Machine { name, description, area, height, dpi, thickness, .. } = machine;
-    let Machine { strips, scan, recoating, times, defaults, .. } = machine;
+    let Machine { strips, scan, fields, recoating, times, defaults, .. } = machine;
     let swaths = machine.swaths();
     json!({
         "name": name,
@@ -129,6 +129,12 @@ fn fields(machine: &Machine) -> Value {
         "mirrors": swaths.map(|(mirrors, _)| mirrors),
         "overlap": swaths.map(|(_, overlap)| overlap),
         "scan": scan.as_ref().map(scan_fields),
+        "fields": fields.as_ref().map(|fields| json!({
+            "pixels": fields.pixels,
+            "overlap": fields.overlap,
+            "step_s": fields.step_s,
+            "source": fields.source,
+        })),
         "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
         "times": times.as_ref().map(|times| json!({
             "recoat_s": times.recoat_s,

@@ -18,7 +18,7 @@ mod fix;
 mod frames;
 mod heights;
 mod info;
-mod info_strips;
+mod info_fields;
 mod job;
 mod join;
 mod learn;

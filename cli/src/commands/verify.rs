@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use lamp_build::{is_strips, join_strips};
+use lamp_build::{FieldForm, FieldKind, is_fields, join_fields};
 use lamp_stack::{StackTotals, VerifyError, digest_of, open_ending, stacks_in, verify};
 use serde::Serialize;
 
@@ -50,11 +50,11 @@ pub(crate) fn run(args: &VerifyArgs, common: &Common) -> Result<(), Exit> {
     let digests = digests.collect::<Result<Vec<_>, _>>()?;
     let mut verdicts = Vec::new();
     let stacks = stacks_at(&args.stacks)?;
-    // Strips of one build lie beside each other: their folder is checked once.
+    // Strips or fields of one build lie beside each other: their folder is checked once.
     let folders: BTreeSet<&Path> = stacks.iter().filter_map(|path| path.parent()).collect();
-    let strips = folders.into_iter().filter(|folder| is_strips(folder));
+    let cut = folders.into_iter().filter(|folder| is_fields(folder));
     let of_stacks = stacks.iter().map(|path| Verdict::of(path, &digests));
-    for verdict in of_stacks.chain(strips.map(Verdict::of_strips)) {
+    for verdict in of_stacks.chain(cut.map(Verdict::of_fields)) {
         if !args.json && (!common.quiet || verdict.result.is_err()) {
             // Each as soon as it is known: a folder may take hours.
             print(&format!("{}\n", printable(&verdict.line())))?;
@@ -96,9 +96,11 @@ fn stacks_at(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Exit> {
 /// The result of checking a stack.
 struct Verdict {
     name: String,
-    /// For a stack without fault, its facts (a folder of strips has no facts of its own); otherwise
+    /// For a stack without fault, its facts (a folder of strips or fields has none of its own); otherwise
     /// a sentence that names the stack and the fault.
     result: Result<Option<StackTotals>, String>,
+    /// The kind of fields in it, if it is a folder of them.
+    cut: Option<FieldKind>,
     /// Whether it was compared with parts.
     compared: bool,
 }
@@ -107,16 +109,17 @@ impl Verdict {
     fn of(path: &Path, digests: &[String]) -> Self {
         let result = Self::checked(path, digests).map(Some).map_err(|error| error.to_string());
         // The first page has named the part of standard input.
-        Self { name: input_name(path), result, compared: !digests.is_empty() }
+        Self { name: input_name(path), result, cut: None, compared: !digests.is_empty() }
     }
 
-    /// Checks that the strips in a folder belong to one build.
-    fn of_strips(folder: &Path) -> Self {
+    /// Checks that the strips or fields in a folder belong to one build.
+    fn of_fields(folder: &Path) -> Self {
         let name = input_name(folder);
         let joined =
-            join_strips(folder).and_then(|mut layers| layers.try_for_each(|layer| layer.map(drop)));
+            join_fields(folder).and_then(|mut layers| layers.try_for_each(|layer| layer.map(drop)));
         let named = |error| Exit::from(error).at(name.clone()).to_string();
-        Self { result: joined.map(|()| None).map_err(named), name, compared: false }
+        let cut = FieldForm::of(folder).ok().map(|form| form.kind());
+        Self { result: joined.map(|()| None).map_err(named), name, cut, compared: false }
     }
 
     fn checked(path: &Path, digests: &[String]) -> Result<StackTotals, Exit> {
@@ -134,7 +137,10 @@ impl Verdict {
         let name = &self.name;
         let totals = match &self.result {
             Ok(Some(totals)) => totals,
-            Ok(None) => return format!("{name}: whole, the strips make one build"),
+            Ok(None) => {
+                let kind = self.cut.unwrap_or(FieldKind::Strip);
+                return format!("{name}: whole, the {kind}s make one build");
+            }
             Err(fault) => return fault.clone(),
         };
         let layers = totals.pages;

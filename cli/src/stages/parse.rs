@@ -34,7 +34,7 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 18] = [
+const REFUSED: [(&str, &str); 19] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
@@ -50,6 +50,7 @@ const REFUSED: [(&str, &str); 18] = [
         "strips",
         "leave out --strips: cut strips from the finished build, with lamp tile or lamp join",
     ),
+    ("fields", "leave out --fields: cut fields from the finished build, with lamp tile"),
     ("recipe", "leave out --recipe: run lamp tile by hand for the recipe"),
     ("time", "leave out --time: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),

@@ -374,6 +374,7 @@ fn what_follows_on_ranges_does_what_its_command_does() {
         Tiling::parse(&words, &[Some(1), None], bench.folder.path()).err().unwrap_or_default()
     };
     assert!(refused(&["--strips", "a/"]).contains("leave out --strips"));
+    assert!(refused(&["--fields", "9x9"]).contains("leave out --fields"));
     assert!(refused(&["--copies", "3"]).contains("--copies is for one stack"));
     assert!(refused(&["--layout", "none.json", "a.tif"]).contains("leave out the stacks"));
 }

@@ -6,7 +6,7 @@ use std::error::Error;
 use std::io;
 
 use lamp_adaptive::HeightsError;
-use lamp_build::{LayoutError, RecipeError, StripsError, TileError};
+use lamp_build::{FieldsError, LayoutError, RecipeError, TileError};
 use lamp_edit::{EditError, EditProblem, LayerProblem};
 use lamp_grayscale::calibrate::DataError;
 use lamp_grayscale::exposure::{ExposureError, LampError};
@@ -65,7 +65,7 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
         .or_else(|| error.downcast_ref().and_then(job))
         .or_else(|| error.downcast_ref().and_then(learning))
         .or_else(|| error.downcast_ref().and_then(plot))
-        .or_else(|| error.downcast_ref().and_then(strips))
+        .or_else(|| error.downcast_ref().and_then(fields))
         .or_else(|| error.downcast_ref().and_then(machine_limit))
         .or_else(|| error.downcast_ref().map(no_solid))
         .or_else(|| error.downcast_ref().and_then(data))
@@ -398,10 +398,11 @@ fn recipe(error: &RecipeError) -> Option<String> {
     Some(hint.to_owned())
 }
 
-fn strips(error: &StripsError) -> Option<String> {
+fn fields(error: &FieldsError) -> Option<String> {
     let hint = match error {
-        StripsError::TooMany { .. } => "give more --mirrors",
-        StripsError::Already { .. } => "lamp join makes the build of its folder again",
+        FieldsError::TooManyStrips { .. } => "give more --mirrors",
+        FieldsError::TooManyFields { .. } => "give larger --fields",
+        FieldsError::Already { .. } => "lamp join makes the build of its folder again",
         _ => return None,
     };
     Some(hint.to_owned())

@@ -1,4 +1,4 @@
-//! Makes the layers of a beta build and writes them, or their strips, to compare what both cost.
+//! Makes the layers of a beta build and writes them, or their strips or fields, to compare what both cost.
 //!
 //! ```sh
 //! lamp sample blade -o blade.stl
@@ -6,13 +6,16 @@
 //! cargo build --release -p lamp-build --example strips
 //! time target/release/examples/strips blade.tif build
 //! time target/release/examples/strips blade.tif strips/ 1920 64 comb
+//! time target/release/examples/strips blade.tif fields/ 2560x1600 4 comb
 //! ```
 
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use lamp_build::{HeightOptions, Layout, MeshOptions, Pack, PartStack, StripWriter, TileError};
+use lamp_build::{
+    FieldForm, FieldWriter, HeightOptions, Layout, MeshOptions, Pack, PartStack, TileError,
+};
 use lamp_stack::{EncodedPage, FolderBeside, Format, Layer, PageWriter, Pages};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -43,9 +46,13 @@ fn main() -> Result<(), Failure> {
         }
         [mirrors, overlap, seam] => {
             let folder = FolderBeside::replacing(Path::new(out))?;
-            let (mirrors, overlap) = (mirrors.parse()?, overlap.parse()?);
-            let mut strips =
-                StripWriter::new(folder, mirrors, overlap, seam.parse()?, Format::Big)?;
+            // WxH makes fields.
+            let (width, height) = match mirrors.split_once('x') {
+                Some((width, height)) => (width.parse()?, Some(height.parse()?)),
+                None => (mirrors.parse()?, None),
+            };
+            let form = FieldForm { width, height, overlap: overlap.parse()?, seam: seam.parse()? };
+            let mut strips = FieldWriter::new(folder, form, Format::Big)?;
             for layer in build {
                 strips.push(&layer?)?;
             }

@@ -8,8 +8,8 @@
 //!   build's. [`tile`] does all of this for one part.
 //! - [`MeshOptions`] says which mesh holds copies together.
 //! - A [`Composer`] makes any layer of a build by its [`Recipe`].
-//! - [`StripWriter`] cuts build layers into [`Swaths`] for a projector that scans, and
-//!   [`join_strips`] joins them again.
+//! - [`FieldWriter`] cuts build layers into [`Swaths`] for a projector that scans, or into
+//!   [`Fields`] for one that steps, and [`join_fields`] joins them again.
 //!
 //! Source: 002 section 2.4.2.
 
@@ -17,6 +17,7 @@ mod areas;
 mod black_parts;
 mod build_page;
 mod compose;
+mod fields;
 mod image_bounds;
 mod layout;
 mod layout_file;
@@ -29,7 +30,6 @@ mod part_stack;
 mod pixel_size;
 mod placed;
 mod recipe;
-mod strips;
 #[cfg(test)]
 mod testing;
 mod tile;
@@ -41,6 +41,10 @@ mod turned;
 pub use areas::{CuredPixels, LayerAreas};
 pub use build_page::StrayRows;
 pub use compose::{ComposeError, PlacedImage, united};
+pub use fields::{
+    FieldDifference, FieldFile, FieldForm, FieldKind, FieldPlace, FieldWriter, Fields, FieldsError,
+    IndexError, JoinSwathsError, Seam, Swaths, SwathsError, field_files, is_fields, join_fields,
+};
 pub use image_bounds::ImageBounds;
 pub use layout::{CopyPlacement, Layout};
 pub use layout_file::{CopyEntry, LayoutError, LayoutFile};
@@ -51,10 +55,6 @@ pub use page_frame::frame_page;
 pub use part_stack::PartStack;
 pub use pixel_size::PixelSize;
 pub use recipe::{Composer, LoosePieces, Recipe, RecipeError, RecipePart, TILE_CODE};
-pub use strips::{
-    IndexError, JoinSwathsError, Seam, StripDifference, StripFile, StripForm, StripWriter,
-    StripsError, Swaths, SwathsError, check_number, is_strips, join_strips, strip_files,
-};
 pub use tile::{BuildFinding, BuildWanted, TileOptions, tile};
 pub use tile_error::{CopyName, TileError};
 pub use turned::{FreeTurns, FreeTurnsError, PlannedStack, TurnedPlan, TurnedSlicing};

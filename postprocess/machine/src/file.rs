@@ -52,6 +52,18 @@ pub enum MachineError {
     /// Swaths that are described twice.
     #[error("scan: the file has [strips], too: keep [strips] or [scan]")]
     StripsAndScan,
+    /// Fields without pixels, or with too many.
+    #[error("fields: pixels: each must be between 1 and 65535")]
+    FieldPixels,
+    /// Fields without a pixel of their own.
+    #[error("fields: overlap: it must be less than half of either side: write fewer pixels")]
+    FieldOverlap,
+    /// A step that is negative or never ends.
+    #[error("fields: step_s: it must be between 0 and 1000000")]
+    FieldStep,
+    /// A projector that steps and scans.
+    #[error("fields: the file has [strips] or [scan], too: keep them, or [fields] alone")]
+    FieldsAndSwaths,
     /// Impossible numbers of a scan.
     #[error("scan: {0}")]
     Scan(ScanError),
@@ -118,6 +130,12 @@ impl Catalogued for Machine {
             if self.times.as_ref().is_some_and(|times| times.swath_speed_mm_per_s.is_some()) {
                 return Err(MachineError::SpeedBesideScan);
             }
+        }
+        if let Some(fields) = &self.fields {
+            if self.strips.is_some() || self.scan.is_some() {
+                return Err(MachineError::FieldsAndSwaths);
+            }
+            fields.check()?;
         }
         match &self.strips {
             // A swath needs a column of its own between its two seams: a seam joins two swaths,

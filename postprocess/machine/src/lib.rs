@@ -11,6 +11,7 @@
 //! ```
 
 mod display;
+mod fields;
 mod file;
 mod light;
 mod limit;
@@ -22,6 +23,7 @@ use lamp_stack::{Length, Size, nonempty_text};
 use serde::Deserialize;
 
 pub use display::{Display, DisplayError};
+pub use fields::MachineFields;
 pub use file::MachineError;
 pub use light::{LightError, LightTable};
 pub use limit::MachineLimit;
@@ -50,6 +52,8 @@ pub struct Machine {
     pub strips: Option<Strips>,
     /// How a display of mirrors scans a layer, in place of `strips`.
     pub scan: Option<Scan>,
+    /// The fields that a projector exposes step by step, in place of `strips` and `scan`.
+    pub fields: Option<MachineFields>,
     /// How a blade spreads the next layer.
     pub recoating: Option<Recoating>,
     /// How long the steps of a layer take.

@@ -26,7 +26,7 @@ pub use compensate::CompensateRecord;
 pub use dither::DitherRecord;
 pub use fix::{FixRecord, FixedBand};
 pub use slice::SliceRecord;
-pub use strip::StripRecord;
+pub use strip::{FieldRecord, StripRecord};
 
 use crate::layer::page_info::PageInfo;
 

@@ -23,6 +23,7 @@ const WRITERS: &[&str] = &[
     "tile good.tif --fit --area 2x2in --mesh none -o out.tif",
     "tile good.tif --area 2x2in --mesh none --recipe out.json",
     "tile good.tif --area 2x2in --mesh none --strips out/ --mirrors 40",
+    "tile good.tif --area 2x2in --mesh none --fields 40x40 -o out/",
     "lamp compensate good.tif --uniform 100um -o out.tif",
     "lamp check good.tif --evidence out/",
     "lamp show good.tif --layer 2 -o out.png",

@@ -50,6 +50,7 @@ fn a_full_disk_is_one_sentence_and_an_empty_folder() {
         "fix ../stray.tif -q -o out.tif",
         "tile ../stray.tif -q --area 60x60mm -o out.tif",
         "tile ../stray.tif -q --area 60x60mm --strips out --mirrors 200",
+        "tile ../stray.tif -q --area 60x60mm --fields 200x160 -o out/",
         "lamp convert ../stray.tif -q --png -o out/",
         "lamp split ../stray.tif -q --every 20 -o out/",
         "lamp sample blade --facets 24k -q -o blade.stl",

@@ -17,7 +17,7 @@ pub(crate) struct Job {
 
 /// Commands that write each kind of output. All take a good part of a second where nothing is
 /// optimized.
-pub(crate) const JOBS: [Job; 8] = [
+pub(crate) const JOBS: [Job; 9] = [
     Job { line: "slice ball.stl --dpi 500 -q -o out.tif", outputs: &["out.tif"] },
     Job { line: "slice ball.stl --dpi 500 -q --force -o out/", outputs: &["out"] },
     Job {
@@ -27,6 +27,10 @@ pub(crate) const JOBS: [Job; 8] = [
     Job { line: "tile stray.tif -q --area 60x60mm -o out.tif", outputs: &["out.tif"] },
     Job {
         line: "tile stray.tif -q --force --area 60x60mm --strips out --mirrors 200",
+        outputs: &["out"],
+    },
+    Job {
+        line: "tile stray.tif -q --force --area 60x60mm --fields 200x160 --overlap 4 -o out/",
         outputs: &["out"],
     },
     Job { line: "lamp convert stray.tif -q --force --png -o out/", outputs: &["out"] },

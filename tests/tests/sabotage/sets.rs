@@ -21,7 +21,7 @@ struct Target {
     is_edited: bool,
 }
 
-const TARGETS: [Target; 9] = [
+const TARGETS: [Target; 10] = [
     Target {
         name: "files",
         make: |s| convert(s, "-o set/a.tif"),
@@ -37,6 +37,7 @@ const TARGETS: [Target; 9] = [
     },
     Target { name: "packed", make: packed, line: "fix set/a.lamp -q -o out", is_edited: false },
     Target { name: "strips", make: strips, line: "lamp join set/a -q -o out", is_edited: false },
+    Target { name: "fields", make: fields, line: "lamp join set/a -q -o out", is_edited: false },
     Target {
         name: "recipes",
         make: recipe,
@@ -66,6 +67,11 @@ fn packed(scratch: &Scratch) {
 
 fn strips(scratch: &Scratch) {
     let line = "tile good.tif --area 40x40mm --mesh none --strips set/a --mirrors 40 -q -o x.tif";
+    scratch.run(line).succeeds();
+}
+
+fn fields(scratch: &Scratch) {
+    let line = "tile good.tif --area 40x40mm --mesh none --fields 40x30 --overlap 4 -q -o set/a/";
     scratch.run(line).succeeds();
 }
 

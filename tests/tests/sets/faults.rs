@@ -13,6 +13,7 @@ pub(crate) enum Form {
     Pngs,
     Packed,
     Strips,
+    Fields,
     Pipe,
 }
 
@@ -36,18 +37,20 @@ use Fault::{
     Unreadable,
 };
 
-/// The pages of the good stack, and the strips of a build of it.
+/// The pages of the good stack, and the strips and rows of fields of a build of it.
 const PAGES: usize = 6;
 const STRIPS: usize = 4;
+const ROWS: usize = 4;
 
 impl Form {
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::File,
         Self::Classic,
         Self::Folder,
         Self::Pngs,
         Self::Packed,
         Self::Strips,
+        Self::Fields,
         Self::Pipe,
     ];
 
@@ -59,6 +62,7 @@ impl Form {
             Self::Pngs => "PNGs",
             Self::Packed => "packed",
             Self::Strips => "strips",
+            Self::Fields => "fields",
             Self::Pipe => "pipe",
         }
     }
@@ -67,7 +71,7 @@ impl Form {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::File | Self::Classic | Self::Pipe => "stack.tif",
-            Self::Folder | Self::Pngs | Self::Strips => "stack",
+            Self::Folder | Self::Pngs | Self::Strips | Self::Fields => "stack",
             Self::Packed => "stack.lamp",
         }
     }
@@ -75,7 +79,7 @@ impl Form {
     /// Returns what can be wrong with it.
     pub(crate) fn faults(self) -> &'static [Fault] {
         match self {
-            Self::Folder | Self::Pngs | Self::Strips => &[
+            Self::Folder | Self::Pngs | Self::Strips | Self::Fields => &[
                 FirstMissing,
                 MiddleMissing,
                 LastMissing,
@@ -102,7 +106,7 @@ impl Form {
         folder.run(&format!("lamp {}", self.line("good.tif", self.name()))).succeeds_quietly();
         match (self, fault) {
             (_, None) => {}
-            (Self::Folder | Self::Pngs | Self::Strips, Some(fault)) => {
+            (Self::Folder | Self::Pngs | Self::Strips | Self::Fields, Some(fault)) => {
                 self.break_folder(folder, fault);
             }
             (_, Some(fault)) => {
@@ -123,16 +127,21 @@ impl Form {
             Self::Strips => format!(
                 "tile {from} --area 40x40mm --mesh none --strips {to} --mirrors 20 -q -o x.tif"
             ),
+            // A column of fields, so that their names count.
+            Self::Fields => {
+                format!("tile {from} --area 40x40mm --mesh none --fields 80x20 -q -o {to}/")
+            }
         }
     }
 
     fn break_folder(self, folder: &Scratch, fault: Fault) {
         let (start, end, digits, count) = match self {
-            Self::Strips => ("strip", "tif", 3, STRIPS),
-            Self::Pngs => ("layer", "png", 5, PAGES),
-            _ => ("layer", "tif", 5, PAGES),
+            Self::Strips => ("strip", ".tif", 3, STRIPS),
+            Self::Fields => ("field", "_000.tif", 3, ROWS),
+            Self::Pngs => ("layer", ".png", 5, PAGES),
+            _ => ("layer", ".tif", 5, PAGES),
         };
-        let name = |number: usize| format!("{start}_{number:0digits$}.{end}");
+        let name = |number: usize| format!("{start}_{number:0digits$}{end}");
         let page = |number: usize| folder.path("stack").join(name(number));
         let remove = |number: usize| fs::remove_file(page(number)).unwrap();
         let (middle, last) = (count / 2, count - 1);

@@ -152,8 +152,10 @@ fn line_of(command: &str, form: Form) -> Result<String, String> {
     form.write(&folder, None);
     let (status, said, whole) = outcome(&folder, command, form);
     let place = format!("{:8} {command}", form.label());
-    // A folder of strips is no stack of layers, and only some commands take it for its build.
-    if status == Some(2) || form == Form::Strips && status == Some(1) {
+    // A folder of strips or fields is no stack of layers, and only some commands take it for its
+    // build.
+    let is_cut = matches!(form, Form::Strips | Form::Fields);
+    if status == Some(2) || is_cut && status == Some(1) {
         return Ok(format!("{place:66} -\n"));
     }
     if status != Some(0) {

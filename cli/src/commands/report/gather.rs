@@ -133,6 +133,7 @@ impl StackReport {
             "build_exposure_s": self.time.exposure_s,
             "recoating_s": self.time.recoating_s,
             "swaths_s": self.time.swaths.map(|swaths| swaths.seconds),
+            "fields_s": self.time.fields.and_then(|fields| fields.seconds()),
             "build_s": self.time.sum_s(),
             "fixed_rows": self.layers.iter().map(|layer| layer.fixed_rows).sum::<u64>(),
             "unchecked": self.found.as_ref().err(),

@@ -102,7 +102,9 @@ fn build_time(report: &StackReport) -> Markup {
                 }
             },
             Some(sum) => table.facts {
-                @if let Some(swaths) = time.swaths {
+                @if let Some((fields, seconds)) = time.fields.zip(time.fields.and_then(|f| f.seconds())) {
+                    tr { th { "fields" } td { (time_text(seconds)) ", " (fields.count) " in all" } }
+                } @else if let Some(swaths) = time.swaths {
                     tr { th { "swaths" } td { (time_text(swaths.seconds)) ", " (swaths.count) " in all" } }
                 } @else if let Some(exposure_s) = time.exposure_s {
                     tr { th { "exposures" } td { (time_text(exposure_s)) } }

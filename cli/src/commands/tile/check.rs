@@ -27,6 +27,7 @@ impl TileArgs {
         }
         self.check_plan()?;
         self.settings.mesh.check()?;
+        self.cut.check(self.output.as_ref(), self.time || self.recipe.is_some())?;
         let inputs = || {
             self.stacks
                 .iter()
@@ -36,16 +37,16 @@ impl TileArgs {
                 .chain(self.settings.mesh.file())
         };
         let output = self.output().map(|output| output.output);
-        let main = output.as_ref().or(self.strips.folder()).or(self.recipe.as_ref());
+        let main = output.as_ref().or(self.cut_folder()).or(self.recipe.as_ref());
         let main = main.map_or(Path::new("-"), PathBuf::as_path);
         self.check_by_products()?;
         for beside in [&self.layout_out, &self.layout_picture, &self.report].into_iter().flatten() {
             check_beside(beside, main, inputs())?;
         }
-        if let (Some(output), Some(folder)) = (&output, self.strips.folder()) {
+        if let (Some(output), Some(folder)) = (&output, self.cut_folder()) {
             check_beside(folder, output, inputs())?;
         }
-        self.check_recipe(output.as_ref().or(self.strips.folder()), inputs())?;
+        self.check_recipe(output.as_ref().or(self.cut_folder()), inputs())?;
         self.layout_picture.as_deref().map(plots::check_name).transpose()?;
         let read = self
             .settings

@@ -1,6 +1,7 @@
 //! `lamp tile`: lays out copies on a build area.
 
 mod check;
+mod fields;
 mod found;
 mod mesh;
 mod placing;
@@ -8,7 +9,6 @@ mod plan;
 mod recipe;
 mod report;
 mod stacks;
-mod strips;
 mod time;
 
 use std::cell::RefCell;
@@ -32,12 +32,12 @@ use crate::streams::Layers;
 use crate::streams::{progress, unless_found, write_file};
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
+use fields::CutArgs;
 use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::template;
 use placing::read_layout;
 use report::BuildTotals;
 use stacks::{InputStack, StackArg};
-use strips::StripArgs;
 
 /// Lay out copies of parts on a build area, in a mesh
 ///
@@ -62,6 +62,7 @@ Examples:
   tile blade.tif --machine beta --turns 15deg --layout-out layout.json -o build.tif > build.sh
   tile blade.tif core.tif --layout layout.json --fit --layout-picture layout.png -o build.tif
   tile blade.tif --machine beta --strips strips/ --mirrors 1920 --overlap 64
+  tile blade.tif --area 90x50mm --fields 2560x1600 --overlap 4 -o fields/
   tile blade.tif --machine beta --recipe build.json
   tile blade.tif --machine mine.toml --report report.json -o build.tif
   tile blade.tif --machine mine.toml --time")]
@@ -106,11 +107,11 @@ pub(crate) struct TileArgs {
     strict: bool,
 
     #[command(flatten)]
-    strips: StripArgs,
+    cut: CutArgs,
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
-    /// folder), or - for standard output [default: -, or nowhere with --strips,
-    /// --recipe or --time]
+    /// folder), or - for standard output. With --fields, the folder of the fields [default: -, or
+    /// nowhere with --strips, --recipe or --time]
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
@@ -140,14 +141,15 @@ pub(crate) fn run(args: &TileArgs, common: &Common) -> Result<(), Exit> {
         None => Progress::new("tile", common, true),
     };
     let machine = args.settings.machine()?;
-    let strips = args.strips.writer(machine.as_ref(), args.classic, args.force)?;
+    let form = args.cut.form(machine.as_ref())?;
+    let cut = args.cut.writer(form, args.output.as_ref(), args.classic, args.force)?;
     let built = args.build(machine.clone(), &progress)?;
     let Build { layers, layout, stray_rows, no_mesh, recipe, totals } = built;
     let finding = || {
         let found = stray_rows.borrow().text().or_else(doubts);
         found.filter(|_| args.strict).map(Exit::Findings)
     };
-    strips::write(unless_found(layers, finding), strips, output.as_ref(), &progress)?;
+    fields::write(unless_found(layers, finding), cut, output.as_ref(), &progress)?;
     if let Some(text) = stray_rows.borrow().text() {
         progress.warn(&text);
     }
@@ -240,6 +242,10 @@ impl TileArgs {
         let is_timed = self.time || self.report.is_some();
         let clock =
             build_clock(self.settings.machine.as_deref().filter(|_| is_timed), machine.as_ref())?;
+        let clock = match fields::of_steps(self.cut.form(machine.as_ref())?) {
+            Some(form) => clock.with_fields(form),
+            None => clock,
+        };
         let needs_images = self.needs_images() || clock.needs_images();
         let totals = Rc::new(RefCell::new(BuildTotals::new(&layout, clock)));
         let added = Rc::clone(&totals);
@@ -267,9 +273,17 @@ impl TileArgs {
         Ok(Build { layers, layout: placed, stray_rows, no_mesh, recipe, totals })
     }
 
+    /// Returns the folder of the strips or fields, if any are written.
+    fn cut_folder(&self) -> Option<&PathBuf> {
+        self.cut.folder(self.output.as_ref())
+    }
+
     /// Returns the output of the whole build, if it is wanted.
     fn output(&self) -> Option<Output> {
-        let is_alone = self.strips.folder().is_none() && self.recipe.is_none() && !self.time;
+        if self.cut.makes_fields() {
+            return None;
+        }
+        let is_alone = self.cut_folder().is_none() && self.recipe.is_none() && !self.time;
         let output = self.output.clone().or_else(|| is_alone.then(|| PathBuf::from("-")))?;
         Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
     }

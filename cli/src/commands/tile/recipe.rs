@@ -16,7 +16,7 @@ use crate::streams::{check_beside, input_name, is_stream};
 impl TileArgs {
     /// Returns whether a stack of the build is written, so that its images are needed.
     pub(super) fn needs_images(&self) -> bool {
-        self.output().is_some() || self.strips.folder().is_some()
+        self.output().is_some() || self.cut_folder().is_some()
     }
 
     /// Checks, before the work, that a recipe can be written beside `main`, if that is written.

@@ -90,6 +90,9 @@ impl BuildTotals {
             "swaths_s": time.swaths.map(|swaths| to_nm(swaths.seconds)),
             "swaths": time.swaths.map(|swaths| swaths.count),
             "black_swaths": time.swaths.map(|swaths| swaths.black),
+            "fields_s": time.fields.and_then(|fields| fields.seconds()).map(to_nm),
+            "fields": time.fields.map(|fields| fields.count),
+            "black_fields": time.fields.map(|fields| fields.black),
             "build_s": time.sum_s().map(to_nm),
             "warnings": time::missing(time, machine),
         });

@@ -16,17 +16,25 @@ pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
     let mut line = |name: &str, seconds: f64, how: &str| {
         text += &format!("{:<12}{}{how}\n", format!("{name}:"), time_text(seconds));
     };
-    if let Some(seconds) = time.exposure_s {
+    // Each field has the exposure of its layer.
+    if let Some(seconds) = time.exposure_s.filter(|_| time.fields.is_none()) {
         let within = if time.swaths.is_some() { ", within the swaths" } else { "" };
         line("exposure", seconds, within);
     }
+    let counted = |count: u64, black: u64| match black {
+        0 => format!(", {count} in all"),
+        black => format!(", {count} in all, and {black} black ones are left out"),
+    };
     if let Some(swaths) = time.swaths {
-        let black = match swaths.black {
-            0 => String::new(),
-            black => format!(", and {black} black ones are left out"),
-        };
-        let how = format!(", {} in all{black}", swaths.count);
-        line("swaths", swaths.seconds, &how);
+        line("swaths", swaths.seconds, &counted(swaths.count, swaths.black));
+    }
+    if let Some(fields) = time.fields {
+        if let Some(seconds) = fields.exposure_s {
+            line("fields", seconds, &counted(fields.count, fields.black));
+        }
+        if let Some(seconds) = fields.steps_s {
+            line("steps", seconds, " between fields");
+        }
     }
     if let Some(seconds) = time.recoating_s {
         line("recoating", seconds, "");
@@ -46,15 +54,21 @@ pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String
     let file = format!("[times] of {which} (lamp machine show {name} > mine.toml starts one)");
     let mut missing = Vec::new();
     if let Some(why) = &time.unscanned {
-        missing.push(format!("the machine cannot scan the build: {why}"));
+        let verb = if time.fields.is_some() { "expose" } else { "scan" };
+        missing.push(format!("the machine cannot {verb} the build: {why}"));
     } else if time.sum_s().is_none() {
         let scans = machine.is_some_and(|machine| machine.scan.is_some());
-        let speed = match scans {
+        let speed = match scans || time.fields.is_some() {
             true => "",
             false => ", or swath_speed_mm_per_s for a projector that scans,",
         };
         missing
             .push(format!("not every layer states an exposure: write expose_s{speed} into {file}"));
+    }
+    if time.fields.is_some_and(|fields| fields.steps_s.is_none()) {
+        missing.push(format!(
+            "steps between fields are not in it: write step_s into [fields] of {which}"
+        ));
     }
     if time.recoating_s.is_none() {
         missing.push(format!("recoating is not in it: write recoat_s into {file}"));

@@ -1,12 +1,13 @@
 //! Cuts the rows of an image into the rows of swaths, in one pass from the left.
 
 use std::ops::Range;
+use std::vec::IntoIter;
 
 use lamp_stack::{Change, GrayMask, Image, LevelChange, Mask, RunImage};
 
+use super::Swaths;
 use super::ramps::Ramps;
 use super::seam::tooth;
-use super::{Seam, Swaths};
 
 impl Swaths {
     /// Returns the images of some of the swaths, each as wide as there are mirrors. In shared
@@ -17,26 +18,31 @@ impl Swaths {
     ///
     /// # Panics
     /// Panics if the image is not as wide as the layers, or there are no such swaths.
-    pub fn cut<'a>(
+    pub fn cut(&self, image: &Image, layer: u32, swaths: Range<u32>) -> IntoIter<Image> {
+        self.cut_from(image, layer, 0, swaths).into_iter()
+    }
+
+    /// Cuts an image that begins with this row of its layer.
+    pub(super) fn cut_from(
         &self,
-        image: &'a Image,
+        image: &Image,
         layer: u32,
+        first_row: u32,
         swaths: Range<u32>,
-    ) -> Box<dyn Iterator<Item = Image> + 'a> {
+    ) -> Vec<Image> {
         assert_eq!(image.width(), self.width);
         assert!(swaths.end <= self.count());
-        // Without shared columns no level is divided, and a mask stays a mask.
-        if self.seam == Seam::Gray && self.overlap > 0 && self.count() > 1 {
-            return Box::new(self.ramped(image, swaths).into_iter().map(Image::Gray));
+        if self.makes_gray() {
+            return self.ramped(image, swaths).into_iter().map(Image::Gray).collect();
         }
         match image {
             Image::Mask(mask) => {
-                let cut = self.cut_rows(mask, layer, swaths).into_iter();
-                Box::new(cut.map(|rows| Image::Mask(rows.into_mask())))
+                let cut = self.cut_rows(mask, layer, first_row, swaths).into_iter();
+                cut.map(|rows| Image::Mask(rows.into_mask())).collect()
             }
             Image::Gray(gray) => {
-                let cut = self.cut_rows(gray, layer, swaths).into_iter();
-                Box::new(cut.map(|rows| Image::Gray(rows.into_gray())))
+                let cut = self.cut_rows(gray, layer, first_row, swaths).into_iter();
+                cut.map(|rows| Image::Gray(rows.into_gray())).collect()
             }
         }
     }
@@ -46,13 +52,14 @@ impl Swaths {
         &self,
         image: &RunImage<C>,
         layer: u32,
+        first_row: u32,
         swaths: Range<u32>,
     ) -> Vec<SwathRows<C>> {
         // A quarter more than an even share: swaths with more changes grow, which is rare.
         let room = image.change_count() / self.count() as usize / 4 * 5;
         let rows = || SwathRows::new(self.mirrors, image.height() as usize, room);
         let mut cut: Vec<_> = swaths.clone().map(|_| rows()).collect();
-        for (changes, row) in image.rows().zip(0..) {
+        for (changes, row) in image.rows().zip(first_row..) {
             let tooth = tooth(self.overlap, row, layer);
             // The changes left of the next swath.
             let mut at = match self.taken(swaths.start, tooth).start {
@@ -106,7 +113,7 @@ impl Swaths {
 }
 
 /// The rows of a swath, in the form of a [`RunImage`].
-struct SwathRows<C> {
+pub(super) struct SwathRows<C> {
     width: u32,
     /// The number of changes up to each row's end, after a zero.
     ends: Vec<u32>,
@@ -117,10 +124,41 @@ struct SwathRows<C> {
 
 impl<C: Change> SwathRows<C> {
     /// Starts a swath, with room for so many rows and changes.
-    fn new(width: u32, rows: usize, changes: usize) -> Self {
+    pub(super) fn new(width: u32, rows: usize, changes: usize) -> Self {
         let mut ends = Vec::with_capacity(rows + 1);
         ends.push(0);
         Self { width, ends, changes: Vec::with_capacity(changes), within: 0 }
+    }
+
+    /// Adds all of a row.
+    pub(super) fn push_all(&mut self, row: &[C]) {
+        self.changes.extend_from_slice(row);
+        self.ends.push(self.changes.len() as u32);
+    }
+
+    /// Adds a row's pixels in some columns, and black in the others.
+    pub(super) fn push_where(&mut self, row: &[C], is_in: impl Fn(u32) -> bool) {
+        let black = C::Pixel::default();
+        let (mut pixel, mut shown) = (black, black);
+        for (k, &change) in row.iter().enumerate() {
+            pixel = change.after(pixel);
+            let end = row.get(k + 1).map_or(self.width, |next| next.column());
+            // Black needs a look at its first column only.
+            let end = if pixel == black { change.column() + 1 } else { end };
+            for column in change.column()..end {
+                let here = if is_in(column) { pixel } else { black };
+                if here != shown {
+                    self.changes.push(C::new(column, here));
+                    shown = here;
+                }
+            }
+        }
+        self.ends.push(self.changes.len() as u32);
+    }
+
+    /// Adds black rows.
+    pub(super) fn push_black(&mut self, rows: u32) {
+        self.ends.resize(self.ends.len() + rows as usize, self.changes.len() as u32);
     }
 
     /// Adds a row: the columns of `taken` of an image's row, with `left` as the first. `at` is the
@@ -164,13 +202,13 @@ impl<C: Change> SwathRows<C> {
 }
 
 impl SwathRows<u32> {
-    fn into_mask(self) -> Mask {
+    pub(super) fn into_mask(self) -> Mask {
         Mask::new(self.width, self.ends, self.changes).expect("transitions within the swath")
     }
 }
 
 impl SwathRows<LevelChange> {
-    fn into_gray(self) -> GrayMask {
+    pub(super) fn into_gray(self) -> GrayMask {
         let mut gray = GrayMask::new(self.width);
         for ends in self.ends.windows(2) {
             let changes = &self.changes[ends[0] as usize..ends[1] as usize];

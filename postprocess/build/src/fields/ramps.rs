@@ -64,7 +64,7 @@ impl Ramps {
 
 /// Returns the part of a level that the second of two swaths exposes in a shared column, counted
 /// from the first shared one: it rises in equal steps. The first swath exposes the rest.
-fn second_share(level: u8, column: u32, overlap: u32) -> u8 {
+pub(super) fn second_share(level: u8, column: u32, overlap: u32) -> u8 {
     let (steps, all) = (u64::from(column) + 1, u64::from(overlap) + 1);
     // Rounded to the nearest level.
     ((2 * u64::from(level) * steps + all) / (2 * all)) as u8

@@ -1,6 +1,7 @@
 //! Layers joined from their swaths.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use lamp_stack::{GrayMask, Image, LevelChange};
 use thiserror::Error;
@@ -24,6 +25,18 @@ pub enum JoinSwathsError {
     },
 }
 
+impl JoinSwathsError {
+    /// Returns the error of an image that begins with this row of the layer.
+    pub(super) fn below(self, first_row: u32) -> Self {
+        match self {
+            Self::TooMuch { row, column } => {
+                Self::TooMuch { row: row + first_row as usize, column }
+            }
+            Self::Unlike => Self::Unlike,
+        }
+    }
+}
+
 impl Swaths {
     /// Adds up the levels of swaths, which gives the layer that they were cut from.
     ///
@@ -41,53 +54,53 @@ impl Swaths {
         for row in 0..height {
             steps.clear();
             for (swath, k) in swaths.iter().zip(0..) {
-                self.steps_of(swath.row(row), k, &mut steps);
+                let start = self.columns(k).start;
+                add_steps(swath.row(row), start..start + self.mirrors, &mut steps);
             }
-            // Steps of one column add up, so their order does not matter.
-            steps.sort_unstable_by_key(|step| step.0);
-            let changes = self.changes(&steps, row as usize)?;
+            let changes = levels_of(&mut steps, self.width, row as usize)?;
             layer.push_row(&changes).expect("changes in order within the width");
         }
         Ok(layer)
     }
+}
 
-    /// Adds the columns and heights of the steps between the levels of a swath's row.
-    fn steps_of(&self, changes: &[LevelChange], swath: u32, steps: &mut Vec<(u32, i32)>) {
-        let start = self.columns(swath).start;
-        let mut before = 0;
-        for change in changes {
-            steps.push((start + change.column, i32::from(change.level) - before));
-            before = change.level.into();
+/// Adds the columns and heights of the steps between the levels of a row that lies in some columns
+/// of a layer.
+pub(super) fn add_steps(changes: &[LevelChange], columns: Range<u32>, steps: &mut Vec<(u32, i32)>) {
+    let mut before = 0;
+    for change in changes {
+        steps.push((columns.start + change.column, i32::from(change.level) - before));
+        before = change.level.into();
+    }
+    if before != 0 {
+        steps.push((columns.end, -before));
+    }
+}
+
+/// Returns the levels that steps lead to, in a row of a layer of this width.
+pub(super) fn levels_of(
+    steps: &mut [(u32, i32)],
+    width: u32,
+    row: usize,
+) -> Result<Vec<LevelChange>, JoinSwathsError> {
+    // Steps of one column add up, so their order does not matter.
+    steps.sort_unstable_by_key(|step| step.0);
+    let (mut changes, mut level) = (Vec::new(), 0);
+    for group in steps.chunk_by(|a, b| a.0 == b.0) {
+        let (column, before) = (group[0].0, level);
+        level += group.iter().map(|step| step.1).sum::<i32>();
+        // From the layer's end on all is black.
+        let most = if column < width { 255 } else { 0 };
+        // Without a step at the layer's end light goes on beyond it, and only a later step shows
+        // this.
+        if column > width && before != 0 || !(0..=most).contains(&level) {
+            return Err(JoinSwathsError::TooMuch { row, column: column.min(width) });
         }
-        if before != 0 {
-            steps.push((start + self.mirrors, -before));
+        if level != before && column < width {
+            changes.push(LevelChange { column, level: level as u8 });
         }
     }
-
-    /// Returns the levels that steps lead to.
-    fn changes(
-        &self,
-        steps: &[(u32, i32)],
-        row: usize,
-    ) -> Result<Vec<LevelChange>, JoinSwathsError> {
-        let (mut changes, mut level) = (Vec::new(), 0);
-        for group in steps.chunk_by(|a, b| a.0 == b.0) {
-            let (column, before) = (group[0].0, level);
-            level += group.iter().map(|step| step.1).sum::<i32>();
-            // From the layer's end on all is black.
-            let most = if column < self.width { 255 } else { 0 };
-            // Without a step at the layer's end light goes on beyond it, and only a later step
-            // shows this.
-            if column > self.width && before != 0 || !(0..=most).contains(&level) {
-                let column = column.min(self.width);
-                return Err(JoinSwathsError::TooMuch { row, column });
-            }
-            if level != before && column < self.width {
-                changes.push(LevelChange { column, level: level as u8 });
-            }
-        }
-        Ok(changes)
-    }
+    Ok(changes)
 }
 
 #[cfg(test)]
