@@ -117,7 +117,7 @@ impl Problem {
             intensity_of: IntensityOf::Pixel(Length::from_um(PITCH_UM)),
             critical_dose: Dose::from_mj_per_cm2(critical),
             penetration_depth: Length::from_um(PITCH_UM / (self.fade * std::f64::consts::LN_10)),
-            spread: Length::from_um(self.sigma * PITCH_UM),
+            spread: [Length::from_um(self.sigma * PITCH_UM); 2],
             gamma: 1.0,
             at: SampleHeight::Top,
         };

@@ -106,9 +106,18 @@ fn widths() -> impl Strategy<Value = Vec<WidthNumbers>> {
 }
 
 fn spread() -> impl Strategy<Value = SpreadNumbers> {
-    let sigma = (0.001..2000.0_f64).prop_map(Length::from_um);
-    (given(sigma), option::of(given(um())))
-        .prop_map(|(sigma, pixel)| SpreadNumbers { sigma, pixel })
+    let sigma = || given((0.001..2000.0_f64).prop_map(Length::from_um));
+    let one = sigma().prop_map(|sigma| [Some(sigma), None, None]);
+    let two = (sigma(), sigma()).prop_map(|(across, along)| [None, Some(across), Some(along)]);
+    (prop_oneof![one, two], option::of(given(mj())), option::of(given(um()))).prop_map(
+        |([sigma, sigma_across, sigma_along], critical_dose, pixel)| SpreadNumbers {
+            sigma,
+            sigma_across,
+            sigma_along,
+            critical_dose,
+            pixel,
+        },
+    )
 }
 
 fn gamma() -> impl Strategy<Value = GivenNumber> {

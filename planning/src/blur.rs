@@ -60,7 +60,8 @@ const FAINTEST: f64 = 1e-5;
 /// Columns that are summed together. The width of images is a multiple of it.
 pub(crate) const LANES: usize = 32;
 
-/// A Gaussian of standard deviation σ, cut off where it is a hundred-thousandth of its peak.
+/// A Gaussian of standard deviation σ, or of two along rows and columns, cut off where it is a
+/// hundred-thousandth of its peak.
 ///
 /// ```
 /// use lamp_planning::Blur;
@@ -75,39 +76,49 @@ pub(crate) const LANES: usize = 32;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Blur<T> {
-    /// The weights at distances 0, 1, ...: the weight at 0 is 1.
-    taps: Vec<T>,
+    /// The weights along rows and along columns, at distances 0, 1, ...: the weight at 0 is 1.
+    taps: [Vec<T>; 2],
 }
 
 impl<T: Real> Blur<T> {
     /// Creates the Gaussian of a standard deviation in pixels; zero leaves images as they are.
     pub fn new(sigma: f64) -> Self {
-        let tap = |distance: usize| {
+        Self::of_scan([sigma; 2])
+    }
+
+    /// Creates the Gaussian of two standard deviations in pixels: along rows, which is across the
+    /// scan, and along columns.
+    pub fn of_scan(sigmas: [f64; 2]) -> Self {
+        let tap = |sigma: f64, distance: usize| {
             let distance = distance as f64;
             // With σ = 0, 0/0 would not be a number.
             if distance == 0.0 { 1.0 } else { (-distance * distance / (2.0 * sigma * sigma)).exp() }
         };
         // Wider light is rejected elsewhere: this only bounds the memory until then.
-        let taps = (0..2048).map(tap).take_while(|&tap| tap >= FAINTEST).map(T::of).collect();
-        Self { taps }
+        let taps = |sigma| {
+            let taps = (0..2048).map(|distance| tap(sigma, distance));
+            taps.take_while(|&tap| tap >= FAINTEST).map(T::of).collect()
+        };
+        Self { taps: sigmas.map(taps) }
     }
 
-    /// Returns the weights at distances 0, 1, ... along a row or a column: the weight at 0 is 1.
-    pub(crate) fn taps(&self) -> &[T] {
-        &self.taps
+    /// Returns the weights along rows and along columns, at distances 0, 1, ...: the weight at 0
+    /// is 1.
+    pub(crate) fn taps(&self) -> [&[T]; 2] {
+        self.taps.each_ref().map(Vec::as_slice)
     }
 
-    /// Returns the distance to which light spreads, in pixels.
+    /// Returns the greatest distance to which light spreads along rows or columns, in pixels.
     pub fn radius(&self) -> usize {
-        self.taps.len() - 1
+        self.taps[0].len().max(self.taps[1].len()) - 1
     }
 
     /// Returns the light of a wide white image at each pixel: the sum of all weights.
     pub fn sum(&self) -> f64 {
-        let side: f64 = self.taps[1..].iter().map(|tap| tap.f64()).sum();
         // The two-dimensional Gaussian of 001 eq. 5 is the product of one along rows and one along
         // columns.
-        (2.0 * side + 1.0).powi(2)
+        let line = |taps: &Vec<T>| 1.0 + 2.0 * taps[1..].iter().map(|tap| tap.f64()).sum::<f64>();
+        line(&self.taps[0]) * line(&self.taps[1])
     }
 
     /// Spreads the light of an image given row by row, with black around it. `width` must be a
@@ -138,8 +149,8 @@ impl<T: Real> Blur<T> {
     ) {
         let rows = image.len() / width;
         // Taps that reach beyond the image meet black only.
-        let along = &self.taps[..self.taps.len().min(width)];
-        let across = &self.taps[..self.taps.len().min(rows)];
+        let [along, across] = self.taps();
+        let [along, across] = [&along[..along.len().min(width)], &across[..across.len().min(rows)]];
         let [left, above] = [along, across].map(|taps| taps.len() - 1);
         room.clear();
         room.resize(width + 2 * left + (rows + 2 * above) * width, T::default());
@@ -211,8 +222,9 @@ impl<T: Real> Chunks<T> {
         for chunk in at.iter().map(|at| at / LANES) {
             let (row, column) = (chunk / across, chunk % across);
             // Light spreads along rows first; the rows that spread into a chunk later are the rows
-            // within the radius.
-            let near = row.saturating_sub(blur.radius())..(row + blur.radius() + 1).min(rows);
+            // within reach.
+            let reach = blur.taps[1].len() - 1;
+            let near = row.saturating_sub(reach)..(row + reach + 1).min(rows);
             near.for_each(|row| is_needed[row * across + column] = true);
         }
         let needed = (0..rows * across).filter(|&chunk| is_needed[chunk]);
@@ -241,14 +253,15 @@ impl<T: Real> Chunks<T> {
 
     /// Taps that reach beyond the image meet black only.
     fn borders(&self) -> [usize; 2] {
-        [self.width, self.rows].map(|side| self.blur.radius().min(side - 1))
+        let reach = |axis: usize, side: usize| self.blur.taps[axis].len().min(side) - 1;
+        [reach(0, self.width), reach(1, self.rows)]
     }
 
     /// Spreads the light of all chunks, chunk after chunk.
     #[inline(always)]
     pub(crate) fn spread(&self, image: &[T], light: &mut [T], room: &mut ChunkRoom<T>) {
         let [left, above] = self.borders();
-        let (along, across) = (&self.blur.taps[..=left], &self.blur.taps[..=above]);
+        let (along, across) = (&self.blur.taps[0][..=left], &self.blur.taps[1][..=above]);
         let stride = self.width + 2 * left;
         let in_lines = |at: usize| at / self.width * stride + at % self.width + left;
         for (&at, chunk) in self.at.iter().zip(image.chunks_exact(LANES)) {
@@ -278,19 +291,24 @@ mod tests {
         let (rows, width) = (9, 32);
         let image: Vec<f64> =
             (0..rows * width).map(|n| ((n * 7919) % 101) as f64 / 100.0).collect();
-        for sigma in [0.0, 0.3, 1.0, 2.0, 13.0] {
-            let blur = Blur::new(sigma);
+        let round = [0.0, 0.3, 1.0, 2.0, 13.0].map(|sigma| [sigma; 2]);
+        for sigmas in round.into_iter().chain([[1.0, 3.0], [5.0, 0.7], [0.0, 2.0], [2.0, 0.0]]) {
+            let blur = Blur::of_scan(sigmas);
             let mut light = vec![0.0; image.len()];
             blur.apply(&image, width, &mut light, &mut Vec::new());
             for (place, &light) in light.iter().enumerate() {
                 let (row, column) = ((place / width) as f64, (place % width) as f64);
                 let weight = |other: usize| {
                     let (down, right) = ((other / width) as f64, (other % width) as f64);
-                    let squared = (down - row).powi(2) + (right - column).powi(2);
-                    if squared == 0.0 { 1.0 } else { (-squared / (2.0 * sigma * sigma)).exp() }
+                    let away = [right - column, down - row];
+                    let along = |axis: usize| match away[axis] {
+                        0.0 => 1.0,
+                        away => (-0.5 * (away / sigmas[axis]).powi(2)).exp(),
+                    };
+                    along(0) * along(1)
                 };
                 let exact: f64 = image.iter().enumerate().map(|(n, a)| a * weight(n)).sum();
-                assert!((light - exact).abs() < 2e-5 * exact.max(1.0), "{sigma} {place}");
+                assert!((light - exact).abs() < 2e-5 * exact.max(1.0), "{sigmas:?} {place}");
             }
         }
     }
@@ -302,5 +320,7 @@ mod tests {
         blur.apply(&vec![1.0; 64 * 64], 64, &mut light, &mut Vec::new());
         assert!((light[32 * 64 + 32] - blur.sum()).abs() < 1e-12);
         assert!((blur.sum() - std::f64::consts::TAU * 4.0).abs() < 1e-4);
+        let two = Blur::<f64>::of_scan([2.0, 7.0]).sum();
+        assert!((two - std::f64::consts::TAU * 14.0).abs() < 1e-3);
     }
 }

@@ -45,8 +45,9 @@ pub struct Light {
     pub critical_dose: Dose,
     /// The depth over which light fades by e, `D_p`.
     pub penetration_depth: Length,
-    /// The standard deviation of the Gaussian that a pixel's light makes, `σ`.
-    pub spread: Length,
+    /// The standard deviations of the Gaussian that a pixel's light makes, `σ`, along the rows of
+    /// images, which is across the scan, and along their columns.
+    pub spread: [Length; 2],
     /// The exponent `γ` that turns a gray level `g` into light `(g / 255)^γ`.
     pub gamma: f64,
     /// The height in each layer at which a voxel's dose is computed.
@@ -108,7 +109,8 @@ impl Light {
             ("the penetration depth", self.penetration_depth.um()),
             ("gamma", self.gamma),
             ("the size of the spread's pixel", pixel),
-            ("the spread, where it is not zero,", self.spread.um() + f64::MIN_POSITIVE),
+            ("the spread, where it is not zero,", self.spread[0].um() + f64::MIN_POSITIVE),
+            ("the spread, where it is not zero,", self.spread[1].um() + f64::MIN_POSITIVE),
         ];
         match numbers.iter().find(|(_, number)| !(*number > 0.0 && number.is_finite())) {
             Some((name, _)) => Err(LightError::NotPositive(name)),
@@ -121,13 +123,14 @@ impl Light {
     /// # Errors
     /// Returns an error if the spread is wider than 256 pixels.
     pub fn check_spread(&self, dpi: Dpi) -> Result<(), LightError> {
-        let pixels = self.spread_pixels(dpi).ceil() as u64;
+        let [across, along] = self.spread_pixels(dpi);
+        let pixels = across.max(along).ceil() as u64;
         if pixels > MOST_SPREAD { Err(LightError::TooWide { pixels }) } else { Ok(()) }
     }
 
-    /// Returns σ in pixels.
-    pub fn spread_pixels(&self, dpi: Dpi) -> f64 {
-        self.spread.um() / dpi.pitch().um()
+    /// Returns σ in pixels, along the rows and along the columns of images.
+    pub fn spread_pixels(&self, dpi: Dpi) -> [f64; 2] {
+        self.spread.map(|sigma| sigma.um() / dpi.pitch().um())
     }
 
     /// Returns the light that reaches each layer. Layers count from the light: the last page comes
@@ -136,7 +139,7 @@ impl Light {
         // 001 gives the light at the center of one pixel's Gaussian; radiometers read a wide field,
         // where the Gaussians of all pixels add up.
         let weight = match self.intensity_of {
-            IntensityOf::Field => 1.0 / Blur::<f64>::new(self.spread_pixels(dpi)).sum(),
+            IntensityOf::Field => 1.0 / Blur::<f64>::of_scan(self.spread_pixels(dpi)).sum(),
             IntensityOf::Pixel(size) => (dpi.pitch().um() / size.um()).powi(2),
         };
         let fade = |um: f64| (-um / self.penetration_depth.um()).exp();
@@ -179,7 +182,7 @@ mod tests {
             intensity_of: IntensityOf::Field,
             critical_dose: Dose::from_mj_per_cm2(7.266),
             penetration_depth: Length::from_um(877.9),
-            spread: Length::from_um(50.0),
+            spread: [Length::from_um(50.0); 2],
             gamma: 2.404,
             at,
         }
@@ -214,7 +217,10 @@ mod tests {
     #[test]
     fn light_that_spreads_too_wide_is_refused() {
         let dpi = Dpi::new(2540.0).unwrap();
-        let wide = |um| Light { spread: Length::from_um(um), ..light(SampleHeight::Top) };
+        let wide = |um| {
+            let spread = [1.0, um].map(Length::from_um);
+            Light { spread, ..light(SampleHeight::Top) }
+        };
         assert_eq!(wide(2560.0).check_spread(dpi), Ok(()));
         assert_eq!(wide(2561.0).check_spread(dpi), Err(LightError::TooWide { pixels: 257 }));
         assert!(wide(1e300).check_spread(dpi).is_err());
@@ -233,7 +239,7 @@ mod tests {
         assert_eq!(light(SampleHeight::Top).check(), Ok(()));
         let dark = Light { intensity: Intensity::from_mw_per_cm2(0.0), ..light(SampleHeight::Top) };
         assert_eq!(dark.check().unwrap_err().to_string(), "the intensity must be above zero");
-        let none = Light { spread: Length::from_um(0.0), ..light(SampleHeight::Top) };
+        let none = Light { spread: [Length::default(); 2], ..light(SampleHeight::Top) };
         assert_eq!(none.check(), Ok(()));
     }
 }

@@ -26,7 +26,7 @@ pub struct RegionDoses {
 impl RegionDoses {
     /// Creates a rectangle without any dose.
     pub fn new(light: Light, dpi: Dpi, columns: Range<u32>, rows: Range<u32>) -> Self {
-        let blur = Blur::new(light.spread_pixels(dpi));
+        let blur = Blur::of_scan(light.spread_pixels(dpi));
         let doses = vec![0.0; columns.len() * rows.len()];
         Self { light, dpi, columns, rows, blur, last: None, doses }
     }

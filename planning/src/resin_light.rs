@@ -53,7 +53,7 @@ impl Light {
             intensity_of: spread.pixel().map_or(IntensityOf::Field, IntensityOf::Pixel),
             critical_dose: curve.critical_dose(),
             penetration_depth: curve.penetration_depth(),
-            spread: spread.sigma(),
+            spread: [spread.across(), spread.along()],
             gamma: material.gamma()?,
             at,
         })
@@ -74,7 +74,7 @@ mod tests {
         let layer =
             LayerTime { thickness: Length::from_um(11.2), time: ExposureTime::from_ms(1000.0) };
         let dpi = Dpi::new(25_400.0 / 11.2).unwrap();
-        assert!((light.spread_pixels(dpi) - 13.0).abs() < 1e-12);
+        assert!(light.spread_pixels(dpi).iter().all(|sigma| (sigma - 13.0).abs() < 1e-12));
         for layer in &light.layers(dpi, &[layer; 3])[1..] {
             // Appendix A: a pixel of light 3 under E_c = 170; 10^-0.008 passes a layer.
             assert!((layer.own - 3.0 / 170.0).abs() < 1e-15, "{layer:?}");
@@ -96,6 +96,7 @@ mod tests {
         assert!(matches!(Light::of(&material, SampleHeight::Top), Err(NoLight::Spread(_))));
         let straight = Material::builtin("lamp-suspension").unwrap();
         let straight = Light::of_any(&straight, SampleHeight::Bottom).unwrap();
-        assert_eq!((straight.spread.um(), straight.at), (0.0, SampleHeight::Bottom));
+        assert_eq!(straight.spread.map(Length::um), [0.0; 2]);
+        assert_eq!(straight.at, SampleHeight::Bottom);
     }
 }

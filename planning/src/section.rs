@@ -52,7 +52,7 @@ struct ExposedLayer {
 impl DoseSection {
     /// Creates the section of a stack whose images have this resolution, along a line.
     pub fn new(light: Light, line: PixelLine, dpi: Dpi) -> Self {
-        let blur = Blur::new(light.spread_pixels(dpi));
+        let blur = Blur::of_scan(light.spread_pixels(dpi));
         Self { light, dpi, line, blur, layers: Vec::new() }
     }
 
@@ -77,7 +77,11 @@ impl DoseSection {
     /// Returns the light that spreads to each pixel of the line from the pixels beside the line.
     fn gathered_across(&self, image: &Image, light_of: impl Fn(u8) -> f64) -> Vec<f64> {
         let mut light = vec![0.0; self.line.len(image) as usize];
-        let taps = self.blur.taps();
+        let [of_rows, of_columns] = self.blur.taps();
+        let taps = match self.line {
+            PixelLine::Row(_) => of_columns,
+            PixelLine::Column(_) => of_rows,
+        };
         let reach = taps.len() as u32 - 1;
         match self.line {
             PixelLine::Row(at) => {
@@ -111,7 +115,11 @@ impl DoseSection {
         if light.iter().all(|&light| light == 0.0) {
             return vec![0.0; light.len()];
         }
-        let taps = self.blur.taps();
+        let [of_rows, of_columns] = self.blur.taps();
+        let taps = match self.line {
+            PixelLine::Row(_) => of_rows,
+            PixelLine::Column(_) => of_columns,
+        };
         let at = |place: Option<usize>| place.and_then(|place| light.get(place)).unwrap_or(&0.0);
         let pair = |centre: usize, (distance, tap): (usize, &f64)| {
             tap * (at(centre.checked_sub(distance)) + at(Some(centre + distance)))
@@ -210,7 +218,7 @@ mod tests {
             intensity_of: IntensityOf::Field,
             critical_dose: Dose::from_mj_per_cm2(8.0),
             penetration_depth: Length::from_um(300.0),
-            spread: Length::from_um(spread_um),
+            spread: [Length::from_um(spread_um); 2],
             gamma: 2.0,
             at,
         }
@@ -307,10 +315,12 @@ mod tests {
     fn spread_to([row, column]: [usize; 2], layer: usize, light: &Light) -> f64 {
         let pixels = (0..SIZE[1]).flat_map(|r| (0..SIZE[0]).map(move |c| [r, c]));
         let share = |[r, c]: [usize; 2]| {
-            let squared = r.abs_diff(row).pow(2) + c.abs_diff(column).pow(2);
-            light.of_level(level(layer, r, c)) * (-(squared as f64) / (2.0 * 1.7 * 1.7)).exp()
+            let away = [c.abs_diff(column), r.abs_diff(row)].map(|pixels| 10.0 * pixels as f64);
+            let weight =
+                |axis: usize| (-0.5 * (away[axis] / light.spread[axis].um()).powi(2)).exp();
+            light.of_level(level(layer, r, c)) * weight(0) * weight(1)
         };
-        pixels.map(share).sum::<f64>() / Blur::<f64>::new(1.7).sum()
+        pixels.map(share).sum::<f64>() / Blur::<f64>::of_scan([1.7, 2.6]).sum()
     }
 
     #[test]
@@ -318,7 +328,8 @@ mod tests {
         let layers = [layer(30.0, 500.0), layer(50.0, 700.0), layer(20.0, 900.0)];
         let tops = [30.0, 80.0, 100.0];
         for (at, below_top) in SampleHeight::ALL.into_iter().zip([0.0, 0.5, 1.0]) {
-            let light = light(17.0, at);
+            let spread = [17.0, 26.0].map(Length::from_um);
+            let light = Light { spread, ..light(17.0, at) };
             for line in [PixelLine::Row(4), PixelLine::Column(12)] {
                 let mut section = DoseSection::new(light, line, dpi());
                 for (number, exposed) in layers.iter().enumerate() {

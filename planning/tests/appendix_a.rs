@@ -31,7 +31,7 @@ fn light() -> Light {
         intensity_of: IntensityOf::Pixel(pixel),
         critical_dose: Dose::from_mj_per_cm2(170.0),
         penetration_depth: Length::from_um(11.2 / (0.008 * std::f64::consts::LN_10)),
-        spread: Length::from_um(13.0 * 11.2),
+        spread: [Length::from_um(13.0 * 11.2); 2],
         gamma: 2.404,
         at: SampleHeight::Top,
     }

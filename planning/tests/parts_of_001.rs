@@ -90,7 +90,7 @@ impl Case {
             penetration_depth: Length::from_um(
                 self.part.thickness().um() / (self.fade * std::f64::consts::LN_10),
             ),
-            spread: Length::from_um(self.sigma * self.part.pitch().um()),
+            spread: [Length::from_um(self.sigma * self.part.pitch().um()); 2],
             gamma: 2.404,
             at: SampleHeight::Top,
         };

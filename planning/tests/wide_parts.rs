@@ -32,7 +32,7 @@ fn weak() -> Light {
         intensity_of: IntensityOf::Field,
         critical_dose: Dose::from_mj_per_cm2(10.0),
         penetration_depth: Length::from_um(150.0),
-        spread: Length::from_um(50.0),
+        spread: [Length::from_um(50.0); 2],
         gamma: 1.0,
         at: SampleHeight::Top,
     }

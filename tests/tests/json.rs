@@ -71,6 +71,8 @@ fn materials() {
             "description": "A resin of mine",
             "light_mw_per_cm2": 2000.0,
             "spread_um": 34.0,
+            "spread_across_um": 34.0,
+            "spread_along_um": 34.0,
             "gamma": 2.2,
             "models": ["working-curve"],
             "cure_width_um": [500.0],

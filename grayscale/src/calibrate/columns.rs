@@ -94,6 +94,10 @@ impl Column {
         }
     }
 
+    pub(super) fn text(self, row: &TableRow) -> &str {
+        row.cell(self.index)
+    }
+
     pub(super) fn number_or_blank(self, row: &TableRow) -> Result<Option<f64>, DataError> {
         match row.cell(self.index) {
             "" => Ok(None),

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use super::columns::{Column, DOSE, DoseColumn, EXPOSURE, LENGTHS, check_columns};
 use super::csv_table::{CsvTable, TableRow};
+use super::fit_scan::{LineKind, ScanDirection};
 use crate::resin::{Dose, GrayLevel, Intensity, cure_width_of_square};
 
 /// A measured cure depth.
@@ -45,13 +46,28 @@ pub struct WidthPoint {
     pub width: Length,
 }
 
+/// The measured width of a line or a gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinePoint {
+    /// The direction of the width.
+    pub direction: ScanDirection,
+    /// Whether the line is white, or black in white.
+    pub kind: LineKind,
+    /// The width in the image.
+    pub drawn: Length,
+    /// The dose of full white.
+    pub dose: Dose,
+    /// The width after curing.
+    pub cured: Length,
+}
+
 /// The points of a table, and the numbers of rows without a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured<T> {
     /// The measurements.
     pub points: Vec<T>,
     /// The number of rows with nothing left to measure: films that did not cure, squares that were
-    /// washed away.
+    /// washed away, gaps that closed.
     pub none: usize,
     /// The number of rows with an empty measurement.
     pub blank: usize,
@@ -112,6 +128,8 @@ const SIZE_PIXELS: &str = "feature_px";
 const SIZE: &str = "feature_um";
 const CURED: &str = "cured_um";
 const WIDTH: &str = "width_um";
+const DIRECTION: &str = "direction";
+const KIND: &str = "kind";
 
 /// Reads cure depths from a table of `dose_mj_per_cm2` or, under a light, `exposure_ms`;
 /// `depth_um`; and `gray`, white if that is absent. The doses are doses of full white. Rows of
@@ -210,6 +228,43 @@ pub fn width_points(
     })
 }
 
+/// Reads the widths of lines and gaps from a table of `direction`, `across` or `along`; `kind`,
+/// `line` or `gap`; `feature_px` or `feature_um`, the width in the image; `dose_mj_per_cm2` or, under
+/// a light, `exposure_ms`; and `cured_um`, the width after curing. Lines of a width of zero or below
+/// did not cure, and such gaps closed.
+///
+/// # Errors
+/// Returns an error if a column is missing or unknown, or a cell is not a number in its range or a
+/// known word.
+pub fn line_points(
+    table: &CsvTable,
+    light: Option<Intensity>,
+    dpi: Dpi,
+) -> Result<Measured<LinePoint>, DataError> {
+    check_columns(table, &[DIRECTION, KIND, SIZE_PIXELS, SIZE, DOSE, EXPOSURE, CURED])?;
+    let needed = |name| Column::find(table, name).ok_or(DataError::NoColumn(name));
+    let [direction, kind, cured] = [needed(DIRECTION)?, needed(KIND)?, needed(CURED)?];
+    let dose = DoseColumn::find(table, light)?;
+    let (size, in_pixels) = Column::either(table, SIZE_PIXELS, SIZE)?;
+    measured(table, |row| {
+        let pitch = if in_pixels { dpi.pitch().um() } else { 1.0 };
+        let drawn = Length::from_um(size.number(row)? * pitch);
+        if !LENGTHS.contains(&drawn.um()) {
+            return Err(size.impossible(row, "a width from 0.001 um to 1 m"));
+        }
+        let wrong = |_| direction.impossible(row, "`across` or `along`");
+        let direction: ScanDirection = direction.text(row).parse().map_err(wrong)?;
+        let kind: LineKind =
+            kind.text(row).parse().map_err(|_| kind.impossible(row, "`line` or `gap`"))?;
+        let dose = dose.of(row)?;
+        Ok(match cured.length_or_blank(row)? {
+            None => RowContent::Blank,
+            Some(cured) if cured.um() <= 0.0 => RowContent::Nothing,
+            Some(cured) => RowContent::Point(LinePoint { direction, kind, drawn, dose, cured }),
+        })
+    })
+}
+
 /// The content of a row.
 enum RowContent<T> {
     Point(T),
@@ -291,6 +346,31 @@ mod tests {
         let by_width = widths("feature_um,dose_mj_per_cm2,width_um\n423,200,13.3\n").unwrap();
         assert_eq!(by_width.points[0].feature_size.um(), 423.0);
         assert_eq!(by_width.points[0].width.um(), 13.3);
+    }
+
+    #[test]
+    fn lines_have_directions_and_kinds() {
+        let lines = |text: &str| {
+            let table = CsvTable::parse(text).unwrap();
+            line_points(&table, None, Dpi::new(1000.0).unwrap())
+        };
+        let head = "direction,kind,feature_px,dose_mj_per_cm2,cured_um\n";
+        let read = lines(&format!("{head}across,line,2,90,55\nalong,gap,3,90,0\nalong,gap,4,9,\n"));
+        let read = read.unwrap();
+        assert_eq!((read.points.len(), read.none, read.blank), (1, 1, 1));
+        let line = read.points[0];
+        assert_eq!((line.direction, line.kind), (ScanDirection::Across, LineKind::Line));
+        assert!((line.drawn.um() - 50.8).abs() < 1e-9 && line.cured.um() == 55.0);
+        for (row, words) in [
+            ("up,line,2,90,55", "column direction: up is not `across` or `along`"),
+            ("along,hole,2,90,55", "column kind: hole is not `line` or `gap`"),
+            ("along,gap,0,90,55", "column feature_px: 0 is not a width"),
+            ("along,gap,2,90,NaN", "column cured_um: `NaN` is not a number"),
+        ] {
+            let said = lines(&format!("{head}{row}\n")).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
+        assert_eq!(lines("kind\nline\n"), Err(DataError::NoColumn(DIRECTION)));
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod extent;
 mod fit_curve;
 mod fit_gray;
 mod fit_lamp;
+mod fit_scan;
 mod fit_two_depth;
 mod fit_widths;
 mod hinge;
@@ -50,10 +51,12 @@ pub use exposure_times::ExposureTimes;
 pub use fit_curve::{CurveFit, fit_curve};
 pub use fit_gray::{GrayFit, LevelFit, LineEstimate, fit_gray};
 pub use fit_lamp::{LampFit, fit_lamp};
+pub use fit_scan::{LineKind, LinesOf, ScanDirection, ScanFit, fit_scan};
 pub use fit_two_depth::{TwoDepthFit, fit_two_depth};
 pub use fit_widths::{WidthFit, fit_widths};
 pub use measurements::{
-    DataError, DepthPoint, LampPoint, Measured, WidthPoint, depth_points, lamp_points, width_points,
+    DataError, DepthPoint, LampPoint, LinePoint, Measured, WidthPoint, depth_points, lamp_points,
+    line_points, width_points,
 };
 
 /// The cure models that can be fitted to depths.
@@ -234,6 +237,40 @@ pub enum FitError {
     /// The model does not fit.
     #[error("the two-depth model does not fit these points: try the working curve")]
     NoFit,
+    /// There are too few lines of a direction.
+    #[error("{count} {lines} are too few: {needed} are the least, of several widths")]
+    TooFewLines {
+        /// The lines.
+        lines: LinesOf,
+        /// The number there is.
+        count: usize,
+        /// The least number.
+        needed: usize,
+    },
+    /// All lines of a direction are of one kind, width and dose.
+    #[error("all {0} are alike: measure several widths")]
+    EqualLines(LinesOf),
+    /// No spread of light fits the lines.
+    #[error(
+        "no light that spreads as a Gaussian cures such lines: check the columns, and that          `across` means widths along x"
+    )]
+    NoScanFit,
+    /// The interval of a number is too wide.
+    #[error(
+        "the lines do not determine {what}: it may be {} to {} {unit}; measure lines and gaps          about as wide as light spreads, or several doses",
+        short(*low),
+        short(*high)
+    )]
+    VagueLines {
+        /// The number's name.
+        what: &'static str,
+        /// The lower end of its 95% confidence interval.
+        low: f64,
+        /// The upper end.
+        high: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
     /// The points of one group cannot be fitted.
     #[error("{group}: {error}")]
     Within {

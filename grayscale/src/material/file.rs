@@ -28,6 +28,9 @@ pub enum MaterialError {
     /// A constant is infinite or not a number.
     #[error("constants.{0}.value must be a finite number")]
     NoNumber(String),
+    /// The spread has neither one standard deviation nor two.
+    #[error("spread: give either sigma, or both sigma-across and sigma-along")]
+    OneOrTwoSpreads,
     /// A dimmed lamp's curve keeps the penetration depth of a working curve, which is missing.
     #[error("dimmed-lamp needs a working curve: add [working-curve.penetration-depth]")]
     NoWorkingCurve,
@@ -85,6 +88,7 @@ impl Catalogued for Material {
         }
         self.check_measured()?;
         self.spread()?;
+        self.edge_light()?;
         self.gamma()?;
         self.working_curve()?;
         self.dimmed_lamp()?;
@@ -240,18 +244,40 @@ source = "notebook, page 3"
         );
         let mut material = material.unwrap();
         assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
-        assert_eq!(material.spread().unwrap().unwrap().sigma().um(), 50.0);
+        assert_eq!(material.spread().unwrap().unwrap().sigma(), Some(Length::from_um(50.0)));
         assert_eq!(material.gamma(), Ok(2.2));
         // A radiometer reads a wide field.
         assert_eq!(material.light().unwrap().unwrap().mw_per_cm2(), 20.0);
         let spread = material.spread.as_mut().unwrap();
-        spread.pixel = Some(Given { value: Length::from_um(25.0), ..spread.sigma.clone() });
+        let sigma = spread.sigma.clone().unwrap();
+        spread.pixel = Some(Given { value: Length::from_um(25.0), ..sigma });
         // 8π pixels of two pixels' spread.
         let light = material.light().unwrap().unwrap().mw_per_cm2();
         assert!((light - 502.654825).abs() < 1e-6, "{light}");
         assert_eq!(material.resin().unwrap().light().mw_per_cm2(), light);
         let none = Material::from_toml(WHOLE).unwrap();
         assert_eq!((none.spread(), none.gamma()), (Ok(None), Ok(1.0)));
+    }
+
+    #[test]
+    fn a_scan_may_spread_light_by_two_widths() {
+        let with = |keys: &str| Material::from_toml(&format!("{WHOLE}[spread]\n{keys}"));
+        let um =
+            |key: &str, um: f64| format!("{key} = {{ value = \"{um} um\", source = \"a\" }}\n");
+        let [across, along] = [um("sigma-across", 30.0), um("sigma-along", 45.0)];
+        let dose = "critical-dose = { value = \"80 mJ/cm2\", source = \"a\" }\n";
+        let material = with(&format!("{across}{along}{dose}")).unwrap();
+        assert_eq!(Material::from_toml(&material.to_toml().unwrap()), Ok(material.clone()));
+        let spread = material.spread().unwrap().unwrap();
+        assert_eq!((spread.across().um(), spread.along().um(), spread.sigma()), (30.0, 45.0, None));
+        assert!(material.edge_light().unwrap().is_some());
+        assert_eq!(with(&format!("{across}{along}")).unwrap().edge_light(), Ok(None));
+        for keys in ["", &across, &along, &(um("sigma", 30.0) + &along), dose] {
+            let said = with(keys).unwrap_err().to_string();
+            assert!(said.contains("either sigma, or both sigma-across and"), "{said} of {keys:?}");
+        }
+        let dark = with(&(um("sigma", 30.0) + &dose.replace("80", "0"))).unwrap_err();
+        assert_eq!(dark.to_string(), "spread.critical-dose must be above zero");
     }
 
     #[test]

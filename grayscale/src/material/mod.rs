@@ -34,8 +34,9 @@ pub use measured::{GivenRange, MeasuredRange};
 pub use number::{Constant, Given, GivenDepths, GivenLine, GivenNumber};
 
 use crate::resin::{
-    CureModel, CureWidth, DepthRange, Dose, FadingLight, GrayCurve, Intensity, IntensityLines,
-    ModelError, Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity, WorkingCurve,
+    CureModel, CureWidth, DepthRange, Dose, EdgeLight, FadingLight, GrayCurve, Intensity,
+    IntensityLines, ModelError, Resin, Spread, StraightLine, TwoDepth, WidthLine, WidthSensitivity,
+    WorkingCurve,
 };
 
 /// The known numbers of a resin; unknown ones are absent. The default is empty and has no
@@ -75,12 +76,18 @@ pub struct Material {
     pub constants: BTreeMap<String, Constant>,
 }
 
-/// The numbers of how far light spreads sideways.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The numbers of how far light spreads sideways: one standard deviation, or two.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct SpreadNumbers {
-    /// The standard deviation `σ`, half of 002's Gaussian width `W_o`.
-    pub sigma: Given<Length>,
+    /// The standard deviation `σ` in all directions, half of 002's Gaussian width `W_o`.
+    pub sigma: Option<Given<Length>>,
+    /// The standard deviation across the scan, along x.
+    pub sigma_across: Option<Given<Length>>,
+    /// The standard deviation along the scan, along y.
+    pub sigma_along: Option<Given<Length>>,
+    /// The dose at the surface from which on lines cure, if it was fitted with the spread.
+    pub critical_dose: Option<Given<Dose>>,
     /// The side of the pixel that the intensity is stated for, if not for a wide field.
     pub pixel: Option<Given<Length>>,
 }
@@ -187,12 +194,27 @@ impl Material {
     /// Returns how light spreads sideways, if it is known.
     ///
     /// # Errors
-    /// Returns an error if `σ` is below zero or above 2 mm, or the pixel is not above zero.
+    /// Returns an error if a `σ` is below zero or above 2 mm, if there is neither one `σ` nor two
+    /// for the scan, or if the pixel is not above zero.
     pub fn spread(&self) -> Result<Option<Spread>, MaterialError> {
-        let spread = |numbers: &SpreadNumbers| {
-            Spread::new(numbers.sigma.value, numbers.pixel.as_ref().map(|pixel| pixel.value))
+        let Some(numbers) = &self.spread else { return Ok(None) };
+        let pixel = numbers.pixel.as_ref().map(|pixel| pixel.value);
+        let spread = match (&numbers.sigma, &numbers.sigma_across, &numbers.sigma_along) {
+            (Some(sigma), None, None) => Spread::new(sigma.value, pixel),
+            (None, Some(across), Some(along)) => Spread::of_scan(across.value, along.value, pixel),
+            _ => return Err(MaterialError::OneOrTwoSpreads),
         };
-        self.spread.as_ref().map(spread).transpose().map_err(of("spread"))
+        spread.map(Some).map_err(of("spread"))
+    }
+
+    /// Returns where the edges of lines and gaps cure, if the spread was fitted to lines.
+    ///
+    /// # Errors
+    /// Returns an error if a number of the spread is impossible.
+    pub fn edge_light(&self) -> Result<Option<EdgeLight>, MaterialError> {
+        let dose = self.spread.as_ref().and_then(|numbers| numbers.critical_dose.as_ref());
+        let Some((spread, dose)) = self.spread()?.zip(dose) else { return Ok(None) };
+        EdgeLight::new(spread, dose.value).map(Some).map_err(of("spread"))
     }
 
     /// Returns the exponent `γ`, with which a level `g` of 255 passes `(g/255)^γ` of the

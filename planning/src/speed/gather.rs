@@ -37,7 +37,7 @@ struct TileRoom {
 
 impl<'a> Gather<'a> {
     pub(crate) fn new(part: &'a TimedPart, light: &Light) -> Self {
-        let blur = Blur::<f32>::new(part.spread_pixels(light));
+        let blur = Blur::<f32>::of_scan(part.spread_pixels(light));
         let sum = blur.sum();
         let light_of = (0..=255).map(|level| (light.of_level(level) / sum) as f32).collect();
         let bytes = |side: usize| side * side * part.images.len() * size_of::<f32>();

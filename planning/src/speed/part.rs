@@ -146,8 +146,8 @@ impl TimedPart {
         Ok(light.layers(self.dpi, &layers))
     }
 
-    /// Returns σ in pixels.
-    pub(crate) fn spread_pixels(&self, light: &Light) -> f64 {
+    /// Returns σ in pixels, along rows and along columns.
+    pub(crate) fn spread_pixels(&self, light: &Light) -> [f64; 2] {
         light.spread_pixels(self.dpi)
     }
 

@@ -40,7 +40,7 @@ impl<'a> Simulation<'a> {
         log_doses: &[f64],
         memory: u64,
     ) -> Result<Self, PartError> {
-        let field = Blur::<f32>::new(part.spread_pixels(light)).sum();
+        let field = Blur::<f32>::of_scan(part.spread_pixels(light)).sum();
         let per_second = part.per_second(light)?.into_iter().zip(log_doses);
         let layers = per_second.map(|(mut light, log_dose)| {
             // Columns have the light 1 under a wide white field.

@@ -15,7 +15,7 @@ pub(crate) fn pegda(spread_um: f64) -> Light {
         intensity_of: IntensityOf::Field,
         critical_dose: Dose::from_mj_per_cm2(7.266),
         penetration_depth: Length::from_um(185.0 / -f64::ln(0.81)),
-        spread: Length::from_um(spread_um),
+        spread: [Length::from_um(spread_um); 2],
         gamma: 1.0,
         at: SampleHeight::Top,
     }

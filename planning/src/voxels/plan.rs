@@ -157,8 +157,9 @@ fn runs_of(wanted: &Mask) -> SpooledRuns {
 fn setting(pages: &PageStatements, light: &Light, options: &Options) -> Option<VoxelSetting> {
     let (size, dpi) = (pages.size?, pages.dpi?);
     let image = size.map(|side| side as usize);
-    let sigma = light.spread_pixels(dpi);
-    let blur = Blur::new(sigma);
+    let sigmas = light.spread_pixels(dpi);
+    let blur = Blur::of_scan(sigmas);
+    let sigma = sigmas[0].max(sigmas[1]);
     let around = options.around.map_or(blur.radius(), |around| around as usize);
     let [width, height] = image.map(|side| side + 2 * around);
     // The last page was exposed last and lies nearest to the light.

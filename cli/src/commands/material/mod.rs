@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin};
+use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin, Spread};
 use lamp_pipeline::documents;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
@@ -93,11 +93,14 @@ fn fields(material: &Material) -> Value {
     };
     let depths = resin.as_ref().ok().map(|resin| resin.model().depths());
     let time = example.as_ref().and_then(|(_, time)| time.as_ref().ok());
+    let spread = spread_of(material);
     json!({
         "name": material.name,
         "description": material.description,
         "light_mw_per_cm2": light_of(material).map(Intensity::mw_per_cm2),
-        "spread_um": material.spread.as_ref().map(|spread| spread.sigma.value.um()),
+        "spread_um": spread.and_then(|spread| spread.sigma()).map(Length::um),
+        "spread_across_um": spread.map(|spread| spread.across().um()),
+        "spread_along_um": spread.map(|spread| spread.along().um()),
         "gamma": material.gamma.as_ref().map(|gamma| gamma.value),
         "models": models(material),
         "cure_width_um": material.cure_width.iter().map(|it| it.feature_size.um()).collect::<Vec<_>>(),
@@ -157,9 +160,17 @@ fn models_and_widths(material: &Material) -> String {
 
 /// How light spreads and how it follows gray levels.
 fn light_laws(material: &Material) -> impl Iterator<Item = String> {
-    let spread = material.spread.as_ref().map(|spread| format!("spread {}", spread.sigma.value));
+    let spread = spread_of(material).map(|spread| match spread.sigma() {
+        Some(sigma) => format!("spread {sigma}"),
+        None => format!("spread {} across and {} along the scan", spread.across(), spread.along()),
+    });
     let gamma = material.gamma.as_ref().map(|gamma| format!("gamma {}", gamma.value));
     spread.into_iter().chain(gamma)
+}
+
+/// How light spreads. Built-in and checked materials have no faults.
+fn spread_of(material: &Material) -> Option<Spread> {
+    material.spread().ok().flatten()
 }
 
 /// The sizes of the squares whose cure widths a material has.
@@ -188,7 +199,8 @@ fn allows(material: &Material) -> String {
         Err(why) => {
             // Plans by kinetics need no model of cure depths.
             let others = material.kinetics.iter().map(|_| "kinetics".to_owned());
-            let others: Vec<_> = others.chain(widths(material)).collect();
+            let others: Vec<_> =
+                others.chain(widths(material)).chain(light_laws(material)).collect();
             let gives = if others.is_empty() { "" } else { " and gives " };
             return format!("in order{gives}{}, but {why}", others.join(", "));
         }

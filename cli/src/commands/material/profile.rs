@@ -59,8 +59,17 @@ pub(super) fn run(args: &ProfileArgs, common: &Common) -> Result<(), Exit> {
             let spread = spread.ok_or_else(|| {
                 Exit::usage(format!("{} has no [spread]: give --beam", material.name))
             })?;
+            let sigma = spread.sigma().ok_or_else(|| {
+                Exit::usage(format!(
+                    "light of {} spreads by {} across and {} along the scan: give --beam, twice \
+                     the one across the line",
+                    material.name,
+                    spread.across(),
+                    spread.along()
+                ))
+            })?;
             // exp(-2 y²/Wo²) is a Gaussian of the standard deviation Wo / 2.
-            Length::from_um(2.0 * spread.sigma().um())
+            Length::from_um(2.0 * sigma.um())
         }
     };
     let beam = GaussianBeam::new(beam).map_err(|error| Exit::usage(format!("--beam: {error}")))?;
