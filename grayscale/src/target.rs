@@ -1,5 +1,6 @@
 //! Images to expose and measure: squares for the cure width (002 section 3.4.3, figure
-//! 73) and screens for the homogeneous transition (002 section 3.3.6, figure 56).
+//! 73), lines in two directions for the spread of light (002 sections 3.4.2.1 and 3.4.8) and
+//! screens for the homogeneous transition (002 section 3.3.6, figure 56).
 
 use lamp_stack::{GrayMask, Mask, MaskBuilder};
 use thiserror::Error;
@@ -22,6 +23,9 @@ pub enum TargetError {
     /// There are no doses or too many, or they do not go up.
     #[error("the doses must be 1 to 100, above zero, and go up")]
     Doses,
+    /// There are no lines or too many.
+    #[error("the widths of lines must be 1 to 50")]
+    Lines,
     /// A length in pixels is zero or too large.
     #[error("{what} of {pixels} pixels: they have 1 to {most}")]
     Pixels {
@@ -39,6 +43,9 @@ const MAX_PIXELS: u32 = 50_000;
 /// The widest tiles of screens in pixels, fewer as a screen has many runs.
 const MAX_TILE: u32 = 5_000;
 const MAX_DOSES: usize = 100;
+const MAX_LINES: usize = 50;
+/// The most rows of a target of lines: more than any machine's.
+const MAX_ROWS: u32 = 200_000;
 
 /// Image widths are multiples of this (002 section 2.2.2).
 const WIDTH_STEP: u32 = 32;
@@ -65,6 +72,14 @@ const WIDTH_STEP: u32 = 32;
 pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<TargetExposure>, TargetError> {
     check_pixels("squares", side, MAX_PIXELS)?;
     check_pixels("gaps", gap, MAX_PIXELS)?;
+    exposures(doses, |first| squares_from(first, doses.len(), side, gap))
+}
+
+/// Makes an exposure for each dose, of the image without the parts before a number.
+fn exposures(
+    doses: &[Dose],
+    image_from: impl Fn(usize) -> Mask,
+) -> Result<Vec<TargetExposure>, TargetError> {
     let rises =
         doses.is_sorted_by(|a, b| a < b) && doses.iter().all(|d| d.mj_per_cm2().is_finite());
     let begins = doses.first().is_some_and(|first| first.mj_per_cm2() > 0.0);
@@ -75,9 +90,103 @@ pub fn squares(side: u32, gap: u32, doses: &[Dose]) -> Result<Vec<TargetExposure
     let expose = |(first, dose): (usize, &Dose)| {
         let added = Dose::from_mj_per_cm2(dose.mj_per_cm2() - before);
         before = dose.mj_per_cm2();
-        TargetExposure { image: squares_from(first, doses.len(), side, gap), dose: added }
+        TargetExposure { image: image_from(first), dose: added }
     };
     Ok(doses.iter().enumerate().map(expose).collect())
+}
+
+/// Makes white lines and black gaps of several `widths` in two directions, one block for each of
+/// `doses`, from the top. As for [`squares`], each exposure leaves out the blocks that have their
+/// dose.
+///
+/// On the left of a block, lines and then a plate with the gaps stand side by side, from the left in
+/// the order of `widths`; they are `length` pixels long along the columns. On the right they lie
+/// along the rows, from the top. `gap` pixels of black are around lines and plates, and as many of
+/// white around gaps.
+///
+/// ```
+/// use lamp_grayscale::{resin::Dose, target::scan_lines};
+///
+/// let exposures = scan_lines(&[2, 5], 100, 30, &[Dose::from_mj_per_cm2(200.0)])?;
+/// let image = &exposures[0].image;
+/// // Two lines, and two gaps in a plate, across the first row of the left half.
+/// assert_eq!(image.row(30)[..10], [30, 32, 62, 67, 97, 127, 129, 159, 164, 194]);
+/// # Ok::<(), lamp_grayscale::target::TargetError>(())
+/// ```
+///
+/// # Errors
+/// Returns an error if there are no widths, no doses or too many, if doses do not go up from above
+/// zero, or if a length is zero or too large.
+pub fn scan_lines(
+    widths: &[u32],
+    length: u32,
+    gap: u32,
+    doses: &[Dose],
+) -> Result<Vec<TargetExposure>, TargetError> {
+    check_pixels("gaps", gap, MAX_TILE)?;
+    check_pixels("lengths", length, MAX_PIXELS)?;
+    widths.iter().try_for_each(|&width| check_pixels("lines", width, MAX_TILE))?;
+    if !(1..=MAX_LINES).contains(&widths.len()) {
+        return Err(TargetError::Lines);
+    }
+    let block = ScanBlock::new(widths, length, gap);
+    let rows = u64::from(block.height()) * doses.len() as u64;
+    check_pixels("targets", rows.try_into().unwrap_or(u32::MAX), MAX_ROWS)?;
+    exposures(doses, |first| {
+        let mut mask = MaskBuilder::new(block.width().next_multiple_of(WIDTH_STEP));
+        mask.push_black(first as u32 * block.height());
+        (first..doses.len()).for_each(|_| block.push(&mut mask));
+        mask.finish()
+    })
+}
+
+/// Lines and gaps in both directions.
+struct ScanBlock {
+    /// Where the color changes across lines and gaps.
+    changes: Vec<u32>,
+    /// The pixels across all of them, with black on both sides.
+    across: u32,
+    length: u32,
+    gap: u32,
+}
+
+impl ScanBlock {
+    fn new(widths: &[u32], length: u32, gap: u32) -> Self {
+        let (mut changes, mut at) = (Vec::new(), gap);
+        for width in widths {
+            changes.extend([at, at + width]);
+            at += width + gap;
+        }
+        changes.push(at);
+        for width in widths {
+            changes.extend([at + gap, at + gap + width]);
+            at += width + gap;
+        }
+        changes.push(at + gap);
+        Self { changes, across: at + 2 * gap, length, gap }
+    }
+
+    fn width(&self) -> u32 {
+        self.across + self.length + self.gap
+    }
+
+    fn height(&self) -> u32 {
+        self.across.max(self.length + 2 * self.gap)
+    }
+
+    fn push(&self, mask: &mut MaskBuilder) {
+        let mut row = Vec::new();
+        for y in 0..self.height() {
+            row.clear();
+            if (self.gap..self.gap + self.length).contains(&y) {
+                row.extend_from_slice(&self.changes);
+            }
+            if self.changes.partition_point(|&at| at <= y) % 2 == 1 {
+                row.extend([self.across, self.across + self.length]);
+            }
+            mask.push_row(&row).expect("both directions stand side by side within the width");
+        }
+    }
 }
 
 fn check_pixels(what: &'static str, pixels: u32, most: u32) -> Result<(), TargetError> {
@@ -195,6 +304,32 @@ mod tests {
     }
 
     #[test]
+    fn lines_and_gaps_are_alike_in_both_directions_and_get_their_doses() {
+        let (widths, length, gap) = ([2, 7, 31], 90, 20);
+        let exposures = scan_lines(&widths, length, gap, &doses(&[50.0, 80.0])).unwrap();
+        let total = |x, y| -> f64 {
+            let white = exposures.iter().filter(|e| e.image.is_white(x, y));
+            white.map(|exposure| exposure.dose.mj_per_cm2()).sum()
+        };
+        let across = 3 * gap + 2 * (40 + 3 * gap);
+        let (first, height) = (&exposures[0].image, exposures[0].image.height());
+        assert_eq!((first.width(), height), (across + length + gap + 22, 2 * across));
+        for (block, dose) in [(0, 50.0), (1, 80.0)] {
+            let top = block * across;
+            // Mirrored at the block's diagonal, left is right.
+            for at in 0..across {
+                let left = total(at, top + gap + length / 2);
+                assert_eq!(left, total(across + length / 2, top + at), "{block} {at}");
+                assert!(left == 0.0 || left == dose, "{block} {at}: {left}");
+            }
+            let runs: Vec<f64> = (0..across).map(|at| total(at, top + gap)).collect();
+            let runs: Vec<usize> = runs.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+            assert_eq!(runs, [20, 2, 20, 7, 20, 31, 20, 20, 2, 20, 7, 20, 31, 20, 20]);
+            assert_eq!([total(gap, top + gap - 1), total(gap, top + gap + length)], [0.0; 2]);
+        }
+    }
+
+    #[test]
     fn odd_numbers_of_squares_have_a_place_less() {
         for count in 1..=7 {
             let rising: Vec<f64> = (1..=count).map(f64::from).collect();
@@ -215,6 +350,17 @@ mod tests {
         assert_eq!(error.to_string(), "squares of 0 pixels: they have 1 to 50000");
         assert!(squares(5, 50_001, &doses(&[1.0])).is_err());
         assert!(screens(GrayLevel::WHITE, 5, 5, &[0]).is_err());
+        let lines = |widths: &[u32], length, gap| {
+            scan_lines(widths, length, gap, &doses(&[1.0])).map(drop).unwrap_err()
+        };
+        assert_eq!(lines(&[], 5, 5), TargetError::Lines);
+        assert_eq!(lines(&[1; 51], 5, 5), TargetError::Lines);
+        for (widths, length, gap) in [([0], 5, 5), ([5001], 5, 5), ([5], 0, 5), ([5], 5, 5001)] {
+            assert!(matches!(lines(&widths, length, gap), TargetError::Pixels { .. }));
+        }
+        assert_eq!(scan_lines(&[3], 5, 5, &[]), Err(TargetError::Doses));
+        let high = scan_lines(&[5000; 50], 5, 5000, &doses(&[1.0])).unwrap_err();
+        assert!(high.to_string().starts_with("targets of "), "{high}");
     }
 
     fn level_at(image: &GrayMask, x: u32, y: u32) -> u8 {

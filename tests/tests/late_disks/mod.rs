@@ -39,6 +39,7 @@ const WRITERS: &[&str] = &[
     "lamp plan speed good.tif --material pegda-sudan -o out.tif",
     "lamp learn out/ --start good.tif --material pegda-sudan",
     "lamp target squares --sizes 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
+    "lamp target scan --widths 4 --doses 60,90mJ/cm2 --intensity 1W/cm2 --dpi 100 -o out/",
     "lamp sample cube -o out.stl",
     "lamp edit good.tif edits.toml -o out.tif",
     "lamp support good.tif --part ball.stl -o out.tif",

@@ -3,6 +3,7 @@
 mod depth;
 mod estimate_table;
 mod lamp;
+mod scan;
 mod width;
 
 use std::io::{self, IsTerminal};
@@ -24,7 +25,7 @@ use crate::output::endings::parse_toml;
 use crate::streams::{check_beside, input_name, is_stream, print, write_file};
 use lamp_plots::{self as plots, Plot, drawn};
 
-/// Fit a resin's parameters to measured cure depths or widths
+/// Fit a resin's parameters to measured cure depths, widths or lines
 ///
 /// It prints each parameter with its 95% confidence interval, writes the parameters to a material
 /// file, and plots the fit with the measured points.
@@ -43,6 +44,7 @@ enum Calibration {
     Depth(depth::DepthArgs),
     Width(width::WidthArgs),
     Lamp(lamp::LampArgs),
+    Scan(scan::ScanArgs),
 }
 
 pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
@@ -50,6 +52,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<(), Exit> {
         Calibration::Depth(args) => depth::run(args, common),
         Calibration::Width(args) => width::run(args, common),
         Calibration::Lamp(args) => lamp::run(args, common),
+        Calibration::Scan(args) => scan::run(args, common),
     }
 }
 

@@ -1,10 +1,16 @@
 //! `lamp target`: the kinds of test images.
 
+mod scan;
 mod screens;
 mod squares;
 
+use std::path::Path;
+
 use clap::{Args, Subcommand};
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::Intensity;
 use lamp_grayscale::target::TargetError;
+use lamp_pipeline::documents::document;
 use lamp_stack::{Dpi, Length};
 
 use crate::args::options::{Common, parse_distance};
@@ -15,6 +21,7 @@ use crate::exit::Exit;
 #[command(after_help = "\
 Examples:
   lamp target squares --doses 60..600mJ/cm2 --material lamp-suspension -o targets/
+  lamp target scan --doses 150,300mJ/cm2 --material lamp-suspension -o lines/
   lamp target screens -o screens.tif")]
 pub(crate) struct TargetArgs {
     #[command(subcommand)]
@@ -24,12 +31,14 @@ pub(crate) struct TargetArgs {
 #[derive(Subcommand)]
 enum Target {
     Squares(squares::SquaresArgs),
+    Scan(scan::ScanArgs),
     Screens(screens::ScreensArgs),
 }
 
 pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
     match &args.what {
         Target::Squares(args) => squares::run(args, common),
+        Target::Scan(args) => scan::run(args, common),
         Target::Screens(args) => screens::run(args, common),
     }
 }
@@ -37,6 +46,32 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
 /// A length in whole pixels, to the nearest.
 fn whole_pixels(length: Length, dpi: Dpi) -> u32 {
     length.pixels(dpi).round() as u32
+}
+
+/// Sorts lengths in pixels and refuses one that stands twice.
+fn sorted(option: &str, pixels: &[u32]) -> Result<Vec<u32>, Exit> {
+    let mut sorted = pixels.to_vec();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(twice) => Err(Exit::usage(format!("{option}: {} is given twice", twice[0]))),
+        None => Ok(sorted),
+    }
+}
+
+/// Returns the light of full white, given or of a material. One of the two is there.
+fn full_white(given: Option<Intensity>, material: Option<&Path>) -> Result<Intensity, Exit> {
+    let Some(path) = material else {
+        return Ok(given.expect("one of the two is required"));
+    };
+    let material: Material = document(path)?;
+    let name = path.display();
+    material.light().map_err(anyhow::Error::new)?.ok_or_else(|| {
+        Exit::usage(format!("{name} states no intensity of full white: give --intensity"))
+    })
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 /// Parses how far squares stand apart, which is some way.

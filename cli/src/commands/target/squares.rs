@@ -4,13 +4,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{TargetExposure, squares};
-use lamp_pipeline::documents::document;
 use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
 
-use super::{parse_gap, whole_pixels};
+use super::{counted, full_white, parse_gap, sorted, whole_pixels};
 use crate::args::options::{Common, parse_light};
 use crate::exit::Exit;
 use crate::streams::{new_folder, write_file, written_to};
@@ -65,13 +63,9 @@ pub(super) struct SquaresArgs {
 }
 
 pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
-    let light = args.light()?;
+    let light = full_white(args.intensity, args.material.as_deref())?;
     let gap = whole_pixels(args.gap, args.dpi);
-    let mut sizes = args.sizes.clone();
-    sizes.sort_unstable();
-    if let Some(twice) = sizes.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Exit::usage(format!("--sizes: {} is given twice", twice[0])));
-    }
+    let sizes = sorted("--sizes", &args.sizes)?;
     // All of them, before there is a folder: a size may be impossible.
     let doses = &args.doses.0;
     let targets: Vec<(u32, Vec<TargetExposure>)> = sizes
@@ -101,10 +95,6 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
     Ok(())
 }
 
-fn counted(count: usize, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
-}
-
 const TABLE_HEAD: &str = "\
 # Write each square's side after curing into cured_um, also where it did not grow; leave it empty
 # where none was measured.
@@ -113,17 +103,6 @@ feature_px,dose_mj_per_cm2,cured_um
 ";
 
 impl SquaresArgs {
-    fn light(&self) -> Result<Intensity, Exit> {
-        let Some(path) = &self.material else {
-            return Ok(self.intensity.expect("one of the two is required"));
-        };
-        let material: Material = document(path)?;
-        let name = path.display();
-        material.light().map_err(anyhow::Error::new)?.ok_or_else(|| {
-            Exit::usage(format!("{name} states no intensity of full white: give --intensity"))
-        })
-    }
-
     /// The pages of a size's stack.
     fn layers(
         &self,
@@ -167,13 +146,13 @@ impl SquaresArgs {
 
 /// The doses of the squares, from the least.
 #[derive(Clone, Debug, PartialEq)]
-struct Doses(Vec<Dose>);
+pub(super) struct Doses(pub(super) Vec<Dose>);
 
 /// How many doses a range has: as many tiles as figure 73 of 002 has.
 const RANGE_STEPS: u32 = 10;
 
 /// Parses `60..600mJ/cm2` or `60,90,140mJ/cm2`; the last unit serves all.
-fn parse_doses(text: &str) -> Result<Doses, String> {
+pub(super) fn parse_doses(text: &str) -> Result<Doses, String> {
     let unit_of = |text: &str| -> String {
         let number = |c: char| c.is_ascii_digit() || " .+-eE".contains(c);
         text.trim_start_matches(number).to_owned()
