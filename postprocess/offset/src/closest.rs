@@ -3,12 +3,15 @@
 //! A side of an outline is nearest only to pixels straight above it, and a corner only to pixels in
 //! the wedge between its two sides: both are filled row by row (closest point transform, Mauch
 //! 2000). So each pixel near an edge is visited about once, however far edges move.
+//!
+//! Where edges move further along one axis, outlines come stretched along the other, so that the
+//! ellipse of the moves is a disc: pixels are rectangles there.
 
 use super::edge_map::{Cut, EdgeMap, NearestPlace};
 use super::outline::Outline;
 
-/// How far beyond the outline pixels may lie, in pixels: their color and the mean line disagree
-/// by less.
+/// How far beyond the outline pixels may lie, in sides of pixels: their color and the mean line
+/// disagree by less.
 const BEYOND: f64 = 1.5;
 /// Up to this length in pixels a side may stand for the wedge beyond its end.
 const MAX_SLACK: f64 = 0.5;
@@ -24,6 +27,15 @@ pub(super) struct MeasuredPixels {
     pub(super) is_right: bool,
     /// The greatest distance in pixels.
     pub(super) reach: f64,
+    /// The width and the height of a pixel in the outlines' unit: 1 or more.
+    pub(super) pixel: [f64; 2],
+}
+
+impl MeasuredPixels {
+    /// Returns how far beyond the outline pixels may lie.
+    fn beyond(&self) -> f64 {
+        BEYOND * greater(self.pixel[0], self.pixel[1])
+    }
 }
 
 /// Measures the pixels of a map from outlines, at each corner of which edges move by `by` pixels,
@@ -46,7 +58,7 @@ pub(super) fn measure(
         for corner in 0..count {
             let next = side((corner + 1) % count);
             let turns = CornerTurn::between(&here, &next, measured.reach);
-            here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured.reach)));
+            here.measure(map, measured, [turned, turns].map(|turn| turn.slack(measured)));
             if turned == CornerTurn::Corner {
                 measure_corner(map, &before, &here, measured);
             }
@@ -77,10 +89,10 @@ impl CornerTurn {
     }
 
     /// By how much the sides are longer, so that no pixel lies between them.
-    fn slack(self, reach: f64) -> f64 {
+    fn slack(self, measured: MeasuredPixels) -> f64 {
         match self {
             // Half of the wedge for each side, and a little for rounding.
-            Self::Smooth(sine) => SLACK + 0.51 * sine * reach.max(BEYOND),
+            Self::Smooth(sine) => SLACK + 0.51 * sine * measured.reach.max(measured.beyond()),
             Self::Corner => SLACK,
         }
     }
@@ -106,23 +118,25 @@ impl Side {
     /// Measures the pixels straight above the side.
     /// At its ends there is room for turns.
     fn measure(&self, map: &mut EdgeMap, measured: MeasuredPixels, slack: [f64; 2]) {
-        let MeasuredPixels { is_right, reach } = measured;
+        let MeasuredPixels { is_right, reach, pixel } = measured;
+        let beyond = measured.beyond();
         let [x, y] = self.along;
         // Rows count down, so the right of (x, y) is (-y, x).
         let inwards = if is_right { [-y, x] } else { [y, -x] };
         let ends = [-slack[0], self.length + slack[1]];
-        let corners = [(ends[0], -BEYOND), (ends[1], -BEYOND), (ends[0], reach), (ends[1], reach)];
+        let corners = [(ends[0], -beyond), (ends[1], -beyond), (ends[0], reach), (ends[1], reach)];
         let rows = corners.map(|(along, away)| self.start[1] + along * y + away * inwards[1]);
         let along = PixelStrip::new([x, y], ends);
-        let across = PixelStrip::new(inwards, [-BEYOND, reach]);
+        let across = PixelStrip::new(inwards, [-beyond, reach]);
         let slope = (self.by[1] - self.by[0]) / self.length;
-        let cut = Cut::new(inwards);
+        let cut = Cut::new(inwards, pixel);
         let mut place = 0;
-        for row in rows_between(rows, map.height()) {
-            let down = f64::from(row) + 0.5 - self.start[1];
-            let columns = along.in_row(down).and(across.in_row(down)).pixels(self.start[0]);
+        for row in rows_between(rows, pixel[1], map.height()) {
+            let down = (f64::from(row) + 0.5) * pixel[1] - self.start[1];
+            let columns = along.in_row(down).and(across.in_row(down));
+            let columns = columns.pixels(self.start[0], pixel[0]);
             map.for_each_near(row, columns, &mut place, |column, near, level| {
-                let right = f64::from(column) + 0.5 - self.start[0];
+                let right = (f64::from(column) + 0.5) * pixel[0] - self.start[0];
                 let distance = right * inwards[0] + down * inwards[1];
                 // Compared as it is stored: in f64, a tie with the side before could look nearer.
                 if (distance as f32).abs() < near.distance.abs() {
@@ -136,41 +150,38 @@ impl Side {
 }
 
 /// Measures the pixels in the wedge between two sides.
-fn measure_corner(
-    map: &mut EdgeMap,
-    before: &Side,
-    after: &Side,
-    MeasuredPixels { is_right, reach }: MeasuredPixels,
-) {
+fn measure_corner(map: &mut EdgeMap, before: &Side, after: &Side, measured: MeasuredPixels) {
+    let MeasuredPixels { is_right, reach, pixel } = measured;
     let turn = before.along[0] * after.along[1] - before.along[1] * after.along[0];
     // A wedge beyond a corner that juts out of the measured pixels holds few of them.
     let juts_out = (turn > 0.0) == is_right;
-    let (radius, sign) = if juts_out { (BEYOND, -1.0) } else { (reach, 1.0) };
+    let (radius, sign) = if juts_out { (measured.beyond(), -1.0) } else { (reach, 1.0) };
     let past_before = PixelStrip::new(before.along, [-SLACK, f64::INFINITY]);
     let short_of_after = PixelStrip::new(after.along, [f64::NEG_INFINITY, SLACK]);
     let [x, y] = after.start;
     let mut place = 0;
-    for row in rows_between([y - radius, y + radius, y, y], map.height()) {
-        let down = f64::from(row) + 0.5 - y;
+    for row in rows_between([y - radius, y + radius, y, y], pixel[1], map.height()) {
+        let down = (f64::from(row) + 0.5) * pixel[1] - y;
         let half = (radius * radius - down * down).max(0.0).sqrt();
         let wedge = past_before.in_row(down).and(short_of_after.in_row(down));
-        let columns = wedge.and(Interval { low: -half, high: half }).pixels(x);
+        let columns = wedge.and(Interval { low: -half, high: half }).pixels(x, pixel[0]);
         map.for_each_near(row, columns, &mut place, |column, near, level| {
-            let right = f64::from(column) + 0.5 - x;
+            let right = (f64::from(column) + 0.5) * pixel[0] - x;
             let distance = right.hypot(down);
             // Straight above a side, the side knows better on which side of it a pixel is.
             if distance + 4.0 * SLACK < f64::from(near.distance.abs()) {
                 *near = NearestPlace { distance: (sign * distance) as f32, by: after.by[0] as f32 };
-                *level = Cut::new([right / distance, down / distance]).level(*near);
+                *level = Cut::new([right / distance, down / distance], pixel).level(*near);
             }
         });
     }
 }
 
-/// Returns the rows whose middles lie between the least and the greatest of places.
-fn rows_between(places: [f64; 4], height: u32) -> std::ops::Range<u32> {
-    let least = places.into_iter().fold(f64::INFINITY, f64::min);
-    let greatest = places.into_iter().fold(f64::NEG_INFINITY, f64::max);
+/// Returns the rows, each `pixel` high, whose middles lie between the least and the greatest of
+/// places.
+fn rows_between(places: [f64; 4], pixel: f64, height: u32) -> std::ops::Range<u32> {
+    let least = places.into_iter().fold(f64::INFINITY, f64::min) / pixel;
+    let greatest = places.into_iter().fold(f64::NEG_INFINITY, f64::max) / pixel;
     let row = |place: f64| (place.max(0.0) as u32).min(height);
     row((least - 0.5).ceil())..row((greatest + 0.5).floor())
 }
@@ -214,10 +225,11 @@ impl Interval {
         Self { low: greater(self.low, other.low), high: lesser(self.high, other.high) }
     }
 
-    /// Returns the columns of the pixels with their middles there, of places from a column on.
-    fn pixels(self, from: f64) -> (i32, i32) {
+    /// Returns the columns of the pixels, each `pixel` wide, with their middles there, of places
+    /// from a place on.
+    fn pixels(self, from: f64, pixel: f64) -> (i32, i32) {
         // Clamped to what images have, so that rounding needs no more than a comparison.
-        let [low, high] = [self.low + from - 0.5, self.high + from + 0.5]
+        let [low, high] = [(self.low + from) / pixel - 0.5, (self.high + from) / pixel + 0.5]
             .map(|at| lesser(greater(at, 0.0), MAX_COLUMN));
         let start = low as i32;
         (start + i32::from(f64::from(start) < low), high as i32)

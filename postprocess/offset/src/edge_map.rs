@@ -89,7 +89,38 @@ impl EdgeMap {
         let by = |of: usize, corner: usize| edges.by.map_or(most, |by| by[of][corner]);
         map.near = vec![NearestPlace::FAR; map.near_count()];
         map.levels = vec![255; map.near_count()];
-        measure(&mut map, edges.outlines, by, MeasuredPixels { is_right, reach: reach + STAIR });
+        let measured = MeasuredPixels { is_right, reach: reach + STAIR, pixel: [1.0; 2] };
+        measure(&mut map, edges.outlines, by, measured);
+        map
+    }
+
+    /// Moves the edges of a region, in which no pixel is a source, by an ellipse: straight edges
+    /// along columns by the first of its half axes, edges along rows by the second, and others by
+    /// a distance between. Both must be above zero.
+    pub(super) fn elliptic(
+        sources: &DistanceSources,
+        region: &RowRuns,
+        width: u32,
+        outlines: &[Outline],
+        axes: [f64; 2],
+    ) -> Self {
+        let by = axes[0].max(axes[1]);
+        // Stretched along the shorter axis, the ellipse is a disc. Distances there give levels, as
+        // stretching keeps shares of areas.
+        let pixel = axes.map(|axis| by / axis);
+        let stretch = |outline: &Outline| {
+            outline.iter().map(|point| [0, 1].map(|axis| point[axis] * pixel[axis])).collect()
+        };
+        let stretched: Vec<Outline> = outlines.iter().map(stretch).collect();
+        // A pixel that an edge cuts lies half a pixel from the ellipse around a place of the old
+        // edge, and that lies near a source.
+        let discs = [Disc::below(0, 0), Disc::ellipse(axes, STAIR + 1.0, region.height())];
+        let mut map = Self::runs(sources, region, width, &discs);
+        map.near = vec![NearestPlace::FAR; map.near_count()];
+        map.levels = vec![255; map.near_count()];
+        let is_right = sources.colour() == SourceColour::Black;
+        let reach = by + pixel[0].hypot(pixel[1]);
+        measure(&mut map, &stretched, |_, _| by, MeasuredPixels { is_right, reach, pixel });
         map
     }
 
@@ -278,24 +309,35 @@ pub(super) struct Cut {
     corner: f64,
     /// By how much a pixel's area on a side grows with its distance, where no corner is cut off.
     growth: f64,
+    /// The distance in pixels of a distance of one.
+    unit: f64,
 }
 
 impl Cut {
-    /// Takes the edge's normal of length one.
-    pub(super) fn new(normal: [f64; 2]) -> Self {
+    /// Takes the edge's normal of length one, and the sides of a pixel, in the unit of distances.
+    pub(super) fn new(normal: [f64; 2], pixel: [f64; 2]) -> Self {
+        // The edge has the distances n·p of places p: for places in pixels, its normal is n times
+        // the sides of a pixel, whose length distances are divided by.
+        let (normal, unit) = if pixel == [1.0; 2] {
+            (normal, 1.0)
+        } else {
+            let normal = [normal[0] * pixel[0], normal[1] * pixel[1]];
+            let length = normal[0].hypot(normal[1]);
+            (normal.map(|side| side / length), 1.0 / length)
+        };
         // As exact as distances are.
         let slant = f64::from(normal[0].abs().min(normal[1].abs()) as f32);
         let steep = (1.0 - slant * slant).sqrt();
         // A corner of height h along the normal (s, c) has area h² / (2 s c). Past the corner, the
         // area grows by h / c.
         let corner = if slant > 0.0 { 0.5 / (steep * slant) } else { 0.0 };
-        Self { slant, reach: (steep + slant) / 2.0, corner, growth: 1.0 / steep }
+        Self { slant, reach: (steep + slant) / 2.0, corner, growth: 1.0 / steep, unit }
     }
 
     /// Returns the level of a pixel after the edge has moved: the share of its area that is
     /// inside.
     pub(super) fn level(&self, near: NearestPlace) -> u8 {
-        let distance = f64::from(near.distance) - f64::from(near.by);
+        let distance = (f64::from(near.distance) - f64::from(near.by)) * self.unit;
         // No branches here, as the next pixel takes another one.
         let cut_off = (self.reach - distance.abs()).max(0.0);
         let corner = cut_off.min(self.slant);

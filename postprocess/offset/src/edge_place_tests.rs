@@ -9,7 +9,7 @@ use super::*;
 const PITCH: f64 = 25_400.0 / 1500.0;
 
 /// The exposed pixels, by their shares.
-fn area(gray: &GrayMask) -> f64 {
+pub(super) fn area(gray: &GrayMask) -> f64 {
     let mut sum = 0;
     for row in gray.rows() {
         let mut ends = row.iter().skip(1).map(|change| change.column);
@@ -21,7 +21,7 @@ fn area(gray: &GrayMask) -> f64 {
     sum as f64 / 255.0
 }
 
-fn square(side: f64, degrees: f64) -> Mask {
+pub(super) fn square(side: f64, degrees: f64) -> Mask {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let size = (side * 1.5) as u32 + 80;
     let middle = [f64::from(size) / 2.0 + 0.13, f64::from(size) / 2.0 - 0.29];
@@ -31,7 +31,7 @@ fn square(side: f64, degrees: f64) -> Mask {
     })
 }
 
-fn disc(radius: f64) -> Mask {
+pub(super) fn disc(radius: f64) -> Mask {
     disc_at(radius, [0.13, -0.29])
 }
 

@@ -162,7 +162,22 @@ impl Disc {
         // Squared distances are whole numbers, so the greatest below `square` is `square` - 1. The
         // limit keeps sums with a column within an i32.
         let half = |away: u64| (square - 1 - away * away).isqrt().min(BEYOND as u64 / 2) as i32;
-        let halves: Vec<i32> = rows.map(half).collect();
+        Self::of_halves(rows.map(half).collect())
+    }
+
+    /// Returns the pixels that lie in an ellipse of these half axes, along the row and across it,
+    /// around a point up to `margin` pixels away along either, as far as an image of `height` rows
+    /// needs them.
+    pub(super) fn ellipse([along, across]: [f64; 2], margin: f64, height: u32) -> Self {
+        let rows = (0..height + 1).map(f64::from).take_while(|away| *away <= across + margin);
+        let half = |away: f64| {
+            let share = ((away - margin).max(0.0) / across).min(1.0);
+            (along * (1.0 - share * share).sqrt() + margin) as i32
+        };
+        Self::of_halves(rows.map(half).collect())
+    }
+
+    fn of_halves(halves: Vec<i32>) -> Self {
         let count = halves.len() as u32;
         let strides = std::iter::successors(Some(1), |away| Some(away * 2));
         let mut order: Vec<u32> = (0..count.min(1)).collect();

@@ -81,6 +81,46 @@ pub fn offset(mask: &Mask, inwards: f64) -> GrayMask {
     edge.gray(mask.width(), level_outside)
 }
 
+/// The least half axis of an ellipse, as a share of the other one.
+const LEAST_AXIS: f64 = 1.0 / 256.0;
+
+/// Moves all edges of a mask inwards by an ellipse, outwards if below zero: edges along columns by
+/// the first number of pixels, edges along rows by the second, and an edge of the normal `n` by
+/// `hypot(x n_x, y n_y)`. The ellipse fits inside the old shape around each place that is left;
+/// ellipses around the old shape cover all that is grown.
+///
+/// A half axis below a 256th of the other counts as that. Numbers of which only one is below zero
+/// count as zero.
+///
+/// ```
+/// use lamp_offset::offset_by_ellipse;
+/// use lamp_stack::Mask;
+///
+/// // A bar three pixels high, columns 2 to 6.
+/// let bar = Mask::new(9, vec![0, 0, 2, 4, 6, 6], vec![2, 7, 2, 7, 2, 7])?;
+/// let narrower = offset_by_ellipse(&bar, [0.25, 0.5]);
+/// assert_eq!([2, 3].map(|column| narrower.level(column, 2)), [191, 255]);
+/// assert_eq!(narrower.level(4, 1), 128);
+/// # Ok::<(), lamp_stack::RunError>(())
+/// ```
+pub fn offset_by_ellipse(mask: &Mask, [x, y]: [f64; 2]) -> GrayMask {
+    if x == y {
+        return offset(mask, x);
+    }
+    let grows = x.min(y) < 0.0;
+    if grows && x.max(y) > 0.0 {
+        return GrayMask::from(mask);
+    }
+    let by = x.abs().max(y.abs()).min(MAX_OFFSET);
+    let axes = [x, y].map(|axis| axis.abs().clamp(by * LEAST_AXIS, by));
+    let (colour, level_outside) =
+        if grows { (SourceColour::White, 255) } else { (SourceColour::Black, 0) };
+    let outlines = outline::outlines(&RowRuns::white(mask));
+    let sources = DistanceSources::new(mask, colour);
+    let edge = EdgeMap::elliptic(&sources, &region(mask, colour), mask.width(), &outlines, axes);
+    edge.gray(mask.width(), level_outside)
+}
+
 /// Moves all edges of a mask inwards by `inwards` pixels, outwards if below zero, to the nearest
 /// pixel. Edges are taken as the stairs that they are: of what is left, no pixel's middle is
 /// nearer than the distance and half a pixel to the middle of one of the other color.
@@ -132,6 +172,8 @@ fn region(mask: &Mask, colour: SourceColour) -> RowRuns {
 
 #[cfg(test)]
 mod edge_place_tests;
+#[cfg(test)]
+mod ellipse_tests;
 #[cfg(test)]
 mod offset_tests;
 #[cfg(test)]

@@ -42,7 +42,7 @@ fn referee(mask: &Mask, inwards: f64, column: u32, row: u32) -> f64 {
 }
 
 /// The share of a pixel inside a straight edge, by 60 x 60 points.
-fn share(distance: f64, angle: f64) -> f64 {
+pub(super) fn share(distance: f64, angle: f64) -> f64 {
     let (sin, cos) = angle.sin_cos();
     let place = |step: i32| (f64::from(step) + 0.5) / 60.0 - 0.5;
     let is_inside = |x: i32, y: i32| place(x) * cos + place(y) * sin + distance > 0.0;
@@ -53,7 +53,11 @@ fn share(distance: f64, angle: f64) -> f64 {
 /// The distance of a pixel's middle from the nearest side of any outline, and the angle of the
 /// way there.
 fn distance(outlines: &[outline::Outline], column: u32, row: u32) -> (f64, f64) {
-    let [x, y] = [column, row].map(|at| f64::from(at) + 0.5);
+    nearest(outlines, [column, row].map(|at| f64::from(at) + 0.5))
+}
+
+/// The same for a place.
+pub(super) fn nearest(outlines: &[outline::Outline], [x, y]: [f64; 2]) -> (f64, f64) {
     let mut least = (f64::INFINITY, 0.0);
     for outline in outlines {
         for (of, a) in outline.iter().enumerate() {
