@@ -8,9 +8,9 @@ use std::str::FromStr;
 
 use lamp_grayscale::exposure::{LampLight, MeasuredDoses};
 use lamp_grayscale::material::Material;
-use lamp_grayscale::resin::{CureWidth, Dose, ExposureTime};
+use lamp_grayscale::resin::{CureWidth, Dose, EdgeLight, ExposureTime};
 use lamp_offset::{CompensateError, CompensateOptions, Shrinkage, Widths};
-use lamp_stack::{CompensateRecord, Dpi, Layer, Length};
+use lamp_stack::{CompensateRecord, Dpi, Layer, Length, LengthError};
 use serde::{Deserialize, Serialize};
 
 use crate::documents::{canonical_word, document, is_file};
@@ -28,7 +28,7 @@ pub const CODE: u32 = 6;
 pub struct CompensateSettings {
     /// Moves all edges inwards by this distance, or outwards if it is negative.
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    pub uniform: Option<Length>,
+    pub uniform: Option<EdgeDistance>,
     /// Moves edges inwards by the cure width of a material: a built-in one's name, or a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<PathBuf>,
@@ -47,6 +47,13 @@ pub struct CompensateSettings {
     /// Rounds edges to whole pixels, without gray.
     #[serde(skip_serializing_if = "is_default")]
     pub one_bit: bool,
+}
+
+/// The distance that edges move, as people write it: `25um`, or `25x40um` along x and y.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EdgeDistance {
+    /// Not on both sides of zero.
+    xy: [Length; 2],
 }
 
 /// Shrinkage as people write it: `2.1%`, or `x:2.1%,y:1.8%`.
@@ -184,8 +191,18 @@ impl DoneBefore {
 
 /// How far edges move.
 enum EdgeMove {
-    Uniform(Length),
+    Uniform(EdgeDistance),
     CureWidth(Box<ByCureWidth>),
+    Spread(Box<BySpread>),
+}
+
+/// Edges that move back by how far light spreads along x and y, and the doses that it is for.
+struct BySpread {
+    light: EdgeLight,
+    material: Material,
+    dose: Option<Dose>,
+    /// A doubt about the lamp.
+    lamp_doubt: Option<String>,
 }
 
 /// A cure width, and the doses that it is for.
@@ -194,8 +211,8 @@ struct ByCureWidth {
     material: Material,
     dose: Option<Dose>,
     doses: MeasuredDoses,
-    /// A doubt about the lamp.
-    lamp_doubt: Option<String>,
+    /// Doubts about the lamp and the directions.
+    more_doubts: Vec<String>,
 }
 
 /// A layer without a dose, and why.
@@ -229,16 +246,31 @@ impl EdgeMove {
             None => (material, None),
         };
         let name = &material.name;
-        let width = material.cure_width();
-        let width = width.map_err(|error| Error::new(ErrorKind::Work, error).at(name.clone()))?;
+        let at_name = |error| Error::new(ErrorKind::Work, error).at(name.clone());
+        let dose = args.dose;
+        let spread = material.spread().map_err(at_name)?;
+        let has_directions = spread.is_some_and(|spread| spread.sigma().is_none());
+        let width = material.cure_width().map_err(at_name)?;
+        // Squares measure one cure width for all directions: two widths of light say more.
+        let light = material.edge_light().map_err(at_name)?;
+        if let Some(light) = light.filter(|_| has_directions || width.is_none()) {
+            return Ok(Self::Spread(Box::new(BySpread { light, material, dose, lamp_doubt })));
+        }
         let width = width.ok_or_else(|| {
             Error::work(format!(
-                "{name} states no cure width: add [[cure-width]] to its file, or give --uniform"
+                "{name} states no cure width: add [[cure-width]] or the critical-dose of [spread] \
+                 to its file, or give --uniform"
             ))
         })?;
+        let of_directions = has_directions.then(|| {
+            format!(
+                "light of {name} spreads differently along and across the scan, and its cure \
+                 widths do not: add the critical-dose of [spread], as lamp calibrate scan does"
+            )
+        });
         let doses = MeasuredDoses::of_widths(&material);
-        let dose = args.dose;
-        Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, lamp_doubt })))
+        let more_doubts = lamp_doubt.into_iter().chain(of_directions).collect();
+        Ok(Self::CureWidth(Box::new(ByCureWidth { width, material, dose, doses, more_doubts })))
     }
 
     /// Returns sentences on a lamp and on doses at which the widths were not measured.
@@ -246,14 +278,29 @@ impl EdgeMove {
         match self {
             Self::Uniform(_) => Vec::new(),
             Self::CureWidth(by) => {
-                by.lamp_doubt.clone().into_iter().chain(by.doses.doubt("layers")).collect()
+                by.more_doubts.iter().cloned().chain(by.doses.doubt("layers")).collect()
             }
+            Self::Spread(by) => by.lamp_doubt.iter().cloned().collect(),
         }
     }
 
     fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Error> {
         let (width, dose) = match self {
-            Self::Uniform(by) => return Ok(Widths::uniform(by.pixels(dpi))),
+            Self::Uniform(by) => return Ok(Widths::elliptic(by.xy.map(|by| by.pixels(dpi)))),
+            Self::Spread(by) => {
+                let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
+                let edges = by.light.edges(dose).ok_or_else(|| {
+                    let (layer, name) = (layer.info.name(), &by.material.name);
+                    Error::new(
+                        ErrorKind::Work,
+                        NoDose(format!(
+                            "{layer} gets {dose}, and {name} cures from {} on: give a greater --dose",
+                            by.light.critical_dose()
+                        )),
+                    )
+                })?;
+                return Ok(Widths::elliptic(edges.map(|by| by.pixels(dpi))));
+            }
             Self::CureWidth(by) => {
                 let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
                 // Doubts need the doses of all layers, which are known only at the end.
@@ -285,6 +332,32 @@ fn dose_of(layer: &Layer, material: &Material) -> Result<Dose, Error> {
             ))
         })?;
     Ok(light * ExposureTime::from_ms(time))
+}
+
+impl FromStr for EdgeDistance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some(xy) = Length::pair(text) else {
+            let both: Length = text.parse().map_err(|error: LengthError| error.to_string())?;
+            return Ok(Self { xy: [both; 2] });
+        };
+        let [x, y] = xy.map(Length::um);
+        if x.min(y) < 0.0 && x.max(y) > 0.0 {
+            return Err(format!(
+                "`{text}` moves edges inwards along one axis and outwards along the other: give \
+                 both alike"
+            ));
+        }
+        Ok(Self { xy })
+    }
+}
+
+impl fmt::Display for EdgeDistance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.xy;
+        if x == y { write!(f, "{x}") } else { write!(f, "{}x{}um", x.um(), y.um()) }
+    }
 }
 
 impl FromStr for FiringShrinkage {
@@ -336,6 +409,27 @@ mod tests {
 
     fn parsed(text: &str) -> Result<Shrinkage, String> {
         text.parse().map(FiringShrinkage::shares)
+    }
+
+    #[test]
+    fn distances_people_write() {
+        let um = |text: &str| text.parse::<EdgeDistance>().map(|by| by.xy.map(Length::um));
+        for (text, xy, shown) in [
+            ("25um", [25.0, 25.0], "25um"),
+            ("-1mil", [-25.4, -25.4], "-25.4um"),
+            ("25x40um", [25.0, 40.0], "25x40um"),
+            ("0.1mm x 40 um", [100.0, 40.0], "100x40um"),
+            ("-25x-40um", [-25.0, -40.0], "-25x-40um"),
+            ("25x25um", [25.0, 25.0], "25um"),
+            ("0x40um", [0.0, 40.0], "0x40um"),
+        ] {
+            assert_eq!(um(text), Ok(xy), "{text}");
+            assert_eq!(text.parse::<EdgeDistance>().unwrap().to_string(), shown);
+            assert_eq!(um(shown), Ok(xy), "{text}");
+        }
+        for wrong in ["", "25", "x40um", "25x", "25x40", "25um x", "-25x40um", "infx1um"] {
+            assert!(um(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

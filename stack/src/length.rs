@@ -37,6 +37,17 @@ impl Length {
         Self { um: (self.um * 1000.0).round() / 1000.0 }
     }
 
+    /// Parses lengths along x and y, such as `25x40um` or `25um x 1mil`. A first one without a unit
+    /// takes the unit of the second. Returns `None` if the text is not two lengths.
+    pub fn pair(text: &str) -> Option<[Self; 2]> {
+        let (x, y) = text.split_once(['x', 'X', '*'])?;
+        let (x, x_unit) = split_unit(x).ok()?;
+        let (y, y_unit) = split_unit(y).ok()?;
+        let y_unit = y_unit?;
+        let pair = [x * x_unit.unwrap_or(y_unit), y * y_unit];
+        pair.iter().all(|um| um.is_finite()).then(|| pair.map(Self::from_um))
+    }
+
     /// Returns the length in pixels at a resolution, not rounded.
     pub fn pixels(self, dpi: Dpi) -> f64 {
         self.um * dpi.get() / 25_400.0
@@ -139,11 +150,7 @@ impl FromStr for Size {
     /// Returns an error if the text is not two positive lengths with an `x` between them.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         let wrong = || LengthError::NotASize(text.to_owned());
-        let (width, height) = text.split_once(['x', 'X', '*']).ok_or_else(wrong)?;
-        let (w, w_unit) = split_unit(width).map_err(|_| wrong())?;
-        let (h, h_unit) = split_unit(height).map_err(|_| wrong())?;
-        let h_unit = h_unit.ok_or_else(wrong)?;
-        let [width, height] = [w * w_unit.unwrap_or(h_unit), h * h_unit];
+        let [width, height] = Length::pair(text).ok_or_else(wrong)?.map(Length::um);
         let possible = |um: f64| um > 0.0 && um.is_finite();
         if !possible(width) || !possible(height) {
             return Err(wrong());

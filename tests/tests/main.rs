@@ -62,6 +62,7 @@ mod ranges;
 mod records;
 mod report;
 mod sabotage;
+mod scan_light;
 mod sets;
 mod shared_files;
 mod show_terminal;

@@ -8,12 +8,12 @@ use lamp_fix::FixMethod;
 use lamp_grayscale::DitherMethod;
 use lamp_grayscale::resin::{Dose, QuantityError};
 use lamp_pipeline::check::CheckSettings;
-use lamp_pipeline::compensate::{CompensateSettings, FiringShrinkage};
+use lamp_pipeline::compensate::{CompensateSettings, EdgeDistance, FiringShrinkage};
 use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
-use lamp_stack::{Length, LengthError, Op};
+use lamp_stack::{Length, Op};
 use lamp_supports::{CheckOptions, FindingGroup, SupportOptions};
 
 use crate::args::lamp_option::LampOption;
@@ -47,9 +47,10 @@ pub(crate) struct FixStageArgs {
 /// By what edges move and images grow.
 #[derive(Args, Clone)]
 pub(crate) struct CompensateStageArgs {
-    /// Move all edges inwards by this distance, or outwards if it is negative
-    #[arg(long, value_name = "LENGTH", value_parser = parse_offset, allow_hyphen_values = true)]
-    uniform: Option<Length>,
+    /// Move all edges inwards by this distance, or outwards if it is negative; 25x40um moves edges by
+    /// an ellipse, 25 um along x and 40 um along y
+    #[arg(long, value_name = "LENGTH|XxY", allow_hyphen_values = true)]
+    uniform: Option<EdgeDistance>,
 
     /// Move edges inwards by the cure width of a material: a built-in one or a file (see lamp material)
     #[arg(long, value_name = "M", conflicts_with = "uniform")]
@@ -314,10 +315,6 @@ fn parse_share(text: &str) -> Result<f64, String> {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
         _ => Err(format!("`{text}` is not a share: write a number from 0 to 1")),
     }
-}
-
-fn parse_offset(text: &str) -> Result<Length, String> {
-    text.parse().map_err(|error: LengthError| error.to_string())
 }
 
 fn parse_dose(text: &str) -> Result<Dose, String> {

@@ -275,7 +275,7 @@ fn compensate(error: &CompensateError) -> Option<String> {
     let hint = match error.problem {
         CompensateProblem::GrayGrows => "dither the stack first",
         CompensateProblem::TooDeep { .. } => "give a smaller --min-feature, or 0um to let walls go",
-        CompensateProblem::TooFarForWalls { .. } => {
+        CompensateProblem::TooFarForWalls { .. } | CompensateProblem::UnequalWithWalls(_) => {
             "--min-feature 0um lets walls go and reports what is lost"
         }
         CompensateProblem::Tiled => "compensate for shrinkage before tile",

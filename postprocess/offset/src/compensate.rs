@@ -9,7 +9,7 @@ use super::components::{self, Loss};
 use super::scale::{Enlargement, scaled};
 use super::walls::ThinWall;
 use super::widths::Widths;
-use super::{offset, shrink};
+use super::{offset_by_ellipse, shrink};
 
 /// Options of [`compensate`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,6 +93,14 @@ pub enum CompensateProblem {
         /// The greatest distance at which walls are kept.
         max: Length,
     },
+    /// Walls cannot be kept where edges move by unequal distances.
+    #[error(
+        "has edges that would move by {:.2} and {:.2} pixels along x and y: walls can be kept only \
+         where these are equal",
+        .0[0],
+        .0[1]
+    )]
+    UnequalWithWalls([f64; 2]),
     /// The enlarged image would be larger than any image.
     #[error("would be more than 2^26 pixels wide or high with that shrinkage")]
     TooLarge,
@@ -248,6 +256,9 @@ fn move_edges(
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
     // A wall that is left so wide had its middle this deep before.
     let depth = most + min_feature / 2.0;
+    if let Some(unequal) = widths.ellipse().filter(|_| most > 0.0 && min_feature > 0.0) {
+        return Err(CompensateProblem::UnequalWithWalls(unequal));
+    }
     if most > 0.0 && min_feature > 0.0 && depth > MAX_DEPTH {
         // Edges are to blame only if they would still move too far with walls of two pixels.
         let max_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
@@ -259,7 +270,10 @@ fn move_edges(
     }
     let mut moved = MovedEdges::default();
     let mut shrunk = |mask: &Mask| {
-        let (gray, walls) = shrink(mask, widths, min_feature);
+        let (gray, walls) = match widths.ellipse() {
+            Some(inwards) => (offset_by_ellipse(mask, inwards), Vec::new()),
+            None => shrink(mask, widths, min_feature),
+        };
         moved.walls = walls;
         if min_feature == 0.0 {
             moved.losses = components::losses(mask, &gray.at_least(128));
@@ -268,10 +282,10 @@ fn move_edges(
     };
     let gray = match &*layer.image {
         Image::Mask(mask) if least < 0.0 => {
-            moved.cut_off = is_near_border(mask, -least);
-            // Only one distance for all places may be below zero (`Widths`), so `least` is that
-            // distance.
-            offset(mask, least)
+            // Only one distance for all places may be below zero (`Widths`), or one for each axis.
+            let inwards = widths.ellipse().unwrap_or([least; 2]);
+            moved.cut_off = is_near_border(mask, inwards.map(|by| -by));
+            offset_by_ellipse(mask, inwards)
         }
         Image::Mask(mask) => shrunk(mask),
         Image::Gray(_) if least < 0.0 => return Err(CompensateProblem::GrayGrows),
@@ -295,13 +309,13 @@ fn move_edges(
 }
 
 /// Returns whether there is white near enough to the image's border to grow beyond it.
-fn is_near_border(mask: &Mask, by: f64) -> bool {
-    let by = by.ceil() as u32;
+fn is_near_border(mask: &Mask, by: [f64; 2]) -> bool {
+    let [by, by_rows] = by.map(|by| by.ceil() as u32);
     let (width, height) = (mask.width(), mask.height());
     (0..height).zip(mask.rows()).any(|(row, transitions)| match transitions {
         [] => false,
         [first, .., last] if transitions.len() % 2 == 0 => {
-            *first < by || width - last < by || row < by || height - 1 - row < by
+            *first < by || width - last < by || row < by_rows || height - 1 - row < by_rows
         }
         // A row that ends white touches the border.
         _ => true,

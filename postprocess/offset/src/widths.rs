@@ -11,11 +11,14 @@
 /// ```
 ///
 /// # Guarantees
-/// There is a size; sizes increase. If there is more than one, no distance is below zero.
+/// There is a size; sizes increase. If there is more than one, no distance is below zero. Distances
+/// along x and y that differ are of one size, and not on both sides of zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Widths {
     /// Sizes, and the distance of each.
     points: Vec<[f64; 2]>,
+    /// The distances along x and y, if they differ.
+    ellipse: Option<[f64; 2]>,
 }
 
 /// The straight lines that stand for the distances between two sizes.
@@ -24,7 +27,31 @@ const LINES: u32 = 32;
 impl Widths {
     /// Returns one distance for all places; outwards if below zero.
     pub fn uniform(inwards: f64) -> Self {
-        Self { points: vec![[0.0, inwards]] }
+        Self { points: vec![[0.0, inwards]], ellipse: None }
+    }
+
+    /// Returns distances along x and y for all places, between which edges at an angle move by an
+    /// ellipse; outwards if below zero. Of distances on both sides of zero, the one below counts as
+    /// zero.
+    ///
+    /// ```
+    /// use lamp_offset::Widths;
+    ///
+    /// assert_eq!(Widths::elliptic([1.5, 2.5]).range(), [1.5, 2.5]);
+    /// assert_eq!(Widths::elliptic([1.5, 1.5]), Widths::uniform(1.5));
+    /// ```
+    pub fn elliptic(inwards: [f64; 2]) -> Self {
+        let [x, y] = if inwards.iter().any(|by| *by > 0.0) {
+            inwards.map(|by| by.max(0.0))
+        } else {
+            inwards
+        };
+        Self { ellipse: (x != y).then_some([x, y]), ..Self::uniform(x) }
+    }
+
+    /// Returns the distances along x and y, if they differ.
+    pub(super) fn ellipse(&self) -> Option<[f64; 2]> {
+        self.ellipse
     }
 
     /// Returns the distance `width` for each size, in pixels, between the first and the last of
@@ -41,7 +68,7 @@ impl Widths {
             let share = |line: u32| f64::from(line) / f64::from(LINES);
             (1..=LINES).for_each(|line| push(pair[0] + share(line) * (pair[1] - pair[0])));
         }
-        if points.is_empty() { Self::uniform(0.0) } else { Self { points } }
+        if points.is_empty() { Self::uniform(0.0) } else { Self { points, ellipse: None } }
     }
 
     /// Returns the distance for features of a size.
@@ -62,7 +89,8 @@ impl Widths {
 
     /// Returns the least and the greatest distance.
     pub fn range(&self) -> [f64; 2] {
-        let by = || self.points.iter().map(|point| point[1]);
+        let by =
+            || self.points.iter().map(|point| point[1]).chain(self.ellipse.into_iter().flatten());
         [by().fold(f64::INFINITY, f64::min), by().fold(f64::NEG_INFINITY, f64::max)]
     }
 
