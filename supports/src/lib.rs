@@ -40,5 +40,6 @@ pub use record::{
     PointRecord, Scale, Shown, StrayRowsRecord, records,
 };
 pub use support::{
-    HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, Surface, plan_supports,
+    HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, SupportShare, Surface,
+    flood_supports, plan_supports,
 };

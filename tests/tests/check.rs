@@ -247,7 +247,9 @@ fn islands_of_the_sample_blade_begin_at_its_minima() {
         ("y:90", &[(436, 458), (300, 346), (347, 348)]),
         ("x:30", &[(1124, 1153)]),
     ] {
-        let line = format!("lamp check blade.stl --rotate {rotate} --only islands --report b.json");
+        let line = format!(
+            "lamp check blade.stl --rotate {rotate} --only islands --speck 50um --report b.json"
+        );
         scratch.run(&line).succeeds_quietly();
         let found = report(&scratch, "b.json");
         let layers = |it: &Value| (it["layer"].as_u64().unwrap(), it["joins"].as_u64().unwrap());

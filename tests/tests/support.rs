@@ -38,7 +38,7 @@ fn islands(scratch: &Scratch, stack: &str) -> Vec<u64> {
 fn supports_hold_islands_and_their_plan_draws_the_same() {
     let scratch = with_cores();
     assert_eq!(islands(&scratch, "core.tif"), [80, 120]);
-    let line = "lamp support core.tif --part core.stl --hold 20mm --plan plan.toml --stl struts.stl \
+    let line = "lamp support core.tif --part core.stl --hold 20mm --least-support 0 --plan plan.toml --stl struts.stl \
                 --report report.json -o held.tif";
     let ran = scratch.run(line).succeeds();
     let first = ran.stderr.lines().next().unwrap();
@@ -132,7 +132,7 @@ fn the_blade_upside_down_is_held_as_short_as_can_be() {
         .succeeds_quietly();
     let held = |tilt: &str| {
         let line = format!(
-            "lamp support blade.tif --part blade.stl --hold 50mm --max-tilt {tilt} --report report.json -q -o held.tif"
+            "lamp support blade.tif --part blade.stl --hold 50mm --least-support 0 --max-tilt {tilt} --report report.json -q -o held.tif"
         );
         scratch.run(&line).succeeds_quietly();
         let report = report(&scratch, "report.json");
@@ -181,6 +181,43 @@ fn islands_without_a_way_are_left_and_told() {
         scratch.run(&format!("{line} --max-length 20mm --max-tilt 60deg --strict -q -o far.tif"));
     far.succeeds_quietly();
     assert!(islands(&scratch, "far.tif").is_empty());
+}
+
+#[test]
+fn wide_islands_rest_on_as_much_as_is_asked() {
+    let scratch = with_cores();
+    let joints = |stack: &str| {
+        let line = format!("lamp check {stack} --only joints --report check.json");
+        scratch.run(&line).succeeds();
+        report(&scratch, "check.json")["findings"].as_array().unwrap().len()
+    };
+    let line = "lamp support core.tif --part core.stl --report report.json --strict";
+    scratch.run(&format!("{line} -o held.tif")).succeeds();
+    assert_eq!(joints("held.tif"), joints("core.tif"));
+    let plans = report(&scratch, "report.json")["plans"].clone();
+    for plan in plans.as_array().unwrap() {
+        let percent = plan["support_percent"].as_f64().unwrap();
+        assert!((25.0..40.0).contains(&percent) && plan["weak"] == false, "{plan}");
+    }
+    let ran = scratch.run(&format!("{line} --least-support 90% -o more.tif"));
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    assert!(ran.stderr.contains("2 islands rest on less than 90"), "{}", ran.stderr);
+    assert!(!scratch.names().contains(&"more.tif".to_owned()));
+}
+
+#[test]
+fn stray_rows_are_not_tied_up_in_silence() {
+    let scratch = with_cores();
+    let mut layers = scratch.layers("core.tif");
+    layers[80].info.stray_rows = vec![5, 6];
+    scratch.stack("stray.tif", layers);
+    let line = "lamp support stray.tif --part core.stl --report report.json";
+    let ran = scratch.run(&format!("{line} -o held.tif")).succeeds();
+    assert!(ran.stderr.contains("2 stray rows in 1 layer may look like islands"), "{ran:?}");
+    assert_eq!(report(&scratch, "report.json")["stray_rows"], 2);
+    let ran = scratch.run(&format!("{line} --strict -o strict.tif"));
+    assert_eq!(ran.statuses, [Some(3)], "{ran:?}");
+    assert!(!scratch.names().contains(&"strict.tif".to_owned()));
 }
 
 #[test]

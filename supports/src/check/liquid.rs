@@ -23,7 +23,7 @@ pub(super) struct Liquid {
 /// Black that is joined so far.
 struct Pool {
     way: WayOut,
-    /// What it holds, unless it has a way to the frame. Its kind is decided when it ends.
+    /// Its pixels, unless it has a way to the frame. The kind is decided when the pool ends.
     pocket: Pocket,
     holds_square: bool,
 }
@@ -74,7 +74,7 @@ impl Liquid {
                         None => pool,
                     });
                 }
-                // What is left has a way through the platform and one aside: a hole.
+                // Other pools have a way through the platform and one aside: they are holes.
             }
             let first = its().next().expect("a group has a component");
             let mut pool = joined.unwrap_or_else(|| Pool::begin(first, number, way));

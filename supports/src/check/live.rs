@@ -94,6 +94,12 @@ impl<B> Live<B> {
         self.of_component.iter().map(|&body| self.bodies.get(body as usize))
     }
 
+    /// Returns the body of a component of the last layer.
+    pub(super) fn body_mut(&mut self, component: u32) -> Option<&mut B> {
+        let body = self.of_component[component as usize];
+        self.bodies.get_mut(body as usize)
+    }
+
     /// Returns the bodies that the last layer is part of.
     pub(super) fn finish(self) -> Vec<B> {
         self.bodies

@@ -17,6 +17,7 @@ mod overhang;
 mod overhangs;
 mod pairs;
 mod pockets;
+mod standing;
 
 use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
@@ -38,6 +39,7 @@ use liquid::Liquid;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;
+pub(crate) use standing::Standing;
 
 /// Limits from which something counts as a finding.
 #[derive(Clone, Debug)]
@@ -50,7 +52,7 @@ pub struct CheckOptions {
     /// The number of layers for which an island must float to be no speck, however thin it is.
     pub speck_layers: NonZeroU32,
     /// The side in pixels of the square that any other finding must hold, so that rounding to
-    /// pixels is none.
+    /// pixels does not count.
     pub rounding: NonZeroU32,
     /// The share of a component's area that must rest on white.
     pub least_support: f64,

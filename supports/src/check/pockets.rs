@@ -1,6 +1,6 @@
 //! Black bodies: those without a way out, up or down as often as it likes.
 //!
-//! Bodies are joined over all layers before they are judged. What a liquid does is in `liquid`.
+//! Bodies are joined over all layers before they are judged. Gravity counts in `liquid`.
 
 use lamp_stack::sets::{root, unite};
 

@@ -46,6 +46,13 @@ pub(super) fn divided(
     })
 }
 
+/// Returns the width or the height of an island in pixels, whichever is greater.
+pub(super) fn extent(runs: &WhiteRuns) -> f64 {
+    let rows = bounds(runs.iter().map(|(row, _)| *row..row + 1));
+    let columns = bounds(runs.iter().map(|(_, run)| run.clone()));
+    rows.len().max(columns.len()) as f64
+}
+
 fn bounds(ranges: impl Iterator<Item = Range<u32>>) -> Range<u32> {
     ranges.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or_default()
 }

@@ -63,6 +63,19 @@ impl IslandSurroundings<'_> {
         if holds { Ok(()) } else { Err(Rejection::Unsteady) }
     }
 
+    /// Returns how many pixels of the island rest on struts that are apart.
+    pub(super) fn covered<'s>(&self, struts: impl Iterator<Item = &'s Strut>) -> u64 {
+        let Some(below) = self.layer.checked_sub(1) else { return 0 };
+        let [bottom, thickness] = self.span_mm(below);
+        let middle = Length::from_mm(bottom + thickness / 2.0);
+        let pixels = |strut: &Strut| -> u64 {
+            let section = self.raster.section(strut, middle);
+            let shared = self.island.iter().flat_map(|(row, run)| overlaps(&section, *row, run));
+            shared.map(|run| u64::from(run.end - run.start)).sum()
+        };
+        struts.map(pixels).sum()
+    }
+
     fn span_mm(&self, number: u32) -> [f64; 2] {
         span_mm(&self.layers[number as usize]).expect("heights were found for all layers")
     }
@@ -104,8 +117,8 @@ impl IslandSurroundings<'_> {
         Ok(())
     }
 
-    /// Checks that at least half of a section rests on white or is white already, and some of
-    /// each of its components. `below` is the strut's section one layer below.
+    /// Checks that at least half of a section rests on white that stands, or is such white already,
+    /// and some of each of its components. `below` is the strut's section one layer below.
     fn check_rest(
         &self,
         number: u32,
@@ -125,8 +138,8 @@ impl IslandSurroundings<'_> {
             if k > 0 && !is_joined && of_component == 0 {
                 return Err(Rejection::Unsteady);
             }
-            let mut held: Vec<_> = self.window.white_in(number - 1, *row, run).collect();
-            held.extend(self.window.white_in(number, *row, run));
+            let mut held: Vec<_> = self.window.standing_in(number - 1, *row, run).collect();
+            held.extend(self.window.standing_in(number, *row, run));
             held.extend(overlaps(below, *row, run));
             // White of both layers and the strut may overlap, and counts once.
             let held = covered(held);

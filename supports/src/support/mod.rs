@@ -10,6 +10,7 @@
 mod cone;
 mod divide;
 mod fit;
+mod flood;
 mod plan;
 #[cfg(test)]
 mod support_tests;
@@ -20,6 +21,7 @@ use lamp_stack::{Length, Strut};
 use std::num::{NonZeroU8, NonZeroU32};
 
 use crate::check::Island;
+pub use flood::flood_supports;
 pub use plan::{SupportError, plan_supports};
 pub use surface::Surface;
 
@@ -146,11 +148,31 @@ pub struct HeldPlace {
     pub rejected: Vec<(Rejection, u32)>,
 }
 
+/// How much of a component rests on white.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SupportShare {
+    /// The pixels that do.
+    pub pixels: u64,
+    /// All of its pixels.
+    pub of: u64,
+}
+
+impl SupportShare {
+    /// Returns the share in percent.
+    pub fn percent(self) -> f64 {
+        100.0 * self.pixels as f64 / self.of.max(1) as f64
+    }
+}
+
 /// The plan for an island.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IslandPlan {
     /// The island.
     pub island: Island,
+    /// Whether its supports connect it to the platform.
+    pub stands: bool,
+    /// How much of its first layer rests on white.
+    pub rests: SupportShare,
     /// Its places, by rows and columns of the grid that divides it.
     pub places: Vec<HeldPlace>,
 }
@@ -163,6 +185,11 @@ impl IslandPlan {
 
     /// Returns whether the island is left floating.
     pub fn is_left(&self) -> bool {
-        self.supports().next().is_none()
+        !self.stands
+    }
+
+    /// Returns whether the island is held, but by less than a share of its first layer.
+    pub fn is_weak(&self, least_support: f64) -> bool {
+        self.stands && (self.rests.pixels as f64) < least_support * self.rests.of as f64
     }
 }

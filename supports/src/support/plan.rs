@@ -5,17 +5,17 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use lamp_slicer::brep::vector::{Vec3, along, dot};
-use lamp_stack::{Layer, Length, Mask};
+use lamp_stack::{Layer, Length, Strut};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::cone::{beside, directions};
-use super::divide::{IslandPiece, divided};
+use super::divide::{IslandPiece, WhiteRuns, divided, extent};
 use super::fit::{IslandSurroundings, distance_mm, span_mm};
 use super::surface::{Contact, NearSurface, Surface};
 use super::window::{Raster, SupportWindow};
-use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions};
-use crate::check::{Findings, Island, Region, component_at};
+use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions, SupportShare};
+use crate::check::{Findings, Island, Region, Standing};
 
 /// A reason that no supports can be planned for a stack.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -44,6 +44,9 @@ pub enum SupportError {
 /// Plans supports of the islands that a check has found, given the stack's layers once more and
 /// the surface of its part. Islands are in the order of the layers they begin in; specks get none.
 ///
+/// Supports rest on what stands on the platform or on islands that have supports. Whether they
+/// hold is known after [`flood_supports`](super::flood_supports).
+///
 /// # Errors
 /// Returns the first error of the layers, or one if the pages lack what is needed.
 pub fn plan_supports<E: From<SupportError>>(
@@ -60,19 +63,29 @@ pub fn plan_supports<E: From<SupportError>>(
     }
     let regions = planner.regions(&islands);
     let (mut window, mut plans) = (SupportWindow::default(), Vec::new());
+    let mut standing = Standing::default();
     for (number, layer) in (0..).zip(layers) {
         let Some(next) = islands.get(plans.len()) else { break };
-        let mask = layer?.image.into_image().into_mask(options.threshold);
+        standing.add(layer?.image.into_image().into_mask(options.threshold));
         // One layer below the lowest stays, for the lowest section may rest on it.
         window.forget_below(planner.lowest(next).saturating_sub(1));
         for island in &islands[plans.len()..] {
             if island.layer != number {
                 break;
             }
-            plans.push(planner.plan(island, &window, &mask)?);
+            let component = standing.component_at(island.first);
+            let plan = planner.plan(island, &window, &standing.runs(component))?;
+            if !plan.is_left() {
+                standing.hold(component);
+            }
+            plans.push(plan);
         }
         // Added after planning: supports of an island rest on the layers below its own.
-        window.push(&mask, regions[number as usize].as_ref());
+        if let Some(region) = &regions[number as usize] {
+            window.push(standing.mask(), standing.standing_mask().as_ref(), Some(region));
+        } else {
+            window.push(standing.mask(), None, None);
+        }
     }
     if plans.len() == islands.len() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
 }
@@ -82,6 +95,9 @@ const MOST_SUPPORTS: usize = 10_000;
 
 /// The largest reach of a strut beyond its contacts, in radii, where it hardly meets them.
 const MOST_RADII: f64 = 4.0;
+
+/// How often an island is divided anew to hold as much of it as is asked for.
+const MOST_DIVISIONS: usize = 6;
 
 /// The least angle by which supports are turned to make them shorter: some 4 um at 10 mm.
 const LEAST_STEP: f64 = 4e-4;
@@ -102,11 +118,7 @@ impl<'a> SupportPlanner<'a> {
         surface: &'a Surface,
         options: &'a SupportOptions,
     ) -> Result<Self, SupportError> {
-        let raster = Raster {
-            origin_mm: found.origin_mm.ok_or(SupportError::NoOrigin)?,
-            dpi: found.dpi.ok_or(SupportError::NoResolution)?,
-            size: found.size,
-        };
+        let raster = Raster::of(found)?;
         if let Some(layer) = found.layers.iter().find(|layer| span_mm(layer).is_none()) {
             return Err(SupportError::NoHeight { index: layer.index });
         }
@@ -161,38 +173,72 @@ impl<'a> SupportPlanner<'a> {
         regions
     }
 
-    /// Plans the supports of an island, given its first layer's image and those below.
+    /// Plans the supports of an island, given its pixels in its first layer and the images below.
     fn plan(
         &mut self,
         island: &Island,
         window: &SupportWindow,
-        mask: &Mask,
+        runs: &WhiteRuns,
     ) -> Result<IslandPlan, SupportError> {
-        let [column, row] = island.first;
-        let runs = component_at(mask, column, row);
         let surroundings = IslandSurroundings {
             raster: self.raster,
             layers: &self.found.layers,
             window,
             lowest: self.lowest(island),
             layer: island.layer,
-            island: &runs,
+            island: runs,
         };
         let near = self.near(island);
-        let [hold, radius] =
+        let [widest, radius] =
             [self.options.hold, self.options.radius].map(|length| length.pixels(self.raster.dpi));
-        let most = MOST_SUPPORTS - self.built.len();
-        // Pieces are connected: one smaller than the section of a strut needs none of its own.
-        let pieces =
-            divided(&runs, hold, PI * radius * radius, most).ok_or(SupportError::TooMany)?;
+        // Nearer to each other, struts touch.
+        let narrowest = 2.0 * radius + 1.0;
+        let asked = self.options.least_support * island.area as f64;
+        let before = self.built.len();
+        let mut best: Option<(u64, Vec<HeldPlace>)> = None;
+        let mut hold = widest;
+        for _ in 0..MOST_DIVISIONS {
+            // Pieces are connected: one smaller than the section of a strut needs none of its own.
+            let pieces = divided(runs, hold, PI * radius * radius, MOST_SUPPORTS - before);
+            let Some(pieces) = pieces else { break };
+            let places = self.places(&pieces, &near, &surroundings);
+            self.built.truncate(before);
+            let struts: Vec<Strut> =
+                places.iter().filter_map(|it| Some(it.supports.first()?.strut())).collect();
+            let covered = surroundings.covered(struts.iter());
+            if best.as_ref().is_none_or(|(most, _)| covered > *most) {
+                best = Some((covered, places));
+            }
+            // Without a way from any place, smaller pieces have none either.
+            if covered as f64 >= asked || covered == 0 || hold <= narrowest {
+                break;
+            }
+            // As many more pieces as are missing, and some more at the edges.
+            let finer = 0.95 * hold.min(extent(runs)) * (covered as f64 / asked).sqrt();
+            hold = finer.max(narrowest);
+        }
+        let (covered, places) = best.ok_or(SupportError::TooMany)?;
+        let supports = places.iter().filter_map(|place| place.supports.first());
+        self.built.extend(supports.map(|support| [support.origin_mm, support.contact_mm]));
+        let rests = SupportShare { pixels: covered, of: island.area };
+        Ok(IslandPlan { island: island.clone(), stands: covered > 0, rests, places })
+    }
+
+    /// Finds the supports of pieces of an island, each apart from those before.
+    fn places(
+        &mut self,
+        pieces: &[IslandPiece],
+        near: &NearSurface,
+        around: &IslandSurroundings<'_>,
+    ) -> Vec<HeldPlace> {
         let mut places = Vec::new();
         for piece in pieces {
-            let place = self.place(&piece, &near, &surroundings);
+            let place = self.place(piece, near, around);
             let support = place.supports.first();
             self.built.extend(support.map(|support| [support.origin_mm, support.contact_mm]));
             places.push(place);
         }
-        Ok(IslandPlan { island: island.clone(), places })
+        places
     }
 
     /// Returns the surface that supports of an island may meet.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 use super::*;
-use crate::check::{CheckError, CheckOptions, Findings, check};
+use crate::check::{CheckError, CheckOptions, Findings, WeakJoint, check};
 
 /// A part, its layers and what is found in them.
 struct Checked {
@@ -32,8 +32,13 @@ fn checked(mesh: Mesh, dpi: f64) -> Checked {
 
 impl Checked {
     fn plan(&self, options: &SupportOptions) -> Vec<IslandPlan> {
-        let layers = self.layers.iter().cloned().map(Ok::<_, SupportError>);
-        plan_supports(layers, &self.found, &self.surface, options).unwrap()
+        let layers = || self.layers.iter().cloned().map(Ok::<_, SupportError>);
+        let planned = plan_supports(layers(), &self.found, &self.surface, options).unwrap();
+        let mut flooded = planned.clone();
+        flood_supports(layers(), &self.found, &mut flooded, options).unwrap();
+        // Planned supports hold. A strut may also touch an island that has none.
+        assert!(planned.iter().zip(&flooded).all(|(plan, drawn)| drawn.stands || !plan.stands));
+        flooded
     }
 
     /// Draws supports into the layers.
@@ -77,27 +82,40 @@ fn lengths(plan: &IslandPlan) -> Vec<Option<f64>> {
     plan.places.iter().map(length).collect()
 }
 
-/// Checks that only islands that are left are islands after supports are drawn.
-fn assert_held(part: &Checked, plans: &[IslandPlan]) {
+/// Checks that only islands that are left are islands after supports are drawn, and only islands
+/// that are held weakly rest on little.
+fn assert_held(part: &Checked, plans: &[IslandPlan], options: &SupportOptions) {
     let left: Vec<_> =
         plans.iter().filter(|plan| plan.is_left()).map(|plan| plan.island.layer).collect();
     let after = found_in(&part.with(plans));
     let mut islands: Vec<_> = after.islands.list.iter().map(|island| island.layer).collect();
     islands.sort_unstable();
     assert_eq!(islands, left);
+    let joint = |joint: &WeakJoint| (joint.layer, joint.first, joint.area, joint.support);
+    let before: Vec<_> = part.found.weak_joints.list.iter().map(joint).collect();
+    let mut weak: Vec<_> = after.weak_joints.list.iter().map(joint).collect();
+    // The same joint may be larger by the sections of struts.
+    weak.retain(|it| !before.iter().any(|other| other.0 == it.0 && other.3 <= it.3));
+    weak.sort_unstable();
+    let held_weakly =
+        plans.iter().filter(|plan| plan.is_weak(CheckOptions::default().least_support));
+    let expected: Vec<_> = held_weakly.map(|plan| (plan.island.layer, plan.rests)).collect();
+    let of = |it: &(u32, [u32; 2], u64, u64)| (it.0, SupportShare { pixels: it.3, of: it.2 });
+    assert_eq!(weak.iter().map(of).collect::<Vec<_>>(), expected, "{options:?}");
     assert_eq!(after.specks.count(), part.found.specks.count());
 }
 
 /// Options that hold an island at one point.
 fn undivided() -> SupportOptions {
-    SupportOptions { hold: Length::from_mm(50.0), ..SupportOptions::default() }
+    SupportOptions { hold: Length::from_mm(50.0), least_support: 0.0, ..SupportOptions::default() }
 }
 
 #[test]
 fn cores_in_a_cavity_are_held_by_the_nearest_walls() {
     let part = checked(cavity_core(2_000), 254.0);
-    let plans = part.plan(&SupportOptions::default());
-    assert_held(&part, &plans);
+    let options = SupportOptions { least_support: 0.0, ..SupportOptions::default() };
+    let plans = part.plan(&options);
+    assert_held(&part, &plans, &options);
     // 10 x 6 mm and 4 x 6 mm, in pieces of 2 x 2 mm; 6 and 10 mm above the floor.
     let lengths =
         [0, 1].map(|k: usize| lengths(&plans[k]).into_iter().flatten().collect::<Vec<_>>());
@@ -136,14 +154,14 @@ fn a_handle_is_held_from_the_side() {
     assert!((best.curvature - 0.1).abs() < 0.01 && best.tilt > 44.0, "{best:?}");
     assert_eq!(place.supports.len(), 3);
     assert!(place.supports.is_sorted_by(|a, b| a.length().um() <= b.length().um()));
-    assert_held(&part, std::slice::from_ref(plan));
+    assert_held(&part, std::slice::from_ref(plan), &undivided());
 
     let flat = SupportOptions { max_curvature: 0.09, ..undivided() };
     let [plan] = &part.plan(&flat)[..] else { panic!("one island") };
     assert!(plan.is_left());
     let curved = plan.places[0].rejected.iter().find(|(cause, _)| *cause == Rejection::Curved);
     assert!(curved.is_some_and(|(_, count)| *count > 3), "{plan:?}");
-    assert_held(&part, std::slice::from_ref(plan));
+    assert_held(&part, std::slice::from_ref(plan), &flat);
 }
 
 #[test]
@@ -151,13 +169,13 @@ fn an_island_without_a_way_is_left() {
     let part = checked(needle(2_000), 254.0);
     let plans = part.plan(&SupportOptions::default());
     assert_eq!(plans[0].places[0].rejected, [(Rejection::Far, 400)]);
-    assert_held(&part, &plans);
+    assert_held(&part, &plans, &SupportOptions::default());
     // Posts stand 12 mm aside.
     let far = SupportOptions { max_length: Length::from_mm(20.0), max_tilt: 60.0, ..undivided() };
     let plans = part.plan(&far);
     let length = lengths_of_one(&plans[0]);
     assert!((length - 12.0 / 60f64.to_radians().sin()).abs() < 0.3, "{length}");
-    assert_held(&part, &plans);
+    assert_held(&part, &plans, &far);
 }
 
 #[test]
@@ -167,7 +185,25 @@ fn a_ring_is_held_where_it_is_white() {
     let plans = part.plan(&far);
     let [x, y, z] = plans[0].places[0].origin_mm;
     assert!(x.abs().max(y.abs()) > 5.0 && x.abs().max(y.abs()) < 5.1 && z == 10.0, "{x} {y} {z}");
-    assert_held(&part, &plans);
+    assert_held(&part, &plans, &far);
+}
+
+#[test]
+fn a_wide_island_is_held_by_as_much_as_is_asked() {
+    let part = checked(cavity_core(2_000), 254.0);
+    for least_support in [0.1, 0.25] {
+        let options = SupportOptions { least_support, ..SupportOptions::default() };
+        let plans = part.plan(&options);
+        for plan in &plans {
+            assert!(plan.stands && !plan.is_weak(least_support), "{:?}", plan.rests);
+            // No more than half more than needed.
+            assert!(plan.rests.percent() < 150.0 * least_support, "{:?}", plan.rests);
+        }
+        assert_held(&part, &plans, &options);
+    }
+    // Struts that may not touch cover less than 79 %.
+    let plans = part.plan(&SupportOptions { least_support: 0.9, ..SupportOptions::default() });
+    assert!(plans.iter().all(|plan| plan.stands && plan.is_weak(0.9)));
 }
 
 fn lengths_of_one(plan: &IslandPlan) -> f64 {
@@ -234,7 +270,7 @@ proptest! {
             ..SupportOptions::default()
         };
         let plans = part.plan(&options);
-        assert_held(&part, &plans);
+        assert_held(&part, &plans, &options);
         let places = plans.iter().flat_map(|plan| &plan.places);
         for support in places.flat_map(|place| &place.supports) {
             // The contact lies on a side of a block, which is level or upright.

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use lamp_stack::{Dpi, Frame, Length, Mask, Strut, white_runs};
 
-use crate::check::Region;
+use super::SupportError;
+use crate::check::{Findings, Region};
 
 /// How the pixels of a stack lie in the part.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +17,15 @@ pub(super) struct Raster {
 }
 
 impl Raster {
+    /// Returns how the pixels of a checked stack lie.
+    pub(super) fn of(found: &Findings) -> Result<Self, SupportError> {
+        Ok(Self {
+            origin_mm: found.origin_mm.ok_or(SupportError::NoOrigin)?,
+            dpi: found.dpi.ok_or(SupportError::NoResolution)?,
+            size: found.size,
+        })
+    }
+
     /// Returns the x and y of a column and row; the first pixel's center is at (0.5, 0.5).
     pub(super) fn place_mm(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         let pitch = self.dpi.pitch().mm();
@@ -47,21 +57,30 @@ pub(super) struct SupportWindow {
 struct Cropped {
     region: Region,
     mask: Mask,
+    /// The white that stands, unless all does.
+    standing: Option<Mask>,
+}
+
+impl Cropped {
+    fn standing(&self) -> &Mask {
+        self.standing.as_ref().unwrap_or(&self.mask)
+    }
 }
 
 impl SupportWindow {
-    /// Adds the next layer, or nothing of it.
-    pub(super) fn push(&mut self, mask: &Mask, region: Option<&Region>) {
+    /// Adds the next layer and what of it stands, unless all does; or nothing of it.
+    pub(super) fn push(&mut self, mask: &Mask, standing: Option<&Mask>, region: Option<&Region>) {
         let nothing = Region { columns: 0..0, rows: 0..0 };
         // Even an empty layer takes its place, for layers are found by their number.
         let region = region.cloned().unwrap_or(nothing);
-        let mask = mask.framed(Frame {
+        let frame = Frame {
             left: region.columns.start.into(),
             top: region.rows.start.into(),
             width: region.columns.len() as u32,
             height: region.rows.len() as u32,
-        });
-        self.kept.push_back(Cropped { region, mask });
+        };
+        let (mask, standing) = (mask.framed(frame), standing.map(|mask| mask.framed(frame)));
+        self.kept.push_back(Cropped { region, mask, standing });
     }
 
     /// Forgets the layers below one.
@@ -78,10 +97,30 @@ impl SupportWindow {
         row: u32,
         run: &Range<u32>,
     ) -> impl Iterator<Item = Range<u32>> + use<'_> {
-        let run = run.clone();
+        self.runs_in(layer, row, run.clone(), |cropped| &cropped.mask)
+    }
+
+    /// Returns the white runs of a layer that stand, within a run of a row.
+    pub(super) fn standing_in(
+        &self,
+        layer: u32,
+        row: u32,
+        run: &Range<u32>,
+    ) -> impl Iterator<Item = Range<u32>> + use<'_> {
+        self.runs_in(layer, row, run.clone(), Cropped::standing)
+    }
+
+    fn runs_in<'a>(
+        &'a self,
+        layer: u32,
+        row: u32,
+        run: Range<u32>,
+        image: impl Fn(&'a Cropped) -> &'a Mask,
+    ) -> impl Iterator<Item = Range<u32>> {
         let cropped = layer.checked_sub(self.first).and_then(|k| self.kept.get(k as usize));
         let cropped = cropped.filter(|cropped| cropped.region.rows.contains(&row));
-        let clipped = cropped.into_iter().flat_map(move |Cropped { region, mask }| {
+        let clipped = cropped.into_iter().flat_map(move |cropped| {
+            let (region, mask) = (&cropped.region, image(cropped));
             let (run, left) = (run.clone(), region.columns.start);
             let runs = white_runs(mask.row(row - region.rows.start), mask.width());
             runs.map(move |(start, end)| run.start.max(left + start)..run.end.min(left + end))

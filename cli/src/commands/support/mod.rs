@@ -17,7 +17,7 @@ use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::support::SupportSettings;
 use lamp_stack::{CompensateRecord, Page, PageInfo};
 use lamp_supports::{
-    CheckError, Findings, IslandPlan, Support, SupportError, Surface, plan_supports,
+    CheckError, Findings, IslandPlan, Support, SupportError, Surface, flood_supports, plan_supports,
 };
 use serde_json::Value;
 
@@ -43,7 +43,8 @@ use report::SupportReport;
 /// Supports stay in the mold and become features of the casting, so look at each before you build.
 /// The command tries directions over a cone below the middle of an island. It takes the shortest
 /// support that can be built and meets the part where it is smooth, even and away from creases.
-/// Islands without such a support are left, and reported. The plan is a list of edits: delete or
+/// Wide islands get as many as --least-support asks. Islands without such a support are left, and
+/// reported. The plan is a list of edits: delete or
 /// exchange supports in it, and apply it with lamp edit.
 #[derive(Args, Clone)]
 #[command(after_help = "\
@@ -53,7 +54,8 @@ Examples:
   lamp edit blade.tif supports.toml -o supported.tif
   lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
 
-Exit status: 0 if the work is done; 3 with --strict if islands are left.")]
+Exit status: 0 if the work is done; 3 with --strict if islands are left or rest on too little, or if
+there are stray rows.")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
@@ -76,8 +78,8 @@ pub(crate) struct SupportArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Stop with status 3 if islands are left, or if pages of a folder may be missing: no stack is
-    /// written, and the next stage of a pipe fails, too
+    /// Stop with status 3 if islands are left or rest on too little, if there are stray rows, or if
+    /// pages of a folder may be missing: no stack is written, and the next stage of a pipe fails, too
     #[arg(long)]
     strict: bool,
 
@@ -113,26 +115,24 @@ impl SupportArgs {
         let name = input_name(&self.stack);
         let surface = self.surface(&first, &name, progress)?;
         let found = self.check(stack, progress)?;
-        let layers = layers_of(stack.pages(true)?, &self.stack, None);
-        let plans = plan_supports(layers, &found, &surface, &self.settings.options());
-        let plans = plans.map_err(|error| match error.cause::<SupportError>() {
-            Some(_) => error.at(name),
-            None => error,
+        let plans = self.plans(stack, &found, &surface).map_err(|error| {
+            let is_of_stack = error.cause::<SupportError>().is_some();
+            if is_of_stack { error.at(name) } else { error }
         })?;
         let part = first.stack.map(|stack| stack.part).unwrap_or_default();
         let plan = plan_text(&part, &plans, &found);
         self.write_beside(&plan, &plans)?;
-        let report = SupportReport::new(&plans, &found, machine.recoating.as_ref());
+        let least_support = self.settings.least_support;
+        let report = SupportReport::new(&plans, &found, machine.recoating.as_ref(), least_support);
         if let Some(path) = &self.report {
             report.write(&part, path)?;
         }
         report.tell(progress);
-        if let Some(left) = report.text_of_left() {
-            if self.strict {
-                return Err(Exit::Findings(left));
-            }
-            progress.warn(&left);
+        let troubles = report.troubles();
+        if self.strict && !troubles.is_empty() {
+            return Err(Exit::Findings(troubles.join("; ")));
         }
+        troubles.iter().for_each(|trouble| progress.warn(trouble));
         if let Some(doubts) = doubts().filter(|_| self.strict) {
             return Err(Exit::Findings(doubts));
         }
@@ -144,6 +144,23 @@ impl SupportArgs {
                 Box::new(edited.map(|layer| Ok(layer?.decode()?)))
             }
         })
+    }
+
+    /// Plans the supports, and checks in the images that they hold.
+    fn plans(
+        &self,
+        stack: &mut KeptStack,
+        found: &Findings,
+        surface: &Surface,
+    ) -> Result<Vec<IslandPlan>, Exit> {
+        let options = self.settings.options();
+        let layers = layers_of(stack.pages(true)?, &self.stack, None);
+        let mut plans = plan_supports(layers, found, surface, &options)?;
+        if supports(&plans).next().is_some() {
+            let layers = layers_of(stack.pages(true)?, &self.stack, None);
+            flood_supports(layers, found, &mut plans, &options)?;
+        }
+        Ok(plans)
     }
 
     /// Returns the options that matter to bytes as one text. The machine only decides forces.

@@ -20,8 +20,10 @@ pub(super) struct SupportReport<'a> {
     plans: &'a [IslandPlan],
     /// Islands that are too many to be listed, and so are left.
     unlisted: u64,
+    found: &'a Findings,
     scale: Scale<'a>,
     shear_pa: Option<f64>,
+    least_support: f64,
 }
 
 impl<'a> SupportReport<'a> {
@@ -29,10 +31,11 @@ impl<'a> SupportReport<'a> {
         plans: &'a [IslandPlan],
         found: &'a Findings,
         recoating: Option<&Recoating>,
+        least_support: f64,
     ) -> Self {
         let unlisted = found.islands.left_out;
         let shear_pa = recoating.map(Recoating::greatest_shear_pa);
-        Self { plans, unlisted, scale: Scale::new(found), shear_pa }
+        Self { plans, unlisted, found, scale: Scale::new(found), shear_pa, least_support }
     }
 
     /// Prints what is done: first of all what that means.
@@ -71,15 +74,57 @@ impl<'a> SupportReport<'a> {
         }
     }
 
+    /// Returns a line for each reason that a person must look at the stack.
+    pub(super) fn troubles(&self) -> Vec<String> {
+        [self.text_of_stray_rows(), self.text_of_left(), self.text_of_weak()]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+
+    fn text_of_stray_rows(&self) -> Option<String> {
+        let stray = self.found.layers.iter().map(|layer| layer.stray_rows).filter(|rows| *rows > 0);
+        let (rows, layers) = (stray.clone().map(u64::from).sum::<u64>(), stray.count());
+        let rows = if rows == 1 { "1 stray row".to_owned() } else { format!("{rows} stray rows") };
+        let layers = if layers == 1 { "1 layer".to_owned() } else { format!("{layers} layers") };
+        (self.stray_rows() > 0).then(|| {
+            format!("{rows} in {layers} may look like islands and get supports: correct them with fix first")
+        })
+    }
+
+    fn stray_rows(&self) -> u64 {
+        self.found.layers.iter().map(|layer| u64::from(layer.stray_rows)).sum()
+    }
+
+    /// Returns the number of islands that rest on too little.
+    fn weak(&self) -> impl Iterator<Item = &IslandPlan> + Clone {
+        self.plans.iter().filter(|plan| plan.is_weak(self.least_support))
+    }
+
+    fn place_of(&self, plan: &IslandPlan) -> String {
+        let island = &plan.island;
+        let layer = self.scale.layer(island.layer);
+        format!(", the first in {layer} at {}", self.scale.point(island.centroid))
+    }
+
+    /// Returns a line that sums up the islands that rest on too little, if some do.
+    fn text_of_weak(&self) -> Option<String> {
+        let mut weak = self.weak();
+        let count = weak.clone().count();
+        let first = self.place_of(weak.next()?);
+        let rest = if count == 1 { "island rests" } else { "islands rest" };
+        let percent = significant(100.0 * self.least_support);
+        Some(format!(
+            "{count} {rest} on less than {percent}% of the first layer{first}: allow more with \
+             --max-length or --max-tilt, or give a larger --radius or a lower --least-support"
+        ))
+    }
+
     /// Returns a line that sums up the islands that are left, if some are.
-    pub(super) fn text_of_left(&self) -> Option<String> {
+    fn text_of_left(&self) -> Option<String> {
         let mut left = self.plans.iter().filter(|plan| plan.is_left());
         let count = left.clone().count() as u64 + self.unlisted;
-        let first = left.next().map(|plan| {
-            let island = &plan.island;
-            let layer = self.scale.layer(island.layer);
-            format!(", the first in {layer} at {}", self.scale.point(island.centroid))
-        });
+        let first = left.next().map(|plan| self.place_of(plan));
         let are = if count == 1 { "island is" } else { "islands are" };
         let first = first.unwrap_or_default();
         (count > 0).then(|| {
@@ -94,11 +139,13 @@ impl<'a> SupportReport<'a> {
     pub(super) fn write(&self, part: &str, path: &Path) -> Result<(), Exit> {
         let left = self.plans.iter().filter(|plan| plan.is_left()).count() as u64;
         let head = json!({
-            "schema": "lamp-support-1",
+            "schema": "lamp-support-2",
             "note": "supports stay in the mold and become features of the casting",
             "part": part,
             "islands": self.plans.len() as u64 + self.unlisted,
             "left": left + self.unlisted,
+            "weak": self.weak().count(),
+            "stray_rows": self.stray_rows(),
             "supports": self.supports().count(),
             "volume_mm3": to_nm(self.volume_mm3()),
         });
@@ -125,7 +172,7 @@ impl<'a> SupportReport<'a> {
         let (layer, at) = (self.scale.layer(island.layer), self.scale.point(island.centroid));
         let start = format!("island {} in {layer} at {at}: ", island.number);
         if let [place] = &plan.places[..] {
-            return start + &held(place, self.drag_mn(plan));
+            return start + &held(place, self.drag_mn(plan)) + &rests(plan);
         }
         let (held, all) = (plan.supports().count(), plan.places.len());
         if held == 0 {
@@ -133,12 +180,13 @@ impl<'a> SupportReport<'a> {
         }
         let lengths = || plan.supports().map(|support| support.length().mm());
         format!(
-            "{start}held in {held} of {all} places, {:.2} to {:.2} mm away, {} mm3{}{}",
+            "{start}held in {held} of {all} places, {:.2} to {:.2} mm away, {} mm3{}{}{}",
             lengths().fold(f64::INFINITY, f64::min),
             lengths().fold(0.0, f64::max),
             significant(plan.supports().map(Support::volume_mm3).sum()),
             drag_text(self.drag_mn(plan), ", each holds"),
             causes(&plan.places),
+            rests(plan),
         )
     }
 
@@ -155,8 +203,19 @@ impl<'a> SupportReport<'a> {
             "area_mm2": self.scale.area(island.area).area_mm2,
             "drag_mn": self.scale.drag_mn(island, self.shear_pa),
             "left": plan.is_left(),
+            "weak": plan.is_weak(self.least_support),
+            "support_percent": to_nm(plan.rests.percent()),
             "places": places,
         })
+    }
+}
+
+/// Returns how much of an island rests on its supports.
+fn rests(plan: &IslandPlan) -> String {
+    match (plan.supports().next(), plan.stands) {
+        (None, _) => String::new(),
+        (Some(_), true) => format!("; {}% of it rests on them", significant(plan.rests.percent())),
+        (Some(_), false) => "; it floats even so".to_owned(),
     }
 }
 
