@@ -1,15 +1,20 @@
 //! The settings of a check.
 
+use std::collections::BTreeMap;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use lamp_machine::{Machine, Recoating};
-use lamp_stack::{Layer, Length, MemorySize};
+use lamp_stack::{Layer, Length, Mask, MemorySize};
 use lamp_supports::{
-    CheckError, CheckOptions, Disagreements, FindingGroup, FindingRecord, Findings,
+    CheckError, CheckOptions, CopyRecord, Disagreements, Feature, FindingGroup, FindingRecord,
+    Findings, Listed, Region, Scale, Severity,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::build_copies::{BuildCopies, OnBuild};
 use crate::documents::{canonical_word, document, is_file};
 use crate::error::Error;
 use crate::words::{list, optional, path, text, words_of};
@@ -115,29 +120,177 @@ impl CheckSettings {
         records
     }
 
-    /// Finds what there is in layers, and returns the records that are asked for with it. Drag is
-    /// computed for `machine`, or else for the settings' machine.
+    /// Finds what there is in a stack, given its layers and how to decode one. Of a build, whose copies
+    /// are given, each part is judged once. Drag is computed for `machine`, or else for the settings'
+    /// machine.
     ///
     /// # Errors
     /// Returns the first error of the layers, or an error if they cannot be checked.
     pub fn find<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
         &self,
+        build: Option<BuildCopies>,
         layers: impl Iterator<Item = Result<T, E>>,
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
         machine: Option<&Machine>,
-    ) -> Result<(Findings, Vec<FindingRecord>), E> {
-        let findings = lamp_supports::check(layers, decode, &self.options())?;
-        let records = match machine {
-            Some(machine) => self.records(&findings, &Disagreements::default(), machine),
-            None => self.records(&findings, &Disagreements::default(), &self.machine()?),
+    ) -> Result<Found, E> {
+        let (findings, differing) = match &build {
+            Some(build) => self.find_in_build(build, layers, decode)?,
+            None => (lamp_supports::check(layers, decode, &self.options())?, Vec::new()),
         };
-        Ok((findings, records))
+        let of_settings;
+        let machine = match machine {
+            Some(machine) => machine,
+            None => {
+                of_settings = self.machine()?;
+                &of_settings
+            }
+        };
+        Ok(self.found(findings, &Disagreements::default(), differing, build, machine))
+    }
+
+    /// Returns what was found, as people and programs read it.
+    pub fn found(
+        &self,
+        findings: Findings,
+        disagreements: &Disagreements,
+        differing: Vec<CopyRecord>,
+        build: Option<BuildCopies>,
+        machine: &Machine,
+    ) -> Found {
+        let mut records = self.records(&findings, disagreements, machine);
+        if self.reports(FindingGroup::Layers) {
+            let differing = differing.into_iter().map(FindingRecord::CopyDiffers);
+            // Before white at the border and empty layers, which harm least.
+            let at = records.iter().position(|record| {
+                matches!(record, FindingRecord::Border(_) | FindingRecord::Empty(_))
+            });
+            let at = at.unwrap_or(records.len());
+            records.splice(at..at, differing);
+        }
+        let features = lamp_supports::features(&records);
+        Found { findings, records, features, build }
+    }
+
+    /// Finds what there is in a build: in the first copy of each part alone, and islands of its mesh.
+    fn find_in_build<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
+        &self,
+        build: &BuildCopies,
+        layers: impl Iterator<Item = Result<T, E>>,
+        decode: impl Fn(T) -> Result<Layer, E> + Sync,
+    ) -> Result<(Findings, Vec<CopyRecord>), E> {
+        // For each copy that differs: its layers' indices, and its pixels.
+        let differing: Mutex<BTreeMap<[usize; 2], ([u32; 2], u64)>> = Mutex::default();
+        let has_mesh = AtomicBool::new(false);
+        // Pages of mesh alone show where it is. They come before all parts.
+        let base: OnceLock<Mask> = OnceLock::new();
+        let decode = |item: T| {
+            let layer = decode(item)?;
+            if build.is_base(layer.info.index) {
+                base.get_or_init(|| layer.image.clone().into_image().into_mask(self.threshold));
+            }
+            Ok(layer)
+        };
+        let parts = |layer: &Layer| {
+            let Layer { info, dpi, image } = layer;
+            let mask = image.clone().into_image().into_mask(self.threshold);
+            let found = build.divide(&mask, info.index, base.get());
+            has_mesh.fetch_or(found.has_mesh, Ordering::Relaxed);
+            let mut all = differing.lock().unwrap_or_else(PoisonError::into_inner);
+            for (copy, pixels) in found.differing {
+                let (layers, sum) = all.entry(copy).or_insert(([info.index; 2], 0));
+                // Two layers are in work at once, and either may be the first.
+                *layers = [layers[0].min(info.index), layers[1].max(info.index)];
+                *sum += pixels;
+            }
+            let parts = found.first_copies?;
+            Some(Layer { info: info.clone(), dpi: *dpi, image: parts.into() })
+        };
+        let (whole, parts) = lamp_supports::check_build(layers, decode, parts, &self.options())?;
+        let mut findings = whole;
+        if let Some(parts) = parts {
+            findings = findings.with_parts(parts, |Region { columns, rows }| {
+                let bounds = [columns.start, columns.end, rows.start, rows.end];
+                build.owner(bounds) == OnBuild::Mesh
+            });
+        }
+        if has_mesh.into_inner() {
+            // The mesh holds the parts (002 section 4.2.3).
+            findings.off_balance = Listed::default();
+        }
+        let scale = Scale::new(&findings);
+        let position = |index: u32| {
+            let found = findings.layers.iter().position(|layer| layer.index == index);
+            found.map_or(0, |position| position as u32)
+        };
+        let differing = differing.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let differing = differing.into_iter().map(|(copy, (layers, pixels))| {
+            let (part, copies, frame) = build.copy(copy);
+            let within = |start: i64, size: u32, most: u32| {
+                let end = start.saturating_add(size.into()).clamp(0, most.into()) as u32;
+                start.clamp(0, most.into()) as u32..end
+            };
+            let [width, height] = findings.size;
+            let region = Region {
+                columns: within(frame.left, frame.width, width),
+                rows: within(frame.top, frame.height, height),
+            };
+            CopyRecord {
+                layers: scale.span(layers.map(position)),
+                bounds: scale.bounds(&region),
+                part: part.to_owned(),
+                copy: copy[1] + 1,
+                copies,
+                differing_px: pixels,
+            }
+        });
+        let differing = differing.collect();
+        Ok((findings, differing))
     }
 
     /// Puts the machine's file into a folder, unless its path is absolute.
     pub fn set_folder(&mut self, folder: &Path) {
         if let Some(file) = self.machine_file() {
             self.machine = folder.join(file);
+        }
+    }
+}
+
+/// What a check found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Findings by kind.
+    pub findings: Findings,
+    /// The records of the findings that are asked for, the worst first.
+    pub records: Vec<FindingRecord>,
+    /// The records as features.
+    pub features: Vec<Feature>,
+    /// The copies, if the stack is a build.
+    pub build: Option<BuildCopies>,
+}
+
+impl Found {
+    /// Returns the number of features that need a person.
+    pub fn count(&self) -> usize {
+        self.features.iter().filter(|feature| feature.severity != Severity::Note).count()
+    }
+
+    /// Returns what a finding belongs to, if the stack is a build and the finding has a place.
+    pub fn owner(&self, record: &FindingRecord) -> Option<OnBuild> {
+        Some(self.build.as_ref()?.owner(record.box_px()?))
+    }
+
+    /// Returns the line about a feature, without the name of its kind.
+    pub fn text(&self, feature: &Feature) -> String {
+        let record = &self.records[feature.finding];
+        let text = feature.text(&self.records);
+        match self.owner(record) {
+            _ if matches!(record, FindingRecord::CopyDiffers(_)) => text,
+            None => text,
+            Some(OnBuild::Mesh) => format!("{text}; in the build mesh"),
+            Some(OnBuild::Part { name, copies: 1 }) => format!("{text}; in {name}"),
+            Some(OnBuild::Part { name, copies }) => {
+                format!("{text}; in each of {copies} copies of {name}")
+            }
         }
     }
 }

@@ -7,6 +7,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod build_copies;
 pub mod check;
 pub mod compensate;
 pub mod dither;

@@ -23,6 +23,7 @@
 //! ```
 
 mod check;
+mod features;
 mod orient;
 mod record;
 mod support;
@@ -30,11 +31,12 @@ mod support;
 pub use check::{
     CheckError, CheckOptions, Disagreements, Findings, Island, IslandEnd, IslandMinimum,
     LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketEffect, PocketKind,
-    Region, WeakJoint, check, component_at, inner_components,
+    Region, WeakJoint, check, check_build, component_at, inner_components, inner_components_beyond,
 };
+pub use features::{Feature, Severity, features};
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{
-    AreaRecord, BorderRecord, BoxRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord,
+    AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord,
     FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace,
     LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord, PocketRecord,
     PointRecord, Scale, Shown, StrayRowsRecord, records,

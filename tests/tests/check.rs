@@ -114,10 +114,9 @@ fn overhangs_weak_joints_borders_and_empty_layers_are_told() {
     let ran = scratch.run("lamp check a.tif --report a.json").succeeds_quietly();
     let text = String::from_utf8(ran.stdout).unwrap();
     for line in [
-        "a.tif: 5 layers, 5 findings",
+        "a.tif: 5 layers, 4 findings",
         "island: number 1 begins in layer 3 (z 3.00 mm) at x 4.50, y 5.50 mm with 81.0 mm2; never joins",
-        "weak joint: layer 1 (z 1.00 mm) at x 5.00, y 5.00 mm: 64.0 mm2 rest on 4.00 mm2 (6.25%)",
-        "overhang: layer 1 (z 1.00 mm) at x 1.50, y 8.50 mm: reaches 4.24 mm beyond",
+        "weak joint: layer 1 (z 1.00 mm) at x 5.00, y 5.00 mm: 64.0 mm2 rest on 4.00 mm2 (6.25%); with 1 overhang",
         "border: layer 3 (z 3.00 mm): white there",
         "empty: layer 2 (z 2.00 mm): no white; nothing holds",
         "empty: layer 4 (z 4.00 mm): no white; above the part",
@@ -125,7 +124,7 @@ fn overhangs_weak_joints_borders_and_empty_layers_are_told() {
         assert!(text.contains(line), "no `{line}` in {text}");
     }
     let report = report(&scratch, "a.json");
-    assert_eq!(report["inputs"][0]["findings"], 5);
+    assert_eq!(report["inputs"][0]["findings"], 4);
     assert_eq!(of_kind(&report, "overhang")[0]["reach_px"], 18f64.sqrt());
     // Reaches of 4 mm are allowed.
     let ran = scratch.run(
@@ -278,8 +277,9 @@ fn builds_and_adaptive_layers_are_checked() {
         let found = of_kind(&found, kind).into_iter();
         found.filter(|it| it["input"] == input).map(|it| it["z_mm"].as_f64().unwrap()).collect()
     };
-    assert_eq!(of(0, "island"), [8.0, 8.0]);
-    assert_eq!(of(0, "cup").len(), 2);
+    // Each part of a build is judged once.
+    assert_eq!(of(0, "island"), [8.0]);
+    assert_eq!(of(0, "cup").len(), 1);
     let [z] = of(1, "island")[..] else { panic!("{found}") };
     assert!((7.79..=8.0).contains(&z), "{z}");
     let volume = of_kind(&found, "island").into_iter().find(|it| it["input"] == 1).unwrap();
@@ -326,4 +326,69 @@ fn what_cannot_be_checked_is_refused_in_a_sentence() {
     }
     scratch.run("lamp check a.tif --only rings").is_wrong_usage(&["rings"]);
     scratch.run("lamp check a.tif --least-support 130%").is_wrong_usage(&["130%"]);
+}
+
+#[test]
+fn a_build_is_judged_by_one_copy_of_each_part() {
+    let scratch = Scratch::new();
+    scratch.part("mug.stl", Sample::Mug, 2_000);
+    scratch.run("slice mug.stl --dpi 150 --thickness 500um -q -o mug.tif").succeeds();
+    let tile = "tile mug.tif --area 110x110mm --copies 4";
+    scratch.run(&format!("{tile} -o build.tif")).succeeds();
+    let report = |stack: &str| -> serde_json::Value {
+        scratch.run(&format!("lamp check {stack} --report r.json --verbose")).succeeds();
+        serde_json::from_slice(&scratch.bytes("r.json")).unwrap()
+    };
+    let kinds = |report: &serde_json::Value| -> Vec<String> {
+        let features = report["features"].as_array().unwrap();
+        let kind = |feature: &serde_json::Value| {
+            let finding = &report["findings"][feature["finding"].as_u64().unwrap() as usize];
+            finding["kind"].as_str().unwrap().to_owned()
+        };
+        features.iter().map(kind).collect()
+    };
+    let (part, build) = (report("mug.tif"), report("build.tif"));
+    assert!(kinds(&part).contains(&"cup".to_owned()), "{part}");
+    assert_eq!(kinds(&build), kinds(&part));
+    for finding in build["findings"].as_array().unwrap() {
+        assert_eq!((&finding["part"], &finding["copies"]), (&"mug".into(), &4.into()));
+    }
+    // The same volume, five layers of mesh higher.
+    let cup = |report: &serde_json::Value| {
+        let cup = report["findings"].as_array().unwrap().iter().find(|it| it["kind"] == "cup");
+        let cup = cup.unwrap();
+        [&cup["volume_px"], &cup["layer"]].map(|number| number.as_u64().unwrap())
+    };
+    let [[volume, layer], of_build] = [cup(&part), cup(&build)];
+    assert_eq!(of_build, [volume, layer + 5]);
+    // A copy that lacks a few pixels in a layer is named.
+    let mut layers = scratch.layers("build.tif");
+    let parts = layers[0].info.stack.as_ref().unwrap().built_parts().unwrap();
+    let [left, top] = parts.map(Result::unwrap).next().unwrap().copies[2];
+    let broken = &mut layers[20];
+    let mask = broken.image.exposed().into_owned();
+    let (mut rows, mut changed) = (lamp_stack::MaskBuilder::new(mask.width()), 0);
+    for row in 0..mask.height() {
+        let mut transitions = mask.row(row).to_vec();
+        let within = transitions.iter().position(|&column| i64::from(column) >= left);
+        if let Some(at) = within.filter(|_| i64::from(row) == top + 40) {
+            transitions[at] += 3;
+            changed += 1;
+        }
+        rows.push_row(&transitions).unwrap();
+    }
+    assert_eq!(changed, 1);
+    broken.image = rows.finish().into();
+    scratch.stack("broken.tif", layers);
+    let broken = report("broken.tif");
+    let copy =
+        broken["findings"].as_array().unwrap().iter().find(|it| it["kind"] == "copy-differs");
+    let copy = copy.unwrap();
+    assert_eq!((&copy["copy"], &copy["differing_px"]), (&3.into(), &3.into()), "{copy}");
+    assert_eq!((&copy["layer"], &copy["last_layer"]), (&20.into(), &20.into()));
+    // A plain part on a build with a mesh has no findings.
+    scratch.part("cube.stl", Sample::Cube, 100);
+    scratch.run("slice cube.stl --dpi 150 --thickness 500um -q -o cube.tif").succeeds();
+    scratch.run("tile cube.tif --area 80x80mm --copies 4 -o cubes.tif").succeeds();
+    scratch.run("lamp check cubes.tif --strict").succeeds();
 }

@@ -1,5 +1,6 @@
 //! Findings of `lamp check` and `lamp support`, in the form that the page shows.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageHeader};
@@ -33,16 +34,17 @@ pub struct Finding {
 /// The longest list that people can look through.
 const MOST: usize = 10_000;
 
-/// Returns what a check found in a stack, given its pages.
+/// Returns what a check found in a stack, given the records that name features, a line about each,
+/// and the stack's pages.
 ///
 /// # Errors
 /// Returns a sentence if the findings are about a stack with other layers.
-pub fn of_records(
-    records: &[FindingRecord],
+pub fn of_records<'a>(
+    records: impl Iterator<Item = (&'a FindingRecord, String)>,
     headers: &[PageHeader],
 ) -> Result<Vec<Finding>, String> {
-    let found = records.iter().take(MOST);
-    fitting(found.map(|record| of_record(record, record.to_string(), headers)).collect(), headers)
+    let found = records.take(MOST);
+    fitting(found.map(|(record, text)| of_record(record, text, headers)).collect(), headers)
 }
 
 /// Reads a report of `lamp check` or `lamp support` about a stack, given its pages.
@@ -83,14 +85,21 @@ fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, 
     if [&input["width_px"], &input["height_px"]] != size.map(Value::from).each_ref() {
         return Err("the report is about a stack of a different size".to_owned());
     }
-    let findings = report["findings"].as_array().into_iter().flatten().take(MOST);
+    let findings = report["findings"].as_array().into_iter().flatten();
+    // Since lamp-check-2 findings belong to features, and the finding that names one is shown.
+    let naming: Option<BTreeSet<u64>> = report["features"]
+        .as_array()
+        .map(|features| features.iter().filter_map(|it| it["finding"].as_u64()).collect());
+    let is_shown = |(number, _): &(usize, &Value)| {
+        naming.as_ref().is_none_or(|naming| naming.contains(&(*number as u64)))
+    };
     let read = |(number, json): (usize, &Value)| {
         let record = FindingRecord::deserialize(json)
             .map_err(|error| format!("finding {} of the report: {error}", number + 1))?;
         let text = record.size_text();
         Ok(of_record(&record, text, headers))
     };
-    findings.enumerate().map(read).collect()
+    findings.enumerate().filter(is_shown).take(MOST).map(read).collect()
 }
 
 fn of_record(record: &FindingRecord, text: String, headers: &[PageHeader]) -> Finding {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 use lamp_stack::{Destination, Format, IndexedStack, Page, PrivateFile, write_stack};
@@ -195,8 +196,11 @@ fn find(
         progress.one_done();
         Ok::<_, Exit>(layer)
     };
-    let (_, found) = CheckSettings::default().find(pages, decode, None)?;
-    of_records(&found, headers).map_err(|why| Exit::Failed(anyhow!(why)))
+    let build = headers[0].info.stack.as_ref().and_then(BuildCopies::of);
+    let found = CheckSettings::default().find(build, pages, decode, None)?;
+    let lines =
+        found.features.iter().map(|feature| (&found.records[feature.finding], found.text(feature)));
+    of_records(lines, headers).map_err(|why| Exit::Failed(anyhow!(why)))
 }
 
 fn read_json(path: &Path) -> Result<serde_json::Value, Exit> {

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use lamp_batch::{Call, WriteLayers};
 use lamp_build::TILE_CODE;
+use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::{self, CheckSettings};
 use lamp_pipeline::watcher::KeptRemarks;
 use lamp_stack::{Page, Pages, StackError};
-use lamp_supports::{CheckError, FindingRecord};
+use lamp_supports::{CheckError, FindingRecord, Severity};
 use serde::{Deserialize, Serialize};
 
 use super::parse::{parse_check, parse_tile};
@@ -79,16 +80,16 @@ pub(crate) struct Checking(CheckSettings);
 /// Findings of a check.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CheckFindings {
-    /// The number of findings of each kind that need a person.
+    /// The number of features of each kind that need a person.
     pub(crate) kinds: BTreeMap<String, usize>,
-    /// A line for each finding, also for notes, the worst first.
+    /// A line for each feature, also for notes, the worst first.
     pub(crate) lines: Vec<String>,
     /// The same as in the report of `lamp check`, without the input's number.
     pub(crate) findings: Vec<FindingRecord>,
 }
 
 impl CheckFindings {
-    /// Returns how many findings need a person.
+    /// Returns how many features need a person.
     pub(crate) fn found(&self) -> usize {
         self.kinds.values().sum()
     }
@@ -112,22 +113,25 @@ impl Checking {
         let mut found = CheckFindings::default();
         let name = stack.display().to_string();
         let failed = |error: StackError| Exit::Failed(error.into()).at(name.clone());
-        let pages = Pages::open(stack).map_err(failed)?.map(|page| page.map_err(failed));
+        let mut pages =
+            Pages::open(stack).map_err(failed)?.map(|page| page.map_err(failed)).peekable();
+        let build = pages.peek().and_then(|page| page.as_ref().ok()).and_then(BuildCopies::of_page);
         let decode = |page: Page| page.decode().map_err(failed);
-        let (_, records) = self.0.find(pages, decode, None).map_err(|error: Exit| {
+        let all = self.0.find(build, pages, decode, None).map_err(|error: Exit| {
             // Errors of pages have their place.
             match error.cause::<CheckError>() {
                 Some(_) => error.at(name.clone()),
                 None => error,
             }
         })?;
-        for record in records {
-            if !record.is_note() {
-                *found.kinds.entry(record.name().to_owned()).or_default() += 1;
+        for feature in &all.features {
+            let name = all.records[feature.finding].name();
+            if feature.severity != Severity::Note {
+                *found.kinds.entry(name.to_owned()).or_default() += 1;
             }
-            found.lines.push(format!("{}: {record}", record.name()));
-            found.findings.push(record);
+            found.lines.push(format!("{name}: {}", all.text(feature)));
         }
+        found.findings = all.records;
         Ok(found)
     }
 }

@@ -48,6 +48,8 @@ pub struct Island {
     pub centroid: [f64; 2],
     /// The rectangle around them.
     pub region: Region,
+    /// The rectangle around all that floats until it joins.
+    pub floating_region: Region,
     /// The pixels of the layers until it joins. Where islands join, the one of the largest volume
     /// so far goes on.
     pub floating_pixels: u64,
@@ -238,6 +240,16 @@ impl<T> Listed<T> {
         }
     }
 
+    /// Adds the entries of another list.
+    fn extend(&mut self, other: Self) {
+        self.left_out += other.left_out;
+        other.list.into_iter().for_each(|item| self.push(item));
+    }
+
+    fn map(self, change: impl FnMut(T) -> T) -> Self {
+        Self { list: self.list.into_iter().map(change).collect(), left_out: self.left_out }
+    }
+
     /// Returns how many there are.
     pub fn count(&self) -> u64 {
         self.list.len() as u64 + self.left_out
@@ -302,6 +314,57 @@ impl Findings {
         self.off_balance.list.sort_by(|a, b| {
             b.off_pixels.total_cmp(&a.off_pixels).then(a.worst_layer.cmp(&b.worst_layer))
         });
+    }
+
+    /// Adds the findings of a build's parts to the islands of the whole build, of which only the mesh's
+    /// are kept: those for which `is_mesh` holds.
+    pub fn with_parts(mut self, parts: Self, is_mesh: impl Fn(&Region) -> bool) -> Self {
+        // The parts' layers are the last.
+        let base = (self.layers.len() - parts.layers.len()) as u32;
+        let numbers = parts.islands.list.iter().chain(&parts.specks.list);
+        let most = numbers.map(|island| island.number).max().unwrap_or(0);
+        self.islands.list.retain(|island| is_mesh(&island.floating_region));
+        for island in &mut self.islands.list {
+            island.number += most;
+            if let IslandEnd::JoinsIsland { number, .. } = &mut island.end {
+                *number += most;
+            }
+        }
+        let raised = |mut island: Island| {
+            island.layer += base;
+            island.largest_layer += base;
+            match &mut island.end {
+                IslandEnd::Loose => {}
+                IslandEnd::JoinsPart { layer } | IslandEnd::JoinsIsland { layer, .. } => {
+                    *layer += base;
+                }
+            }
+            island
+        };
+        let span = |layers: [u32; 2]| layers.map(|layer| layer + base);
+        self.islands.extend(parts.islands.map(raised));
+        self.specks = parts.specks.map(raised);
+        self.weak_joints =
+            parts.weak_joints.map(|joint| WeakJoint { layer: joint.layer + base, ..joint });
+        self.overhangs = parts.overhangs.map(|overhang| Overhang {
+            layers: span(overhang.layers),
+            reach_layer: overhang.reach_layer + base,
+            ..overhang
+        });
+        self.pockets = parts.pockets.map(|pocket| Pocket { layers: span(pocket.layers), ..pocket });
+        self.off_balance = parts.off_balance.map(|off| OffBalance {
+            layer: off.layer + base,
+            worst_layer: off.worst_layer + base,
+            ..off
+        });
+        for layer in &mut self.layers {
+            layer.white_at_border = false;
+        }
+        for (layer, of_parts) in self.layers[base as usize..].iter_mut().zip(&parts.layers) {
+            layer.white_at_border = of_parts.white_at_border;
+        }
+        self.sort();
+        self
     }
 
     /// Returns the runs of layers, as the first and the last, that hold.

@@ -100,6 +100,7 @@ impl Growth {
             area: component.area,
             centroid: component.centroid(),
             region: component.region(),
+            floating_region: component.region(),
             floating_pixels: 0,
             floating_pixels_um: 0.0,
             largest_area: 0,
@@ -176,6 +177,9 @@ impl Floating {
         self.weight.grow(layer, components, thickness_um);
         let area: u64 = components.iter().map(|&c| layer.components.all[c as usize].area).sum();
         let island = &mut self.island;
+        for &component in components {
+            island.floating_region.unite(&layer.components.all[component as usize].region());
+        }
         island.floating_pixels += area;
         island.floating_pixels_um += area as f64 * thickness_um;
         if area > island.largest_area {

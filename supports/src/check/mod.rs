@@ -23,7 +23,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, take_batch};
+use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, Op, take_batch, white_runs};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -61,6 +61,8 @@ pub struct CheckOptions {
     pub max_overhang: Option<Length>,
     /// The width that a way out must have to drain a pocket; if `None`, a pixel and a layer do.
     pub drain: Option<Length>,
+    /// Whether to look for islands alone.
+    pub islands_only: bool,
 }
 
 impl Default for CheckOptions {
@@ -74,6 +76,7 @@ impl Default for CheckOptions {
             least_support: 0.25,
             max_overhang: None,
             drain: None,
+            islands_only: false,
         }
     }
 }
@@ -136,33 +139,96 @@ where
     T: MemorySize + Send,
     E: From<CheckError> + Send,
 {
+    let mut pass = Pass::new(options);
+    for_batches(layers, decode, |batch| pass.add(batch.into_iter().map(Some).collect()))?;
+    Ok(pass.finish().ok_or(CheckError::NoLayers)?)
+}
+
+/// Checks a build in one pass as [`check`] does, given its layers and how to decode one: all of it,
+/// where only islands are looked for, and its parts, which stand on their own first layer.
+///
+/// `parts` returns the parts of a layer to judge, alone, pixel by pixel where the layer has them; none
+/// below the parts. It is called once all layers before have been decoded. The parts' findings are none
+/// if no layer has parts.
+///
+/// # Errors
+/// Returns the first error of the layers, or one if layers cannot be compared.
+pub fn check_build<T, E>(
+    layers: impl Iterator<Item = Result<T, E>>,
+    decode: impl Fn(T) -> Result<Layer, E> + Sync,
+    parts: impl Fn(&Layer) -> Option<Layer> + Sync,
+    options: &CheckOptions,
+) -> Result<(Findings, Option<Findings>), E>
+where
+    T: MemorySize + Send,
+    E: From<CheckError> + Send,
+{
+    let islands = CheckOptions { islands_only: true, ..options.clone() };
+    let (mut whole, mut of_parts) = (Pass::new(&islands), Pass::new(options));
+    for_batches(layers, decode, |batch| {
+        of_parts.add(batch.par_iter().map(&parts).collect())?;
+        whole.add(batch.into_iter().map(Some).collect())
+    })?;
+    Ok((whole.finish().ok_or(CheckError::NoLayers)?, of_parts.finish()))
+}
+
+/// Decodes layers, some at once, and passes them on in their order.
+fn for_batches<T, L, E>(
+    layers: impl Iterator<Item = Result<T, E>>,
+    decode: impl Fn(T) -> Result<L, E> + Sync,
+    mut each: impl FnMut(Vec<L>) -> Result<(), CheckError>,
+) -> Result<(), E>
+where
+    T: MemorySize + Send,
+    L: Send,
+    E: From<CheckError> + Send,
+{
     // A batch may end the layers, and the next one asks again.
     let mut layers = layers.fuse();
     // Of large layers two are in work at most, however many threads there are.
     let at_once = rayon::current_num_threads().min(2);
-    let mut checker: Option<Checker> = None;
-    let mut last: Option<Arc<LabeledLayer>> = None;
     loop {
         let batch = take_batch(&mut layers, at_once);
         if batch.is_empty() {
-            return Ok(checker.ok_or(CheckError::NoLayers)?.finish());
+            return Ok(());
         }
-        let labelled = batch.into_par_iter().map(|item| {
-            let layer = decode(item?)?;
-            Ok(Arc::new(LabeledLayer::new(layer, options)))
-        });
-        let batch: Vec<Arc<LabeledLayer>> = labelled.collect::<Result<_, E>>()?;
-        let checker = match &mut checker {
+        let decoded = batch.into_par_iter().map(|item| decode(item?));
+        each(decoded.collect::<Result<_, E>>()?)?;
+    }
+}
+
+/// A check of the layers so far.
+struct Pass<'a> {
+    options: &'a CheckOptions,
+    checker: Option<Checker>,
+    last: Option<Arc<LabeledLayer>>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(options: &'a CheckOptions) -> Self {
+        Self { options, checker: None, last: None }
+    }
+
+    /// Adds layers that follow each other, without those that have nothing to check.
+    fn add(&mut self, batch: Vec<Option<Layer>>) -> Result<(), CheckError> {
+        let options = self.options;
+        let labelled = batch
+            .into_par_iter()
+            .flatten()
+            .map(|layer| Arc::new(LabeledLayer::new(layer, options)));
+        let batch: Vec<Arc<LabeledLayer>> = labelled.collect();
+        let Some(first) = batch.first() else { return Ok(()) };
+        let checker = match &mut self.checker {
             Some(checker) => checker,
-            none => none.insert(Checker::new(&batch[0], options)?),
+            none => none.insert(Checker::new(first, options)?),
         };
         // Rows are compared by number and column, so sizes must agree before any comparison.
         for layer in &batch {
             checker.compare(layer)?;
         }
         // The layer below the first of the batch is the last of the batch before, if there was one.
-        let below = last.iter().chain(&batch[..batch.len() - 1]).map(Some);
-        let below: Vec<_> = last.is_none().then_some(None).into_iter().chain(below).collect();
+        let below = self.last.iter().chain(&batch[..batch.len() - 1]).map(Some);
+        let below: Vec<_> = self.last.is_none().then_some(None).into_iter().chain(below).collect();
         let contacts = batch.par_iter().zip(below).map(|(layer, below)| {
             let limit = checker.limit(&layer.facts);
             let rounding = options.rounding.get();
@@ -176,7 +242,13 @@ where
         if let Some((drain, _)) = &mut checker.drain {
             drain.advance(false);
         }
-        last = batch.into_iter().next_back();
+        self.last = batch.into_iter().next_back();
+        Ok(())
+    }
+
+    /// Returns the findings; none without layers.
+    fn finish(self) -> Option<Findings> {
+        self.checker.map(Checker::finish)
     }
 }
 
@@ -193,14 +265,40 @@ pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)
 
 /// Returns a mask of the components of a color that do not touch the image's border.
 pub fn inner_components(mask: &Mask, white: bool) -> Mask {
+    inner_where(mask, &Components::of(mask), white, |_| true)
+}
+
+/// Returns a mask of the white components that do not touch the image's border, and are not wholly
+/// within the white of `cover`, an image of the same size.
+pub fn inner_components_beyond(mask: &Mask, cover: &Mask) -> Mask {
+    let mut beyond = Vec::new();
     let components = Components::of(mask);
+    let mut is_beyond = vec![false; components.all.len()];
+    for row in 0..mask.height() {
+        beyond.clear();
+        Op::Difference.rows(mask.row(row), cover.row(row), &mut beyond);
+        for (start, _) in white_runs(&beyond, mask.width()) {
+            is_beyond[components.at(mask, start, row) as usize] = true;
+        }
+    }
+    inner_where(mask, &components, true, |component| is_beyond[component])
+}
+
+fn inner_where(
+    mask: &Mask,
+    components: &Components,
+    white: bool,
+    wanted: impl Fn(usize) -> bool,
+) -> Mask {
     let [width, height] = [mask.width(), mask.height()];
     let is_inner: Vec<bool> = components
         .all
         .iter()
-        .map(|component| {
+        .enumerate()
+        .map(|(number, component)| {
             let inside = |range: &Range<u32>, size: u32| range.start > 0 && range.end < size;
             component.is_white == white
+                && wanted(number)
                 && inside(&component.columns, width)
                 && inside(&component.rows, height)
         })
@@ -260,7 +358,7 @@ struct Checker {
 impl Checker {
     fn new(first: &LabeledLayer, options: &CheckOptions) -> Result<Self, CheckError> {
         let rounding = options.rounding.get();
-        let drain = options.drain.map(|drain| {
+        let drain = options.drain.filter(|_| !options.islands_only).map(|drain| {
             let dpi = first.dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
             Ok((Drain::new(drain.um(), dpi.pitch().um(), rounding), Hollows::new(rounding)))
         });
@@ -296,6 +394,9 @@ impl Checker {
 
     /// Returns how far white may reach beyond the white below, in pixels.
     fn limit(&self, layer: &LayerFacts) -> Option<f64> {
+        if self.options.islands_only {
+            return None;
+        }
         let of_layer = || layer.thickness_um.map(Length::from_um);
         Some(self.options.max_overhang.or_else(of_layer)?.pixels(self.dpi?))
     }
@@ -309,6 +410,10 @@ impl Checker {
         // Without thicknesses, all layers weigh the same.
         let thickness_um = layer.facts.thickness_um.unwrap_or(1.0);
         self.growth.add(&layer.labelled, contact, number, thickness_um);
+        if self.options.islands_only {
+            self.layers.push(layer.facts);
+            return Ok(());
+        }
         self.liquid.add(&layer.labelled, contact, number, thickness_um);
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);

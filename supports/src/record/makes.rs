@@ -62,6 +62,7 @@ impl IslandRecord {
             at: scale.point(island.centroid),
             bounds: scale.bounds(&island.region),
             area: scale.area(island.area),
+            floating_box_px: scale.bounds(&island.floating_region).box_px,
             floating_px: island.floating_pixels,
             floating_mm3: scale.volume_mm3(island.floating_pixels_um),
             joins: joins.map(|layer| scale.layer(layer).layer),

@@ -47,6 +47,8 @@ pub enum FindingRecord {
     Overhang(OverhangRecord),
     /// A body whose center of gravity leaves its base.
     OffBalance(OffBalanceRecord),
+    /// A copy that is not as the first of its part.
+    CopyDiffers(CopyRecord),
     /// White at the border of images.
     Border(BorderRecord),
     /// Layers without white.
@@ -66,7 +68,7 @@ pub enum FindingGroup {
     Overhangs,
     /// Centers of gravity off their base.
     Balance,
-    /// Stray rows, white at the border, empty layers.
+    /// Stray rows, copies that differ, white at the border, empty layers.
     Layers,
 }
 
@@ -136,6 +138,8 @@ pub struct IslandRecord {
     /// Their area.
     #[serde(flatten)]
     pub area: AreaRecord,
+    /// The rectangle around all that floats until it joins, as in [`BoxRecord::box_px`].
+    pub floating_box_px: [u32; 4],
     /// The pixels of the layers until it joins.
     pub floating_px: u64,
     /// Their volume.
@@ -312,6 +316,26 @@ pub struct OffBalanceRecord {
     pub base_box_px: [u32; 4],
 }
 
+/// A copy of a part on a build that is not as the first copy.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CopyRecord {
+    /// The first and the last layer in which it differs.
+    #[serde(flatten)]
+    pub layers: LayerSpan,
+    /// The rectangle of its images.
+    #[serde(flatten)]
+    pub bounds: BoxRecord,
+    /// The part's name.
+    pub part: String,
+    /// The copy's number, from 1.
+    pub copy: usize,
+    /// The number of the part's copies.
+    pub copies: usize,
+    /// The pixels in which it differs, in all layers.
+    pub differing_px: u64,
+}
+
 /// Layers with white at the border of the image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -379,6 +403,7 @@ mod tests {
             FindingRecord::Narrow(pocket()),
             FindingRecord::Overhang(OverhangRecord::default()),
             FindingRecord::OffBalance(OffBalanceRecord::default()),
+            FindingRecord::CopyDiffers(CopyRecord::default()),
             FindingRecord::Border(BorderRecord::default()),
             FindingRecord::Empty(EmptyRecord::default()),
         ] {
@@ -402,7 +427,7 @@ mod tests {
             text,
             "{\"kind\":\"island\",\"number\":3,\"layer\":80,\"z_mm\":8.0,\"at_mm\":null,\
              \"at_px\":[0.0,0.0],\"box_mm\":null,\"box_px\":[0,0,0,0],\"area_px\":0,\
-             \"area_mm2\":null,\"floating_px\":0,\"floating_mm3\":null,\"joins\":82,\
+             \"area_mm2\":null,\"floating_box_px\":[0,0,0,0],\"floating_px\":0,\"floating_mm3\":null,\"joins\":82,\
              \"into\":\"part\",\"largest_px\":0,\"largest_mm2\":null,\"largest_layer\":0,\
              \"drag_mn\":null}"
         );

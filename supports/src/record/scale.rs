@@ -36,7 +36,8 @@ impl<'a> Scale<'a> {
         self.point([middle(&region.columns), middle(&region.rows)])
     }
 
-    pub(super) fn bounds(&self, region: &Region) -> BoxRecord {
+    /// Returns a rectangle, also in millimeters.
+    pub fn bounds(&self, region: &Region) -> BoxRecord {
         let Region { columns, rows } = region;
         let corner = |column: u32, row: u32| self.point([column.into(), row.into()]).at_mm;
         // The first row has the greatest y, so this corner has the least x and the greatest y.
@@ -93,7 +94,8 @@ impl<'a> Scale<'a> {
         Some(to_nm(um? / 1000.0))
     }
 
-    pub(super) fn span(&self, layers: [u32; 2]) -> LayerSpan {
+    /// Returns layers by the places of the first and the last among the layers that were checked.
+    pub fn span(&self, layers: [u32; 2]) -> LayerSpan {
         let [first, last] = layers.map(|layer| self.layer(layer));
         LayerSpan {
             layer: first.layer,

@@ -4,9 +4,9 @@ use std::fmt;
 
 use super::places::{area_text, length_text, significant, volume_text};
 use super::{
-    DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels,
-    IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan, MinimumRecord, OffBalanceRecord,
-    OverhangRecord, PocketRecord, Shown,
+    CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup, FindingRecord,
+    FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan, MinimumRecord,
+    OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
 };
 
 impl FindingRecord {
@@ -24,6 +24,7 @@ impl FindingRecord {
             Self::Narrow(_) => "narrow pocket",
             Self::Overhang(_) => "overhang",
             Self::OffBalance(_) => "off balance",
+            Self::CopyDiffers(_) => "differing copy",
             Self::Border(_) => "border",
             Self::Empty(_) => "empty",
         }
@@ -43,6 +44,7 @@ impl FindingRecord {
             Self::Narrow(_) => "narrow",
             Self::Overhang(_) => "overhang",
             Self::OffBalance(_) => "off-balance",
+            Self::CopyDiffers(_) => "copy-differs",
             Self::Border(_) => "border",
             Self::Empty(_) => "empty",
         }
@@ -60,7 +62,9 @@ impl FindingRecord {
             }
             Self::Overhang(_) => FindingGroup::Overhangs,
             Self::OffBalance(_) => FindingGroup::Balance,
-            Self::StrayRows(_) | Self::Border(_) | Self::Empty(_) => FindingGroup::Layers,
+            Self::StrayRows(_) | Self::CopyDiffers(_) | Self::Border(_) | Self::Empty(_) => {
+                FindingGroup::Layers
+            }
         }
     }
 
@@ -109,6 +113,7 @@ impl FindingRecord {
             Self::Overhang(overhang) => span(&overhang.layers),
             Self::OffBalance(off) => one(&off.layer),
             Self::StrayRows(rows) => span(&rows.layers),
+            Self::CopyDiffers(copy) => span(&copy.layers),
             Self::Border(border) => span(&border.layers),
             Self::Empty(empty) => span(&empty.layers),
         }
@@ -125,6 +130,7 @@ impl FindingRecord {
             | Self::Narrow(pocket) => Some(pocket.bounds.box_px),
             Self::Overhang(overhang) => Some(overhang.bounds.box_px),
             Self::OffBalance(off) => Some(off.base_box_px),
+            Self::CopyDiffers(copy) => Some(copy.bounds.box_px),
             _ => None,
         }
     }
@@ -202,6 +208,13 @@ impl fmt::Display for FindingRecord {
             }
             Self::Overhang(overhang) => overhang.fmt(f),
             Self::OffBalance(off) => off.fmt(f),
+            Self::CopyDiffers(CopyRecord { layers, part, copy, copies, differing_px, .. }) => {
+                write!(
+                    f,
+                    "{part} {copy} of {copies} is not as the first in {layers}: {differing_px} pixels \
+                 differ, and only the first was checked"
+                )
+            }
             Self::Border(border) => {
                 write!(f, "{}: white there; the image may cut the part off", border.layers)
             }

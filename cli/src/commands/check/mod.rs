@@ -13,7 +13,7 @@ use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
 use lamp_stack::{Layer, Page};
 use lamp_supports::{
-    CheckError, Disagreements, FindingGroup, FindingRecord, Findings, IslandMinimum, LoneMinimum,
+    CheckError, Disagreements, Feature, FindingGroup, Findings, IslandMinimum, LoneMinimum,
 };
 
 use crate::args::options::{Common, parse_layers, parse_memory};
@@ -26,7 +26,8 @@ use crate::output::endings::parse_report;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
-use lamp_pipeline::check::CheckSettings;
+use lamp_pipeline::build_copies::BuildCopies;
+use lamp_pipeline::check::{CheckSettings, Found};
 use lamp_pipeline::solid::at_part;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
@@ -103,7 +104,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let evidence = evidence.transpose()?;
     let checked = args.inputs.iter().map(|path| {
         let checked = args.checked(path, &machine, common)?;
-        print(&printed(&checked.name, &checked.findings, &checked.records, common.verbose))?;
+        print(&printed(&checked.name, &checked.found, common.verbose))?;
         Ok(checked)
     });
     let mut checked = checked.collect::<Result<Vec<_>, Exit>>()?;
@@ -113,7 +114,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     if let Some(folder) = evidence {
         write_pictures(&mut checked, args, common, folder)?;
     }
-    let found: usize = checked.iter().map(CheckedInput::found).sum();
+    let found: usize = checked.iter().map(|checked| checked.found.count()).sum();
     let found = match found {
         0 => doubts(),
         1 => Some("1 finding".to_owned()),
@@ -134,45 +135,42 @@ impl CheckArgs {
         let mut input = Input::open(path, &slicing, common)?;
         // The mesh is out of memory before the layers come.
         let minima = self.minima(&input)?;
-        let findings = self.check(&mut input, common)?;
-        let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
-        let records = self.settings.records(&findings, &disagreements, machine);
-        Ok(CheckedInput { name: input_name(path), input, findings, records })
-    }
-
-    /// Checks a stack, or the layers of a part.
-    fn check(&self, input: &mut Input, common: &Common) -> Result<Findings, Exit> {
         let progress = Progress::new("check", common, true);
-        let options = self.settings.options();
-        let found = match input {
+        let name = input_name(path);
+        let found = match &mut input {
             Input::Stack(stack) => {
-                let name = input_name(&stack.path);
                 let pages = stack.pages(self.evidence.is_some())?;
                 let pages = in_range(pages, Page::info, stack.path.clone(), self.layers.clone());
+                let mut pages = pages.peekable();
+                let first = pages.peek().and_then(|page| page.as_ref().ok());
+                let build = first.and_then(|(page, _)| BuildCopies::of_page(page));
                 let decode = |(page, _): (Page, _)| {
                     let layer = page.decode().map_err(|error| failed_at(name.clone(), error));
                     progress.layer_done();
                     layer
                 };
-                lamp_supports::check(pages, decode, &options).map_err(|error: Exit| {
+                let found = self.settings.find(build, pages, decode, Some(machine));
+                found.map_err(|error: Exit| {
                     // Errors of pages have their place.
                     match error.cause::<CheckError>() {
                         Some(_) => error.at(name.clone()),
                         None => error,
                     }
-                })
+                })?
             }
             Input::Part(part) => {
                 let layers = self.slices(part, &progress)?;
                 let decode = |layer| {
                     progress.layer_done();
-                    Ok(layer)
+                    Ok::<_, Exit>(layer)
                 };
-                lamp_supports::check(layers, decode, &options)
+                let findings = lamp_supports::check(layers, decode, &self.settings.options())?;
+                let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
+                self.settings.found(findings, &disagreements, Vec::new(), None, machine)
             }
         };
         progress.done();
-        found
+        Ok(CheckedInput { name, input, found })
     }
 
     /// Slices a part.
@@ -258,15 +256,7 @@ impl Input {
 struct CheckedInput {
     name: String,
     input: Input,
-    findings: Findings,
-    records: Vec<FindingRecord>,
-}
-
-impl CheckedInput {
-    /// Returns the number of findings that count.
-    fn found(&self) -> usize {
-        self.records.iter().filter(|record| !record.is_note()).count()
-    }
+    found: Found,
 }
 
 /// How far from a minimum its first pixels may be.
@@ -276,33 +266,32 @@ const NEAR: u32 = 2;
 const MOST_LINES: usize = 20;
 
 /// Returns the lines to print for an input.
-fn printed(name: &str, findings: &Findings, records: &[FindingRecord], all: bool) -> String {
-    let layers = match findings.layers.len() {
+fn printed(name: &str, found: &Found, all: bool) -> String {
+    let layers = match found.findings.layers.len() {
         1 => "1 layer".to_owned(),
         layers => format!("{layers} layers"),
     };
-    let specks = match findings.specks.count() {
+    let specks = match found.findings.specks.count() {
         0 => String::new(),
         1 => ", 1 speck".to_owned(),
         specks => format!(", {specks} specks"),
     };
-    let found = match records.iter().filter(|record| !record.is_note()).count() {
+    let count = match found.count() {
         0 => "no findings".to_owned(),
         1 => "1 finding".to_owned(),
-        found => format!("{found} findings"),
+        count => format!("{count} findings"),
     };
-    let mut text = format!("{}: {layers}, {found}{specks}\n", printable(name));
-    for of_kind in records.chunk_by(|a, b| a.name() == b.name()) {
+    let mut text = format!("{}: {layers}, {count}{specks}\n", printable(name));
+    let name_of = |feature: &Feature| found.records[feature.finding].name();
+    for of_kind in found.features.chunk_by(|a, b| name_of(a) == name_of(b)) {
+        let name = name_of(&of_kind[0]);
         let shown = if all { of_kind.len() } else { of_kind.len().min(MOST_LINES) };
-        for record in &of_kind[..shown] {
-            text += &format!("  {}: {record}\n", record.name());
+        for feature in &of_kind[..shown] {
+            text += &format!("  {name}: {}\n", found.text(feature));
         }
         if shown < of_kind.len() {
             let left = of_kind.len() - shown;
-            text += &format!(
-                "  {}: {left} more (--verbose or --report lists them)\n",
-                of_kind[0].name()
-            );
+            text += &format!("  {name}: {left} more (--verbose or --report lists them)\n");
         }
     }
     text

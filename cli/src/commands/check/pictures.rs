@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::ops::Range;
 
+use lamp_pipeline::check::Found;
 use lamp_stack::{FolderBeside, Layer, Mask, Page, combine_rows, white_runs};
-use lamp_supports::{FindingRecord, Region, Shown, component_at};
+use lamp_supports::{Region, Shown, component_at};
 
 use super::{CheckArgs, CheckedInput, Input};
 use crate::args::options::Common;
@@ -54,9 +55,9 @@ pub(super) fn write_pictures(
     folder: FolderBeside,
 ) -> Result<(), Exit> {
     let several = checked.len() > 1;
-    for (number, CheckedInput { input, records, .. }) in checked.iter_mut().enumerate() {
+    for (number, CheckedInput { input, found, .. }) in checked.iter_mut().enumerate() {
         let prefix = if several { format!("{:02}_", number + 1) } else { String::new() };
-        let drawings = drawings(records);
+        let drawings = drawings(found);
         let is_wanted = |position| drawings.contains_key(&position);
         args.for_each_layer(input, common, is_wanted, |position, below, layer| {
             for (name, shown) in drawings.get(&position).into_iter().flatten() {
@@ -72,9 +73,10 @@ pub(super) fn write_pictures(
 }
 
 /// Returns the names of pictures and what they show, by layer.
-fn drawings(records: &[FindingRecord]) -> BTreeMap<u32, Vec<(String, &Shown)>> {
+fn drawings(found: &Found) -> BTreeMap<u32, Vec<(String, &Shown)>> {
     let mut drawings: BTreeMap<u32, Vec<_>> = BTreeMap::new();
-    let shown = records.iter().filter_map(|record| Some((record, record.shown()?)));
+    let named = found.features.iter().map(|feature| &found.records[feature.finding]);
+    let shown = named.filter_map(|record| Some((record, record.shown()?)));
     for (rank, (record, shown)) in shown.take(MOST_PICTURES).enumerate() {
         let (rank, word) = (rank + 1, record.name().replace(' ', "_"));
         let name = format!("{rank:02}_{word}_layer_{:05}.png", shown.index);

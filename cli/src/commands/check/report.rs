@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
-use lamp_supports::{FindingRecord, IslandRecord, Scale};
+use lamp_pipeline::build_copies::OnBuild;
+use lamp_supports::{Feature, FindingRecord, Findings, IslandRecord, Scale};
 use serde::Serialize;
 use serde_json::json;
 
@@ -21,48 +22,83 @@ pub(super) fn write_report(
     path: &Path,
 ) -> Result<(), Exit> {
     let inputs = checked.iter().map(|checked| {
-        let findings = &checked.findings;
+        let findings = &checked.found.findings;
         json!({
             "input": checked.name,
             "layers": findings.layers.len(),
             "width_px": findings.size[0],
             "height_px": findings.size[1],
             "dpi": findings.dpi.map(lamp_stack::Dpi::get),
-            "findings": checked.found(),
+            "findings": checked.found.count(),
             "specks": findings.specks.count(),
-            "left_out": left_out(checked),
+            "left_out": left_out(findings),
         })
     });
     let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
-        checked.records.iter().map(move |finding| OfInput { finding, input })
+        let found = &checked.found;
+        found.records.iter().map(move |finding| {
+            let (part, copies) = match found.owner(finding) {
+                Some(OnBuild::Part { name, copies }) => (Some(name), Some(copies)),
+                Some(OnBuild::Mesh) | None => (None, None),
+            };
+            OfInput { finding, part, copies, input }
+        })
+    });
+    let mut first = 0;
+    let features = checked.iter().enumerate().flat_map(|(input, checked)| {
+        // Findings of all inputs are in one list.
+        let before = first;
+        first += checked.found.records.len();
+        let in_list = move |at: &usize| before + at;
+        checked.found.features.iter().map(move |feature| {
+            let feature = Feature {
+                severity: feature.severity,
+                finding: in_list(&feature.finding),
+                with: feature.with.iter().map(in_list).collect(),
+                alike: feature.alike.iter().map(in_list).collect(),
+            };
+            FeatureOfInput { feature, input }
+        })
     });
     let shear_pa = recoating.map(Recoating::greatest_shear_pa);
     let specks = checked.iter().enumerate().flat_map(|(input, checked)| {
-        let scale = Scale::new(&checked.findings);
-        let specks = checked.findings.specks.list.iter();
-        specks.map(move |speck| OfInput {
-            finding: FindingRecord::Island(IslandRecord::new(speck, &scale, shear_pa)),
-            input,
+        let scale = Scale::new(&checked.found.findings);
+        let specks = checked.found.findings.specks.list.iter();
+        specks.map(move |speck| {
+            let finding = FindingRecord::Island(IslandRecord::new(speck, &scale, shear_pa));
+            OfInput { finding, part: None, copies: None, input }
         })
     });
     JsonReport::new(&json!({ "schema": SCHEMA }))
         .list("inputs", inputs)
+        .list("features", features)
         .list("findings", findings)
         .list("specks", specks)
         .write(path)
 }
 
-/// A finding, and the number of its input.
+/// A finding, the part of a build that it belongs to, and the number of its input.
 #[derive(Serialize)]
 struct OfInput<F> {
     #[serde(flatten)]
     finding: F,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    part: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    copies: Option<usize>,
+    input: usize,
+}
+
+/// A feature, and the number of its input.
+#[derive(Serialize)]
+struct FeatureOfInput {
+    #[serde(flatten)]
+    feature: Feature,
     input: usize,
 }
 
 /// The number of findings and specks that are not listed, for there are too many.
-fn left_out(checked: &CheckedInput) -> u64 {
-    let findings = &checked.findings;
+fn left_out(findings: &Findings) -> u64 {
     [
         findings.islands.left_out,
         findings.specks.left_out,

@@ -4,9 +4,10 @@ use std::cell::RefCell;
 
 use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
-use lamp_pipeline::check::CheckSettings;
+use lamp_pipeline::build_copies::BuildCopies;
+use lamp_pipeline::check::{CheckSettings, Found};
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
-use lamp_supports::{CheckError, FindingRecord, Findings};
+use lamp_supports::{CheckError, Severity};
 use serde_json::{Value, json};
 
 use super::measure::{LayerNumbers, new_pixels};
@@ -25,24 +26,16 @@ pub(super) struct StackReport {
     pub(super) totals: StackTotals,
     pub(super) layers: Vec<LayerNumbers>,
     /// The findings of `lamp check`, or why it cannot check the stack.
-    pub(super) found: Result<Found, String>,
+    pub(super) found: Result<Drawn, String>,
     pub(super) sheet: Vec<InlinePicture>,
     pub(super) time: BuildTime,
 }
 
-/// The findings of `lamp check`.
-pub(super) struct Found {
-    pub(super) findings: Findings,
-    pub(super) records: Vec<FindingRecord>,
-    /// Pictures of the worst, each with the number of its record.
+/// The findings of `lamp check`, drawn.
+pub(super) struct Drawn {
+    pub(super) found: Found,
+    /// Pictures of the worst, each with the number of its feature.
     pub(super) pictures: Vec<(usize, InlinePicture)>,
-}
-
-impl Found {
-    /// Returns the number of findings that count.
-    pub(super) fn count(&self) -> usize {
-        self.records.iter().filter(|record| !record.is_note()).count()
-    }
 }
 
 impl StackReport {
@@ -66,7 +59,8 @@ impl StackReport {
                 clock.borrow_mut().add(&layer.info, layer.dpi, size, &layer.image);
             }
         });
-        let found = match CheckSettings::default().find(&mut layers, Ok, machine) {
+        let build = headers[0].info.stack.as_ref().and_then(BuildCopies::of);
+        let found = match CheckSettings::default().find(build, &mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             // A stack that cannot be checked still has numbers and pictures.
             Err(error) => match error.cause::<CheckError>() {
@@ -78,10 +72,7 @@ impl StackReport {
         layers.try_for_each(|layer| layer.map(drop))?;
         drop(layers);
         let found = match found {
-            Ok((findings, records)) => {
-                let pictures = drawn(stack, &records)?;
-                Ok(Found { findings, records, pictures })
-            }
+            Ok(found) => Ok(Drawn { pictures: drawn(stack, &found)?, found }),
             Err(why) => Err(why),
         };
         let layers = numbers.into_inner();
@@ -93,7 +84,7 @@ impl StackReport {
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         match &self.found {
-            Ok(found) => warnings.extend(found_text(found)),
+            Ok(drawn) => warnings.extend(found_text(&drawn.found)),
             Err(why) => warnings.push(format!("It could not be checked for what floats: {why}.")),
         }
         let totals = &self.totals;
@@ -123,7 +114,7 @@ impl StackReport {
     pub(super) fn json(&self) -> Value {
         let column =
             |of: &dyn Fn(&LayerNumbers) -> Value| self.layers.iter().map(of).collect::<Vec<_>>();
-        let found = self.found.as_ref().ok();
+        let found = self.found.as_ref().ok().map(|drawn| &drawn.found);
         let mut json =
             serde_json::to_value(StackFacts::new(&self.totals)).expect("facts have text keys");
         let more = json!({
@@ -140,6 +131,7 @@ impl StackReport {
             "finding_count": found.map(Found::count),
             "specks": found.map(|found| found.findings.specks.count()),
             "findings": found.map(|found| &found.records),
+            "features": found.map(|found| &found.features),
             "by_layer": {
                 "index": column(&|layer| layer.index.into()),
                 "z_um": column(&|layer| layer.z_um.into()),
@@ -163,7 +155,7 @@ impl StackReport {
 
     /// Returns how many islands begin in each layer.
     pub(super) fn islands_by_layer(&self) -> Option<Vec<u64>> {
-        let found = self.found.as_ref().ok()?;
+        let found = &self.found.as_ref().ok()?.found;
         let mut islands = vec![0; self.layers.len()];
         for island in &found.findings.islands.list {
             islands[island.layer as usize] += 1;
@@ -174,10 +166,10 @@ impl StackReport {
 
 /// `3 islands, 1 cup were found ...`
 fn found_text(found: &Found) -> Option<String> {
-    let told: Vec<_> = found.records.iter().filter(|record| !record.is_note()).collect();
-    let kinds = told.chunk_by(|a, b| a.name() == b.name());
-    let kinds: Vec<_> =
-        kinds.map(|records| format!("{} ({})", records[0].name(), records.len())).collect();
+    let needed = found.features.iter().filter(|feature| feature.severity != Severity::Note);
+    let told: Vec<&str> = needed.map(|feature| found.records[feature.finding].name()).collect();
+    let kinds = told.chunk_by(|a, b| a == b);
+    let kinds: Vec<_> = kinds.map(|names| format!("{} ({})", names[0], names.len())).collect();
     let count = match told.len() {
         0 => return None,
         1 => "1 finding".to_owned(),
@@ -228,12 +220,11 @@ fn is_on_sheet(position: usize, count: usize) -> bool {
 }
 
 /// Draws the worst findings, as `lamp check --evidence` does.
-fn drawn(
-    stack: &IndexedStack,
-    records: &[FindingRecord],
-) -> Result<Vec<(usize, InlinePicture)>, Exit> {
+fn drawn(stack: &IndexedStack, found: &Found) -> Result<Vec<(usize, InlinePicture)>, Exit> {
     let shown =
-        records.iter().enumerate().filter_map(|(number, record)| Some((number, record.shown()?)));
+        found.features.iter().enumerate().filter_map(|(number, feature)| {
+            Some((number, found.records[feature.finding].shown()?))
+        });
     let worst = shown.take(MOST_DRAWN).map(|(number, shown)| {
         let mask = |position: u32| {
             let layer = stack.layer(position as usize).map_err(failed)?;

@@ -33,7 +33,7 @@ impl Entry {
             top_mm: totals.top_mm(),
             volume_mm3: totals.volume_mm3,
             build_s: report.time.sum_s(),
-            findings: report.found.as_ref().ok().map(super::gather::Found::count),
+            findings: report.found.as_ref().ok().map(|drawn| drawn.found.count()),
             stray_rows: totals.stray_rows,
         };
         Self { name: report.name.clone(), page: Ok(page) }

@@ -4,10 +4,11 @@ use lamp_pipeline::heights::time_text;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::charts::{charts, same_thickness_um};
-use super::gather::{Found, StackReport};
+use super::gather::{Drawn, StackReport};
 use super::pictures::InlinePicture;
 use crate::commands::info;
 use crate::terminal::progress::printable;
+use lamp_supports::Feature;
 
 /// The most findings of a kind that are listed, as `lamp check` does.
 const MOST_LINES: usize = 20;
@@ -43,7 +44,7 @@ pub(super) fn html(report: &StackReport, index: Option<&str>) -> String {
         (warnings(report))
         section { h2 { "Stack" } (facts(report)) }
         section { h2 { "Build time" } (build_time(report)) }
-        @if let Ok(found) = &report.found { section { h2 { "Findings" } (findings(found)) } }
+        @if let Ok(drawn) = &report.found { section { h2 { "Findings" } (findings(drawn)) } }
         section {
             h2 { "Layers" }
             div.sheet { @for picture in &report.sheet { (figure(picture)) } }
@@ -123,17 +124,20 @@ fn build_time(report: &StackReport) -> Markup {
     }
 }
 
-fn findings(found: &Found) -> Markup {
-    let kinds = found.records.chunk_by(|a, b| a.name() == b.name());
+fn findings(Drawn { found, pictures }: &Drawn) -> Markup {
+    let name = |feature: &Feature| found.records[feature.finding].name();
+    let text = |feature: &Feature| with_signs(&found.text(feature));
+    let kinds = found.features.chunk_by(|a, b| name(a) == name(b));
     let specks = found.findings.specks.count();
     html! {
         @if found.records.is_empty() { p { "lamp check finds nothing." } }
-        @if !found.pictures.is_empty() {
+        @if !pictures.is_empty() {
             div.evidence {
-                @for (number, picture) in &found.pictures {
+                @for (number, picture) in pictures {
+                    @let feature = &found.features[*number];
                     figure {
-                        img src=(picture.address) alt=(found.records[*number].name());
-                        figcaption { b { (found.records[*number].name()) } ": " (with_signs(&found.records[*number].to_string())) }
+                        img src=(picture.address) alt=(name(feature));
+                        figcaption { b { (name(feature)) } ": " (text(feature)) }
                     }
                 }
             }
@@ -142,12 +146,12 @@ fn findings(found: &Found) -> Markup {
             }
         }
         table.findings {
-            @for records in kinds {
-                @for record in &records[..records.len().min(MOST_LINES)] {
-                    tr { th { (record.name()) } td { (with_signs(&record.to_string())) } }
+            @for features in kinds {
+                @for feature in &features[..features.len().min(MOST_LINES)] {
+                    tr { th { (name(feature)) } td { (text(feature)) } }
                 }
-                @if records.len() > MOST_LINES {
-                    tr { th { (records[0].name()) } td { (records.len() - MOST_LINES) " more (lamp check --report lists them)" } }
+                @if features.len() > MOST_LINES {
+                    tr { th { (name(&features[0])) } td { (features.len() - MOST_LINES) " more (lamp check --report lists them)" } }
                 }
             }
         }
