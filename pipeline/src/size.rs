@@ -29,16 +29,13 @@ impl PartSize {
     /// if they share one.
     pub fn doubt(&self, dpi: Dpi, thickness: Option<Length>) -> Option<String> {
         let [x, y, z] = self.mm;
-        let size = || format!("the part is {} x {} x {} mm", short(x), short(y), short(z));
+        let size = || self.text();
         let pixels = |mm: f64| Length::from_mm(mm).pixels(dpi);
         // Adaptive heights choose the number of layers: nothing to doubt before.
         let layers = thickness.map_or(FEW, |thickness| (1000.0 * z / thickness.um()).round());
         let advice = self.advice();
-        if x.max(y).max(z) > LARGE_MM {
-            Some(format!("{}, larger than any machine builds: {advice}", size()))
-        } else if x.max(y).max(z) < SMALL_MM && self.likely_unit().is_some() {
-            // If no unit makes the size usual, the unit is not at fault.
-            Some(format!("{}, smaller than any casting: {advice}", size()))
+        if let Some(doubt) = self.doubt_of_unit() {
+            Some(doubt)
         } else if pixels(x.min(y)) < FEW {
             let [columns, rows] = [x, y].map(|mm| short(pixels(mm)));
             Some(format!("{}, only {columns} x {rows} pixels: {advice}", size()))
@@ -48,6 +45,25 @@ impl PartSize {
         } else {
             None
         }
+    }
+
+    /// Returns a doubt about the unit, if no casting is so large or so small.
+    pub fn doubt_of_unit(&self) -> Option<String> {
+        let largest = self.mm.into_iter().fold(0.0, f64::max);
+        let advice = self.advice();
+        if largest > LARGE_MM {
+            Some(format!("{}, larger than any machine builds: {advice}", self.text()))
+        } else if largest < SMALL_MM && self.likely_unit().is_some() {
+            // If no unit makes the size usual, the unit is not at fault.
+            Some(format!("{}, smaller than any casting: {advice}", self.text()))
+        } else {
+            None
+        }
+    }
+
+    fn text(&self) -> String {
+        let [x, y, z] = self.mm.map(short);
+        format!("the part is {x} x {y} x {z} mm")
     }
 
     /// Returns advice about the size.

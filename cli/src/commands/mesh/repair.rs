@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use lamp_pipeline::size::PartSize;
 use lamp_slicer::topology::{CornerTable, Deed, RepairOptions, Repaired, repair};
 use lamp_slicer::{SliceError, write_stl};
 use lamp_stack::Length;
@@ -19,7 +20,7 @@ use crate::exit::Exit;
 use crate::output::endings::{STL, check_ending, parse_report};
 use crate::output::json_report::JsonReport;
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
-use crate::terminal::progress::say;
+use crate::terminal::progress::{Progress, say};
 
 /// Repair a mesh: weld, drop, flip and add facets, and list each change
 ///
@@ -59,6 +60,9 @@ pub(super) struct RepairArgs {
     strict: bool,
 }
 
+/// The share of the diagonal from which a weld is doubtful: walls of castings are a hundredth.
+const LARGE_WELD: f64 = 1e-3;
+
 pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let (name, input) = (args.part.name(), &args.part.part);
     check_not_input(&args.output, [input])?;
@@ -76,6 +80,25 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
         Some(weld) => weld.mm() / unit,
         None => CornerTable::of_facets(&facets).map_err(failed)?.usual_weld(),
     };
+    let corners = facets.iter().flatten().filter(|corner| corner.iter().all(|c| c.is_finite()));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for corner in corners.map(|corner| corner.map(|c| f64::from(c) * unit)) {
+        low = [0, 1, 2].map(|axis| low[axis].min(corner[axis]));
+        high = [0, 1, 2].map(|axis| high[axis].max(corner[axis]));
+    }
+    let progress = Progress::new("mesh repair", common, true);
+    let units = (!part.states_unit()).then_some(args.part.units);
+    if let Some(doubt) = PartSize::new([low, high], units).doubt_of_unit() {
+        progress.warn(&format!("{name}: {doubt}"));
+    }
+    let diagonal = [0, 1, 2].map(|axis| high[axis] - low[axis]).iter().map(|d| d * d).sum::<f64>();
+    if weld * unit > LARGE_WELD * diagonal.sqrt() {
+        progress.warn(&format!(
+            "{name}: vertices up to {:.3} mm apart become one, more than a thousandth of the part's \
+             diagonal: walls thinner than that may close; give a smaller --weld",
+            weld * unit
+        ));
+    }
     let options = RepairOptions { weld, close: args.close.mm() / unit };
     let repaired = repair(facets, &options).map_err(failed)?;
     let output = &args.output;
