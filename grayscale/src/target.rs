@@ -129,6 +129,9 @@ pub fn scan_lines(
     if !(1..=MAX_LINES).contains(&widths.len()) {
         return Err(TargetError::Lines);
     }
+    if doses.is_empty() {
+        return Err(TargetError::Doses);
+    }
     let block = ScanBlock::new(widths, length, gap);
     let rows = u64::from(block.height()) * doses.len() as u64;
     check_pixels("targets", rows.try_into().unwrap_or(u32::MAX), MAX_ROWS)?;
@@ -313,7 +316,8 @@ mod tests {
         };
         let across = 3 * gap + 2 * (40 + 3 * gap);
         let (first, height) = (&exposures[0].image, exposures[0].image.height());
-        assert_eq!((first.width(), height), (across + length + gap + 22, 2 * across));
+        let width = (across + length + gap).next_multiple_of(WIDTH_STEP);
+        assert_eq!((first.width(), height), (width, 2 * across));
         for (block, dose) in [(0, 50.0), (1, 80.0)] {
             let top = block * across;
             // Mirrored at the block's diagonal, left is right.

@@ -124,7 +124,7 @@ fn impossible_targets_are_wrong_usage() {
         (&format!("{squares} --doses 1,2mJ/cm2 --sizes 25,0"), "squares of 0 pixels"),
         (&format!("{squares} --doses 1,2mJ/cm2 --sizes 25,30,25"), "25 is given twice"),
         (&format!("{squares} --doses 1e-300..1e300mJ/cm2"), "is not a plausible dose"),
-        (&format!("{squares} --doses 1,2mJ/cm2 --gap 0um"), "the gap must be above zero"),
+        (&format!("{squares} --doses 1,2mJ/cm2 --gap 0um"), "it must be above zero"),
         (&format!("{squares} --doses 1,2mJ/cm2 --gap 1um"), "gaps of 0 pixels"),
         ("lamp target screens --gray 120% -o a.tif", "0% (black) to 100% (white)"),
         ("lamp target screens --tile 9999999 -o a.tif", "tiles of 9999999 pixels"),

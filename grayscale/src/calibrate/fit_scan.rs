@@ -66,6 +66,9 @@ const LEAST_LINES: usize = 3;
 /// The widest interval: from the value over e to e times the value.
 const WIDEST_LOG: f64 = 1.0;
 
+/// The least share of the scatter that the model must explain: below it, other things made the widths.
+const LEAST_R2: f64 = 0.5;
+
 /// Fits `σ` across and along the scan, and the dose that cures, to the widths of lines and gaps by
 /// nonlinear least squares: a line cures where its light, `E/2 (erf((w/2 - x) / √2 σ) + erf((w/2 +
 /// x) / √2 σ))`, is at least `E_c`; a gap stays open where that light of a white gap is missing from
@@ -101,11 +104,24 @@ pub fn fit_scan(points: &[LinePoint]) -> Result<ScanFit, FitError> {
     let growth = |point: &LinePoint| point.cured.um() - point.drawn.um();
     let mean = points.iter().map(growth).sum::<f64>() / points.len() as f64;
     let scatter: f64 = points.iter().map(|point| (growth(point) - mean).powi(2)).sum();
+    let r2 = if scatter > 0.0 { 1.0 - left / scatter } else { 0.0 };
+    if r2 < LEAST_R2 {
+        return Err(FitError::NoScanFit);
+    }
+    // Lines much wider than light spreads all grow by z σ, so one dose shows the product alone.
+    let is_one_dose = points.iter().all(|point| point.dose == points[0].dose);
+    let narrowest = points.iter().map(|point| point.drawn.um()).fold(f64::INFINITY, f64::min);
+    if let Some(of) =
+        [across, along].iter().position(|sigma| is_one_dose && narrowest > 3.0 * sigma)
+    {
+        let (high, unit) = (narrowest / 3.0, units[of]);
+        return Err(FitError::VagueLines { what: names[of], low: 0.0, high, unit });
+    }
     Ok(ScanFit {
         across: estimate(across, half(0)),
         along: estimate(along, half(1)),
         critical_dose: estimate(critical, half(2)),
-        r2: if scatter > 0.0 { 1.0 - left / scatter } else { 0.0 },
+        r2,
         points: points.len(),
         model,
     })

@@ -22,7 +22,15 @@ pub(super) fn fitted<T: Copy, const N: usize>(
             // Marquardt (1963): in shares of the diagonal, damping has no unit.
             row[i] *= 1.0 + damping;
         }
-        let next = moved(&numbers, product(&inverse(matrix)?, &vector));
+        let Some(inverse) = inverse(matrix) else {
+            // A number that does nothing here: shorter steps may lead to where it does.
+            if damping > 1e9 {
+                break;
+            }
+            damping *= 10.0;
+            continue;
+        };
+        let next = moved(&numbers, product(&inverse, &vector));
         let then = squares(&next);
         if then < left {
             // Nothing but rounding is left to gain.

@@ -252,12 +252,14 @@ pub enum FitError {
     EqualLines(LinesOf),
     /// No spread of light fits the lines.
     #[error(
-        "no light that spreads as a Gaussian cures such lines: check the columns, and that          `across` means widths along x"
+        "no light that spreads as a Gaussian cures such lines: check the columns, \
+         the resolution (--dpi), and that `across` means widths along x"
     )]
     NoScanFit,
     /// The interval of a number is too wide.
     #[error(
-        "the lines do not determine {what}: it may be {} to {} {unit}; measure lines and gaps          about as wide as light spreads, or several doses",
+        "the lines do not determine {what}: it may be {} to {} {unit}; measure lines and gaps \
+         about as wide as light spreads, or several doses",
         short(*low),
         short(*high)
     )]

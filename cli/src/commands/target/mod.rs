@@ -77,7 +77,7 @@ fn counted(count: usize, what: &str) -> String {
 /// Parses how far squares stand apart, which is some way.
 fn parse_gap(text: &str) -> Result<Length, String> {
     let gap = parse_distance(text)?;
-    if gap.um() == 0.0 { Err("the gap must be above zero".to_owned()) } else { Ok(gap) }
+    if gap.um() == 0.0 { Err("it must be above zero".to_owned()) } else { Ok(gap) }
 }
 
 /// Impossible targets come from options.

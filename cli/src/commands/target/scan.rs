@@ -105,7 +105,7 @@ const TABLE_HEAD: &str = "\
 # Write the width of each line, and of the opening of each gap, after curing into cured_um: 0 if the
 # line did not cure or the gap closed; leave it empty where none was measured.
 # across: measured across the scan, along x. along: measured along the scan, along y.
-# Then: lamp calibrate scan lines.csv
+# Then: lamp calibrate scan lines.csv, with the --dpi of the target
 direction,kind,feature_px,dose_mj_per_cm2,cured_um
 ";
 

@@ -98,7 +98,7 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
 const TABLE_HEAD: &str = "\
 # Write each square's side after curing into cured_um, also where it did not grow; leave it empty
 # where none was measured.
-# Then: lamp calibrate width squares.csv
+# Then: lamp calibrate width squares.csv, with the --dpi of the target
 feature_px,dose_mj_per_cm2,cured_um
 ";
 
