@@ -141,13 +141,22 @@ impl FieldForm {
         }
     }
 
-    /// Checks that a page says that it is of a field of this form.
-    pub(super) fn check(&self, page: &PageInfo, at: FieldPlace) -> Result<(), FieldDifference> {
+    /// Checks that a page says that it is of a field of this form, with its columns and rows of the
+    /// build.
+    pub(super) fn check(
+        &self,
+        page: &PageInfo,
+        at: FieldPlace,
+        [columns, rows]: [&Range<u32>; 2],
+    ) -> Result<(), FieldDifference> {
+        let [columns, rows] = [columns, rows].map(|range| [range.start, range.end]);
         let is_of = match self.kind() {
-            FieldKind::Strip => page.record().is_some_and(|of: StripRecord| of.number == at.column),
-            FieldKind::Field => page
+            FieldKind::Strip => page
                 .record()
-                .is_some_and(|of: FieldRecord| (of.row, of.column) == (at.row, at.column)),
+                .is_some_and(|of: StripRecord| (of.number, of.columns) == (at.column, columns)),
+            FieldKind::Field => page.record().is_some_and(|of: FieldRecord| {
+                (of.row, of.column, of.columns, of.rows) == (at.row, at.column, columns, rows)
+            }),
         };
         match is_of {
             true => Ok(()),
@@ -202,7 +211,8 @@ impl FieldFile {
     /// # Errors
     /// Returns an error if it says anything else.
     pub fn check(&self, page: &PageInfo) -> Result<(), FieldsError> {
-        self.form.check(page, self.place).map_err(|difference| self.unlike(difference))
+        let place = [&self.columns, &self.rows];
+        self.form.check(page, self.place, place).map_err(|difference| self.unlike(difference))
     }
 
     /// Returns the error that this file's input differs from the first field's.

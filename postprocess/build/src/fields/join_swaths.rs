@@ -13,10 +13,12 @@ use super::Swaths;
 #[non_exhaustive]
 pub enum JoinSwathsError {
     /// There are too many or too few swaths, or one has another size.
-    #[error("the swaths do not make up such a layer")]
+    #[error("the parts do not make up such a layer")]
     Unlike,
     /// Swaths add up to more than full exposure, or expose pixels beyond the layer.
-    #[error("row {row}, column {column}: the swaths add up to more than full exposure")]
+    #[error(
+        "row {row}, column {column}: the parts that share it add up to more than full exposure"
+    )]
     TooMuch {
         /// The row, from the top.
         row: usize,

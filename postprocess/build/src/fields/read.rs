@@ -149,7 +149,8 @@ impl FieldReader {
         if self.left == 0 {
             return Some(FieldDifference::Unlisted { layer: info.name(), kind });
         }
-        if let Err(difference) = self.fields.form().check(info, self.fields.place(field)) {
+        let place = [&self.fields.columns(field), &self.fields.rows(field)];
+        if let Err(difference) = self.fields.form().check(info, self.fields.place(field), place) {
             return Some(difference);
         }
         // Only first pages describe the stack.
