@@ -8,7 +8,7 @@
 //! | 8, 12 | mirrors across the scan, along it (u32) |
 //! | 16 | bytes of a row of mirrors, a multiple of 8 (u32) |
 //! | 20, 24 | the layer's index, the swath's number (u32) |
-//! | 28 | the build's column below the first mirror (i32) |
+//! | 28 | the build's first column below the display (i32) |
 //! | 32 | the row of the image below mirror row 0 in the first frame (i64) |
 //! | 40 | the number of frames (u64) |
 //! | 48 | rows per second (f64) |
@@ -36,7 +36,7 @@ pub struct FrameHeader {
     pub layer: u32,
     /// The swath's number, from the left.
     pub swath: u32,
-    /// The build's column below the first mirror.
+    /// The build's first column below the display: below the first mirror, unless it is tilted.
     pub first_column: i32,
     /// The row of the image below mirror row 0 in the first frame.
     pub first_position: i64,

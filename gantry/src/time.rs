@@ -189,8 +189,9 @@ impl BuildClock {
         let Some(scan) = &machine.scan else { return Ok(()) };
         let Some(exposure_ms) = exposure_ms else { return Ok(()) };
         let text = |error: GantryError| error.to_string();
-        let layout =
-            SwathLayout::uncut(scan, dpi.pitch(), JobSeam::Comb, GrayBy::Time).map_err(text)?;
+        // Gray takes as long as white, so it is timed as if it were shown; tilted displays refuse it.
+        let gray = if scan.tilt.is_some() { GrayBy::Dots } else { GrayBy::Time };
+        let layout = SwathLayout::uncut(scan, dpi.pitch(), JobSeam::Comb, gray).map_err(text)?;
         let count = layout.count(image.width()).map_err(text)?;
         let clock = RowClock::new(exposure_ms, layout.full_rows(mirrors), dpi.pitch(), scan)
             .map_err(|limit| format!("{}: {limit}", info.name()))?;
@@ -389,6 +390,11 @@ mod tests {
             time(&format!("{scan}[times]\nrecoat_s = 9\nsource = \"-\"\n"), &[Some(100.0); 3]);
         assert!((recoated.swaths.unwrap().seconds - 3.0 * layer(50.0)).abs() < 1e-9);
         assert!((recoated.sum_s().unwrap() - 27.0 - 3.0 * layer(50.0)).abs() < 1e-9);
+        // Slanted swaths are 400 columns apart, and their ends 6: the one that ends left of column 394
+        // holds all white.
+        let tilt = "[scan.tilt]\ndegrees = 7\nsource = \"-\"\n";
+        let tilted = time(&(scan.replace("overlap = 100", "overlap = 0") + tilt), &[Some(100.0)]);
+        assert_eq!((tilted.unscanned, tilted.swaths.unwrap().count), (None, 1));
         let short = time(scan, &[Some(1.0)]);
         assert!(short.unscanned.as_ref().unwrap().contains("at most 100 mm/s"), "{short:?}");
         assert_eq!((short.sum_s(), time(scan, &[None]).sum_s()), (None, None));

@@ -207,6 +207,7 @@ fn json_says_how_a_display_scans() {
             "irradiance_mw_per_cm2": null,
             "light": null,
             "faults": {"dead": [[3, 1]], "stuck": [], "source": "camera"},
+            "tilt": null,
             "source": "data sheet",
         })
     );

@@ -174,6 +174,13 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     if args.json {
         print_answer("lamp-expose-1", &json(&doses, args.tolerance))?;
     }
+    let unjudged = doses.iter().find(|dose| dose.all.white_px == 0 && dose.edge_px > 0);
+    if let Some(dose) = unjudged.filter(|_| args.strict) {
+        return Err(Exit::Findings(format!(
+            "layer {}: all {} white pixels are beside black, where the doses of tilted mirrors are not judged",
+            dose.layer, dose.edge_px
+        )));
+    }
     let off: u64 = doses.iter().map(|dose| dose.all.off_px).sum();
     let over: u64 = doses.iter().map(|dose| dose.all.dark.over_px).sum();
     if args.strict && off + over > 0 {
@@ -382,7 +389,8 @@ fn text(dose: &LayerDose, layer: &JobLayer, tolerance: f64) -> String {
     }
     if dose.edge_px > 0 {
         text += &format!(
-            "  {} more white pixels are beside black, where tilted mirrors are over both\n",
+            "  {} more white pixels are beside black, where tilted mirrors are over both: their doses are \
+             not judged\n",
             dose.edge_px
         );
     }

@@ -112,6 +112,10 @@ impl CutArgs {
             return Err(Exit::usage(match machine {
                 None => "--strips needs --mirrors, or a --machine that has [strips] or [scan]"
                     .to_owned(),
+                Some(Machine { name, scan: Some(_), .. }) => format!(
+                    "--strips: the machine {name} scans slanted swaths, which no strip fits: give the build \
+                     to lamp job"
+                ),
                 Some(Machine { name, .. }) => format!(
                     "--strips needs --mirrors: the machine {name} has no [strips] or [scan] (docs/tile.md)"
                 ),
