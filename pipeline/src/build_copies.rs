@@ -1,19 +1,19 @@
 //! Builds as `tile` makes them, for checks: each part is judged once, and its copies by how they
 //! differ.
 //!
-//! A build mesh keeps its distance from parts, so white within the frame of a copy that does not reach
-//! the frame's border is the part's. Stubs of the mesh may also end within a frame: they lie within the
-//! mesh of the layers below the parts, where it is whole.
+//! The layers of mesh alone below the parts show where mesh is, as it only shrinks further up. White
+//! within the frame of a copy is the part's if its component has a pixel that is not mesh there. A tip
+//! that begins on a wall of the mesh looks like mesh in one copy and not in another, so a part is all
+//! white that is a part's in any copy.
 
 use std::collections::BTreeMap;
 
-use lamp_stack::{Frame, Mask, Op, Orientation, Page, StackInfo};
-use lamp_supports::{inner_components, inner_components_beyond};
+use lamp_stack::{FieldRecord, Frame, Mask, Op, Orientation, Page, PageInfo, StripRecord};
+use lamp_supports::components_beyond;
 
 /// The copies of a build's parts, as its first page records them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildCopies {
-    /// For each part its name, where its copies are, and how they are turned.
     parts: Vec<PlacedPart>,
     base_layers: u32,
 }
@@ -25,7 +25,7 @@ struct PlacedPart {
 }
 
 /// What something on a build belongs to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum OnBuild {
     /// A part, of which there are so many copies.
     Part {
@@ -34,25 +34,33 @@ pub enum OnBuild {
         /// The number of its copies.
         copies: usize,
     },
-    /// The build mesh.
+    /// The build mesh, or whatever else is beside the parts.
     Mesh,
 }
 
 /// A layer of a build, divided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DividedLayer {
-    /// The first copy of each part alone; none below the parts.
-    pub first_copies: Option<Mask>,
-    /// The copies that are not as the first of their part: the numbers of both, from 0, and by how
+    /// Each part alone, in the place of its first copy; none below the parts.
+    pub parts: Option<Mask>,
+    /// The copies that are not as the others of their part: the numbers of both, from 0, and by how
     /// many pixels they differ.
     pub differing: Vec<([usize; 2], u64)>,
-    /// Whether there is white beside the copies.
-    pub has_mesh: bool,
 }
 
 impl BuildCopies {
-    /// Returns the copies of a build; none if the stack is no build, or does not say where they are.
-    pub fn of(stack: &StackInfo) -> Option<Self> {
+    /// Returns the copies of a build, given its first page and the size of its images.
+    ///
+    /// Returns none if copies cannot be told apart, so that the stack is checked as it stands: if it
+    /// is no build, a strip or a field of one, or a range without the layers below the parts, if the
+    /// record is of another form, or if frames overlap or leave the image.
+    pub fn of(info: &PageInfo, [width, height]: [u32; 2]) -> Option<Self> {
+        let stack = info.stack.as_ref()?;
+        let base_layers = stack.base_layers();
+        let is_cut = info.has_record::<StripRecord>() || info.has_record::<FieldRecord>();
+        if is_cut || (base_layers > 0 && info.index >= base_layers) {
+            return None;
+        }
         let parts = stack.built_parts()?.map(|part| {
             let part = part.ok()?;
             let turns = part.turns.iter().map(|turn| turn.parse::<Orientation>().ok());
@@ -67,12 +75,34 @@ impl BuildCopies {
             (!copies.is_empty()).then_some(PlacedPart { name, copies })
         });
         let parts = parts.collect::<Option<Vec<_>>>()?;
-        Some(Self { parts, base_layers: stack.base_layers() })
+        let frames: Vec<Frame> =
+            parts.iter().flat_map(|part| part.copies.iter().map(|(frame, _)| *frame)).collect();
+        let is_within = |frame: &Frame| {
+            let fits = |at: i64, size: u32, most: u32| {
+                at >= 0 && at.saturating_add(size.into()) <= most.into()
+            };
+            fits(frame.left, frame.width, width) && fits(frame.top, frame.height, height)
+        };
+        let meet = |a: &Frame, b: &Frame| {
+            let near = |a: i64, a_size: u32, b: i64, b_size: u32| {
+                a < b + i64::from(b_size) && b < a + i64::from(a_size)
+            };
+            near(a.left, a.width, b.left, b.width) && near(a.top, a.height, b.top, b.height)
+        };
+        // Places are within the image, so their sums fit.
+        let is_clear = frames.iter().all(is_within)
+            && frames.iter().enumerate().all(|(k, a)| !frames[..k].iter().any(|b| meet(a, b)));
+        is_clear.then_some(Self { parts, base_layers })
     }
 
     /// Returns the copies of a build, given its first page, as [`of`](Self::of) does.
     pub fn of_page(page: &Page) -> Option<Self> {
-        Self::of(page.info().stack.as_ref()?)
+        Self::of(page.info(), page.size())
+    }
+
+    /// Returns whether the build has a mesh.
+    pub fn has_mesh(&self) -> bool {
+        self.base_layers > 0
     }
 
     /// Returns what a rectangle belongs to: left, right, top and bottom.
@@ -105,99 +135,71 @@ impl BuildCopies {
 
     /// Divides a layer, given its index, and the mesh of a layer below the parts, if there is one.
     pub fn divide(&self, mask: &Mask, index: u32, base: Option<&Mask>) -> DividedLayer {
-        let (width, height) = (mask.width(), mask.height());
         if self.is_base(index) {
-            return DividedLayer { first_copies: None, differing: Vec::new(), has_mesh: true };
+            return DividedLayer { parts: None, differing: Vec::new() };
         }
-        let mut firsts = Mask::black(width, height);
+        let (width, height) = (mask.width(), mask.height());
+        let mut parts = Mask::black(width, height);
         let mut differing = Vec::new();
-        let mut of_copies = 0;
         for (number, part) in self.parts.iter().enumerate() {
-            let (frame, turn) = part.copies[0];
-            let first = part_in(mask, frame, base);
-            let placed = Frame { left: -frame.left, top: -frame.top, width, height };
-            // A part's runs are among the layer's, so there are not too many.
-            if let Some(more) = firsts.combined(Op::Union, &first.framed(placed)) {
-                firsts = more;
+            let (first, turn) = part.copies[0];
+            let images: Vec<Mask> =
+                part.copies.iter().map(|(frame, _)| mask.framed(*frame)).collect();
+            // As copies are turned, all of them, of which most are the same.
+            let mut whole = Mask::black(first.width, first.height);
+            for (image, &(frame, as_copy)) in images.iter().zip(&part.copies) {
+                let own = match base {
+                    Some(base) => components_beyond(image, &base.framed(frame)),
+                    None => image.clone(),
+                };
+                whole = united(whole, &turned(&own, as_copy, turn));
             }
-            let mut turned: BTreeMap<String, Mask> = BTreeMap::new();
-            for (copy, &(frame, as_copy)) in part.copies.iter().enumerate().skip(1) {
-                let expected = turned.entry(as_copy.to_string()).or_insert_with(|| {
-                    let upright = first.oriented(turn.inverse());
-                    let turned = upright.and_then(|upright| upright.oriented(as_copy));
-                    turned.unwrap_or_else(|| first.clone())
-                });
-                let pixels = self.difference(mask, frame, base, expected);
+            let mut expected: BTreeMap<String, Mask> = BTreeMap::new();
+            let missing: Vec<u64> = images
+                .iter()
+                .zip(&part.copies)
+                .map(|(image, &(_, as_copy))| {
+                    let expected = expected
+                        .entry(as_copy.to_string())
+                        .or_insert_with(|| turned(&whole, turn, as_copy));
+                    let missing = expected.combined(Op::Difference, image);
+                    missing.map_or(0, |missing| missing.white_pixels())
+                })
+                .collect();
+            // What most copies lack, the others have too much.
+            let lacking = missing.iter().filter(|&&pixels| pixels > 0).count();
+            let most = missing.iter().copied().max().unwrap_or(0);
+            let is_surplus = 2 * lacking > missing.len();
+            for (copy, &pixels) in missing.iter().enumerate() {
+                let pixels = if is_surplus { most - pixels } else { pixels };
                 if pixels > 0 {
                     differing.push(([number, copy], pixels));
                 }
             }
-            of_copies += first.white_pixels() * part.copies.len() as u64;
+            let placed = Frame { left: -first.left, top: -first.top, width, height };
+            parts = united(parts, &whole.framed(placed));
         }
-        let has_mesh = mask.white_pixels() > of_copies;
-        if has_mesh && base.is_none() {
-            // What is a stub and what a part is not known well enough to compare copies.
-            differing.clear();
-        }
-        DividedLayer { first_copies: Some(firsts), differing, has_mesh }
-    }
-
-    /// Returns by how many pixels a copy differs from what it should be.
-    fn difference(&self, mask: &Mask, frame: Frame, base: Option<&Mask>, expected: &Mask) -> u64 {
-        let (around, Frame { left, top, .. }) = (grown(frame), frame);
-        let expected = expected.framed(Frame { left: -1, top: -1, ..around });
-        let here = mask.framed(around);
-        let without = |a: &Mask, b: &Mask| a.combined(Op::Difference, b);
-        let missing = without(&expected, &here).map_or(0, |missing| missing.white_pixels());
-        // Whatever else is white in the frame, and is neither mesh nor a copy beside it.
-        let extra = without(&here, &expected).map_or(0, |extra| {
-            let extra = part_of(&extra, around, base);
-            let rows = (0..extra.height()).map(|row| {
-                let runs = lamp_stack::white_runs(extra.row(row), extra.width());
-                let own = runs.filter(|&(start, _)| {
-                    let at = [left - 1 + i64::from(start), top - 1 + i64::from(row)];
-                    !self.is_in_another(frame, at)
-                });
-                own.map(|(start, end)| u64::from(end - start)).sum::<u64>()
-            });
-            rows.sum()
-        });
-        missing + extra
-    }
-
-    /// Returns whether a pixel is in the frame of another copy, too.
-    fn is_in_another(&self, frame: Frame, [column, row]: [i64; 2]) -> bool {
-        let copies = self.parts.iter().flat_map(|part| &part.copies);
-        copies.filter(|(other, _)| *other != frame).any(|(other, _)| {
-            (other.left..other.left + i64::from(other.width)).contains(&column)
-                && (other.top..other.top + i64::from(other.height)).contains(&row)
-        })
+        DividedLayer { parts: Some(parts), differing }
     }
 }
 
-/// Returns a frame with a pixel more on all sides: a part may reach its frame's border, but not beyond.
-fn grown(Frame { left, top, width, height }: Frame) -> Frame {
-    Frame { left: left - 1, top: top - 1, width: width + 2, height: height + 2 }
-}
-
-/// Returns the white of a part within a frame.
-fn part_in(mask: &Mask, frame: Frame, base: Option<&Mask>) -> Mask {
-    let around = grown(frame);
-    let part = part_of(&mask.framed(around), around, base);
-    part.framed(Frame { left: 1, top: 1, width: frame.width, height: frame.height })
-}
-
-/// Returns the components of a frame's image that neither leave it nor are stubs of the mesh.
-fn part_of(image: &Mask, frame: Frame, base: Option<&Mask>) -> Mask {
-    match base {
-        Some(base) => inner_components_beyond(image, &base.framed(frame)),
-        None => inner_components(image, true),
+/// Returns an image that stands as one copy as it stands as another.
+fn turned(image: &Mask, from: Orientation, to: Orientation) -> Mask {
+    if from == to {
+        return image.clone();
     }
+    let upright = image.oriented(from.inverse());
+    // The runs are among the layer's, so there are not too many.
+    upright.and_then(|upright| upright.oriented(to)).unwrap_or_else(|| image.clone())
+}
+
+fn united(a: Mask, b: &Mask) -> Mask {
+    a.combined(Op::Union, b).unwrap_or(a)
 }
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{BuildRecord, BuiltPart, BuiltParts, MaskBuilder};
+    use lamp_stack::{BuildRecord, BuiltPart, BuiltParts, MaskBuilder, StackInfo};
 
     use super::*;
 
@@ -217,63 +219,67 @@ mod tests {
     }
 
     fn copies(base_layers: u32) -> BuildCopies {
+        copies_on(base_layers, [60, 40]).unwrap()
+    }
+
+    fn copies_on(base_layers: u32, size: [u32; 2]) -> Option<BuildCopies> {
         let part = BuiltPart {
             part_pixels: [10, 8],
-            copies: vec![[5, 5], [30, 5]],
-            turns: vec!["0".to_owned(), "90".to_owned()],
+            copies: vec![[5, 5], [30, 5], [15, 20]],
+            turns: vec!["0".to_owned(), "90".to_owned(), "0".to_owned()],
             ..BuiltPart::default()
         };
         let mut stack = StackInfo { part: "blade".to_owned(), ..StackInfo::default() };
         stack.set_build_record(&BuildRecord { parts: BuiltParts::One(part), base_layers });
-        BuildCopies::of(&stack).unwrap()
+        BuildCopies::of(&PageInfo { stack: Some(stack), ..PageInfo::default() }, size)
     }
 
-    #[test]
-    fn a_copy_is_as_the_first_turned() {
-        // A pixel near a corner of 10 x 8: turned, it is near another of 8 x 10.
-        let mut white = vec![[6, 6, 2]];
-        let found = copies(0).divide(&squares(&white), 3, None);
-        assert_eq!(found.first_copies, Some(squares(&white)));
-        assert_eq!((found.differing, found.has_mesh), (vec![([0, 1], 4)], false));
-        // Anticlockwise, the top left corner comes to the bottom left.
-        white.push([31, 12, 2]);
-        let whole = copies(0).divide(&squares(&white), 3, None);
-        assert_eq!(whole.first_copies, Some(squares(&white[..1])));
-        assert_eq!((whole.differing, whole.has_mesh), (vec![], false));
-        // Something beside a copy is mesh if it reaches out of the frame.
-        white.push([36, 6, 9]);
-        let with_mesh = copies(0).divide(&squares(&white), 3, None);
-        assert_eq!((with_mesh.differing, with_mesh.has_mesh), (vec![], true));
-        white.pop();
-        white.push([34, 7, 1]);
-        let differing = copies(0).divide(&squares(&white), 3, Some(&squares(&[]))).differing;
-        assert_eq!(differing, [([0, 1], 1)]);
-    }
+    /// A square near a corner in all copies; turned, the top left corner comes to the bottom left.
+    const ALIKE: [[u32; 3]; 3] = [[6, 6, 2], [31, 12, 2], [16, 21, 2]];
 
     #[test]
-    fn base_layers_are_mesh_alone() {
-        let found = copies(2).divide(&squares(&[[6, 6, 2]]), 1, None);
-        assert_eq!((found.first_copies, found.has_mesh), (None, true));
-        assert!(copies(2).divide(&squares(&[[6, 6, 2]]), 2, None).first_copies.is_some());
+    fn copies_are_alike_as_they_are_turned() {
+        let found = copies(0).divide(&squares(&ALIKE), 3, None);
+        assert_eq!((found.parts, found.differing), (Some(squares(&ALIKE[..1])), vec![]));
+        // One copy lacks its square, and then has one too many: both are seen.
+        let lacking = copies(0).divide(&squares(&ALIKE[..2]), 3, None);
+        assert_eq!(lacking.differing, [([0, 2], 4)]);
+        assert_eq!(lacking.parts, Some(squares(&ALIKE[..1])));
+        let more = [&ALIKE[..], &[[18, 25, 1]]].concat();
+        let more = copies(0).divide(&squares(&more), 3, None);
+        assert_eq!(more.differing, [([0, 2], 1)]);
+        assert_eq!(more.parts, Some(squares(&[ALIKE[0], [8, 10, 1]])));
     }
 
     #[test]
     fn stubs_of_the_mesh_belong_to_no_copy() {
-        let base = squares(&[[12, 6, 2], [33, 9, 3]]);
-        // A part that a stub would touch if it were white below, and stubs in both frames.
-        let found = copies(0).divide(&squares(&[[12, 6, 2], [33, 9, 2]]), 3, Some(&base));
-        assert_eq!(found.first_copies, Some(squares(&[])));
-        assert_eq!((found.differing, found.has_mesh), (vec![], true));
-        let found = copies(0).divide(&squares(&[[11, 6, 3]]), 3, Some(&base));
-        assert_eq!(found.first_copies, Some(squares(&[[11, 6, 3]])));
+        let base = squares(&[[12, 6, 2], [33, 9, 3], [6, 6, 2]]);
+        // The first copy's square begins on a wall of the mesh, and the others' do not.
+        let white = [&ALIKE[..], &[[12, 6, 2], [33, 9, 2]]].concat();
+        let found = copies(1).divide(&squares(&white), 3, Some(&base));
+        assert_eq!((found.parts, found.differing), (Some(squares(&ALIKE[..1])), vec![]));
+        // A copy that has grown together with the mesh differs, also beyond its frame.
+        let fused = [&ALIKE[..], &[[23, 21, 5]]].concat();
+        let found = copies(1).divide(&squares(&fused), 3, Some(&base));
+        assert_eq!(found.differing, [([0, 2], 10)]);
+    }
+
+    #[test]
+    fn base_layers_are_mesh_alone() {
+        let found = copies(2).divide(&squares(&ALIKE), 1, None);
+        assert_eq!(found, DividedLayer { parts: None, differing: vec![] });
+        assert!(copies(2).divide(&squares(&ALIKE), 2, None).parts.is_some());
+        assert!(copies(2).has_mesh() && !copies(0).has_mesh());
     }
 
     #[test]
     fn what_lies_within_a_frame_belongs_to_the_part() {
-        let part = OnBuild::Part { name: "blade".to_owned(), copies: 2 };
+        let part = OnBuild::Part { name: "blade".to_owned(), copies: 3 };
         assert_eq!(copies(0).owner([5, 15, 5, 13]), part);
         assert_eq!(copies(0).owner([31, 33, 14, 15]), part);
         assert_eq!(copies(0).owner([31, 39, 14, 15]), OnBuild::Mesh);
-        assert_eq!(BuildCopies::of(&StackInfo::default()), None);
+        // Copies that are cut off, or are not there, are not told apart.
+        assert_eq!(copies_on(0, [37, 40]), None);
+        assert_eq!(BuildCopies::of(&PageInfo::default(), [60, 40]), None);
     }
 }

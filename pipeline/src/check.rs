@@ -1,16 +1,17 @@
 //! The settings of a check.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use lamp_machine::{Machine, Recoating};
 use lamp_stack::{Layer, Length, Mask, MemorySize};
 use lamp_supports::{
-    CheckError, CheckOptions, CopyRecord, Disagreements, Feature, FindingGroup, FindingRecord,
-    Findings, Listed, Region, Scale, Severity,
+    AcceptedFindings, CheckError, CheckOptions, CopyRecord, Disagreements, Feature, FindingGroup,
+    FindingRecord, Findings, Listed, Region, Scale, Severity,
 };
 use serde::{Deserialize, Serialize};
 
@@ -159,6 +160,8 @@ impl CheckSettings {
     ) -> Found {
         let mut records = self.records(&findings, disagreements, machine);
         if self.reports(FindingGroup::Layers) {
+            let mut differing = differing;
+            differing.sort_by_key(|copy| Reverse(copy.differing_px));
             let differing = differing.into_iter().map(FindingRecord::CopyDiffers);
             // Before white at the border and empty layers, which harm least.
             let at = records.iter().position(|record| {
@@ -167,8 +170,9 @@ impl CheckSettings {
             let at = at.unwrap_or(records.len());
             records.splice(at..at, differing);
         }
-        let features = lamp_supports::features(&records);
-        Found { findings, records, features, build }
+        let mut found = Found { findings, records, features: Vec::new(), accepted: 0, build };
+        found.group();
+        found
     }
 
     /// Finds what there is in a build: in the first copy of each part alone, and islands of its mesh.
@@ -178,9 +182,7 @@ impl CheckSettings {
         layers: impl Iterator<Item = Result<T, E>>,
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
     ) -> Result<(Findings, Vec<CopyRecord>), E> {
-        // For each copy that differs: its layers' indices, and its pixels.
-        let differing: Mutex<BTreeMap<[usize; 2], ([u32; 2], u64)>> = Mutex::default();
-        let has_mesh = AtomicBool::new(false);
+        let differing: Mutex<DifferingCopies> = Mutex::default();
         // Pages of mesh alone show where it is. They come before all parts.
         let base: OnceLock<Mask> = OnceLock::new();
         let decode = |item: T| {
@@ -194,7 +196,6 @@ impl CheckSettings {
             let Layer { info, dpi, image } = layer;
             let mask = image.clone().into_image().into_mask(self.threshold);
             let found = build.divide(&mask, info.index, base.get());
-            has_mesh.fetch_or(found.has_mesh, Ordering::Relaxed);
             let mut all = differing.lock().unwrap_or_else(PoisonError::into_inner);
             for (copy, pixels) in found.differing {
                 let (layers, sum) = all.entry(copy).or_insert(([info.index; 2], 0));
@@ -202,7 +203,7 @@ impl CheckSettings {
                 *layers = [layers[0].min(info.index), layers[1].max(info.index)];
                 *sum += pixels;
             }
-            let parts = found.first_copies?;
+            let parts = found.parts?;
             Some(Layer { info: info.clone(), dpi: *dpi, image: parts.into() })
         };
         let (whole, parts) = lamp_supports::check_build(layers, decode, parts, &self.options())?;
@@ -213,7 +214,7 @@ impl CheckSettings {
                 build.owner(bounds) == OnBuild::Mesh
             });
         }
-        if has_mesh.into_inner() {
+        if build.has_mesh() {
             // The mesh holds the parts (002 section 4.2.3).
             findings.off_balance = Listed::default();
         }
@@ -255,6 +256,9 @@ impl CheckSettings {
     }
 }
 
+/// For each copy that differs: the indices of its first and last layer, and its pixels.
+type DifferingCopies = BTreeMap<[usize; 2], ([u32; 2], u64)>;
+
 /// What a check found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
@@ -264,11 +268,30 @@ pub struct Found {
     pub records: Vec<FindingRecord>,
     /// The records as features.
     pub features: Vec<Feature>,
+    /// The number of findings that are left out, as a person accepts them.
+    pub accepted: usize,
     /// The copies, if the stack is a build.
     pub build: Option<BuildCopies>,
 }
 
 impl Found {
+    /// Leaves out findings that a person accepts.
+    pub fn accept(&mut self, accepted: &AcceptedFindings) {
+        let before = self.records.len();
+        self.records.retain(|record| !accepted.has(record));
+        self.accepted += before - self.records.len();
+        self.group();
+    }
+
+    fn group(&mut self) {
+        let owner = |record: &FindingRecord| {
+            let mut hasher = DefaultHasher::new();
+            self.owner(record).hash(&mut hasher);
+            hasher.finish()
+        };
+        self.features = lamp_supports::features(&self.records, owner);
+    }
+
     /// Returns the number of features that need a person.
     pub fn count(&self) -> usize {
         self.features.iter().filter(|feature| feature.severity != Severity::Note).count()

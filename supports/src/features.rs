@@ -61,31 +61,33 @@ const NEAR_PX: u32 = 2;
 /// Groups findings into features, in the order of the findings that name them.
 ///
 /// A weak joint or an overhang belongs to an island if it is within its layers, up to the second above
-/// the joining one, and its box is near the box of all that floats. An overhang belongs to a weak joint
-/// of one of its layers near it.
+/// the last, its box is near the box of all that floats, and it is no larger than the island's largest
+/// area. An overhang belongs to a weak joint of one of its layers near it that is no smaller.
 ///
-/// Findings are alike if they are of one kind and equal in size: boxes to within 2 pixels, turned or
+/// Findings are alike if they belong to the same, such as one part of a build, by `owner`; if they are of
+/// one kind; if islands float for as long and all join or none does, and if joints rest on as large a share,
+/// to within half; and if they are equal in size: boxes to within 2 pixels, turned or
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
 /// are less than a quarter. Overhangs are alike if they reach as far, to within a quarter or 2 pixels, over
-/// as many layers, to within a quarter or 2 layers: rows of pins and holes.
-pub fn features(records: &[FindingRecord]) -> Vec<Feature> {
+/// as many layers, to within a quarter or 2 layers, and none is twice as large as the first: rows of pins
+/// and holes. Copies that differ are alike if the first differs at most four times as much.
+pub fn features(records: &[FindingRecord], owner: impl Fn(&FindingRecord) -> u64) -> Vec<Feature> {
     let places = Places::of(records);
     let mut features: Vec<Feature> = Vec::new();
     // The feature that a finding names, or is one of the like.
     let mut named: HashMap<usize, usize> = HashMap::new();
     let mut followers = Vec::new();
-    let mut kinds: HashMap<(&str, [u32; 2]), Vec<usize>> = HashMap::new();
+    let mut kinds: HashMap<(&str, u64, [u32; 2]), Vec<usize>> = HashMap::new();
     for (at, record) in records.iter().enumerate() {
         if let Some(leader) = places.leader(at) {
             followers.push((leader, at));
             continue;
         }
-        let size = Size::of(record);
-        let near = size
-            .as_ref()
-            .into_iter()
-            .flat_map(Size::keys)
-            .flat_map(|key| kinds.get(&(record.kind(), key)).map_or(&[][..], Vec::as_slice));
+        let (size, owner) = (Size::of(record), owner(record));
+        let near =
+            size.as_ref().into_iter().flat_map(Size::keys).flat_map(|key| {
+                kinds.get(&(record.kind(), owner, key)).map_or(&[][..], Vec::as_slice)
+            });
         let like = near.copied().find(|&feature: &usize| {
             let other = Size::of(&records[features[feature].finding]);
             size.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| a.is_like(b))
@@ -96,7 +98,7 @@ pub fn features(records: &[FindingRecord]) -> Vec<Feature> {
             continue;
         }
         if let Some(size) = size {
-            kinds.entry((record.kind(), size.key())).or_default().push(features.len());
+            kinds.entry((record.kind(), owner, size.key())).or_default().push(features.len());
         }
         named.insert(at, features.len());
         let severity = Severity::of(record);
@@ -182,7 +184,9 @@ impl<'a> Places<'a> {
                     FindingRecord::Island(island) => has(island, record),
                     FindingRecord::WeakJoint(joint) => {
                         let [first, last] = record.layers();
-                        is_overhang && (first..=last).contains(&joint.layer.layer)
+                        is_overhang
+                            && (first..=last).contains(&joint.layer.layer)
+                            && area_px(record) <= joint.area.area_px
                     }
                     _ => false,
                 });
@@ -230,8 +234,17 @@ impl<'a> Places<'a> {
 fn has(island: &IslandRecord, record: &FindingRecord) -> bool {
     let [first, last] = record.layers();
     let begins = island.layer.layer;
-    let ends = island.joins.map_or(u32::MAX, |layer| layer.saturating_add(2));
-    last >= begins && first <= ends
+    let ends = island.last_layer.saturating_add(3);
+    last >= begins && first <= ends && area_px(record) <= island.largest_px
+}
+
+/// Returns the area of a weak joint or an overhang.
+fn area_px(record: &FindingRecord) -> u64 {
+    match record {
+        FindingRecord::WeakJoint(joint) => joint.area.area_px,
+        FindingRecord::Overhang(overhang) => overhang.area.area_px,
+        _ => 0,
+    }
 }
 
 /// The size of a finding, to compare.
@@ -241,6 +254,11 @@ struct Size {
     layers: u32,
     /// Pixels in all layers.
     amount: f64,
+    /// How much of the amount another may have more or less.
+    may_differ: f64,
+    /// The share in percent on which a weak joint rests.
+    share: f64,
+    joins: bool,
     is_overhang: bool,
 }
 
@@ -255,8 +273,8 @@ impl Size {
             | FindingRecord::Cup(pocket)
             | FindingRecord::Sealed(pocket)
             | FindingRecord::Narrow(pocket) => pocket.volume_px,
-            // Copies that differ are alike, such as by their serial numbers.
-            FindingRecord::CopyDiffers(_) => 0,
+            // Copies differ alike by their serial numbers.
+            FindingRecord::CopyDiffers(copy) => copy.differing_px,
             _ => return None,
         };
         let [left, right, top, bottom] = record.box_px()?;
@@ -269,9 +287,20 @@ impl Size {
         if let Some(reach) = reach {
             sides = [reach.round() as u32, 0];
         }
-        let [first, last] = record.layers();
+        let [first, mut last] = record.layers();
+        let (mut joins, mut share, mut may_differ) = (false, 0.0, 0.05);
+        match record {
+            FindingRecord::Island(island) => {
+                (last, joins) = (island.last_layer.max(first), island.joins.is_some());
+            }
+            FindingRecord::WeakJoint(joint) => share = joint.support_percent,
+            FindingRecord::Overhang(_) => may_differ = 1.0,
+            FindingRecord::CopyDiffers(_) => may_differ = 0.75,
+            _ => {}
+        }
         let (layers, amount) = (last.saturating_sub(first) + 1, amount as f64);
-        Some(Self { sides, layers, amount, is_overhang: reach.is_some() })
+        let is_overhang = reach.is_some();
+        Some(Self { sides, layers, amount, may_differ, share, joins, is_overhang })
     }
 
     /// Returns the square of a grid of sizes in which it is. Overhangs are in one: their leaders are few,
@@ -290,13 +319,19 @@ impl Size {
     fn is_like(&self, other: &Self) -> bool {
         if self.is_overhang {
             let near = |a: u32, b: u32| a.abs_diff(b) <= NEAR_PX.max(a.max(b) / 4);
-            return near(self.sides[0], other.sides[0]) && near(self.layers, other.layers);
+            // The other one came first.
+            let is_larger = self.amount > 2.0 * other.amount;
+            return near(self.sides[0], other.sides[0])
+                && near(self.layers, other.layers)
+                && !is_larger;
         }
         let sides = self.sides.iter().zip(other.sides).all(|(a, b)| a.abs_diff(b) <= NEAR_PX);
         let rim = f64::from(2 * (self.sides[0] + self.sides[1])) * f64::from(self.layers);
         let amount = self.amount.max(other.amount);
-        let off = (0.05 * amount).max(rim.min(0.25 * amount));
+        let off = (self.may_differ * amount).max(rim.min(0.25 * amount));
         sides
+            && self.joins == other.joins
+            && (self.share - other.share).abs() <= 0.5 * self.share.max(other.share)
             && self.layers.abs_diff(other.layers) <= 1
             && (self.amount - other.amount).abs() <= off
     }
@@ -331,6 +366,8 @@ mod tests {
             bounds: bounds(box_px),
             floating_box_px: box_px,
             floating_px: 1000 * number,
+            largest_px: 100 * number,
+            last_layer: joins - 1,
             joins: Some(joins),
             into: Some(into),
             ..IslandRecord::default()
@@ -338,7 +375,7 @@ mod tests {
     }
 
     fn joint(at: u32, box_px: [u32; 4]) -> FindingRecord {
-        let area = AreaRecord { area_px: 500, area_mm2: None };
+        let area = AreaRecord { area_px: 90, area_mm2: None };
         let (layer, bounds) = (layer(at), bounds(box_px));
         FindingRecord::WeakJoint(JointRecord { layer, bounds, area, ..JointRecord::default() })
     }
@@ -377,7 +414,7 @@ mod tests {
             joint(60, [100, 200, 100, 200]),
             overhang([16, 18], [231, 238, 100, 104]),
         ];
-        let found = features(&records);
+        let found = features(&records, |_| 0);
         let groups: Vec<_> = found.iter().map(|f| (f.finding, f.with.clone())).collect();
         // A joint beside no island, and one far above, are features of their own.
         assert_eq!(groups, [(0, vec![1, 2, 4, 7]), (3, vec![]), (5, vec![]), (6, vec![])]);
@@ -397,11 +434,52 @@ mod tests {
             cup([10, 30], [120, 160, 0, 10], 6500),
             cup([10, 30], [0, 10, 120, 160], 6500),
         ];
-        let found = features(&records);
+        let found = features(&records, |_| 0);
         let alike: Vec<_> = found.iter().map(|f| (f.finding, f.alike.clone())).collect();
         assert_eq!(alike, [(0, vec![1, 2]), (3, vec![]), (4, vec![5])]);
         assert!(found[0].text(&records).ends_with("; and 2 more like it"));
-        assert_eq!(features(&[]), []);
+        assert_eq!(features(&[], |_| 0), []);
+    }
+
+    #[test]
+    fn what_is_worse_has_its_own_line() {
+        let part = Joined::Part(PartWord::Part);
+        let loose = |number| match island(number, 10, 40, part, [0, 9, 0, 9]) {
+            FindingRecord::Island(island) => {
+                FindingRecord::Island(IslandRecord { joins: None, into: None, ..island })
+            }
+            _ => unreachable!(),
+        };
+        let wide = |area_px| match overhang([12, 12], [0, 9, 0, 9]) {
+            FindingRecord::Overhang(overhang) => {
+                let area = AreaRecord { area_px, area_mm2: None };
+                FindingRecord::Overhang(OverhangRecord { area, ..overhang })
+            }
+            _ => unreachable!(),
+        };
+        let resting = |support_percent| match joint(70, [0, 9, 0, 9]) {
+            FindingRecord::WeakJoint(joint) => {
+                FindingRecord::WeakJoint(JointRecord { support_percent, ..joint })
+            }
+            _ => unreachable!(),
+        };
+        for [a, b] in [
+            // One never joins.
+            [island(1, 10, 40, part, [0, 9, 0, 9]), loose(1)],
+            // An overhang larger than the island, or beyond its end, is not the island's.
+            [island(1, 10, 40, part, [0, 9, 0, 9]), wide(101)],
+            [island(1, 2, 8, part, [0, 9, 0, 9]), wide(40)],
+            [wide(40), wide(81)],
+            [resting(20.0), resting(9.0)],
+        ] {
+            let records = [a, b];
+            assert_eq!(features(&records, |_| 0).len(), 2, "{records:?}");
+        }
+        let alike = [wide(40), wide(79)];
+        assert_eq!(features(&alike, |_| 0).len(), 1);
+        // Of two parts.
+        let owner = |record: &FindingRecord| u64::from(*record == alike[0]);
+        assert_eq!(features(&alike, owner).len(), 2);
     }
 
     #[test]
@@ -413,7 +491,7 @@ mod tests {
             island(3, 5, 9, Joined::Island(77), [40, 49, 0, 9]),
             joint(6, [0, 50, 0, 9]),
         ];
-        let found = features(&records[2..]);
+        let found = features(&records[2..], |_| 0);
         let mut all: Vec<usize> =
             found.iter().flat_map(|f| [&[f.finding], &f.with[..], &f.alike].concat()).collect();
         all.sort_unstable();

@@ -31,15 +31,15 @@ mod support;
 pub use check::{
     CheckError, CheckOptions, Disagreements, Findings, Island, IslandEnd, IslandMinimum,
     LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketEffect, PocketKind,
-    Region, WeakJoint, check, check_build, component_at, inner_components, inner_components_beyond,
+    Region, WeakJoint, check, check_build, component_at, components_beyond, inner_components,
 };
 pub use features::{Feature, Severity, features};
 pub use orient::{Pose, PoseFacts, PoseLimits, measure, pareto, poses};
 pub use record::{
-    AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord,
-    FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace,
-    LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord, PocketRecord,
-    PointRecord, Scale, Shown, StrayRowsRecord, records,
+    AcceptedFindings, AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord,
+    EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined,
+    JointRecord, LayerPlace, LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord,
+    PocketRecord, PointRecord, Scale, Shown, StrayRowsRecord, records,
 };
 pub use support::{
     HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, SupportShare, Surface,

@@ -361,6 +361,15 @@ fn a_build_is_judged_by_one_copy_of_each_part() {
     };
     let [[volume, layer], of_build] = [cup(&part), cup(&build)];
     assert_eq!(of_build, [volume, layer + 5]);
+    // What a person has seen is left out, and the rest is not.
+    let seen = scratch.run("lamp check build.tif --accept r.json --strict").succeeds();
+    let line = String::from_utf8(seen.stdout).unwrap();
+    assert!(line.contains("no findings") && line.contains(" accepted"), "{line}");
+    let one = "lamp check build.tif --only islands --report one.json";
+    scratch.run(one).succeeds();
+    let new = scratch.run("lamp check build.tif --accept one.json --only islands,pockets --strict");
+    assert_eq!(new.statuses, [Some(3)], "{new:?}");
+    scratch.run("lamp check build.tif --accept mug.tif").is_refused_with(&["mug.tif"]);
     // A copy that lacks a few pixels in a layer is named.
     let mut layers = scratch.layers("build.tif");
     let parts = layers[0].info.stack.as_ref().unwrap().built_parts().unwrap();

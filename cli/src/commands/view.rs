@@ -196,7 +196,7 @@ fn find(
         progress.one_done();
         Ok::<_, Exit>(layer)
     };
-    let build = headers[0].info.stack.as_ref().and_then(BuildCopies::of);
+    let build = BuildCopies::of(&headers[0].info, headers[0].size);
     let found = CheckSettings::default().find(build, pages, decode, None)?;
     let lines =
         found.features.iter().map(|feature| (&found.records[feature.finding], found.text(feature)));

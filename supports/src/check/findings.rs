@@ -59,6 +59,8 @@ pub struct Island {
     pub largest_area: u64,
     /// The first layer that has them.
     pub largest_layer: u32,
+    /// The last layer in which it floats.
+    pub last_layer: u32,
     /// How it ends.
     pub end: IslandEnd,
 }
@@ -333,6 +335,7 @@ impl Findings {
         let raised = |mut island: Island| {
             island.layer += base;
             island.largest_layer += base;
+            island.last_layer += base;
             match &mut island.end {
                 IslandEnd::Loose => {}
                 IslandEnd::JoinsPart { layer } | IslandEnd::JoinsIsland { layer, .. } => {

@@ -105,6 +105,7 @@ impl Growth {
             floating_pixels_um: 0.0,
             largest_area: 0,
             largest_layer: layer,
+            last_layer: layer,
             end: IslandEnd::Loose,
         };
         ImageBody::Floating(Floating {
@@ -177,6 +178,7 @@ impl Floating {
         self.weight.grow(layer, components, thickness_um);
         let area: u64 = components.iter().map(|&c| layer.components.all[c as usize].area).sum();
         let island = &mut self.island;
+        island.last_layer = number;
         for &component in components {
             island.floating_region.unite(&layer.components.all[component as usize].region());
         }

@@ -265,12 +265,24 @@ pub fn component_at(mask: &Mask, column: u32, row: u32) -> Vec<(u32, Range<u32>)
 
 /// Returns a mask of the components of a color that do not touch the image's border.
 pub fn inner_components(mask: &Mask, white: bool) -> Mask {
-    inner_where(mask, &Components::of(mask), white, |_| true)
+    let components = Components::of(mask);
+    let [width, height] = [mask.width(), mask.height()];
+    let is_inner: Vec<bool> = components
+        .all
+        .iter()
+        .map(|component| {
+            let inside = |range: &Range<u32>, size: u32| range.start > 0 && range.end < size;
+            component.is_white == white
+                && inside(&component.columns, width)
+                && inside(&component.rows, height)
+        })
+        .collect();
+    components_where(mask, &components, &is_inner)
 }
 
-/// Returns a mask of the white components that do not touch the image's border, and are not wholly
-/// within the white of `cover`, an image of the same size.
-pub fn inner_components_beyond(mask: &Mask, cover: &Mask) -> Mask {
+/// Returns a mask of the white components that are not wholly within the white of `cover`, an image of
+/// the same size.
+pub fn components_beyond(mask: &Mask, cover: &Mask) -> Mask {
     let mut beyond = Vec::new();
     let components = Components::of(mask);
     let mut is_beyond = vec![false; components.all.len()];
@@ -281,39 +293,26 @@ pub fn inner_components_beyond(mask: &Mask, cover: &Mask) -> Mask {
             is_beyond[components.at(mask, start, row) as usize] = true;
         }
     }
-    inner_where(mask, &components, true, |component| is_beyond[component])
+    components_where(mask, &components, &is_beyond)
 }
 
-fn inner_where(
-    mask: &Mask,
-    components: &Components,
-    white: bool,
-    wanted: impl Fn(usize) -> bool,
-) -> Mask {
-    let [width, height] = [mask.width(), mask.height()];
-    let is_inner: Vec<bool> = components
-        .all
-        .iter()
-        .enumerate()
-        .map(|(number, component)| {
-            let inside = |range: &Range<u32>, size: u32| range.start > 0 && range.end < size;
-            component.is_white == white
-                && wanted(number)
-                && inside(&component.columns, width)
-                && inside(&component.rows, height)
-        })
-        .collect();
-    let mut inner = MaskBuilder::new(width);
+/// Returns a mask of some components.
+fn components_where(mask: &Mask, components: &Components, wanted: &[bool]) -> Mask {
+    let mut chosen = MaskBuilder::new(mask.width());
     let mut row = Vec::new();
     for (number, transitions) in (0..).zip(mask.rows()) {
-        // A segment that is inner ends before the border, at a transition.
-        let segments = components.of_row(number).iter().enumerate().skip(1);
-        let inner_ones = segments.filter(|(_, label)| is_inner[**label as usize]);
         row.clear();
-        row.extend(inner_ones.flat_map(|(k, _)| [transitions[k - 1], transitions[k]]));
-        inner.push_row(&row).expect("segments of one color do not touch");
+        for (segment, label) in components.of_row(number).iter().enumerate() {
+            // Some black has no component.
+            if wanted.get(*label as usize).is_some_and(|wanted| *wanted) {
+                // The first segment begins at the left border, and the last ends at the right one.
+                row.push(if segment == 0 { 0 } else { transitions[segment - 1] });
+                row.extend(transitions.get(segment));
+            }
+        }
+        chosen.push_row(&row).expect("segments of one color do not touch");
     }
-    inner.finish()
+    chosen.finish()
 }
 
 /// A layer, labeled.

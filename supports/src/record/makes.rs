@@ -65,6 +65,7 @@ impl IslandRecord {
             floating_box_px: scale.bounds(&island.floating_region).box_px,
             floating_px: island.floating_pixels,
             floating_mm3: scale.volume_mm3(island.floating_pixels_um),
+            last_layer: scale.layer(island.last_layer).layer,
             joins: joins.map(|layer| scale.layer(layer).layer),
             into,
             largest_px: island.largest_area,

@@ -2,6 +2,7 @@
 //!
 //! A kind of findings is a variant of [`FindingRecord`]; its name, text and JSON are here.
 
+mod accepted;
 mod makes;
 mod places;
 mod scale;
@@ -12,6 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::check::{PocketEffect, Region};
 
+pub use accepted::AcceptedFindings;
 pub use makes::records;
 pub use places::{AreaRecord, BoxRecord, LayerPlace, LayerSpan, PointRecord};
 pub use scale::Scale;
@@ -144,6 +146,8 @@ pub struct IslandRecord {
     pub floating_px: u64,
     /// Their volume.
     pub floating_mm3: Option<f64>,
+    /// The last layer in which it floats.
+    pub last_layer: u32,
     /// The layer in which it joins.
     pub joins: Option<u32>,
     /// The body that it joins.
@@ -427,7 +431,7 @@ mod tests {
             text,
             "{\"kind\":\"island\",\"number\":3,\"layer\":80,\"z_mm\":8.0,\"at_mm\":null,\
              \"at_px\":[0.0,0.0],\"box_mm\":null,\"box_px\":[0,0,0,0],\"area_px\":0,\
-             \"area_mm2\":null,\"floating_box_px\":[0,0,0,0],\"floating_px\":0,\"floating_mm3\":null,\"joins\":82,\
+             \"area_mm2\":null,\"floating_box_px\":[0,0,0,0],\"floating_px\":0,\"floating_mm3\":null,\"last_layer\":0,\"joins\":82,\
              \"into\":\"part\",\"largest_px\":0,\"largest_mm2\":null,\"largest_layer\":0,\
              \"drag_mn\":null}"
         );

@@ -4,9 +4,9 @@ use std::fmt;
 
 use super::places::{area_text, length_text, significant, volume_text};
 use super::{
-    CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup, FindingRecord,
-    FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan, MinimumRecord,
-    OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
+    BoxRecord, CopyRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingGroup,
+    FindingRecord, FoundPixels, IslandRecord, Joined, JointRecord, LayerPlace, LayerSpan,
+    MinimumRecord, OffBalanceRecord, OverhangRecord, PocketRecord, Shown,
 };
 
 impl FindingRecord {
@@ -119,20 +119,47 @@ impl FindingRecord {
         }
     }
 
-    /// Returns the rectangle around it in pixels, as in [`BoxRecord`](super::BoxRecord).
-    pub fn box_px(&self) -> Option<[u32; 4]> {
+    /// Returns the height of the bottom of its first layer.
+    pub fn z_mm(&self) -> Option<f64> {
         match self {
-            Self::Island(island) => Some(island.bounds.box_px),
-            Self::WeakJoint(joint) => Some(joint.bounds.box_px),
+            Self::Island(island) => island.layer.z_mm,
+            Self::MinimumWithoutIsland(minimum) => Some(minimum.z_mm),
+            Self::IslandWithoutMinimum(island) => island.layer.z_mm,
+            Self::WeakJoint(joint) => joint.layer.z_mm,
             Self::Trap(pocket)
             | Self::Cup(pocket)
             | Self::Sealed(pocket)
-            | Self::Narrow(pocket) => Some(pocket.bounds.box_px),
-            Self::Overhang(overhang) => Some(overhang.bounds.box_px),
-            Self::OffBalance(off) => Some(off.base_box_px),
-            Self::CopyDiffers(copy) => Some(copy.bounds.box_px),
+            | Self::Narrow(pocket) => pocket.layers.z_mm,
+            Self::Overhang(overhang) => overhang.layers.z_mm,
+            Self::OffBalance(off) => off.layer.z_mm,
+            Self::StrayRows(rows) => rows.layers.z_mm,
+            Self::CopyDiffers(copy) => copy.layers.z_mm,
+            Self::Border(border) => border.layers.z_mm,
+            Self::Empty(empty) => empty.layers.z_mm,
+        }
+    }
+
+    /// Returns the rectangle around it, if it has a place.
+    pub fn bounds(&self) -> Option<BoxRecord> {
+        match self {
+            Self::Island(island) => Some(island.bounds.clone()),
+            Self::WeakJoint(joint) => Some(joint.bounds.clone()),
+            Self::Trap(pocket)
+            | Self::Cup(pocket)
+            | Self::Sealed(pocket)
+            | Self::Narrow(pocket) => Some(pocket.bounds.clone()),
+            Self::Overhang(overhang) => Some(overhang.bounds.clone()),
+            Self::OffBalance(off) => {
+                Some(BoxRecord { box_mm: off.base_box_mm, box_px: off.base_box_px })
+            }
+            Self::CopyDiffers(copy) => Some(copy.bounds.clone()),
             _ => None,
         }
+    }
+
+    /// Returns the rectangle around it in pixels, as in [`BoxRecord`].
+    pub fn box_px(&self) -> Option<[u32; 4]> {
+        self.bounds().map(|bounds| bounds.box_px)
     }
 
     /// Returns the column and the row of a point within it.

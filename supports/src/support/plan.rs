@@ -214,8 +214,11 @@ impl<'a> SupportPlanner<'a> {
                 break;
             }
             // As many more pieces as are missing, and some more at the edges.
-            let finer = 0.95 * hold.min(extent(runs)) * (covered as f64 / asked).sqrt();
-            hold = finer.max(narrowest);
+            // The cells are as many as the extent has room for, so they are smaller than asked.
+            let cells = (extent(runs) / hold).ceil().max(1.0);
+            let cell = extent(runs) / cells;
+            let finer = 0.95 * cell * (covered as f64 / asked).sqrt();
+            hold = finer.min(extent(runs) / (cells + 0.5)).max(narrowest);
         }
         let (covered, places) = best.ok_or(SupportError::TooMany)?;
         let supports = places.iter().filter_map(|place| place.supports.first());

@@ -7,13 +7,15 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_machine::Machine;
 use lamp_slicer::SliceError;
 use lamp_slicer::topology::CornerTable;
-use lamp_stack::{Layer, Page};
+use lamp_stack::{Layer, Page, one_line};
 use lamp_supports::{
-    CheckError, Disagreements, Feature, FindingGroup, Findings, IslandMinimum, LoneMinimum,
+    AcceptedFindings, CheckError, Disagreements, Feature, FindingGroup, Findings, IslandMinimum,
+    LoneMinimum,
 };
 
 use crate::args::options::{Common, parse_layers, parse_memory};
@@ -49,6 +51,7 @@ Examples:
   lamp check blade.stl --rotate x:180 --evidence pictures/
   slice blade.stl | fix | lamp check --strict
   lamp check night/*.tif --only islands,pockets --report check.json
+  lamp check blade.tif --accept check.json --strict
 
 Exit status: 0 if the work is done, even with findings; 3 with --strict if there are any.")]
 pub(crate) struct CheckArgs {
@@ -68,6 +71,11 @@ pub(crate) struct CheckArgs {
     /// that rest on nothing white in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
+
+    /// Leave out findings that are in this report of an earlier check: the same kind at the same
+    /// place, to within a millimeter
+    #[arg(long, value_name = "FILE.json")]
+    accept: Option<PathBuf>,
 
     /// Replace a folder of pictures that an earlier run wrote
     #[arg(long)]
@@ -102,8 +110,12 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     check_slicing(&slicing, &args.inputs, Some(&machine))?;
     let evidence = args.evidence.as_deref().map(|folder| new_folder(folder, args.force));
     let evidence = evidence.transpose()?;
+    let accepted = args.accept.as_deref().map(read_accepted).transpose()?;
     let checked = args.inputs.iter().map(|path| {
-        let checked = args.checked(path, &machine, common)?;
+        let mut checked = args.checked(path, &machine, common)?;
+        if let Some(accepted) = &accepted {
+            checked.found.accept(accepted);
+        }
         print(&printed(&checked.name, &checked.found, common.verbose))?;
         Ok(checked)
     });
@@ -121,6 +133,17 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         found => Some(format!("{found} findings")),
     };
     found.filter(|_| args.strict).map_or(Ok(()), |found| Err(Exit::Findings(found)))
+}
+
+/// Reads the findings of an earlier report.
+fn read_accepted(path: &Path) -> Result<AcceptedFindings, Exit> {
+    let name = input_name(path);
+    let text = std::fs::read_to_string(path).with_context(|| name.clone())?;
+    AcceptedFindings::from_json(&text).map_err(|error| {
+        let problem =
+            format!("this is no report of lamp check --report: {}", one_line(&error.to_string()));
+        Exit::Failed(anyhow!(problem)).at(name)
+    })
 }
 
 impl CheckArgs {
@@ -281,13 +304,21 @@ fn printed(name: &str, found: &Found, all: bool) -> String {
         1 => "1 finding".to_owned(),
         count => format!("{count} findings"),
     };
-    let mut text = format!("{}: {layers}, {count}{specks}\n", printable(name));
+    let accepted = match found.accepted {
+        0 => String::new(),
+        accepted => format!(", {accepted} accepted"),
+    };
+    let mut text = format!("{}: {layers}, {count}{specks}{accepted}\n", printable(name));
     let name_of = |feature: &Feature| found.records[feature.finding].name();
     for of_kind in found.features.chunk_by(|a, b| name_of(a) == name_of(b)) {
         let name = name_of(&of_kind[0]);
         let shown = if all { of_kind.len() } else { of_kind.len().min(MOST_LINES) };
         for feature in &of_kind[..shown] {
             text += &format!("  {name}: {}\n", found.text(feature));
+            for &at in feature.with.iter().chain(&feature.alike).filter(|_| all) {
+                let record = &found.records[at];
+                text += &format!("    {}: {record}\n", record.name());
+            }
         }
         if shown < of_kind.len() {
             let left = of_kind.len() - shown;

@@ -31,6 +31,7 @@ pub(super) fn write_report(
             "dpi": findings.dpi.map(lamp_stack::Dpi::get),
             "findings": checked.found.count(),
             "specks": findings.specks.count(),
+            "accepted": checked.found.accepted,
             "left_out": left_out(findings),
         })
     });

@@ -59,7 +59,7 @@ impl StackReport {
                 clock.borrow_mut().add(&layer.info, layer.dpi, size, &layer.image);
             }
         });
-        let build = headers[0].info.stack.as_ref().and_then(BuildCopies::of);
+        let build = BuildCopies::of(&headers[0].info, headers[0].size);
         let found = match CheckSettings::default().find(build, &mut layers, Ok, machine) {
             Ok(found) => Ok(found),
             // A stack that cannot be checked still has numbers and pictures.

@@ -187,7 +187,7 @@ impl Page {
     }
 
     /// Returns the width and height in pixels of the upright image.
-    pub(crate) fn size(&self) -> [u32; 2] {
+    pub fn size(&self) -> [u32; 2] {
         let (width, height) = (self.width, self.layout.page_height);
         if self.orientation.is_across() { [height, width] } else { [width, height] }
     }
