@@ -69,7 +69,7 @@ const NEAR_PX: u32 = 2;
 /// to within half; and if they are equal in size: boxes to within 2 pixels, turned or
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
 /// are less than a quarter. Overhangs are alike if they reach as far, to within a quarter or 2 pixels, over
-/// as many layers, to within a quarter or 2 layers, and none is twice as large as the first: rows of pins
+/// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
 /// and holes. Copies that differ are alike if the first differs at most four times as much.
 pub fn features(records: &[FindingRecord], owner: impl Fn(&FindingRecord) -> u64) -> Vec<Feature> {
     let places = Places::of(records);
@@ -320,7 +320,7 @@ impl Size {
         if self.is_overhang {
             let near = |a: u32, b: u32| a.abs_diff(b) <= NEAR_PX.max(a.max(b) / 4);
             // The other one came first.
-            let is_larger = self.amount > 2.0 * other.amount;
+            let is_larger = self.amount > 2.5 * other.amount;
             return near(self.sides[0], other.sides[0])
                 && near(self.layers, other.layers)
                 && !is_larger;
@@ -469,13 +469,13 @@ mod tests {
             // An overhang larger than the island, or beyond its end, is not the island's.
             [island(1, 10, 40, part, [0, 9, 0, 9]), wide(101)],
             [island(1, 2, 8, part, [0, 9, 0, 9]), wide(40)],
-            [wide(40), wide(81)],
+            [wide(40), wide(101)],
             [resting(20.0), resting(9.0)],
         ] {
             let records = [a, b];
             assert_eq!(features(&records, |_| 0).len(), 2, "{records:?}");
         }
-        let alike = [wide(40), wide(79)];
+        let alike = [wide(40), wide(99)];
         assert_eq!(features(&alike, |_| 0).len(), 1);
         // Of two parts.
         let owner = |record: &FindingRecord| u64::from(*record == alike[0]);
