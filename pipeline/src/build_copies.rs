@@ -24,7 +24,7 @@ struct PlacedPart {
     copies: Vec<(Frame, Orientation)>,
 }
 
-/// What something on a build belongs to.
+/// The owner of a place on a build.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum OnBuild {
     /// A part, of which there are so many copies.
@@ -43,15 +43,15 @@ pub enum OnBuild {
 pub struct DividedLayer {
     /// Each part alone, in the place of its first copy; none below the parts.
     pub parts: Option<Mask>,
-    /// The copies that are not as the others of their part: the numbers of both, from 0, and by how
-    /// many pixels they differ.
+    /// The copies that differ from most of the others: the numbers of the part and the copy, from 0,
+    /// and the pixels.
     pub differing: Vec<([usize; 2], u64)>,
 }
 
 impl BuildCopies {
     /// Returns the copies of a build, given its first page and the size of its images.
     ///
-    /// Returns none if copies cannot be told apart, so that the stack is checked as it stands: if it
+    /// Returns none if copies cannot be separated, so that the stack is checked as it stands: if it
     /// is no build, a strip or a field of one, or a range without the layers below the parts, if the
     /// record is of another form, or if frames overlap or leave the image.
     pub fn of(info: &PageInfo, [width, height]: [u32; 2]) -> Option<Self> {
@@ -166,7 +166,7 @@ impl BuildCopies {
                     missing.map_or(0, |missing| missing.white_pixels())
                 })
                 .collect();
-            // What most copies lack, the others have too much.
+            // White that most copies lack is too much in the others.
             let lacking = missing.iter().filter(|&&pixels| pixels > 0).count();
             let most = missing.iter().copied().max().unwrap_or(0);
             let is_surplus = 2 * lacking > missing.len();
@@ -278,7 +278,7 @@ mod tests {
         assert_eq!(copies(0).owner([5, 15, 5, 13]), part);
         assert_eq!(copies(0).owner([31, 33, 14, 15]), part);
         assert_eq!(copies(0).owner([31, 39, 14, 15]), OnBuild::Mesh);
-        // Copies that are cut off, or are not there, are not told apart.
+        // Copies that are cut off, or are not there, are not separated.
         assert_eq!(copies_on(0, [37, 40]), None);
         assert_eq!(BuildCopies::of(&PageInfo::default(), [60, 40]), None);
     }

@@ -259,7 +259,7 @@ impl CheckSettings {
 /// For each copy that differs: the indices of its first and last layer, and its pixels.
 type DifferingCopies = BTreeMap<[usize; 2], ([u32; 2], u64)>;
 
-/// What a check found.
+/// The result of a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Findings by kind.

@@ -206,7 +206,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Returns the island that an island joins at last, among those that are listed.
+    /// Returns the listed island that an island joins at last.
     fn root(&self, mut at: usize) -> Option<usize> {
         for _ in 0..self.islands.len() {
             let Some(Joined::Island(number)) = island_of(&self.records[at])?.into else { break };
@@ -484,7 +484,7 @@ mod tests {
 
     #[test]
     fn every_finding_is_in_one_feature() {
-        // Islands may join those that are not listed, or, in a damaged report, each other.
+        // Islands may join unlisted ones, or, in a damaged report, each other.
         let records = [
             island(1, 5, 9, Joined::Island(2), [0, 9, 0, 9]),
             island(2, 5, 9, Joined::Island(1), [20, 29, 0, 9]),

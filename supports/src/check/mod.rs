@@ -148,8 +148,8 @@ where
 /// where only islands are looked for, and its parts, which stand on their own first layer.
 ///
 /// `parts` returns the parts of a layer to judge, alone, pixel by pixel where the layer has them; none
-/// below the parts. It is called once all layers before have been decoded. The parts' findings are none
-/// if no layer has parts.
+/// below the parts. It is called once all layers before have been decoded. If no layer has parts,
+/// only the whole has findings.
 ///
 /// # Errors
 /// Returns the first error of the layers, or one if layers cannot be compared.
@@ -209,7 +209,7 @@ impl<'a> Pass<'a> {
         Self { options, checker: None, last: None }
     }
 
-    /// Adds layers that follow each other, without those that have nothing to check.
+    /// Adds layers that follow each other; a layer that has nothing to check is left out.
     fn add(&mut self, batch: Vec<Option<Layer>>) -> Result<(), CheckError> {
         let options = self.options;
         let labelled = batch

@@ -49,7 +49,7 @@ pub enum FindingRecord {
     Overhang(OverhangRecord),
     /// A body whose center of gravity leaves its base.
     OffBalance(OffBalanceRecord),
-    /// A copy that is not as the first of its part.
+    /// A copy that differs from the others of its part.
     CopyDiffers(CopyRecord),
     /// White at the border of images.
     Border(BorderRecord),
@@ -320,7 +320,7 @@ pub struct OffBalanceRecord {
     pub base_box_px: [u32; 4],
 }
 
-/// A copy of a part on a build that is not as the first copy.
+/// A copy of a part on a build that differs from most of the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CopyRecord {

@@ -238,8 +238,8 @@ impl fmt::Display for FindingRecord {
             Self::CopyDiffers(CopyRecord { layers, part, copy, copies, differing_px, .. }) => {
                 write!(
                     f,
-                    "{part} {copy} of {copies} is not as the first in {layers}: {differing_px} pixels \
-                 differ, and only the first was checked"
+                    "{part} {copy} of {copies} differs from the other copies in {layers}, by \
+                     {differing_px} pixels; it was not checked by itself"
                 )
             }
             Self::Border(border) => {
