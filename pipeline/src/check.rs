@@ -175,7 +175,7 @@ impl CheckSettings {
         found
     }
 
-    /// Finds what there is in a build: in the first copy of each part alone, and islands of its mesh.
+    /// Finds what there is in a build: in each part alone, once for all copies, and islands of its mesh.
     fn find_in_build<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
         &self,
         build: &BuildCopies,

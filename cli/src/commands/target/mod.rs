@@ -9,12 +9,13 @@ use std::path::Path;
 use clap::{Args, Subcommand};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::Intensity;
-use lamp_grayscale::target::TargetError;
+use lamp_grayscale::target::{TargetError, TargetExposure};
 use lamp_pipeline::documents::document;
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Dpi, Layer, Length, PageInfo, StackInfo};
 
 use crate::args::options::{Common, parse_distance};
 use crate::exit::Exit;
+use squares::Doses;
 
 /// Write test images to expose, measure and calibrate with
 #[derive(Args)]
@@ -41,6 +42,36 @@ pub(crate) fn run(args: &TargetArgs, common: &Common) -> Result<(), Exit> {
         Target::Scan(args) => scan::run(args, common),
         Target::Screens(args) => screens::run(args, common),
     }
+}
+
+/// Returns the pages of a target's stack, one for each dose, at a light and a resolution. The pages of
+/// squares have the side of these.
+fn pages(
+    part: String,
+    command: String,
+    doses: &Doses,
+    exposures: Vec<TargetExposure>,
+    (light, dpi): (Intensity, Dpi),
+    feature_px: Option<u32>,
+) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
+    let layers = Some(exposures.len() as u32);
+    let mut stack =
+        Some(StackInfo { part, commands: vec![command], layers, ..StackInfo::default() });
+    let doses: Vec<f64> = doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
+    (0..).zip(exposures.into_iter().zip(doses)).map(move |(index, (exposure, dose))| {
+        let mut info = PageInfo {
+            index,
+            exposure_ms: Some((exposure.dose / light).ms()),
+            stack: stack.take(),
+            ..PageInfo::default()
+        };
+        // The first tile that is white has its whole dose after this page.
+        if let Some(feature) = feature_px {
+            info.other.insert("feature_px".to_owned(), feature.into());
+        }
+        info.other.insert("dose_mj_per_cm2".to_owned(), dose.into());
+        Ok(Layer { info, dpi: Some(dpi), image: exposure.image.into() })
+    })
 }
 
 /// A length in whole pixels, to the nearest.

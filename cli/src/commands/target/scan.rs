@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use lamp_grayscale::calibrate::{LineKind, ScanDirection};
 use lamp_grayscale::resin::Intensity;
-use lamp_grayscale::target::{TargetExposure, scan_lines};
-use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
+use lamp_grayscale::target::scan_lines;
+use lamp_stack::{Destination, Dpi, Format, Length, write_stack};
 
 use super::squares::{Doses, parse_doses};
-use super::{counted, full_white, parse_gap, sorted, whole_pixels};
+use super::{counted, full_white, pages, parse_gap, sorted, whole_pixels};
 use crate::args::options::{Common, parse_light};
 use crate::exit::Exit;
 use crate::streams::{new_folder, write_file, written_to};
@@ -88,7 +88,9 @@ pub(super) fn run(args: &ScanArgs, common: &Common) -> Result<(), Exit> {
     }
     let to = new_folder(&args.output, args.force)?;
     let path = to.path().join("lines.tif");
-    let layers = args.layers(&widths, exposures, light);
+    let part = "lines along and across the scan".to_owned();
+    let command = args.command(&widths, light);
+    let layers = pages(part, command, &args.doses, exposures, (light, args.dpi), None);
     write_stack(layers, Destination::File(path), Format::Big)?;
     write_file(&to.path().join("lines.csv"), |out| out.write_all(table.as_bytes()))?;
     let progress = Progress::new("target", common, true);
@@ -110,33 +112,6 @@ direction,kind,feature_px,dose_mj_per_cm2,cured_um
 ";
 
 impl ScanArgs {
-    fn layers(
-        &self,
-        widths: &[u32],
-        exposures: Vec<TargetExposure>,
-        light: Intensity,
-    ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
-        let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
-        let mut stack = Some(StackInfo {
-            part: "lines along and across the scan".to_owned(),
-            commands: vec![self.command(widths, light)],
-            layers: Some(exposures.len() as u32),
-            ..StackInfo::default()
-        });
-        let dpi = self.dpi;
-        (0..).zip(exposures).map(move |(index, exposure)| {
-            let mut info = PageInfo {
-                index,
-                exposure_ms: Some((exposure.dose / light).ms()),
-                stack: stack.take(),
-                ..PageInfo::default()
-            };
-            // The first block that is white has its whole dose after this page.
-            info.other.insert("dose_mj_per_cm2".to_owned(), doses[index as usize].into());
-            Ok(Layer { info, dpi: Some(dpi), image: exposure.image.into() })
-        })
-    }
-
     fn command(&self, widths: &[u32], light: Intensity) -> String {
         let widths: Vec<String> = widths.iter().map(u32::to_string).collect();
         let doses: Vec<String> = self.doses.0.iter().map(|d| d.mj_per_cm2().to_string()).collect();

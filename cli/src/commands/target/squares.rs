@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_grayscale::target::{TargetExposure, squares};
-use lamp_stack::{Destination, Dpi, Format, Layer, Length, PageInfo, StackInfo, write_stack};
+use lamp_stack::{Destination, Dpi, Format, Length, write_stack};
 
-use super::{counted, full_white, parse_gap, sorted, whole_pixels};
+use super::{counted, full_white, pages, parse_gap, sorted, whole_pixels};
 use crate::args::options::{Common, parse_light};
 use crate::exit::Exit;
 use crate::streams::{new_folder, write_file, written_to};
@@ -81,7 +81,9 @@ pub(super) fn run(args: &SquaresArgs, common: &Common) -> Result<(), Exit> {
             written.expect("a text takes all");
         }
         let path = to.path().join(format!("squares_{size:05}px.tif"));
-        write_stack(args.layers(size, exposures, light), Destination::File(path), Format::Big)?;
+        let (part, command) = (format!("squares of {size} pixels"), args.command(size, light));
+        let layers = pages(part, command, &args.doses, exposures, (light, args.dpi), Some(size));
+        write_stack(layers, Destination::File(path), Format::Big)?;
     }
     write_file(&to.path().join("squares.csv"), |out| out.write_all(table.as_bytes()))?;
     let progress = Progress::new("target", common, true);
@@ -103,35 +105,6 @@ feature_px,dose_mj_per_cm2,cured_um
 ";
 
 impl SquaresArgs {
-    /// The pages of a size's stack.
-    fn layers(
-        &self,
-        size: u32,
-        exposures: Vec<TargetExposure>,
-        light: Intensity,
-    ) -> impl Iterator<Item = Result<Layer, Exit>> + use<> {
-        let doses: Vec<f64> = self.doses.0.iter().map(|dose| dose.mj_per_cm2()).collect();
-        let mut stack = Some(StackInfo {
-            part: format!("squares of {size} pixels"),
-            commands: vec![self.command(size, light)],
-            layers: Some(exposures.len() as u32),
-            ..StackInfo::default()
-        });
-        let dpi = self.dpi;
-        (0..).zip(exposures).map(move |(index, exposure)| {
-            let mut info = PageInfo {
-                index,
-                exposure_ms: Some((exposure.dose / light).ms()),
-                stack: stack.take(),
-                ..PageInfo::default()
-            };
-            // The first square that is white has its whole dose after this page.
-            info.other.insert("feature_px".to_owned(), size.into());
-            info.other.insert("dose_mj_per_cm2".to_owned(), doses[index as usize].into());
-            Ok(Layer { info, dpi: Some(dpi), image: exposure.image.into() })
-        })
-    }
-
     /// The command that makes a size's stack alone.
     fn command(&self, size: u32, light: Intensity) -> String {
         let doses: Vec<String> = self.doses.0.iter().map(|d| d.mj_per_cm2().to_string()).collect();
