@@ -282,7 +282,7 @@ impl Job {
             pitch_um: pages.dpi().pitch().um(),
             full_rows: layout.full_rows(mirrors),
             strobe: scan.strobe,
-            tilt: TiltedMirrors::of(scan, pages.dpi().pitch()),
+            tilt: JobTilt::of(scan, pages.dpi().pitch()),
             sums: JobSums::default(),
             layers: Vec::with_capacity(chosen.len()),
         };
@@ -511,7 +511,7 @@ impl SwathLayout {
         if seam == JobSeam::Gray {
             return Err(GantryError::GraySeam);
         }
-        if let Some(tilt) = TiltedMirrors::of(scan, pitch) {
+        if let Some(tilt) = JobTilt::of(scan, pitch) {
             if !layout.is_plain() {
                 return Err(GantryError::TiltedShares);
             }

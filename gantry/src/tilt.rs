@@ -23,8 +23,17 @@ pub struct TiltedMirrors {
     cos: f64,
 }
 
+impl JobTilt {
+    /// Returns how the display of a machine's scan is turned, if it is, over pixels of a pitch.
+    pub(crate) fn of(scan: &Scan, pitch: Length) -> Option<Self> {
+        let tilt = scan.tilt.as_ref()?;
+        let mirror_pitch_um = tilt.mirror_pitch.unwrap_or(pitch).um();
+        Some(Self { degrees: tilt.degrees, mirror_pitch_um })
+    }
+}
+
 impl TiltedMirrors {
-    /// Returns the mirrors of a display, if they can be: tilted by less than 45 degrees, and so little
+    /// Returns the mirrors of a display, if they can be: tilted by at most 45 degrees, and so little
     /// that its slanted ends are no wider than the way from swath to swath.
     pub fn new(mirrors: [u32; 2], tilt: JobTilt, pitch_um: f64) -> Option<Self> {
         let (sin, cos) = tilt.degrees.to_radians().sin_cos();
@@ -37,13 +46,6 @@ impl TiltedMirrors {
             // More pixels below a mirror than that say that a length is not what was meant.
             && pitch_px <= 1000.0;
         fits.then_some(Self { mirrors, pitch_px, sin, cos })
-    }
-
-    /// Returns the mirrors of a machine's scan over pixels of a pitch, if they are tilted.
-    pub(crate) fn of(scan: &Scan, pitch: Length) -> Option<JobTilt> {
-        let tilt = scan.tilt.as_ref()?;
-        let mirror_pitch_um = tilt.mirror_pitch.unwrap_or(pitch).um();
-        Some(JobTilt { degrees: tilt.degrees, mirror_pitch_um })
     }
 
     /// Returns the columns from swath to swath.

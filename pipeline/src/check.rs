@@ -2,7 +2,6 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::num::{NonZeroU8, NonZeroU32};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -284,11 +283,7 @@ impl Found {
     }
 
     fn group(&mut self) {
-        let owner = |record: &FindingRecord| {
-            let mut hasher = DefaultHasher::new();
-            self.owner(record).hash(&mut hasher);
-            hasher.finish()
-        };
+        let owner = |record: &FindingRecord| self.owner(record);
         self.features = lamp_supports::features(&self.records, owner);
     }
 

@@ -5,6 +5,7 @@
 //! alike are one feature, too, with a count.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -71,23 +72,25 @@ const NEAR_PX: u32 = 2;
 /// are less than a quarter. Overhangs are alike if they reach as far, to within a quarter or 2 pixels, over
 /// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
 /// and holes. Copies that differ are alike if the first differs at most four times as much.
-pub fn features(records: &[FindingRecord], owner: impl Fn(&FindingRecord) -> u64) -> Vec<Feature> {
+pub fn features<K: Clone + Eq + Hash>(
+    records: &[FindingRecord],
+    owner: impl Fn(&FindingRecord) -> K,
+) -> Vec<Feature> {
     let places = Places::of(records);
     let mut features: Vec<Feature> = Vec::new();
     // The feature that a finding names, or is one of the like.
     let mut named: HashMap<usize, usize> = HashMap::new();
     let mut followers = Vec::new();
-    let mut kinds: HashMap<(&str, u64, [u32; 2]), Vec<usize>> = HashMap::new();
+    let mut kinds: HashMap<(&str, K, [u32; 2]), Vec<usize>> = HashMap::new();
     for (at, record) in records.iter().enumerate() {
         if let Some(leader) = places.leader(at) {
             followers.push((leader, at));
             continue;
         }
         let (size, owner) = (Size::of(record), owner(record));
-        let near =
-            size.as_ref().into_iter().flat_map(Size::keys).flat_map(|key| {
-                kinds.get(&(record.kind(), owner, key)).map_or(&[][..], Vec::as_slice)
-            });
+        let near = size.as_ref().into_iter().flat_map(Size::keys).flat_map(|key| {
+            kinds.get(&(record.kind(), owner.clone(), key)).map_or(&[][..], Vec::as_slice)
+        });
         let like = near.copied().find(|&feature: &usize| {
             let other = Size::of(&records[features[feature].finding]);
             size.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| a.is_like(b))
@@ -414,7 +417,7 @@ mod tests {
             joint(60, [100, 200, 100, 200]),
             overhang([16, 18], [231, 238, 100, 104]),
         ];
-        let found = features(&records, |_| 0);
+        let found = features(&records, |_| ());
         let groups: Vec<_> = found.iter().map(|f| (f.finding, f.with.clone())).collect();
         // A joint beside no island, and one far above, are features of their own.
         assert_eq!(groups, [(0, vec![1, 2, 4, 7]), (3, vec![]), (5, vec![]), (6, vec![])]);
@@ -434,11 +437,11 @@ mod tests {
             cup([10, 30], [120, 160, 0, 10], 6500),
             cup([10, 30], [0, 10, 120, 160], 6500),
         ];
-        let found = features(&records, |_| 0);
+        let found = features(&records, |_| ());
         let alike: Vec<_> = found.iter().map(|f| (f.finding, f.alike.clone())).collect();
         assert_eq!(alike, [(0, vec![1, 2]), (3, vec![]), (4, vec![5])]);
         assert!(found[0].text(&records).ends_with("; and 2 more like it"));
-        assert_eq!(features(&[], |_| 0), []);
+        assert_eq!(features(&[], |_| ()), []);
     }
 
     #[test]
@@ -473,12 +476,12 @@ mod tests {
             [resting(20.0), resting(9.0)],
         ] {
             let records = [a, b];
-            assert_eq!(features(&records, |_| 0).len(), 2, "{records:?}");
+            assert_eq!(features(&records, |_| ()).len(), 2, "{records:?}");
         }
         let alike = [wide(40), wide(99)];
-        assert_eq!(features(&alike, |_| 0).len(), 1);
+        assert_eq!(features(&alike, |_| ()).len(), 1);
         // Of two parts.
-        let owner = |record: &FindingRecord| u64::from(*record == alike[0]);
+        let owner = |record: &FindingRecord| *record == alike[0];
         assert_eq!(features(&alike, owner).len(), 2);
     }
 
@@ -491,7 +494,7 @@ mod tests {
             island(3, 5, 9, Joined::Island(77), [40, 49, 0, 9]),
             joint(6, [0, 50, 0, 9]),
         ];
-        let found = features(&records[2..], |_| 0);
+        let found = features(&records[2..], |_| ());
         let mut all: Vec<usize> =
             found.iter().flat_map(|f| [&[f.finding], &f.with[..], &f.alike].concat()).collect();
         all.sort_unstable();
