@@ -214,7 +214,8 @@ fn display_table() -> String {
     for Display { name, description, mirrors, pitch_um, binary_rate_hz, .. } in Display::builtins()
     {
         let mirrors = mirrors.map(|side| side.to_string()).join("x");
-        let [pitch, rate] = [format!("{pitch_um}um"), format!("{binary_rate_hz}/s")];
+        let pitch = format!("{pitch_um}um");
+        let rate = binary_rate_hz.map_or("unknown".to_owned(), |rate| format!("{rate}/s"));
         text += &format!("{name:<10}{mirrors:<12}{pitch:<10}{rate:<14}{description}\n");
     }
     text

@@ -191,8 +191,8 @@ pub enum ScanError {
         /// The second speed.
         most: Speed,
     },
-    /// Neither a row clock nor a display.
-    #[error("row_clock_hz: add the most rows in a second, or a built-in display")]
+    /// Neither a row clock nor a display of a known rate.
+    #[error("row_clock_hz: add the most rows in a second, or a built-in display of a known rate")]
     NoRowClock,
     /// A number that is not above zero.
     #[error("{0}: it must be a number above zero")]
@@ -281,7 +281,7 @@ impl Scan {
     }
 
     fn given_row_clock_hz(&self) -> Option<f64> {
-        self.row_clock_hz.or_else(|| Some(self.known_display()?.binary_rate_hz))
+        self.row_clock_hz.or_else(|| self.known_display()?.binary_rate_hz)
     }
 
     fn known_display(&self) -> Option<&'static Display> {
@@ -501,7 +501,12 @@ source = "-"
             assert!(error.contains("more than the 1024x768 of the display dlp7000"), "{error}");
         }
         let unknown = machine(&bare.replacen("dlp7000", "dlp1", 1)).unwrap_err();
-        assert!(unknown.contains("write one of dlp7000, or leave it out"), "{unknown}");
+        assert!(unknown.contains("write one of dlp7000, dlp9500, dlp9000x, or"), "{unknown}");
+        // The rate of the DLP9000X is not known.
+        let no_rate = machine(&bare.replacen("dlp7000", "dlp9000x", 1)).unwrap_err();
+        assert!(no_rate.contains("row_clock_hz: add the most rows in a second"), "{no_rate}");
+        let stated = with(&LEAST.replacen(mirrors, "", 1)).replacen("dlp7000", "dlp9000x", 1);
+        assert_eq!((scan(&stated).mirrors(), scan(&stated).row_clock_hz()), ([2560, 1600], 0.5));
     }
 
     #[test]
