@@ -165,6 +165,12 @@ pub enum StackError {
     /// A file of a folder has several pages.
     #[error("it has several pages: the files of a folder have one page each")]
     SeveralPages,
+    /// The files of a folder are strips or fields of a build.
+    #[error(
+        "the folder holds strips or fields of a build, not its layers: make one stack of them with \
+         lamp join"
+    )]
+    PartsOfLayers,
     /// The stack does not fit a classic TIFF.
     #[error(
         "the stack passes 4 GiB at layer {layer}: a classic TIFF cannot hold it, write a BigTIFF"

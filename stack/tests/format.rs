@@ -7,7 +7,7 @@ use std::process::Command;
 
 use lamp_stack::{
     Destination, Dpi, EncodedPage, FolderBeside, Format, GrayMask, Image, Layer, Mask, PageInfo,
-    PageReader, PageWriter, Pages, StackError, StackInfo, write_stack,
+    PageReader, PageWriter, Pages, StackError, StackInfo, StripRecord, write_stack,
 };
 use tiff::decoder::{Decoder, DecodingResult};
 
@@ -210,6 +210,26 @@ fn a_folder_of_stacks_is_no_stack() {
     let error = Pages::open(folder.path()).unwrap().layers().next().unwrap().unwrap_err();
     let StackError::InFile { file, source } = error else { panic!("{error}") };
     assert!(file == "a.tif" && matches!(*source, StackError::SeveralPages));
+}
+
+#[test]
+fn a_folder_of_strips_or_fields_is_no_stack() {
+    for count in [1, 2] {
+        let folder = tempfile::tempdir().unwrap();
+        for (number, name) in (0..).zip(["strip_000.tif", "strip_001.tif"]) {
+            let mut layers = layers(count);
+            for layer in &mut layers {
+                layer.info.set_record(&StripRecord { number, of: 2, columns: [0, 9], bits: 1 });
+            }
+            std::fs::write(folder.path().join(name), write(&layers, Format::Big)).unwrap();
+        }
+        let error = Pages::open(folder.path()).unwrap().layers().last().unwrap().unwrap_err();
+        let error = match error {
+            StackError::InFile { source, .. } => *source,
+            error => error,
+        };
+        assert!(matches!(error, StackError::PartsOfLayers), "{count} layers: {error}");
+    }
 }
 
 #[test]

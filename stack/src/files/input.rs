@@ -13,6 +13,7 @@ use crate::layer::check::ChainReader;
 use crate::limits::Limits;
 use crate::note::{ImagesBeside, StackNote};
 use crate::ordered::map_in_order;
+use crate::record::{FieldRecord, StripRecord};
 
 /// An iterator over the pages of a stack, bottom first.
 #[derive(Debug)]
@@ -247,7 +248,11 @@ impl Pages {
                 None => info.stack.is_some() || info.z_um.is_none(),
             };
             if !follows {
-                return Err(StackError::MissingPage { layer });
+                // Strips of one layer each look like its pages.
+                return Err(match is_part_of_layer(page) {
+                    true => StackError::PartsOfLayers,
+                    false => StackError::MissingPage { layer },
+                });
             }
         }
         match self.last_whole {
@@ -323,6 +328,12 @@ pub(crate) fn only_page(reader: &mut PageReader) -> Result<Page, StackError> {
     let page = reader.next().unwrap_or(Err(StackError::Empty))?;
     match reader.next() {
         None => Ok(page),
+        Some(_) if is_part_of_layer(&page) => Err(StackError::PartsOfLayers),
         Some(_) => Err(StackError::SeveralPages),
     }
+}
+
+/// Returns whether a page is a strip's or a field's.
+fn is_part_of_layer(page: &Page) -> bool {
+    page.info().has_record::<StripRecord>() || page.info().has_record::<FieldRecord>()
 }
