@@ -175,20 +175,27 @@ struct SpreadModel {
 }
 
 impl SpreadModel {
-    /// Returns the most promising places to search from.
+    /// Returns the most promising places to search from. Under one `E_c`, each `σ` has its own lines.
     fn starts(points: &[LinePoint]) -> Vec<Self> {
         let least = |of: fn(&LinePoint) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min);
         let (width, dose) =
             (least(|point| point.drawn.um()), least(|point| point.dose.mj_per_cm2()));
         let sigmas = [0.1, 0.2, 0.4, 0.8, 1.6, 3.2].map(|times: f64| (times * width).ln());
         let doses = [0.05, 0.15, 0.3, 0.5, 0.7, 0.9].map(|share: f64| (share * dose).ln());
-        let mut starts: Vec<Self> = sigmas
-            .into_iter()
-            .flat_map(|sigma| doses.map(|dose| Self { logs: [sigma, sigma, dose] }))
-            .collect();
+        let [across, along] = ScanDirection::ALL.map(|direction| {
+            let of = |point: &&LinePoint| point.direction == direction;
+            points.iter().filter(of).copied().collect::<Vec<_>>()
+        });
+        let mut starts = doses.map(|dose| {
+            let best = |lines: &[LinePoint]| {
+                let left = |sigma: f64| Self { logs: [sigma, sigma, dose] }.squares(lines);
+                sigmas.into_iter().min_by(|a, b| left(*a).total_cmp(&left(*b)))
+            };
+            let sigma = |lines| best(lines).expect("there are widths to begin with");
+            Self { logs: [sigma(&across), sigma(&along), dose] }
+        });
         starts.sort_by(|a, b| a.squares(points).total_cmp(&b.squares(points)));
-        starts.truncate(3);
-        starts
+        starts[..3].to_vec()
     }
 
     fn numbers(&self) -> [f64; 3] {
@@ -259,7 +266,8 @@ mod tests {
     const WIDTHS: [f64; 8] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0];
     const PITCH: f64 = 25_400.0 / 1500.0;
 
-    /// The width of a line by brute force: its light on a grid of 0.01 um, a sum of error functions.
+    /// The width of a line by brute force: its light, a sum of error functions, on a grid of 1/2000
+    /// of the spread.
     fn printed(kind: LineKind, drawn: f64, sigma: f64, share: f64) -> f64 {
         let erf = |at: f64| libm::erf(at / (2f64.sqrt() * sigma));
         let line = |x: f64| 0.5 * (erf(drawn / 2.0 - x) + erf(drawn / 2.0 + x));
@@ -267,9 +275,10 @@ mod tests {
             LineKind::Line => line(x) >= share,
             LineKind::Gap => 1.0 - line(x) < share,
         };
-        let steps = (100.0 * (drawn / 2.0 + 6.0 * sigma)) as u32;
-        let inside = (0..steps).filter(|&step| is_inside((f64::from(step) + 0.5) / 100.0)).count();
-        inside as f64 / 50.0
+        let grid = sigma / 2000.0;
+        let steps = ((drawn / 2.0 + 6.0 * sigma) / grid) as u32;
+        let inside = (0..steps).filter(|&step| is_inside((f64::from(step) + 0.5) * grid)).count();
+        2.0 * grid * inside as f64
     }
 
     /// The lines of `lamp target scan` that cured and gaps that stayed open, with errors.
@@ -309,11 +318,18 @@ mod tests {
 
     #[test]
     fn printed_lines_give_both_spreads_back() {
-        for truth in [[30.0, 45.0, 100.0], [20.0, 20.0, 30.0], [55.0, 35.0, 120.0]] {
+        // The last two lie far from equal spreads, where no start is near.
+        for truth in [
+            [30.0, 45.0, 100.0],
+            [20.0, 20.0, 30.0],
+            [55.0, 35.0, 120.0],
+            [15.0, 160.0, 60.0],
+            [220.0, 14.0, 40.0],
+        ] {
             for doses in [&[200.0][..], &[150.0, 300.0]] {
                 let fit = fit_scan(&lines(truth, doses, &WIDTHS, || 0.0)).unwrap();
                 for (found, truth) in values(&fit).into_iter().zip(truth) {
-                    // The referee's grid is 0.01 um.
+                    // The referee's grid is 1/2000 of the spread.
                     assert!((found / truth - 1.0).abs() < 2e-3, "{found} of {truth}: {fit:?}");
                 }
                 assert!(fit.r2 > 0.999_99, "{fit:?}");
@@ -342,8 +358,8 @@ mod tests {
                 fit.critical_dose.holds(Dose::from_mj_per_cm2(critical)),
             ]
         });
-        // 1.1 % is a standard deviation here.
-        assert!(held.iter().all(|share| (0.93..=0.97).contains(share)), "{held:?}");
+        // 1.1 % is a standard deviation here, and these are three.
+        assert!(held.iter().all(|share| (0.917..=0.983).contains(share)), "{held:?}");
         // Lines of 34 um and more, measured to 3 um, show narrow light less well than wide light.
         for (of, most) in [0.12, 0.04, 0.012].into_iter().enumerate() {
             let off = fits.iter().map(|fit| values(fit.as_ref().unwrap())[of] / truth[of] - 1.0);
