@@ -7,7 +7,8 @@ use lamp_machine::ScanDirection;
 use lamp_stack::Image;
 
 use crate::mirrors::{MirrorArray, PHASES};
-use crate::tilt::{TiltedMirrors, TiltedWindow};
+use crate::tilt::TiltedMirrors;
+use crate::tilted_window::TiltedWindow;
 
 /// The bits of a word.
 const WORD: u32 = 64;
@@ -130,7 +131,7 @@ impl<'a> Frames<'a> {
             tilted: swath
                 .tilt
                 .as_ref()
-                .map(|tilt| TiltedWindow::new(tilt, swath.swath, swath.image)),
+                .map(|tilt| TiltedWindow::new(tilt, mirrors.size(), swath.swath, swath.image)),
             row_words,
             white,
             window: Window::new(along as usize, row_words, swath.direction),

@@ -29,6 +29,7 @@ mod route;
 mod source;
 mod tilt;
 mod tilted_dose;
+mod tilted_window;
 mod time;
 
 pub use clock::{ExposureLimit, RowClock};

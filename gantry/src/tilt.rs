@@ -9,7 +9,7 @@
 //! each other by M cos a mirrors, so that the end of one and the beginning of the next add up to N / cos a.
 
 use lamp_machine::Scan;
-use lamp_stack::{Image, Length};
+use lamp_stack::Length;
 
 use crate::job::JobTilt;
 
@@ -120,7 +120,7 @@ impl TiltedMirrors {
 
     /// Returns for each mirror the pixel below its center: the column from the first that the swath
     /// reaches, and the row from the frame's position.
-    fn places(&self, swath: u32) -> Vec<[i32; 2]> {
+    pub(crate) fn places(&self, swath: u32) -> Vec<[i32; 2]> {
         let left = self.columns(swath).start as f64;
         let corner = self.corner_px(swath) - left;
         let [across, along] = self.mirrors.map(|side| side as u32);
@@ -132,93 +132,5 @@ impl TiltedMirrors {
             [x.floor() as i32, y.floor() as i32]
         };
         (0..along).flat_map(|row| (0..across).map(move |column| center(row, column))).collect()
-    }
-}
-
-/// The pixels below the mirrors of a tilted display, row by row of the scan.
-pub(crate) struct TiltedWindow {
-    /// For each mirror, its column in the image and its row from the frame's position.
-    places: Vec<[i32; 2]>,
-    /// The least and the greatest of these rows.
-    reach: [i64; 2],
-    across: usize,
-    /// The words of a row of the image.
-    row_words: usize,
-    /// The rows below the display, each at its number modulo their count.
-    bits: Vec<u64>,
-    rows: u32,
-    /// The rows that are drawn.
-    drawn: std::ops::Range<i64>,
-    frame: Vec<u64>,
-}
-
-impl TiltedWindow {
-    pub(crate) fn new(tilt: &TiltedMirrors, swath: u32, image: &Image) -> Self {
-        let places = tilt.places(swath);
-        let [across, along] = tilt.mirrors.map(|side| side as usize);
-        let rows = || places.iter().map(|place| i64::from(place[1]));
-        let reach = [rows().min().unwrap_or(0), rows().max().unwrap_or(0)];
-        let rows = (reach[1] - reach[0] + 1).min(image.height().max(1).into()) as u32;
-        let row_words = image.width().div_ceil(64) as usize;
-        Self {
-            places,
-            reach,
-            across,
-            row_words,
-            bits: vec![0; rows as usize * row_words],
-            rows,
-            drawn: 0..0,
-            frame: vec![0; along * across.div_ceil(64)],
-        }
-    }
-
-    /// Returns the frame at a position. Rows outside of `shown` are black.
-    pub(crate) fn frame(&mut self, position: i64, image: &Image, shown: [u32; 2]) -> &[u64] {
-        let [first, last] = shown.map(i64::from);
-        let below =
-            (position + self.reach[0]).max(first)..(position + self.reach[1] + 1).min(last + 1);
-        for row in below.clone() {
-            if !self.drawn.contains(&row) {
-                let words = self.row_range(row);
-                let words = &mut self.bits[words];
-                words.fill(0);
-                for (start, end, _) in image.runs(row as u32) {
-                    fill(words, start, end);
-                }
-            }
-        }
-        self.drawn = below;
-        let row_words = self.across.div_ceil(64);
-        let rows = self.places.chunks_exact(self.across);
-        let width = i64::from(image.width());
-        for (row, places) in rows.enumerate() {
-            let words = &mut self.frame[row * row_words..][..row_words];
-            words.fill(0);
-            for (at, &[column, row]) in places.iter().enumerate() {
-                let row = position + i64::from(row);
-                if self.drawn.contains(&row) && (0..width).contains(&column.into()) {
-                    let slot = (row % i64::from(self.rows)) as usize * self.row_words;
-                    let bit = self.bits[slot + column as usize / 64] >> (63 - column % 64) & 1;
-                    words[at / 64] |= bit << (63 - at % 64);
-                }
-            }
-        }
-        &self.frame
-    }
-
-    fn row_range(&self, row: i64) -> std::ops::Range<usize> {
-        let start = (row % i64::from(self.rows)) as usize * self.row_words;
-        start..start + self.row_words
-    }
-}
-
-/// Sets the bits of columns.
-fn fill(words: &mut [u64], start: u32, end: u32) {
-    let mut at = start;
-    while at < end {
-        let word = at / 64;
-        let stop = end.min((word + 1) * 64);
-        words[word as usize] |= crate::frames::bits(at % 64, stop - word * 64);
-        at = stop;
     }
 }
