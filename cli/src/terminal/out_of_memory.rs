@@ -6,14 +6,16 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs::File;
 use std::io::{self, Cursor, Write};
-use std::os::fd::AsFd;
 use std::panic;
+#[cfg(windows)]
+use std::process::exit;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
 
 use lamp_stack::remove_temporaries;
+#[cfg(unix)]
 use signal_hook::low_level::exit;
 
 use crate::terminal::signals::say_no_more;
@@ -108,17 +110,26 @@ fn end(bytes: usize) -> ! {
 
 /// Prints the message past standard error's lock, which a thread may hold that waits in [`end`].
 fn tell(bytes: usize) {
+    #[cfg(unix)]
+    const RAISE: &str = "raise the limit (ulimit -v), ";
+    #[cfg(windows)]
+    const RAISE: &str = "";
     // On the stack, as there is no memory for a string.
     let mut line = [0; 256];
     let mut cursor = Cursor::new(&mut line[..]);
     let command = COMMAND.get().map_or("lamp", String::as_str);
     let written = writeln!(
         cursor,
-        "{command}: out of memory ({bytes} bytes more were asked for): raise the limit \
-         (ulimit -v), end other programs, or give fewer --threads"
+        "{command}: out of memory ({bytes} bytes more were asked for): {RAISE}end other programs, \
+         or give fewer --threads"
     );
     let end = cursor.position() as usize;
-    if let (Ok(()), Ok(stderr)) = (written, io::stderr().as_fd().try_clone_to_owned()) {
+    let stderr = io::stderr();
+    #[cfg(unix)]
+    let stderr = std::os::fd::AsFd::as_fd(&stderr).try_clone_to_owned();
+    #[cfg(windows)]
+    let stderr = std::os::windows::io::AsHandle::as_handle(&stderr).try_clone_to_owned();
+    if let (Ok(()), Ok(stderr)) = (written, stderr) {
         // No one is left to report to.
         let _ = File::from(stderr).write_all(&line[..end]);
     }
