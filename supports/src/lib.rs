@@ -43,5 +43,5 @@ pub use record::{
 };
 pub use support::{
     HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, SupportShare, Surface,
-    flood_supports, plan_supports,
+    Vent, VentPlan, flood_supports, left_of, plan_supports, plan_vents,
 };

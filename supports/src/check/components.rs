@@ -14,18 +14,18 @@ const NONE: u32 = u32::MAX;
 
 /// The components of an image, 4-connected, in the order of their first pixels.
 #[derive(Debug)]
-pub(super) struct Components {
+pub(crate) struct Components {
     /// The component of each segment, row by row.
     labels: Vec<u32>,
     /// The first segment of each row, and the end.
     row_starts: Vec<u32>,
-    pub(super) all: Vec<Component>,
+    pub(crate) all: Vec<Component>,
 }
 
 /// Pixels of one color that touch at their sides.
 #[derive(Clone, Debug)]
-pub(super) struct Component {
-    pub(super) is_white: bool,
+pub(crate) struct Component {
+    pub(crate) is_white: bool,
     /// The column and row of the first pixel, by rows.
     pub(super) first: [u32; 2],
     pub(super) area: u64,
@@ -120,7 +120,7 @@ impl Components {
     }
 
     /// Returns the rows and columns of a component's runs, from the top.
-    pub(super) fn runs<'a>(
+    pub(crate) fn runs<'a>(
         &'a self,
         mask: &'a Mask,
         component: u32,
@@ -149,7 +149,7 @@ impl Components {
     }
 
     /// Returns the component that holds a pixel.
-    pub(super) fn at(&self, mask: &Mask, column: u32, row: u32) -> u32 {
+    pub(crate) fn at(&self, mask: &Mask, column: u32, row: u32) -> u32 {
         self.of_row(row)[mask.row(row).partition_point(|&t| t <= column)]
     }
 }

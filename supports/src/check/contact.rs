@@ -9,13 +9,13 @@ use super::overhang::{OverhangPatch, Unheld, patches};
 
 /// A layer's image and its components.
 #[derive(Debug)]
-pub(super) struct Labelled {
-    pub(super) mask: Mask,
-    pub(super) components: Components,
+pub(crate) struct Labelled {
+    pub(crate) mask: Mask,
+    pub(crate) components: Components,
 }
 
 impl Labelled {
-    pub(super) fn new(mask: Mask) -> Self {
+    pub(crate) fn new(mask: Mask) -> Self {
         let components = Components::of(&mask);
         Self { mask, components }
     }
@@ -32,7 +32,7 @@ impl Labelled {
     }
 
     /// Returns whether a component has pixels at the image's border.
-    pub(super) fn reaches_frame(&self, component: &Component) -> bool {
+    pub(crate) fn reaches_frame(&self, component: &Component) -> bool {
         let reaches = |range: &Range<u32>, end: u32| range.start == 0 || range.end == end;
         reaches(&component.columns, self.mask.width())
             || reaches(&component.rows, self.mask.height())

@@ -23,7 +23,7 @@ impl Region {
     }
 
     /// Returns whether the region, grown by `by` pixels on each side, meets another one.
-    pub(super) fn is_near(&self, other: &Self, by: u32) -> bool {
+    pub(crate) fn is_near(&self, other: &Self, by: u32) -> bool {
         let near = |a: &Range<u32>, b: &Range<u32>| {
             a.start < b.end.saturating_add(by) && b.start < a.end.saturating_add(by)
         };

@@ -28,7 +28,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use components::Components;
-use contact::{Labelled, LayerContact};
+pub(crate) use contact::Labelled;
+use contact::LayerContact;
 use drain::Drain;
 pub use findings::{
     Findings, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketEffect,

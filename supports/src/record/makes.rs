@@ -108,6 +108,13 @@ fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> JointRecord {
     }
 }
 
+impl FindingRecord {
+    /// Returns the record of a pocket.
+    pub fn of_pocket(pocket: &Pocket, scale: &Scale<'_>) -> Self {
+        of_pocket(pocket, scale)
+    }
+}
+
 fn of_pocket(pocket: &Pocket, scale: &Scale<'_>) -> FindingRecord {
     let rim = (pocket.kind == PocketKind::Cup).then_some(pocket.layers);
     let record = PocketRecord {

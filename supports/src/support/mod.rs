@@ -15,6 +15,9 @@ mod plan;
 #[cfg(test)]
 mod support_tests;
 mod surface;
+mod vent;
+#[cfg(test)]
+mod vent_tests;
 mod window;
 
 use lamp_stack::{Length, Strut};
@@ -24,6 +27,7 @@ use crate::check::Island;
 pub use flood::flood_supports;
 pub use plan::{SupportError, plan_supports};
 pub use surface::Surface;
+pub use vent::{Vent, VentPlan, left_of, plan_vents};
 
 /// Limits of supports. The seed prints only the radius: the other defaults are LAMP's own.
 #[derive(Clone, Debug, PartialEq)]
