@@ -6,6 +6,7 @@
 
 mod cells;
 mod nets;
+mod pinches;
 mod planes;
 mod scale;
 
@@ -17,9 +18,9 @@ pub use cells::{CellGrid, MAX_CELLS, SurfaceOptions};
 /// The surface of a stack, as triangles.
 ///
 /// # Guarantees
-/// It is closed: along each edge as many triangles run one way as the other. Where two pieces of
-/// the surface touch, four triangles meet in an edge. Triangles run counter-clockwise seen from
-/// outside.
+/// It is closed and a manifold: each edge has two triangles, which run it in opposite ways, and the
+/// triangles at a vertex are one fan. Where cells touch along an edge or at a corner alone, a cell
+/// between them is white, too. Triangles run counter-clockwise seen from outside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StackSurface {
     /// The unit of coordinates.

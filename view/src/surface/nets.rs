@@ -3,6 +3,7 @@
 use fast_surface_nets::ndshape::RuntimeShape;
 use fast_surface_nets::{SignedDistance, SurfaceNetsBuffer, surface_nets};
 
+use super::pinches::fill_pinches;
 use super::{StackSurface, SurfaceError, SurfaceUnit};
 
 /// The number of planes worked on at a time.
@@ -17,7 +18,13 @@ const BEHIND: u32 = 2;
 
 /// The level of a cell as a distance: white is inside. No level is on the surface itself.
 #[derive(Clone, Copy)]
-struct Level(u8);
+pub(super) struct Level(pub(super) u8);
+
+impl Level {
+    pub(super) fn is_white(self) -> bool {
+        self.0 > 127
+    }
+}
 
 impl From<Level> for f32 {
     fn from(level: Level) -> Self {
@@ -27,7 +34,7 @@ impl From<Level> for f32 {
 
 impl SignedDistance for Level {
     fn is_negative(self) -> bool {
-        self.0 > 127
+        self.is_white()
     }
 }
 
@@ -104,6 +111,10 @@ impl Nets {
         for (line, levels) in lines.zip(plane.chunks_exact(self.size[0] as usize)) {
             let cells = line[BEFORE as usize..].iter_mut();
             cells.zip(levels).for_each(|(cell, &level)| *cell = Level(level));
+        }
+        if let Some(below) = start.checked_sub(self.plane_cells()) {
+            let (below, plane) = self.levels[below..].split_at_mut(start - below);
+            fill_pinches(below, plane, width);
         }
     }
 
