@@ -1,7 +1,9 @@
 //! Checks of blocks and parts, compared in every number with a referee that fills voxels.
 
 mod agree;
+mod at_scale;
 mod blocks;
 mod drawn;
 mod parts;
+mod random_parts;
 mod referee;

@@ -34,7 +34,7 @@ fn slice(mesh: Mesh, dpi: f64, thickness_um: f64, placement: Placement) -> Vec<L
 }
 
 /// Returns the voxels of masks.
-fn block(layers: &[Layer]) -> Block {
+pub(crate) fn block(layers: &[Layer]) -> Block {
     let mut block = Block {
         size: [0, 0, layers.len()],
         white: Vec::new(),
