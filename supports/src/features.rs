@@ -11,6 +11,7 @@ use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use serde::Serialize;
 
+use crate::check::HeldAt;
 use crate::record::{FindingRecord, IslandRecord, Joined};
 
 /// A thing that a person would name, as numbers of findings in their list.
@@ -69,7 +70,7 @@ const NEAR_PX: u32 = 2;
 /// one kind; if islands float for as long and all join or none does, and if joints rest on as large a share,
 /// to within half; and if they are equal in size: boxes to within 2 pixels, turned or
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
-/// are less than a quarter. Overhangs are alike if they reach as far, to within a quarter or 2 pixels, over
+/// are less than a quarter. Overhangs are alike if they are held alike, and reach as far, to within a quarter or 2 pixels, over
 /// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
 /// and holes. Copies that differ are alike if the first differs at most four times as much.
 pub fn features<K: Clone + Eq + Hash>(
@@ -262,7 +263,8 @@ struct Size {
     /// The share in percent on which a weak joint rests.
     share: f64,
     joins: bool,
-    is_overhang: bool,
+    /// How an overhang is held; none of others.
+    held_at: Option<HeldAt>,
 }
 
 impl Size {
@@ -283,12 +285,10 @@ impl Size {
         let [left, right, top, bottom] = record.box_px()?;
         let mut sides = [right.saturating_sub(left), bottom.saturating_sub(top)];
         sides.sort_unstable();
-        let reach = match record {
-            FindingRecord::Overhang(overhang) => Some(overhang.reach_px),
-            _ => None,
-        };
-        if let Some(reach) = reach {
-            sides = [reach.round() as u32, 0];
+        let mut held_at = None;
+        if let FindingRecord::Overhang(overhang) = record {
+            sides = [overhang.reach_px.round() as u32, 0];
+            held_at = Some(overhang.held_at);
         }
         let [first, mut last] = record.layers();
         let (mut joins, mut share, mut may_differ) = (false, 0.0, 0.05);
@@ -302,14 +302,13 @@ impl Size {
             _ => {}
         }
         let (layers, amount) = (last.saturating_sub(first) + 1, amount as f64);
-        let is_overhang = reach.is_some();
-        Some(Self { sides, layers, amount, may_differ, share, joins, is_overhang })
+        Some(Self { sides, layers, amount, may_differ, share, joins, held_at })
     }
 
     /// Returns the square of a grid of sizes in which it is. Overhangs are in one: their leaders are few,
     /// as each is a quarter shorter than the one before.
     fn key(&self) -> [u32; 2] {
-        if self.is_overhang { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
+        if self.held_at.is_some() { [0; 2] } else { self.sides.map(|side| side / NEAR_PX) }
     }
 
     /// Returns the squares in which sizes like it are.
@@ -320,11 +319,12 @@ impl Size {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        if self.is_overhang {
+        if self.held_at.is_some() {
             let near = |a: u32, b: u32| a.abs_diff(b) <= NEAR_PX.max(a.max(b) / 4);
             // The other one came first.
             let is_larger = self.amount > 2.5 * other.amount;
-            return near(self.sides[0], other.sides[0])
+            return self.held_at == other.held_at
+                && near(self.sides[0], other.sides[0])
                 && near(self.layers, other.layers)
                 && !is_larger;
         }
@@ -466,7 +466,17 @@ mod tests {
             }
             _ => unreachable!(),
         };
+        let bridge = |area_px| match wide(area_px) {
+            FindingRecord::Overhang(overhang) => FindingRecord::Overhang(OverhangRecord {
+                held_at: HeldAt::BothSides,
+                span_px: Some(8.0),
+                ..overhang
+            }),
+            _ => unreachable!(),
+        };
         for [a, b] in [
+            // A cantilever is not like a bridge.
+            [wide(40), bridge(40)],
             // One never joins.
             [island(1, 10, 40, part, [0, 9, 0, 9]), loose(1)],
             // An overhang larger than the island, or beyond its end, is not the island's.

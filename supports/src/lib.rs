@@ -29,7 +29,7 @@ mod record;
 mod support;
 
 pub use check::{
-    CheckError, CheckOptions, Disagreements, Findings, Island, IslandEnd, IslandMinimum,
+    CheckError, CheckOptions, Disagreements, Findings, HeldAt, Island, IslandEnd, IslandMinimum,
     LayerFacts, Listed, LoneMinimum, OffBalance, Overhang, Pocket, PocketEffect, PocketKind,
     Region, WeakJoint, check, check_build, component_at, components_beyond, inner_components,
 };

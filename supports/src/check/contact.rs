@@ -95,7 +95,8 @@ impl LayerContact {
             joints.binary_search_by_key(&component, |joint| joint.component).is_ok()
         };
         unheld.retain(|run| is_held(run.component));
-        let patches = limit.map_or(Vec::new(), |limit| patches(&below.mask, &unheld, limit, speck));
+        let patches = limit
+            .map_or(Vec::new(), |limit| patches([&layer.mask, &below.mask], &unheld, limit, speck));
         Self { joints, patches }
     }
 }

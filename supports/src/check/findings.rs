@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 use std::ops::Range;
 
 use lamp_stack::{Dpi, PageInfo};
+use serde::{Deserialize, Serialize};
 
 /// A rectangle of pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -114,11 +115,32 @@ pub struct Overhang {
     pub reach_layer: u32,
     /// The pixel of that layer that does, as column and row.
     pub farthest: [u32; 2],
+    /// The span there in pixels, if that pixel is held at both sides: the shortest way in a line through
+    /// it, from white on white to white on white.
+    pub span_pixels: Option<f64>,
     /// The rectangle around all.
     pub region: Region,
 }
 
+/// How the pixel of an overhang that reaches farthest is held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeldAt {
+    /// At one side: a cantilever.
+    #[default]
+    OneSide,
+    /// At two opposite sides, or around: a bridge or a ceiling.
+    BothSides,
+}
+
+lamp_stack::named!(HeldAt { OneSide = "one-side", BothSides = "both-sides" });
+
 impl Overhang {
+    /// Returns how the pixel that reaches farthest is held.
+    pub fn held_at(&self) -> HeldAt {
+        if self.span_pixels.is_some() { HeldAt::BothSides } else { HeldAt::OneSide }
+    }
+
     /// Returns the largest distance to white below, in pixels.
     pub fn reach_pixels(&self) -> f64 {
         (self.reach_squared as f64).sqrt()

@@ -17,6 +17,7 @@ mod overhang;
 mod overhangs;
 mod pairs;
 mod pockets;
+mod span;
 mod standing;
 
 use std::num::{NonZeroU8, NonZeroU32};
@@ -32,8 +33,8 @@ pub(crate) use contact::Labelled;
 use contact::LayerContact;
 use drain::Drain;
 pub use findings::{
-    Findings, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket, PocketEffect,
-    PocketKind, Region, WeakJoint,
+    Findings, HeldAt, Island, IslandEnd, LayerFacts, Listed, OffBalance, Overhang, Pocket,
+    PocketEffect, PocketKind, Region, WeakJoint,
 };
 use islands::{Growth, Speck};
 use liquid::Liquid;

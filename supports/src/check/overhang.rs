@@ -6,6 +6,7 @@ use lamp_stack::sets::{root, unite};
 use lamp_stack::{Mask, white_runs};
 
 use super::components::holds_square;
+use super::span::span;
 
 /// White pixels of a row that may lie too far from the white below.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub(super) struct OverhangPatch {
     pub(super) reach_squared: u64,
     /// The pixel that is so far: column and row.
     pub(super) farthest: [u32; 2],
+    /// The span there in pixels, if it is held at both sides.
+    pub(super) span: Option<f64>,
 }
 
 /// Whether a distance, squared and in pixels, is within a limit. The margin takes up the rounding
@@ -33,10 +36,15 @@ fn is_within(squared: u64, limit: f64) -> bool {
     squared as f64 <= limit * limit * (1.0 + 1e-9)
 }
 
-/// Returns the patches that are farther than `limit` pixels from the white of `below`, by rows.
+/// Returns the patches of a layer that are farther than `limit` pixels from the white of `below`, by rows.
 /// Patches without a square of `speck` pixels are left out. The runs are sorted by row and column,
 /// and exclude pixels that white of their own row reaches.
-pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> Vec<OverhangPatch> {
+pub(super) fn patches(
+    [layer, below]: [&Mask; 2],
+    runs: &[Unheld],
+    limit: f64,
+    speck: u32,
+) -> Vec<OverhangPatch> {
     let mut far: Vec<(u32, Range<u32>)> = Vec::new();
     let (mut left, mut next) = (Vec::new(), Vec::new());
     for Unheld { row, columns, .. } in runs {
@@ -56,7 +64,7 @@ pub(super) fn patches(below: &Mask, runs: &[Unheld], limit: f64, speck: u32) -> 
     }
     let mut groups = touching(&far);
     groups.retain(|runs| holds_square(runs.iter().cloned(), speck));
-    groups.iter().map(|runs| patch(below, runs)).collect()
+    groups.iter().map(|runs| patch([layer, below], runs)).collect()
 }
 
 /// Returns how far white of a row reaches sideways, for each distance in rows.
@@ -133,7 +141,7 @@ fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
 }
 
 /// Measures a patch.
-fn patch(below: &Mask, runs: &[(u32, Range<u32>)]) -> OverhangPatch {
+fn patch([layer, below]: [&Mask; 2], runs: &[(u32, Range<u32>)]) -> OverhangPatch {
     let columns = runs.iter().map(|(_, columns)| columns);
     let start = columns.clone().map(|columns| columns.start).min().unwrap_or_default();
     let end = columns.clone().map(|columns| columns.end).max().unwrap_or_default();
@@ -145,6 +153,7 @@ fn patch(below: &Mask, runs: &[(u32, Range<u32>)]) -> OverhangPatch {
         area: columns.map(|columns| u64::from(columns.end - columns.start)).sum(),
         reach_squared: farthest.squared,
         farthest: farthest.at,
+        span: span([layer, below], farthest.at, (farthest.squared as f64).sqrt()),
     }
 }
 

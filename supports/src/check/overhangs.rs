@@ -72,6 +72,7 @@ impl Overhang {
             reach_squared: patch.reach_squared,
             reach_layer: layer,
             farthest: patch.farthest,
+            span_pixels: patch.span,
             region: Region { columns: patch.columns.clone(), rows: patch.rows.clone() },
         }
     }
@@ -86,6 +87,7 @@ impl Overhang {
         if reach(other) < reach(self) {
             self.reach_squared = other.reach_squared;
             (self.reach_layer, self.farthest) = (other.reach_layer, other.farthest);
+            self.span_pixels = other.span_pixels;
         }
     }
 }

@@ -145,6 +145,9 @@ fn of_overhang(overhang: &Overhang, scale: &Scale<'_>) -> OverhangRecord {
         reach_px: overhang.reach_pixels(),
         reach_mm: scale.length_mm(overhang.reach_pixels()),
         reach_layer: scale.layer(overhang.reach_layer).layer,
+        held_at: overhang.held_at(),
+        span_px: overhang.span_pixels,
+        span_mm: overhang.span_pixels.and_then(|span| scale.length_mm(span)),
         area: scale.area(overhang.area),
         shown: shown(overhang.reach_layer, &overhang.region, None, scale),
     }

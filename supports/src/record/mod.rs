@@ -11,7 +11,7 @@ mod texts;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::check::{PocketEffect, Region};
+use crate::check::{HeldAt, PocketEffect, Region};
 
 pub use accepted::AcceptedFindings;
 pub use makes::records;
@@ -290,6 +290,12 @@ pub struct OverhangRecord {
     pub reach_mm: Option<f64>,
     /// The index of the first layer that reaches so far.
     pub reach_layer: u32,
+    /// How that pixel is held.
+    pub held_at: HeldAt,
+    /// The span of a bridge through that pixel, in pixels.
+    pub span_px: Option<f64>,
+    /// The same in millimeters.
+    pub span_mm: Option<f64>,
     /// The area of pixels that lie too far from white below.
     #[serde(flatten)]
     pub area: AreaRecord,

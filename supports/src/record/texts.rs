@@ -197,7 +197,10 @@ impl FindingRecord {
             }
             Self::Overhang(overhang) => vec![
                 Some(area(overhang.area.area_mm2, overhang.area.area_px)),
-                overhang.reach_mm.map(|mm| number(mm, "mm beyond the layer below")),
+                match (overhang.span_mm, overhang.reach_mm) {
+                    (Some(mm), _) => Some(format!("bridge of {} span", number(mm, "mm"))),
+                    (None, reach) => reach.map(|mm| number(mm, "mm beyond the layer below")),
+                },
             ],
             Self::OffBalance(off) => vec![off.off_mm.map(|mm| number(mm, "mm off its base"))],
             _ => Vec::new(),
@@ -320,7 +323,13 @@ impl fmt::Display for OverhangRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { layers, at, area, .. } = self;
         let reach = length_text(self.reach_px, self.reach_mm);
-        write!(f, "{layers} at {at}: reaches {reach} beyond the layer below")?;
+        match self.span_px {
+            Some(span) => {
+                let span = length_text(span, self.span_mm);
+                write!(f, "{layers} at {at}: bridge of {span} span")?;
+            }
+            None => write!(f, "{layers} at {at}: reaches {reach} beyond the layer below")?,
+        }
         if layers.layer != layers.last_layer {
             write!(f, " in layer {}", self.reach_layer)?;
         }

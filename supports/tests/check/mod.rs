@@ -7,3 +7,4 @@ mod drawn;
 mod parts;
 mod random_parts;
 mod referee;
+mod spans;

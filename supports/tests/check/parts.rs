@@ -6,7 +6,7 @@ use lamp_fixtures::{
 };
 use lamp_slicer::{Axis, Part, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
-use lamp_supports::{Findings, IslandEnd, PocketKind};
+use lamp_supports::{Findings, HeldAt, IslandEnd, PocketKind};
 
 use super::agree::{agree_as, check};
 use super::referee::{Block, Limits};
@@ -190,6 +190,7 @@ fn an_arch_hangs_over_by_half_its_span() {
     // The pixels next to the piers are as far from them as the layer is thick.
     assert_eq!((overhang.layers, overhang.area), ([160; 2], 198 * 80));
     assert_eq!((overhang.reach_pixels(), overhang.reach_layer), (100.0, 160));
+    assert_eq!((overhang.held_at(), overhang.span_pixels), (HeldAt::BothSides, Some(200.0)));
 }
 
 /// One pass up the layers and one down, as others make, call it a trap.
@@ -224,7 +225,7 @@ fn a_cup_is_sealed_by_the_platform_upside_down() {
     near(mm3, 960.0, 1e-12);
     let [overhang] = &found.overhangs.list[..] else { panic!("{:?}", found.overhangs) };
     assert_eq!((overhang.layers, overhang.area), ([100; 2], 118 * 78));
-    assert_eq!(overhang.reach_pixels(), 40.0);
+    assert_eq!((overhang.reach_pixels(), overhang.span_pixels), (40.0, Some(80.0)));
 }
 
 #[test]
@@ -248,6 +249,7 @@ fn walls_lean_until_they_hardly_rest_and_then_float() {
     assert_eq!(counts(&found), [0, 199, 1]);
     let [overhang] = &found.overhangs.list[..] else { panic!("{:?}", found.overhangs) };
     assert_eq!((overhang.layers, overhang.reach_pixels()), ([1, 199], 4.0));
+    assert_eq!(overhang.held_at(), HeldAt::OneSide);
     assert!(found.weak_joints.list.iter().all(|joint| 5 * joint.support == joint.area));
     assert_eq!(counts(&leaning(6.0)), [199, 0, 0]);
 }
