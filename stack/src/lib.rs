@@ -25,6 +25,7 @@
 
 mod catalogue;
 mod codec;
+mod cone;
 mod counting_sort;
 mod depth_levels;
 mod digest;
@@ -56,6 +57,7 @@ pub use codec::png_write::{
     png_of_layer, write_gray_animation, write_gray_png, write_png_folder, write_rgb_png,
 };
 pub use codec::tiff::{EncodedPage, Format, Page, PageHeader, PageReader, PageWriter};
+pub use cone::Cone;
 pub use counting_sort::{Grouped, KeyCounts, UnfinishedGroups};
 pub use depth_levels::{DepthLevels, LevelSteps};
 pub use digest::{digest_of, digest_of_digests, digest_of_range, open_ending, sealed, unsealed};

@@ -5,7 +5,6 @@
 //!
 //! Source: 002 section 2.4.3.
 
-mod cone;
 mod copies;
 mod csv;
 mod edit_error;

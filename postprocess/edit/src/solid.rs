@@ -1,9 +1,8 @@
 //! Solids of edits: shapes with another section at each height.
 
 use lamp_build::ImageBounds;
-use lamp_stack::{Length, Strut};
+use lamp_stack::{Cone, Length, Strut};
 
-use super::cone::Cone;
 use super::edit_error::EditProblem;
 use super::fill::{PixelPoint, RunSet};
 use super::pattern::Motion;
@@ -30,10 +29,8 @@ impl Solid {
             return strut.map(|strut| Some(Self::Strut(strut))).ok_or(EditProblem::NoLength);
         }
         if let Some(ConeEnds { from, to, diameters }) = edit.cone {
-            let ends = ConeEnds { from: motion.of(from), to: motion.of(to), diameters };
-            return Cone::new(&ends)
-                .map(|cone| Some(Self::Cone(cone)))
-                .ok_or(EditProblem::NoLength);
+            let cone = Cone::new([motion.of(from), motion.of(to)], diameters);
+            return cone.map(|cone| Some(Self::Cone(cone))).ok_or(EditProblem::NoLength);
         }
         if let Some(Sphere { at, diameter }) = edit.sphere {
             return Ok(Some(Self::Sphere(Sphere { at: motion.of(at), diameter })));
@@ -72,7 +69,7 @@ impl Solid {
                 [-0.5, 0.5].map(|share| Length::from_um(z.um() + share * diameter.um()))
             }
             Self::Strut(strut) => strut.heights(),
-            Self::Cone(cone) => cone.reach_mm(2).map(Length::from_mm),
+            Self::Cone(cone) => cone.heights(),
         };
         (low..=high).contains(&height)
     }
@@ -86,19 +83,17 @@ impl Solid {
         runs: &mut RunSet,
     ) {
         let columns = |start: u32, end: u32| [start, end].map(f64::from);
+        let dpi = part.dpi.expect("shapes are drawn in known resolutions");
+        let size = [part.width, part.height];
         match self {
             Self::Lying(cylinder) => {
                 runs.add_polygons(&[rectangle(section(*cylinder, height), grid, &Motion::NONE)]);
             }
-            Self::Strut(strut) => {
-                let dpi = part.dpi.expect("shapes are drawn in known resolutions");
-                let size = [part.width, part.height];
-                strut
-                    .section(height, part.origin_mm, dpi, size)
-                    .for_each(|(row, start, end)| runs.add(row, columns(start, end)));
-            }
+            Self::Strut(strut) => strut
+                .section(height, part.origin_mm, dpi, size)
+                .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Cone(cone) => cone
-                .section(height, part)
+                .section(height, part.origin_mm, dpi, size)
                 .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
                 let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];

@@ -1,16 +1,13 @@
 //! Cones and frustums between two points, and their sections in the rows of images.
 
-use lamp_build::ImageBounds;
-use lamp_stack::Length;
-
-use super::schema::ConeEnds;
+use crate::length::{Dpi, Length};
 
 /// A round cone or frustum with flat ends, in part coordinates.
 ///
 /// A point is in it if it lies between the planes through the ends that the axis stands on, and
 /// nearer to the axis than the radius there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cone {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
     from_mm: [f64; 3],
     direction: [f64; 3],
     length_mm: f64,
@@ -18,18 +15,24 @@ pub(super) struct Cone {
 }
 
 impl Cone {
-    /// Creates a cone between the middles of its ends, or returns `None` if they coincide.
-    pub(super) fn new(ends: &ConeEnds) -> Option<Self> {
-        let [from_mm, to_mm] = [ends.from, ends.to].map(|end| end.map(Length::mm));
+    /// Creates a cone between the middles of its ends, with these diameters there, or returns
+    /// `None` if they coincide.
+    pub fn new(ends: [[Length; 3]; 2], diameters: [Length; 2]) -> Option<Self> {
+        let [from_mm, to_mm] = ends.map(|end| end.map(Length::mm));
         let along: [f64; 3] = std::array::from_fn(|k| to_mm[k] - from_mm[k]);
         let length_mm = along.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let radii_mm = ends.diameters.map(|diameter| diameter.mm() / 2.0);
+        let radii_mm = diameters.map(|diameter| diameter.mm() / 2.0);
         let direction = along.map(|part| part / length_mm);
         (length_mm > 0.0).then_some(Self { from_mm, direction, length_mm, radii_mm })
     }
 
+    /// Returns the heights of its lowest and its highest point.
+    pub fn heights(&self) -> [Length; 2] {
+        self.reach_mm(2).map(Length::from_mm)
+    }
+
     /// Returns the least and the greatest coordinate of an axis.
-    pub(super) fn reach_mm(&self, axis: usize) -> [f64; 2] {
+    fn reach_mm(&self, axis: usize) -> [f64; 2] {
         let along = self.direction[axis];
         // A flat end is a disc across the axis, which reaches r √(1 - d²) along a coordinate whose
         // share of the direction is d.
@@ -40,25 +43,26 @@ impl Cone {
     }
 
     /// Returns the pixels whose centers are in its section at a height: at most one run a row, as
-    /// the row, the first column and the column after the last, from the top. The image's
-    /// resolution is known.
-    pub(super) fn section(
+    /// the row, the first column and the column after the last, from the top. The image's top left
+    /// corner is at `origin_mm`, and it has `size` columns and rows.
+    pub fn section(
         &self,
         height: Length,
-        image: &ImageBounds,
+        origin_mm: [f64; 2],
+        dpi: Dpi,
+        size: [u32; 2],
     ) -> impl Iterator<Item = (u32, u32, u32)> + use<> {
-        let (cone, [x0, y1], width) = (*self, image.origin_mm, image.width);
-        let dpi = image.dpi.expect("shapes are drawn in known resolutions");
+        let (cone, [x0, y1]) = (*self, origin_mm);
         let pitch_mm = dpi.pitch().mm();
         let up_mm = height.mm() - self.from_mm[2];
         // Pixel centers are whole numbers; the casts make negative values zero.
         let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
         let [low, high] = self.reach_mm(1);
         let end = (pixels(y1 - low).floor() + 1.0) as u32;
-        (pixels(y1 - high).ceil() as u32..end.min(image.height)).filter_map(move |row| {
+        (pixels(y1 - high).ceil() as u32..end.min(size[1])).filter_map(move |row| {
             let y_mm = y1 - (f64::from(row) + 0.5) * pitch_mm;
             let run = cone.run_mm(y_mm - cone.from_mm[1], up_mm)?;
-            let column = |x: f64| (pixels(cone.from_mm[0] + x - x0).ceil() as u32).min(width);
+            let column = |x: f64| (pixels(cone.from_mm[0] + x - x0).ceil() as u32).min(size[0]);
             let [start, end] = run.map(column);
             (start < end).then_some((row, start, end))
         })
