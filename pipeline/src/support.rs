@@ -5,7 +5,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::str::FromStr;
 
 use lamp_stack::Length;
-use lamp_supports::{CheckOptions, SupportOptions};
+use lamp_supports::{CheckOptions, PillarSizes, SupportFoot, SupportOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::words::{text, words_of};
@@ -17,6 +17,21 @@ pub const CODE: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct SupportSettings {
+    /// Where supports end.
+    #[serde(with = "text")]
+    pub to: SupportFoot,
+    /// Least diameter of the tips of pillars.
+    #[serde(with = "text")]
+    pub tip: Length,
+    /// Diameter of pillars.
+    #[serde(with = "text")]
+    pub pillar: Length,
+    /// Diameter of the bases of pillars.
+    #[serde(with = "text")]
+    pub base: Length,
+    /// Least distance between pillars and the part.
+    #[serde(with = "text")]
+    pub clearance: Length,
     /// Radius of supports.
     #[serde(with = "text")]
     pub radius: Length,
@@ -57,6 +72,11 @@ impl Default for SupportSettings {
     fn default() -> Self {
         let options = SupportOptions::default();
         Self {
+            to: options.to,
+            tip: options.pillar.tip,
+            pillar: options.pillar.diameter,
+            base: options.pillar.base,
+            clearance: options.pillar.clearance,
             radius: options.radius,
             max_tilt: Degrees(options.max_tilt),
             max_length: options.max_length,
@@ -82,6 +102,13 @@ impl SupportSettings {
     /// Returns the options of the search for supports.
     pub fn options(&self) -> SupportOptions {
         SupportOptions {
+            to: self.to,
+            pillar: PillarSizes {
+                tip: self.tip,
+                diameter: self.pillar,
+                base: self.base,
+                clearance: self.clearance,
+            },
             candidates: self.candidates,
             max_tilt: self.max_tilt.0,
             edge_clearance: self.edge_clearance,

@@ -42,6 +42,7 @@ pub use record::{
     PocketRecord, PointRecord, Scale, Shown, StrayRowsRecord, records,
 };
 pub use support::{
-    HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportOptions, SupportShare, Surface,
-    Vent, VentPlan, flood_supports, left_of, plan_supports, plan_vents,
+    HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support, SupportError, SupportFoot,
+    SupportOptions, SupportShare, Surface, Vent, VentPlan, flood_supports, left_of, padded,
+    plan_supports, plan_vents, room_for,
 };

@@ -184,6 +184,60 @@ fn islands_without_a_way_are_left_and_told() {
 }
 
 #[test]
+fn pillars_hold_what_the_part_does_not() {
+    let scratch = Scratch::new();
+    scratch.part("needle.stl", Sample::Needle, 1_000);
+    scratch.run("slice needle.stl --dpi 254 -q -o needle.tif").succeeds_quietly();
+    let line = "lamp support needle.tif --part needle.stl";
+    let part = scratch.run(&format!("{line} -o part.tif")).succeeds();
+    assert!(part.stderr.contains("--to both holds all"), "{}", part.stderr);
+    for to in ["platform", "both"] {
+        let files = "--plan plan.toml --stl pillars.stl --report report.json --strict -o held.tif";
+        let ran = scratch.run(&format!("{line} --to {to} {files}")).succeeds();
+        assert!(ran.stderr.contains("on the platform"), "{}", ran.stderr);
+        assert!(islands(&scratch, "held.tif").is_empty());
+        scratch.run("lamp edit needle.tif plan.toml -q -o edited.tif").succeeds_quietly();
+        assert!(scratch.bytes("edited.tif") == scratch.bytes("held.tif"));
+        let report = report(&scratch, "report.json");
+        let support = &report["plans"][0]["places"][0]["supports"][0];
+        assert_eq!((&support["to"], &support["contact_mm"][2]), (&"platform".into(), &0.0.into()));
+        // The same solids: a slice of the STL is the difference, except the tip in the needle.
+        let layer = scratch.layers("held.tif").remove(0);
+        let (origin, image) = (layer.info.origin_mm.unwrap(), layer.image);
+        let slice = format!(
+            "slice pillars.stl --dpi 254 --plane middle --origin {},{} --size {}x{}mm -q -o pillars.tif",
+            origin[0],
+            origin[1],
+            f64::from(image.width()) / 10.0,
+            f64::from(image.height()) / 10.0
+        );
+        scratch.run(&slice).succeeds_quietly();
+        let white = |layers: &str| -> i64 {
+            scratch.layers(layers).iter().map(|layer| mask(layer).white_pixels() as i64).sum()
+        };
+        let share = (white("held.tif") - white("needle.tif")) as f64 / white("pillars.tif") as f64;
+        assert!(share > 0.93 && share < 1.0, "{share}");
+    }
+}
+
+#[test]
+fn images_get_room_for_bases_beside_the_part() {
+    let scratch = Scratch::new();
+    scratch.part("mug.stl", Sample::Mug, 2_000);
+    scratch.run("slice mug.stl --dpi 254 -q -o mug.tif").succeeds_quietly();
+    let line = "lamp support mug.tif --part mug.stl --to platform --plan plan.toml --strict";
+    scratch.run(&format!("{line} -o held.tif")).succeeds();
+    let plan = String::from_utf8(scratch.bytes("plan.toml")).unwrap();
+    assert!(plan.contains("pad = {"), "{plan}");
+    let [before, after] = ["mug.tif", "held.tif"].map(|name| scratch.layers(name).remove(0));
+    assert!(after.image.width() > before.image.width());
+    // The grip is 2.5 mm beyond the base's radius from the image's right border.
+    let [left, right] = [&before, &after].map(|layer| layer.info.origin_mm.unwrap()[0]);
+    assert!((left - right).abs() < 1e-6, "{left} {right}");
+    assert!(islands(&scratch, "held.tif").is_empty());
+}
+
+#[test]
 fn wide_islands_rest_on_as_much_as_is_asked() {
     let scratch = with_cores();
     let joints = |stack: &str| {

@@ -54,7 +54,9 @@ pub fn of_records<'a>(
 pub fn of_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, String> {
     let found = match report["schema"].as_str() {
         Some("lamp-check-1" | "lamp-check-2") => check_report(report, headers)?,
-        Some("lamp-support-1" | "lamp-support-2") => support_report(report, headers),
+        Some("lamp-support-1" | "lamp-support-2" | "lamp-support-3") => {
+            support_report(report, headers)
+        }
         _ => return Err("this is not a report of lamp check or lamp support".to_owned()),
     };
     fitting(found, headers)

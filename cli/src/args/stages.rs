@@ -14,7 +14,7 @@ use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
 use lamp_stack::{Length, Op};
-use lamp_supports::{CheckOptions, FindingGroup, SupportOptions};
+use lamp_supports::{CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions};
 
 use crate::args::lamp_option::LampOption;
 use crate::args::options::{one_of_described, parse_distance, parse_thickness};
@@ -145,9 +145,41 @@ pub(crate) struct CheckStageArgs {
 /// The heading of options that choose supports.
 const CHOICE: &str = "Choice of supports";
 
+/// The heading of options of supports that stand on the platform.
+const PILLARS: &str = "Supports to the platform";
+
 /// How islands are held.
 #[derive(Args, Clone)]
 pub(crate) struct SupportStageArgs {
+    /// Where supports end
+    #[arg(long, value_name = "WHERE", default_value_t = SupportFoot::Part)]
+    #[arg(value_parser = one_of_described::<SupportFoot>(&[
+        "On the part, as molds need it",
+        "On the platform: pillars with thin tips, to be cut off after the build",
+        "On either: the shortest support is built",
+    ]))]
+    to: SupportFoot,
+
+    /// Smallest diameter of the tips of pillars; wide islands get wider ones, up to --pillar
+    #[arg(long, value_name = "LENGTH", default_value_t = PillarSizes::default().tip)]
+    #[arg(value_parser = parse_thickness, help_heading = PILLARS)]
+    tip: Length,
+
+    /// Diameter of pillars
+    #[arg(long, value_name = "LENGTH", default_value_t = PillarSizes::default().diameter)]
+    #[arg(value_parser = parse_thickness, help_heading = PILLARS)]
+    pillar: Length,
+
+    /// Diameter of the bases of pillars, where the part leaves room
+    #[arg(long, value_name = "LENGTH", default_value_t = PillarSizes::default().base)]
+    #[arg(value_parser = parse_thickness, help_heading = PILLARS)]
+    base: Length,
+
+    /// Smallest distance between pillars and the part
+    #[arg(long, value_name = "LENGTH", default_value_t = PillarSizes::default().clearance)]
+    #[arg(value_parser = parse_distance, help_heading = PILLARS)]
+    clearance: Length,
+
     /// Radius of supports
     #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().radius)]
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
@@ -276,6 +308,11 @@ impl From<CheckStageArgs> for CheckSettings {
 impl From<SupportStageArgs> for SupportSettings {
     fn from(args: SupportStageArgs) -> Self {
         Self {
+            to: args.to,
+            tip: args.tip,
+            pillar: args.pillar,
+            base: args.base,
+            clearance: args.clearance,
             radius: args.radius,
             max_tilt: args.max_tilt,
             max_length: args.max_length,

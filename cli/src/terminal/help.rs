@@ -75,7 +75,18 @@ const USUAL: [(&str, &[&str]); 5] = [
     ),
     (
         "support",
-        &["part", "plan", "stl", "report", "max_tilt", "max_length", "hold", "strict", "output"],
+        &[
+            "part",
+            "to",
+            "plan",
+            "stl",
+            "report",
+            "max_tilt",
+            "max_length",
+            "hold",
+            "strict",
+            "output",
+        ],
     ),
     ("heights", &["report", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
 ];

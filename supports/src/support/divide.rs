@@ -8,6 +8,7 @@ pub(super) type WhiteRuns = Vec<(u32, Range<u32>)>;
 /// A piece of an island.
 #[derive(Debug, PartialEq)]
 pub(super) struct IslandPiece {
+    pub(super) runs: WhiteRuns,
     pub(super) area: u64,
     /// The point to hold, as column and row: the centroid, or else the center of the pixel that is
     /// nearest to it. The first pixel's center is at (0.5, 0.5).
@@ -38,11 +39,11 @@ pub(super) fn divided(
     };
     let grid = down.iter().flat_map(|rows| across.iter().map(move |columns| (rows, columns)));
     let pieces: Vec<IslandPiece> =
-        grid.map(within).filter(|runs| !runs.is_empty()).map(|runs| piece(&runs)).collect();
+        grid.map(within).filter(|runs| !runs.is_empty()).map(piece).collect();
     let is_large = |piece: &IslandPiece| piece.area as f64 >= least;
     Some(match pieces.iter().any(is_large) {
         true => pieces.into_iter().filter(is_large).collect(),
-        false => vec![piece(runs)],
+        false => vec![piece(runs.clone())],
     })
 }
 
@@ -66,7 +67,8 @@ fn cells(range: &Range<u32>, hold: f64, most: usize) -> Option<Vec<Range<u32>>> 
     (count <= most as u64).then(|| (0..count).map(|k| at(k)..at(k + 1)).collect())
 }
 
-fn piece(runs: &WhiteRuns) -> IslandPiece {
+/// Returns all of an island as one piece.
+pub(super) fn piece(runs: WhiteRuns) -> IslandPiece {
     let area: u64 = runs.iter().map(|(_, run)| u64::from(run.end - run.start)).sum();
     let count = |run: &Range<u32>| f64::from(run.end - run.start);
     let columns = |run: &Range<u32>| count(run) * f64::midpoint(run.start.into(), run.end.into());
@@ -76,15 +78,16 @@ fn piece(runs: &WhiteRuns) -> IslandPiece {
     let pixel = [x, y].map(|place| place as u32);
     // The centroid of a ring or a hook may be outside of it.
     if runs.iter().any(|(row, run)| *row == pixel[1] && run.contains(&pixel[0])) {
-        return IslandPiece { area, middle: [x, y] };
+        return IslandPiece { runs, area, middle: [x, y] };
     }
     let nearest = runs.iter().map(|(row, run)| {
         let column = pixel[0].clamp(run.start, run.end - 1);
         let middle = [column, *row].map(|place| f64::from(place) + 0.5);
         ((middle[0] - x).powi(2) + (middle[1] - y).powi(2), middle)
     });
-    let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a piece has pixels");
-    IslandPiece { area, middle: nearest.1 }
+    let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, middle) = nearest.expect("a piece has pixels");
+    IslandPiece { runs, area, middle }
 }
 
 #[cfg(test)]
@@ -96,7 +99,7 @@ mod tests {
         let ring: WhiteRuns = vec![(3, 4..9), (4, 4..5), (4, 8..9), (5, 4..9)];
         assert_eq!(
             divided(&ring, 9.0, 1.0, 1),
-            Some(vec![IslandPiece { area: 12, middle: [6.5, 3.5] }])
+            Some(vec![IslandPiece { runs: ring.clone(), area: 12, middle: [6.5, 3.5] }])
         );
     }
 
@@ -114,7 +117,7 @@ mod tests {
         );
         assert_eq!(pieces.iter().map(|piece| piece.area).sum::<u64>(), 38);
         assert_eq!(divided(5.0, 9.0).len(), 2);
-        assert_eq!(divided(5.0, 99.0), [piece(&runs)]);
+        assert_eq!(divided(5.0, 99.0), [piece(runs.clone())]);
         assert_eq!(divided(1e9, 1.0).len(), 1);
         assert_eq!(divided(1e-9, 1.0).len(), 38);
         assert_eq!(super::divided(&runs, 1e-9, 1.0, 107), None);

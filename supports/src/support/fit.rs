@@ -3,12 +3,13 @@
 use std::ops::Range;
 
 use lamp_slicer::brep::vector::{Vec3, dot, sub};
-use lamp_stack::{Length, Strut};
+use lamp_stack::Length;
 
-use super::Rejection;
 use super::divide::WhiteRuns;
+use super::rod::Rod;
 use super::surface::Contact;
 use super::window::{Raster, SupportWindow};
+use super::{Rejection, Support};
 use crate::check::LayerFacts;
 
 /// The surroundings of an island.
@@ -35,7 +36,7 @@ impl IslandSurroundings<'_> {
     /// is drawn into the images, touches nothing on the way and stays in the part below.
     pub(super) fn try_strut(
         &self,
-        strut: &Strut,
+        strut: &Rod,
         contact: &Contact,
         radius_mm: f64,
     ) -> Result<(), Rejection> {
@@ -43,15 +44,14 @@ impl IslandSurroundings<'_> {
         let mut below = Vec::new();
         let mut holds = false;
         for number in self.lowest..self.layers.len() as u32 {
-            let [bottom, thickness] = self.span_mm(number);
-            let middle = Length::from_mm(bottom + thickness / 2.0);
+            let middle = self.middle(number);
             if middle > high {
                 break;
             }
             if middle < low {
                 continue;
             }
-            let section = self.raster.section(strut, middle);
+            let section = strut.section(middle, &self.raster);
             if number < self.layer {
                 self.check_solid(number, middle, &section, contact, radius_mm)?;
                 let held = |(row, run): &(u32, _)| overlaps(&section, *row, run).next().is_some();
@@ -63,17 +63,61 @@ impl IslandSurroundings<'_> {
         if holds { Ok(()) } else { Err(Rejection::Unsteady) }
     }
 
-    /// Returns how many pixels of the island rest on struts that are apart.
-    pub(super) fn covered<'s>(&self, struts: impl Iterator<Item = &'s Strut>) -> u64 {
+    /// Checks that the leaning rods of a pillar, its first ones, are in black down to the junction at
+    /// the bottom of a layer, and that each of their sections rests on the one below. The clearance
+    /// grows from a pixel at the island to all of it.
+    pub(super) fn try_leaning(
+        &self,
+        rods: &[Rod],
+        leaning: usize,
+        junction: u32,
+        clearance_mm: f64,
+    ) -> Result<(), Rejection> {
+        let section = |rods: &[Rod], number: u32| united(rods, self.middle(number), &self.raster);
+        let mut below = match junction.checked_sub(1) {
+            Some(column) => section(&rods[leaning..], column),
+            None => WhiteRuns::new(),
+        };
+        let pitch = self.raster.dpi.pitch().mm();
+        for number in junction..self.layer {
+            let section = section(&rods[..leaning], number);
+            let depth = self.middle(self.layer).mm() - self.middle(number).mm();
+            let clear = (clearance_mm.min(depth) / pitch).max(1.0);
+            if section.iter().any(|(row, run)| self.is_white_near(number, *row, run, clear)) {
+                return Err(Rejection::Blocked);
+            }
+            self.check_rest(number, &section, &below)?;
+            below = section;
+        }
+        let held = |(row, run): &(u32, _)| overlaps(&below, *row, run).next().is_some();
+        if self.island.iter().any(held) { Ok(()) } else { Err(Rejection::Unsteady) }
+    }
+
+    fn is_white_near(&self, number: u32, row: u32, run: &Range<u32>, distance: f64) -> bool {
+        let far = distance.floor() as u32;
+        (row.saturating_sub(far)..=row.saturating_add(far)).any(|near| {
+            let aside = (distance.powi(2) - f64::from(near.abs_diff(row)).powi(2)).max(0.0).sqrt();
+            let aside = aside as u32;
+            let run = run.start.saturating_sub(aside)..run.end.saturating_add(aside);
+            self.window.white_in(number, near, &run).next().is_some()
+        })
+    }
+
+    /// Returns how many pixels of the island rest on supports that are apart.
+    pub(super) fn covered<'s>(&self, supports: impl Iterator<Item = &'s Support>) -> u64 {
         let Some(below) = self.layer.checked_sub(1) else { return 0 };
-        let [bottom, thickness] = self.span_mm(below);
-        let middle = Length::from_mm(bottom + thickness / 2.0);
-        let pixels = |strut: &Strut| -> u64 {
-            let section = self.raster.section(strut, middle);
+        let pixels = |support: &Support| -> u64 {
+            let section = united(&support.rods, self.middle(below), &self.raster);
             let shared = self.island.iter().flat_map(|(row, run)| overlaps(&section, *row, run));
             shared.map(|run| u64::from(run.end - run.start)).sum()
         };
-        struts.map(pixels).sum()
+        supports.map(pixels).sum()
+    }
+
+    /// Returns the height of the middle of a layer.
+    fn middle(&self, number: u32) -> Length {
+        let [bottom, thickness] = self.span_mm(number);
+        Length::from_mm(bottom + thickness / 2.0)
     }
 
     fn span_mm(&self, number: u32) -> [f64; 2] {
@@ -151,6 +195,20 @@ impl IslandSurroundings<'_> {
         let is_steady = section.is_empty() || (of_component > 0 && 2 * resting >= all);
         if is_steady { Ok(()) } else { Err(Rejection::Unsteady) }
     }
+}
+
+/// Returns the section of rods that follow each other along a line, a run a row.
+fn united(rods: &[Rod], height: Length, raster: &Raster) -> WhiteRuns {
+    let mut runs: WhiteRuns = rods.iter().flat_map(|rod| rod.section(height, raster)).collect();
+    runs.sort_unstable_by_key(|(row, run)| (*row, run.start));
+    runs.dedup_by(|(row, run), (last_row, last)| {
+        let is_same = row == last_row;
+        if is_same {
+            last.end = last.end.max(run.end);
+        }
+        is_same
+    });
+    runs
 }
 
 /// Returns what a run of a row shares with others, which have at most one run a row.

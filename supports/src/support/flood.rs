@@ -1,10 +1,11 @@
 //! Draws planned supports and lets all that does not stand float.
 
-use lamp_stack::{Layer, Length, Mask, MaskBuilder, Op, Strut};
+use lamp_stack::{Layer, Length, Mask, MaskBuilder, Op};
 
 use super::fit::span_mm;
+use super::rod::Rod;
 use super::window::Raster;
-use super::{IslandPlan, Support, SupportError, SupportOptions, SupportShare};
+use super::{IslandPlan, SupportError, SupportOptions, SupportShare};
 use crate::check::{Findings, Standing};
 
 /// Checks plans in the images that they make, given the stack's layers once more: sets which
@@ -19,9 +20,9 @@ pub fn flood_supports<E: From<SupportError>>(
     options: &SupportOptions,
 ) -> Result<(), E> {
     let raster = Raster::of(found)?;
-    let mut struts: Vec<Strut> =
-        plans.iter().flat_map(IslandPlan::supports).map(Support::strut).collect();
-    struts.sort_by(|a, b| a.heights()[0].um().total_cmp(&b.heights()[0].um()));
+    let supports = plans.iter().flat_map(IslandPlan::supports);
+    let mut rods: Vec<Rod> = supports.flat_map(|support| support.rods.iter().copied()).collect();
+    rods.sort_by(|a, b| a.heights()[0].um().total_cmp(&b.heights()[0].um()));
     let (mut drawn, mut next) = (Vec::new(), 0);
     let mut standing = Standing::default();
     for (number, layer) in (0..).zip(layers) {
@@ -34,10 +35,10 @@ pub fn flood_supports<E: From<SupportError>>(
         let [bottom, thickness] =
             span_mm(facts).ok_or(SupportError::NoHeight { index: facts.index })?;
         let middle = Length::from_mm(bottom + thickness / 2.0);
-        let begun = struts[next..].iter().take_while(|strut| strut.heights()[0] <= middle);
+        let begun = rods[next..].iter().take_while(|rod| rod.heights()[0] <= middle);
         drawn.extend(begun.copied());
-        next = struts.partition_point(|strut| strut.heights()[0] <= middle);
-        drawn.retain(|strut| strut.heights()[1] >= middle);
+        next = rods.partition_point(|rod| rod.heights()[0] <= middle);
+        drawn.retain(|rod: &Rod| rod.heights()[1] >= middle);
         if !drawn.is_empty() {
             let sections = sections(&drawn, middle, raster);
             mask = mask.combined(Op::Union, &sections).ok_or(SupportError::TooMany)?;
@@ -53,9 +54,9 @@ pub fn flood_supports<E: From<SupportError>>(
     Err(SupportError::MissingLayers.into())
 }
 
-/// Returns the image of struts at a height.
-fn sections(struts: &[Strut], height: Length, raster: Raster) -> Mask {
-    let mut runs: Vec<_> = struts.iter().flat_map(|strut| raster.section(strut, height)).collect();
+/// Returns the image of rods at a height.
+fn sections(rods: &[Rod], height: Length, raster: Raster) -> Mask {
+    let mut runs: Vec<_> = rods.iter().flat_map(|rod| rod.section(height, &raster)).collect();
     runs.sort_unstable_by_key(|(row, run)| (*row, run.start));
     let [width, rows] = raster.size;
     let mut mask = MaskBuilder::new(width);
@@ -65,7 +66,7 @@ fn sections(struts: &[Strut], height: Length, raster: Raster) -> Mask {
         row.clear();
         while let Some((_, run)) = runs.next_if(|(of, _)| *of == number) {
             match row.last_mut() {
-                // Struts of one island may touch where they enter it.
+                // Rods may touch and cross.
                 Some(end) if *end >= run.start => *end = run.end.max(*end),
                 _ => row.extend([run.start, run.end]),
             }

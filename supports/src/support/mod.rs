@@ -1,9 +1,12 @@
-//! Plans supports that tie floating islands to the part around them.
+//! Plans supports that tie floating islands to the part around them, or to the platform.
 //!
-//! Supports stay in the mold and become features of the casting, so there is one for each
+//! Supports to the part stay in the mold and become features of the casting, so there is one for each
 //! island, or for each piece of a wide one, and it is as short as can be. Rays over a cone below
 //! the island look for the surface of the part; where one meets it smooth and even, a straight
 //! round strut is tried in the images, layer by layer, as it will be drawn.
+//!
+//! Supports to the platform are pillars: upright columns with a thin tip below the island. They
+//! stand where nothing is white from the platform up.
 //!
 //! Source: 002 section 4.4, algorithm 17.
 
@@ -11,7 +14,14 @@ mod cone;
 mod divide;
 mod fit;
 mod flood;
+mod free;
+mod pillar;
+#[cfg(test)]
+mod pillar_tests;
 mod plan;
+mod rod;
+mod room;
+mod strut_search;
 #[cfg(test)]
 mod support_tests;
 mod surface;
@@ -20,18 +30,70 @@ mod vent;
 mod vent_tests;
 mod window;
 
-use lamp_stack::{Length, Strut};
+use lamp_slicer::brep::vector::{Vec3, length, sub};
+use lamp_stack::Length;
 use std::num::{NonZeroU8, NonZeroU32};
 
 use crate::check::Island;
 pub use flood::flood_supports;
 pub use plan::{SupportError, plan_supports};
+pub use rod::Rod;
+pub use room::{padded, room_for};
 pub use surface::Surface;
 pub use vent::{Vent, VentPlan, left_of, plan_vents};
+
+/// Where supports end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SupportFoot {
+    /// On the part, as molds need it.
+    #[default]
+    Part,
+    /// On the platform.
+    Platform,
+    /// On either: the shortest supports are built.
+    Both,
+}
+
+lamp_stack::named!(SupportFoot {
+    Part = "part",
+    Platform = "platform",
+    Both = "both",
+});
+
+/// The sizes of supports that stand on the platform.
+///
+/// The defaults are the ones that `PrusaSlicer` has for resin printers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PillarSizes {
+    /// The least diameter of the tip, where it meets the island. It is wider, up to the pillar's
+    /// diameter, where islands must rest on more.
+    pub tip: Length,
+    /// The diameter of the column.
+    pub diameter: Length,
+    /// The diameter of the base on the platform, unless the part is too near.
+    pub base: Length,
+    /// The least distance between the column and the part.
+    pub clearance: Length,
+}
+
+impl Default for PillarSizes {
+    fn default() -> Self {
+        Self {
+            tip: Length::from_um(400.0),
+            diameter: Length::from_mm(1.0),
+            base: Length::from_mm(4.0),
+            clearance: Length::from_um(500.0),
+        }
+    }
+}
 
 /// Limits of supports. The seed prints only the radius: the other defaults are LAMP's own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SupportOptions {
+    /// Where supports end.
+    pub to: SupportFoot,
+    /// The sizes of supports that end on the platform.
+    pub pillar: PillarSizes,
     /// The number of directions that are tried, evenly over the cone.
     pub candidates: NonZeroU32,
     /// The largest angle of a support to the vertical, in degrees, below 90.
@@ -58,6 +120,8 @@ pub struct SupportOptions {
 impl Default for SupportOptions {
     fn default() -> Self {
         Self {
+            to: SupportFoot::Part,
+            pillar: PillarSizes::default(),
             candidates: NonZeroU32::new(400).expect("it is not zero"),
             max_tilt: 45.0,
             edge_clearance: Length::from_um(500.0),
@@ -72,40 +136,66 @@ impl Default for SupportOptions {
     }
 }
 
+impl SupportOptions {
+    /// Returns how far supports may reach beyond the images: for pillars that lean outwards, the
+    /// images need as much black around them.
+    pub fn reach_outside(&self) -> Length {
+        match self.to {
+            SupportFoot::Part => Length::default(),
+            SupportFoot::Platform | SupportFoot::Both => {
+                let aside = self.max_length.mm() * self.max_tilt.to_radians().sin();
+                let widest = self.pillar.base.mm().max(self.pillar.diameter.mm());
+                Length::from_mm(aside + widest)
+            }
+        }
+    }
+}
+
 /// A way to hold an island.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Support {
-    /// The point of the island where it begins, at the bottom of the island's first layer.
-    pub origin_mm: [f64; 3],
-    /// The point of the part that its axis meets first.
-    pub contact_mm: [f64; 3],
-    /// The ends of the strut to draw, to whole nanometers. It reaches into the island and the part
-    /// until it meets them wholly, and into the part at least by its radius.
-    pub ends: [[Length; 3]; 2],
-    /// The diameter.
+    /// Its axis: from the point of the island where it begins, at the bottom of the island's first
+    /// layer, to the first point of the part or the platform that it meets.
+    pub path_mm: Vec<Vec3>,
+    /// The rods to draw, from the island down. They reach into the island, and into the part at
+    /// least by the radius, until they meet them wholly.
+    pub rods: Vec<Rod>,
+    /// The diameter of the strut or column.
     pub diameter: Length,
-    /// The angle to the vertical in degrees.
+    /// The angle at the island to the vertical in degrees.
     pub tilt: f64,
-    /// The curvature of the part's surface around the contact, in 1/mm.
-    pub curvature: f64,
+    /// The curvature of the part's surface around the contact, in 1/mm; `None` on the platform.
+    pub curvature: Option<f64>,
 }
 
 impl Support {
-    /// Returns the distance between island and part along the axis.
+    /// Returns the point of the island where it begins.
+    pub fn origin_mm(&self) -> Vec3 {
+        self.path_mm[0]
+    }
+
+    /// Returns the point of the part or the platform that its axis meets first.
+    pub fn contact_mm(&self) -> Vec3 {
+        self.path_mm[self.path_mm.len() - 1]
+    }
+
+    /// Returns whether it stands on the platform.
+    pub fn is_pillar(&self) -> bool {
+        self.curvature.is_none()
+    }
+
+    /// Returns the length of its axis.
     pub fn length(&self) -> Length {
-        let parts = (0..3).map(|k| (self.contact_mm[k] - self.origin_mm[k]).powi(2));
-        Length::from_mm(parts.sum::<f64>().sqrt())
+        let legs = self.path_mm.windows(2).map(|leg| length(sub(leg[1], leg[0])));
+        Length::from_mm(legs.sum())
     }
 
-    /// Returns the volume between island and part in mm³.
+    /// Returns the volume in mm³: of a strut between island and part, of a pillar altogether.
     pub fn volume_mm3(&self) -> f64 {
+        if self.is_pillar() {
+            return self.rods.iter().map(Rod::volume_mm3).sum();
+        }
         std::f64::consts::PI * (self.diameter.mm() / 2.0).powi(2) * self.length().mm()
-    }
-
-    /// Returns the strut to draw.
-    pub fn strut(&self) -> Strut {
-        let [from, to] = self.ends;
-        Strut::new(from, to, self.diameter).expect("a support has a length")
     }
 }
 
@@ -126,6 +216,8 @@ pub enum Rejection {
     Through,
     /// A layer of it would not rest on half of the one below, or it would not meet the island.
     Unsteady,
+    /// White stands between each place that it may reach and the platform.
+    NoColumn,
 }
 
 lamp_stack::named!(Rejection {
@@ -136,6 +228,7 @@ lamp_stack::named!(Rejection {
     Blocked = "blocked",
     Through = "through",
     Unsteady = "unsteady",
+    NoColumn = "no-column",
 });
 
 /// The supports of an island, or of a piece of a wide one.

@@ -4,17 +4,20 @@ use std::cmp::Ordering;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use lamp_slicer::brep::vector::{Vec3, along, dot};
-use lamp_stack::{Layer, Length, Strut};
+use lamp_slicer::brep::vector::Vec3;
+use lamp_stack::{Layer, Length};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::cone::{beside, directions};
-use super::divide::{IslandPiece, WhiteRuns, divided, extent};
+use super::cone::directions;
+use super::divide::{IslandPiece, WhiteRuns, divided, extent, piece};
 use super::fit::{IslandSurroundings, distance_mm, span_mm};
-use super::surface::{Contact, NearSurface, Surface};
+use super::free::WhiteBelow;
+use super::pillar::PillarGround;
+use super::strut_search::MOST_RADII;
+use super::surface::{NearSurface, Surface};
 use super::window::{Raster, SupportWindow};
-use super::{HeldPlace, IslandPlan, Rejection, Support, SupportOptions, SupportShare};
+use super::{HeldPlace, IslandPlan, Rejection, Support, SupportFoot, SupportOptions, SupportShare};
 use crate::check::{Findings, Island, Region, Standing};
 
 /// A reason that no supports can be planned for a stack.
@@ -63,7 +66,7 @@ pub fn plan_supports<E: From<SupportError>>(
     }
     let regions = planner.regions(&islands);
     let (mut window, mut plans) = (SupportWindow::default(), Vec::new());
-    let mut standing = Standing::default();
+    let (mut standing, mut below) = (Standing::default(), WhiteBelow::default());
     for (number, layer) in (0..).zip(layers) {
         let Some(next) = islands.get(plans.len()) else { break };
         standing.add(layer?.image.into_image().into_mask(options.threshold));
@@ -74,13 +77,16 @@ pub fn plan_supports<E: From<SupportError>>(
                 break;
             }
             let component = standing.component_at(island.first);
-            let plan = planner.plan(island, &window, &standing.runs(component))?;
+            let plan = planner.plan(island, &window, &below, &standing.runs(component))?;
             if !plan.is_left() {
                 standing.hold(component);
             }
             plans.push(plan);
         }
         // Added after planning: supports of an island rest on the layers below its own.
+        if options.to != SupportFoot::Part {
+            below.add(standing.mask(), planner.is_low(number)).ok_or(SupportError::TooMany)?;
+        }
         if let Some(region) = &regions[number as usize] {
             window.push(standing.mask(), standing.standing_mask().as_ref(), Some(region));
         } else {
@@ -93,23 +99,18 @@ pub fn plan_supports<E: From<SupportError>>(
 /// The most supports of a stack. Each takes time to draw, and a person looks at each.
 const MOST_SUPPORTS: usize = 10_000;
 
-/// The largest reach of a strut beyond its contacts, in radii, where it hardly meets them.
-const MOST_RADII: f64 = 4.0;
-
 /// How often an island is divided anew to hold as much of it as is asked for.
 const MOST_DIVISIONS: usize = 6;
 
-/// The least angle by which supports are turned to make them shorter: some 4 um at 10 mm.
-const LEAST_STEP: f64 = 4e-4;
-
-struct SupportPlanner<'a> {
-    found: &'a Findings,
+/// Plans supports, each apart from those before.
+pub(super) struct SupportPlanner<'a> {
+    pub(super) found: &'a Findings,
     surface: &'a Surface,
-    options: &'a SupportOptions,
-    raster: Raster,
-    directions: Vec<Vec3>,
-    /// The ends of the supports so far.
-    built: Vec<[Vec3; 2]>,
+    pub(super) options: &'a SupportOptions,
+    pub(super) raster: Raster,
+    pub(super) directions: Vec<Vec3>,
+    /// The axes of the supports so far, and their radii in millimeters.
+    built: Vec<([Vec3; 2], f64)>,
 }
 
 impl<'a> SupportPlanner<'a> {
@@ -127,13 +128,24 @@ impl<'a> SupportPlanner<'a> {
     }
 
     /// Returns the height of a layer's bottom.
-    fn bottom_mm(&self, number: u32) -> f64 {
+    pub(super) fn bottom_mm(&self, number: u32) -> f64 {
         span_mm(&self.found.layers[number as usize]).expect("heights were found for all layers")[0]
+    }
+
+    /// Returns the radius of the widest supports, with what must stay black around them.
+    fn radius_mm(&self) -> f64 {
+        let sizes = &self.options.pillar;
+        match self.options.to {
+            SupportFoot::Part => self.options.radius.mm(),
+            SupportFoot::Platform | SupportFoot::Both => {
+                (sizes.diameter.mm() / 2.0 + sizes.clearance.mm()).max(self.options.radius.mm())
+            }
+        }
     }
 
     /// Returns the reach of supports from an island, to each side and down.
     fn reach_mm(&self) -> [f64; 2] {
-        let (radius, length) = (self.options.radius.mm(), self.options.max_length.mm());
+        let (radius, length) = (self.radius_mm(), self.options.max_length.mm());
         let (sin, _) = self.options.max_tilt.to_radians().sin_cos();
         let length = length + MOST_RADII * radius;
         // The greatest tilt reaches farthest to the side, straight down reaches deepest.
@@ -153,15 +165,9 @@ impl<'a> SupportPlanner<'a> {
     /// Returns the region in each layer that supports may reach or rest on.
     fn regions(&self, islands: &[&Island]) -> Vec<Option<Region>> {
         let [aside, _] = self.reach_mm();
-        let by = self.raster.pixels(Length::from_mm(aside));
-        let grown = |range: &Range<u32>, size: u32| {
-            range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
-        };
-        let [width, height] = self.raster.size;
         let mut regions: Vec<Option<Region>> = vec![None; self.found.layers.len()];
         for island in islands {
-            let Region { columns, rows } = &island.region;
-            let reached = Region { columns: grown(columns, width), rows: grown(rows, height) };
+            let reached = self.grown(&island.region, aside);
             let layers = self.lowest(island).saturating_sub(1)..island.layer;
             for layer in &mut regions[layers.start as usize..layers.end as usize] {
                 match layer {
@@ -173,11 +179,22 @@ impl<'a> SupportPlanner<'a> {
         regions
     }
 
+    /// Returns a region grown by a length, in the images.
+    fn grown(&self, Region { columns, rows }: &Region, by_mm: f64) -> Region {
+        let by = self.raster.pixels(Length::from_mm(by_mm));
+        let grown = |range: &Range<u32>, size: u32| {
+            range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
+        };
+        let [width, height] = self.raster.size;
+        Region { columns: grown(columns, width), rows: grown(rows, height) }
+    }
+
     /// Plans the supports of an island, given its pixels in its first layer and the images below.
     fn plan(
         &mut self,
         island: &Island,
         window: &SupportWindow,
+        below: &WhiteBelow,
         runs: &WhiteRuns,
     ) -> Result<IslandPlan, SupportError> {
         let surroundings = IslandSurroundings {
@@ -189,8 +206,9 @@ impl<'a> SupportPlanner<'a> {
             island: runs,
         };
         let near = self.near(island);
-        let [widest, radius] =
-            [self.options.hold, self.options.radius].map(|length| length.pixels(self.raster.dpi));
+        let mut ground = self.ground(island, below);
+        let [widest, radius] = [self.options.hold, Length::from_mm(self.least_radius_mm())]
+            .map(|length| length.pixels(self.raster.dpi));
         // Nearer to each other, struts touch.
         let narrowest = 2.0 * radius + 1.0;
         let asked = self.options.least_support * island.area as f64;
@@ -201,17 +219,27 @@ impl<'a> SupportPlanner<'a> {
             // Pieces are connected: one smaller than the section of a strut needs none of its own.
             let pieces = divided(runs, hold, PI * radius * radius, MOST_SUPPORTS - before);
             let Some(pieces) = pieces else { break };
-            let places = self.places(&pieces, &near, &surroundings);
+            if let Some(ground) = &mut ground {
+                ground.tip = self.wider(ground.tip, self.tip_for(asked, pieces.len()));
+            }
+            let places = self.places(&pieces, &near, &surroundings, ground.as_ref());
             self.built.truncate(before);
-            let struts: Vec<Strut> =
-                places.iter().filter_map(|it| Some(it.supports.first()?.strut())).collect();
-            let covered = surroundings.covered(struts.iter());
+            let covered = surroundings.covered(places.iter().filter_map(|it| it.supports.first()));
             if best.as_ref().is_none_or(|(most, _)| covered > *most) {
                 best = Some((covered, places));
             }
             // Without a way from any place, smaller pieces have none either.
             if covered as f64 >= asked || covered == 0 || hold <= narrowest {
                 break;
+            }
+            // Wider tips come first.
+            if let Some(ground) = &mut ground {
+                let tip = ground.tip;
+                let wide = 1.02 * tip.mm() * (asked / covered as f64).sqrt();
+                ground.tip = self.wider(tip, Length::from_mm(wide));
+                if ground.tip > tip {
+                    continue;
+                }
             }
             // As many more pieces as are missing, and some more at the edges.
             // The cells are as many as the extent has room for, so they are smaller than asked.
@@ -220,11 +248,66 @@ impl<'a> SupportPlanner<'a> {
             let finer = 0.95 * cell * (covered as f64 / asked).sqrt();
             hold = finer.min(extent(runs) / (cells + 0.5)).max(narrowest);
         }
-        let (covered, places) = best.ok_or(SupportError::TooMany)?;
-        let supports = places.iter().filter_map(|place| place.supports.first());
-        self.built.extend(supports.map(|support| [support.origin_mm, support.contact_mm]));
+        let (mut covered, mut places) = best.ok_or(SupportError::TooMany)?;
+        // A pillar anywhere, even through others, is better than none.
+        if let Some(ground) = ground.as_mut().filter(|_| covered == 0) {
+            ground.may_touch = true;
+            let anywhere = self.places(&[piece(runs.clone())], &near, &surroundings, Some(ground));
+            self.built.truncate(before);
+            covered = surroundings.covered(anywhere.iter().filter_map(|it| it.supports.first()));
+            places = if covered > 0 { anywhere } else { places };
+        }
+        places.iter().filter_map(|place| place.supports.first()).for_each(|it| self.build(it));
         let rests = SupportShare { pixels: covered, of: island.area };
         Ok(IslandPlan { island: island.clone(), stands: covered > 0, rests, places })
+    }
+
+    /// Returns where pillars of an island may stand, if they are asked for.
+    fn ground<'b>(&self, island: &Island, below: &'b WhiteBelow) -> Option<PillarGround<'b>> {
+        if self.options.to == SupportFoot::Part {
+            return None;
+        }
+        let [aside, _] = self.reach_mm();
+        let region = self.grown(&island.region, aside);
+        let free = below.free_columns(&region, self.column_clearance());
+        Some(PillarGround { below, free, tip: self.options.pillar.tip, may_touch: false })
+    }
+
+    /// Returns the diameter of equal tips that cover a number of pixels.
+    fn tip_for(&self, pixels: f64, tips: usize) -> Length {
+        let area = pixels * self.raster.dpi.pitch().mm().powi(2) / tips as f64;
+        // Some reach beyond an edge of the island.
+        Length::from_mm(1.05 * (4.0 * area / PI).sqrt())
+    }
+
+    /// Returns a wider tip, up to the pillar's diameter.
+    fn wider(&self, tip: Length, wide: Length) -> Length {
+        let most = self.options.pillar.diameter.um();
+        Length::from_um(wide.um().min(most).max(tip.um()))
+    }
+
+    /// Returns the radius of the thinnest supports.
+    fn least_radius_mm(&self) -> f64 {
+        let pillar = self.options.pillar.diameter.mm() / 2.0;
+        match self.options.to {
+            SupportFoot::Part => self.options.radius.mm(),
+            SupportFoot::Platform => pillar,
+            SupportFoot::Both => pillar.min(self.options.radius.mm()),
+        }
+    }
+
+    /// Keeps other supports away from one.
+    fn build(&mut self, support: &Support) {
+        let radius = support.diameter.mm() / 2.0;
+        self.built.extend(support.path_mm.windows(2).map(|leg| ([leg[0], leg[1]], radius)));
+    }
+
+    /// Returns whether an axis comes too near to a support.
+    pub(super) fn is_beside_another(&self, axis: [Vec3; 2], radius_mm: f64) -> bool {
+        // A pixel between them keeps them apart in the images, too.
+        let apart = radius_mm + self.raster.dpi.pitch().mm();
+        let mut built = self.built.iter();
+        built.any(|(other, radius)| distance_mm(*other, axis) < apart + radius)
     }
 
     /// Finds the supports of pieces of an island, each apart from those before.
@@ -233,12 +316,12 @@ impl<'a> SupportPlanner<'a> {
         pieces: &[IslandPiece],
         near: &NearSurface,
         around: &IslandSurroundings<'_>,
+        ground: Option<&PillarGround<'_>>,
     ) -> Vec<HeldPlace> {
         let mut places = Vec::new();
         for piece in pieces {
-            let place = self.place(piece, near, around);
-            let support = place.supports.first();
-            self.built.extend(support.map(|support| [support.origin_mm, support.contact_mm]));
+            let place = self.place(piece, near, around, ground);
+            place.supports.first().into_iter().for_each(|support| self.build(support));
             places.push(place);
         }
         places
@@ -264,12 +347,18 @@ impl<'a> SupportPlanner<'a> {
         piece: &IslandPiece,
         near: &NearSurface,
         around: &IslandSurroundings<'_>,
+        ground: Option<&PillarGround<'_>>,
     ) -> HeldPlace {
         let [x, y] = self.raster.place_mm(piece.middle);
         let origin_mm = [x, y, self.bottom_mm(around.layer)];
-        let tried = self.directions.par_iter();
-        let tried = tried.map(|direction| self.support(origin_mm, *direction, near, around));
-        let tried: Vec<Result<Support, Rejection>> = tried.collect();
+        let directions = match self.options.to {
+            SupportFoot::Platform => &[],
+            SupportFoot::Part | SupportFoot::Both => &self.directions[..],
+        };
+        let tried = directions.par_iter();
+        let tried = tried.map(|direction| self.strut(origin_mm, *direction, near, around));
+        let mut tried: Vec<Result<Support, Rejection>> = tried.collect();
+        tried.extend(ground.iter().flat_map(|ground| self.pillars(piece, around, ground)));
         let count = |cause: Rejection| {
             let failed = tried.iter().filter(|tried| tried.as_ref().err() == Some(&cause)).count();
             (failed > 0).then_some((cause, failed as u32))
@@ -279,89 +368,13 @@ impl<'a> SupportPlanner<'a> {
         supports.sort_by(by_length);
         supports.truncate(self.options.keep.max(1));
         // Only the support to build is turned, as each turn tries six struts in the images.
-        if let Some(shortest) = supports.first_mut() {
+        if let Some(shortest) = supports.first_mut().filter(|shortest| !shortest.is_pillar()) {
             self.shorten(shortest, near, around);
         }
         HeldPlace { origin_mm, area: piece.area, supports, rejected }
     }
-
-    /// Turns a support in ever smaller steps, beginning with half the angle between directions, as
-    /// long as a turn makes it shorter.
-    fn shorten(&self, support: &mut Support, near: &NearSurface, around: &IslandSurroundings<'_>) {
-        // A direction's share of the solid angle, 2π (1 - cos), is about a step squared.
-        let cone = 2.0 * PI * (1.0 - self.options.max_tilt.to_radians().cos());
-        let mut step = (cone / self.directions.len() as f64).sqrt() / 2.0;
-        while step > LEAST_STEP {
-            let axis = direction_of(support);
-            let turned = beside(axis, step, self.options.max_tilt)
-                .map(|direction| self.support(support.origin_mm, direction, near, around).ok());
-            let shortest = turned.into_iter().flatten().min_by(by_length);
-            match shortest.filter(|shorter| by_length(shorter, support).is_lt()) {
-                Some(shorter) => *support = shorter,
-                None => step /= 2.0,
-            }
-        }
-    }
-
-    /// Returns the support in a direction, or the reason that it fails.
-    fn support(
-        &self,
-        origin_mm: Vec3,
-        direction: Vec3,
-        near: &NearSurface,
-        around: &IslandSurroundings<'_>,
-    ) -> Result<Support, Rejection> {
-        let options = self.options;
-        // The costly check, in the images, comes last.
-        let contact = near.entered(origin_mm, direction).ok_or(Rejection::Far)?;
-        if contact.length_mm > options.max_length.mm() {
-            return Err(Rejection::Far);
-        }
-        if near.has_crease_within(contact.at_mm, options.edge_clearance.mm()) {
-            return Err(Rejection::Edge);
-        }
-        let curvature = near.curvature(&contact, options.radius.mm());
-        if curvature > options.max_curvature {
-            return Err(Rejection::Curved);
-        }
-        let apart = |other: &[Vec3; 2]| distance_mm(*other, [origin_mm, contact.at_mm]);
-        // A pixel between struts keeps them apart in the images, too.
-        let least = 2.0 * options.radius.mm() + self.raster.dpi.pitch().mm();
-        if self.built.iter().any(|other| apart(other) < least) {
-            return Err(Rejection::Crossing);
-        }
-        let support = Support {
-            origin_mm,
-            contact_mm: contact.at_mm,
-            ends: ends(origin_mm, direction, &contact, options.radius.mm()),
-            diameter: Length::from_um(2.0 * options.radius.um()),
-            tilt: (-direction[2]).clamp(0.0, 1.0).acos().to_degrees(),
-            curvature,
-        };
-        around.try_strut(&support.strut(), &contact, options.radius.mm())?;
-        Ok(support)
-    }
 }
 
-fn by_length(a: &Support, b: &Support) -> Ordering {
+pub(super) fn by_length(a: &Support, b: &Support) -> Ordering {
     a.length().um().total_cmp(&b.length().um())
-}
-
-fn direction_of(support: &Support) -> Vec3 {
-    let along = [0, 1, 2].map(|k| support.contact_mm[k] - support.origin_mm[k]);
-    let length = dot(along, along).sqrt();
-    along.map(|part| part / length)
-}
-
-/// Returns the ends of the strut to draw. Both ends are wholly beyond the level bottom of the
-/// island and the contact's plane, and the strut enters the part at least by its radius.
-fn ends(origin: Vec3, direction: Vec3, contact: &Contact, radius_mm: f64) -> [[Length; 3]; 2] {
-    // The tangent of the angle between the axis and a plane's normal.
-    let slope = |cosine: f64| (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-    // A disc that is tilted against a plane passes it by its radius times this along the axis.
-    let above = slope(-direction[2]).min(MOST_RADII);
-    let beyond = slope(-dot(direction, contact.normal)).clamp(1.0, MOST_RADII);
-    let from = along(origin, direction, -radius_mm * above);
-    let to = along(contact.at_mm, direction, radius_mm * beyond);
-    [from, to].map(|end| end.map(|place| Length::from_mm(place).to_whole_nm()))
 }

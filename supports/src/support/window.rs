@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Frame, Length, Mask, Strut, white_runs};
+use lamp_stack::{Dpi, Frame, Length, Mask, white_runs};
 
 use super::SupportError;
 use crate::check::{Findings, Region};
@@ -33,15 +33,18 @@ impl Raster {
         [x0 + column * pitch, y1 - row * pitch]
     }
 
+    /// Returns the pixel at x and y, as column and row, if the images have one there.
+    pub(super) fn pixel_at(&self, [x, y]: [f64; 2]) -> Option<[u32; 2]> {
+        let pitch = self.dpi.pitch().mm();
+        let [x0, y1] = self.origin_mm;
+        let at = [(x - x0) / pitch, (y1 - y) / pitch];
+        let is_within = (0..2).all(|k| (0.0..f64::from(self.size[k])).contains(&at[k]));
+        is_within.then_some(at.map(|place| place as u32))
+    }
+
     /// Returns a length in pixels, at least one.
     pub(super) fn pixels(&self, length: Length) -> u32 {
         length.pixels(self.dpi).ceil().max(1.0) as u32
-    }
-
-    /// Returns the section of a strut, a run a row.
-    pub(super) fn section(&self, strut: &Strut, height: Length) -> Vec<(u32, Range<u32>)> {
-        let runs = strut.section(height, self.origin_mm, self.dpi, self.size);
-        runs.map(|(row, start, end)| (row, start..end)).collect()
     }
 }
 

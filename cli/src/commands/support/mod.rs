@@ -15,9 +15,10 @@ use lamp_pipeline::documents::document;
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::support::SupportSettings;
-use lamp_stack::{CompensateRecord, Page, PageInfo};
+use lamp_stack::{CompensateRecord, Length, Page, PageHeader, PageInfo};
 use lamp_supports::{
-    CheckError, Findings, IslandPlan, Support, SupportError, Surface, flood_supports, plan_supports,
+    CheckError, Findings, IslandPlan, Listed, Support, SupportError, SupportFoot, SupportOptions,
+    Surface, flood_supports, padded, plan_supports, room_for,
 };
 use serde_json::Value;
 
@@ -36,16 +37,17 @@ use crate::streams::{
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
 use plan_file::plan_text;
-use report::SupportReport;
+use report::{Hint, SupportReport};
 
-/// Connect floating islands to the part by the shortest supports
+/// Connect floating islands to the part or the platform by the shortest supports
 ///
 /// Supports stay in the mold and become features of the casting, so look at each before you build.
 /// The command tries directions over a cone below the middle of an island. It takes the shortest
 /// support that can be built and meets the part where it is smooth, even and away from creases.
 /// Wide islands get as many as --least-support asks. Islands without such a support are left, and
-/// reported. The plan is a list of edits: delete or
-/// exchange supports in it, and apply it with lamp edit.
+/// reported. With --to platform, islands get pillars from the platform, with thin tips, to be cut off
+/// after the build. The plan is a list of edits: delete or exchange supports in it, and apply it with
+/// lamp edit.
 #[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
@@ -53,6 +55,7 @@ Examples:
   lamp support blade.tif --part blade.stl --plan supports.toml --stl supports.stl -o supported.tif
   lamp edit blade.tif supports.toml -o supported.tif
   lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
+  lamp support clip.tif --part clip.stl --to platform -o supported.tif
 
 Exit status: 0 if the work is done; 3 with --strict if islands are left or rest on too little, or if
 there are stray rows.")]
@@ -113,17 +116,30 @@ impl SupportArgs {
         let machine: Machine = document(&self.machine)?;
         let first = first_page(stack)?;
         let name = input_name(&self.stack);
-        let surface = self.surface(&first, &name, progress)?;
-        let found = self.check(stack, progress)?;
-        let plans = self.plans(stack, &found, &surface).map_err(|error| {
-            let is_of_stack = error.cause::<SupportError>().is_some();
-            if is_of_stack { error.at(name) } else { error }
-        })?;
-        let part = first.stack.map(|stack| stack.part).unwrap_or_default();
-        let plan = plan_text(&part, &plans, &found);
+        let surface = self.surface(&first.info, &name, progress)?;
+        // Room for pillars that lean outwards.
+        let options = self.settings.options();
+        let reach = first.dpi.map_or(0.0, |dpi| options.reach_outside().pixels(dpi).ceil());
+        let room = reach.min(MOST_ROOM) as u32;
+        let found = self.check(stack, room, progress)?;
+        let of_stack = |error: Exit| match error.cause::<SupportError>() {
+            Some(_) => error.at(name.clone()),
+            None => error,
+        };
+        let mut plan = |found: &Findings, options: &SupportOptions| {
+            self.plans(stack, found, &surface, options, room).map_err(of_stack)
+        };
+        let plans = plan(&found, &options)?;
+        let hints = hints(&plans, &found, &options, plan)?;
+        let rods = || supports(&plans).flat_map(|support| &support.rods);
+        let outside =
+            room_for(rods(), &found, room).map_err(|error| of_stack(Exit::from(error)))?;
+        let part = first.info.stack.map(|stack| stack.part).unwrap_or_default();
+        let plan = plan_text(&part, &plans, outside, &found);
         self.write_beside(&plan, &plans)?;
         let least_support = self.settings.least_support;
-        let report = SupportReport::new(&plans, &found, machine.recoating.as_ref(), least_support);
+        let recoating = machine.recoating.as_ref();
+        let report = SupportReport::new(&plans, &found, recoating, least_support, &hints);
         if let Some(path) = &self.report {
             report.write(&part, path)?;
         }
@@ -152,13 +168,16 @@ impl SupportArgs {
         stack: &mut KeptStack,
         found: &Findings,
         surface: &Surface,
+        options: &SupportOptions,
+        room: u32,
     ) -> Result<Vec<IslandPlan>, Exit> {
-        let options = self.settings.options();
-        let layers = layers_of(stack.pages(true)?, &self.stack, None);
-        let mut plans = plan_supports(layers, found, surface, &options)?;
-        if supports(&plans).next().is_some() {
+        let mut layers = || -> Result<_, Exit> {
             let layers = layers_of(stack.pages(true)?, &self.stack, None);
-            flood_supports(layers, found, &mut plans, &options)?;
+            Ok(layers.map(move |layer| layer.map(|layer| padded(layer, room))))
+        };
+        let mut plans = plan_supports(layers()?, found, surface, options)?;
+        if supports(&plans).next().is_some() {
+            flood_supports(layers()?, found, &mut plans, options)?;
         }
         Ok(plans)
     }
@@ -195,14 +214,19 @@ impl SupportArgs {
         Ok(Surface::new(facets.map_err(|error| Exit::from(error).at(name_of_all(&self.part)))?))
     }
 
-    /// Finds the islands.
-    fn check(&self, stack: &mut KeptStack, progress: &Progress) -> Result<Findings, Exit> {
+    /// Finds the islands, with some pixels of black around the images.
+    fn check(
+        &self,
+        stack: &mut KeptStack,
+        room: u32,
+        progress: &Progress,
+    ) -> Result<Findings, Exit> {
         let options = self.settings.check_options();
         let name = input_name(&self.stack);
         let failed = |error| failed_at(name.clone(), error);
         let pages = stack.pages(true)?.map(|page| page.map_err(failed));
-        let found =
-            lamp_supports::check(pages, |page: Page| page.decode().map_err(failed), &options);
+        let decode = |page: Page| page.decode().map(|layer| padded(layer, room)).map_err(failed);
+        let found = lamp_supports::check(pages, decode, &options);
         progress.done();
         found.map_err(|error| match error.cause::<CheckError>() {
             Some(_) => error.at(name.clone()),
@@ -216,22 +240,57 @@ impl SupportArgs {
             write_file(path, |out| out.write_all(plan.as_bytes()))?;
         }
         if let Some(path) = &self.stl {
-            write_file(path, |out| solid::prisms(supports(plans)).write_stl(out))?;
+            let rods = supports(plans).flat_map(|support| &support.rods);
+            write_file(path, |out| solid::prisms(rods).write_stl(out))?;
         }
         Ok(())
     }
 }
+
+/// The most black around the images in pixels, where options ask for more than any machine has.
+const MOST_ROOM: f64 = 20_000.0;
 
 /// Returns the supports to draw.
 fn supports(plans: &[IslandPlan]) -> impl Iterator<Item = &Support> {
     plans.iter().flat_map(IslandPlan::supports)
 }
 
+/// Tries options that may hold islands that are left, one at a time.
+fn hints(
+    plans: &[IslandPlan],
+    found: &Findings,
+    options: &SupportOptions,
+    mut plan: impl FnMut(&Findings, &SupportOptions) -> Result<Vec<IslandPlan>, Exit>,
+) -> Result<Vec<Hint>, Exit> {
+    let left: Vec<_> =
+        plans.iter().filter(|plan| plan.is_left()).map(|plan| plan.island.clone()).collect();
+    if left.is_empty() {
+        return Ok(Vec::new());
+    }
+    let found = Findings { islands: Listed { list: left, ..Listed::default() }, ..found.clone() };
+    let twice = Length::from_um(2.0 * options.max_length.um());
+    let longer = SupportOptions { max_length: twice, ..options.clone() };
+    let mut hints = Vec::new();
+    if options.to == SupportFoot::Part {
+        let both = SupportOptions { to: SupportFoot::Both, ..options.clone() };
+        let held = plan(&found, &both)?.iter().filter(|plan| plan.stands).count();
+        hints.push(Hint { options: "--to both".to_owned(), islands: held });
+    }
+    let held = plan(&found, &longer)?;
+    let held = || held.iter().filter(|plan| plan.stands);
+    // The length that is needed, of all supports that are longer than those so far.
+    let lengths = held().flat_map(IslandPlan::supports).filter(|support| !support.is_pillar());
+    let longest = lengths.map(|support| support.length().mm()).fold(0.0, f64::max).ceil();
+    hints.push(Hint { options: format!("--max-length {longest}mm"), islands: held().count() });
+    hints.retain(|hint| hint.islands > 0);
+    Ok(hints)
+}
+
 /// Returns what the first page says.
-fn first_page(stack: &mut KeptStack) -> Result<PageInfo, Exit> {
+fn first_page(stack: &mut KeptStack) -> Result<PageHeader, Exit> {
     let page = stack.pages(true)?.next();
     let page = page.unwrap_or(Err(lamp_stack::StackError::NoLayers));
-    Ok(page.map_err(|error| failed_at(input_name(&stack.path), error))?.info().clone())
+    Ok(page.map_err(|error| failed_at(input_name(&stack.path), error))?.header())
 }
 
 /// Returns what was done to a stack so that it no longer lies as its part did when it was sliced.

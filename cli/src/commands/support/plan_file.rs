@@ -1,25 +1,37 @@
 //! Plans of supports as lists of edits, which people can change.
 
-use std::fmt::Write;
-
 use lamp_stack::{Length, one_line};
 use lamp_supports::{Findings, IslandPlan, Scale, Support};
 
-/// Returns the plan as a list of edits: a strut for each support, alternatives as comments.
-pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> String {
+/// Returns the plan as a list of edits: room around the images, the rods of each support, and
+/// alternatives as comments. `room` is at the left, right, top and bottom.
+pub(super) fn plan_text(
+    part: &str,
+    plans: &[IslandPlan],
+    room: [Length; 4],
+    found: &Findings,
+) -> String {
     let scale = Scale::new(found);
     let mut text = format!(
         "\
 # Supports of {}: lamp edit STACK THIS -o OUT draws them.
-# They stay in the mold and become features of the casting. Delete the [[edit]] of one that is
-# not wanted, or exchange its strut for one of the alternatives below it. lamp check shows
-# whether islands are left.
+# {}
+# Delete each [[edit]] of one that is not wanted, or exchange it for one of the alternatives below
+# it. lamp check shows whether islands are left.
 ",
-        one_line(part)
+        one_line(part),
+        fate(plans),
     );
     let mut places = plans.iter().flat_map(|plan| &plan.places);
     if places.all(|place| place.supports.is_empty()) {
         text += "edit = []\n";
+    }
+    if room.iter().any(|side| side.um() > 0.0) {
+        let [left, right, top, bottom] = room.map(mm);
+        text += &format!(
+            "\n# Room around the images\n[[edit]]\npad = {{ left = {left}, right = {right}, \
+             top = {top}, bottom = {bottom} }}\n"
+        );
     }
     for plan in plans {
         let island = &plan.island;
@@ -34,8 +46,8 @@ pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> S
             match &place.supports[..] {
                 [] => text += "# A place without a way for a support\n",
                 [support, others @ ..] => {
-                    text += &format!("[[edit]]\n{}\n", strut(support));
-                    others.iter().for_each(|other| text += &format!("# {}\n", strut(other)));
+                    text += &edits(support, "");
+                    others.iter().for_each(|other| text += &edits(other, "# "));
                 }
             }
         }
@@ -43,26 +55,55 @@ pub(super) fn plan_text(part: &str, plans: &[IslandPlan], found: &Findings) -> S
     text
 }
 
-fn strut(support: &Support) -> String {
-    let [from, to] = support.ends.map(point);
+/// Returns the edits of a support, each line behind a mark. The strut of an alternative lacks the
+/// line that begins an edit: it takes the place of the one above.
+fn edits(support: &Support, mark: &str) -> String {
     let (length, tilt) = (support.length().mm(), support.tilt);
-    let diameter = support.diameter;
-    format!(
-        "strut = {{ from = {from}, to = {to}, diameter = \"{diameter}\" }} \
-         # {length:.3} mm long, tilt {tilt:.1} degrees"
-    )
+    let mut text = String::new();
+    for (number, rod) in support.rods.iter().enumerate() {
+        if mark.is_empty() || support.is_pillar() {
+            text += &format!("{mark}[[edit]]\n");
+        }
+        let [from, to] = rod.ends.map(point);
+        let [from_width, to_width] = rod.diameters;
+        text += mark;
+        text += &match rod.is_strut() {
+            true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{from_width}\" }}"),
+            false => format!(
+                "cone = {{ from = {from}, to = {to}, diameters = [\"{from_width}\", \"{to_width}\"] }}"
+            ),
+        };
+        if number == 0 {
+            let what = if support.is_pillar() { "a pillar, " } else { "" };
+            text += &format!(" # {what}{length:.3} mm long, tilt {tilt:.1} degrees");
+        }
+        text += "\n";
+    }
+    text
+}
+
+/// Says what becomes of supports.
+fn fate(plans: &[IslandPlan]) -> &'static str {
+    let mut supports = plans.iter().flat_map(IslandPlan::supports);
+    let has_pillars = supports.any(Support::is_pillar);
+    let mut supports = plans.iter().flat_map(IslandPlan::supports);
+    let has_struts = supports.any(|support| !support.is_pillar());
+    match (has_pillars, has_struts) {
+        (true, false) => "Cut them off after the build.",
+        (true, true) => "Cut the pillars off after the build; the others stay in the mold.",
+        (false, _) => "They stay in the mold and become features of the casting.",
+    }
+}
+
+/// Writes a length to whole nanometers.
+fn mm(length: Length) -> String {
+    let mm = format!("{:.6}", length.mm());
+    format!("\"{}mm\"", mm.trim_end_matches('0').trim_end_matches('.'))
 }
 
 /// Writes a point to whole nanometers.
 fn point(point: [Length; 3]) -> String {
-    let mut text = String::new();
-    for (k, length) in point.into_iter().enumerate() {
-        let mm = format!("{:.6}", length.mm());
-        let mm = mm.trim_end_matches('0').trim_end_matches('.');
-        let start = if k == 0 { "[" } else { ", " };
-        write!(text, "{start}\"{mm}mm\"").expect("text takes all");
-    }
-    text + "]"
+    format!("[{}]", point.map(mm).join(", "))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use lamp_machine::Recoating;
 use lamp_pipeline::heights::significant;
 use lamp_stack::to_nm;
-use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Scale, Support};
+use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Rod, Scale, Support, SupportFoot};
 use serde_json::{Map, Value, json};
 
 use crate::exit::Exit;
@@ -24,6 +24,14 @@ pub(super) struct SupportReport<'a> {
     scale: Scale<'a>,
     shear_pa: Option<f64>,
     least_support: f64,
+    /// Options that hold islands that are left, as tried.
+    hints: &'a [Hint],
+}
+
+/// Options that hold more islands.
+pub(super) struct Hint {
+    pub(super) options: String,
+    pub(super) islands: usize,
 }
 
 impl<'a> SupportReport<'a> {
@@ -32,30 +40,37 @@ impl<'a> SupportReport<'a> {
         found: &'a Findings,
         recoating: Option<&Recoating>,
         least_support: f64,
+        hints: &'a [Hint],
     ) -> Self {
         let unlisted = found.islands.left_out;
         let shear_pa = recoating.map(Recoating::greatest_shear_pa);
-        Self { plans, unlisted, found, scale: Scale::new(found), shear_pa, least_support }
+        Self { plans, unlisted, found, scale: Scale::new(found), shear_pa, least_support, hints }
     }
 
     /// Prints what is done: first of all what that means.
     pub(super) fn tell(&self, progress: &Progress) {
-        let count = self.supports().count();
-        if count > 0 {
-            let length: f64 = self.supports().map(|support| support.length().mm()).sum();
-            progress.say(&format!(
-                "{}, {} mm long and {} mm3 in all, so look at each",
-                match count {
-                    1 => "1 support stays in the mold and becomes a feature of the casting"
-                        .to_owned(),
-                    count => format!(
-                        "{count} supports stay in the mold and become features of the casting"
-                    ),
-                },
-                significant(length),
-                significant(self.volume_mm3()),
-            ));
-        } else if self.plans.is_empty() {
+        let sizes = |are_pillars: bool| {
+            let supports = || self.supports().filter(move |it| it.is_pillar() == are_pillars);
+            let length: f64 = supports().map(|support| support.length().mm()).sum();
+            let volume: f64 = supports().map(Support::volume_mm3).sum();
+            let sizes =
+                format!("{} mm long and {} mm3 in all", significant(length), significant(volume));
+            (supports().count(), sizes)
+        };
+        if let (count @ 1.., sizes) = sizes(false) {
+            let stay = match count {
+                1 => "1 support stays in the mold and becomes a feature of the casting".to_owned(),
+                count => {
+                    format!("{count} supports stay in the mold and become features of the casting")
+                }
+            };
+            progress.say(&format!("{stay}, {sizes}, so look at each"));
+        }
+        if let (count @ 1.., sizes) = sizes(true) {
+            let stand = if count == 1 { "pillar stands" } else { "pillars stand" };
+            progress.say(&format!("{count} {stand} on the platform, {sizes}"));
+        }
+        if self.plans.is_empty() {
             progress.say("there are no islands, and the layers stay as they are");
         }
         for (number, plan) in self.plans.iter().enumerate() {
@@ -127,11 +142,18 @@ impl<'a> SupportReport<'a> {
         let first = left.next().map(|plan| self.place_of(plan));
         let are = if count == 1 { "island is" } else { "islands are" };
         let first = first.unwrap_or_default();
+        let helps = match self.hints {
+            [] => "allow more with --max-length or --max-tilt".to_owned(),
+            hints => {
+                let hint = |hint: &Hint| match hint.islands as u64 {
+                    islands if islands == count => format!("{} holds all", hint.options),
+                    islands => format!("{} holds {islands} of them", hint.options),
+                };
+                hints.iter().map(hint).collect::<Vec<_>>().join(", ")
+            }
+        };
         (count > 0).then(|| {
-            format!(
-                "{count} {are} left floating{first}: allow more with --max-length or --max-tilt, \
-                 turn the part, or change it"
-            )
+            format!("{count} {are} left floating{first}: {helps}; or turn or change the part")
         })
     }
 
@@ -139,14 +161,16 @@ impl<'a> SupportReport<'a> {
     pub(super) fn write(&self, part: &str, path: &Path) -> Result<(), Exit> {
         let left = self.plans.iter().filter(|plan| plan.is_left()).count() as u64;
         let head = json!({
-            "schema": "lamp-support-2",
-            "note": "supports stay in the mold and become features of the casting",
+            "schema": "lamp-support-3",
+            "note": "supports to the part stay in the mold and become features of the casting; pillars are cut off",
             "part": part,
             "islands": self.plans.len() as u64 + self.unlisted,
             "left": left + self.unlisted,
             "weak": self.weak().count(),
             "stray_rows": self.stray_rows(),
             "supports": self.supports().count(),
+            "pillars": self.supports().filter(|support| support.is_pillar()).count(),
+            "contact_mm2": self.scale.area(self.contact()).area_mm2,
             "volume_mm3": to_nm(self.volume_mm3()),
         });
         let islands = self.plans.iter().map(|plan| self.island_json(plan));
@@ -155,6 +179,11 @@ impl<'a> SupportReport<'a> {
 
     fn supports(&self) -> impl Iterator<Item = &Support> {
         super::supports(self.plans)
+    }
+
+    /// Returns the pixels of islands that rest on supports.
+    fn contact(&self) -> u64 {
+        self.plans.iter().map(|plan| plan.rests.pixels).sum()
     }
 
     fn volume_mm3(&self) -> f64 {
@@ -233,17 +262,24 @@ fn place_json(place: &HeldPlace, drag_mn: Option<f64>) -> Value {
 }
 
 fn support_json(support: &Support, drag_mn: Option<f64>) -> Value {
-    let [from, to] = support.ends.map(|end| end.map(|place| to_nm(place.mm())));
+    let rod = |rod: &Rod| {
+        let [from, to] = rod.ends.map(|end| end.map(|place| to_nm(place.mm())));
+        json!({
+            "from_mm": from,
+            "to_mm": to,
+            "diameters_mm": rod.diameters.map(|diameter| to_nm(diameter.mm())),
+        })
+    };
     json!({
-        "contact_mm": support.contact_mm.map(to_nm),
+        "to": if support.is_pillar() { SupportFoot::Platform } else { SupportFoot::Part }.name(),
+        "contact_mm": support.contact_mm().map(to_nm),
         "length_mm": to_nm(support.length().mm()),
         "tilt_degrees": to_nm(support.tilt),
         "diameter_mm": to_nm(support.diameter.mm()),
         "volume_mm3": to_nm(support.volume_mm3()),
-        "curvature_per_mm": to_nm(support.curvature),
+        "curvature_per_mm": support.curvature.map(to_nm),
         "drag_mn": drag_mn,
-        "from_mm": from,
-        "to_mm": to,
+        "rods": support.rods.iter().map(rod).collect::<Vec<_>>(),
     })
 }
 
@@ -256,7 +292,7 @@ fn place_line(place: &HeldPlace) -> String {
 fn held(place: &HeldPlace, drag_mn: Option<f64>) -> String {
     let causes = causes(std::slice::from_ref(place));
     let Some(support) = place.supports.first() else { return format!("no way{causes}") };
-    let [x, y, z] = support.contact_mm;
+    let [x, y, z] = support.contact_mm();
     format!(
         "held {:.2} mm away at x {x:.2}, y {y:.2}, z {z:.2} mm, tilt {:.0} degrees, {} mm3{}{causes}",
         support.length().mm(),
@@ -280,6 +316,7 @@ fn causes(places: &[HeldPlace]) -> String {
         Rejection::Blocked => "through other solid",
         Rejection::Through => "out of the part again",
         Rejection::Unsteady => "not steady",
+        Rejection::NoColumn => "without a free column",
     };
     let rejected = || places.iter().flat_map(|place| &place.rejected);
     let causes = Rejection::ALL.iter().filter_map(|&cause| {

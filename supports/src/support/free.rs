@@ -1,0 +1,161 @@
+//! Where nothing is white from the platform up to an island.
+
+use std::ops::Range;
+
+use lamp_stack::{Mask, Op, white_runs};
+
+use super::divide::WhiteRuns;
+use crate::check::Region;
+
+/// The white of the layers so far, seen from below.
+#[derive(Debug, Default)]
+pub(super) struct WhiteBelow {
+    all: Option<Mask>,
+    /// The same of the layers that bases of pillars reach.
+    low: Option<Mask>,
+}
+
+impl WhiteBelow {
+    /// Adds a layer; `is_low` if bases reach it. Returns `None` if there are too many runs.
+    pub(super) fn add(&mut self, mask: &Mask, is_low: bool) -> Option<()> {
+        let united = |white: Option<Mask>| match white {
+            Some(white) => white.combined(Op::Union, mask),
+            None => Some(mask.clone()),
+        };
+        self.all = Some(united(self.all.take())?);
+        if is_low {
+            self.low = Some(united(self.low.take())?);
+        }
+        Some(())
+    }
+
+    /// Returns the pixels of a region whose centers are not within a distance in pixels of the
+    /// center of a pixel that is white in some layer.
+    pub(super) fn free_columns(&self, region: &Region, distance: f64) -> FreeColumns {
+        let mut runs = WhiteRuns::new();
+        let (mut left, mut next) = (Vec::new(), Vec::new());
+        for row in region.rows.clone() {
+            left.clear();
+            left.push(region.columns.clone());
+            if let Some(white) = &self.all {
+                for (near, reach) in rows_within(white, row, distance) {
+                    next.clear();
+                    left.iter().for_each(|run| without(run, white, near, reach, &mut next));
+                    std::mem::swap(&mut left, &mut next);
+                }
+            }
+            runs.extend(left.drain(..).map(|run| (row, run)));
+        }
+        FreeColumns { runs }
+    }
+
+    /// Returns whether no white of the lowest layers is within a distance in pixels of a pixel.
+    pub(super) fn is_base_free(&self, [column, row]: [u32; 2], distance: f64) -> bool {
+        let Some(white) = &self.low else { return true };
+        rows_within(white, row, distance).all(|(near, reach)| {
+            let run = column.saturating_sub(reach)..column.saturating_add(reach + 1);
+            let mut others = white_runs(white.row(near), white.width());
+            !others.any(|(start, end)| start < run.end && run.start < end)
+        })
+    }
+}
+
+/// The pixels that columns may stand on, as runs by row and column.
+#[derive(Debug)]
+pub(super) struct FreeColumns {
+    runs: WhiteRuns,
+}
+
+impl FreeColumns {
+    /// Returns the runs that a run of a row shares with them.
+    pub(super) fn within(&self, row: u32, run: &Range<u32>) -> impl Iterator<Item = Range<u32>> {
+        let first = self.runs.partition_point(|(at, free)| (*at, free.end) <= (row, run.start));
+        let (start, end) = (run.start, run.end);
+        let met = self.runs[first..].iter();
+        let met = met.take_while(move |(at, free)| *at == row && free.start < end);
+        met.map(move |(_, free)| free.start.max(start)..free.end.min(end))
+    }
+
+    /// Returns whether a column may stand on a pixel.
+    pub(super) fn holds(&self, [column, row]: [u32; 2]) -> bool {
+        self.within(row, &(column..column + 1)).next().is_some()
+    }
+}
+
+/// Returns the rows that hold pixels nearer than a distance, and how many columns aside.
+fn rows_within(white: &Mask, row: u32, distance: f64) -> impl Iterator<Item = (u32, u32)> {
+    // The margin takes up the rounding of a distance of whole pixels.
+    let limit = distance * distance * (1.0 - 1e-9);
+    let most = distance.ceil() as u32;
+    let rows = row.saturating_sub(most)..row.saturating_add(most + 1).min(white.height());
+    rows.filter_map(move |near| {
+        let square = limit - f64::from(near.abs_diff(row)).powi(2);
+        let reach = square.max(0.0).sqrt();
+        // A pixel at just the distance is not nearer.
+        let whole = if reach.fract() == 0.0 { reach - 1.0 } else { reach.floor() };
+        (square > 0.0).then_some((near, whole.max(0.0) as u32))
+    })
+}
+
+/// Adds what is left of a run without the white of a row, grown by `reach` on both sides.
+fn without(run: &Range<u32>, white: &Mask, row: u32, reach: u32, out: &mut Vec<Range<u32>>) {
+    let mut start = run.start;
+    for (from, to) in white_runs(white.row(row), white.width()) {
+        let (from, to) = (from.saturating_sub(reach), to.saturating_add(reach));
+        if from >= run.end {
+            break;
+        }
+        if from > start {
+            out.push(start..from);
+        }
+        start = start.max(to);
+    }
+    if start < run.end {
+        out.push(start..run.end);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lamp_stack::MaskBuilder;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SIZE: u32 = 24;
+
+    fn image(pixels: &[[u32; 2]]) -> Mask {
+        let mut mask = MaskBuilder::new(SIZE);
+        for row in 0..SIZE {
+            let is_white = |column: u32| pixels.contains(&[column, row]);
+            let changes = |column: &u32| is_white(*column) != (*column > 0 && is_white(column - 1));
+            let row: Vec<u32> = (0..SIZE).filter(changes).collect();
+            mask.push_row(&row).unwrap();
+        }
+        mask.finish()
+    }
+
+    proptest! {
+        #[test]
+        fn columns_are_free_if_no_white_is_near(
+            layers in prop::collection::vec(prop::collection::vec([0..SIZE, 0..SIZE], 0..4), 1..4),
+            distance in 0.2f64..6.0,
+        ) {
+            for distance in [distance, distance.ceil()] {
+                let mut below = WhiteBelow::default();
+                layers.iter().for_each(|pixels| below.add(&image(pixels), true).unwrap());
+                let region = Region { columns: 2..20, rows: 1..23 };
+                let free = below.free_columns(&region, distance);
+                for (row, column) in (1..23).flat_map(|row| (2..20).map(move |column| (row, column))) {
+                    let far = |[x, y]: &[u32; 2]| {
+                        let square = x.abs_diff(column).pow(2) + y.abs_diff(row).pow(2);
+                        f64::from(square) >= distance * distance * (1.0 - 1e-9)
+                    };
+                    let is_free = layers.iter().flatten().all(far);
+                    prop_assert_eq!(free.holds([column, row]), is_free, "{} {}", column, row);
+                    prop_assert_eq!(below.is_base_free([column, row], distance), is_free);
+                }
+            }
+        }
+    }
+}
