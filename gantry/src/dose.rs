@@ -416,19 +416,37 @@ impl<'a> Mirrors<'a> {
             if word == 0 {
                 continue;
             }
-            let light = light.get(number * 64..).unwrap_or(&[]);
-            for (byte, sums) in word.to_be_bytes().into_iter().zip(sums.chunks_exact_mut(8)) {
-                let on: [f32; 8] =
-                    std::array::from_fn(|bit| f32::from(byte >> (7 - bit) & 1) * weight);
-                sums.iter_mut().zip(on).for_each(|(sum, on)| *sum += on);
+            let light = match light.get(number * 64..) {
+                Some(light) if !light.is_empty() => &light[..light.len().min(64)],
+                _ => &EVEN[..],
+            };
+            if word == u64::MAX {
+                sums.iter_mut().zip(light).for_each(|(sum, light)| *sum += light * weight);
+                continue;
             }
-            // Even light is 1. Uneven light takes off what is missing of it.
-            for (at, (sum, &light)) in sums.iter_mut().zip(light).enumerate() {
-                *sum -= f32::from((word >> (63 - at) & 1) as u8) * weight * (1.0 - light);
+            let bytes = word.to_be_bytes().into_iter();
+            for ((byte, sums), light) in bytes.zip(sums.chunks_exact_mut(8)).zip(light.chunks(8)) {
+                for ((sum, light), bit) in sums.iter_mut().zip(light).zip(&BITS[byte as usize]) {
+                    // No branch and no conversion, so that 8 mirrors take as long as one.
+                    *sum += f32::from_bits(light.to_bits() & bit) * weight;
+                }
             }
         }
     }
 }
+
+/// Light of mirrors that are all alike.
+static EVEN: [f32; 64] = [1.0; 64];
+
+/// For each byte, its bits from the highest, all ones for a bit that is set.
+static BITS: [[u32; 8]; 256] = {
+    let (mut bits, mut at) = ([[0; 8]; 256], 0);
+    while at < 256 * 8 {
+        bits[at / 8][at % 8] = if at / 8 >> (7 - at % 8) & 1 == 1 { u32::MAX } else { 0 };
+        at += 1;
+    }
+    bits
+};
 
 /// Normally distributed numbers, the same for the same swath (Box and Muller 1958).
 struct Jitter(u64);
