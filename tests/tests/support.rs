@@ -303,3 +303,31 @@ fn the_part_must_be_that_of_the_stack() {
     }
     assert!(!scratch.names().contains(&"out.tif".to_owned()));
 }
+
+#[test]
+fn a_hole_drains_a_mug() {
+    let scratch = Scratch::new();
+    scratch.part("mug.stl", Sample::Mug, 2_000);
+    scratch.run("slice mug.stl --dpi 254 -q -o mug.tif").succeeds_quietly();
+    let cups = |stack: &str| {
+        let line = format!("lamp check {stack} --only pockets --report check.json");
+        scratch.run(&line).succeeds();
+        report(&scratch, "check.json")["findings"].as_array().unwrap().len()
+    };
+    assert_eq!(cups("mug.tif"), 1);
+    let ran = scratch.run("lamp support mug.tif --vent 2mm --strict --plan vents.toml").succeeds();
+    assert!(ran.stderr.contains("holes drain 1 of 1 pockets"), "{}", ran.stderr);
+    scratch.run("lamp edit mug.tif vents.toml -q -o vented.tif").succeeds_quietly();
+    assert_eq!(cups("vented.tif"), 0);
+    // Nothing is left to do, and an empty list of edits changes nothing.
+    let line = "lamp support vented.tif --vent 2mm --strict --plan none.toml";
+    let ran = scratch.run(line).succeeds();
+    assert!(ran.stderr.contains("there are no cups or traps"), "{}", ran.stderr);
+    scratch.run("lamp edit vented.tif none.toml -q -o same.tif").succeeds_quietly();
+    // A wall that is thicker than asked for.
+    let line = "lamp support mug.tif --vent 2mm --max-length 0.5mm --strict --plan none.toml";
+    let ran = scratch.run(line);
+    assert_eq!(ran.statuses, [Some(3)]);
+    assert!(ran.stderr.contains("1 of 1 pockets have no hole"), "{}", ran.stderr);
+    scratch.run("lamp edit mug.tif none.toml -q -o same.tif").succeeds_quietly();
+}

@@ -10,30 +10,21 @@ use std::collections::VecDeque;
 use std::num::NonZeroU8;
 use std::ops::Range;
 
-use lamp_stack::{Layer, Length, Strut};
+use lamp_stack::{Layer, Length};
 
 use super::fit::span_mm;
 use super::plan::SupportError;
+use super::rod::Rod;
 use super::window::Raster;
 use crate::check::{Findings, Labelled, Pocket, PocketKind};
 
-/// A hole that is to drain a pocket: a strut to take out of the part.
+/// A hole that is to drain a pocket.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vent {
-    /// Its ends, in the pocket and outside of the part.
-    pub ends: [[Length; 3]; 2],
-    /// Its diameter.
-    pub diameter: Length,
+    /// What is to be taken out, from the pocket to the outside.
+    pub rod: Rod,
     /// The distance between the pocket and the outside.
     pub wall: Length,
-}
-
-impl Vent {
-    /// Returns the strut to take out.
-    pub fn strut(&self) -> Strut {
-        let [from, to] = self.ends;
-        Strut::new(from, to, self.diameter).expect("a hole has a length")
-    }
 }
 
 /// A pocket and the holes that may drain it.
@@ -219,13 +210,14 @@ fn vents(
     let [[high, above], [low, thickness]] = way.layers.map(|layer| {
         span_mm(&found.layers[layer as usize]).expect("heights were found for all layers")
     });
-    let place = |[x, y]: [f64; 2], height: f64| [x, y, height].map(Length::from_mm);
+    let place = |[x, y]: [f64; 2], height: f64| [x, y, height];
+    let rod = |ends: [[f64; 3]; 2]| Rod::new(ends, [diameter; 2]);
     let aside_px = (to[0] - from[0]).hypot(to[1] - from[1]);
     if aside_px == 0.0 {
         // Straight down, from the floor's layer to the black below.
         let ends = [place(raster.place_mm(from), high + above), place(raster.place_mm(to), low)];
         let wall = Length::from_mm((high - low - thickness).max(0.0));
-        return vec![Vent { ends, diameter, wall }];
+        return vec![Vent { rod: rod(ends), wall }];
     }
     let along = [0, 1].map(|k| (to[k] - from[k]) / aside_px);
     // Walls may be curved, so that the ends reach on by a radius, as far as black goes.
@@ -254,7 +246,7 @@ fn vents(
         let ends = [end(-inside_px), end(aside_px + outside_px)];
         // From center to center, less half a pixel at both ends.
         let wall = ((aside_px - 1.0) * pitch).hypot(high - low);
-        Vent { ends, diameter, wall: Length::from_mm(wall) }
+        Vent { rod: rod(ends), wall: Length::from_mm(wall) }
     };
     vec![hole(0.0), hole(1.0 / 3.0)]
 }

@@ -56,7 +56,7 @@ fn with(layers: &[Layer], vent: &Vent) -> Vec<Layer> {
     let raster = Raster::of(&found_in(layers)).unwrap();
     let drawn = |layer: &Layer| {
         let middle = Length::from_um(layer.info.z_um.unwrap() + 50.0);
-        let section = raster.section(&vent.strut(), middle);
+        let section = vent.rod.section(middle, &raster);
         let hole = image(|column, row| {
             section.iter().any(|(at, run)| *at == row && run.contains(&column))
         });
@@ -86,7 +86,7 @@ fn a_round_cup_drains_through_its_wall() {
     // Pixels of both edges may be nearer to each other than the edges by one diagonal.
     assert!((0.55..0.75).contains(&vent.wall.mm()), "{}", vent.wall);
     // It leads out level, at the height of the floor.
-    let [from, to] = vent.ends.map(|end| end.map(Length::mm));
+    let [from, to] = vent.rod.ends.map(|end| end.map(Length::mm));
     assert_eq!(from[2], to[2]);
     assert!((1.3..=1.71).contains(&from[2]), "{from:?}");
 }
@@ -108,7 +108,7 @@ fn a_trap_above_a_thin_floor_drains_down() {
     let [plan] = &plans[..] else { panic!("{plans:?}") };
     let (left, vent) = drained(&part, plan).unwrap();
     assert!(left == 0.0 && (vent.wall.mm() - 0.3).abs() < 1e-9, "{left}, {}", vent.wall);
-    let [from, to] = vent.ends.map(|end| end.map(Length::mm));
+    let [from, to] = vent.rod.ends.map(|end| end.map(Length::mm));
     assert!(
         from[..2] == to[..2] && (from[2] - 1.0).abs() + (to[2] - 0.5).abs() < 1e-9,
         "{from:?} {to:?}"

@@ -3,6 +3,7 @@
 mod plan_file;
 mod report;
 mod solid;
+mod vents;
 
 use std::path::PathBuf;
 
@@ -22,7 +23,7 @@ use lamp_supports::{
 };
 use serde_json::Value;
 
-use crate::args::options::{Common, Output};
+use crate::args::options::{Common, Output, parse_thickness};
 use crate::args::parsed::Parsed;
 use crate::args::solid::part_file;
 use crate::args::stages::SupportStageArgs;
@@ -56,9 +57,10 @@ Examples:
   lamp edit blade.tif supports.toml -o supported.tif
   lamp support blade.tif --part blade.stl --max-tilt 60deg --strict -o supported.tif
   lamp support clip.tif --part clip.stl --to platform -o supported.tif
+  lamp support cup.tif --vent 2mm --plan vents.toml
 
-Exit status: 0 if the work is done; 3 with --strict if islands are left or rest on too little, or if
-there are stray rows.")]
+Exit status: 0 if the work is done; 3 with --strict if islands are left or rest on too little, if
+there are stray rows, or if --vent leaves a pocket.")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
@@ -66,8 +68,25 @@ pub(crate) struct SupportArgs {
 
     /// The part that the stack was sliced from; repeat it for several parts, in the same order as
     /// to slice
-    #[arg(long, value_name = "PART", required = true, value_parser = part_file())]
+    #[arg(
+        long,
+        value_name = "PART",
+        required_unless_present = "vent",
+        value_parser = part_file()
+    )]
     pub(crate) part: Vec<PartFile>,
+
+    /// Plan holes of this diameter that drain cups and traps, and no supports: --plan gets them, and
+    /// no stack is written
+    #[arg(
+        long,
+        value_name = "DIAMETER",
+        requires = "plan",
+        conflicts_with_all = ["part", "stl", "report", "output"],
+        value_parser = parse_thickness,
+        hide_short_help = true
+    )]
+    vent: Option<Length>,
 
     /// Write the supports as a list of edits, with alternatives, for you to change
     #[arg(long, value_name = "FILE.toml", value_parser = parse_toml)]
@@ -101,6 +120,9 @@ pub(crate) fn run(args: &SupportArgs, common: &Common) -> Result<(), Exit> {
     args.check_files()?;
     let progress = progress("support", common, &args.output);
     let mut stack = KeptStack::new(&args.stack);
+    if let Some(diameter) = args.vent {
+        return vents::propose(args, diameter, &mut stack, &progress);
+    }
     let layers = args.layers(&mut stack, &progress)?;
     write_layers(layers, &args.output, &progress)
 }

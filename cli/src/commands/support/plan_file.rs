@@ -1,7 +1,7 @@
 //! Plans of supports as lists of edits, which people can change.
 
 use lamp_stack::{Length, one_line};
-use lamp_supports::{Findings, IslandPlan, Scale, Support};
+use lamp_supports::{Findings, IslandPlan, Rod, Scale, Support};
 
 /// Returns the plan as a list of edits: room around the images, the rods of each support, and
 /// alternatives as comments. `room` is at the left, right, top and bottom.
@@ -64,15 +64,7 @@ fn edits(support: &Support, mark: &str) -> String {
         if mark.is_empty() || support.is_pillar() {
             text += &format!("{mark}[[edit]]\n");
         }
-        let [from, to] = rod.ends.map(point);
-        let [from_width, to_width] = rod.diameters;
-        text += mark;
-        text += &match rod.is_strut() {
-            true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{from_width}\" }}"),
-            false => format!(
-                "cone = {{ from = {from}, to = {to}, diameters = [\"{from_width}\", \"{to_width}\"] }}"
-            ),
-        };
+        text += &format!("{mark}{}", shape(rod));
         if number == 0 {
             let what = if support.is_pillar() { "a pillar, " } else { "" };
             text += &format!(" # {what}{length:.3} mm long, tilt {tilt:.1} degrees");
@@ -80,6 +72,18 @@ fn edits(support: &Support, mark: &str) -> String {
         text += "\n";
     }
     text
+}
+
+/// Returns a rod as a shape of an edit.
+pub(super) fn shape(rod: &Rod) -> String {
+    let [from, to] = rod.ends.map(point);
+    let [from_width, to_width] = rod.diameters;
+    match rod.is_strut() {
+        true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{from_width}\" }}"),
+        false => format!(
+            "cone = {{ from = {from}, to = {to}, diameters = [\"{from_width}\", \"{to_width}\"] }}"
+        ),
+    }
 }
 
 /// Says what becomes of supports.
