@@ -442,7 +442,7 @@ static EVEN: [f32; 64] = [1.0; 64];
 static BITS: [[u32; 8]; 256] = {
     let (mut bits, mut at) = ([[0; 8]; 256], 0);
     while at < 256 * 8 {
-        bits[at / 8][at % 8] = if at / 8 >> (7 - at % 8) & 1 == 1 { u32::MAX } else { 0 };
+        bits[at / 8][at % 8] = if (at / 8) >> (7 - at % 8) & 1 == 1 { u32::MAX } else { 0 };
         at += 1;
     }
     bits

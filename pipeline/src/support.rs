@@ -5,21 +5,30 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::str::FromStr;
 
 use lamp_stack::Length;
-use lamp_supports::{CheckOptions, PillarSizes, SupportFoot, SupportOptions};
+use lamp_supports::{AvoidedBox, CheckOptions, PillarSizes, SupportFoot, SupportOptions};
 use serde::{Deserialize, Serialize};
 
-use crate::words::{text, words_of};
+use crate::words::{list, optional, text, words_of};
 
 /// Changes when other bytes come of the same settings, stack and part.
 pub const CODE: u32 = 4;
 
 /// How islands are held.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
 pub struct SupportSettings {
     /// Where supports end.
     #[serde(with = "text")]
     pub to: SupportFoot,
+    /// Undersides flatter than this angle get supports, too.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub overhangs: Option<Degrees>,
+    /// Distance of supports of such undersides.
+    #[serde(with = "text")]
+    pub spacing: Length,
+    /// Boxes whose surfaces no support may touch.
+    #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
+    pub avoid: Vec<AvoidedBox>,
     /// Least diameter of the tips of pillars.
     #[serde(with = "text")]
     pub tip: Length,
@@ -73,6 +82,9 @@ impl Default for SupportSettings {
         let options = SupportOptions::default();
         Self {
             to: options.to,
+            overhangs: options.overhangs.map(Degrees),
+            spacing: options.spacing,
+            avoid: options.avoid,
             tip: options.pillar.tip,
             pillar: options.pillar.diameter,
             base: options.pillar.base,
@@ -103,6 +115,9 @@ impl SupportSettings {
     pub fn options(&self) -> SupportOptions {
         SupportOptions {
             to: self.to,
+            overhangs: self.overhangs.map(|angle| angle.0),
+            spacing: self.spacing,
+            avoid: self.avoid.clone(),
             pillar: PillarSizes {
                 tip: self.tip,
                 diameter: self.pillar,

@@ -42,7 +42,8 @@ pub use record::{
     PocketRecord, PointRecord, Scale, Shown, StrayRowsRecord, records,
 };
 pub use support::{
-    HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support, SupportError, SupportFoot,
-    SupportOptions, SupportShare, Surface, Vent, VentPlan, flood_supports, left_of, padded,
-    plan_supports, plan_vents, room_for,
+    AvoidError, AvoidedBox, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support,
+    SupportError, SupportFoot, SupportOptions, SupportPlan, SupportShare, Surface, Vent, VentPlan,
+    avoided_boxes, flood_supports, left_of, padded, plan_braces, plan_supports, plan_vents,
+    room_for,
 };

@@ -238,6 +238,42 @@ fn images_get_room_for_bases_beside_the_part() {
 }
 
 #[test]
+fn undersides_are_held_and_surfaces_avoided() {
+    let scratch = with_cores();
+    let line = "lamp support core.tif --part core.stl --report report.json --plan plan.toml";
+    let count = |report: &Value| report["overhangs"].as_u64().unwrap();
+    scratch
+        .run(&format!("{line} --overhangs 45deg --hold 20mm --least-support 0 -o held.tif"))
+        .succeeds();
+    let few = report(&scratch, "report.json");
+    scratch
+        .run(&format!(
+            "{line} --overhangs 45deg --spacing 1mm --hold 20mm --least-support 0 -o held.tif"
+        ))
+        .succeeds();
+    let many = report(&scratch, "report.json");
+    assert!(count(&few) <= count(&many), "{few} {many}");
+    scratch.run("lamp edit core.tif plan.toml -q -o edited.tif").succeeds_quietly();
+    assert!(scratch.bytes("edited.tif") == scratch.bytes("held.tif"));
+
+    // The floor below the wide core, which is 2 mm high.
+    let avoid = "[[avoid]]\nx = [\"-20mm\", \"20mm\"]\ny = [\"-20mm\", \"20mm\"]\nz = [\"1.5mm\", \"2.5mm\"]\n";
+    scratch.write("avoid.toml", avoid.as_bytes());
+    let ran = scratch.run(&format!("{line} --avoid avoid.toml -o held.tif")).succeeds();
+    assert!(ran.stderr.contains("on a surface to avoid"), "{}", ran.stderr);
+    for plan in report(&scratch, "report.json")["plans"].as_array().unwrap() {
+        for place in plan["places"].as_array().unwrap() {
+            for support in place["supports"].as_array().unwrap() {
+                assert!(support["contact_mm"][2].as_f64().unwrap() > 2.5, "{support}");
+            }
+        }
+    }
+    scratch.write("color.toml", b"[[avoid]]\ncolor = \"red\"\n");
+    let colors = scratch.run(&format!("{line} --avoid color.toml -o out.tif"));
+    colors.is_wrong_usage(&["parts are read without their colors"]);
+}
+
+#[test]
 fn wide_islands_rest_on_as_much_as_is_asked() {
     let scratch = with_cores();
     let joints = |stack: &str| {

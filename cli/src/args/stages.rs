@@ -14,7 +14,9 @@ use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
 use lamp_stack::{Length, Op};
-use lamp_supports::{CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions};
+use lamp_supports::{
+    AvoidedBox, CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions, avoided_boxes,
+};
 
 use crate::args::lamp_option::LampOption;
 use crate::args::options::{one_of_described, parse_distance, parse_thickness};
@@ -142,6 +144,24 @@ pub(crate) struct CheckStageArgs {
     machine: PathBuf,
 }
 
+/// The boxes of a file.
+#[derive(Clone)]
+struct Avoided(Vec<AvoidedBox>);
+
+/// Reads a list of boxes.
+fn parse_avoided(path: &str) -> Result<Avoided, String> {
+    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    avoided_boxes(&text).map(Avoided).map_err(|error| error.to_string())
+}
+
+/// Parses an angle above zero.
+fn parse_overhang(text: &str) -> Result<Degrees, String> {
+    match text.parse()? {
+        Degrees(0.0) => Err("the angle must be above zero".to_owned()),
+        angle => Ok(angle),
+    }
+}
+
 /// The heading of options that choose supports.
 const CHOICE: &str = "Choice of supports";
 
@@ -159,6 +179,19 @@ pub(crate) struct SupportStageArgs {
         "On either: the shortest support is built",
     ]))]
     to: SupportFoot,
+
+    /// Also hold undersides that are flatter than this angle to the level
+    #[arg(long, value_name = "ANGLE", value_parser = parse_overhang)]
+    overhangs: Option<Degrees>,
+
+    /// Distance between supports of undersides
+    #[arg(long, value_name = "LENGTH", default_value_t = SupportOptions::default().spacing)]
+    #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
+    spacing: Length,
+
+    /// Boxes whose surfaces no support may touch, a TOML file
+    #[arg(long, value_name = "FILE.toml", value_parser = parse_avoided, help_heading = CHOICE)]
+    avoid: Option<Avoided>,
 
     /// Smallest diameter of the tips of pillars; wide islands get wider ones, up to --pillar
     #[arg(long, value_name = "LENGTH", default_value_t = PillarSizes::default().tip)]
@@ -309,6 +342,9 @@ impl From<SupportStageArgs> for SupportSettings {
     fn from(args: SupportStageArgs) -> Self {
         Self {
             to: args.to,
+            overhangs: args.overhangs,
+            spacing: args.spacing,
+            avoid: args.avoid.map(|avoided| avoided.0).unwrap_or_default(),
             tip: args.tip,
             pillar: args.pillar,
             base: args.base,

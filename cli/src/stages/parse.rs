@@ -34,7 +34,7 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 19] = [
+const REFUSED: [(&str, &str); 21] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
@@ -45,6 +45,8 @@ const REFUSED: [(&str, &str); 19] = [
     ("layers", "leave out --layers: a part is cut into ranges of layers by itself"),
     ("options", "leave out --options: write its options into the stage"),
     ("plan", "leave out --plan: run lamp support by hand for its plan"),
+    ("vent", "leave out --vent: run lamp support by hand for holes that drain pockets"),
+    ("avoid", "leave out --avoid: run lamp support by hand around surfaces to avoid"),
     ("stl", "leave out --stl: run lamp support by hand for only its supports"),
     (
         "strips",

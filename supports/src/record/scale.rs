@@ -31,7 +31,8 @@ impl<'a> Scale<'a> {
         PointRecord { at_mm, at_px }
     }
 
-    pub(super) fn middle(&self, region: &Region) -> PointRecord {
+    /// Returns the middle of a rectangle, also as x and y.
+    pub fn middle(&self, region: &Region) -> PointRecord {
         let middle = |range: &Range<u32>| f64::from(range.start + range.end) / 2.0;
         self.point([middle(&region.columns), middle(&region.rows)])
     }

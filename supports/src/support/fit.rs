@@ -24,6 +24,8 @@ pub(super) struct IslandSurroundings<'a> {
     /// The island's first layer, and its pixels there.
     pub(super) layer: u32,
     pub(super) island: &'a WhiteRuns,
+    /// How deep the tips of pillars may meet white below.
+    pub(super) contact_depth_mm: f64,
 }
 
 /// Returns the bottom and the thickness of a layer in millimeters, if its page states them.
@@ -83,7 +85,10 @@ impl IslandSurroundings<'_> {
             let section = section(&rods[..leaning], number);
             let depth = self.middle(self.layer).mm() - self.middle(number).mm();
             let clear = (clearance_mm.min(depth) / pitch).max(1.0);
-            if section.iter().any(|(row, run)| self.is_white_near(number, *row, run, clear)) {
+            let is_beyond = depth > self.contact_depth_mm;
+            if is_beyond
+                && section.iter().any(|(row, run)| self.is_white_near(number, *row, run, clear))
+            {
                 return Err(Rejection::Blocked);
             }
             self.check_rest(number, &section, &below)?;

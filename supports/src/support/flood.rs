@@ -5,10 +5,10 @@ use lamp_stack::{Layer, Length, Mask, MaskBuilder, Op};
 use super::fit::span_mm;
 use super::rod::Rod;
 use super::window::Raster;
-use super::{IslandPlan, SupportError, SupportOptions, SupportShare};
+use super::{SupportError, SupportOptions, SupportPlan, SupportShare};
 use crate::check::{Findings, Standing};
 
-/// Checks plans in the images that they make, given the stack's layers once more: sets which
+/// Checks a plan in the images that it makes, given the stack's layers once more: sets which
 /// islands stand and how much of them rests on white.
 ///
 /// # Errors
@@ -16,18 +16,17 @@ use crate::check::{Findings, Standing};
 pub fn flood_supports<E: From<SupportError>>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     found: &Findings,
-    plans: &mut [IslandPlan],
+    plan: &mut SupportPlan,
     options: &SupportOptions,
 ) -> Result<(), E> {
     let raster = Raster::of(found)?;
-    let supports = plans.iter().flat_map(IslandPlan::supports);
-    let mut rods: Vec<Rod> = supports.flat_map(|support| support.rods.iter().copied()).collect();
+    let mut rods: Vec<Rod> = plan.rods().copied().collect();
     rods.sort_by(|a, b| a.heights()[0].um().total_cmp(&b.heights()[0].um()));
     let (mut drawn, mut next) = (Vec::new(), 0);
     let mut standing = Standing::default();
     for (number, layer) in (0..).zip(layers) {
         // Plans are in the order of layers.
-        if plans.last().is_none_or(|last| number > last.island.layer) {
+        if plan.islands.last().is_none_or(|last| number > last.island.layer) {
             return Ok(());
         }
         let mut mask = layer?.image.into_image().into_mask(options.threshold);
@@ -44,18 +43,18 @@ pub fn flood_supports<E: From<SupportError>>(
             mask = mask.combined(Op::Union, &sections).ok_or(SupportError::TooMany)?;
         }
         standing.add(mask);
-        for plan in plans.iter_mut().filter(|plan| plan.island.layer == number) {
-            let component = standing.component_at(plan.island.first);
-            plan.stands = standing.stands(component);
+        for held in plan.islands.iter_mut().filter(|it| it.island.layer == number) {
+            let component = standing.component_at(held.island.first);
+            held.stands = standing.stands(component);
             let [pixels, of] = standing.support(component);
-            plan.rests = SupportShare { pixels, of };
+            held.rests = SupportShare { pixels, of };
         }
     }
     Err(SupportError::MissingLayers.into())
 }
 
 /// Returns the image of rods at a height.
-fn sections(rods: &[Rod], height: Length, raster: Raster) -> Mask {
+pub(super) fn sections(rods: &[Rod], height: Length, raster: Raster) -> Mask {
     let mut runs: Vec<_> = rods.iter().flat_map(|rod| rod.section(height, &raster)).collect();
     runs.sort_unstable_by_key(|(row, run)| (*row, run.start));
     let [width, rows] = raster.size;

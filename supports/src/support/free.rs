@@ -33,16 +33,12 @@ impl WhiteBelow {
     /// center of a pixel that is white in some layer.
     pub(super) fn free_columns(&self, region: &Region, distance: f64) -> FreeColumns {
         let mut runs = WhiteRuns::new();
-        let (mut left, mut next) = (Vec::new(), Vec::new());
+        let mut left = Vec::new();
         for row in region.rows.clone() {
             left.clear();
             left.push(region.columns.clone());
             if let Some(white) = &self.all {
-                for (near, reach) in rows_within(white, row, distance) {
-                    next.clear();
-                    left.iter().for_each(|run| without(run, white, near, reach, &mut next));
-                    std::mem::swap(&mut left, &mut next);
-                }
+                remote(white, row, distance, &mut left);
             }
             runs.extend(left.drain(..).map(|run| (row, run)));
         }
@@ -51,12 +47,8 @@ impl WhiteBelow {
 
     /// Returns whether no white of the lowest layers is within a distance in pixels of a pixel.
     pub(super) fn is_base_free(&self, [column, row]: [u32; 2], distance: f64) -> bool {
-        let Some(white) = &self.low else { return true };
-        rows_within(white, row, distance).all(|(near, reach)| {
-            let run = column.saturating_sub(reach)..column.saturating_add(reach + 1);
-            let mut others = white_runs(white.row(near), white.width());
-            !others.any(|(start, end)| start < run.end && run.start < end)
-        })
+        let run = column..column + 1;
+        self.low.as_ref().is_none_or(|white| !is_white_near(white, row, &run, distance))
     }
 }
 
@@ -80,6 +72,28 @@ impl FreeColumns {
     pub(super) fn holds(&self, [column, row]: [u32; 2]) -> bool {
         self.within(row, &(column..column + 1)).next().is_some()
     }
+}
+
+/// Keeps what of runs of a row is not nearer to white than a distance in pixels.
+pub(super) fn remote(white: &Mask, row: u32, distance: f64, runs: &mut Vec<Range<u32>>) {
+    let mut next = Vec::new();
+    for (near, reach) in rows_within(white, row, distance) {
+        if runs.is_empty() {
+            return;
+        }
+        next.clear();
+        runs.iter().for_each(|run| without(run, white, near, reach, &mut next));
+        std::mem::swap(runs, &mut next);
+    }
+}
+
+/// Returns whether white is nearer to a run of a row than a distance in pixels.
+pub(super) fn is_white_near(white: &Mask, row: u32, run: &Range<u32>, distance: f64) -> bool {
+    rows_within(white, row, distance).any(|(near, reach)| {
+        let run = run.start.saturating_sub(reach)..run.end.saturating_add(reach);
+        let mut others = white_runs(white.row(near), white.width());
+        others.any(|(start, end)| start < run.end && run.start < end)
+    })
 }
 
 /// Returns the rows that hold pixels nearer than a distance, and how many columns aside.

@@ -10,11 +10,15 @@
 //!
 //! Source: 002 section 4.4, algorithm 17.
 
+mod avoid;
+mod brace;
 mod cone;
 mod divide;
+mod error;
 mod fit;
 mod flood;
 mod free;
+mod overhang;
 mod pillar;
 #[cfg(test)]
 mod pillar_tests;
@@ -35,8 +39,11 @@ use lamp_stack::Length;
 use std::num::{NonZeroU8, NonZeroU32};
 
 use crate::check::Island;
+pub use avoid::{AvoidError, AvoidedBox, avoided_boxes};
+pub use brace::{Braces, plan_braces};
+pub use error::SupportError;
 pub use flood::flood_supports;
-pub use plan::{SupportError, plan_supports};
+pub use plan::plan_supports;
 pub use rod::Rod;
 pub use room::{padded, room_for};
 pub use surface::Surface;
@@ -92,6 +99,13 @@ impl Default for PillarSizes {
 pub struct SupportOptions {
     /// Where supports end.
     pub to: SupportFoot,
+    /// The angle to the level, in degrees above 0 and below 90: undersides that are flatter get
+    /// supports, too.
+    pub overhangs: Option<f64>,
+    /// The distance of supports of such undersides.
+    pub spacing: Length,
+    /// Boxes whose surfaces no support may touch.
+    pub avoid: Vec<AvoidedBox>,
     /// The sizes of supports that end on the platform.
     pub pillar: PillarSizes,
     /// The number of directions that are tried, evenly over the cone.
@@ -121,6 +135,9 @@ impl Default for SupportOptions {
     fn default() -> Self {
         Self {
             to: SupportFoot::Part,
+            overhangs: None,
+            spacing: Length::from_mm(3.0),
+            avoid: Vec::new(),
             pillar: PillarSizes::default(),
             candidates: NonZeroU32::new(400).expect("it is not zero"),
             max_tilt: 45.0,
@@ -216,6 +233,8 @@ pub enum Rejection {
     Through,
     /// A layer of it would not rest on half of the one below, or it would not meet the island.
     Unsteady,
+    /// It would touch a surface that supports must avoid.
+    Avoided,
     /// White stands between each place that it may reach and the platform.
     NoColumn,
 }
@@ -228,6 +247,7 @@ lamp_stack::named!(Rejection {
     Blocked = "blocked",
     Through = "through",
     Unsteady = "unsteady",
+    Avoided = "avoided",
     NoColumn = "no-column",
 });
 
@@ -258,6 +278,30 @@ impl SupportShare {
     /// Returns the share in percent.
     pub fn percent(self) -> f64 {
         100.0 * self.pixels as f64 / self.of.max(1) as f64
+    }
+}
+
+/// The supports of a stack.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SupportPlan {
+    /// The plans of islands, in the order of the layers they begin in.
+    pub islands: Vec<IslandPlan>,
+    /// The places of undersides that are held as well.
+    pub overhangs: Vec<HeldPlace>,
+    /// The struts that tie tall pillars.
+    pub braces: Braces,
+}
+
+impl SupportPlan {
+    /// Returns the supports to build.
+    pub fn supports(&self) -> impl Iterator<Item = &Support> {
+        let overhangs = self.overhangs.iter().filter_map(|place| place.supports.first());
+        self.islands.iter().flat_map(IslandPlan::supports).chain(overhangs)
+    }
+
+    /// Returns the rods to draw.
+    pub fn rods(&self) -> impl Iterator<Item = &Rod> {
+        self.supports().flat_map(|support| &support.rods).chain(&self.braces.rods)
     }
 }
 

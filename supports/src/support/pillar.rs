@@ -4,6 +4,8 @@
 //! Elsewhere a rod leads from the tip aside to the nearest column. The shapes follow the supports
 //! of `PrusaSlicer` for resin printers, as users know them.
 
+use std::f64::consts::PI;
+
 use lamp_slicer::brep::vector::{Vec3, along};
 use lamp_stack::Length;
 
@@ -13,16 +15,17 @@ use super::free::{FreeColumns, WhiteBelow};
 use super::plan::SupportPlanner;
 use super::rod::Rod;
 use super::strut_search::tilt_of;
-use super::{Rejection, Support};
+use super::{Rejection, Support, SupportFoot};
+use crate::check::Region;
 
 /// The length of the cone from the tip to the column (`support_head_width` of `PrusaSlicer`).
-const TIP_LENGTH_MM: f64 = 1.0;
+pub(super) const TIP_LENGTH_MM: f64 = 1.0;
 
 /// How deep tips reach into the island (`support_head_penetration`).
 const PENETRATION_MM: f64 = 0.2;
 
 /// The height of the base (`support_base_height`).
-const BASE_HEIGHT_MM: f64 = 1.0;
+pub(super) const BASE_HEIGHT_MM: f64 = 1.0;
 
 /// The diameters that a base is tried with, from its full one down to the column's.
 const BASE_STEPS: u32 = 8;
@@ -55,6 +58,34 @@ impl SupportPlanner<'_> {
     pub(super) fn column_clearance(&self) -> f64 {
         let sizes = &self.options.pillar;
         (sizes.diameter.mm() / 2.0 + sizes.clearance.mm()) / self.raster.dpi.pitch().mm()
+    }
+
+    /// Returns where pillars of white in a region may stand, if they are asked for.
+    pub(super) fn ground<'b>(
+        &self,
+        region: &Region,
+        below: &'b WhiteBelow,
+    ) -> Option<PillarGround<'b>> {
+        if self.options.to == SupportFoot::Part {
+            return None;
+        }
+        let [aside, _] = self.reach_mm();
+        let region = self.grown(region, aside);
+        let free = below.free_columns(&region, self.column_clearance());
+        Some(PillarGround { below, free, tip: self.options.pillar.tip, may_touch: false })
+    }
+
+    /// Returns the diameter of equal tips that cover a number of pixels.
+    pub(super) fn tip_for(&self, pixels: f64, tips: usize) -> Length {
+        let area = pixels * self.raster.dpi.pitch().mm().powi(2) / tips as f64;
+        // Some reach beyond an edge of the island.
+        Length::from_mm(1.05 * (4.0 * area / PI).sqrt())
+    }
+
+    /// Returns a wider tip, up to the pillar's diameter.
+    pub(super) fn wider(&self, tip: Length, wide: Length) -> Length {
+        let most = self.options.pillar.diameter.um();
+        Length::from_um(wide.um().min(most).max(tip.um()))
     }
 
     /// Returns pillars below a piece of an island, and why others fail.
@@ -96,13 +127,19 @@ impl SupportPlanner<'_> {
         let mut bottoms = (0..layer).rev().map(|number| self.bottom_mm(number));
         let junction = bottoms.find(|bottom| *bottom <= z - TIP_LENGTH_MM);
         let junction = junction.unwrap_or(self.bottom_mm(0));
+        let mut why = Rejection::NoColumn;
         let pillar = |pixel: &[u32; 2]| {
             let [x, y] = self.raster.place_mm(pixel.map(|place| f64::from(place) + 0.5));
             let foot = [x, y, self.bottom_mm(0)];
+            if self.is_avoided([x, y, z], ground.tip.mm() / 2.0) {
+                why = Rejection::Avoided;
+                return None;
+            }
             if !ground.may_touch
                 && self
                     .is_beside_another([[x, y, z], foot], self.options.pillar.diameter.mm() / 2.0)
             {
+                why = Rejection::Crossing;
                 return None;
             }
             let tip = Rod::new(
@@ -113,11 +150,8 @@ impl SupportPlanner<'_> {
             rods.extend(self.column([x, y, junction], *pixel, ground));
             Some(self.pillar(vec![[x, y, z], foot], rods, 0.0))
         };
-        match free.iter().find_map(pillar) {
-            Some(pillar) => Ok(pillar),
-            None if free.is_empty() => Err(Rejection::NoColumn),
-            None => Err(Rejection::Crossing),
-        }
+        let found = free.iter().find_map(pillar);
+        found.ok_or(why)
     }
 
     fn pillar(&self, path_mm: Vec<Vec3>, rods: Vec<Rod>, tilt: f64) -> Support {
@@ -161,6 +195,9 @@ impl SupportPlanner<'_> {
         let middle = piece.middle.map(|place| place.floor() + 0.5);
         let [x, y] = self.raster.place_mm(middle);
         let origin = [x, y, self.bottom_mm(around.layer)];
+        if self.is_avoided(origin, ground.tip.mm() / 2.0) {
+            return vec![Err(Rejection::Avoided)];
+        }
         let ways = self.directions.iter();
         let ways = ways.map(|&direction| self.aside(origin, direction, around.layer, &ground.free));
         let (mut ways, failed): (Vec<_>, Vec<_>) = ways.partition(Result::is_ok);

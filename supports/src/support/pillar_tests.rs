@@ -67,24 +67,26 @@ fn small() -> SupportOptions {
     }
 }
 
-/// Returns the plans and the layers with supports.
-fn supported(part: &[Layer], options: &SupportOptions) -> (Vec<IslandPlan>, Vec<Layer>) {
+/// Returns the plan and the layers with its supports.
+fn supported(part: &[Layer], options: &SupportOptions) -> (SupportPlan, Vec<Layer>) {
     let found = found_in(part);
     let layers = || part.iter().cloned().map(Ok::<_, SupportError>);
-    let mut plans = plan_supports(layers(), &found, &no_surface(), options).unwrap();
-    flood_supports(layers(), &found, &mut plans, options).unwrap();
+    let mut plan = plan_supports(layers(), &found, &no_surface(), options).unwrap();
+    plan_braces(layers(), &found, &mut plan, options).unwrap();
+    flood_supports(layers(), &found, &mut plan, options).unwrap();
     let mut voxels = voxels(part);
     for (number, rows) in voxels.iter_mut().enumerate() {
         let z = 0.1 * number as f64 + 0.05;
         let height = rows.len();
-        for rod in plans.iter().flat_map(IslandPlan::supports).flat_map(|it| &it.rods) {
+        for rod in plan.rods() {
             for (row, column) in pixels(rows) {
                 let at = [0.1 * (column as f64 + 0.5), 0.1 * ((height - row) as f64 - 0.5), z];
                 rows[row][column] |= is_in(rod, at);
             }
         }
     }
-    (plans, self::layers(&voxels))
+    let drawn = self::layers(&voxels);
+    (plan, drawn)
 }
 
 fn pixels(rows: &[Vec<bool>]) -> impl Iterator<Item = (usize, usize)> + use<> {
@@ -160,35 +162,38 @@ proptest! {
     fn islands_with_a_free_column_are_held(part in blocks()) {
         let options = small();
         let stack = layers(&part);
-        let (plans, drawn) = supported(&stack, &options);
-        for plan in &plans {
+        let (plan, drawn) = supported(&stack, &options);
+        for plan in &plan.islands {
             // A radius and the clearance.
             prop_assert!(plan.stands || !has_free_column(&plan.island, &part, 3.0), "{plan:?}");
         }
         let after = found_in(&drawn);
-        let left: Vec<u32> = plans.iter().filter(|it| it.is_left()).map(|it| it.island.layer).collect();
+        let left: Vec<u32> = plan.islands.iter().filter(|it| it.is_left()).map(|it| it.island.layer).collect();
         let mut islands: Vec<u32> = after.islands.list.iter().map(|island| island.layer).collect();
         islands.sort_unstable();
         prop_assert_eq!(islands, left);
-        let weak = plans.iter().filter(|plan| plan.is_weak(options.least_support)).count();
+        let weak = plan.islands.iter().filter(|plan| plan.is_weak(options.least_support)).count();
         let before = found_in(&stack).weak_joints.list.len();
         prop_assert!(after.weak_joints.list.len() <= before + weak);
         // Supports leave black between them and the part, up to the island.
         let drawn = voxels(&drawn);
-        for plan in &plans {
-            for support in plan.supports() {
-                let bottom = plan.island.layer as usize;
-                for (number, rows) in part[..bottom].iter().enumerate() {
-                    for (row, column) in pixels(rows) {
-                        let at = [column as f64 + 0.5, 59.5 - row as f64, number as f64 + 0.5].map(|at| 0.1 * at);
-                        if support.rods.iter().any(|rod| is_in(rod, at)) {
-                            prop_assert!(drawn[number][row][column]);
-                            let near = [[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]].map(|[x, y]| {
-                                let at = [row as i32 + y, column as i32 + x].map(|at| at as usize);
-                                rows.get(at[0]).is_some_and(|row| row.get(at[1]) == Some(&true))
-                            });
-                            prop_assert!(!near.contains(&true), "{number} {row} {column} {support:?}");
-                        }
+        let of_plan = |plan: &IslandPlan| {
+            let rods = plan.supports().flat_map(|support| support.rods.clone()).collect();
+            (plan.island.layer as usize, rods)
+        };
+        let mut rods: Vec<(usize, Vec<Rod>)> = plan.islands.iter().map(of_plan).collect();
+        rods.push((part.len(), plan.braces.rods));
+        for (end, rods) in rods {
+            for (number, rows) in part[..end].iter().enumerate() {
+                for (row, column) in pixels(rows) {
+                    let at = [column as f64 + 0.5, 59.5 - row as f64, number as f64 + 0.5].map(|at| 0.1 * at);
+                    if rods.iter().any(|rod| is_in(rod, at)) {
+                        prop_assert!(drawn[number][row][column]);
+                        let near = [[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]].map(|[x, y]| {
+                            let at = [row as i32 + y, column as i32 + x].map(|at| at as usize);
+                            rows.get(at[0]).is_some_and(|row| row.get(at[1]) == Some(&true))
+                        });
+                        prop_assert!(!near.contains(&true), "{number} {row} {column} {rods:?}");
                     }
                 }
             }
@@ -209,8 +214,8 @@ fn an_island_above_a_plate_gets_a_pillar_from_beside_it() {
     fill(&mut part, [[20, 36], [20, 36], [0, 3]]);
     // 0.4 mm inside the plate's edge, 2 mm above it.
     fill(&mut part, [[26, 32], [26, 32], [25, 30]]);
-    let (plans, _) = supported(&layers(&part), &small());
-    let [plan] = &plans[..] else { panic!("one island") };
+    let (plan, _) = supported(&layers(&part), &small());
+    let [plan] = &plan.islands[..] else { panic!("one island") };
     let support = plan.supports().next().expect("it is held");
     assert!(plan.stands && support.tilt > 10.0 && support.tilt <= 45.0, "{support:?}");
     // The foot is beside the plate by the column's radius and the clearance.
@@ -226,8 +231,8 @@ fn tips_widen_until_the_island_rests_on_enough() {
     fill(&mut part, [[2, 5], [2, 5], [0, 30]]);
     let tips = |least_support: f64| {
         let options = SupportOptions { least_support, ..small() };
-        let (plans, _) = supported(&layers(&part), &options);
-        let [plan] = &plans[..] else { panic!("one island") };
+        let (plan, _) = supported(&layers(&part), &options);
+        let [plan] = &plan.islands[..] else { panic!("one island") };
         assert!(plan.stands && !plan.is_weak(least_support), "{plan:?}");
         plan.supports().map(|support| support.rods[0].diameters[0].um()).collect::<Vec<_>>()
     };
@@ -235,4 +240,79 @@ fn tips_widen_until_the_island_rests_on_enough() {
     // 0.2 of 4 mm2 is more than one column of 0.07 mm2 has.
     let wide = tips(0.2);
     assert!(wide.len() > 10 && wide.iter().all(|tip| *tip > 200.0 && *tip <= 300.0), "{wide:?}");
+}
+
+#[test]
+fn tall_pillars_are_braced_unless_they_stand_alone() {
+    // Two islands 1.5 mm apart and one 12 mm farther, 8 mm above the platform: 26 diameters.
+    let mut part = vec![vec![vec![false; 200]; 40]; 84];
+    for x in [20, 35, 170] {
+        fill(&mut part, [[x, x + 6], [17, 23], [80, 84]]);
+    }
+    let (plan, drawn) = supported(&layers(&part), &small());
+    assert_eq!(plan.islands.iter().map(|plan| plan.supports().count()).collect::<Vec<_>>(), [1; 3]);
+    assert_eq!(plan.braces.alone, 1);
+    // Each rises by the distance that it leads aside.
+    assert!(plan.braces.rods.len() > 2);
+    for rod in &plan.braces.rods {
+        let [from, to] = rod.ends.map(|end| end.map(Length::mm));
+        let (aside, up) = ((to[0] - from[0]).hypot(to[1] - from[1]), to[2] - from[2]);
+        assert!((aside - 1.5).abs() < 0.02 && (up - aside).abs() < 1e-5, "{rod:?}");
+    }
+    assert_eq!(found_in(&drawn).islands.list, []);
+    // A wall between them leaves no way for braces.
+    fill(&mut part, [[28, 33], [0, 40], [0, 70]]);
+    let (plan, _) = supported(&layers(&part), &small());
+    assert!(plan.islands.iter().all(|plan| plan.stands));
+    assert_eq!((plan.braces.rods.len(), plan.braces.alone), (0, 3));
+}
+
+#[test]
+fn undersides_flatter_than_the_angle_get_supports_on_an_even_grid() {
+    // A wall, and a roof of 12 x 4 mm on it, 2 mm above the platform.
+    let mut part = vec![vec![vec![false; 160]; 60]; 34];
+    fill(&mut part, [[10, 14], [10, 50], [0, 24]]);
+    fill(&mut part, [[10, 134], [10, 50], [20, 24]]);
+    let stack = layers(&part);
+    let options =
+        SupportOptions { overhangs: Some(45.0), spacing: Length::from_mm(2.0), ..small() };
+    let (plan, drawn) = supported(&stack, &options);
+    assert!(plan.islands.is_empty());
+    let held: Vec<Vec3> =
+        plan.overhangs.iter().filter_map(|it| Some(it.supports.first()?.origin_mm())).collect();
+    // 48 mm2 in cells of 4 mm2.
+    assert!((10..=18).contains(&held.len()) && held.len() == plan.overhangs.len(), "{held:?}");
+    // Each pixel of the roof is near one: half a diagonal of a cell, and what the cells leave.
+    for (x, y) in (14..134).flat_map(|x| (10..50).map(move |y| (x, y))) {
+        let at = [0.1 * (f64::from(x) + 0.5), 6.0 - 0.1 * (f64::from(y) + 0.5), 2.0];
+        let nearest = held.iter().map(|it| length(sub(*it, at))).fold(f64::MAX, f64::min);
+        assert!(nearest < 2.1, "{x} {y} {nearest}");
+    }
+    let reach = |layers: &[Layer]| {
+        let found = found_in(layers);
+        found.overhangs.list.iter().map(crate::check::Overhang::reach_pixels).fold(0.0, f64::max)
+    };
+    assert!(reach(&stack) > 100.0 && reach(&drawn) < 20.0);
+    // Not unless they are asked for.
+    let (plan, _) = supported(&stack, &SupportOptions { overhangs: None, ..small() });
+    assert_eq!(plan.supports().count(), 0);
+}
+
+#[test]
+fn slopes_get_supports_only_if_they_are_flatter() {
+    // A slope of a layer and two pixels: 26.6 degrees.
+    let mut part = vec![vec![vec![false; 120]; 60]; 34];
+    for layer in 0..30 {
+        fill(&mut part, [[10, 24 + 2 * layer], [20, 40], [layer, layer + 1]]);
+    }
+    let count = |angle: f64| {
+        let options =
+            SupportOptions { overhangs: Some(angle), spacing: Length::from_mm(2.0), ..small() };
+        let (plan, drawn) = supported(&layers(&part), &options);
+        assert_eq!(found_in(&drawn).islands.list, []);
+        (plan.overhangs.len(), plan.supports().count())
+    };
+    assert_eq!(count(25.0), (0, 0));
+    let (places, held) = count(30.0);
+    assert!(places > 3 && held > places / 2, "{places} {held}");
 }

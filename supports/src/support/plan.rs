@@ -4,10 +4,9 @@ use std::cmp::Ordering;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use lamp_slicer::brep::vector::Vec3;
+use lamp_slicer::brep::vector::{Vec3, length, sub};
 use lamp_stack::{Layer, Length};
 use rayon::prelude::*;
-use thiserror::Error;
 
 use super::cone::directions;
 use super::divide::{IslandPiece, WhiteRuns, divided, extent, piece};
@@ -17,32 +16,11 @@ use super::pillar::PillarGround;
 use super::strut_search::MOST_RADII;
 use super::surface::{NearSurface, Surface};
 use super::window::{Raster, SupportWindow};
-use super::{HeldPlace, IslandPlan, Rejection, Support, SupportFoot, SupportOptions, SupportShare};
+use super::{
+    HeldPlace, IslandPlan, Rejection, Support, SupportError, SupportFoot, SupportOptions,
+    SupportPlan, SupportShare,
+};
 use crate::check::{Findings, Island, Region, Standing};
-
-/// A reason that no supports can be planned for a stack.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum SupportError {
-    /// The pages do not say how large pixels are.
-    #[error("the stack has no resolution, so it cannot be compared with the part")]
-    NoResolution,
-    /// The pages do not say where the images lie in the part.
-    #[error("the stack does not state where its images are in the part")]
-    NoOrigin,
-    /// A page does not say the layer's height and thickness.
-    #[error("layer {index} does not state its height and thickness")]
-    NoHeight {
-        /// The layer's index.
-        index: u32,
-    },
-    /// There are more islands, or pieces of them, than a person can look at.
-    #[error("the islands need more than {MOST_SUPPORTS} supports")]
-    TooMany,
-    /// The layers differ from the checked ones.
-    #[error("the stack has fewer layers than when it was checked")]
-    MissingLayers,
-}
 
 /// Plans supports of the islands that a check has found, given the stack's layers once more and
 /// the surface of its part. Islands are in the order of the layers they begin in; specks get none.
@@ -57,47 +35,55 @@ pub fn plan_supports<E: From<SupportError>>(
     found: &Findings,
     surface: &Surface,
     options: &SupportOptions,
-) -> Result<Vec<IslandPlan>, E> {
+) -> Result<SupportPlan, E> {
     let mut planner = SupportPlanner::new(found, surface, options)?;
     let mut islands: Vec<&Island> = found.islands.list.iter().collect();
     islands.sort_by_key(|island| island.number);
     if islands.len() > MOST_SUPPORTS {
         return Err(SupportError::TooMany.into());
     }
+    let has_overhangs = options.overhangs.is_some();
     let regions = planner.regions(&islands);
-    let (mut window, mut plans) = (SupportWindow::default(), Vec::new());
+    let (mut window, mut plan) = (SupportWindow::default(), SupportPlan::default());
     let (mut standing, mut below) = (Standing::default(), WhiteBelow::default());
     for (number, layer) in (0..).zip(layers) {
-        let Some(next) = islands.get(plans.len()) else { break };
+        let next = islands.get(plan.islands.len()).map(|next| next.layer);
+        // The next layer with something to hold.
+        let Some(next) = (if has_overhangs { Some(number) } else { next }) else { break };
+        let under = (has_overhangs && number > 0).then(|| standing.mask().clone());
         standing.add(layer?.image.into_image().into_mask(options.threshold));
         // One layer below the lowest stays, for the lowest section may rest on it.
         window.forget_below(planner.lowest(next).saturating_sub(1));
-        for island in &islands[plans.len()..] {
+        for island in &islands[plan.islands.len()..] {
             if island.layer != number {
                 break;
             }
             let component = standing.component_at(island.first);
-            let plan = planner.plan(island, &window, &below, &standing.runs(component))?;
-            if !plan.is_left() {
+            let held = planner.plan(island, &window, &below, &standing.runs(component))?;
+            if !held.is_left() {
                 standing.hold(component);
             }
-            plans.push(plan);
+            plan.islands.push(held);
+        }
+        if let Some(under) = under {
+            plan.overhangs.extend(planner.overhangs(number, &under, &standing, &window, &below)?);
         }
         // Added after planning: supports of an island rest on the layers below its own.
         if options.to != SupportFoot::Part {
             below.add(standing.mask(), planner.is_low(number)).ok_or(SupportError::TooMany)?;
         }
-        if let Some(region) = &regions[number as usize] {
+        if let Some(region) = regions.get(number as usize).and_then(Option::as_ref) {
             window.push(standing.mask(), standing.standing_mask().as_ref(), Some(region));
         } else {
             window.push(standing.mask(), None, None);
         }
     }
-    if plans.len() == islands.len() { Ok(plans) } else { Err(SupportError::MissingLayers.into()) }
+    let is_whole = plan.islands.len() == islands.len();
+    if is_whole { Ok(plan) } else { Err(SupportError::MissingLayers.into()) }
 }
 
 /// The most supports of a stack. Each takes time to draw, and a person looks at each.
-const MOST_SUPPORTS: usize = 10_000;
+pub(super) const MOST_SUPPORTS: usize = 10_000;
 
 /// How often an island is divided anew to hold as much of it as is asked for.
 const MOST_DIVISIONS: usize = 6;
@@ -111,6 +97,8 @@ pub(super) struct SupportPlanner<'a> {
     pub(super) directions: Vec<Vec3>,
     /// The axes of the supports so far, and their radii in millimeters.
     built: Vec<([Vec3; 2], f64)>,
+    /// The places that have a support or that no support reaches.
+    pub(super) places_mm: Vec<Vec3>,
 }
 
 impl<'a> SupportPlanner<'a> {
@@ -124,7 +112,15 @@ impl<'a> SupportPlanner<'a> {
             return Err(SupportError::NoHeight { index: layer.index });
         }
         let directions = directions(options.candidates.get(), options.max_tilt);
-        Ok(Self { found, surface, options, raster, directions, built: Vec::new() })
+        Ok(Self {
+            found,
+            surface,
+            options,
+            raster,
+            directions,
+            built: Vec::new(),
+            places_mm: Vec::new(),
+        })
     }
 
     /// Returns the height of a layer's bottom.
@@ -143,8 +139,17 @@ impl<'a> SupportPlanner<'a> {
         }
     }
 
+    pub(super) fn thickness_mm(&self, number: u32) -> f64 {
+        span_mm(&self.found.layers[number as usize]).expect("heights were found for all layers")[1]
+    }
+
+    /// Returns whether a point is nearer than a distance to a place that was searched for supports.
+    pub(super) fn is_near_place(&self, at: Vec3, distance_mm: f64) -> bool {
+        self.places_mm.iter().any(|place| length(sub(*place, at)) < distance_mm)
+    }
+
     /// Returns the reach of supports from an island, to each side and down.
-    fn reach_mm(&self) -> [f64; 2] {
+    pub(super) fn reach_mm(&self) -> [f64; 2] {
         let (radius, length) = (self.radius_mm(), self.options.max_length.mm());
         let (sin, _) = self.options.max_tilt.to_radians().sin_cos();
         let length = length + MOST_RADII * radius;
@@ -152,11 +157,11 @@ impl<'a> SupportPlanner<'a> {
         [length * sin + radius, length + radius]
     }
 
-    /// Returns the first layer that supports of an island may reach.
-    fn lowest(&self, island: &Island) -> u32 {
+    /// Returns the first layer that supports of a layer may reach.
+    pub(super) fn lowest(&self, layer: u32) -> u32 {
         let [_, down] = self.reach_mm();
-        let lowest = self.bottom_mm(island.layer) - down;
-        let layers = &self.found.layers[..island.layer as usize];
+        let lowest = self.bottom_mm(layer) - down;
+        let layers = &self.found.layers[..layer as usize];
         let above =
             layers.iter().rposition(|layer| span_mm(layer).is_some_and(|[z, _]| z < lowest));
         above.unwrap_or(0) as u32
@@ -165,10 +170,14 @@ impl<'a> SupportPlanner<'a> {
     /// Returns the region in each layer that supports may reach or rest on.
     fn regions(&self, islands: &[&Island]) -> Vec<Option<Region>> {
         let [aside, _] = self.reach_mm();
-        let mut regions: Vec<Option<Region>> = vec![None; self.found.layers.len()];
+        // Overhangs may be anywhere.
+        let [width, height] = self.raster.size;
+        let whole = Region { columns: 0..width, rows: 0..height };
+        let whole = self.options.overhangs.map(|_| whole);
+        let mut regions: Vec<Option<Region>> = vec![whole; self.found.layers.len()];
         for island in islands {
             let reached = self.grown(&island.region, aside);
-            let layers = self.lowest(island).saturating_sub(1)..island.layer;
+            let layers = self.lowest(island.layer).saturating_sub(1)..island.layer;
             for layer in &mut regions[layers.start as usize..layers.end as usize] {
                 match layer {
                     Some(region) => region.unite(&reached),
@@ -180,7 +189,7 @@ impl<'a> SupportPlanner<'a> {
     }
 
     /// Returns a region grown by a length, in the images.
-    fn grown(&self, Region { columns, rows }: &Region, by_mm: f64) -> Region {
+    pub(super) fn grown(&self, Region { columns, rows }: &Region, by_mm: f64) -> Region {
         let by = self.raster.pixels(Length::from_mm(by_mm));
         let grown = |range: &Range<u32>, size: u32| {
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
@@ -201,12 +210,13 @@ impl<'a> SupportPlanner<'a> {
             raster: self.raster,
             layers: &self.found.layers,
             window,
-            lowest: self.lowest(island),
+            lowest: self.lowest(island.layer),
             layer: island.layer,
             island: runs,
+            contact_depth_mm: 0.0,
         };
-        let near = self.near(island);
-        let mut ground = self.ground(island, below);
+        let near = self.near(&island.region, island.layer);
+        let mut ground = self.ground(&island.region, below);
         let [widest, radius] = [self.options.hold, Length::from_mm(self.least_radius_mm())]
             .map(|length| length.pixels(self.raster.dpi));
         // Nearer to each other, struts touch.
@@ -258,32 +268,11 @@ impl<'a> SupportPlanner<'a> {
             places = if covered > 0 { anywhere } else { places };
         }
         places.iter().filter_map(|place| place.supports.first()).for_each(|it| self.build(it));
+        let origin =
+            |place: &HeldPlace| place.supports.first().map_or(place.origin_mm, Support::origin_mm);
+        self.places_mm.extend(places.iter().map(origin));
         let rests = SupportShare { pixels: covered, of: island.area };
         Ok(IslandPlan { island: island.clone(), stands: covered > 0, rests, places })
-    }
-
-    /// Returns where pillars of an island may stand, if they are asked for.
-    fn ground<'b>(&self, island: &Island, below: &'b WhiteBelow) -> Option<PillarGround<'b>> {
-        if self.options.to == SupportFoot::Part {
-            return None;
-        }
-        let [aside, _] = self.reach_mm();
-        let region = self.grown(&island.region, aside);
-        let free = below.free_columns(&region, self.column_clearance());
-        Some(PillarGround { below, free, tip: self.options.pillar.tip, may_touch: false })
-    }
-
-    /// Returns the diameter of equal tips that cover a number of pixels.
-    fn tip_for(&self, pixels: f64, tips: usize) -> Length {
-        let area = pixels * self.raster.dpi.pitch().mm().powi(2) / tips as f64;
-        // Some reach beyond an edge of the island.
-        Length::from_mm(1.05 * (4.0 * area / PI).sqrt())
-    }
-
-    /// Returns a wider tip, up to the pillar's diameter.
-    fn wider(&self, tip: Length, wide: Length) -> Length {
-        let most = self.options.pillar.diameter.um();
-        Length::from_um(wide.um().min(most).max(tip.um()))
     }
 
     /// Returns the radius of the thinnest supports.
@@ -296,8 +285,13 @@ impl<'a> SupportPlanner<'a> {
         }
     }
 
+    /// Returns whether a support must not touch a surface at a point.
+    pub(super) fn is_avoided(&self, at_mm: Vec3, radius_mm: f64) -> bool {
+        self.options.avoid.iter().any(|avoided| avoided.is_met(at_mm, radius_mm))
+    }
+
     /// Keeps other supports away from one.
-    fn build(&mut self, support: &Support) {
+    pub(super) fn build(&mut self, support: &Support) {
         let radius = support.diameter.mm() / 2.0;
         self.built.extend(support.path_mm.windows(2).map(|leg| ([leg[0], leg[1]], radius)));
     }
@@ -327,22 +321,22 @@ impl<'a> SupportPlanner<'a> {
         places
     }
 
-    /// Returns the surface that supports of an island may meet.
-    fn near(&self, island: &Island) -> NearSurface {
+    /// Returns the surface that supports of white in a region of a layer may meet.
+    pub(super) fn near(&self, region: &Region, layer: u32) -> NearSurface {
         let [aside, down] = self.reach_mm();
         // Creases count up to the clearance beyond a contact.
         let more = aside + self.options.edge_clearance.mm();
-        let Region { columns, rows } = &island.region;
+        let Region { columns, rows } = region;
         let [left, top] = self.raster.place_mm([columns.start.into(), rows.start.into()]);
         let [right, bottom] = self.raster.place_mm([columns.end.into(), rows.end.into()]);
-        let z = self.bottom_mm(island.layer);
+        let z = self.bottom_mm(layer);
         let clear = self.options.edge_clearance.mm();
         let low = [left - more, bottom - more, z - down - clear];
         self.surface.near(low, [right + more, top + more, z + clear])
     }
 
     /// Finds the supports of a piece of an island.
-    fn place(
+    pub(super) fn place(
         &self,
         piece: &IslandPiece,
         near: &NearSurface,

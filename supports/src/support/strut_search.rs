@@ -59,6 +59,10 @@ impl SupportPlanner<'_> {
         if near.has_crease_within(contact.at_mm, options.edge_clearance.mm()) {
             return Err(Rejection::Edge);
         }
+        let radius = options.radius.mm();
+        if [origin_mm, contact.at_mm].iter().any(|at| self.is_avoided(*at, radius)) {
+            return Err(Rejection::Avoided);
+        }
         let curvature = near.curvature(&contact, options.radius.mm());
         if curvature > options.max_curvature {
             return Err(Rejection::Curved);

@@ -37,8 +37,9 @@ impl Checked {
         let mut flooded = planned.clone();
         flood_supports(layers(), &self.found, &mut flooded, options).unwrap();
         // Planned supports hold. A strut may also touch an island that has none.
-        assert!(planned.iter().zip(&flooded).all(|(plan, drawn)| drawn.stands || !plan.stands));
-        flooded
+        let mut pairs = planned.islands.iter().zip(&flooded.islands);
+        assert!(pairs.all(|(plan, drawn)| drawn.stands || !plan.stands));
+        flooded.islands
     }
 
     /// Draws supports into the layers.

@@ -12,8 +12,8 @@ use std::ops::Range;
 
 use lamp_stack::{Layer, Length};
 
+use super::SupportError;
 use super::fit::span_mm;
-use super::plan::SupportError;
 use super::rod::Rod;
 use super::window::Raster;
 use crate::check::{Findings, Labelled, Pocket, PocketKind};

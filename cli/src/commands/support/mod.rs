@@ -1,5 +1,7 @@
 //! `lamp support`: ties floating islands to the part below them.
 
+mod hints;
+mod json;
 mod plan_file;
 mod report;
 mod solid;
@@ -18,8 +20,8 @@ use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::support::SupportSettings;
 use lamp_stack::{CompensateRecord, Length, Page, PageHeader, PageInfo};
 use lamp_supports::{
-    CheckError, Findings, IslandPlan, Listed, Support, SupportError, SupportFoot, SupportOptions,
-    Surface, flood_supports, padded, plan_supports, room_for,
+    CheckError, Findings, Support, SupportError, SupportOptions, SupportPlan, Surface,
+    flood_supports, padded, plan_braces, plan_supports, room_for,
 };
 use serde_json::Value;
 
@@ -37,8 +39,9 @@ use crate::streams::{
 };
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
+use hints::hints;
 use plan_file::plan_text;
-use report::{Hint, SupportReport};
+use report::SupportReport;
 
 /// Connect floating islands to the part or the platform by the shortest supports
 ///
@@ -151,17 +154,16 @@ impl SupportArgs {
         let mut plan = |found: &Findings, options: &SupportOptions| {
             self.plans(stack, found, &surface, options, room).map_err(of_stack)
         };
-        let plans = plan(&found, &options)?;
-        let hints = hints(&plans, &found, &options, plan)?;
-        let rods = || supports(&plans).flat_map(|support| &support.rods);
+        let supports = plan(&found, &options)?;
+        let hints = hints(&supports, &found, &options, plan)?;
         let outside =
-            room_for(rods(), &found, room).map_err(|error| of_stack(Exit::from(error)))?;
+            room_for(supports.rods(), &found, room).map_err(|error| of_stack(Exit::from(error)))?;
         let part = first.info.stack.map(|stack| stack.part).unwrap_or_default();
-        let plan = plan_text(&part, &plans, outside, &found);
-        self.write_beside(&plan, &plans)?;
+        let plan = plan_text(&part, &supports, outside, &found);
+        self.write_beside(&plan, &supports)?;
         let least_support = self.settings.least_support;
         let recoating = machine.recoating.as_ref();
-        let report = SupportReport::new(&plans, &found, recoating, least_support, &hints);
+        let report = SupportReport::new(&supports, &found, recoating, least_support, &hints);
         if let Some(path) = &self.report {
             report.write(&part, path)?;
         }
@@ -175,7 +177,7 @@ impl SupportArgs {
             return Err(Exit::Findings(doubts));
         }
         let layers = layers_of(stack.pages(true)?, &self.stack, None);
-        Ok(match supports(&plans).next() {
+        Ok(match supports.supports().next() {
             None => Box::new(layers),
             Some(_) => {
                 let edited = edit(layers, Edits::from_toml(&plan)?, vec![], vec![], |_, _| {});
@@ -184,7 +186,7 @@ impl SupportArgs {
         })
     }
 
-    /// Plans the supports, and checks in the images that they hold.
+    /// Plans the supports and their braces, and checks in the images that they hold.
     fn plans(
         &self,
         stack: &mut KeptStack,
@@ -192,16 +194,19 @@ impl SupportArgs {
         surface: &Surface,
         options: &SupportOptions,
         room: u32,
-    ) -> Result<Vec<IslandPlan>, Exit> {
+    ) -> Result<SupportPlan, Exit> {
         let mut layers = || -> Result<_, Exit> {
             let layers = layers_of(stack.pages(true)?, &self.stack, None);
             Ok(layers.map(move |layer| layer.map(|layer| padded(layer, room))))
         };
-        let mut plans = plan_supports(layers()?, found, surface, options)?;
-        if supports(&plans).next().is_some() {
-            flood_supports(layers()?, found, &mut plans, options)?;
+        let mut plan = plan_supports(layers()?, found, surface, options)?;
+        if plan.supports().any(Support::is_pillar) {
+            plan_braces(layers()?, found, &mut plan, options)?;
         }
-        Ok(plans)
+        if plan.supports().next().is_some() {
+            flood_supports(layers()?, found, &mut plan, options)?;
+        }
+        Ok(plan)
     }
 
     /// Returns the options that matter to bytes as one text. The machine only decides forces.
@@ -257,13 +262,12 @@ impl SupportArgs {
     }
 
     /// Writes the plan and the STL.
-    fn write_beside(&self, plan: &str, plans: &[IslandPlan]) -> Result<(), Exit> {
+    fn write_beside(&self, plan: &str, supports: &SupportPlan) -> Result<(), Exit> {
         if let Some(path) = &self.plan {
             write_file(path, |out| out.write_all(plan.as_bytes()))?;
         }
         if let Some(path) = &self.stl {
-            let rods = supports(plans).flat_map(|support| &support.rods);
-            write_file(path, |out| solid::prisms(rods).write_stl(out))?;
+            write_file(path, |out| solid::prisms(supports.rods()).write_stl(out))?;
         }
         Ok(())
     }
@@ -271,42 +275,6 @@ impl SupportArgs {
 
 /// The most black around the images in pixels, where options ask for more than any machine has.
 const MOST_ROOM: f64 = 20_000.0;
-
-/// Returns the supports to draw.
-fn supports(plans: &[IslandPlan]) -> impl Iterator<Item = &Support> {
-    plans.iter().flat_map(IslandPlan::supports)
-}
-
-/// Tries options that may hold islands that are left, one at a time.
-fn hints(
-    plans: &[IslandPlan],
-    found: &Findings,
-    options: &SupportOptions,
-    mut plan: impl FnMut(&Findings, &SupportOptions) -> Result<Vec<IslandPlan>, Exit>,
-) -> Result<Vec<Hint>, Exit> {
-    let left: Vec<_> =
-        plans.iter().filter(|plan| plan.is_left()).map(|plan| plan.island.clone()).collect();
-    if left.is_empty() {
-        return Ok(Vec::new());
-    }
-    let found = Findings { islands: Listed { list: left, ..Listed::default() }, ..found.clone() };
-    let twice = Length::from_um(2.0 * options.max_length.um());
-    let longer = SupportOptions { max_length: twice, ..options.clone() };
-    let mut hints = Vec::new();
-    if options.to == SupportFoot::Part {
-        let both = SupportOptions { to: SupportFoot::Both, ..options.clone() };
-        let held = plan(&found, &both)?.iter().filter(|plan| plan.stands).count();
-        hints.push(Hint { options: "--to both".to_owned(), islands: held });
-    }
-    let held = plan(&found, &longer)?;
-    let held = || held.iter().filter(|plan| plan.stands);
-    // The length that is needed, of all supports that are longer than those so far.
-    let lengths = held().flat_map(IslandPlan::supports).filter(|support| !support.is_pillar());
-    let longest = lengths.map(|support| support.length().mm()).fold(0.0, f64::max).ceil();
-    hints.push(Hint { options: format!("--max-length {longest}mm"), islands: held().count() });
-    hints.retain(|hint| hint.islands > 0);
-    Ok(hints)
-}
 
 /// Returns what the first page says.
 fn first_page(stack: &mut KeptStack) -> Result<PageHeader, Exit> {

@@ -1,13 +1,13 @@
 //! Plans of supports as lists of edits, which people can change.
 
 use lamp_stack::{Length, one_line};
-use lamp_supports::{Findings, IslandPlan, Rod, Scale, Support};
+use lamp_supports::{Findings, HeldPlace, Rod, Scale, Support, SupportPlan};
 
 /// Returns the plan as a list of edits: room around the images, the rods of each support, and
 /// alternatives as comments. `room` is at the left, right, top and bottom.
 pub(super) fn plan_text(
     part: &str,
-    plans: &[IslandPlan],
+    plan: &SupportPlan,
     room: [Length; 4],
     found: &Findings,
 ) -> String {
@@ -20,10 +20,9 @@ pub(super) fn plan_text(
 # it. lamp check shows whether islands are left.
 ",
         one_line(part),
-        fate(plans),
+        fate(plan),
     );
-    let mut places = plans.iter().flat_map(|plan| &plan.places);
-    if places.all(|place| place.supports.is_empty()) {
+    if plan.supports().next().is_none() {
         text += "edit = []\n";
     }
     if room.iter().any(|side| side.um() > 0.0) {
@@ -33,26 +32,36 @@ pub(super) fn plan_text(
              top = {top}, bottom = {bottom} }}\n"
         );
     }
-    for plan in plans {
-        let island = &plan.island;
+    for held in &plan.islands {
+        let island = &held.island;
         let layer = scale.layer(island.layer);
         let area = scale.area(island.area);
-        let places = match plan.places.len() {
+        let places = match held.places.len() {
             1 => String::new(),
             places => format!(", in {places} places"),
         };
         text += &format!("\n# Island {}, {layer}, {area}{places}\n", island.number);
-        for place in &plan.places {
-            match &place.supports[..] {
-                [] => text += "# A place without a way for a support\n",
-                [support, others @ ..] => {
-                    text += &edits(support, "");
-                    others.iter().for_each(|other| text += &edits(other, "# "));
-                }
-            }
-        }
+        held.places.iter().for_each(|place| text += &place_edits(place));
+    }
+    if !plan.overhangs.is_empty() {
+        text += "\n# Undersides\n";
+        plan.overhangs.iter().for_each(|place| text += &place_edits(place));
+    }
+    if !plan.braces.rods.is_empty() {
+        text += "\n# Braces between pillars\n";
+        plan.braces.rods.iter().for_each(|rod| text += &format!("[[edit]]\n{}\n", shape(rod)));
     }
     text
+}
+
+/// Returns the edits of a place, its alternatives as comments.
+fn place_edits(place: &HeldPlace) -> String {
+    match &place.supports[..] {
+        [] => "# A place without a way for a support\n".to_owned(),
+        [support, others @ ..] => {
+            others.iter().fold(edits(support, ""), |text, other| text + &edits(other, "# "))
+        }
+    }
 }
 
 /// Returns the edits of a support, each line behind a mark. The strut of an alternative lacks the
@@ -64,7 +73,8 @@ fn edits(support: &Support, mark: &str) -> String {
         if mark.is_empty() || support.is_pillar() {
             text += &format!("{mark}[[edit]]\n");
         }
-        text += &format!("{mark}{}", shape(rod));
+        text += mark;
+        text += &shape(rod);
         if number == 0 {
             let what = if support.is_pillar() { "a pillar, " } else { "" };
             text += &format!(" # {what}{length:.3} mm long, tilt {tilt:.1} degrees");
@@ -74,24 +84,22 @@ fn edits(support: &Support, mark: &str) -> String {
     text
 }
 
-/// Returns a rod as a shape of an edit.
+/// Returns the shape of a rod.
 pub(super) fn shape(rod: &Rod) -> String {
     let [from, to] = rod.ends.map(point);
-    let [from_width, to_width] = rod.diameters;
+    let [wide, other] = rod.diameters;
     match rod.is_strut() {
-        true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{from_width}\" }}"),
-        false => format!(
-            "cone = {{ from = {from}, to = {to}, diameters = [\"{from_width}\", \"{to_width}\"] }}"
-        ),
+        true => format!("strut = {{ from = {from}, to = {to}, diameter = \"{wide}\" }}"),
+        false => {
+            format!("cone = {{ from = {from}, to = {to}, diameters = [\"{wide}\", \"{other}\"] }}")
+        }
     }
 }
 
 /// Says what becomes of supports.
-fn fate(plans: &[IslandPlan]) -> &'static str {
-    let mut supports = plans.iter().flat_map(IslandPlan::supports);
-    let has_pillars = supports.any(Support::is_pillar);
-    let mut supports = plans.iter().flat_map(IslandPlan::supports);
-    let has_struts = supports.any(|support| !support.is_pillar());
+fn fate(plan: &SupportPlan) -> &'static str {
+    let has_pillars = plan.supports().any(Support::is_pillar);
+    let has_struts = plan.supports().any(|support| !support.is_pillar());
     match (has_pillars, has_struts) {
         (true, false) => "Cut them off after the build.",
         (true, true) => "Cut the pillars off after the build; the others stay in the mold.",

@@ -1,15 +1,12 @@
-//! Reports planned supports: lines for people, and JSON.
+//! Reports planned supports in lines for people.
 
-use std::path::Path;
+use std::f64::consts::PI;
 
 use lamp_machine::Recoating;
 use lamp_pipeline::heights::significant;
-use lamp_stack::to_nm;
-use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Rod, Scale, Support, SupportFoot};
-use serde_json::{Map, Value, json};
+use lamp_supports::{Findings, HeldPlace, IslandPlan, Rejection, Rod, Scale, Support, SupportPlan};
 
-use crate::exit::Exit;
-use crate::output::json_report::JsonReport;
+use super::hints::Hint;
 use crate::terminal::progress::Progress;
 
 /// The most islands that are printed, unless all are asked for.
@@ -17,26 +14,20 @@ const MOST_LINES: usize = 20;
 
 /// The plans for the islands of a stack.
 pub(super) struct SupportReport<'a> {
-    plans: &'a [IslandPlan],
+    pub(super) plan: &'a SupportPlan,
     /// Islands that are too many to be listed, and so are left.
-    unlisted: u64,
-    found: &'a Findings,
-    scale: Scale<'a>,
-    shear_pa: Option<f64>,
-    least_support: f64,
+    pub(super) unlisted: u64,
+    pub(super) found: &'a Findings,
+    pub(super) scale: Scale<'a>,
+    pub(super) shear_pa: Option<f64>,
+    pub(super) least_support: f64,
     /// Options that hold islands that are left, as tried.
-    hints: &'a [Hint],
-}
-
-/// Options that hold more islands.
-pub(super) struct Hint {
-    pub(super) options: String,
-    pub(super) islands: usize,
+    pub(super) hints: &'a [Hint],
 }
 
 impl<'a> SupportReport<'a> {
     pub(super) fn new(
-        plans: &'a [IslandPlan],
+        plan: &'a SupportPlan,
         found: &'a Findings,
         recoating: Option<&Recoating>,
         least_support: f64,
@@ -44,7 +35,7 @@ impl<'a> SupportReport<'a> {
     ) -> Self {
         let unlisted = found.islands.left_out;
         let shear_pa = recoating.map(Recoating::greatest_shear_pa);
-        Self { plans, unlisted, found, scale: Scale::new(found), shear_pa, least_support, hints }
+        Self { plan, unlisted, found, scale: Scale::new(found), shear_pa, least_support, hints }
     }
 
     /// Prints what is done: first of all what that means.
@@ -68,12 +59,21 @@ impl<'a> SupportReport<'a> {
         }
         if let (count @ 1.., sizes) = sizes(true) {
             let stand = if count == 1 { "pillar stands" } else { "pillars stand" };
-            progress.say(&format!("{count} {stand} on the platform, {sizes}"));
+            let braces = match self.plan.braces.rods.len() {
+                0 => String::new(),
+                1 => ", with 1 brace".to_owned(),
+                braces => format!(", with {braces} braces"),
+            };
+            progress.say(&format!("{count} {stand} on the platform, {sizes}{braces}"));
         }
-        if self.plans.is_empty() {
+        if !self.plan.overhangs.is_empty() {
+            let (all, bare) = (self.plan.overhangs.len(), self.bare().count());
+            let places = if all == 1 { "place of an underside" } else { "places of undersides" };
+            progress.say(&format!("{} of {all} {places} have supports", all - bare));
+        } else if self.plan.islands.is_empty() {
             progress.say("there are no islands, and the layers stay as they are");
         }
-        for (number, plan) in self.plans.iter().enumerate() {
+        for (number, plan) in self.plan.islands.iter().enumerate() {
             let line = self.line(plan);
             if number < MOST_LINES {
                 progress.say(&line);
@@ -83,7 +83,7 @@ impl<'a> SupportReport<'a> {
             let places = plan.places.iter().filter(|_| plan.places.len() > 1);
             places.for_each(|place| progress.detail(&place_line(place)));
         }
-        let more = self.plans.len().saturating_sub(MOST_LINES);
+        let more = self.plan.islands.len().saturating_sub(MOST_LINES);
         if more > 0 && !progress.is_verbose() {
             progress.say(&format!("{more} more islands (--verbose or --report lists them)"));
         }
@@ -91,10 +91,16 @@ impl<'a> SupportReport<'a> {
 
     /// Returns a line for each reason that a person must look at the stack.
     pub(super) fn troubles(&self) -> Vec<String> {
-        [self.text_of_stray_rows(), self.text_of_left(), self.text_of_weak()]
-            .into_iter()
-            .flatten()
-            .collect()
+        [
+            self.text_of_stray_rows(),
+            self.text_of_left(),
+            self.text_of_weak(),
+            self.text_of_alone(),
+            self.text_of_bare(),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 
     fn text_of_stray_rows(&self) -> Option<String> {
@@ -107,13 +113,13 @@ impl<'a> SupportReport<'a> {
         })
     }
 
-    fn stray_rows(&self) -> u64 {
+    pub(super) fn stray_rows(&self) -> u64 {
         self.found.layers.iter().map(|layer| u64::from(layer.stray_rows)).sum()
     }
 
     /// Returns the number of islands that rest on too little.
-    fn weak(&self) -> impl Iterator<Item = &IslandPlan> + Clone {
-        self.plans.iter().filter(|plan| plan.is_weak(self.least_support))
+    pub(super) fn weak(&self) -> impl Iterator<Item = &IslandPlan> + Clone {
+        self.plan.islands.iter().filter(|plan| plan.is_weak(self.least_support))
     }
 
     fn place_of(&self, plan: &IslandPlan) -> String {
@@ -135,9 +141,33 @@ impl<'a> SupportReport<'a> {
         ))
     }
 
+    /// Returns a line about undersides without supports, if there are some.
+    fn text_of_bare(&self) -> Option<String> {
+        let count = self.bare().count();
+        let [x, y, z] = self.bare().next()?.origin_mm;
+        let places =
+            if count == 1 { "place of an underside is" } else { "places of undersides are" };
+        let causes = causes(&self.bare().cloned().collect::<Vec<_>>());
+        Some(format!(
+            "{count} {places} left without a support, the first at x {x:.2}, y {y:.2}, z {z:.2} mm{causes}"
+        ))
+    }
+
+    /// Returns a line about slender pillars without braces, if there are some.
+    fn text_of_alone(&self) -> Option<String> {
+        let are = match self.plan.braces.alone {
+            0 => return None,
+            1 => "1 pillar is".to_owned(),
+            count => format!("{count} pillars are"),
+        };
+        Some(format!(
+            "{are} higher than 15 diameters and too far from others for braces: give a larger --pillar"
+        ))
+    }
+
     /// Returns a line that sums up the islands that are left, if some are.
     fn text_of_left(&self) -> Option<String> {
-        let mut left = self.plans.iter().filter(|plan| plan.is_left());
+        let mut left = self.plan.islands.iter().filter(|plan| plan.is_left());
         let count = left.clone().count() as u64 + self.unlisted;
         let first = left.next().map(|plan| self.place_of(plan));
         let are = if count == 1 { "island is" } else { "islands are" };
@@ -157,41 +187,31 @@ impl<'a> SupportReport<'a> {
         })
     }
 
-    /// Writes the report.
-    pub(super) fn write(&self, part: &str, path: &Path) -> Result<(), Exit> {
-        let left = self.plans.iter().filter(|plan| plan.is_left()).count() as u64;
-        let head = json!({
-            "schema": "lamp-support-3",
-            "note": "supports to the part stay in the mold and become features of the casting; pillars are cut off",
-            "part": part,
-            "islands": self.plans.len() as u64 + self.unlisted,
-            "left": left + self.unlisted,
-            "weak": self.weak().count(),
-            "stray_rows": self.stray_rows(),
-            "supports": self.supports().count(),
-            "pillars": self.supports().filter(|support| support.is_pillar()).count(),
-            "contact_mm2": self.scale.area(self.contact()).area_mm2,
-            "volume_mm3": to_nm(self.volume_mm3()),
-        });
-        let islands = self.plans.iter().map(|plan| self.island_json(plan));
-        JsonReport::new(&head).list("plans", islands).write(path)
+    pub(super) fn supports(&self) -> impl Iterator<Item = &Support> {
+        self.plan.supports()
     }
 
-    fn supports(&self) -> impl Iterator<Item = &Support> {
-        super::supports(self.plans)
+    /// Returns the area of the part that rests on supports in mm²: of islands in their first layers,
+    /// and below undersides.
+    pub(super) fn contact_mm2(&self) -> Option<f64> {
+        let rests = self.plan.islands.iter().map(|plan| plan.rests.pixels).sum();
+        let supports = self.plan.overhangs.iter().filter_map(|place| place.supports.first());
+        let area = |support: &Support| PI / 4.0 * support.rods[0].diameters[0].mm().powi(2);
+        Some(self.scale.area(rests).area_mm2? + supports.map(area).sum::<f64>())
     }
 
-    /// Returns the pixels of islands that rest on supports.
-    fn contact(&self) -> u64 {
-        self.plans.iter().map(|plan| plan.rests.pixels).sum()
+    /// Returns the places of undersides without a support.
+    pub(super) fn bare(&self) -> impl Iterator<Item = &HeldPlace> {
+        self.plan.overhangs.iter().filter(|place| place.supports.is_empty())
     }
 
-    fn volume_mm3(&self) -> f64 {
-        self.supports().map(Support::volume_mm3).sum()
+    pub(super) fn volume_mm3(&self) -> f64 {
+        let braces: f64 = self.plan.braces.rods.iter().map(Rod::volume_mm3).sum();
+        self.supports().map(Support::volume_mm3).sum::<f64>() + braces
     }
 
     /// Returns how hard the blade drags on what each support of an island holds, in millinewtons.
-    fn drag_mn(&self, plan: &IslandPlan) -> Option<f64> {
+    pub(super) fn drag_mn(&self, plan: &IslandPlan) -> Option<f64> {
         let drag = self.scale.drag_mn(&plan.island, self.shear_pa)?;
         Some(drag / plan.supports().count().max(1) as f64)
     }
@@ -218,25 +238,6 @@ impl<'a> SupportReport<'a> {
             rests(plan),
         )
     }
-
-    fn island_json(&self, plan: &IslandPlan) -> Value {
-        let island = &plan.island;
-        let layer = self.scale.layer(island.layer);
-        let drag = self.drag_mn(plan).map(to_nm);
-        let places: Vec<Value> = plan.places.iter().map(|place| place_json(place, drag)).collect();
-        json!({
-            "island": island.number,
-            "layer": layer.layer,
-            "z_mm": layer.z_mm,
-            "at_mm": self.scale.point(island.centroid).at_mm,
-            "area_mm2": self.scale.area(island.area).area_mm2,
-            "drag_mn": self.scale.drag_mn(island, self.shear_pa),
-            "left": plan.is_left(),
-            "weak": plan.is_weak(self.least_support),
-            "support_percent": to_nm(plan.rests.percent()),
-            "places": places,
-        })
-    }
 }
 
 /// Returns how much of an island rests on its supports.
@@ -246,41 +247,6 @@ fn rests(plan: &IslandPlan) -> String {
         (Some(_), true) => format!("; {}% of it rests on them", significant(plan.rests.percent())),
         (Some(_), false) => "; it floats even so".to_owned(),
     }
-}
-
-fn place_json(place: &HeldPlace, drag_mn: Option<f64>) -> Value {
-    let supports: Vec<Value> = place.supports.iter().map(|s| support_json(s, drag_mn)).collect();
-    let rejected =
-        place.rejected.iter().map(|(cause, count)| (cause.name().to_owned(), (*count).into()));
-    json!({
-        "at_mm": place.origin_mm.map(to_nm),
-        "area_px": place.area,
-        // The first is drawn, the others are alternatives.
-        "supports": supports,
-        "rejected": Value::Object(rejected.collect::<Map<String, Value>>()),
-    })
-}
-
-fn support_json(support: &Support, drag_mn: Option<f64>) -> Value {
-    let rod = |rod: &Rod| {
-        let [from, to] = rod.ends.map(|end| end.map(|place| to_nm(place.mm())));
-        json!({
-            "from_mm": from,
-            "to_mm": to,
-            "diameters_mm": rod.diameters.map(|diameter| to_nm(diameter.mm())),
-        })
-    };
-    json!({
-        "to": if support.is_pillar() { SupportFoot::Platform } else { SupportFoot::Part }.name(),
-        "contact_mm": support.contact_mm().map(to_nm),
-        "length_mm": to_nm(support.length().mm()),
-        "tilt_degrees": to_nm(support.tilt),
-        "diameter_mm": to_nm(support.diameter.mm()),
-        "volume_mm3": to_nm(support.volume_mm3()),
-        "curvature_per_mm": support.curvature.map(to_nm),
-        "drag_mn": drag_mn,
-        "rods": support.rods.iter().map(rod).collect::<Vec<_>>(),
-    })
 }
 
 fn place_line(place: &HeldPlace) -> String {
@@ -316,6 +282,7 @@ fn causes(places: &[HeldPlace]) -> String {
         Rejection::Blocked => "through other solid",
         Rejection::Through => "out of the part again",
         Rejection::Unsteady => "not steady",
+        Rejection::Avoided => "on a surface to avoid",
         Rejection::NoColumn => "without a free column",
     };
     let rejected = || places.iter().flat_map(|place| &place.rejected);
