@@ -27,6 +27,9 @@ const PENETRATION_MM: f64 = 0.2;
 /// The height of the base (`support_base_height`).
 pub(super) const BASE_HEIGHT_MM: f64 = 1.0;
 
+/// The least height of a rod: a sliver adds nothing.
+const LEAST_ROD_MM: f64 = 1e-3;
+
 /// The diameters that a base is tried with, from its full one down to the column's.
 const BASE_STEPS: u32 = 8;
 
@@ -178,7 +181,7 @@ impl SupportPlanner<'_> {
         let mut bottoms = numbers.map(|number| self.bottom_mm(number)).take_while(|at| *at < z);
         let top = bottoms.find(|at| *at >= bottom + BASE_HEIGHT_MM).unwrap_or(z);
         let upright = |from: f64, to: f64, diameters: [Length; 2]| {
-            (from > to).then(|| Rod::new([[x, y, from], [x, y, to]], diameters))
+            (from - to > LEAST_ROD_MM).then(|| Rod::new([[x, y, from], [x, y, to]], diameters))
         };
         let column = upright(z, top, [sizes.diameter; 2]);
         column.into_iter().chain(upright(top, bottom, [sizes.diameter, base])).collect()
@@ -232,10 +235,10 @@ impl SupportPlanner<'_> {
         });
         let near = |(_, far): &(u32, f64)| *far <= self.options.max_length.mm();
         let steps = steps.take_while(near).filter(|(_, far)| *far >= TIP_LENGTH_MM);
-        let mut junctions = steps.map(|(layer, far)| Aside {
-            direction,
-            junction: along(origin, direction, far),
-            layer,
+        let mut junctions = steps.map(|(layer, far)| {
+            let [x, y, _] = along(origin, direction, far);
+            // Just at the layer's bottom, without the rounding of the way there.
+            Aside { direction, junction: [x, y, self.bottom_mm(layer)], layer }
         });
         let free = |way: &Aside| {
             let pixel = self.raster.pixel_at([way.junction[0], way.junction[1]]);
@@ -261,11 +264,10 @@ impl SupportPlanner<'_> {
             return Err(Rejection::Crossing);
         }
         let end = along(origin, direction, TIP_LENGTH_MM);
-        // A sliver of a rod would add nothing.
-        let end = if end[2] - junction[2] < 0.1 { junction } else { end };
+        let end = if end[2] - junction[2] < LEAST_ROD_MM { junction } else { end };
         let inside = along(origin, direction, -PENETRATION_MM);
         let mut rods = vec![Rod::new([inside, end], [ground.tip, sizes.diameter])];
-        if end[2] > junction[2] {
+        if end != junction {
             rods.push(Rod::new([end, junction], [sizes.diameter; 2]));
         }
         let leaning = rods.len();
