@@ -19,6 +19,7 @@
 mod axis_scale;
 mod caption;
 mod dose_map;
+mod evidence;
 mod heat_map;
 mod layout;
 mod picture;
@@ -39,6 +40,7 @@ use axis_scale::AxisScale;
 
 pub use caption::{CAPTION_HEIGHT, caption};
 pub use dose_map::{DoseMap, dose_map};
+pub use evidence::EvidencePicture;
 pub use heat_map::{Colors, HeatMap, heat_map};
 pub use layout::layout_picture;
 pub use picture::{Picture, PictureRegion, PictureScale, levels_of_region};

@@ -43,17 +43,40 @@ impl ShadedPicture {
         Self { region, down: longer.div_ceil(side), up: (side / longer).clamp(1, MOST_ENLARGED) }
     }
 
+    /// Returns the part of the image that shows.
+    pub(crate) fn region(&self) -> &PictureRegion {
+        &self.region
+    }
+
+    /// Returns how many pixels of the picture a pixel of the image has.
+    pub(crate) fn scale(&self) -> f64 {
+        f64::from(self.up) / f64::from(self.down)
+    }
+
+    /// Returns the picture's width and height.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        let PictureRegion { columns, rows } = &self.region;
+        [columns, rows].map(|range| (range.len() as u32).div_ceil(self.down) * self.up)
+    }
+
     /// Writes the picture as a PNG. `shade` is called with each row of the image that shows, from
     /// the top, to paint runs of columns.
     pub fn write_png<S: Shade>(
         &self,
         out: impl Write,
-        mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)),
+        shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)),
     ) -> io::Result<()> {
+        let [width, height] = self.size();
+        write_rgb_png(out, width, height, self.rows(shade))
+    }
+
+    /// Returns the picture's rows of red, green and blue.
+    pub(crate) fn rows<'a, S: Shade + 'a>(
+        &'a self,
+        mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)) + 'a,
+    ) -> impl Iterator<Item = Vec<u8>> + 'a {
         let Self { region: PictureRegion { columns, rows }, down, up } = self;
-        let [width, height] =
-            [columns, rows].map(|range| (range.len() as u32).div_ceil(*down) * up);
-        let pictured = rows.clone().step_by(*down as usize).flat_map(|first| {
+        rows.clone().step_by(*down as usize).flat_map(move |first| {
             let mut shades = vec![S::NONE; columns.len().div_ceil(*down as usize)];
             for row in first..(first + down).min(rows.end) {
                 shade(row, &mut |run, shade| {
@@ -69,7 +92,6 @@ impl ShadedPicture {
             }
             let wide = shades.iter().flat_map(|shade| shade.color().repeat(*up as usize));
             std::iter::repeat_n(wide.collect::<Vec<u8>>(), *up as usize)
-        });
-        write_rgb_png(out, width, height, pictured)
+        })
     }
 }

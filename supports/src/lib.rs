@@ -39,7 +39,7 @@ pub use record::{
     AcceptedFindings, AreaRecord, BorderRecord, BoxRecord, CopyRecord, DoubtfulIslandRecord,
     EmptyPlace, EmptyRecord, FindingGroup, FindingRecord, FoundPixels, IslandRecord, Joined,
     JointRecord, LayerPlace, LayerSpan, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord,
-    PocketRecord, PointRecord, Scale, Shown, StrayRowsRecord, records,
+    PocketRecord, PointRecord, Scale, Shown, ShownMoment, StrayRowsRecord, records,
 };
 pub use support::{
     AvoidError, AvoidedBox, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support,

@@ -1,12 +1,14 @@
 //! Makes the records of all findings of a stack.
 
+use std::ops::Range;
+
 use lamp_stack::to_nm;
 
 use super::scale::Scale;
 use super::{
-    BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord, IslandRecord,
-    Joined, JointRecord, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord, PocketRecord,
-    Shown, StrayRowsRecord,
+    BorderRecord, DoubtfulIslandRecord, EmptyPlace, EmptyRecord, FindingRecord, FoundPixels,
+    IslandRecord, Joined, JointRecord, MinimumRecord, OffBalanceRecord, OverhangRecord, PartWord,
+    PocketRecord, Shown, ShownMoment, StrayRowsRecord,
 };
 use crate::check::{
     Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, OffBalance, Overhang,
@@ -43,8 +45,38 @@ pub fn records(
     records
 }
 
-fn shown(layer: u32, region: &Region, pixel: Option<[u32; 2]>, scale: &Scale<'_>) -> Shown {
-    Shown { layer, index: scale.layer(layer).layer, region: region.clone(), pixel }
+/// Returns the place of a finding in one layer, in its middle.
+fn shown(layer: u32, region: &Region, pixels: FoundPixels, scale: &Scale<'_>) -> Shown {
+    let middle = |range: &Range<u32>| range.start + (range.end - range.start) / 2;
+    Shown {
+        layer,
+        index: scale.layer(layer).layer,
+        region: region.clone(),
+        layers: [layer; 2],
+        whole: region.clone(),
+        at: [middle(&region.columns), middle(&region.rows)],
+        pixels,
+        ..Shown::default()
+    }
+}
+
+fn shown_island(island: &Island, scale: &Scale<'_>) -> Shown {
+    let floating = shown(island.layer, &island.floating_region, FoundPixels::White, scale);
+    let largest = (island.largest_layer != island.layer)
+        .then_some((ShownMoment::LargestFloating, island.largest_layer));
+    let join = match island.end {
+        IslandEnd::Loose => None,
+        IslandEnd::JoinsPart { layer } | IslandEnd::JoinsIsland { layer, .. } => {
+            Some((ShownMoment::Join, layer))
+        }
+    };
+    Shown {
+        region: island.region.clone(),
+        pixel: Some(island.first),
+        layers: [island.layer, island.last_layer],
+        also: largest.into_iter().chain(join).collect(),
+        ..floating
+    }
 }
 
 impl IslandRecord {
@@ -72,7 +104,7 @@ impl IslandRecord {
             largest_mm2: scale.area_mm2(island.largest_area),
             largest_layer: scale.layer(island.largest_layer).layer,
             drag_mn: scale.drag_mn(island, shear_pa),
-            shown: shown(island.layer, &island.region, Some(island.first), scale),
+            shown: shown_island(island, scale),
         }
     }
 }
@@ -104,7 +136,10 @@ fn of_joint(joint: &WeakJoint, scale: &Scale<'_>) -> JointRecord {
         support_px: joint.support,
         support_percent: 100.0 * joint.support as f64 / joint.area as f64,
         support_mm2: scale.area_mm2(joint.support),
-        shown: shown(joint.layer, &joint.region, Some(joint.first), scale),
+        shown: Shown {
+            pixel: Some(joint.first),
+            ..shown(joint.layer, &joint.region, FoundPixels::White, scale)
+        },
     }
 }
 
@@ -127,7 +162,11 @@ fn of_pocket(pocket: &Pocket, scale: &Scale<'_>) -> FindingRecord {
         rim_mm: rim.and_then(|[_, last]| scale.top_mm(last)),
         rim_layer: rim.and_then(|[_, last]| scale.index(last + 1)),
         middle: scale.middle(&pocket.region),
-        shown: shown(pocket.layers[0], &pocket.region, Some(pocket.first), scale),
+        shown: Shown {
+            pixel: Some(pocket.first),
+            layers: pocket.layers,
+            ..shown(pocket.layers[0], &pocket.region, FoundPixels::Black, scale)
+        },
     };
     match pocket.kind {
         PocketKind::Trap => FindingRecord::Trap(record),
@@ -149,7 +188,11 @@ fn of_overhang(overhang: &Overhang, scale: &Scale<'_>) -> OverhangRecord {
         span_px: overhang.span_pixels,
         span_mm: overhang.span_pixels.and_then(|span| scale.length_mm(span)),
         area: scale.area(overhang.area),
-        shown: shown(overhang.reach_layer, &overhang.region, None, scale),
+        shown: Shown {
+            layers: overhang.layers,
+            at: overhang.farthest,
+            ..shown(overhang.reach_layer, &overhang.region, FoundPixels::Unheld, scale)
+        },
     }
 }
 

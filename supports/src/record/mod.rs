@@ -97,10 +97,10 @@ pub enum FoundPixels {
     All,
 }
 
-/// The place that a picture of a finding shows.
+/// The place that a picture of a finding shows. Layers are counted from the first that was checked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// The layer, from the first that was checked.
+    /// The layer.
     pub layer: u32,
     /// The index that its page states.
     pub index: u32,
@@ -108,6 +108,25 @@ pub struct Shown {
     pub region: Region,
     /// A pixel of the marked component; `None` marks the region's white without white below.
     pub pixel: Option<[u32; 2]>,
+    /// The first layer of the finding and the last.
+    pub layers: [u32; 2],
+    /// The rectangle around the finding in all layers.
+    pub whole: Region,
+    /// The column and the row of a vertical section through it.
+    pub at: [u32; 2],
+    /// The pixels that a section marks.
+    pub pixels: FoundPixels,
+    /// Other layers that show what becomes of it.
+    pub also: Vec<(ShownMoment, u32)>,
+}
+
+/// A moment of an island's growth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownMoment {
+    /// Its largest area floats.
+    LargestFloating,
+    /// It joins another body.
+    Join,
 }
 
 /// Layers with stray rows.

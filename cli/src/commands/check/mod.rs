@@ -33,7 +33,6 @@ use lamp_pipeline::check::{CheckSettings, Found};
 use lamp_pipeline::solid::at_part;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 
-pub(super) use pictures::draw;
 use pictures::write_pictures;
 use report::write_report;
 
@@ -67,8 +66,8 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
     report: Option<PathBuf>,
 
-    /// Write pictures of the worst findings to a new folder: findings in red, other white pixels
-    /// that rest on nothing white in yellow, the layer below in gray
+    /// Write pictures of the worst findings to a new folder, with the whole layer and a side view:
+    /// findings in red, other white that rests on nothing white in yellow, the layer below in gray
     #[arg(long, value_name = "DIR")]
     evidence: Option<PathBuf>,
 

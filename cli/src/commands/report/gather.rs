@@ -6,6 +6,7 @@ use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
 use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::{CheckSettings, Found};
+use lamp_plots::EvidencePicture;
 use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
 use lamp_supports::{CheckError, Severity};
 use serde_json::{Value, json};
@@ -230,8 +231,15 @@ fn drawn(stack: &IndexedStack, found: &Found) -> Result<Vec<(usize, InlinePictur
             let layer = stack.layer(position as usize).map_err(failed)?;
             Ok::<_, Exit>(layer.image.exposed().into_owned())
         };
-        let below = shown.layer.checked_sub(1).map(mask).transpose()?;
-        Ok((number, of_finding(below.as_ref(), &mask(shown.layer)?, shown)))
+        let mut picture = EvidencePicture::new(shown, &found.findings);
+        for position in 0..found.findings.layers.len() as u32 {
+            if picture.needs(position) {
+                let below = position.checked_sub(1).filter(|_| picture.needs_below(position));
+                let below = below.map(mask).transpose()?;
+                picture.add(position, below.as_ref(), &mask(position)?);
+            }
+        }
+        Ok((number, of_finding(picture)))
     });
     worst.collect()
 }

@@ -142,7 +142,7 @@ fn findings(Drawn { found, pictures }: &Drawn) -> Markup {
                 }
             }
             p.note {
-                "Red: the finding. Yellow: other white without white below. White: white. Gray: white in the layer below only."
+                "Red: the finding. Yellow: other white without white below. White: white. Gray: white in the layer below only. Blue: the place in the whole layer, and the layer in the side view."
             }
         }
         table.findings {

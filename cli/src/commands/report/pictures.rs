@@ -1,11 +1,9 @@
 //! Pictures within a page.
 
-use lamp_stack::{Layer, Mask};
-use lamp_supports::Shown;
+use lamp_stack::Layer;
 use serde::{Deserialize, Serialize};
 
-use crate::commands::check::draw;
-use lamp_plots::{PictureRegion, PictureScale};
+use lamp_plots::{EvidencePicture, PictureRegion, PictureScale};
 
 /// The longer side of a layer on the sheet, in pixels.
 const SIDE: u32 = 260;
@@ -30,9 +28,9 @@ pub(in crate::commands) fn of_layer(layer: &Layer) -> InlinePicture {
 }
 
 /// Draws a finding.
-pub(super) fn of_finding(below: Option<&Mask>, layer: &Mask, shown: &Shown) -> InlinePicture {
+pub(super) fn of_finding(picture: EvidencePicture<'_>) -> InlinePicture {
     let mut png = Vec::new();
-    draw(&mut png, below, layer, shown).expect("memory takes all");
+    picture.write_png(&mut png).expect("memory takes all");
     InlinePicture { address: address(&png), caption: String::new() }
 }
 
