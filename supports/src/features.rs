@@ -9,13 +9,13 @@ use std::hash::Hash;
 
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::check::HeldAt;
-use crate::record::{FindingRecord, IslandRecord, Joined};
+use crate::record::{FindingRecord, IslandRecord, Joined, PocketRecord};
 
 /// A thing that a person would name, as numbers of findings in their list.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Feature {
     /// How much it matters.
     pub severity: Severity,
@@ -28,7 +28,7 @@ pub struct Feature {
 }
 
 /// How much a feature matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
     /// The build fails, or the stack is broken: stray rows, islands, white that the image may cut
@@ -64,7 +64,8 @@ const NEAR_PX: u32 = 2;
 ///
 /// A weak joint or an overhang belongs to an island if it is within its layers, up to the second above
 /// the last, its box is near the box of all that floats, and it is no larger than the island's largest
-/// area. An overhang belongs to a weak joint of one of its layers near it that is no smaller.
+/// area. An overhang belongs to a weak joint of one of its layers near it that is no smaller, and to a
+/// pocket whose ceiling it is.
 ///
 /// Findings are alike if they belong to the same, such as one part of a build, by `owner`; if they are of
 /// one kind; if islands float for as long and all join or none does, and if joints rest on as large a share,
@@ -115,20 +116,38 @@ pub fn features<K: Clone + Eq + Hash>(
 }
 
 impl Feature {
+    /// Returns the feature of a finding alone, of which a report does not say how much it matters.
+    pub fn of_one(finding: usize) -> Self {
+        Self { severity: Severity::Look, finding, with: Vec::new(), alike: Vec::new() }
+    }
+
     /// Returns the line about it, without the name of its kind.
+    ///
+    /// # Panics
+    /// Panics if it names findings that are not in the list.
     pub fn text(&self, records: &[FindingRecord]) -> String {
-        let mut text = records[self.finding].to_string();
-        if !self.with.is_empty() {
-            let mut kinds: Vec<(&str, usize)> = Vec::new();
-            for &at in &self.with {
-                let name = records[at].name();
-                match kinds.iter_mut().find(|(kind, _)| *kind == name) {
-                    Some((_, count)) => *count += 1,
-                    None => kinds.push((name, 1)),
-                }
+        records[self.finding].to_string() + &self.more_text(|at| records.get(at).cloned())
+    }
+
+    /// Returns the end of the line: the findings that it has and the number of others like it, given its
+    /// findings.
+    pub fn more_text(&self, record: impl Fn(usize) -> Option<FindingRecord>) -> String {
+        let mut kinds: Vec<(&str, usize)> = Vec::new();
+        let mut reach = None;
+        for record in self.with.iter().filter_map(|&at| record(at)) {
+            match kinds.iter_mut().find(|(kind, _)| *kind == record.name()) {
+                Some((_, count)) => *count += 1,
+                None => kinds.push((record.name(), 1)),
             }
-            let kinds = kinds.iter().map(|&(name, count)| counted(count, name));
-            text += &format!("; with {}", kinds.collect::<Vec<_>>().join(", "));
+            // The worst comes first.
+            if let FindingRecord::Overhang(overhang) = &record {
+                reach.get_or_insert_with(|| format!(" ({})", overhang.reach_text()));
+            }
+        }
+        let kinds: Vec<String> = kinds.iter().map(|&(name, count)| counted(count, name)).collect();
+        let mut text = String::new();
+        if !kinds.is_empty() {
+            text = format!("; with {}{}", kinds.join(", "), reach.unwrap_or_default());
         }
         if !self.alike.is_empty() {
             text += &format!("; and {} more like it", self.alike.len());
@@ -149,12 +168,12 @@ fn island_of(record: &FindingRecord) -> Option<&IslandRecord> {
     }
 }
 
-/// Where islands and weak joints are.
+/// Where islands, weak joints and pockets are.
 struct Places<'a> {
     records: &'a [FindingRecord],
     /// The islands' numbers.
     islands: HashMap<u64, usize>,
-    /// The boxes of all that floats, and of weak joints.
+    /// The boxes of all that floats, of weak joints and of pockets.
     boxes: RTree<GeomWithData<Rectangle<[i64; 2]>, usize>>,
 }
 
@@ -170,7 +189,7 @@ impl<'a> Places<'a> {
             let bounds = match record {
                 FindingRecord::Island(island) => island.floating_box_px,
                 FindingRecord::WeakJoint(joint) => joint.bounds.box_px,
-                _ => return None,
+                record => pocket_of(record)?.bounds.box_px,
             };
             Some(GeomWithData::new(corners(bounds), at))
         });
@@ -192,15 +211,19 @@ impl<'a> Places<'a> {
                             && (first..=last).contains(&joint.layer.layer)
                             && area_px(record) <= joint.area.area_px
                     }
-                    _ => false,
+                    other => is_overhang && pocket_of(other).is_some_and(|it| closes(record, it)),
                 });
-                // Islands before joints, and the worst, so that the order of a tree decides nothing.
-                let is_joint = |at: usize| island_of(&self.records[at]).is_none();
-                let leader = near.min_by_key(|&other| (is_joint(other), other))?;
-                match is_joint(leader) {
-                    // A joint may belong to an island itself.
-                    true => self.leader(leader).or(Some(leader)),
-                    false => self.root(leader),
+                // Islands first, then joints, which may belong to an island themselves, then pockets;
+                // of each the worst, so that the order of a tree decides nothing.
+                let rank = |at: usize| match &self.records[at] {
+                    FindingRecord::Island(_) => 0,
+                    FindingRecord::WeakJoint(_) => 1,
+                    _ => 2,
+                };
+                let leader = near.min_by_key(|&other| (rank(other), other))?;
+                match rank(leader) {
+                    0 => self.root(leader),
+                    _ => self.leader(leader).or(Some(leader)),
                 }
             }
             FindingRecord::IslandWithoutMinimum(doubtful) => {
@@ -220,7 +243,7 @@ impl<'a> Places<'a> {
         Some(at)
     }
 
-    /// Returns islands and weak joints near a finding.
+    /// Returns islands, weak joints and pockets near a finding.
     fn near(&self, record: &FindingRecord) -> impl Iterator<Item = usize> {
         let around = record.box_px().map(|[left, right, top, bottom]| {
             let near = i64::from(NEAR_PX);
@@ -232,6 +255,28 @@ impl<'a> Places<'a> {
         let near = around.map(|around| self.boxes.locate_in_envelope_intersecting(around));
         near.into_iter().flatten().map(|place| place.data)
     }
+}
+
+fn pocket_of(record: &FindingRecord) -> Option<&PocketRecord> {
+    match record {
+        FindingRecord::Trap(pocket)
+        | FindingRecord::Sealed(pocket)
+        | FindingRecord::Narrow(pocket) => Some(pocket),
+        _ => None,
+    }
+}
+
+/// Returns whether an overhang is the ceiling of a pocket: within its box, and at its top.
+fn closes(record: &FindingRecord, pocket: &PocketRecord) -> bool {
+    let Some([left, right, top, bottom]) = record.box_px() else { return false };
+    let [least, most, upper, lower] = pocket.bounds.box_px;
+    let within = |[from, to]: [u32; 2], [start, end]: [u32; 2]| {
+        from.saturating_add(NEAR_PX) >= start && to <= end.saturating_add(NEAR_PX)
+    };
+    let last = pocket.layers.last_layer;
+    within([left, right], [least, most])
+        && within([top, bottom], [upper, lower])
+        && (last..=last.saturating_add(1)).contains(&record.layers()[1])
 }
 
 /// Returns whether a weak joint or an overhang near an island is within its layers.
@@ -341,173 +386,4 @@ impl Size {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::record::{
-        AreaRecord, BoxRecord, JointRecord, LayerPlace, LayerSpan, OverhangRecord, PartWord,
-        PocketRecord,
-    };
-
-    fn layer(layer: u32) -> LayerPlace {
-        LayerPlace { layer, z_mm: None }
-    }
-
-    fn bounds(box_px: [u32; 4]) -> BoxRecord {
-        BoxRecord { box_mm: None, box_px }
-    }
-
-    fn island(
-        number: u64,
-        first: u32,
-        joins: u32,
-        into: Joined,
-        box_px: [u32; 4],
-    ) -> FindingRecord {
-        FindingRecord::Island(IslandRecord {
-            number,
-            layer: layer(first),
-            bounds: bounds(box_px),
-            floating_box_px: box_px,
-            floating_px: 1000 * number,
-            largest_px: 100 * number,
-            last_layer: joins - 1,
-            joins: Some(joins),
-            into: Some(into),
-            ..IslandRecord::default()
-        })
-    }
-
-    fn joint(at: u32, box_px: [u32; 4]) -> FindingRecord {
-        let area = AreaRecord { area_px: 90, area_mm2: None };
-        let (layer, bounds) = (layer(at), bounds(box_px));
-        FindingRecord::WeakJoint(JointRecord { layer, bounds, area, ..JointRecord::default() })
-    }
-
-    fn overhang(layers: [u32; 2], box_px: [u32; 4]) -> FindingRecord {
-        let [layer, last_layer] = layers;
-        FindingRecord::Overhang(OverhangRecord {
-            layers: LayerSpan { layer, last_layer, ..LayerSpan::default() },
-            bounds: bounds(box_px),
-            area: AreaRecord { area_px: 40, area_mm2: None },
-            ..OverhangRecord::default()
-        })
-    }
-
-    fn cup(layers: [u32; 2], box_px: [u32; 4], volume_px: u64) -> FindingRecord {
-        let [layer, last_layer] = layers;
-        FindingRecord::Cup(PocketRecord {
-            layers: LayerSpan { layer, last_layer, ..LayerSpan::default() },
-            bounds: bounds(box_px),
-            volume_px,
-            ..PocketRecord::default()
-        })
-    }
-
-    #[test]
-    fn an_island_has_what_joins_it_and_where_it_grows() {
-        let part = Joined::Part(PartWord::Part);
-        let records = [
-            island(1, 10, 40, part, [100, 200, 100, 200]),
-            // Fingers that join it, one by way of another.
-            island(2, 12, 20, Joined::Island(1), [210, 220, 100, 110]),
-            island(3, 12, 15, Joined::Island(2), [230, 240, 100, 110]),
-            island(4, 10, 40, part, [500, 640, 500, 600]),
-            joint(41, [90, 300, 90, 210]),
-            joint(41, [700, 720, 90, 210]),
-            joint(60, [100, 200, 100, 200]),
-            overhang([16, 18], [231, 238, 100, 104]),
-        ];
-        let found = features(&records, |_| ());
-        let groups: Vec<_> = found.iter().map(|f| (f.finding, f.with.clone())).collect();
-        // A joint beside no island, and one far above, are features of their own.
-        assert_eq!(groups, [(0, vec![1, 2, 4, 7]), (3, vec![]), (5, vec![]), (6, vec![])]);
-        assert_eq!((found[0].severity, found[2].severity), (Severity::Blocks, Severity::Look));
-        let text = found[0].text(&records);
-        assert!(text.ends_with("; with 2 islands, 1 weak joint, 1 overhang"), "{text}");
-    }
-
-    #[test]
-    fn equal_holes_are_one_feature() {
-        let records = [
-            cup([10, 30], [0, 20, 0, 20], 6500),
-            cup([10, 30], [50, 71, 0, 20], 6550),
-            cup([40, 60], [0, 20, 50, 69], 6400),
-            // Twice as deep, and as wide as long.
-            cup([10, 50], [90, 110, 0, 20], 13_000),
-            cup([10, 30], [120, 160, 0, 10], 6500),
-            cup([10, 30], [0, 10, 120, 160], 6500),
-        ];
-        let found = features(&records, |_| ());
-        let alike: Vec<_> = found.iter().map(|f| (f.finding, f.alike.clone())).collect();
-        assert_eq!(alike, [(0, vec![1, 2]), (3, vec![]), (4, vec![5])]);
-        assert!(found[0].text(&records).ends_with("; and 2 more like it"));
-        assert_eq!(features(&[], |_| ()), []);
-    }
-
-    #[test]
-    fn what_is_worse_has_its_own_line() {
-        let part = Joined::Part(PartWord::Part);
-        let loose = |number| match island(number, 10, 40, part, [0, 9, 0, 9]) {
-            FindingRecord::Island(island) => {
-                FindingRecord::Island(IslandRecord { joins: None, into: None, ..island })
-            }
-            _ => unreachable!(),
-        };
-        let wide = |area_px| match overhang([12, 12], [0, 9, 0, 9]) {
-            FindingRecord::Overhang(overhang) => {
-                let area = AreaRecord { area_px, area_mm2: None };
-                FindingRecord::Overhang(OverhangRecord { area, ..overhang })
-            }
-            _ => unreachable!(),
-        };
-        let resting = |support_percent| match joint(70, [0, 9, 0, 9]) {
-            FindingRecord::WeakJoint(joint) => {
-                FindingRecord::WeakJoint(JointRecord { support_percent, ..joint })
-            }
-            _ => unreachable!(),
-        };
-        let bridge = |area_px| match wide(area_px) {
-            FindingRecord::Overhang(overhang) => FindingRecord::Overhang(OverhangRecord {
-                held_at: HeldAt::BothSides,
-                span_px: Some(8.0),
-                ..overhang
-            }),
-            _ => unreachable!(),
-        };
-        for [a, b] in [
-            // A cantilever is not like a bridge.
-            [wide(40), bridge(40)],
-            // One never joins.
-            [island(1, 10, 40, part, [0, 9, 0, 9]), loose(1)],
-            // An overhang larger than the island, or beyond its end, is not the island's.
-            [island(1, 10, 40, part, [0, 9, 0, 9]), wide(101)],
-            [island(1, 2, 8, part, [0, 9, 0, 9]), wide(40)],
-            [wide(40), wide(101)],
-            [resting(20.0), resting(9.0)],
-        ] {
-            let records = [a, b];
-            assert_eq!(features(&records, |_| ()).len(), 2, "{records:?}");
-        }
-        let alike = [wide(40), wide(99)];
-        assert_eq!(features(&alike, |_| ()).len(), 1);
-        // Of two parts.
-        let owner = |record: &FindingRecord| *record == alike[0];
-        assert_eq!(features(&alike, owner).len(), 2);
-    }
-
-    #[test]
-    fn every_finding_is_in_one_feature() {
-        // Islands may join unlisted ones, or, in a damaged report, each other.
-        let records = [
-            island(1, 5, 9, Joined::Island(2), [0, 9, 0, 9]),
-            island(2, 5, 9, Joined::Island(1), [20, 29, 0, 9]),
-            island(3, 5, 9, Joined::Island(77), [40, 49, 0, 9]),
-            joint(6, [0, 50, 0, 9]),
-        ];
-        let found = features(&records[2..], |_| ());
-        let mut all: Vec<usize> =
-            found.iter().flat_map(|f| [&[f.finding], &f.with[..], &f.alike].concat()).collect();
-        all.sort_unstable();
-        assert_eq!(all, [0, 1]);
-    }
-}
+mod tests;

@@ -16,6 +16,10 @@ pub(super) struct Growth {
     pub(super) off_balance: Listed<OffBalance>,
 }
 
+/// The area in a layer that makes a long, thin island more than a speck, in squares of its side. By
+/// default it is a square millimeter.
+const SPECK_SQUARES: u64 = 16;
+
 /// The size up to which an island is a speck.
 #[derive(Clone, Copy)]
 pub(super) struct Speck {
@@ -189,8 +193,10 @@ impl Floating {
         }
         self.layers += 1;
         // One square is enough, and the search reads all runs.
-        self.counts =
-            self.counts || self.layers >= speck.layers || layer.hold_square(components, speck.side);
+        self.counts = self.counts
+            || self.layers >= speck.layers
+            || area >= SPECK_SQUARES * u64::from(speck.side).pow(2)
+            || layer.hold_square(components, speck.side);
     }
 }
 

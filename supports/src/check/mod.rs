@@ -92,6 +92,13 @@ impl CheckOptions {
         let pixels = |dpi| (self.speck.pixels(dpi) - 1e-6).ceil().clamp(least, 1e9) as u32;
         dpi.map_or(self.rounding.get(), pixels)
     }
+
+    /// Returns the reach in pixels and the number of layers of which an overhang must have one. A
+    /// given limit is taken as it is.
+    fn least_overhang(&self, dpi: Option<Dpi>) -> (f64, u32) {
+        let reach = dpi.filter(|_| self.max_overhang.is_none()).map(|dpi| self.speck.pixels(dpi));
+        (reach.unwrap_or(0.0), self.speck_layers.get())
+    }
 }
 
 /// A reason that a stack cannot be checked.
@@ -374,7 +381,7 @@ impl Checker {
             growth: Growth::new(speck),
             liquid: Liquid::new(rounding),
             drain: drain.transpose()?,
-            overhangs: Overhangs::default(),
+            overhangs: Overhangs::new(options.least_overhang(first.dpi)),
             weak_joints: Listed::default(),
         })
     }

@@ -8,6 +8,8 @@ use super::overhang::OverhangPatch;
 /// The overhangs of the layers so far.
 #[derive(Default)]
 pub(super) struct Overhangs {
+    /// The reach in pixels and the number of layers of which an overhang must have one.
+    least: (f64, u32),
     /// The last layer's patches, and which of `open` each belongs to.
     last: Vec<(Region, usize)>,
     open: Vec<Overhang>,
@@ -15,6 +17,10 @@ pub(super) struct Overhangs {
 }
 
 impl Overhangs {
+    pub(super) fn new(least: (f64, u32)) -> Self {
+        Self { least, ..Self::default() }
+    }
+
     /// Adds a layer's patches. A patch whose box is within `near` pixels of a patch of the last
     /// layer continues it.
     pub(super) fn add(&mut self, patches: &[OverhangPatch], number: u32, near: u32) {
@@ -49,7 +55,7 @@ impl Overhangs {
         }
         self.open = kept.iter().filter_map(|&k| merged[k].take()).collect();
         // Overhangs without a patch in this layer have ended.
-        merged.into_iter().flatten().for_each(|overhang| self.ended.push(overhang));
+        merged.into_iter().flatten().for_each(|overhang| self.end(overhang));
         let place = |root: &usize| kept.binary_search(root).expect("it is kept");
         self.last = of_patch
             .into_iter()
@@ -60,7 +66,15 @@ impl Overhangs {
 
     /// Ends all overhangs.
     pub(super) fn finish(&mut self) {
-        std::mem::take(&mut self.open).into_iter().for_each(|overhang| self.ended.push(overhang));
+        std::mem::take(&mut self.open).into_iter().for_each(|overhang| self.end(overhang));
+    }
+
+    /// Lists an overhang, unless a few layers reach a little too far.
+    fn end(&mut self, overhang: Overhang) {
+        let layers = overhang.layers[1] - overhang.layers[0] + 1;
+        if overhang.reach_pixels() >= self.least.0 || layers >= self.least.1 {
+            self.ended.push(overhang);
+        }
     }
 }
 

@@ -319,17 +319,23 @@ impl PocketRecord {
     }
 }
 
+impl OverhangRecord {
+    /// Returns its reach or its span as text.
+    pub fn reach_text(&self) -> String {
+        match self.span_px {
+            Some(span) => format!("bridge of {} span", length_text(span, self.span_mm)),
+            None => {
+                let reach = length_text(self.reach_px, self.reach_mm);
+                format!("reaches {reach} beyond the layer below")
+            }
+        }
+    }
+}
+
 impl fmt::Display for OverhangRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { layers, at, area, .. } = self;
-        let reach = length_text(self.reach_px, self.reach_mm);
-        match self.span_px {
-            Some(span) => {
-                let span = length_text(span, self.span_mm);
-                write!(f, "{layers} at {at}: bridge of {span} span")?;
-            }
-            None => write!(f, "{layers} at {at}: reaches {reach} beyond the layer below")?,
-        }
+        write!(f, "{layers} at {at}: {}", self.reach_text())?;
         if layers.layer != layers.last_layer {
             write!(f, " in layer {}", self.reach_layer)?;
         }

@@ -38,7 +38,7 @@ pub(super) fn fill_pinches(below: &[Level], plane: &mut [Level], width: usize) {
         let Some(corner) = fills[usize::from(pattern)] else { continue };
         let cell = at + usize::from(corner & 1) + width * usize::from(corner >> 1 & 1);
         plane[cell] = FILLED;
-        // A pinch lies within the border of black cells, so there are cells on all sides.
+        // Black cells surround all others, so there are cells on all sides of a pinch.
         open.extend([cell, cell - 1, cell - width, cell - width - 1]);
     }
 }

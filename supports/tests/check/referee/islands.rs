@@ -29,7 +29,8 @@ pub(crate) struct Island {
     pub(crate) largest_layer: usize,
     /// The number of floating layers.
     pub(crate) floating_layers: usize,
-    /// True if no component of a floating layer holds a square, and there are few such layers.
+    /// True if no component of a floating layer holds a square, and there are few such layers, none
+    /// of the area of 16 squares.
     pub(crate) is_speck: bool,
 }
 
@@ -194,6 +195,7 @@ fn float(growth: &Growth, layer: usize, limits: &Limits, found: &mut [Option<Isl
             (island.largest_area, island.largest_layer) = (its.len(), layer);
         }
         island.is_speck &= !block.hold_square(&its, limits.speck.0);
+        island.is_speck &= its.len() < 16 * limits.speck.0.pow(2);
         island.is_speck &= island.floating_layers < limits.speck.1;
     }
 }

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 pub(crate) use balance::tilts;
 pub(crate) use islands::{islands, weak_joints};
-pub(crate) use overhangs::{overhangs, patches};
+pub(crate) use overhangs::{Overhang, overhangs, patches};
 pub(crate) use pockets::{Kind, holes, narrow_pockets, pockets};
 
 /// A block of voxels: layer after layer from the bottom, each row after row from the top.
