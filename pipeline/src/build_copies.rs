@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 use lamp_stack::{FieldRecord, Frame, Mask, Op, Orientation, Page, PageInfo, StripRecord};
 use lamp_supports::components_beyond;
+use thiserror::Error;
 
 /// The copies of a build's parts, as its first page records them.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,29 @@ pub struct BuildCopies {
 struct PlacedPart {
     name: String,
     copies: Vec<(Frame, Orientation)>,
+}
+
+/// A reason that copies cannot be separated, so that a stack is checked as it stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Inseparable {
+    /// The stack is no build.
+    #[error("the stack is no build")]
+    NoBuild,
+    /// The record of copies is of another form.
+    #[error("its record of copies cannot be read")]
+    Record,
+    /// The stack is a strip or a field of a build.
+    #[error("it is a strip or a field of a build; check the build itself")]
+    Cut,
+    /// The layers of mesh below the parts are not there.
+    #[error("the layers of mesh below the parts are not among its layers")]
+    NoBase,
+    /// A copy's rectangle is not wholly on the images.
+    #[error("a copy reaches beyond the images")]
+    Outside,
+    /// Rectangles of copies meet.
+    #[error("the rectangles of copies overlap, as with tile --pack outline")]
+    Overlap,
 }
 
 /// The owner of a place on a build.
@@ -51,17 +75,19 @@ pub struct DividedLayer {
 impl BuildCopies {
     /// Returns the copies of a build, given its first page and the size of its images.
     ///
-    /// Returns none if copies cannot be separated, so that the stack is checked as it stands: if it
-    /// is no build, a strip or a field of one, or a range without the layers below the parts, if the
-    /// record is of another form, or if frames overlap or leave the image.
-    pub fn of(info: &PageInfo, [width, height]: [u32; 2]) -> Option<Self> {
-        let stack = info.stack.as_ref()?;
+    /// # Errors
+    /// Returns a reason if copies cannot be separated.
+    pub fn of(info: &PageInfo, [width, height]: [u32; 2]) -> Result<Self, Inseparable> {
+        let stack = info.stack.as_ref().ok_or(Inseparable::NoBuild)?;
         let base_layers = stack.base_layers();
-        let is_cut = info.has_record::<StripRecord>() || info.has_record::<FieldRecord>();
-        if is_cut || (base_layers > 0 && info.index >= base_layers) {
-            return None;
+        let parts = stack.built_parts().ok_or(Inseparable::NoBuild)?;
+        if info.has_record::<StripRecord>() || info.has_record::<FieldRecord>() {
+            return Err(Inseparable::Cut);
         }
-        let parts = stack.built_parts()?.map(|part| {
+        if base_layers > 0 && info.index >= base_layers {
+            return Err(Inseparable::NoBase);
+        }
+        let parts = parts.map(|part| {
             let part = part.ok()?;
             let turns = part.turns.iter().map(|turn| turn.parse::<Orientation>().ok());
             let turns = turns.chain(std::iter::repeat(Some(Orientation::default())));
@@ -74,7 +100,7 @@ impl BuildCopies {
             let name = part.part.unwrap_or_else(|| stack.part.clone());
             (!copies.is_empty()).then_some(PlacedPart { name, copies })
         });
-        let parts = parts.collect::<Option<Vec<_>>>()?;
+        let parts = parts.collect::<Option<Vec<_>>>().ok_or(Inseparable::Record)?;
         let frames: Vec<Frame> =
             parts.iter().flat_map(|part| part.copies.iter().map(|(frame, _)| *frame)).collect();
         let is_within = |frame: &Frame| {
@@ -90,14 +116,21 @@ impl BuildCopies {
             near(a.left, a.width, b.left, b.width) && near(a.top, a.height, b.top, b.height)
         };
         // Places are within the image, so their sums fit.
-        let is_clear = frames.iter().all(is_within)
-            && frames.iter().enumerate().all(|(k, a)| !frames[..k].iter().any(|b| meet(a, b)));
-        is_clear.then_some(Self { parts, base_layers })
+        if !frames.iter().all(is_within) {
+            return Err(Inseparable::Outside);
+        }
+        if frames.iter().enumerate().any(|(k, a)| frames[..k].iter().any(|b| meet(a, b))) {
+            return Err(Inseparable::Overlap);
+        }
+        Ok(Self { parts, base_layers })
     }
 
-    /// Returns the copies of a build, given its first page, as [`of`](Self::of) does.
-    pub fn of_page(page: &Page) -> Option<Self> {
-        Self::of(page.info(), page.size())
+    /// Returns the copies of a build, given its first page, if there is one, as [`of`](Self::of) does.
+    ///
+    /// # Errors
+    /// Returns a reason if copies cannot be separated.
+    pub fn of_page(page: Option<&Page>) -> Result<Self, Inseparable> {
+        page.map_or(Err(Inseparable::NoBuild), |page| Self::of(page.info(), page.size()))
     }
 
     /// Returns whether the build has a mesh.
@@ -222,10 +255,18 @@ mod tests {
         copies_on(base_layers, [60, 40]).unwrap()
     }
 
-    fn copies_on(base_layers: u32, size: [u32; 2]) -> Option<BuildCopies> {
+    fn copies_on(base_layers: u32, size: [u32; 2]) -> Result<BuildCopies, Inseparable> {
+        placed(base_layers, size, [[5, 5], [30, 5], [15, 20]])
+    }
+
+    fn placed(
+        base_layers: u32,
+        size: [u32; 2],
+        places: [[i64; 2]; 3],
+    ) -> Result<BuildCopies, Inseparable> {
         let part = BuiltPart {
             part_pixels: [10, 8],
-            copies: vec![[5, 5], [30, 5], [15, 20]],
+            copies: places.to_vec(),
             turns: vec!["0".to_owned(), "90".to_owned(), "0".to_owned()],
             ..BuiltPart::default()
         };
@@ -279,7 +320,9 @@ mod tests {
         assert_eq!(copies(0).owner([31, 33, 14, 15]), part);
         assert_eq!(copies(0).owner([31, 39, 14, 15]), OnBuild::Mesh);
         // Copies that are cut off, or are not there, are not separated.
-        assert_eq!(copies_on(0, [37, 40]), None);
-        assert_eq!(BuildCopies::of(&PageInfo::default(), [60, 40]), None);
+        assert_eq!(copies_on(0, [37, 40]), Err(Inseparable::Outside));
+        let overlapping = placed(0, [60, 40], [[5, 5], [14, 5], [15, 20]]);
+        assert_eq!(overlapping, Err(Inseparable::Overlap));
+        assert_eq!(BuildCopies::of(&PageInfo::default(), [60, 40]), Err(Inseparable::NoBuild));
     }
 }

@@ -14,7 +14,7 @@ use lamp_supports::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::build_copies::{BuildCopies, OnBuild};
+use crate::build_copies::{BuildCopies, Inseparable, OnBuild};
 use crate::documents::{canonical_word, document, is_file};
 use crate::error::Error;
 use crate::words::{list, optional, path, text, words_of};
@@ -128,14 +128,14 @@ impl CheckSettings {
     /// Returns the first error of the layers, or an error if they cannot be checked.
     pub fn find<T: MemorySize + Send, E: From<CheckError> + From<Error> + Send>(
         &self,
-        build: Option<BuildCopies>,
+        build: Result<BuildCopies, Inseparable>,
         layers: impl Iterator<Item = Result<T, E>>,
         decode: impl Fn(T) -> Result<Layer, E> + Sync,
         machine: Option<&Machine>,
     ) -> Result<Found, E> {
         let (findings, differing) = match &build {
-            Some(build) => self.find_in_build(build, layers, decode)?,
-            None => (lamp_supports::check(layers, decode, &self.options())?, Vec::new()),
+            Ok(build) => self.find_in_build(build, layers, decode)?,
+            Err(_) => (lamp_supports::check(layers, decode, &self.options())?, Vec::new()),
         };
         let of_settings;
         let machine = match machine {
@@ -154,7 +154,7 @@ impl CheckSettings {
         findings: Findings,
         disagreements: &Disagreements,
         differing: Vec<CopyRecord>,
-        build: Option<BuildCopies>,
+        build: Result<BuildCopies, Inseparable>,
         machine: &Machine,
     ) -> Found {
         let mut records = self.records(&findings, disagreements, machine);
@@ -269,8 +269,22 @@ pub struct Found {
     pub features: Vec<Feature>,
     /// The number of findings that are left out, as a person accepts them.
     pub accepted: usize,
-    /// The copies, if the stack is a build.
-    pub build: Option<BuildCopies>,
+    /// The copies of a build, or why the stack was checked as it stands.
+    pub build: Result<BuildCopies, Inseparable>,
+}
+
+/// A finding, and the part of a build that it belongs to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlacedFinding<F> {
+    /// The finding.
+    #[serde(flatten)]
+    pub finding: F,
+    /// The part's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+    /// The number of its copies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copies: Option<usize>,
 }
 
 impl Found {
@@ -294,7 +308,24 @@ impl Found {
 
     /// Returns what a finding belongs to, if the stack is a build and the finding has a place.
     pub fn owner(&self, record: &FindingRecord) -> Option<OnBuild> {
-        Some(self.build.as_ref()?.owner(record.box_px()?))
+        Some(self.build.as_ref().ok()?.owner(record.box_px()?))
+    }
+
+    /// Returns the findings with the parts of a build that they belong to.
+    pub fn placed(&self) -> impl Iterator<Item = PlacedFinding<&FindingRecord>> {
+        self.records.iter().map(|finding| {
+            let (part, copies) = match self.owner(finding) {
+                Some(OnBuild::Part { name, copies }) => (Some(name), Some(copies)),
+                Some(OnBuild::Mesh) | None => (None, None),
+            };
+            PlacedFinding { finding, part, copies }
+        })
+    }
+
+    /// Returns why copies and build mesh were checked as they stand, if the stack is a build.
+    pub fn whole_build(&self) -> Option<String> {
+        let why = self.build.as_ref().err().filter(|why| **why != Inseparable::NoBuild)?;
+        Some(format!("each copy and the build mesh were checked as they stand: {why}"))
     }
 
     /// Returns the line about a feature, without the name of its kind.

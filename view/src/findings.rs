@@ -1,10 +1,9 @@
 //! Findings of `lamp check` and `lamp support`, in the form that the page shows.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 use lamp_stack::{Frame, Mask, MaskBuilder, Op, PageHeader};
-use lamp_supports::{FindingRecord, FoundPixels, inner_components};
+use lamp_supports::{Feature, FindingRecord, FoundPixels, inner_components};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -87,21 +86,28 @@ fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, 
     if [&input["width_px"], &input["height_px"]] != size.map(Value::from).each_ref() {
         return Err("the report is about a stack of a different size".to_owned());
     }
-    let findings = report["findings"].as_array().into_iter().flatten();
+    let findings = report["findings"].as_array().map_or(&[][..], Vec::as_slice);
+    let record = |number: usize| {
+        let json = findings.get(number).unwrap_or(&Value::Null);
+        FindingRecord::deserialize(json)
+            .map_err(|error| format!("finding {} of the report: {error}", number + 1))
+    };
     // Since lamp-check-2 findings belong to features, and the finding that names one is shown.
-    let naming: Option<BTreeSet<u64>> = report["features"]
-        .as_array()
-        .map(|features| features.iter().filter_map(|it| it["finding"].as_u64()).collect());
-    let is_shown = |(number, _): &(usize, &Value)| {
-        naming.as_ref().is_none_or(|naming| naming.contains(&(*number as u64)))
+    let features: Vec<Feature> = match report["features"].as_array() {
+        Some(features) => features
+            .iter()
+            .take(MOST)
+            .map(Feature::deserialize)
+            .collect::<Result<_, _>>()
+            .map_err(|error| format!("a feature of the report: {error}"))?,
+        None => (0..findings.len().min(MOST)).map(Feature::of_one).collect(),
     };
-    let read = |(number, json): (usize, &Value)| {
-        let record = FindingRecord::deserialize(json)
-            .map_err(|error| format!("finding {} of the report: {error}", number + 1))?;
-        let text = record.size_text();
-        Ok(of_record(&record, text, headers))
+    let read = |feature: &Feature| {
+        let naming = record(feature.finding)?;
+        let text = naming.size_text() + &feature.more_text(|at| record(at).ok());
+        Ok(of_record(&naming, text, headers))
     };
-    findings.enumerate().filter(is_shown).take(MOST).map(read).collect()
+    features.iter().map(read).collect()
 }
 
 fn of_record(record: &FindingRecord, text: String, headers: &[PageHeader]) -> Finding {
@@ -256,6 +262,24 @@ mod tests {
         assert_eq!((found[1].layer, found[1].last_layer), (0, 2));
         assert_eq!(found[2].bounds, Some([1, 3, 2, 4]));
         assert!(of_report(&report, &headers(2)).unwrap_err().contains("different layers"));
+    }
+
+    #[test]
+    fn features_of_reports_have_their_counts() {
+        let overhang = json!({"kind": "overhang", "layer": 6, "last_layer": 6,
+            "box_px": [10, 14, 20, 22], "area_px": 8, "area_mm2": 0.5, "span_mm": 4.2, "span_px": 42.0});
+        let report = json!({
+            "schema": "lamp-check-2",
+            "inputs": [{"width_px": 60, "height_px": 40}],
+            "findings": [overhang, overhang, overhang],
+            "features": [{"severity": "look", "finding": 1, "with": [0], "alike": [2], "input": 0}],
+        });
+        let found = of_report(&report, &headers(3)).unwrap();
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            found[0].text,
+            "0.5 mm2, bridge of 4.2 mm span; with 1 overhang (bridge of 4.20 mm span); and 1 more like it"
+        );
     }
 
     #[test]

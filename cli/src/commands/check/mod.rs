@@ -28,7 +28,7 @@ use crate::output::endings::parse_report;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
-use lamp_pipeline::build_copies::BuildCopies;
+use lamp_pipeline::build_copies::{BuildCopies, Inseparable};
 use lamp_pipeline::check::{CheckSettings, Found};
 use lamp_pipeline::solid::at_part;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
@@ -165,7 +165,7 @@ impl CheckArgs {
                 let pages = in_range(pages, Page::info, stack.path.clone(), self.layers.clone());
                 let mut pages = pages.peekable();
                 let first = pages.peek().and_then(|page| page.as_ref().ok());
-                let build = first.and_then(|(page, _)| BuildCopies::of_page(page));
+                let build = BuildCopies::of_page(first.map(|(page, _)| page));
                 let decode = |(page, _): (Page, _)| {
                     let layer = page.decode().map_err(|error| failed_at(name.clone(), error));
                     progress.layer_done();
@@ -188,7 +188,8 @@ impl CheckArgs {
                 };
                 let findings = lamp_supports::check(layers, decode, &self.settings.options())?;
                 let disagreements = self.disagreements(&mut input, &minima, &findings, common)?;
-                self.settings.found(findings, &disagreements, Vec::new(), None, machine)
+                let build = Err(Inseparable::NoBuild);
+                self.settings.found(findings, &disagreements, Vec::new(), build, machine)
             }
         };
         progress.done();
@@ -308,6 +309,9 @@ fn printed(name: &str, found: &Found, all: bool) -> String {
         accepted => format!(", {accepted} accepted"),
     };
     let mut text = format!("{}: {layers}, {count}{specks}{accepted}\n", printable(name));
+    if let Some(note) = found.whole_build() {
+        text += &format!("  note: {note}\n");
+    }
     let name_of = |feature: &Feature| found.records[feature.finding].name();
     for of_kind in found.features.chunk_by(|a, b| name_of(a) == name_of(b)) {
         let name = name_of(&of_kind[0]);

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
-use lamp_pipeline::build_copies::OnBuild;
 use lamp_supports::{Feature, FindingRecord, Findings, IslandRecord, Scale};
 use serde::Serialize;
 use serde_json::json;
@@ -32,18 +31,12 @@ pub(super) fn write_report(
             "findings": checked.found.count(),
             "specks": findings.specks.count(),
             "accepted": checked.found.accepted,
+            "note": checked.found.whole_build(),
             "left_out": left_out(findings),
         })
     });
     let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
-        let found = &checked.found;
-        found.records.iter().map(move |finding| {
-            let (part, copies) = match found.owner(finding) {
-                Some(OnBuild::Part { name, copies }) => (Some(name), Some(copies)),
-                Some(OnBuild::Mesh) | None => (None, None),
-            };
-            OfInput { finding, part, copies, input }
-        })
+        checked.found.placed().map(move |finding| OfInput { finding, input })
     });
     let mut first = 0;
     let features = checked.iter().enumerate().flat_map(|(input, checked)| {
@@ -67,7 +60,7 @@ pub(super) fn write_report(
         let specks = checked.found.findings.specks.list.iter();
         specks.map(move |speck| {
             let finding = FindingRecord::Island(IslandRecord::new(speck, &scale, shear_pa));
-            OfInput { finding, part: None, copies: None, input }
+            OfInput { finding, input }
         })
     });
     JsonReport::new(&json!({ "schema": SCHEMA }))
@@ -78,15 +71,11 @@ pub(super) fn write_report(
         .write(path)
 }
 
-/// A finding, the part of a build that it belongs to, and the number of its input.
+/// A finding and the number of its input.
 #[derive(Serialize)]
 struct OfInput<F> {
     #[serde(flatten)]
     finding: F,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    part: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    copies: Option<usize>,
     input: usize,
 }
 

@@ -85,7 +85,11 @@ impl StackReport {
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         match &self.found {
-            Ok(drawn) => warnings.extend(found_text(&drawn.found)),
+            Ok(drawn) => {
+                warnings.extend(found_text(&drawn.found));
+                let note = drawn.found.whole_build();
+                warnings.extend(note.map(|note| format!("In lamp check, {note}.")));
+            }
             Err(why) => warnings.push(format!("It could not be checked for what floats: {why}.")),
         }
         let totals = &self.totals;
@@ -131,7 +135,7 @@ impl StackReport {
             "unchecked": self.found.as_ref().err(),
             "finding_count": found.map(Found::count),
             "specks": found.map(|found| found.findings.specks.count()),
-            "findings": found.map(|found| &found.records),
+            "findings": found.map(|found| found.placed().collect::<Vec<_>>()),
             "features": found.map(|found| &found.features),
             "by_layer": {
                 "index": column(&|layer| layer.index.into()),
