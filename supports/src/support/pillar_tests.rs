@@ -74,6 +74,8 @@ fn supported(part: &[Layer], options: &SupportOptions) -> (SupportPlan, Vec<Laye
     let mut plan = plan_supports(layers(), &found, &no_surface(), options).unwrap();
     plan_braces(layers(), &found, &mut plan, options).unwrap();
     flood_supports(layers(), &found, &mut plan, options).unwrap();
+    // Edits refuse a rod without a length.
+    assert!(plan.rods().all(|rod| rod.ends[0] != rod.ends[1]));
     let mut voxels = voxels(part);
     for (number, rows) in voxels.iter_mut().enumerate() {
         let z = 0.1 * number as f64 + 0.05;
