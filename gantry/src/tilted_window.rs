@@ -1,4 +1,4 @@
-//! What tilted mirrors show, 64 frames at a time.
+//! The frames of tilted mirrors, 64 at a time.
 //!
 //! From frame to frame the display moves by one row, so 64 frames of a mirror are 64 rows of one column
 //! of the image. Where the rows of a column are the bits of a word, a shift of two words is all frames of
@@ -132,7 +132,7 @@ impl TiltedWindow {
                     for (mirror, Place { column, slot, row }) in mirrors.iter_mut().zip(places) {
                         let [now, next] = [0, 1]
                             .map(|more| slots[starts[(slot + more) as usize] + *column as usize]);
-                        // In two steps, as a shift by 64 is none.
+                        // In two steps, as a shift by 64 overflows.
                         *mirror = now << row | next >> 1 >> (BLOCK as u32 - 1 - row);
                     }
                     transpose(&mut mirrors);

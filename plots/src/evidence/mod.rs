@@ -140,7 +140,7 @@ impl<'a> EvidencePicture<'a> {
         for panel in first.into_iter().chain([side_view]).chain(panels) {
             drawn.push(panel.drawn(self.findings.dpi)?);
         }
-        // The place at the left, the whole layer and the side view beside it, others where there is room.
+        // The place at the left, the whole layer and the side view next to it, others where there is room.
         let (mut column_of, mut bottoms) = (Vec::new(), [0; 2]);
         for (number, panel) in drawn.iter().enumerate() {
             let column = match number {

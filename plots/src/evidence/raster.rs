@@ -29,7 +29,7 @@ impl Raster {
         Self { width, height, colors }
     }
 
-    /// Paints a rectangle; what is outside is left out.
+    /// Paints a rectangle, cut off at the edges of the picture.
     pub(super) fn fill(&mut self, columns: Range<u32>, rows: Range<u32>, color: Color) {
         let columns = columns.start as usize..columns.end.min(self.width) as usize;
         for row in rows.start..rows.end.min(self.height) {

@@ -21,7 +21,7 @@ use crate::check::{Findings, Labelled, Pocket, PocketKind};
 /// A hole that is to drain a pocket.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vent {
-    /// What is to be taken out, from the pocket to the outside.
+    /// The rod to take out, from the pocket to the outside.
     pub rod: Rod,
     /// The distance between the pocket and the outside.
     pub wall: Length,
@@ -172,7 +172,7 @@ fn shortest<'a>(
     let pitch = raster.dpi.pitch().mm();
     let mut best_mm = max_length.mm().next_up();
     let mut best = None;
-    // Ways aside come first, so that of equal ways the one that a person reaches best is taken.
+    // Ways aside come first: of two equally long ways, people reach this one more easily.
     for (layer, outside) in kept.iter().rev() {
         let down = bottom_mm(top) - bottom_mm(*layer);
         if down >= best_mm {
