@@ -125,12 +125,15 @@ impl BuildCopies {
         Ok(Self { parts, base_layers })
     }
 
-    /// Returns the copies of a build, given its first page, if there is one, as [`of`](Self::of) does.
+    /// Returns the copies of a build, given its first page, which alone has the record, and the index
+    /// from which layers are checked.
     ///
     /// # Errors
     /// Returns a reason if copies cannot be separated.
-    pub fn of_page(page: Option<&Page>) -> Result<Self, Inseparable> {
-        page.map_or(Err(Inseparable::NoBuild), |page| Self::of(page.info(), page.size()))
+    pub fn of_page(page: Option<&Page>, from: u32) -> Result<Self, Inseparable> {
+        let page = page.ok_or(Inseparable::NoBuild)?;
+        let index = page.info().index.max(from);
+        Self::of(&PageInfo { index, ..page.info().clone() }, page.size())
     }
 
     /// Returns whether the build has a mesh.

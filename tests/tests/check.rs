@@ -363,6 +363,10 @@ fn a_build_is_judged_by_one_copy_of_each_part() {
     };
     let [[volume, layer], of_build] = [cup(&part), cup(&build)];
     assert_eq!(of_build, [volume, layer + 5]);
+    // Without the layers of mesh below, copies stand as they are, and a note says so.
+    let range = scratch.run("lamp check build.tif --layers 8..").succeeds();
+    let text = String::from_utf8(range.stdout).unwrap();
+    assert!(text.contains("\n  note: each copy and the build mesh were checked"), "{text}");
     // What a person has seen is left out, and the rest is not.
     let seen = scratch.run("lamp check build.tif --accept r.json --strict").succeeds();
     let line = String::from_utf8(seen.stdout).unwrap();

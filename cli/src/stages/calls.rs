@@ -115,7 +115,7 @@ impl Checking {
         let failed = |error: StackError| Exit::Failed(error.into()).at(name.clone());
         let mut pages =
             Pages::open(stack).map_err(failed)?.map(|page| page.map_err(failed)).peekable();
-        let build = BuildCopies::of_page(pages.peek().and_then(|page| page.as_ref().ok()));
+        let build = BuildCopies::of_page(pages.peek().and_then(|page| page.as_ref().ok()), 0);
         let decode = |page: Page| page.decode().map_err(failed);
         let all = self.0.find(build, pages, decode, None).map_err(|error: Exit| {
             // Errors of pages have their place.

@@ -161,11 +161,12 @@ impl CheckArgs {
         let name = input_name(path);
         let found = match &mut input {
             Input::Stack(stack) => {
-                let pages = stack.pages(self.evidence.is_some())?;
-                let pages = in_range(pages, Page::info, stack.path.clone(), self.layers.clone());
-                let mut pages = pages.peekable();
+                let path = stack.path.clone();
+                let mut pages = stack.pages(self.evidence.is_some())?.peekable();
                 let first = pages.peek().and_then(|page| page.as_ref().ok());
-                let build = BuildCopies::of_page(first.map(|(page, _)| page));
+                let from = self.layers.as_ref().map_or(0, |layers| layers.start);
+                let build = BuildCopies::of_page(first, from);
+                let pages = in_range(pages, Page::info, path, self.layers.clone());
                 let decode = |(page, _): (Page, _)| {
                     let layer = page.decode().map_err(|error| failed_at(name.clone(), error));
                     progress.layer_done();
