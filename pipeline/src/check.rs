@@ -338,7 +338,15 @@ impl Found {
             Some(OnBuild::Mesh) => format!("{text}; in the build mesh"),
             Some(OnBuild::Part { name, copies: 1 }) => format!("{text}; in {name}"),
             Some(OnBuild::Part { name, copies }) => {
-                format!("{text}; in each of {copies} copies of {name}")
+                let differs = |record: &FindingRecord| match record {
+                    FindingRecord::CopyDiffers(copy) => copy.part == name,
+                    _ => false,
+                };
+                match self.records.iter().any(differs) {
+                    // A part has all white that any copy has.
+                    true => format!("{text}; in {copies} copies of {name}, of which some differ"),
+                    false => format!("{text}; in each of {copies} copies of {name}"),
+                }
             }
         }
     }

@@ -156,9 +156,9 @@ fn parse_avoided(path: &str) -> Result<Avoided, String> {
 
 /// Parses an angle above zero.
 fn parse_overhang(text: &str) -> Result<Degrees, String> {
-    match text.parse()? {
-        Degrees(0.0) => Err("the angle must be above zero".to_owned()),
-        angle => Ok(angle),
+    match text.parse() {
+        Ok(Degrees(angle)) if angle > 0.0 => Ok(Degrees(angle)),
+        _ => Err(format!("`{text}` is no angle above 0deg up to 80deg, such as 45deg")),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::env;
 use std::error::Error as _;
-use std::num::ParseIntError;
+use std::num::{IntErrorKind, ParseIntError};
 
 use clap::error::{ContextKind, ErrorKind};
 
@@ -56,8 +56,11 @@ fn with_known_words(error: &clap::Error) -> Option<clap::Error> {
             "that is too large".to_owned()
         }
         Some(least) => format!("write a whole number of at least {least}"),
-        None if source.is::<ParseIntError>() => "write a whole number".to_owned(),
-        None => return None,
+        None => match source.downcast_ref::<ParseIntError>()?.kind() {
+            IntErrorKind::Zero => "write a whole number above zero".to_owned(),
+            IntErrorKind::PosOverflow => "that is too large".to_owned(),
+            _ => "write a whole number".to_owned(),
+        },
     };
     let message = format!("invalid value '{value}' for '{option}': {todo}\n\n{MORE}\n");
     Some(clap::Error::raw(ErrorKind::ValueValidation, message))

@@ -39,7 +39,8 @@ impl SupportPlanner<'_> {
         let Some(angle) = self.options.overhangs else { return Ok(Vec::new()) };
         let limit_mm = self.thickness_mm(layer) / angle.to_radians().tan();
         let limit = limit_mm / self.raster.dpi.pitch().mm();
-        let cell = self.options.spacing.pixels(self.raster.dpi).max(1.0) as u32;
+        // Smaller cells than pieces need pixels would leave all without a support.
+        let cell = self.options.spacing.pixels(self.raster.dpi).max(3.0) as u32;
         let mut places = Vec::new();
         for piece in pieces(standing.mask(), under, limit, cell) {
             let [column, row] = piece.middle.map(|place| place as u32);

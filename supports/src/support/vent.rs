@@ -32,8 +32,10 @@ pub struct Vent {
 pub struct VentPlan {
     /// The pocket.
     pub pocket: Pocket,
-    /// The holes to try, the best first. Empty if no wall is thin enough.
+    /// The holes to try, the best first. Empty if no wall is thin enough, or the pocket too narrow.
     pub vents: Vec<Vent>,
+    /// Whether the hole would be wider than the pocket: it would cut more than the wall.
+    pub is_too_wide: bool,
 }
 
 /// Plans holes for the cups and traps that a check has found, given the stack's layers once more. Whether
@@ -59,7 +61,11 @@ pub fn plan_vents<E: From<SupportError>>(
         .list
         .iter()
         .filter(is_full)
-        .map(|pocket| VentPlan { pocket: pocket.clone(), vents: Vec::new() })
+        .map(|pocket| {
+            let sides = [&pocket.region.columns, &pocket.region.rows].map(ExactSizeIterator::len);
+            let is_too_wide = diameter.pixels(raster.dpi) > sides[0].min(sides[1]) as f64;
+            VentPlan { pocket: pocket.clone(), vents: Vec::new(), is_too_wide }
+        })
         .collect();
     // The layers that a hole may reach, the highest last.
     let mut kept: VecDeque<(u32, Outside)> = VecDeque::new();
@@ -73,7 +79,8 @@ pub fn plan_vents<E: From<SupportError>>(
         let layer = Labelled::new(image.into_image().into_mask(threshold));
         kept.retain(|(below, _)| bottom_mm(number) - bottom_mm(*below) <= max_length.mm());
         kept.push_back((number, Outside::of(&layer)));
-        for plan in plans.iter_mut().filter(|plan| plan.pocket.layers[0] == number) {
+        let here = |plan: &&mut VentPlan| plan.pocket.layers[0] == number && !plan.is_too_wide;
+        for plan in plans.iter_mut().filter(here) {
             let component =
                 layer.components.at(&layer.mask, plan.pocket.first[0], plan.pocket.first[1]);
             let floor: Vec<_> = layer.components.runs(&layer.mask, component).collect();

@@ -28,7 +28,7 @@ pub(super) fn hints(
     let found = Findings { islands: Listed { list: left, ..Listed::default() }, ..found.clone() };
     let options = SupportOptions { overhangs: None, ..options.clone() };
     let mut hints = Vec::new();
-    if options.to == SupportFoot::Part {
+    if options.to != SupportFoot::Both {
         let both = SupportOptions { to: SupportFoot::Both, ..options.clone() };
         let islands = plan(&found, &both)?.islands.iter().filter(|plan| plan.stands).count();
         hints.push(Hint { options: "--to both".to_owned(), islands });

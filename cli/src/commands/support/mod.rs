@@ -20,7 +20,7 @@ use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::support::SupportSettings;
 use lamp_stack::{CompensateRecord, Length, Page, PageHeader, PageInfo};
 use lamp_supports::{
-    CheckError, Findings, Support, SupportError, SupportOptions, SupportPlan, Surface,
+    CheckError, Findings, Support, SupportError, SupportFoot, SupportOptions, SupportPlan, Surface,
     flood_supports, padded, plan_braces, plan_supports, room_for,
 };
 use serde_json::Value;
@@ -63,7 +63,7 @@ Examples:
   lamp support cup.tif --vent 2mm --plan vents.toml
 
 Exit status: 0 if the work is done; 3 with --strict if islands are left or rest on too little, if
-there are stray rows, or if --vent leaves a pocket.")]
+undersides of --overhangs are left, if there are stray rows, or if --vent leaves a pocket.")]
 pub(crate) struct SupportArgs {
     /// The stack to read: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
@@ -121,11 +121,13 @@ pub(crate) struct SupportArgs {
 
 pub(crate) fn run(args: &SupportArgs, common: &Common) -> Result<(), Exit> {
     args.check_files()?;
-    let progress = progress("support", common, &args.output);
     let mut stack = KeptStack::new(&args.stack);
     if let Some(diameter) = args.vent {
+        // No stage follows: no stack is written.
+        let progress = Progress::new("support", common, true);
         return vents::propose(args, diameter, &mut stack, &progress);
     }
+    let progress = progress("support", common, &args.output);
     let layers = args.layers(&mut stack, &progress)?;
     write_layers(layers, &args.output, &progress)
 }
@@ -218,6 +220,16 @@ impl SupportArgs {
         let inputs = || paths(&self.part).chain([&self.stack]);
         if inputs().filter(|path| is_stream(path)).count() > 1 {
             return Err(Exit::usage("only one input can be standard input"));
+        }
+        let SupportSettings { to, radius, pillar, spacing, .. } = *self.settings;
+        let wide = match to {
+            SupportFoot::Part => Length::from_um(2.0 * radius.um()),
+            SupportFoot::Platform | SupportFoot::Both => pillar,
+        };
+        if self.settings.overhangs.is_some() && spacing.um() < wide.um() {
+            return Err(Exit::usage(format!(
+                "--spacing {spacing}: supports are {wide} wide, so they would touch: write at least that"
+            )));
         }
         check_not_input(&self.output.output, paths(&self.part))?;
         for beside in [&self.plan, &self.stl, &self.report].into_iter().flatten() {

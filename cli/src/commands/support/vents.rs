@@ -106,6 +106,7 @@ fn tell(
         let record = FindingRecord::of_pocket(&plan.pocket, &Scale::new(found));
         let hole = match vent {
             Some(vent) => format!("a hole through {} mm drains it", millimeters(vent.wall)),
+            None if plan.is_too_wide => format!("a hole of {diameter} is wider than the pocket"),
             None if plan.vents.is_empty() => {
                 format!("the wall is thicker than --max-length {}", args.settings.max_length)
             }
