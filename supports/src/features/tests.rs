@@ -170,7 +170,7 @@ fn a_pocket_has_its_ceiling() {
     let records = [
         trap(cup([10, 30], [100, 200, 100, 200], 65_000)),
         overhang([31, 31], [110, 190, 110, 190]),
-        // Within the pocket, beside it, and above it.
+        // Within the pocket, at its side, and above it.
         overhang([20, 22], [110, 190, 110, 190]),
         overhang([31, 31], [150, 290, 110, 190]),
         overhang([34, 34], [110, 190, 110, 190]),
