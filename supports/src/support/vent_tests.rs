@@ -127,10 +127,13 @@ fn thick_walls_get_no_hole() {
     let found = found_in(&part);
     let layers = part.iter().cloned().map(Ok::<_, SupportError>);
     let plans =
-        plan_vents(layers, &found, [1.0, 1.5].map(Length::from_mm), NonZeroU8::MIN).unwrap();
-    assert!(plans.len() == 1 && plans[0].vents.is_empty(), "{plans:?}");
-    // A narrower limit than the floor, which stands on the platform: no way down either.
-    assert_eq!(planned(&part, 1.0)[0].vents.len(), 2);
+        plan_vents(layers, &found, [0.6, 1.5].map(Length::from_mm), NonZeroU8::MIN).unwrap();
+    assert!(plans.len() == 1 && plans[0].vents.is_empty() && !plans[0].is_too_wide, "{plans:?}");
+    // The wall is 1.8 mm thick, and the floor stands on the platform.
+    assert_eq!(planned(&part, 0.6)[0].vents.len(), 2);
+    // The pocket is 0.8 mm wide.
+    let wide = &planned(&part, 0.9)[0];
+    assert!(wide.is_too_wide && wide.vents.is_empty(), "{wide:?}");
 }
 
 proptest! {
