@@ -44,6 +44,5 @@ pub use record::{
 pub use support::{
     AvoidError, AvoidedBox, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support,
     SupportError, SupportFoot, SupportOptions, SupportPlan, SupportShare, Surface, Vent, VentPlan,
-    avoided_boxes, flood_supports, left_of, padded, plan_braces, plan_supports, plan_vents,
-    room_for,
+    avoided_boxes, flood_supports, padded, plan_braces, plan_supports, plan_vents, room_for,
 };

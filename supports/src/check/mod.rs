@@ -38,6 +38,7 @@ pub use findings::{
 };
 use islands::{Growth, Speck};
 use liquid::Liquid;
+pub(crate) use overhang::without;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
 use pockets::Hollows;

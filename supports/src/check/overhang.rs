@@ -83,7 +83,7 @@ fn reaches(limit: f64) -> impl Iterator<Item = (u32, u32)> {
 }
 
 /// Adds what is left of a run without the white of a row, grown by `reach` on both sides.
-pub(super) fn without(
+pub(crate) fn without(
     run: &Range<u32>,
     row: &[u32],
     width: u32,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use lamp_stack::{Mask, Op, white_runs};
 
 use super::divide::WhiteRuns;
-use crate::check::Region;
+use crate::check::{Region, without};
 
 /// The white of the layers so far, seen from below.
 #[derive(Debug, Default)]
@@ -82,7 +82,7 @@ pub(super) fn remote(white: &Mask, row: u32, distance: f64, runs: &mut Vec<Range
             return;
         }
         next.clear();
-        runs.iter().for_each(|run| without(run, white, near, reach, &mut next));
+        runs.iter().for_each(|run| without(run, white.row(near), white.width(), reach, &mut next));
         std::mem::swap(runs, &mut next);
     }
 }
@@ -109,24 +109,6 @@ fn rows_within(white: &Mask, row: u32, distance: f64) -> impl Iterator<Item = (u
         let whole = if reach.fract() == 0.0 { reach - 1.0 } else { reach.floor() };
         (square > 0.0).then_some((near, whole.max(0.0) as u32))
     })
-}
-
-/// Adds what is left of a run without the white of a row, grown by `reach` on both sides.
-fn without(run: &Range<u32>, white: &Mask, row: u32, reach: u32, out: &mut Vec<Range<u32>>) {
-    let mut start = run.start;
-    for (from, to) in white_runs(white.row(row), white.width()) {
-        let (from, to) = (from.saturating_sub(reach), to.saturating_add(reach));
-        if from >= run.end {
-            break;
-        }
-        if from > start {
-            out.push(start..from);
-        }
-        start = start.max(to);
-    }
-    if start < run.end {
-        out.push(start..run.end);
-    }
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub use plan::plan_supports;
 pub use rod::Rod;
 pub use room::{padded, room_for};
 pub use surface::Surface;
-pub use vent::{Vent, VentPlan, left_of, plan_vents};
+pub use vent::{Vent, VentPlan, plan_vents};
 
 /// Where supports end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -38,8 +38,25 @@ pub struct VentPlan {
     pub is_too_wide: bool,
 }
 
+impl VentPlan {
+    /// Returns the share of the pocket's volume that stays in it, by a check of the stack with holes.
+    pub fn share_left(&self, found: &Findings) -> f64 {
+        let pocket = &self.pocket;
+        let meets = |other: &&Pocket| {
+            let [first, last] = pocket.layers;
+            matches!(other.kind, PocketKind::Trap | PocketKind::Cup)
+                && other.layers[0] <= last
+                && first <= other.layers[1]
+                && pocket.region.is_near(&other.region, 0)
+        };
+        let volumes = found.pockets.list.iter().filter(meets).map(|other| other.pixels_um);
+        // A sum of nothing is -0.
+        volumes.fold(0.0, |sum, um| sum + um) / pocket.pixels_um
+    }
+}
+
 /// Plans holes for the cups and traps that a check has found, given the stack's layers once more. Whether
-/// they drain is known from a check of the stack with the holes: see [`left_of`].
+/// they drain is known from a check of the stack with the holes: see [`VentPlan::share_left`].
 ///
 /// # Errors
 /// Returns the first error of the layers, or one if the pages lack what is needed.
@@ -90,21 +107,6 @@ pub fn plan_vents<E: From<SupportError>>(
         }
     }
     Ok(plans)
-}
-
-/// Returns the share of a pocket's volume that stays in it, by the pockets of a check of the stack with
-/// holes.
-pub fn left_of(pocket: &Pocket, found: &Findings) -> f64 {
-    let meets = |other: &&Pocket| {
-        let [first, last] = pocket.layers;
-        matches!(other.kind, PocketKind::Trap | PocketKind::Cup)
-            && other.layers[0] <= last
-            && first <= other.layers[1]
-            && pocket.region.is_near(&other.region, 0)
-    };
-    let volumes = found.pockets.list.iter().filter(meets).map(|other| other.pixels_um);
-    // A sum of nothing is -0.
-    volumes.fold(0.0, |sum, um| sum + um) / pocket.pixels_um
 }
 
 /// The black of a layer that reaches the image's border, as runs of each row.

@@ -68,7 +68,7 @@ fn with(layers: &[Layer], vent: &Vent) -> Vec<Layer> {
 
 /// Returns what is left in the pocket with the first of its holes that drains it, and the hole.
 fn drained(layers: &[Layer], plan: &VentPlan) -> Option<(f64, Vent)> {
-    let left = |vent: &Vent| (left_of(&plan.pocket, &found_in(&with(layers, vent))), vent.clone());
+    let left = |vent: &Vent| (plan.share_left(&found_in(&with(layers, vent))), vent.clone());
     plan.vents.iter().map(left).find(|(left, _)| *left < 0.01)
 }
 

@@ -173,7 +173,7 @@ impl<'a> SupportReport<'a> {
         let are = if count == 1 { "island is" } else { "islands are" };
         let first = first.unwrap_or_default();
         let helps = match self.hints {
-            [] => "neither --to both nor twice the --max-length holds one".to_owned(),
+            [] => "no option that was tried holds one".to_owned(),
             hints => {
                 let hint = |hint: &Hint| match hint.islands as u64 {
                     islands if islands == count => format!("{} holds all", hint.options),

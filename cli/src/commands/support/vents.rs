@@ -2,9 +2,7 @@
 
 use lamp_edit::{Edits, edit};
 use lamp_stack::{Length, PassingLayer, one_line};
-use lamp_supports::{
-    FindingRecord, Findings, Scale, SupportError, Vent, VentPlan, left_of, plan_vents,
-};
+use lamp_supports::{FindingRecord, Findings, Scale, SupportError, Vent, VentPlan, plan_vents};
 
 use super::plan_file::shape;
 use super::{SupportArgs, first_page};
@@ -45,7 +43,7 @@ pub(super) fn propose(
         let drained = checked(args, stack, edits)?;
         let mut fail = 0;
         for ((plan, vent), tries) in plans.iter().zip(&vents).zip(&mut tries) {
-            if vent.is_some() && left_of(&plan.pocket, &drained) > MAY_STAY {
+            if vent.is_some() && plan.share_left(&drained) > MAY_STAY {
                 tries.next();
                 fail += 1;
             }
