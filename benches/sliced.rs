@@ -1,7 +1,7 @@
 //! Slices parts in memory, whole and broken, in one frame.
 
 use lamp_fixtures::{Defect, Mesh, inject};
-use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
+use lamp_slicing::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Mask};
 
 /// A part's layers, bottom first.

@@ -1,6 +1,6 @@
 //! Checks whether a mesh is closed without finding neighboring facets.
 
-use lamp_slicer::PlacedFacet;
+use lamp_slicing::PlacedFacet;
 
 /// A sum over the edges of facets: zero if each edge is passed equally often in both directions.
 /// Edges count by unrelated numbers, so about one in 2^64 meshes with gaps sums to zero.

@@ -5,7 +5,7 @@
 //! that it makes a layer lose or gain is a cubic polynomial of the layer's top. The segments in
 //! which facets cut the layer's bottom enclose the section there.
 
-use lamp_slicer::PlacedFacet;
+use lamp_slicing::PlacedFacet;
 use rayon::prelude::*;
 
 use crate::profile::{ChangeProfile, ProfileChange, SurfacePiece};

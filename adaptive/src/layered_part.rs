@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use lamp_slicer::scan::RowFacet;
-use lamp_slicer::{FacetIndex, Fill, FillRule, PlacedFacet, facet_heights};
+use lamp_slicing::scan::RowFacet;
+use lamp_slicing::{FacetIndex, Fill, FillRule, PlacedFacet, facet_heights};
 use lamp_stack::Length;
 use rayon::prelude::*;
 

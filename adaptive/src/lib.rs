@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use lamp_adaptive::{HeightSearch, LayeredPart, Thicknesses, VolumeDeviation, Watch};
-//! use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
+//! use lamp_slicing::{FacetIndex, Fill, Part, Placement, Units};
 //! use lamp_stack::Length;
 //!
 //! // A tetrahedron, 1 mm high.

@@ -7,8 +7,8 @@
 //! takes it away again at the first above its upper end. Its cost does not
 //! depend on the number of tops.
 
-use lamp_slicer::PLANE_TOLERANCE;
-use lamp_slicer::scan::count_at_or_below;
+use lamp_slicing::PLANE_TOLERANCE;
+use lamp_slicing::scan::count_at_or_below;
 
 /// From this many tops between a surface's ends on, a polynomial is cheaper than one
 /// sum for each top.

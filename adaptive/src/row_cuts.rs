@@ -1,7 +1,7 @@
 //! Lines of facets along rows, clipped to a layer's heights.
 
-use lamp_slicer::Turn;
-use lamp_slicer::scan::RowFacet;
+use lamp_slicing::Turn;
+use lamp_slicing::scan::RowFacet;
 use lamp_stack::Grouped;
 
 use crate::sweep::{SlopeLine, Toggle};

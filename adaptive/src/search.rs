@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_slicer::{LayerHeights, SliceError};
+use lamp_slicing::{LayerHeights, SliceError};
 use lamp_stack::Length;
 
 use crate::criterion::Criterion;

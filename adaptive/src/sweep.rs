@@ -9,7 +9,7 @@
 //! without rows ([`FacetSums`](crate::facets::FacetSums)). So rows need only add how other columns
 //! differ from that.
 
-use lamp_slicer::{FillRule, Position, Turn};
+use lamp_slicing::{FillRule, Position, Turn};
 
 use crate::profile::{ChangeProfile, EVEN, SurfacePiece};
 
@@ -284,7 +284,7 @@ fn next_until<'a, T>(
 
 #[cfg(test)]
 mod tests {
-    use lamp_slicer::Fill;
+    use lamp_slicing::Fill;
 
     use super::*;
     use crate::profile::ProfileChange;

@@ -5,7 +5,7 @@
 //! do not overlap, the sum is a bound: a search by the table alone may miss a layer, but takes none
 //! that is worse than the table gives.
 
-use lamp_slicer::PlacedFacet;
+use lamp_slicing::PlacedFacet;
 
 use crate::facets::area_from_above;
 use crate::layered_part::{LayeredPart, cosine_to_vertical};

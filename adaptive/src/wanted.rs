@@ -154,7 +154,7 @@ impl FoundHeights {
 
 #[cfg(test)]
 mod tests {
-    use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
+    use lamp_slicing::{FacetIndex, Fill, Part, Placement, Units};
 
     use super::*;
 

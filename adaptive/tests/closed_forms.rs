@@ -8,7 +8,7 @@ use lamp_adaptive::{
     VolumeDeviation, Watch,
 };
 use lamp_fixtures::{Mesh, cone, sphere};
-use lamp_slicer::{FacetIndex, Fill, Part, Placement, Units};
+use lamp_slicing::{FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh) -> LayeredPart {

@@ -5,7 +5,7 @@ use lamp_adaptive::{
     SweptLayer, Thicknesses, VolumeDeviation, Watch, uniform_heights,
 };
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, tower};
-use lamp_slicer::{Axis, FacetIndex, Fill, Part, Placement, Units};
+use lamp_slicing::{Axis, FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 const INCH_UM: f64 = 25_400.0;

@@ -5,7 +5,7 @@ use lamp_adaptive::{
     uniform_heights,
 };
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{Axis, FacetIndex, Fill, Part, Placement, Units};
+use lamp_slicing::{Axis, FacetIndex, Fill, Part, Placement, Units};
 use lamp_stack::Length;
 
 fn part(mesh: &Mesh, placement: &Placement, fill: Fill) -> LayeredPart {

@@ -3,7 +3,7 @@
 
 use lamp_adaptive::{LayeredPart, SweptLayer};
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, FacetIndex, Fill, Inside, Part, Placement, SectionOptions, Units, section,
 };
 use lamp_stack::{Dpi, Length};

@@ -12,7 +12,7 @@ use lamp_adaptive::LayeredPart;
 use lamp_fixtures::{Sample, build};
 use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_offset::{Widths, offset, offset_one_bit, shrink};
-use lamp_slicer::{FacetIndex, Fill, Part, Placement, Shading, SliceOptions, Slices, Units};
+use lamp_slicing::{FacetIndex, Fill, Part, Placement, Shading, SliceOptions, Slices, Units};
 use lamp_stack::{
     DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask,
     PageInfo, PageWriter, g4,

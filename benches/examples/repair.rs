@@ -17,7 +17,7 @@ use lamp_benches::score::{Bands, Score};
 use lamp_benches::sliced::{Layers, broken, mask, slice};
 use lamp_fix::{Band, BandOutcome, FixMethod, FixOptions, fix};
 use lamp_fixtures::{Defect, Sample, build};
-use lamp_slicer::{Fill, SliceOptions};
+use lamp_slicing::{Fill, SliceOptions};
 use lamp_stack::StackError;
 
 const PARTS: [(Sample, usize); 5] = [

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use lamp_slicer::brep::{BodyMeasure, BodyPair, Comparison, MeasurePair, Prepared};
-use lamp_slicer::{OpenOptions, body_name};
+use lamp_slicing::brep::{BodyMeasure, BodyPair, Comparison, MeasurePair, Prepared};
+use lamp_slicing::{OpenOptions, body_name};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
@@ -18,7 +18,7 @@ pub(crate) fn asked(
     bytes: Arc<[u8]>,
     options: &OpenOptions,
 ) -> Result<Comparison, Exit> {
-    Ok(lamp_slicer::second_opinion(ours, bytes, options)?)
+    Ok(lamp_slicing::second_opinion(ours, bytes, options)?)
 }
 
 #[cfg(not(feature = "occt"))]

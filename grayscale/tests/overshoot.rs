@@ -5,7 +5,7 @@ use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{GrayLevel, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, excess};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, Fill, Part, PixelGrid, Placement, SectionOptions, Shading, SliceOptions, Slices, Units,
     section,
 };

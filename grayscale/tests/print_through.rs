@@ -5,7 +5,7 @@ use lamp_fixtures::{Mesh, cube_with_hole, sphere, tower};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{ExposureTime, FadingLight, Resin};
 use lamp_grayscale::{CuredLine, PixelLine, SolidHeights, SummedLine, excess};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, Fill, LayerHeights, LayerLevels, Part, PixelGrid, Placement, SectionOptions, Shading,
     SliceOptions, Slices, Units, section,
 };

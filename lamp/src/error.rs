@@ -13,7 +13,7 @@ use lamp_planning::speed::SpeedPlanError;
 use lamp_planning::voxels::VoxelPlanError;
 use lamp_planning::{LightError, NoLight};
 use lamp_plots::PlotError;
-use lamp_slicer::SliceError;
+use lamp_slicing::SliceError;
 use lamp_stack::StackError;
 use lamp_supports::{CheckError, SupportError};
 use lamp_view::ViewError;

@@ -21,9 +21,9 @@
 //! # Slice, fix and write
 //!
 //! ```
-//! use lamp::fix::{FixOptions, fix};
-//! use lamp::slicer::{OpenOptions, Part, SliceOptions, Slices};
-//! use lamp::stack::{Destination, Dpi, Format, Length, Pages, write_stack};
+//! use lamp_slicer::fix::{FixOptions, fix};
+//! use lamp_slicer::slicer::{OpenOptions, Part, SliceOptions, Slices};
+//! use lamp_slicer::stack::{Destination, Dpi, Format, Length, Pages, write_stack};
 //!
 //! # let folder = tempfile::tempdir()?;
 //! # let stl = folder.path().join("wedge.stl");
@@ -43,7 +43,7 @@
 //!     thickness: Length::from_um(100.0),
 //!     ..SliceOptions::default()
 //! };
-//! let layers = Slices::new(part, &options)?.map(|layer| Ok::<_, lamp::Error>(layer?));
+//! let layers = Slices::new(part, &options)?.map(|layer| Ok::<_, lamp_slicer::Error>(layer?));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
 //!     println!("layer {}: {} bands corrected", fixed.before.info.index, fixed.bands.len());
 //! });
@@ -51,7 +51,7 @@
 //! write_stack(fixed, Destination::File(tiff.clone()), Format::Big)?;
 //!
 //! assert_eq!(Pages::open(&tiff)?.layers().count(), 90);
-//! # Ok::<(), lamp::Error>(())
+//! # Ok::<(), lamp_slicer::Error>(())
 //! ```
 //!
 //! # Lay out a build
@@ -59,21 +59,21 @@
 //! Stages are adaptors, so a build of corrected layers is a chain of two:
 //!
 //! ```
-//! use lamp::build::{TileOptions, tile};
-//! use lamp::fix::{FixOptions, fix};
-//! use lamp::stack::{Dpi, Image, Layer, Mask, PageInfo};
+//! use lamp_slicer::build::{TileOptions, tile};
+//! use lamp_slicer::fix::{FixOptions, fix};
+//! use lamp_slicer::stack::{Dpi, Image, Layer, Mask, PageInfo};
 //!
 //! // Row 1 missed its second crossing and runs to the image's edge.
 //! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
 //! let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: mask.into() };
 //!
-//! let layers = std::iter::once(Ok::<_, lamp::Error>(layer));
+//! let layers = std::iter::once(Ok::<_, lamp_slicer::Error>(layer));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
 //!     let band = &fixed.bands[0];
 //!     assert_eq!((band.first_row, band.pixels, band.gap.clone()), (1, 3, Some(5..6)));
 //! });
 //! let options = TileOptions { area: "0.2x0.1in".parse()?, ..TileOptions::default() };
-//! let fixed = fixed.map(|layer| Ok::<_, lamp::Error>(layer?.decode()?));
+//! let fixed = fixed.map(|layer| Ok::<_, lamp_slicer::Error>(layer?.decode()?));
 //! let mut build = tile(fixed, options);
 //! let Image::Mask(build) = build.next().unwrap()?.image.into_image() else { unreachable!() };
 //! assert_eq!((build.width(), build.height()), (20, 10));
@@ -83,8 +83,8 @@
 //! # Check for what floats
 //!
 //! ```
-//! use lamp::stack::{Dpi, Layer, Mask, PageInfo};
-//! use lamp::supports::{CheckOptions, check};
+//! use lamp_slicer::stack::{Dpi, Layer, Mask, PageInfo};
+//! use lamp_slicer::supports::{CheckOptions, check};
 //!
 //! let layer = |index: u32, changes: Vec<u32>| {
 //!     // All ten rows are alike: white from each first column to the second.
@@ -96,24 +96,24 @@
 //! };
 //! // The second piece of layer 1 stands on nothing.
 //! let layers = [layer(0, vec![2, 8]), layer(1, vec![2, 8, 12, 18])];
-//! let layers = layers.into_iter().map(Ok::<_, lamp::Error>);
+//! let layers = layers.into_iter().map(Ok::<_, lamp_slicer::Error>);
 //! let findings = check(layers, Ok, &CheckOptions::default())?;
 //! assert_eq!(findings.islands.count(), 1);
-//! # Ok::<(), lamp::Error>(())
+//! # Ok::<(), lamp_slicer::Error>(())
 //! ```
 //!
 //! # Plan exposures
 //!
 //! ```
-//! use lamp::grayscale::exposure::Exposure;
-//! use lamp::grayscale::material::Material;
-//! use lamp::stack::{Catalogued, Length};
+//! use lamp_slicer::grayscale::exposure::Exposure;
+//! use lamp_slicer::grayscale::material::Material;
+//! use lamp_slicer::stack::{Catalogued, Length};
 //!
 //! // White cures half as deep again as a layer.
 //! let material = Material::builtin("lamp-suspension").expect("it is built in");
 //! let exposure = Exposure::by_material(material, None, 1.5)?;
 //! assert_eq!(exposure.time(Length::from_um(100.0))?.ms().round(), 172.0);
-//! # Ok::<(), lamp::Error>(())
+//! # Ok::<(), lamp_slicer::Error>(())
 //! ```
 //!
 //! [`planning`] chooses times and gray levels where the light of many layers adds up.
@@ -121,8 +121,8 @@
 //! # Run a pipeline from its settings
 //!
 //! ```
-//! use lamp::pipeline::fix::FixSettings;
-//! use lamp::pipeline::{SliceSettings, Stage};
+//! use lamp_slicer::pipeline::fix::FixSettings;
+//! use lamp_slicer::pipeline::{SliceSettings, Stage};
 //!
 //! // Settings are plain structs; equal texts mean equal results, whatever the spelling was.
 //! let slice: SliceSettings = Default::default();
@@ -136,7 +136,7 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use lamp::batch::Night;
+//! use lamp_slicer::batch::Night;
 //!
 //! let text = "parts = \"parts/*.stl\"\nstages = \"slice --dpi 600 | fix\"\n";
 //! let error = Night::parse(text, Path::new("night.toml")).unwrap_err();
@@ -162,7 +162,7 @@ pub use lamp_offset as offset;
 pub use lamp_pipeline as pipeline;
 pub use lamp_planning as planning;
 pub use lamp_plots as plots;
-pub use lamp_slicer as slicer;
+pub use lamp_slicing as slicer;
 pub use lamp_stack as stack;
 pub use lamp_supports as supports;
 pub use lamp_view as view;

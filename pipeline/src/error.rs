@@ -9,7 +9,7 @@ use lamp_grayscale::DitherError;
 use lamp_grayscale::exposure::ExposureError;
 use lamp_machine::MachineLimit;
 use lamp_offset::CompensateError;
-use lamp_slicer::SliceError;
+use lamp_slicing::SliceError;
 use lamp_stack::StackError;
 use lamp_supports::CheckError;
 

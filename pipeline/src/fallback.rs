@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_slicer::{GridRule, Part, SliceError, SliceOptions, Slices};
+use lamp_slicing::{GridRule, Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Image, Layer, Length, PageInfo, SliceRecord};
 
 use crate::documents::{check_word, input_name, without_digest, word_of};

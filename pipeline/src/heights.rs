@@ -8,7 +8,7 @@ use lamp_adaptive::{
     WantedHeights, Watch, row_pitch,
 };
 use lamp_grayscale::exposure::Exposure;
-use lamp_slicer::{FacetIndex, Fill};
+use lamp_slicing::{FacetIndex, Fill};
 use lamp_stack::format_significant;
 use lamp_stack::{Dpi, Length};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Reports the overlap of the bodies of one file.
 
-use lamp_slicer::brep::Prepared;
-use lamp_slicer::{BodyOverlap, Part};
+use lamp_slicing::brep::Prepared;
+use lamp_slicing::{BodyOverlap, Part};
 use lamp_stack::one_line;
 
 use crate::part_file::PartFile;

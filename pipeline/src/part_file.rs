@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use lamp_slicer::{Axis, Placement};
+use lamp_slicing::{Axis, Placement};
 use lamp_stack::{Length, file_word};
 
 use crate::documents::{input_name, is_stream};

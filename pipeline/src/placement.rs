@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use lamp_slicer::{Axis, Placement};
+use lamp_slicing::{Axis, Placement};
 use serde::{Deserialize, Serialize};
 
 use crate::words::{list, optional};

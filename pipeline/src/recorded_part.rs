@@ -1,6 +1,6 @@
 //! The part that a stack was sliced from, opened again.
 
-use lamp_slicer::Part;
+use lamp_slicing::Part;
 use lamp_stack::StackInfo;
 
 use crate::error::Error;

@@ -1,6 +1,6 @@
 //! Doubts about a part that can be sliced, but hardly as intended.
 
-use lamp_slicer::Units;
+use lamp_slicing::Units;
 use lamp_stack::{Dpi, Length};
 
 /// Images below this width or height, in pixels, show no shape; nor do stacks of fewer layers.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_machine::{Machine, MachineLimit};
-use lamp_slicer::{
+use lamp_slicing::{
     Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, Shading, SliceError,
     SliceOptions, Slices,
 };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use lamp_build::TurnedSlicing;
 use lamp_machine::{Defaults, Machine, MachineLimit};
-use lamp_slicer::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
+use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
 use lamp_stack::{Dpi, Length, Size, StackInfo, quoted};
 use serde::{Deserialize, Serialize};
 

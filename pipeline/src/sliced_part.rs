@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use lamp_machine::Machine;
-use lamp_slicer::Part;
+use lamp_slicing::Part;
 use lamp_stack::{Layer, Pages, StackError};
 
 use crate::documents::{input_name, is_stream};

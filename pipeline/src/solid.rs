@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use lamp_slicer::{
+use lamp_slicing::{
     Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, Units,
 };
 use lamp_stack::Dpi;

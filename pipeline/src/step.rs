@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lamp_slicer::brep::{BrepFinding, Prepared};
-use lamp_slicer::{KernelName, OpenOptions, SliceError, step_bytes};
+use lamp_slicing::brep::{BrepFinding, Prepared};
+use lamp_slicing::{KernelName, OpenOptions, SliceError, step_bytes};
 use lamp_stack::{Dpi, Length, open_ending};
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::Instant;
 
-use lamp_slicer::Slices;
+use lamp_slicing::Slices;
 use serde::{Deserialize, Serialize};
 
 use crate::chain::{Stage, StageChain};

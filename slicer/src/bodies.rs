@@ -216,7 +216,7 @@ impl FillRule {
 /// The bodies that hold a point while it moves through a part, from crossing to crossing.
 ///
 /// ```
-/// use lamp_slicer::{FillRule, Position, Turn};
+/// use lamp_slicing::{FillRule, Position, Turn};
 ///
 /// let rule = FillRule::default();
 /// let mut position = Position::outside(&rule);

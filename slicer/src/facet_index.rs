@@ -17,14 +17,14 @@ use crate::survey::FacetSurvey;
 /// takes about 49 bytes per facet.
 ///
 /// ```
-/// use lamp_slicer::{FacetIndex, Part, Placement, Units};
+/// use lamp_slicing::{FacetIndex, Part, Placement, Units};
 ///
 /// let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
 /// let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 /// let facets = FacetIndex::new(part, &Placement::default(), Units::Millimetres)?;
 /// // All but the bottom reach above 100 um.
 /// assert_eq!(facets.between(100.0, 200.0).len(), 3);
-/// # Ok::<(), lamp_slicer::SliceError>(())
+/// # Ok::<(), lamp_slicing::SliceError>(())
 /// ```
 #[derive(Debug)]
 pub struct FacetIndex {

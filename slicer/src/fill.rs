@@ -3,7 +3,7 @@
 /// The rule that decides what is inside a body.
 ///
 /// ```
-/// use lamp_slicer::Fill;
+/// use lamp_slicing::Fill;
 ///
 /// // Where two shells overlap, contours wind around a point twice.
 /// assert!(Fill::Solid.is_inside(2) && !Fill::EvenOdd.is_inside(2));

@@ -37,14 +37,14 @@ impl PixelGrid {
     /// to a whole nanometer, so that six decimals state it exactly.
     ///
     /// ```
-    /// use lamp_slicer::PixelGrid;
+    /// use lamp_slicing::PixelGrid;
     /// use lamp_stack::Dpi;
     ///
     /// let dpi = Dpi::new(254.0).unwrap(); // 0.1 mm pixels
     /// let grid = PixelGrid::around([0.0, 0.0], [3.0, 1.0], 1, dpi)?;
     /// assert_eq!((grid.width, grid.height), (32, 12));
     /// assert_eq!(grid.origin_mm, [-0.1, 1.1]);
-    /// # Ok::<(), lamp_slicer::SliceError>(())
+    /// # Ok::<(), lamp_slicing::SliceError>(())
     /// ```
     ///
     /// # Errors

@@ -13,7 +13,7 @@
 //! - [`topology`] finds neighboring facets and shells.
 //!
 //! ```
-//! use lamp_slicer::{Part, SliceOptions, Slices};
+//! use lamp_slicing::{Part, SliceOptions, Slices};
 //! use lamp_stack::{Dpi, Image, Length};
 //!
 //! // A tetrahedron: four facets, counter-clockwise seen from outside.
@@ -29,12 +29,12 @@
 //!         Image::Mask(mask) => Ok(mask.white_pixels() as f64 * 0.01),
 //!         Image::Gray(_) => unreachable!("slices are masks"),
 //!     })
-//!     .collect::<Result<_, lamp_slicer::SliceError>>()?;
+//!     .collect::<Result<_, lamp_slicing::SliceError>>()?;
 //! // Sections at the layers' tops, 2, 4, ... 10 mm: half a square each.
 //! for (area, side) in areas_mm2.iter().zip([8.0, 6.0, 4.0, 2.0, 0.0]) {
 //!     assert!((area - side * side / 2.0).abs() < 0.5);
 //! }
-//! # Ok::<(), lamp_slicer::SliceError>(())
+//! # Ok::<(), lamp_slicing::SliceError>(())
 //! ```
 
 mod archive;

@@ -22,7 +22,7 @@ lamp_stack::named!(Axis { X = "x", Y = "y", Z = "z" });
 /// origin, after the steps before.
 ///
 /// ```
-/// use lamp_slicer::{Axis, Placement};
+/// use lamp_slicing::{Axis, Placement};
 ///
 /// let placement = Placement::default().scaled([2.0; 3]).rotated(Axis::Z, 90.0);
 /// assert_eq!(placement.at([1.0, 0.0, 0.5]), [0.0, 2.0, 1.0]);

@@ -35,12 +35,12 @@ lamp_stack::named!(PlaneRule { Top = "top", Middle = "middle", Bottom = "bottom"
 /// Layers of any thickness, by the heights between them.
 ///
 /// ```
-/// use lamp_slicer::LayerHeights;
+/// use lamp_slicing::LayerHeights;
 ///
 /// let heights = LayerHeights::new(vec![0.0, 100.0, 150.0])?;
 /// assert_eq!(heights.thicknesses_um().collect::<Vec<_>>(), [100.0, 50.0]);
 /// assert!(LayerHeights::new(vec![0.0, 100.0, 50.0]).is_err());
-/// # Ok::<(), lamp_slicer::SliceError>(())
+/// # Ok::<(), lamp_slicing::SliceError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerHeights {

@@ -3,7 +3,7 @@
 
 use crate::referee::{askew, back, model, model_by, options, wrong_levels, wrong_pixels};
 use lamp_fixtures::StepSample;
-use lamp_slicer::{Axis, KernelName, Placement};
+use lamp_slicing::{Axis, KernelName, Placement};
 
 type Outside = fn([f64; 3]) -> f64;
 

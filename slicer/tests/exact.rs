@@ -2,7 +2,7 @@
 
 use crate::referee::{askew, back, model, options, wrong_levels, wrong_pixels};
 use lamp_fixtures::StepSample;
-use lamp_slicer::{Axis, LayerHeights, Placement, SliceOptions};
+use lamp_slicing::{Axis, LayerHeights, Placement, SliceOptions};
 
 fn off_sphere([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).hypot(z - 15.0) - 15.0

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lamp_brep::{KernelModel, StepModel, Tessellation};
 use lamp_fixtures::{StepSample, StepUnit, blade_area_mm2, step};
-use lamp_slicer::exact::{FacetPoint, PlacedSurfaces, RowContact, polish};
+use lamp_slicing::exact::{FacetPoint, PlacedSurfaces, RowContact, polish};
 
 use crate::kernels::OTHERS;
 

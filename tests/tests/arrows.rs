@@ -10,13 +10,13 @@ use serde_json::Value;
 const FLOORS: &[&[&str]] = &[
     &["lamp-stack", "lamp-brep"],
     &["lamp-brep-occt", "lamp-fixtures"],
-    &["lamp-slicer"],
+    &["lamp-slicing"],
     &["lamp-adaptive", "lamp-grayscale", "lamp-fix", "lamp-offset", "lamp-machine"],
     &["lamp-build", "lamp-planning", "lamp-supports"],
     &["lamp-edit", "lamp-view", "lamp-plots", "lamp-gantry"],
     &["lamp-pipeline"],
     &["lamp-batch"],
-    &["lamp"],
+    &["lamp-slicer"],
     &["lamp-cli"],
     // Crates that test the others. Nothing is built on them.
     &["lamp-truck-fixtures", "lamp-tests", "lamp-benches"],

@@ -2,7 +2,7 @@
 //! up.
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Axis, Fill, Part, Placement, SectionOptions, Units, section};
+use lamp_slicing::{Axis, Fill, Part, Placement, SectionOptions, Units, section};
 use lamp_stack::{Dpi, Layer, Length};
 use lamp_tests::Scratch;
 

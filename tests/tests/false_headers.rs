@@ -8,7 +8,7 @@ use std::io::{Cursor, Read, repeat};
 use std::path::Path;
 
 use lamp_fixtures::sphere;
-use lamp_slicer::{OpenOptions, Part};
+use lamp_slicing::{OpenOptions, Part};
 use lamp_stack::{Layer, Pages, g4};
 use lamp_tests::Scratch;
 use lamp_tests::hostile::classic_tiff;

@@ -10,7 +10,7 @@ use lamp_pipeline::placement::FiniteNumbers;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::words::differing;
 use lamp_pipeline::{GrayRule, SliceFrame, SliceSettings, Thickness};
-use lamp_slicer::{PLANE_TOLERANCE, PlaneRule};
+use lamp_slicing::{PLANE_TOLERANCE, PlaneRule};
 use lamp_stack::{Dpi, Length, Size};
 
 use super::exposure::{EXPOSURE, ExposureArgs};

@@ -10,7 +10,7 @@ use lamp_pipeline::placement::{
 };
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::step::{Kernel, ReaderSettings, StepSettings};
-use lamp_slicer::{Axis, Bodies, Fill, Units};
+use lamp_slicing::{Axis, Bodies, Fill, Units};
 use lamp_stack::Length;
 
 use crate::args::options::{one_of, parse_distance};

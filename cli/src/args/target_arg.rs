@@ -10,7 +10,7 @@ use lamp_planning::projector::Projector;
 use lamp_planning::target::{
     Grid, HeightMap, MapScale, Round, Shapes, Target, TargetError, TargetOptions,
 };
-use lamp_slicer::Units;
+use lamp_slicing::Units;
 use lamp_stack::{Catalogued, Length};
 
 use crate::args::options::{one_of, parse_thickness};

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
-use lamp_slicer::brep::{Body, BodyReport, Comparison, PreparationAttempt, Prepared};
-use lamp_slicer::{SliceError, body_name, read_step};
+use lamp_slicing::brep::{Body, BodyReport, Comparison, PreparationAttempt, Prepared};
+use lamp_slicing::{SliceError, body_name, read_step};
 use lamp_stack::{Dpi, one_line};
 use serde_json::{Map, Value, json};
 

@@ -7,8 +7,8 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_pipeline::solid::part_notes;
 use lamp_pipeline::step::{ReaderSettings, bytes_of};
-use lamp_slicer::topology::{CornerTable, StepSolids};
-use lamp_slicer::{OpenOptions, Part, Placement, Units};
+use lamp_slicing::topology::{CornerTable, StepSolids};
+use lamp_slicing::{OpenOptions, Part, Placement, Units};
 use lamp_stack::{
     FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
 };

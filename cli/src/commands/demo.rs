@@ -16,7 +16,7 @@ use lamp_machine::Machine;
 use lamp_pipeline::SliceSettings;
 use lamp_pipeline::documents::document_and_word;
 use lamp_pipeline::part_file::PartFile;
-use lamp_slicer::{OpenOptions, Part};
+use lamp_slicing::{OpenOptions, Part};
 use lamp_stack::{Catalogued, Layer, Pages, StackError};
 
 use crate::args::options::{Common, Output, parse_count};

@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lamp_slicer::write_stl;
+use lamp_slicing::write_stl;
 use lamp_stack::IndexedStack;
 use lamp_view::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions, SurfaceUnit};
 

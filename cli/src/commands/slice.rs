@@ -7,7 +7,7 @@ use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::{SliceStage, Slicing};
 use lamp_pipeline::solid::name_of_all;
 use lamp_pipeline::watcher::Watcher;
-use lamp_slicer::{Bodies, PixelGrid, StrayBand};
+use lamp_slicing::{Bodies, PixelGrid, StrayBand};
 
 use crate::args::options::{Common, Output};
 use crate::args::slicing::SliceStageArgs;

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use lamp_pipeline::slice::Counts;
-use lamp_slicer::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
+use lamp_slicing::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
 use lamp_stack::Dpi;
 use lamp_stack::to_nm;
 use serde::Serialize;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use lamp_grayscale::{OutlinePiece, PixelLine};
-use lamp_slicer::{Axis, Part, SectionOptions, SliceError, SliceOptions, Trapezoid, section_area};
+use lamp_slicing::{Axis, Part, SectionOptions, SliceError, SliceOptions, Trapezoid, section_area};
 use lamp_stack::{Dpi, Layer, Length};
 
 use super::error::{CureSectionError, UnknownPlane};

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use lamp_slicer::SliceError;
+use lamp_slicing::SliceError;
 use lamp_stack::{CatalogueError, Length};
 use png::ColorType;
 use thiserror::Error;

@@ -23,7 +23,7 @@ mod picture;
 mod round;
 mod shapes;
 
-use lamp_slicer::Part;
+use lamp_slicing::Part;
 use lamp_stack::{Catalogued, Length};
 
 pub use error::TargetError;

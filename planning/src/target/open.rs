@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-use lamp_slicer::{OpenOptions, Part, Units};
+use lamp_slicing::{OpenOptions, Part, Units};
 use lamp_stack::Catalogued;
 
 use super::part::PartColumns;

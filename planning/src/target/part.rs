@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use lamp_slicer::scan::RowFacet;
-use lamp_slicer::{FacetIndex, Part, Placement, Units};
+use lamp_slicing::scan::RowFacet;
+use lamp_slicing::{FacetIndex, Part, Placement, Units};
 use lamp_stack::Length;
 
 use super::TargetError;
@@ -124,7 +124,7 @@ fn cross_row(
 ) {
     let is_reversed = short[0] < long[0];
     let [from, to] = if is_reversed { [short, long] } else { [long, short] };
-    let first = |x: f64| lamp_slicer::scan::ceil_clamped(x, columns);
+    let first = |x: f64| lamp_slicing::scan::ceil_clamped(x, columns);
     let Range { start, end } = first(from[0])..first(to[0]);
     let enters = if is_reversed == is_flipped { 1 } else { -1 };
     for column in (start..end).take(room) {

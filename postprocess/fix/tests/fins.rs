@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Facet, Mesh, SplitMix};
-use lamp_slicer::{GridRule, Part, Shading, SliceOptions, Slices};
+use lamp_slicing::{GridRule, Part, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, StackError, white_in_row};
 
 /// A pixel at 300 dpi, in mm.

@@ -5,8 +5,8 @@
 //! facet t has the corners 3t, 3t + 1 and 3t + 2, and this number indexes flat arrays.
 //!
 //! ```
-//! use lamp_slicer::topology::{CornerTable, MeshCheck, Shells, facet_of, next, previous};
-//! use lamp_slicer::{Part, Placement, Units};
+//! use lamp_slicing::topology::{CornerTable, MeshCheck, Shells, facet_of, next, previous};
+//! use lamp_slicing::{Part, Placement, Units};
 //!
 //! let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0f32]];
 //! let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
@@ -26,7 +26,7 @@
 //! let check = MeshCheck::new(&table);
 //! assert!(check.is_clean());
 //! assert!((check.lumps[0].mass.unwrap().volume_mm3 - 1.0 / 6.0).abs() < 1e-12);
-//! # Ok::<(), lamp_slicer::SliceError>(())
+//! # Ok::<(), lamp_slicing::SliceError>(())
 //! ```
 
 mod around_edge;

@@ -2,7 +2,7 @@
 //! gray.
 
 use lamp_fixtures::{StepSample, StepUnit, step};
-use lamp_slicer::{Axis, KernelName, OpenOptions, Part, Placement, Shading, SliceOptions, Slices};
+use lamp_slicing::{Axis, KernelName, OpenOptions, Part, Placement, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Dpi, Image, Length};
 
 pub(crate) fn model(part: StepSample, chord_mm: f64) -> Part {

@@ -2,7 +2,7 @@
 //! where the plane meets a facet that is missing or comes twice.
 
 use lamp_fixtures::{Defect, Facet, Mesh, Sample, build, inject};
-use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceOptions};
+use lamp_slicing::{Axis, Fill, GridRule, Placement, PlaneRule, SliceOptions};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use lamp_fixtures::{Mesh, cone, sphere, torus};
-use lamp_slicer::{PlaneRule, Slices};
+use lamp_slicing::{PlaneRule, Slices};
 use lamp_stack::Layer;
 
 use super::common::{mask, model, options};
@@ -206,7 +206,7 @@ impl Counted {
         let thickness_mm = part.height_mm / f64::from(part.layers);
         let slices = Slices::new(
             model(&part.mesh),
-            &lamp_slicer::SliceOptions { plane, ..options(dpi, 1000.0 * thickness_mm) },
+            &lamp_slicing::SliceOptions { plane, ..options(dpi, 1000.0 * thickness_mm) },
         )
         .unwrap();
         let pitch_mm = 25.4 / dpi;

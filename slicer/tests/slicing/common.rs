@@ -1,7 +1,7 @@
 //! What the tests share: small parts, options, and the way to layers.
 
 use lamp_fixtures::Mesh;
-use lamp_slicer::{Part, SliceError, SliceOptions, Slices};
+use lamp_slicing::{Part, SliceError, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask};
 use proptest::test_runner::Config;
 

@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use lamp_fixtures::{Defect, Mesh, blade, cone, cube_with_hole, inject, sphere, torus, tower};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, Facet, Fill, GridRule, PixelGrid, Placement, PlaneRule, SliceOptions, Slices,
 };
 use lamp_stack::Layer;

@@ -2,7 +2,7 @@
 //! inside out.
 
 use lamp_fixtures::{Mesh, blade, sphere};
-use lamp_slicer::{Fill, Join, Part, Placement, PlaneRule, SliceOptions, Slices};
+use lamp_slicing::{Fill, Join, Part, Placement, PlaneRule, SliceOptions, Slices};
 use lamp_stack::Layer;
 
 use super::common::{
@@ -224,7 +224,7 @@ fn doubts(mesh: &Mesh) -> [f64; 3] {
     let mut slices = Slices::new(model(mesh), &options(254.0, 100.0)).unwrap();
     slices.by_ref().for_each(|layer| drop(layer.unwrap()));
     let doubts = slices.fill_doubts();
-    let sum = |of: fn(&lamp_slicer::FillDoubt) -> f64| doubts.iter().map(of).sum::<f64>();
+    let sum = |of: fn(&lamp_slicing::FillDoubt) -> f64| doubts.iter().map(of).sum::<f64>();
     [sum(|it| it.unsigned_rows as f64), sum(|it| it.repeated_mm3), sum(|it| it.inward_mm3)]
 }
 

@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use lamp_fixtures::{Mesh, SplitMix, three_mf, three_mf_model};
-use lamp_slicer::topology::{CornerTable, StepSolids};
-use lamp_slicer::{
+use lamp_slicing::topology::{CornerTable, StepSolids};
+use lamp_slicing::{
     Axis, LayerHeights, OpenOptions, Part, Placement, PlaneRule, SliceOptions, Slices, Units,
 };
 use lamp_stack::{Dpi, Layer, Length};

@@ -5,7 +5,7 @@ use std::io::Write;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use lamp_fixtures::{Mesh, StepSample, StepUnit, sphere, step, three_mf, three_mf_model, torus};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, Bodies, Fill, OpenOptions, Part, Placement, ReadNote, SliceError, SliceOptions, Slices,
     Units,
 };

@@ -3,7 +3,7 @@
 //! against the rules that white layers keep.
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, Fill, LayerHeights, LayerLevels, PixelGrid, Placement, PlaneRule, Shading, SliceError,
     SliceOptions, Slices,
 };

@@ -1,6 +1,6 @@
 //! What the layers say of themselves: index, place, thickness, part.
 
-use lamp_slicer::{GridRule, PlaneRule, SliceError, SliceOptions, Slices};
+use lamp_slicing::{GridRule, PlaneRule, SliceError, SliceOptions, Slices};
 use lamp_stack::Length;
 use proptest::prelude::*;
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use lamp_fixtures::{Mesh, sphere, torus};
-use lamp_slicer::{Axis, Fill, GridRule, Placement, PlaneRule, SliceError, SliceOptions, Units};
+use lamp_slicing::{Axis, Fill, GridRule, Placement, PlaneRule, SliceError, SliceOptions, Units};
 use lamp_stack::Layer;
 use proptest::prelude::*;
 

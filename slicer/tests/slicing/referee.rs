@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
-use lamp_slicer::{Fill, GridRule, PixelGrid, PlaneRule, SliceOptions, Slices, Units};
+use lamp_slicing::{Fill, GridRule, PixelGrid, PlaneRule, SliceOptions, Slices, Units};
 use lamp_stack::{Layer, Length};
 use proptest::prelude::*;
 use rayon::prelude::*;

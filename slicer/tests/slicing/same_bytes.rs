@@ -4,7 +4,7 @@
 use std::fs;
 
 use lamp_fixtures::{Mesh, sphere, tower};
-use lamp_slicer::{Fill, LayerHeights, OpenOptions, Part, Shading, SliceOptions, Slices};
+use lamp_slicing::{Fill, LayerHeights, OpenOptions, Part, Shading, SliceOptions, Slices};
 use lamp_stack::{DepthLevels, Layer, Length};
 
 use super::common::{

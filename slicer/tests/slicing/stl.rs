@@ -1,7 +1,7 @@
 //! STL files: good ones of every style, and bad ones of every kind.
 
 use lamp_fixtures::{Mesh, sphere};
-use lamp_slicer::{Facet, Fill, OpenOptions, Part, SliceError, SliceOptions};
+use lamp_slicing::{Facet, Fill, OpenOptions, Part, SliceError, SliceOptions};
 use proptest::prelude::*;
 
 use super::common::{cases, cube, options, slice, try_layers, without_stack};

@@ -5,7 +5,7 @@
 //! millimetre: half pixels, half layers.
 
 use lamp_fixtures::Mesh;
-use lamp_slicer::{GridRule, PlaneRule, SliceOptions};
+use lamp_slicing::{GridRule, PlaneRule, SliceOptions};
 use lamp_stack::Mask;
 use proptest::prelude::*;
 

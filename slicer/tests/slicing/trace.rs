@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use lamp_fixtures::{Defect, Facet, Mesh, Sample, build, inject, sphere};
-use lamp_slicer::{
+use lamp_slicing::{
     Axis, EdgeFacet, Fill, Part, Placement, SliceError, SliceOptions, Slices, StrayBand, Trace,
 };
 use proptest::prelude::*;

@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use lamp_slicer::PLANE_TOLERANCE;
-use lamp_slicer::topology::{CornerTable, Minimum, MinimumKind, minima};
+use lamp_slicing::PLANE_TOLERANCE;
+use lamp_slicing::topology::{CornerTable, Minimum, MinimumKind, minima};
 
 use super::findings::{Findings, Island, Region};
 

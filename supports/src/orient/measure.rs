@@ -1,7 +1,7 @@
 //! Measures poses: islands, pits, overhangs and size.
 
-use lamp_slicer::PLANE_TOLERANCE;
-use lamp_slicer::topology::{CornerTable, Minimum, MinimumKind, Relief};
+use lamp_slicing::PLANE_TOLERANCE;
+use lamp_slicing::topology::{CornerTable, Minimum, MinimumKind, Relief};
 use rayon::prelude::*;
 
 use super::Pose;
@@ -154,7 +154,7 @@ fn length([low, high]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use lamp_fixtures::{Mesh, cup, needle, slanted_wall, twin_islands};
-    use lamp_slicer::{Part, Placement, Units};
+    use lamp_slicing::{Part, Placement, Units};
 
     use super::super::poses;
     use super::*;

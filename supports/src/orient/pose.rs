@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use lamp_slicer::{Axis, Placement};
+use lamp_slicing::{Axis, Placement};
 
 /// A pose of a part: turns about x and then y, so that some direction of the part points up.
 ///

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use lamp_slicer::brep::vector::Vec3;
+use lamp_slicing::brep::vector::Vec3;
 use lamp_stack::{Length, line_of, one_line};
 use serde::Deserialize;
 use thiserror::Error;

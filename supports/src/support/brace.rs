@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use lamp_slicer::brep::vector::Vec3;
+use lamp_slicing::brep::vector::Vec3;
 use lamp_stack::{Layer, Length, Mask};
 
 use super::divide::WhiteRuns;

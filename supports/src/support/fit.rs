@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_slicer::brep::vector::{Vec3, dot, sub};
+use lamp_slicing::brep::vector::{Vec3, dot, sub};
 use lamp_stack::Length;
 
 use super::divide::WhiteRuns;

@@ -34,7 +34,7 @@ mod vent;
 mod vent_tests;
 mod window;
 
-use lamp_slicer::brep::vector::{Vec3, length, sub};
+use lamp_slicing::brep::vector::{Vec3, length, sub};
 use lamp_stack::Length;
 use std::num::{NonZeroU8, NonZeroU32};
 

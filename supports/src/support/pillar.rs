@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use lamp_slicer::brep::vector::{Vec3, along};
+use lamp_slicing::brep::vector::{Vec3, along};
 use lamp_stack::Length;
 
 use super::divide::IslandPiece;

@@ -1,6 +1,6 @@
 //! Supports to the platform, against brute force over the pixels of random parts.
 
-use lamp_slicer::{FacetIndex, Part, Placement, Units};
+use lamp_slicing::{FacetIndex, Part, Placement, Units};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use lamp_slicer::brep::vector::{Vec3, length, sub};
+use lamp_slicing::brep::vector::{Vec3, length, sub};
 use lamp_stack::{Layer, Length};
 use rayon::prelude::*;
 

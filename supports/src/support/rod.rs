@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use lamp_slicer::brep::vector::{length, sub};
+use lamp_slicing::brep::vector::{length, sub};
 use lamp_stack::{Cone, Length, Strut};
 
 use super::window::Raster;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use lamp_slicer::brep::vector::{Vec3, along, dot};
+use lamp_slicing::brep::vector::{Vec3, along, dot};
 use lamp_stack::Length;
 
 use super::cone::beside;

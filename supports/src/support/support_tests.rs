@@ -1,7 +1,7 @@
 //! Supports of whole parts, drawn and checked again.
 
 use lamp_fixtures::{Mesh, cavity_core, mug, needle, ring};
-use lamp_slicer::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
+use lamp_slicing::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, Op};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

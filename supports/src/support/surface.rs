@@ -1,7 +1,7 @@
 //! The surface of a part: where rays enter it, and how smooth it is there.
 
-use lamp_slicer::brep::vector::{Vec3, add, cross, dot, length, scale, sub, unit};
-use lamp_slicer::{FacetIndex, PlacedFacet};
+use lamp_slicing::brep::vector::{Vec3, add, cross, dot, length, scale, sub, unit};
+use lamp_slicing::{FacetIndex, PlacedFacet};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree, RTreeObject, SelectionFunction};
 
@@ -230,7 +230,7 @@ impl SelectionFunction<NearFacet> for RaySelection {
 
 #[cfg(test)]
 mod tests {
-    use lamp_slicer::{Facet, Part, Placement, Units};
+    use lamp_slicing::{Facet, Part, Placement, Units};
 
     use super::*;
 

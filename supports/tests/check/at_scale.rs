@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lamp_slicer::{Axis, OpenOptions, Part, Placement, SliceOptions, Slices};
+use lamp_slicing::{Axis, OpenOptions, Part, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Layer, Length};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, Feature, FindingRecord, Findings, Island, Pocket,

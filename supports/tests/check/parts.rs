@@ -4,7 +4,7 @@ use lamp_fixtures::{
     Mesh, arch, cavity_core, closed_void, cup, lying_rod, mug, needle, ring, serpentine,
     slanted_wall, twin_islands,
 };
-use lamp_slicer::{Axis, Part, Placement, SliceOptions, Slices};
+use lamp_slicing::{Axis, Part, Placement, SliceOptions, Slices};
 use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
 use lamp_supports::{Findings, HeldAt, IslandEnd, PocketKind};
 

@@ -1,9 +1,9 @@
 //! Meshes of arbitrary facets.
 
-use lamp_slicer::topology::{
+use lamp_slicing::topology::{
     CornerTable, Crossings, MeshCheck, RepairOptions, facet_of, minima, repair,
 };
-use lamp_slicer::{Facet, SliceError};
+use lamp_slicing::{Facet, SliceError};
 
 use super::one_line;
 

@@ -14,8 +14,8 @@ use std::path::Path;
 
 use fax::decoder::decode_g4;
 use lamp_gantry::{FrameReader, FrameWriter, Job};
-use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
-use lamp_slicer::{Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units};
+use lamp_slicing::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
+use lamp_slicing::{Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, IndexedStack, Layer, Length, Mask, MaskBuilder, PageWriter,
     Pages, StackError, g4 as codec,

@@ -11,7 +11,7 @@ use lamp_fixtures::{
 };
 use lamp_gantry::{FrameHeader, FrameWriter, Frames, MirrorArray, SwathImage};
 use lamp_machine::ScanDirection;
-use lamp_slicer::{Part, SliceOptions, Slices};
+use lamp_slicing::{Part, SliceOptions, Slices};
 use lamp_stack::{
     Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder,
     PackLevel, PageInfo, PageWriter, StackError, g4, png_of_layer, write_packed,

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_machine::Machine;
-use lamp_slicer::SliceError;
-use lamp_slicer::topology::CornerTable;
+use lamp_slicing::SliceError;
+use lamp_slicing::topology::CornerTable;
 use lamp_stack::{Layer, Page, one_line};
 use lamp_supports::{
     AcceptedFindings, CheckError, Disagreements, Feature, FindingGroup, Findings, IslandMinimum,

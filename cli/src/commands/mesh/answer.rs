@@ -1,6 +1,6 @@
 //! Findings about a mesh, as JSON.
 
-use lamp_slicer::topology::{
+use lamp_slicing::topology::{
     Crossings, Deed, Doubled, Lump, Mass, MeshCheck, Repaired, RimLoop, ShellOverlap, ShellReport,
     facet_of,
 };

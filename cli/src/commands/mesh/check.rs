@@ -1,8 +1,8 @@
 //! `lamp mesh check`: finds what is wrong with a mesh.
 
 use clap::Args;
-use lamp_slicer::topology::{CornerTable, Crossings, MeshCheck, ShellOverlap, Shells};
-use lamp_slicer::{Placement, SliceError};
+use lamp_slicing::topology::{CornerTable, Crossings, MeshCheck, ShellOverlap, Shells};
+use lamp_slicing::{Placement, SliceError};
 use lamp_stack::Length;
 
 use crate::args::options::{Common, parse_distance};

@@ -13,7 +13,7 @@ use clap::{Args, Subcommand};
 use lamp_pipeline::memory::{available, in_words};
 use lamp_pipeline::solid::part_notes;
 use lamp_pipeline::step::ReaderSettings;
-use lamp_slicer::{Part, Units};
+use lamp_slicing::{Part, Units};
 use lamp_stack::Length;
 
 use crate::args::options::{Common, one_of, parse_memory};

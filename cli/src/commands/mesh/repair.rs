@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use lamp_pipeline::size::PartSize;
-use lamp_slicer::topology::{CornerTable, Deed, RepairOptions, Repaired, repair};
-use lamp_slicer::{SliceError, write_stl};
+use lamp_slicing::topology::{CornerTable, Deed, RepairOptions, Repaired, repair};
+use lamp_slicing::{SliceError, write_stl};
 use lamp_stack::Length;
 use serde_json::{Map, Value, json};
 

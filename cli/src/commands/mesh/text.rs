@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use lamp_slicer::topology::{
+use lamp_slicing::topology::{
     CornerTable, Lump, Mass, MeshCheck, ShellOverlap, ShellReport, facet_of,
 };
 

@@ -2,7 +2,7 @@
 
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::solid::{SolidSettings, at_part};
-use lamp_slicer::{Part, SliceError, SliceOptions, Slices};
+use lamp_slicing::{Part, SliceError, SliceOptions, Slices};
 use lamp_supports::{CheckOptions, Pose, check};
 
 use super::OrientArgs;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::{Reading, SolidSettings, at_part, name_of_all};
-use lamp_slicer::topology::CornerTable;
+use lamp_slicing::topology::CornerTable;
 use lamp_stack::{Dpi, Length};
 use lamp_supports::{PoseFacts, PoseLimits, measure, pareto, poses};
 

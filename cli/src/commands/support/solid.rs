@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use lamp_slicer::brep::vector::{Vec3, along, cross, scale, sub, unit};
-use lamp_slicer::{Facet, Part};
+use lamp_slicing::brep::vector::{Vec3, along, cross, scale, sub, unit};
+use lamp_slicing::{Facet, Part};
 use lamp_stack::Length;
 use lamp_supports::Rod;
 

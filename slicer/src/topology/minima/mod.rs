@@ -45,8 +45,8 @@ pub struct Minimum {
 /// turned over, boundary edges and crowded edges change the findings near them, and nothing else.
 ///
 /// ```
-/// use lamp_slicer::topology::{CornerTable, MinimumKind, minima};
-/// use lamp_slicer::{Part, Placement, Units};
+/// use lamp_slicing::topology::{CornerTable, MinimumKind, minima};
+/// use lamp_slicing::{Part, Placement, Units};
 ///
 /// // A tetrahedron on its tip.
 /// let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0], [-1.0, -1.0, 2.0f32]];
@@ -54,7 +54,7 @@ pub struct Minimum {
 /// let table = CornerTable::of_part(&part, &Placement::default(), Units::Millimetres)?;
 /// let found = minima(&table, [0.0, 0.0, 1.0]);
 /// assert_eq!((found.len(), found[0].kind, found[0].depth_mm), (1, MinimumKind::Island, 2.0));
-/// # Ok::<(), lamp_slicer::SliceError>(())
+/// # Ok::<(), lamp_slicing::SliceError>(())
 /// ```
 pub fn minima(table: &CornerTable, up: [f64; 3]) -> Vec<Minimum> {
     let relief = Relief::new(table);
