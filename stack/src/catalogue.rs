@@ -4,7 +4,8 @@ use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer};
 use thiserror::Error;
 
-use crate::{line_of, one_line};
+use crate::one_line;
+use crate::toml_document::{TomlError, TomlStep, read_toml};
 
 /// A TOML document of a kind with built-in documents, such as materials and machines.
 ///
@@ -59,22 +60,13 @@ pub trait Catalogued: DeserializeOwned {
     /// Returns an error if the text is not TOML, if a key is unknown, missing or wrong,
     /// or if [`check`](Self::check) fails. Every error names its line or key.
     fn from_toml(text: &str) -> Result<Self, CatalogueError<Self::CheckError>> {
-        let syntax = |error: toml::de::Error| CatalogueError::Syntax {
-            kind: Self::KIND,
-            line: line_of(text, error.span()),
-            problem: one_line(error.message()),
-        };
-        let file = toml::Deserializer::parse(text).map_err(syntax)?;
-        let entry: Self = serde_path_to_error::deserialize(file).map_err(|error| {
-            let key = error.path().to_string();
-            let inner = error.into_inner();
-            CatalogueError::Key {
-                line: line_of(text, inner.span()),
-                // The parser calls the document itself `.`.
-                key: if key == "." { "the file".to_owned() } else { one_line(&key) },
-                problem: key_problem(inner.message()),
-            }
-        })?;
+        let entry: Self =
+            read_toml(text).map_err(|TomlError { line, path, problem }| match path {
+                None => CatalogueError::Syntax { kind: Self::KIND, line, problem },
+                Some(path) => {
+                    CatalogueError::Key { line, key: key_of(&path), problem: with_remedy(problem) }
+                }
+            })?;
         let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         if entry.name().is_empty() || !entry.name().chars().all(letters) {
             let example = Self::BUILTINS.first().map_or("mine", |builtin| builtin.name);
@@ -151,10 +143,24 @@ pub enum CatalogueError<E> {
     Check(E),
 }
 
-/// Writes a parser's message in TOML's words: serde says `field` for a key.
-fn key_problem(message: &str) -> String {
-    let todo = if message.starts_with("missing field") { ": add it" } else { "" };
-    one_line(message).replace(" field ", " key ") + todo
+/// Returns a key's path, as `working-curve.critical-dose`.
+fn key_of(path: &[TomlStep]) -> String {
+    let mut key = String::new();
+    for step in path {
+        match step {
+            TomlStep::Index(index) => key += &format!("[{index}]"),
+            TomlStep::Key(name) => {
+                key += if key.is_empty() { "" } else { "." };
+                key += &one_line(name);
+            }
+        }
+    }
+    if key.is_empty() { "the file".to_owned() } else { key }
+}
+
+/// Adds what to do about a missing key.
+fn with_remedy(problem: String) -> String {
+    if problem.starts_with("missing key") { problem + ": add it" } else { problem }
 }
 
 /// Deserializes a text of more than spaces, for keys such as `source`.

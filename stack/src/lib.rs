@@ -47,6 +47,7 @@ mod strut;
 #[cfg(test)]
 mod testing;
 mod text;
+mod toml_document;
 
 pub use catalogue::{Builtin, CatalogueError, Catalogued, nonempty_text};
 pub use codec::compression::Compression;
@@ -106,3 +107,4 @@ pub use shell::{file_word, quoted, words};
 pub use significant::{format_significant, round_significant, to_nm};
 pub use strut::Strut;
 pub use text::{line_of, one_line};
+pub use toml_document::{TomlError, TomlStep, read_toml};

@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use lamp_stack::{Length, Op, line_of, one_line};
+use lamp_stack::{Length, Op, TomlError, TomlStep, one_line, read_toml};
 use serde::Deserialize;
 use serde_json::Value;
-use serde_path_to_error::Segment;
 
 use super::edit_error::{EditError, EditProblem};
 use super::letters::SERIAL;
@@ -47,21 +46,14 @@ impl Edits {
             #[serde(default)]
             edit: Vec<Edit>,
         }
-        let syntax = |error: toml::de::Error| EditError::Syntax {
-            line: line_of(text, error.span()),
-            problem: one_line(error.message()),
+        let named = |TomlError { line, path, problem }| match path {
+            None => EditError::Syntax { line, problem },
+            Some(path) => EditError::Key { line, key: key_of(&path), problem },
         };
-        let file = toml::Deserializer::parse(text).map_err(syntax)?;
-        let file: EditFile = serde_path_to_error::deserialize(file).map_err(|error| {
-            let key = key_of(error.path());
-            let inner = error.into_inner();
-            // serde says field where TOML says key.
-            let problem = one_line(inner.message()).replace(" field ", " key ");
-            EditError::Key { line: line_of(text, inner.span()), key, problem }
-        })?;
+        let file: EditFile = read_toml(text).map_err(named)?;
         // Read again without the schema: the first page has the list as it was written, without
         // defaults.
-        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
+        let table: toml::Table = read_toml(text).map_err(named)?;
         let told = table.get("edit").and_then(|list| list.as_array()).ok_or(EditError::NoEdits)?;
         // No key takes a date, so the schema has refused dates by now.
         let told =
@@ -238,18 +230,17 @@ impl Label {
 }
 
 /// Returns a key's path with edits counted from 1: `edit 2, box.x`.
-fn key_of(path: &serde_path_to_error::Path) -> String {
+fn key_of(path: &[TomlStep]) -> String {
     let mut key = String::new();
-    for segment in path {
-        match segment {
-            Segment::Seq { index } if key == "edit" => key += &format!(" {}", index + 1),
-            Segment::Seq { index } => key += &format!("[{index}]"),
-            Segment::Map { key: name } if key.is_empty() => key += &one_line(name),
-            Segment::Map { key: name } => {
+    for step in path {
+        match step {
+            TomlStep::Index(index) if key == "edit" => key += &format!(" {}", index + 1),
+            TomlStep::Index(index) => key += &format!("[{index}]"),
+            TomlStep::Key(name) if key.is_empty() => key += &one_line(name),
+            TomlStep::Key(name) => {
                 key += if key.starts_with("edit ") && !key.contains(',') { ", " } else { "." };
                 key += &one_line(name);
             }
-            _ => {}
         }
     }
     if key.is_empty() { "the file".to_owned() } else { key }

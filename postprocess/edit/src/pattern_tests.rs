@@ -297,8 +297,8 @@ fn what_cannot_be_repeated_is_said() {
         (block, many, "edit 1: it repeats more than 100000 times"),
         (picture, ring, "edit 1: pictures can be turned only by 90, 180 or 270 degrees"),
         (block, "repeat = { count = 2 }", "line 3: edit 1, repeat: write step, or center"),
-        (block, "repeat = [{ count = 2 }]", "line 3: edit 1, repeat[0]: write step, or center"),
-        (block, "repeat = { count = 2, radius = 1 }", "line 3: edit 1, repeat.radius: unknown key"),
+        (block, "repeat = [{ count = 2 }]", "line 3: edit 1, repeat: write step, or center"),
+        (block, "repeat = { count = 2, radius = 1 }", "line 3: edit 1, repeat: unknown key"),
     ] {
         let error = edited(&black(), &format!("[[edit]]\n{shape}\n{repeat}\n")).unwrap_err();
         assert!(error.to_string().starts_with(said), "{shape}, {repeat}: {error}");
