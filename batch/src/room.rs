@@ -34,7 +34,7 @@ impl DiskRoom {
             }
             false => 0,
         };
-        Self { store, delivered, free: free(root) }
+        Self { store, delivered, free: fs4::available_space(root).ok() }
     }
 
     /// Returns a sentence if there is less than the night takes.
@@ -63,18 +63,6 @@ fn is_one_disk(one: &Path, other: &Path) -> bool {
 #[cfg(not(unix))]
 fn is_one_disk(_: &Path, _: &Path) -> bool {
     true
-}
-
-/// Returns the bytes that are free for this user on a folder's disk, where the system reports them.
-#[cfg(target_os = "linux")]
-fn free(folder: &Path) -> Option<u64> {
-    let disk = rustix::fs::statvfs(folder).ok()?;
-    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-}
-
-#[cfg(not(target_os = "linux"))]
-fn free(_: &Path) -> Option<u64> {
-    None
 }
 
 #[cfg(test)]

@@ -2,14 +2,26 @@
 
 use std::path::Path;
 
-use lamp_pipeline::documents::{self, Document, document_and_text};
+use lamp_pipeline::documents::{self, Document, document_and_text, own_names};
 
 use crate::exit::{Exit, boxed};
 use crate::streams::print;
+use crate::terminal::progress::say;
 
 /// Prints a document's file as it was written, once it is checked.
 pub(crate) fn show<T: Document>(path: &Path) -> Result<(), Exit> {
     print(&document_and_text::<T>(path)?.1)
+}
+
+/// Returns all documents of a kind that have a name: the built-in ones, then those of one's own
+/// folder. A warning names each file there that is wrong.
+pub(crate) fn named<T: Document>() -> Vec<T> {
+    let own = own_names::<T>().into_iter().filter_map(|name| {
+        let read = documents::document(Path::new(&name));
+        read.inspect_err(|error| say(&format!("warning: {error}"))).ok()
+    });
+    let own = own.filter(|own: &T| T::BUILTINS.iter().all(|builtin| builtin.name != own.name()));
+    T::builtins().chain(own).collect()
 }
 
 /// Reads a text of at most `max` bytes. `what` is the word for it in messages.

@@ -24,7 +24,8 @@ use args::options::{Common, GENERAL};
 use commands::Command;
 use exit::Exit;
 use streams::{give_up, print, settle_output};
-use terminal::help::{formed, version};
+use terminal::allocator::keep_freed_memory;
+use terminal::help::{LONG_VERSION, formed, version};
 use terminal::out_of_memory::note_command;
 use terminal::progress::say;
 use terminal::signals::{clean_up_on_signals, wait_if_ending};
@@ -33,7 +34,7 @@ use terminal::usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
-#[command(name = "lamp", version, propagate_version = true, max_term_width = 100, after_help = EXAMPLES)]
+#[command(name = "lamp", version, long_version = LONG_VERSION, propagate_version = true, max_term_width = 100, after_help = EXAMPLES)]
 struct Lamp {
     #[command(subcommand)]
     command: Command,
@@ -103,6 +104,7 @@ pub(crate) fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
         .bin_name(name)
         .args(general)
         .version(env!("CARGO_PKG_VERSION"))
+        .long_version(LONG_VERSION)
         .disable_version_flag(true)
         .arg(version())
         .disable_help_flag(true)
@@ -133,15 +135,6 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
     // A full disk may show only here: the status must not say success before.
     settle_output()?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Lets the allocator keep what one layer frees for the next. GNU's gives freed
-/// memory back to the system from 128 KiB on, and asks for it again, unless it
-/// has seen a larger block come and go: a fifth of a stage's time.
-fn keep_freed_memory() {
-    // Freeing a mapped block raises the threshold to its size, up to 32 MiB (M_MMAP_THRESHOLD in
-    // mallopt(3)).
-    drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
 
 /// Prints why a command exits early, and returns its status.

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::num::{NonZeroU8, NonZeroU32};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use lamp_machine::{Machine, Recoating};
@@ -245,13 +245,6 @@ impl CheckSettings {
         });
         let differing = differing.collect();
         Ok((findings, differing))
-    }
-
-    /// Puts the machine's file into a folder, unless its path is absolute.
-    pub fn set_folder(&mut self, folder: &Path) {
-        if let Some(file) = self.machine_file() {
-            self.machine = folder.join(file);
-        }
     }
 }
 

@@ -1,11 +1,13 @@
-//! Materials, machines and projectors, built in or in files, by the words of settings: `alpha`,
-//! `mine.toml`, or `mine.toml@blake3:0123456789abcdef` as stacks record them.
+//! Materials, machines and projectors, built in, in files or in one's own folder, by the words of
+//! settings: `alpha`, `mine.toml`, `mine`, or `mine.toml@blake3:0123456789abcdef` as stacks record
+//! them.
 
 use std::ffi::OsString;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, IsTerminal, Read};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
+use etcetera::BaseStrategy;
 use lamp_stack::{Builtin, Catalogued, Pages, digest_of, file_word};
 
 use crate::error::{Error, ErrorKind};
@@ -122,13 +124,24 @@ pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error>
         let document =
             T::from_toml(builtin.toml).map_err(|error| Error::new(ErrorKind::Work, error))?;
         (document, builtin.toml.to_owned())
-    } else if !is_stream(&path) && !path.exists() {
-        let names: Vec<_> = T::BUILTINS.iter().map(|builtin| builtin.name).collect();
-        let (path, kind, names) = (path.display(), T::KIND, names.join(", "));
-        let text = format!("{path}: there is no such file, nor a built-in {kind}: {names}");
-        return Err(Error::work(text));
-    } else {
+    } else if is_stream(&path) || path.exists() {
         read_file(&path)?
+    } else if let Some(own) = own_file::<T>(&path) {
+        let (document, text) = read_file::<T>(&own)?;
+        // A list shows the name within, so it must be the name that the file is asked for by.
+        if Some(document.name()) != path.to_str() {
+            let (own, name) = (own.display(), document.name());
+            let text = format!("{own}: it is called {name} inside: rename the file {name}.toml");
+            return Err(Error::work(text));
+        }
+        (document, text)
+    } else {
+        let builtins = T::BUILTINS.iter().map(|builtin| builtin.name.into());
+        let names: Vec<OsString> = builtins.chain(own_names::<T>()).collect();
+        let names = names.join(", ".as_ref()).to_string_lossy().into_owned();
+        let (path, kind) = (path.display(), T::KIND);
+        let text = format!("{path}: there is no such file, nor a {kind} of that name: {names}");
+        return Err(Error::work(text));
     };
     check_word(word, &word_of_text(&path, &text))?;
     Ok((document, text))
@@ -136,6 +149,47 @@ pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error>
 
 fn builtin<T: Document>(path: &Path) -> Option<&'static Builtin> {
     T::BUILTINS.iter().find(|builtin| path.to_str() == Some(builtin.name))
+}
+
+/// Returns the folder of one's own settings: `lamp` in `XDG_CONFIG_HOME` or `~/.config`, on Windows
+/// in `%APPDATA%`; `None` where no home is known. It has `config.toml`, and a folder for each kind
+/// of document, such as `machines`.
+pub fn config_folder() -> Option<PathBuf> {
+    Some(etcetera::choose_base_strategy().ok()?.config_dir().join("lamp"))
+}
+
+fn own_folder<T: Document>() -> Option<PathBuf> {
+    Some(config_folder()?.join(format!("{}s", T::KIND)))
+}
+
+/// Returns the file in one's own folder that a name means, if there is one and nothing else has the
+/// name.
+pub fn own_file<T: Document>(word: &Path) -> Option<PathBuf> {
+    let (name, _) = without_digest(word);
+    let mut parts = name.components();
+    let (Some(Component::Normal(_)), None) = (parts.next(), parts.next()) else { return None };
+    let mut file = name.clone().into_os_string();
+    file.push(".toml");
+    let file = own_folder::<T>()?.join(file);
+    (!name.exists() && builtin::<T>(&name).is_none() && file.is_file()).then_some(file)
+}
+
+/// Puts the file in the place of a name, if the name means a document of one's own folder.
+pub fn find_own<T: Document>(word: &mut PathBuf) {
+    if let Some(own) = own_file::<T>(word) {
+        *word = own;
+    }
+}
+
+/// Returns the names of the documents of one's own folder, sorted.
+pub fn own_names<T: Document>() -> Vec<OsString> {
+    let files =
+        own_folder::<T>().and_then(|folder| fs::read_dir(folder).ok()).into_iter().flatten();
+    let paths = files.filter_map(|file| Some(file.ok()?.path()));
+    let toml = paths.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let mut names: Vec<_> = toml.filter_map(|path| Some(path.file_stem()?.to_owned())).collect();
+    names.sort();
+    names
 }
 
 /// Returns a word for a document in an option: a built-in one's name, with the digest of its text;

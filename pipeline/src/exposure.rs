@@ -9,8 +9,8 @@ use lamp_grayscale::material::Material;
 use serde::{Deserialize, Serialize};
 
 use crate::documents::{
-    check_word, document_and_word, input_name, is_file, read_text, recorded_name, without_digest,
-    word_of_text,
+    check_word, document_and_word, find_own, input_name, is_file, own_file, read_text,
+    recorded_name, without_digest, word_of_text,
 };
 use crate::error::{Error, ErrorKind};
 use crate::words::{optional, path, text};
@@ -84,12 +84,23 @@ impl ExposureSettings {
             let text = fs::read_to_string(without_digest(word).0);
             text.is_ok_and(|text| check_word(word, &word_of_text(word, &text)).is_ok())
         };
+        let own = own_file::<Material>(path).filter(|own| {
+            let text = fs::read_to_string(own);
+            text.is_ok_and(|text| check_word(path, &word_of_text(own, &text)).is_ok())
+        });
         let mut words = folders.iter().map(|folder| folder.join(&*path));
-        *path = words.find(is_it).ok_or_else(|| {
+        *path = words.find(is_it).or(own).ok_or_else(|| {
             let name = path.display();
             Error::work(format!("no unchanged {name} is here or next to the stack"))
         })?;
         Ok(())
+    }
+
+    /// Puts the file in the place of a name, if the name means a material of one's own folder.
+    pub fn find_own(&mut self) {
+        if let Self::Material { material, .. } = self {
+            find_own::<Material>(material);
+        }
     }
 
     fn path_mut(&mut self) -> Option<&mut PathBuf> {

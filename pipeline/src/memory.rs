@@ -37,8 +37,28 @@ pub fn in_words(bytes: u64) -> String {
 }
 
 /// Returns the machine's memory, where the system reports it.
+#[cfg(not(any(windows, target_os = "macos")))]
 fn machine() -> Option<u64> {
     bytes_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")
+}
+
+#[cfg(target_os = "macos")]
+fn machine() -> Option<u64> {
+    let sysctl = std::process::Command::new("/usr/sbin/sysctl").args(["-n", "hw.memsize"]).output();
+    String::from_utf8(sysctl.ok()?.stdout).ok()?.trim().parse().ok()
+}
+
+#[cfg(windows)]
+#[expect(unsafe_code, reason = "the system answers by a C function alone")]
+fn machine() -> Option<u64> {
+    use windows_sys::Win32::System::SystemInformation::{GlobalMemoryStatusEx, MEMORYSTATUSEX};
+    let mut status = MEMORYSTATUSEX {
+        dwLength: size_of::<MEMORYSTATUSEX>() as u32,
+        ..MEMORYSTATUSEX::default()
+    };
+    // SAFETY: it fills a struct that states its size.
+    let is_known = unsafe { GlobalMemoryStatusEx(&raw mut status) } != 0;
+    is_known.then_some(status.ullTotalPhys)
 }
 
 /// Returns the memory of the container or job (cgroup) that this process belongs to, if limited.

@@ -47,5 +47,5 @@ fn a_lens_out_of_focus_is_refused_with_how_far() {
     let sharp = printed(&scratch, "lamp projector check sharp.toml");
     assert!(sharp.contains("134.63mm behind its middle, 0.00mm off"), "{sharp}");
     let unknown = scratch.run("lamp projector show nobody");
-    unknown.is_refused_with(&["nobody: there is no such file, nor a built-in projector"]);
+    unknown.is_refused_with(&["nobody: there is no such file, nor a projector of that name"]);
 }

@@ -57,7 +57,7 @@ pub fn end_children() {
     }
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 fn ask_to_end() {
     use rustix::process::{Pid, Signal, kill_process};
     for pid in running().children.iter().filter_map(|&pid| Pid::from_raw(pid as i32)) {
@@ -67,7 +67,7 @@ fn ask_to_end() {
 }
 
 /// Children share the terminal, so that Ctrl-C reaches them, too.
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(unix))]
 fn ask_to_end() {}
 
 /// Starts a process and sends its end, with its last words.

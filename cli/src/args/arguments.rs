@@ -10,7 +10,7 @@ use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, FromArgMatches};
 use lamp_machine::{Defaults, Machine};
-use lamp_pipeline::documents::document;
+use lamp_pipeline::documents::{config_folder, document};
 
 use crate::args::options::Common;
 use crate::args::options_file::{Setting, option_of, settings_of};
@@ -26,32 +26,65 @@ const MAX_OPTIONS_BYTES: u64 = 1 << 20;
 /// Parses a program's arguments. `lamp` has all commands, and `program` is it or one of its stages.
 /// Ends the process where clap does: with a wrong command line, or with help that was asked for.
 pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Exit> {
-    let mut lamp = lamp.clone();
-    lamp.build();
-    let mut arguments =
-        Arguments { lamp, program, words: std::env::args_os().collect(), from: Vec::new() };
+    let mut arguments = Arguments::new(lamp, program, std::env::args_os().collect());
     let given = arguments.parsed_so_far();
     let (path, of_command) = arguments.command(&given);
     let common = Common::from_arg_matches(of_command).expect("every command has these options");
-    if let Some(file) = common.file() {
-        let read = || read_text(file, MAX_OPTIONS_BYTES, "an options file");
-        let named = |error: anyhow::Error| Exit::Usage(error).at(input_name(file));
-        let text = read().map_err(named)?;
-        let settings = settings_of(&arguments.lamp, &path, &text)
-            .map_err(|problem| named(anyhow::Error::msg(problem)))?;
-        arguments.fill_in(&path, of_command, &settings, file);
-    }
-    let given = arguments.parsed_so_far();
-    let (path, of_command) = arguments.command(&given);
-    if [["slice"], ["check"]].iter().any(|command| path == *command)
-        && let Some(file) = of_command.get_one::<PathBuf>("machine")
-    {
-        let settings = settings_of_machine(file)?;
-        arguments.fill_in(&path, of_command, &settings, file);
+    // They report faults of these files themselves.
+    let reports = [["config"], ["doctor"]].iter().any(|command| path == *command);
+    if !reports {
+        arguments.fill_in_all(common.file().map(PathBuf::as_path), !common.ignores_config())?;
     }
     // The arguments are parsed once.
     let _ = WORDS.set(arguments.words.clone());
     Ok(arguments.parsed())
+}
+
+/// Returns the files of options that apply to every command, the strongest first: who names each,
+/// and its path. A path that nobody asked for may not exist.
+pub(crate) fn config_files() -> Vec<(&'static str, PathBuf)> {
+    let of_environment = std::env::var_os(OPTIONS_VARIABLE).filter(|path| !path.is_empty());
+    let own = config_folder().map(|folder| folder.join("config.toml"));
+    let here = Some(PathBuf::from("lamp.toml"));
+    let all = [
+        (OPTIONS_VARIABLE, of_environment.map(PathBuf::from)),
+        ("the current folder", here),
+        ("your settings folder", own),
+    ];
+    all.into_iter().filter_map(|(from, path)| Some((from, path?))).collect()
+}
+
+/// The environment variable that names a file of options.
+pub(crate) const OPTIONS_VARIABLE: &str = "LAMP_OPTIONS";
+
+/// Returns the words that a command gets although its command line does not have them, with the
+/// file of each.
+///
+/// # Errors
+/// Returns an error if a file cannot be read, or is wrong.
+pub(crate) fn words_of_files(
+    lamp: &Command,
+    path: &[String],
+    file: Option<&Path>,
+) -> Result<Vec<(String, Vec<OsString>)>, Exit> {
+    let words = ["lamp".to_owned()].iter().chain(path).map(OsString::from).collect();
+    let mut arguments = Arguments::new(lamp, lamp.clone(), words);
+    arguments.fill_in_all(file, true)?;
+    Ok(arguments.from)
+}
+
+/// Reads the settings of a file of options for a command.
+///
+/// # Errors
+/// Returns an error that names the file if it cannot be read, or is wrong.
+pub(crate) fn settings_of_file(
+    lamp: &Command,
+    path: &[String],
+    file: &Path,
+) -> Result<Vec<Setting>, Exit> {
+    let named = |error: anyhow::Error| Exit::Usage(error).at(input_name(file));
+    let text = read_text(file, MAX_OPTIONS_BYTES, "an options file").map_err(named)?;
+    settings_of(lamp, path, &text).map_err(|problem| named(anyhow::Error::msg(problem)))
 }
 
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -68,11 +101,60 @@ struct Arguments {
     lamp: Command,
     program: Command,
     words: Vec<OsString>,
-    /// The files that some of the words are from.
-    from: Vec<String>,
+    /// The files that some of the words are from, with these words.
+    from: Vec<(String, Vec<OsString>)>,
 }
 
 impl Arguments {
+    fn new(lamp: &Command, program: Command, words: Vec<OsString>) -> Self {
+        let mut lamp = lamp.clone();
+        lamp.build();
+        Self { lamp, program, words, from: Vec::new() }
+    }
+
+    /// Adds what files say: the file that the command line names, then files that apply to every
+    /// command, each followed by the machine that it names, if any. What is said first holds.
+    fn fill_in_all(&mut self, file: Option<&Path>, with_config: bool) -> Result<(), Exit> {
+        if let Some(file) = file {
+            self.fill_in_file(file)?;
+        }
+        let mut has_machine = self.fill_in_machine(|source| source == ValueSource::CommandLine)?;
+        for (from, file) in config_files().into_iter().filter(|_| with_config) {
+            if from == OPTIONS_VARIABLE || file.exists() {
+                self.fill_in_file(&file)?;
+                has_machine = has_machine
+                    || self.fill_in_machine(|source| source == ValueSource::CommandLine)?;
+            }
+        }
+        if !has_machine {
+            // The machine that a command has by default.
+            self.fill_in_machine(|_| true)?;
+        }
+        Ok(())
+    }
+
+    fn fill_in_file(&mut self, file: &Path) -> Result<(), Exit> {
+        let given = self.parsed_so_far();
+        let (path, of_command) = self.command(&given);
+        let settings = settings_of_file(&self.lamp, &path, file)?;
+        self.fill_in(&path, of_command, &settings, file);
+        Ok(())
+    }
+
+    /// Adds the defaults of a machine, if the command takes them, and returns whether it did.
+    fn fill_in_machine(&mut self, counts: impl Fn(ValueSource) -> bool) -> Result<bool, Exit> {
+        let given = self.parsed_so_far();
+        let (path, of_command) = self.command(&given);
+        let takes_defaults = [["slice"], ["check"]].iter().any(|command| path == *command);
+        if !takes_defaults || !of_command.value_source("machine").is_some_and(counts) {
+            return Ok(false);
+        }
+        let machine = of_command.get_one::<PathBuf>("machine").expect("it has a value");
+        let settings = settings_of_machine(machine)?;
+        self.fill_in(&path, of_command, &settings, machine);
+        Ok(true)
+    }
+
     /// Parses the words, though some that are required may be missing.
     fn parsed_so_far(&self) -> ArgMatches {
         let parse = |program: Command| program.try_get_matches_from(&self.words);
@@ -96,7 +178,8 @@ impl Arguments {
         show(error);
         if error.use_stderr() && !self.from.is_empty() {
             say("");
-            say(&format!("With the options of {}.", self.from.join(" and ")));
+            let files: Vec<_> = self.from.iter().map(|(file, _)| file.as_str()).collect();
+            say(&format!("With the options of {}.", files.join(" and ")));
         }
         exit(error.exit_code())
     }
@@ -128,8 +211,8 @@ impl Arguments {
         let words = words_left_open(command, matches, settings);
         // Words after `--` are not options.
         let end = self.words.iter().position(|word| word == "--").unwrap_or(self.words.len());
-        self.words.splice(end..end, words);
-        self.from.push(input_name(file));
+        self.words.splice(end..end, words.iter().cloned());
+        self.from.push((input_name(file), words));
     }
 }
 

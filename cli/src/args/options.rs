@@ -48,6 +48,14 @@ pub(crate) struct Common {
     /// [slice] applies only to that command. The command line takes precedence
     #[arg(long, value_name = "FILE.toml", global = true, help_heading = GENERAL)]
     options: Option<PathBuf>,
+
+    /// Ignore LAMP_OPTIONS, lamp.toml and your config.toml
+    ///
+    /// By default, commands take further options from the file that LAMP_OPTIONS names, lamp.toml
+    /// in the current folder and config.toml in your settings folder, in this order. lamp config
+    /// shows them
+    #[arg(long, global = true, help_heading = GENERAL, hide_short_help = true)]
+    no_config: bool,
 }
 
 /// The memory that a thread takes to start with: its stack, and room to work in.
@@ -57,12 +65,24 @@ impl Common {
     /// Returns options of a command that reports nothing.
     #[cfg(test)]
     pub(crate) fn quiet() -> Self {
-        Self { quiet: true, verbose: false, threads: None, no_sync: false, options: None }
+        Self {
+            quiet: true,
+            verbose: false,
+            threads: None,
+            no_sync: false,
+            options: None,
+            no_config: true,
+        }
     }
 
     /// Returns the options file.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
         self.options.as_ref()
+    }
+
+    /// Returns whether only named files of options count.
+    pub(crate) fn ignores_config(&self) -> bool {
+        self.no_config
     }
 
     /// Sets up the threads. To be called once.

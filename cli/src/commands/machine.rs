@@ -10,7 +10,7 @@ use lamp_stack::to_nm;
 use lamp_stack::{Catalogued, Length};
 use serde_json::{Value, json};
 
-use crate::catalogue::show;
+use crate::catalogue::{named, show};
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::streams::{input_name, print};
@@ -31,7 +31,8 @@ pub(crate) struct MachineArgs {
 
 #[derive(Subcommand)]
 enum MachineAction {
-    /// List the built-in machines, and the built-in displays that a machine's [scan] can name
+    /// List the built-in machines, those of your settings folder, and the built-in displays that a
+    /// machine's [scan] can name
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -61,7 +62,7 @@ enum MachineAction {
 pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
     match &args.action {
         MachineAction::List { json: true } => {
-            let machines: Vec<Value> = Machine::builtins().map(|it| fields(&it)).collect();
+            let machines: Vec<Value> = named::<Machine>().iter().map(fields).collect();
             let displays: Vec<Value> = Display::builtins().map(|it| display_fields(&it)).collect();
             answer(&json!({ "machines": machines, "displays": displays }))
         }
@@ -227,7 +228,7 @@ fn machine_table() -> String {
         "{:<8}{:<18}{:<10}{:<14}{:<16}description\n",
         "name", "area", "height", "dpi", "layers"
     );
-    for machine in Machine::builtins() {
+    for machine in named::<Machine>() {
         let Machine { name, description, area, height, dpi, thickness, .. } = machine;
         let area = area.value.to_string();
         let height = height.map_or("unknown".to_owned(), |height| height.value.to_string());

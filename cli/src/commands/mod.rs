@@ -8,10 +8,12 @@ mod compare;
 mod compensate;
 mod completions;
 mod compose;
+mod config;
 mod convert;
 mod cure;
 mod demo;
 mod dither;
+mod doctor;
 mod edit;
 mod expose;
 mod fix;
@@ -87,6 +89,8 @@ pub(crate) enum Command {
     Mesh(mesh::MeshArgs),
     MeshOut(mesh_out::MeshOutArgs),
     Batch(Box<batch::BatchArgs>),
+    Config(config::ConfigArgs),
+    Doctor(doctor::DoctorArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -143,6 +147,8 @@ impl Command {
             Self::Mesh(args) => mesh::run(args, common),
             Self::MeshOut(args) => mesh_out::run(args, common),
             Self::Batch(args) => batch::run(args, common),
+            Self::Config(args) => config::run(args, common),
+            Self::Doctor(_) => doctor::run(),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use lamp_pipeline::documents;
 use lamp_planning::projector::{Focus, Lens, Projector, SpreadOf};
 use lamp_stack::to_nm;
-use lamp_stack::{Catalogued, Length, Size};
+use lamp_stack::{Length, Size};
 use serde_json::{Value, json};
 
 use crate::catalogue;
@@ -28,7 +28,7 @@ pub(crate) struct ProjectorArgs {
 
 #[derive(Subcommand)]
 enum ProjectorAction {
-    /// List the built-in projectors
+    /// List the built-in projectors, and those of your settings folder
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -57,7 +57,7 @@ enum ProjectorAction {
 
 pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
     match &args.action {
-        ProjectorAction::List { json: true } => answer(Projector::builtins()),
+        ProjectorAction::List { json: true } => answer(catalogue::named::<Projector>()),
         ProjectorAction::List { json: false } => print(&table()),
         ProjectorAction::Show { projector, json: true } => {
             answer([documents::document(projector)?])
@@ -107,7 +107,7 @@ fn table() -> String {
         "{:<10}{:<10}{:<9}{:<15}{:<14}{:<14}description\n",
         "name", "mirrors", "pitch", "image", "full white", "spread"
     );
-    for projector in Projector::builtins() {
+    for projector in catalogue::named::<Projector>() {
         let Projector { name, description, display, pitch, .. } = &projector;
         let mirrors = format!("{}x{}", display.columns, display.rows);
         let pitch = two_digits(pitch.value).to_string();

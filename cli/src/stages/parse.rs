@@ -7,11 +7,12 @@ use std::sync::OnceLock;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use lamp_batch::{StageError, Stages};
+use lamp_grayscale::material::Material;
 use lamp_machine::Machine;
 
 use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating};
-use lamp_pipeline::documents::is_file;
+use lamp_pipeline::documents::{find_own, is_file};
 use lamp_pipeline::edit::{EditSettings, Editing};
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::SliceStage;
@@ -155,6 +156,8 @@ impl<'a> StageReader<'a> {
         }
         // The word in the place of the part: each part of the night stands there later.
         stage.parts.clear();
+        stage.machine.iter_mut().for_each(find_own::<Machine>);
+        stage.settings.exposure.find_own();
         stage.named_mut().for_each(|path| *path = self.folder.join(&*path));
         // Materials and tables are read now: a slip in them must show before the night, not in it.
         stage.settings.exposure().map_err(said)?;
@@ -175,6 +178,7 @@ impl<'a> StageReader<'a> {
             "dither" => Stage::Dither((&self.read::<DitherStageArgs>()).into()),
             "compensate" => {
                 let mut settings = CompensateSettings::from(&self.read::<CompensateStageArgs>());
+                settings.inputs_mut().for_each(find_own::<Material>);
                 settings.inputs_mut().for_each(in_folder);
                 // Tried now, as a night must not begin with a file that is wrong.
                 Compensating::new(&settings).map_err(said)?;
@@ -193,6 +197,7 @@ impl<'a> StageReader<'a> {
 /// Reads the options of `tile`, without stacks.
 pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, String> {
     let mut args: TileArgs = StageReader::new("tile", &with_name("tile", options), folder)?.read();
+    args.settings.machine.iter_mut().for_each(find_own::<Machine>);
     args.settings.files_mut().for_each(|path| *path = folder.join(&*path));
     Ok(args)
 }
@@ -201,7 +206,7 @@ pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, 
 pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
     let args: CheckArgs = StageReader::new("check", &with_name("check", options), folder)?.read();
     let mut settings = CheckSettings::clone(&args.settings);
-    settings.set_folder(folder);
+    settings.machine = of_machine(&settings.machine, folder);
     // A slip in its file must show before the night.
     settings.machine().map_err(|error| Exit::from(error).to_string())?;
     Ok(settings)
@@ -246,5 +251,7 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
 
 /// Returns where a machine's file stands, or the name of a built-in one.
 fn of_machine(machine: &Path, folder: &Path) -> PathBuf {
-    if is_file::<Machine>(machine) { folder.join(machine) } else { machine.to_owned() }
+    let mut machine = machine.to_owned();
+    find_own::<Machine>(&mut machine);
+    if is_file::<Machine>(&machine) { folder.join(machine) } else { machine }
 }

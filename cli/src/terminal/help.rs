@@ -19,7 +19,7 @@ Stacks:
   info        describe a stack              report        write a page to send
   verify      check for damage              compare       show differences
   join split  join or split layer ranges    convert pack  change the format
-Parts, resins and machines; completions and man are for shells:
+Parts, resins and machines; for setting up: config doctor completions man
   mesh        check and repair a mesh       orient        find an orientation
   brep        check a STEP part             heights       find thicknesses
   sample      write a sample part           demo          run all on a sample
@@ -135,6 +135,17 @@ fn few_examples(command: Command) -> Command {
     let few: Vec<_> = all.lines().take(1 + FEW).collect();
     command.after_help(few.join("\n")).after_long_help(all)
 }
+
+/// What `--version` says after the program's name: version, commit, target and features.
+pub(crate) const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit: ",
+    env!("LAMP_COMMIT_OF_BUILD"),
+    "\ntarget: ",
+    env!("LAMP_TARGET"),
+    "\nfeatures: ",
+    env!("LAMP_FEATURES"),
+);
 
 /// Returns the argument of a version, among the general options.
 pub(crate) fn version() -> Arg {

@@ -3,7 +3,9 @@
 //! Rust aborts a process whose allocation failed, and runs no destructors. Only the allocator
 //! itself can do better before that.
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[cfg(not(target_env = "musl"))]
+use std::alloc::System as Base;
+use std::alloc::{GlobalAlloc, Layout};
 use std::fs::File;
 use std::io::{self, Cursor, Write};
 use std::panic;
@@ -15,6 +17,8 @@ use std::thread;
 use std::time::Duration;
 
 use lamp_stack::remove_temporaries;
+#[cfg(target_env = "musl")]
+use mimalloc::MiMalloc as Base;
 #[cfg(unix)]
 use signal_hook::low_level::exit;
 
@@ -48,33 +52,34 @@ pub(crate) fn end_with(status: i32) {
     STATUS.store(status, Relaxed);
 }
 
-/// The system's allocator, except that the process ends where that gives nothing.
+/// The system's allocator, or mimalloc in place of musl's, whose one lock all threads share; except
+/// that the process ends where that gives nothing.
 struct GivesOrEnds;
 
 #[global_allocator]
 static ALLOCATOR: GivesOrEnds = GivesOrEnds;
 
-// SAFETY: The system's allocator does all the work; `given` returns what it gave or not at all.
+// SAFETY: `Base` does all the work; `given` returns what it gave or not at all.
 #[expect(unsafe_code, reason = "only the allocator learns of a failure before the process aborts")]
 unsafe impl GlobalAlloc for GivesOrEnds {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: The caller keeps the same contract.
-        given(unsafe { System.alloc(layout) }, layout.size())
+        given(unsafe { Base.alloc(layout) }, layout.size())
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: The caller keeps the same contract.
-        given(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        given(unsafe { Base.alloc_zeroed(layout) }, layout.size())
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
         // SAFETY: The caller keeps the same contract.
-        given(unsafe { System.realloc(memory, layout, bytes) }, bytes)
+        given(unsafe { Base.realloc(memory, layout, bytes) }, bytes)
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
         // SAFETY: The caller keeps the same contract.
-        unsafe { System.dealloc(memory, layout) }
+        unsafe { Base.dealloc(memory, layout) }
     }
 }
 

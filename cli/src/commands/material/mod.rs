@@ -10,7 +10,7 @@ use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin, Spread};
 use lamp_pipeline::documents;
-use lamp_stack::{Catalogued, Length};
+use lamp_stack::Length;
 use serde_json::{Value, json};
 
 use crate::args::options::Common;
@@ -35,7 +35,7 @@ pub(crate) struct MaterialArgs {
 
 #[derive(Subcommand)]
 enum MaterialAction {
-    /// List the built-in materials
+    /// List the built-in materials, and those of your settings folder
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -66,7 +66,7 @@ enum MaterialAction {
 
 pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     match &args.action {
-        MaterialAction::List { json: true } => answer(Material::builtins()),
+        MaterialAction::List { json: true } => answer(catalogue::named::<Material>()),
         MaterialAction::List { json: false } => print(&table()),
         MaterialAction::Show { material, json: true } => answer([documents::document(material)?]),
         MaterialAction::Show { material, json: false } => catalogue::show::<Material>(material),
@@ -116,7 +116,7 @@ fn fields(material: &Material) -> Value {
 /// A line for each built-in material.
 fn table() -> String {
     let mut text = format!("{:<18}{:<18}{:<44}description\n", "name", "full white", "models");
-    for material in Material::builtins() {
+    for material in catalogue::named::<Material>() {
         let light = light_of(&material).map(|light| light.to_string());
         let light = light.unwrap_or_else(|| "-".to_owned());
         let mut models = models_and_widths(&material);

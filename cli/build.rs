@@ -1,0 +1,47 @@
+//! Notes what `lamp --version` says of the build: its commit, target and features.
+
+use std::env;
+use std::process::Command;
+
+fn main() {
+    println!("cargo::rustc-env=LAMP_TARGET={}", env::var("TARGET").expect("cargo sets it"));
+    let occt = env::var_os("CARGO_FEATURE_OCCT").is_some();
+    println!("cargo::rustc-env=LAMP_FEATURES={}", if occt { "occt" } else { "none" });
+    println!("cargo::rerun-if-env-changed=LAMP_COMMIT");
+    println!("cargo::rerun-if-changed=build.rs");
+    // A program for tests need not be built again after each commit.
+    let is_release = env::var("PROFILE").is_ok_and(|profile| profile == "release");
+    let given = env::var("LAMP_COMMIT").ok();
+    let commit = given.or_else(|| is_release.then(commit).flatten());
+    let commit = commit.unwrap_or_else(|| "unknown".to_owned());
+    println!("cargo::rustc-env=LAMP_COMMIT_OF_BUILD={commit}");
+    compile_memory();
+}
+
+/// Compiles copies of memory for programs that are linked with musl, if it is slow there.
+fn compile_memory() {
+    let is = |key: &str, value: &str| env::var(key).is_ok_and(|set| set == value);
+    println!("cargo::rerun-if-changed=c/memory.c");
+    if is("CARGO_CFG_TARGET_ENV", "musl") && is("CARGO_CFG_TARGET_ARCH", "x86_64") {
+        let mut build = cc::Build::new();
+        // A compiler that knows these functions would have them call themselves.
+        build.file("c/memory.c").opt_level(2).flag("-fno-builtin");
+        build.flag_if_supported("-fno-tree-loop-distribute-patterns");
+        // Linked whole, so that they come before musl's.
+        build.link_lib_modifier("+whole-archive").compile("lamp_memory");
+    }
+}
+
+/// Returns the commit of the checkout and its day; a package of a registry has none.
+fn commit() -> Option<String> {
+    let git = |words: &[&str]| {
+        let output = Command::new("git").args(words).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then(|| text.trim().to_owned())
+    };
+    let log = git(&["rev-parse", "--git-path", "logs/HEAD"])?;
+    println!("cargo::rerun-if-changed={log}");
+    // The checkout around a package that is unpacked elsewhere is another project's.
+    git(&["ls-files", "--error-unmatch", "build.rs"])?;
+    git(&["log", "-1", "--abbrev=8", "--format=%h %cs"])
+}
