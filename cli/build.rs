@@ -15,20 +15,19 @@ fn main() {
     let commit = given.or_else(|| is_release.then(commit).flatten());
     let commit = commit.unwrap_or_else(|| "unknown".to_owned());
     println!("cargo::rustc-env=LAMP_COMMIT_OF_BUILD={commit}");
-    compile_memory();
+    compile_for_musl();
 }
 
-/// Compiles copies of memory for programs that are linked with musl, if it is slow there.
-fn compile_memory() {
-    let is = |key: &str, value: &str| env::var(key).is_ok_and(|set| set == value);
-    println!("cargo::rerun-if-changed=c/memory.c");
-    if is("CARGO_CFG_TARGET_ENV", "musl") && is("CARGO_CFG_TARGET_ARCH", "x86_64") {
+/// Compiles what programs that are linked with musl need: its allocator and copies are slow.
+fn compile_for_musl() {
+    println!("cargo::rerun-if-changed=c/musl.c");
+    if env::var("CARGO_CFG_TARGET_ENV").is_ok_and(|env| env == "musl") {
         let mut build = cc::Build::new();
         // A compiler that knows these functions would have them call themselves.
-        build.file("c/memory.c").opt_level(2).flag("-fno-builtin");
+        build.file("c/musl.c").define("LAMP_MIMALLOC", None).opt_level(2).flag("-fno-builtin");
         build.flag_if_supported("-fno-tree-loop-distribute-patterns");
         // Linked whole, so that they come before musl's.
-        build.link_lib_modifier("+whole-archive").compile("lamp_memory");
+        build.link_lib_modifier("+whole-archive").compile("lamp_musl");
     }
 }
 

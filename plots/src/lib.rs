@@ -356,8 +356,7 @@ fn font(points: u32) -> TextStyle<'static> {
 fn with_font() {
     static DONE: Once = Once::new();
     DONE.call_once(|| {
-        let font = include_bytes!("../../fonts/roboto-subset.ttf");
-        let registered = register_font(FAMILY, FontStyle::Normal, font);
+        let registered = register_font(FAMILY, FontStyle::Normal, lamp_stack::FONT);
         assert!(registered.is_ok(), "the font that comes with the program is one");
     });
 }

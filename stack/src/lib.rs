@@ -108,3 +108,6 @@ pub use significant::{format_significant, round_significant, to_nm};
 pub use strut::Strut;
 pub use text::{line_of, one_line};
 pub use toml_document::{TomlError, TomlStep, read_toml};
+
+/// The font of plots and labels: Roboto Regular, with the letters that they need.
+pub static FONT: &[u8] = include_bytes!("../fonts/roboto-subset.ttf");

@@ -26,7 +26,9 @@ pub use binaries::{bin, target_dir, workspace_root};
 pub use golden::{Change, Golden, Shade, difference};
 pub use images::{at_least, differing, edited, stripped, with_soft_edges};
 pub use referees::{Packed, ask, ask_python, packed, packed_mask, plain_pages};
-pub use scratch::{Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp};
+pub use scratch::{
+    OWN_SETTINGS, Ran, Scratch, ends_white, mask, masks, read_stack, write_gray_ramp,
+};
 pub use viewing::{Answer, Viewing};
 
 use std::io::Write;

@@ -20,6 +20,9 @@ pub struct Scratch {
     folder: TempDir,
 }
 
+/// The folder, below that of [`Scratch`], whose `lamp` has the settings of commands.
+pub const OWN_SETTINGS: &str = "own-settings";
+
 /// The result of a pipeline.
 #[derive(Clone, Debug)]
 pub struct Ran {
@@ -132,6 +135,9 @@ impl Scratch {
         let mut words = words.split_whitespace();
         let mut command = Command::new(bin(words.next().expect("a command has a name")));
         command.args(words).current_dir(self.folder.path()).stdin(Stdio::null());
+        // The settings of whoever runs the tests must not decide them.
+        let own = if cfg!(windows) { "APPDATA" } else { "XDG_CONFIG_HOME" };
+        command.env(own, self.path(OWN_SETTINGS)).env_remove("LAMP_OPTIONS");
         command
     }
 

@@ -14,8 +14,12 @@ fn said(line: &str) -> String {
 fn every_program_has_a_version() {
     for program in PROGRAMS {
         let version = format!("{program} {}\n", env!("CARGO_PKG_VERSION"));
-        assert_eq!(said(&format!("{program} --version")), version);
         assert_eq!(said(&format!("{program} -V")), version);
+        let long = said(&format!("{program} --version"));
+        assert!(long.starts_with(&version), "{long}");
+        for word in ["\ncommit: ", "\ntarget: ", "\nfeatures: "] {
+            assert!(long.contains(word), "no {word} in {long}");
+        }
     }
 }
 

@@ -346,7 +346,7 @@ fn help_and_version_are_no_errors() {
         if name.contains(' ') {
             continue;
         }
-        let version = scratch.run(&format!("{name} --version")).succeeds_quietly();
+        let version = scratch.run(&format!("{name} -V")).succeeds_quietly();
         let version = String::from_utf8(version.stdout).unwrap();
         assert!(version.trim().ends_with(env!("CARGO_PKG_VERSION")), "{version}");
     }

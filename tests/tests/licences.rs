@@ -6,15 +6,16 @@ use std::process::Command;
 
 use lamp_tests::{Scratch, note, workspace_root};
 
-/// The system that the notices are written for, as `cli/licences/update` has it.
-const TARGET: &str = "x86_64-unknown-linux-gnu";
-
 /// The crates in `lamp`, as lines `name version (licence)`; none where cargo does not have their
 /// sources and cannot fetch them.
 fn crates() -> Option<BTreeSet<String>> {
+    // The systems that the notices are written for.
+    let targets = std::fs::read_to_string(workspace_root().join("cli/licences/targets"));
+    let targets = targets.expect("the file is there");
     let tree = Command::new(env!("CARGO"))
         .args(["tree", "--offline", "--package", "lamp-cli", "--edges", "normal,no-proc-macro"])
-        .args(["--target", TARGET, "--prefix", "none", "--format", "{p}|{l}"])
+        .args(targets.split_whitespace().flat_map(|target| ["--target", target]))
+        .args(["--prefix", "none", "--format", "{p}|{l}"])
         .current_dir(workspace_root())
         .output()
         .expect("cargo starts");

@@ -1,25 +1,13 @@
 //! How the allocator keeps freed memory.
 
-/// Lets the allocator keep what one layer frees for the next, but no more. GNU's gives freed memory
-/// back to the system from 128 KiB on, and asks for it again, unless it has seen a larger block come
-/// and go: a fifth of a stage's time. mimalloc keeps all for a second: commands then take twice the
-/// memory that their layers need.
+/// Lets the allocator keep what one layer frees for the next. GNU's gives freed memory back to the
+/// system from 128 KiB on, and asks for it again, unless it has seen a larger block come and go: a
+/// fifth of a stage's time. (`c/musl.c` sets mimalloc.)
 pub(crate) fn keep_freed_memory() {
-    #[cfg(not(target_env = "musl"))]
     // Freeing a mapped block raises the threshold to its size, up to 32 MiB (M_MMAP_THRESHOLD in
     // mallopt(3)).
+    #[cfg(not(target_env = "musl"))]
     drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
-    #[cfg(target_env = "musl")]
-    {
-        // `mi_option_arena_eager_commit` and `mi_option_purge_delay` of mimalloc.h.
-        for option in [4, 15] {
-            #[expect(unsafe_code, reason = "the allocator is set through a C function")]
-            // SAFETY: it takes two numbers, at any time.
-            unsafe {
-                libmimalloc_sys::mi_option_set(option, 0);
-            }
-        }
-    }
 }
 
 /// Lets the allocator give large blocks back to the system as soon as they are freed. GNU's keeps

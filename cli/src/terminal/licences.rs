@@ -3,7 +3,7 @@
 /// The notices of the crates, as `licences/update` wrote them.
 const CRATES: &str = include_str!("../../licences/notices.txt");
 
-const OWN: &str = include_str!("../../../LICENSE-MIT");
+const OWN: &str = include_str!("../../licences/LICENSE-MIT");
 
 const RULE: &str =
     "--------------------------------------------------------------------------------";

@@ -1,6 +1,6 @@
 //! Outlines of labels' letters, as closed lines.
 
-use lamp_stack::Orientation;
+use lamp_stack::{FONT, Orientation};
 use skrifa::instance::{LocationRef, Size};
 use skrifa::outline::pen::PathStyle;
 use skrifa::outline::{DrawSettings, OutlinePen};
@@ -8,8 +8,6 @@ use skrifa::{FontRef, GlyphId, MetadataProvider};
 
 use super::edit_error::EditProblem;
 use super::fill::PixelPoint;
-
-const FONT: &[u8] = include_bytes!("../../../fonts/roboto-subset.ttf");
 
 /// The end of a text, or its middle, that is at its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]

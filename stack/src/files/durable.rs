@@ -3,9 +3,9 @@
 //! A disk may fail after the last write: a thinly provisioned one is full, a network takes files only
 //! as they are closed. The system then reports it as a file is synced or closed, and nowhere else.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -86,6 +86,8 @@ pub(crate) fn sync_all_in(folder: &Path) -> io::Result<()> {
     let files = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
     let files = files.collect::<io::Result<Vec<_>>>()?;
     // Disks take many at once; an error of a file is reported to whoever syncs it first.
-    files.par_iter().try_for_each(|file| sync(&File::open(file)?))?;
+    // Windows synchronizes only files that are open for writing.
+    let open = |file: &PathBuf| OpenOptions::new().read(true).write(cfg!(windows)).open(file);
+    files.par_iter().try_for_each(|file| sync(&open(file)?))?;
     sync_folder(folder)
 }

@@ -149,7 +149,11 @@ impl FileBeside {
         // Its lock lasts as long as this does.
         let _lock = file.try_clone()?;
         close(Arc::into_inner(file).ok_or_else(|| io::Error::other("it is still being written"))?)?;
-        registered.rename(|| temporary.persist(path).map_err(|error| error.error))
+        registered.rename(|| {
+            // On Windows, the standard library's rename replaces a file that others have open.
+            let kept = temporary.keep().map_err(|error| error.error)?;
+            fs::rename(&kept, path).inspect_err(|_| drop(fs::remove_file(&kept)))
+        })
     }
 }
 

@@ -75,6 +75,8 @@ const OTHERS: &[&str] = &[
     "orient",
     "brep",
     "mesh",
+    "config",
+    "doctor",
     "completions",
     "man",
     "help",

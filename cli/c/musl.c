@@ -1,9 +1,22 @@
-/* memcpy, memmove and memcmp for programs that are linked with musl on x86-64.
+/* For programs that are linked with musl: settings of their allocator, and on x86-64 copies of memory.
  *
  * Rows of runs are copied and compared a few words at a time. musl starts each copy by `rep movsq`,
  * whose start alone costs more than such a row, and compares byte by byte: `tile` took 1.4 times as
  * long. All loads of a short copy come before its stores, so memmove has the same path. */
 
+#ifdef LAMP_MIMALLOC
+void mi_option_set(int option, long value);
+
+/* Before the first allocation. mimalloc keeps what is freed for a second, and has the system back 1 GiB
+ * at once: commands took twice the memory that their layers need. The numbers are
+ * mi_option_arena_eager_commit and mi_option_purge_delay of mimalloc.h. */
+__attribute__((constructor(101))) static void keep_little(void) {
+    mi_option_set(4, 0);
+    mi_option_set(15, 0);
+}
+#endif
+
+#ifdef __x86_64__
 #include <emmintrin.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -117,3 +130,4 @@ int memcmp(const void *one, const void *other, size_t n) {
 int bcmp(const void *one, const void *other, size_t n) {
     return memcmp(one, other, n);
 }
+#endif
