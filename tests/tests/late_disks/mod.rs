@@ -68,6 +68,8 @@ const OTHERS: &[&str] = &[
     "calibrate",
     "brep",
     "batch",
+    "config",
+    "doctor",
     "completions",
     "man",
     "help",
