@@ -1,5 +1,6 @@
 //! Defines the trait of a B-rep kernel, and the facets and surface points that it returns.
 
+use crate::color::Color;
 use crate::error::BrepError;
 use crate::notice::Notice;
 
@@ -28,6 +29,14 @@ pub trait KernelModel: Send + Sync {
     /// # Panics
     /// Panics if there is no such face.
     fn face(&self, face: u32) -> FaceInfo;
+
+    /// Returns the color of a face; `None` if the file gives it none, or the kernel does not know.
+    ///
+    /// # Panics
+    /// May panic if there is no such face.
+    fn color(&self, _face: u32) -> Option<Color> {
+        None
+    }
 
     /// Returns the name of the file's length unit, for reports.
     fn unit(&self) -> &str;

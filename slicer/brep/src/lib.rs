@@ -35,6 +35,7 @@
 #![forbid(unsafe_code)]
 
 mod body_report;
+mod color;
 mod compare;
 mod error;
 mod geometry;
@@ -55,6 +56,7 @@ pub mod vector;
 mod volume;
 
 pub use body_report::{BodyFault, BodyReport};
+pub use color::Color;
 pub use compare::{BodyMeasure, BodyPair, Comparison, KernelDifference, MeasurePair, NamedBody};
 pub use error::BrepError;
 pub use kernel::{

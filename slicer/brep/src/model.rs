@@ -1,5 +1,6 @@
 //! Holds a model in memory: placed bodies, faces, edges and vertices, in millimeters.
 
+use crate::color::Color;
 use crate::geometry::{Curve, Surface, edge_range};
 use crate::kernel::Body;
 use crate::notice::Notice;
@@ -78,6 +79,7 @@ pub(crate) struct Face {
     pub(crate) loops: Vec<Loop>,
     /// The index of the loop marked as the outer one, if exactly one is.
     pub(crate) outer: Option<usize>,
+    pub(crate) color: Option<Color>,
 }
 
 /// A piece of a face's boundary.

@@ -22,7 +22,9 @@ impl BodyReader<'_> {
     /// Adds a face whose loops go counterclockwise.
     fn add(&mut self, entity: u64, surface: Surface, loops: Vec<Loop>) {
         let outwards = !self.geometry.place.is_mirrored();
-        let face = Face { entity, surface, along_normal: true, outwards, loops, outer: None };
+        let color = self.color_of(entity);
+        let face =
+            Face { entity, surface, along_normal: true, outwards, loops, outer: None, color };
         self.model.faces.push(face);
     }
 

@@ -13,6 +13,7 @@ mod read_placement;
 mod read_spline;
 mod read_surface;
 mod shapes;
+mod styles;
 mod token;
 mod topology;
 mod units;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 
 pub use error::StepError;
 
+use crate::color::Color;
 use crate::error::BrepError;
 use crate::heal::heal;
 use crate::kernel::{Body, BrepFinding, FaceInfo, Jet, KernelModel, Tessellation};
@@ -104,6 +106,10 @@ impl KernelModel for StepModel {
             is_closed: face.surface.is_closed(),
             control_box_mm: face.surface.control_box(),
         }
+    }
+
+    fn color(&self, face: u32) -> Option<Color> {
+        self.model.faces[face as usize].color
     }
 
     fn unit(&self) -> &str {

@@ -7,7 +7,9 @@ use super::contents::{PlacedBody, is_whole_surface};
 use super::entities::{Entities, Item};
 use super::error::StepError;
 use super::read_placement::{GeometryReader, MAX_NESTED};
+use super::styles::Styles;
 use super::units::RepresentationUnits;
+use crate::color::Color;
 use crate::geometry::Curve;
 use crate::kernel::Body;
 use crate::model::{BrepEdge, BrepModel, Face, Loop};
@@ -16,6 +18,7 @@ use crate::vector::{sub, unit};
 /// Reads all bodies of a file.
 pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
     let placed = placed(entities)?;
+    let styles = Styles::read(entities);
     let mut model = BrepModel { notices: placed.notices, ..BrepModel::default() };
     for body in placed.bodies {
         // Reports name one unit: the first body's.
@@ -25,7 +28,7 @@ pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
         }
         let first = model.faces.len() as u32;
         let units = body.units.scaled(body.place.scale);
-        let mut reader = BodyReader::new(entities, &body, &units, &mut model);
+        let mut reader = BodyReader::new(entities, &styles, &body, &units, &mut model);
         body.items.iter().try_for_each(|&item| reader.item(item))?;
         let faces = first..model.faces.len() as u32;
         model.bodies.push(Body { name: body.name, faces });
@@ -36,6 +39,9 @@ pub(crate) fn model(entities: &Entities) -> Result<BrepModel, StepError> {
 /// Reads one body.
 pub(super) struct BodyReader<'a> {
     pub(super) entities: &'a Entities,
+    styles: &'a Styles,
+    /// The color of faces that have none of their own.
+    color: Option<Color>,
     pub(super) geometry: GeometryReader<'a>,
     pub(super) model: &'a mut BrepModel,
     /// The indices of vertices and edges in the model, by entity.
@@ -48,6 +54,7 @@ pub(super) struct BodyReader<'a> {
 impl<'a> BodyReader<'a> {
     fn new(
         entities: &'a Entities,
+        styles: &'a Styles,
         body: &PlacedBody,
         units: &'a RepresentationUnits,
         model: &'a mut BrepModel,
@@ -55,11 +62,18 @@ impl<'a> BodyReader<'a> {
         let geometry = GeometryReader { entities, units, place: body.place.axes, is_flat: false };
         // A body that is placed twice has edges of its own in each place.
         let (vertices, edges, sides) = (HashMap::new(), HashMap::new(), HashMap::new());
-        Self { entities, geometry, model, vertices, edges, sides }
+        Self { entities, styles, color: None, geometry, model, vertices, edges, sides }
+    }
+
+    /// Returns the color of a face, a shell or a solid: its own, or the color of the solid
+    /// or shell that contains it.
+    pub(super) fn color_of(&self, id: u64) -> Option<Color> {
+        self.styles.of(id).or(self.color)
     }
 
     /// Reads a solid, a shell, a face or a surface.
     fn item(&mut self, id: u64) -> Result<(), StepError> {
+        self.color = self.styles.of(id);
         if is_whole_surface(self.entities, id) {
             return self.whole_surface(id);
         }
@@ -81,8 +95,12 @@ impl<'a> BodyReader<'a> {
         let item = self.entities.simple(id)?;
         match item.name() {
             "CLOSED_SHELL" | "OPEN_SHELL" | "CONNECTED_FACE_SET" => {
+                let of_solid = self.color;
+                self.color = self.color_of(id);
                 let mut faces = item.references(1)?.into_iter();
-                faces.try_for_each(|face| self.face(face, outwards))
+                let read = faces.try_for_each(|face| self.face(face, outwards));
+                self.color = of_solid;
+                read
             }
             // ISO 10303-42 forbids an oriented shell of an oriented shell, which might be a cycle.
             "ORIENTED_CLOSED_SHELL" | "ORIENTED_OPEN_SHELL"
@@ -114,6 +132,7 @@ impl<'a> BodyReader<'a> {
                 // A mirror turns normals over, but not the sense of loops in parameters.
                 let is_mirrored = self.geometry.place.is_mirrored();
                 let outwards = (along_normal == outwards) != is_mirrored;
+                let color = self.color_of(id);
                 self.model.faces.push(Face {
                     entity: id,
                     surface,
@@ -121,6 +140,7 @@ impl<'a> BodyReader<'a> {
                     outwards,
                     loops,
                     outer,
+                    color,
                 });
                 Ok(())
             }
