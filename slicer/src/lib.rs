@@ -57,9 +57,13 @@ mod gray;
 mod grid;
 mod image_rows;
 mod layer_share;
+mod marks;
+mod named_surface;
 mod number;
 mod obj;
+mod obj_colors;
 mod open;
+mod paint;
 mod part;
 mod part_file;
 mod piece;
@@ -85,6 +89,7 @@ mod words;
 
 /// B-rep models: kernels, and reports of what they read.
 pub use lamp_brep as brep;
+pub use lamp_brep::Color;
 
 pub use bodies::{Bodies, BodyOverlap, FillDoubt, FillRule, Join, Position, Turn};
 pub use error::{AsciiFault, FileChange, ObjFault, SliceError};
@@ -94,9 +99,11 @@ pub use facet_index::FacetIndex;
 pub use fill::Fill;
 pub use gray::{LayerLevels, Shading};
 pub use grid::PixelGrid;
+pub use named_surface::{SurfaceError, SurfaceName, SurfaceNames};
 #[cfg(feature = "occt")]
 pub use open::second_opinion;
 pub use open::{KernelName, OpenOptions, body_name, read_step, step_bytes};
+pub use paint::Paint;
 pub use part::Part;
 pub use placement::{Axis, Placement};
 pub use planes::{LayerHeights, PLANE_TOLERANCE, PlaneRule};

@@ -1,10 +1,12 @@
 //! Reads OBJ, Wavefront's text format: its vertices and faces.
 
 use std::io::{self, Read};
+use std::sync::Arc;
 
 use crate::decimal_mesh::DecimalMesh;
 use crate::error::{ObjFault, SliceError};
 use crate::number::{NumberFault, NumberFormat};
+use crate::obj_colors::{ObjColors, add_word};
 use crate::piece::Piece;
 use crate::read_note::ReadNote;
 use crate::words::Words;
@@ -50,12 +52,17 @@ const PASSED_OVER: [&[u8]; 30] = [
 /// Reads the faces of all objects of a file, which `open` opens, as fans of facets. The facets of a
 /// non-convex face overlap, but have the same sections under either fill rule.
 ///
+/// Colors are read if `colors` returns a place for them.
+///
 /// Returns an error if a vertex, a face or the file cannot be read.
-pub(crate) fn read<R: Read>(open: impl Fn() -> R) -> Result<(Piece, Vec<ReadNote>), SliceError> {
-    match ObjReader::new(open(), NumberFormat::default())?.read() {
+pub(crate) fn read<R: Read>(
+    open: impl Fn() -> R,
+    colors: impl Fn() -> Option<ObjColors>,
+) -> Result<(Piece, Vec<ReadNote>), SliceError> {
+    match ObjReader::new(open(), NumberFormat::default(), colors())?.read() {
         // Only all numbers together show the meaning of commas.
         Err(SliceError::Obj { fault: ObjFault::Comma, .. }) => {
-            ObjReader::new(open(), NumberFormat::with_commas())?.read()
+            ObjReader::new(open(), NumberFormat::with_commas(), colors())?.read()
         }
         read => read,
     }
@@ -70,8 +77,8 @@ struct ObjReader<R> {
 }
 
 impl<R: Read> ObjReader<R> {
-    fn new(text: R, numbers: NumberFormat) -> io::Result<Self> {
-        let (mesh, notes) = (ObjMesh::default(), Vec::new());
+    fn new(text: R, numbers: NumberFormat, colors: Option<ObjColors>) -> io::Result<Self> {
+        let (mesh, notes) = (ObjMesh { colors, ..ObjMesh::default() }, Vec::new());
         Ok(Self { words: Words::new(text)?, numbers, mesh, notes, few_corners: 0 })
     }
 
@@ -96,7 +103,13 @@ impl<R: Read> ObjReader<R> {
         if self.few_corners > 0 {
             self.notes.push(ReadNote::FewCorners { faces: self.few_corners });
         }
-        Ok((self.mesh.mesh.into_piece(), self.notes))
+        let mut piece = self.mesh.mesh.into_piece();
+        if let Some(mut colors) = self.mesh.colors {
+            let missing = std::mem::take(&mut colors.missing).into_iter();
+            self.notes.extend(missing.map(|file| ReadNote::NoMaterials { file }));
+            piece.marks = Some(Arc::new(colors.into_marks()));
+        }
+        Ok((piece, self.notes))
     }
 
     /// Moves to the next word of the current line, which a `\` at its end continues. Returns false
@@ -138,8 +151,29 @@ impl<R: Read> ObjReader<R> {
                 Err(NumberFault::NoNumber) => return Ok(Err(ObjFault::Number)),
             };
         }
+        let number = self.mesh.mesh.vertex_count();
         self.mesh.mesh.add_vertex(vertex);
-        self.pass_over()?;
+        if self.mesh.colors.is_none() {
+            self.pass_over()?;
+            return Ok(Ok(()));
+        }
+        // Of their own: commas in colors must not decide how places are read.
+        let mut numbers = match self.numbers.has_commas {
+            true => NumberFormat::with_commas(),
+            false => NumberFormat::default(),
+        };
+        let mut after = Vec::new();
+        while self.advance()? {
+            let word = self.words.word();
+            let word = word.strip_suffix(b"\\").unwrap_or(word);
+            // A weight alone, or one before the colors, is no color.
+            if after.len() < 4 {
+                after.push(numbers.parse(word).unwrap_or(f64::NAN));
+            }
+        }
+        if let Some(colors) = &mut self.mesh.colors {
+            colors.add_vertex(number, &after);
+        }
         Ok(Ok(()))
     }
 
@@ -168,6 +202,18 @@ impl<R: Read> ObjReader<R> {
         if matches!(&*word, b"curv" | b"curv2" | b"surf") {
             return Ok(Err(ObjFault::FreeForm));
         }
+        if matches!(&*word, b"usemtl" | b"mtllib") && self.mesh.colors.is_some() {
+            let mut name = Vec::new();
+            while self.advance()? {
+                add_word(&mut name, self.words.word());
+            }
+            match &mut self.mesh.colors {
+                Some(colors) if *word == *b"usemtl" => colors.use_material(&name),
+                Some(colors) => colors.add_materials(&name),
+                None => {}
+            }
+            return Ok(Ok(()));
+        }
         if !PASSED_OVER.contains(&&*word) {
             ReadNote::count_statement(&mut self.notes, &word);
         }
@@ -186,6 +232,8 @@ struct ObjMesh {
     mesh: DecimalMesh,
     /// The corners of the current face.
     face: Vec<u32>,
+    /// The colors, if they are read.
+    colors: Option<ObjColors>,
 }
 
 impl ObjMesh {
@@ -201,7 +249,13 @@ impl ObjMesh {
     /// Adds the current face. Returns false if it has fewer than three corners.
     fn add_face(&mut self) -> bool {
         let [first, others @ ..] = &self.face[..] else { return false };
-        others.windows(2).for_each(|pair| self.mesh.add_facet([*first, pair[0], pair[1]]));
+        for pair in others.windows(2) {
+            let corners = [*first, pair[0], pair[1]];
+            self.mesh.add_facet(corners);
+            if let Some(colors) = &mut self.colors {
+                colors.add_facet(corners);
+            }
+        }
         others.len() > 1
     }
 
@@ -260,7 +314,8 @@ f 2 3 4
     const CORNERS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
     fn read_text(text: &str) -> Result<(Vec<Facet>, Vec<ReadNote>), String> {
-        let (piece, notes) = read(|| text.as_bytes()).map_err(|error| error.to_string())?;
+        let (piece, notes) =
+            read(|| text.as_bytes(), || None).map_err(|error| error.to_string())?;
         let Facets::Memory(facets) = piece.facets else { panic!("they are in memory") };
         Ok((facets.to_vec(), notes))
     }

@@ -16,6 +16,7 @@ use crate::archive::not_three_mf;
 use crate::ascii;
 use crate::error::SliceError;
 use crate::obj;
+use crate::obj_colors::ObjColors;
 use crate::part::Part;
 use crate::part_file::OpenPartFile;
 use crate::piece::{Facets, Piece};
@@ -63,6 +64,9 @@ pub struct OpenOptions {
     /// Whether files of any format are accepted at any size, even if single vertices are far
     /// outside the rest, or images have more rows than any machine exposes.
     pub trust_extent: bool,
+    /// Whether colors and painted regions of 3MF and OBJ files are kept, so that
+    /// [`Part::surface`] knows them. Other formats have them at hand.
+    pub keep_marks: bool,
 }
 
 impl Default for OpenOptions {
@@ -74,6 +78,7 @@ impl Default for OpenOptions {
             timeout: Duration::from_secs(300),
             allow_gaps: false,
             trust_extent: false,
+            keep_marks: false,
         }
     }
 }
@@ -179,7 +184,7 @@ fn unpacked(
     // A binary STL may hold any bytes, even the bytes of a package.
     let is_counted = format == Some(FileFormat::Part(PartFormat::BinaryStl));
     if !is_counted && looks_packaged(file, start)? {
-        return three_mf::read(file).map_err(|error| not_three_mf(file, error));
+        return three_mf::read(file, options.keep_marks).map_err(|error| not_three_mf(file, error));
     }
     let of_facets = |facets, notes| of_one(Piece::new(facets), notes);
     match format {
@@ -190,7 +195,8 @@ fn unpacked(
             Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() })
         }
         Some(FileFormat::Part(PartFormat::Obj)) => {
-            let (piece, notes) = obj::read(|| file.reader())?;
+            let colors = || options.keep_marks.then(|| ObjColors::new(file.folder()));
+            let (piece, notes) = obj::read(|| file.reader(), colors)?;
             Ok(of_one(piece, notes))
         }
         Some(FileFormat::Part(PartFormat::AsciiStl)) => {

@@ -29,6 +29,8 @@ pub(crate) struct OpenPartFile {
     file: File,
     /// Its path and state; `None` for a temporary file, which nobody else can open.
     shared: Option<(PathBuf, FileState)>,
+    /// The folder of the file, or of the file that it was unpacked from; `None` for a stream.
+    folder: Option<PathBuf>,
     size: u64,
     digest: String,
     /// The data collected from its blocks if it is a binary STL.
@@ -44,7 +46,8 @@ impl OpenPartFile {
         let state = FileState::of(&file.metadata()?);
         let size = state.size;
         let shared = Some((path.to_owned(), state));
-        Self { file, shared, size, digest: String::new(), seen: Vec::new() }.seen()
+        let folder = path.parent().map(Path::to_owned);
+        Self { file, shared, folder, size, digest: String::new(), seen: Vec::new() }.seen()
     }
 
     /// Keeps a stream in an unnamed temporary file.
@@ -54,7 +57,8 @@ impl OpenPartFile {
     pub(crate) fn of_stream(mut stream: impl Read) -> io::Result<Self> {
         let mut file = tempfile::tempfile()?;
         let size = io::copy(&mut stream, &mut file)?;
-        Self { file, shared: None, size, digest: String::new(), seen: Vec::new() }.seen()
+        let (shared, folder) = (None, None);
+        Self { file, shared, folder, size, digest: String::new(), seen: Vec::new() }.seen()
     }
 
     /// Reads all bytes once, for the digest and for a survey's data.
@@ -75,7 +79,8 @@ impl OpenPartFile {
     /// Creates a part file from a temporary file with this one's content in another form. Its
     /// digest is this one's.
     pub(crate) fn in_other_form(&self, file: File, size: u64) -> Self {
-        Self { file, shared: None, size, digest: self.digest.clone(), seen: Vec::new() }
+        let (folder, digest) = (self.folder.clone(), self.digest.clone());
+        Self { file, shared: None, folder, size, digest, seen: Vec::new() }
     }
 
     /// Returns the first bytes, at most `count`.
@@ -83,6 +88,11 @@ impl OpenPartFile {
         let mut start = Vec::new();
         self.reader().take(count).read_to_end(&mut start)?;
         Ok(start)
+    }
+
+    /// Returns the folder of the file; `None` for a stream.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
     }
 
     /// Returns the size in bytes.

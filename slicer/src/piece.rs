@@ -10,6 +10,7 @@ use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
 use crate::bodies::{BodyRole, BodyRule, Join};
 use crate::facet::{Facet, Units, rounded};
 use crate::file_blocks::{BLOCK_FACETS, FileBlock};
+use crate::marks::FacetMarks;
 use crate::part_file::OpenPartFile;
 use crate::placement::Placement;
 
@@ -37,6 +38,8 @@ pub(crate) struct Piece {
     pub(crate) role: BodyRole,
     /// How its file joins the other files.
     pub(crate) join: Join,
+    /// The marks of its facets, if they were read.
+    pub(crate) marks: Option<Arc<FacetMarks>>,
 }
 
 impl Piece {
@@ -52,6 +55,7 @@ impl Piece {
             object: 0,
             role: BodyRole::default(),
             join: Join::default(),
+            marks: None,
         }
     }
 
@@ -147,8 +151,12 @@ impl Facets {
         }
     }
 
-    /// Calls `each` with every facet of a range.
-    fn for_each(&self, range: Range<usize>, mut each: impl FnMut(&Facet)) -> io::Result<()> {
+    /// Calls `each` with every facet of a range, as it stands in the file.
+    pub(crate) fn for_each(
+        &self,
+        range: Range<usize>,
+        mut each: impl FnMut(&Facet),
+    ) -> io::Result<()> {
         match self {
             Self::Memory(facets) => facets[range].iter().for_each(each),
             Self::Surfaces { prepared, facets } => {

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use lamp_stack::one_line;
+
 /// Contents of a part's file that slicing does not use, or that were read differently from the
 /// format's definition. As text it is one sentence.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,6 +84,11 @@ pub enum ReadNote {
     FewCorners {
         /// The number of faces.
         faces: u64,
+    },
+    /// A file of an OBJ's materials that cannot be read, so that their colors are unknown.
+    NoMaterials {
+        /// Its name in the OBJ.
+        file: String,
     },
 }
 
@@ -204,6 +211,13 @@ impl fmt::Display for ReadNote {
             }
             Self::FewCorners { faces } => {
                 write!(f, "{faces} faces with fewer than three corners are left out")
+            }
+            Self::NoMaterials { file } => {
+                let file: String = one_line(file).chars().take(MAX_CHARACTERS).collect();
+                write!(
+                    f,
+                    "colors of materials are unknown: there is no readable {file} beside the OBJ"
+                )
             }
         }
     }

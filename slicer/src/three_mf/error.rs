@@ -115,6 +115,9 @@ pub enum ModelFault {
         /// The object's number.
         object: u32,
     },
+    /// The digits for a painted triangle contradict themselves.
+    #[error("the paint on a triangle for supports cannot be read: its digits are not a tree")]
+    Paint,
     /// A required extension is not supported.
     #[error("it needs the extension {0}, which is not read")]
     Extension(String),

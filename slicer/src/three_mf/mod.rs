@@ -6,6 +6,7 @@
 //! solids.
 
 mod error;
+mod marks;
 mod model;
 mod package;
 mod project;
@@ -15,6 +16,7 @@ mod tests;
 mod xml;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::BufRead;
 
 use crate::bodies::BodyRole;
 use crate::part_file::OpenPartFile;
@@ -26,6 +28,7 @@ use model::{Object, ObjectReference, ObjectShape, PackageModel};
 use package::{Package, without_root};
 use project::{PROJECT_FILES, Project, UNREAD_FILES, VolumeKind};
 use slices::Prisms;
+use xml::BoundedText;
 
 pub use error::{ModelFault, ThreeMfError};
 pub(crate) use package::looks_packaged;
@@ -43,8 +46,8 @@ pub(crate) struct Contents {
     pub(crate) notes: Vec<ReadNote>,
 }
 
-/// Reads a file's items.
-pub(crate) fn read(file: &OpenPartFile) -> Result<Contents, ThreeMfError> {
+/// Reads a file's items, and the marks of their facets if they are kept.
+pub(crate) fn read(file: &OpenPartFile, keep_marks: bool) -> Result<Contents, ThreeMfError> {
     let mut package = Package::open(file)?;
     let (root, encrypted) = package.model_path()?;
     let mut project = Project::default();
@@ -57,6 +60,7 @@ pub(crate) fn read(file: &OpenPartFile) -> Result<Contents, ThreeMfError> {
         root: root.clone(),
         encrypted,
         project,
+        keep_marks,
         models: BTreeMap::new(),
         sliced: BTreeMap::new(),
         facets: 0,
@@ -155,6 +159,7 @@ struct Models<'a> {
     root: String,
     encrypted: Vec<String>,
     project: Project,
+    keep_marks: bool,
     models: BTreeMap<String, PackageModel>,
     /// The solids of objects that have slices; `None` where the mesh is read.
     sliced: BTreeMap<(String, u32), Option<Piece>>,
@@ -170,9 +175,11 @@ impl Models<'_> {
             }
             let none = Project::default();
             let project = if path == self.root { &self.project } else { &none };
-            let facets = self.facets;
-            let model =
-                self.package.read(path, |text| PackageModel::read(text, facets, project))?;
+            let (facets, marks) = (self.facets, self.keep_marks);
+            let read = |text: &mut BoundedText<&mut dyn BufRead>| {
+                PackageModel::read(text, facets, project, marks)
+            };
+            let model = self.package.read(path, read)?;
             let failed = |(at, fault)| ThreeMfError::Model { model: path.to_owned(), at, fault };
             let model = model.map_err(failed)?;
             self.facets = model.facets_end;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use quick_xml::events::BytesStart;
 
 use super::error::ModelFault;
+use super::marks::MarkReader;
 use super::project::{Project, Volume, VolumeKind};
 use super::slices::{SliceReader, SliceStack};
 use super::xml::{
@@ -29,11 +30,13 @@ enum Effect {
     Shape(&'static str),
 }
 
+const MATERIALS: &str = "/3dmanufacturing/material/";
+
 /// Words in the namespaces of extensions, whose years differ, and the effects of the extensions.
 const EXTENSIONS: [(&str, Effect); 12] = [
     ("/3dmanufacturing/production/alternatives/", Effect::None),
     ("/3dmanufacturing/production/", Effect::None),
-    ("/3dmanufacturing/material/", Effect::None),
+    (MATERIALS, Effect::None),
     ("/3dmanufacturing/trianglesets/", Effect::None),
     ("/3dmanufacturing/slice/", Effect::Slices),
     ("/3dmanufacturing/beamlattice/balls/", Effect::Shape("a beam lattice")),
@@ -95,14 +98,16 @@ pub(super) struct ObjectReference {
 }
 
 impl PackageModel {
-    /// Reads a model whose facets are counted from `first_facet`. A project lists the volumes of
-    /// its objects.
+    /// Reads a model whose facets are counted from `first_facet`, and their marks if they are kept.
+    /// A project lists the volumes of its objects.
     pub(super) fn read(
         text: &mut BoundedText<impl BufRead>,
         first_facet: usize,
         project: &Project,
+        keep_marks: bool,
     ) -> Result<Self, Located> {
         let mut state = ModelReader::new(first_facet, project);
+        state.marks = keep_marks.then(MarkReader::default);
         for_each_piece(text, |piece| match piece {
             Xml::Start(namespace, tag) => state.start(namespace, tag),
             Xml::Text(text) => {
@@ -134,6 +139,7 @@ struct ModelReader<'a> {
     /// The current object and its number.
     object: Option<(u32, Object)>,
     mesh: DecimalMesh,
+    marks: Option<MarkReader>,
     /// Volumes that the model lists itself.
     volumes: Vec<Volume>,
     components: Vec<ObjectReference>,
@@ -153,6 +159,7 @@ impl<'a> ModelReader<'a> {
             own: None,
             object: None,
             mesh: DecimalMesh::default(),
+            marks: None,
             volumes: Vec::new(),
             components: Vec::new(),
             setting: None,
@@ -168,6 +175,10 @@ impl<'a> ModelReader<'a> {
             }
             return Ok(());
         };
+        let is_material = namespace != own && namespace.contains(MATERIALS);
+        if let Some(marks) = self.marks.as_mut().filter(|_| namespace == own || is_material) {
+            marks.start(tag)?;
+        }
         if namespace != own {
             return self.start_of_extension(namespace, tag);
         }
@@ -286,10 +297,12 @@ impl<'a> ModelReader<'a> {
         }
         let components = std::mem::take(&mut self.components);
         let mesh = std::mem::take(&mut self.mesh).into_piece();
+        let marks = self.marks.as_mut().map(MarkReader::end_object);
         let own_volumes = std::mem::take(&mut self.volumes);
         let Some((id, mut object)) = self.object.take() else { return Ok(()) };
         object.shape = if components.is_empty() {
-            let piece = Piece { first_facet: self.first_facet, units: Some(self.units), ..mesh };
+            let (first_facet, units) = (self.first_facet, Some(self.units));
+            let piece = Piece { first_facet, units, marks, ..mesh };
             self.first_facet += piece.facets.count();
             object.kind = object.kind.of_part(&self.project.kind_of_mesh(id));
             let volumes = self.project.volumes(id).unwrap_or(&own_volumes);
@@ -332,14 +345,17 @@ fn volumes_of(mesh: &Piece, volumes: &[Volume]) -> Option<Vec<(VolumeKind, Piece
     let mut pieces = Vec::new();
     let mut add = |range: std::ops::Range<usize>, kind: &VolumeKind| {
         let first_facet = mesh.first_facet + range.start;
-        let facets = match range.len() == count {
+        let (facets, marks) = match range.len() == count {
             // A mesh of one volume needs no copy.
-            true => facets.clone(),
-            false => Arc::new(facets[range].to_vec()),
+            true => (facets.clone(), mesh.marks.clone()),
+            false => {
+                let marks = mesh.marks.as_ref().map(|marks| Arc::new(marks.of_range(&range)));
+                (Arc::new(facets[range].to_vec()), marks)
+            }
         };
         pieces.push((
             kind.clone(),
-            Piece { facets: Facets::Memory(facets), first_facet, ..mesh.clone() },
+            Piece { facets: Facets::Memory(facets), first_facet, marks, ..mesh.clone() },
         ));
     };
     let mut end = 0;
