@@ -26,7 +26,8 @@ impl<'a> RecordedSlicing<'a> {
         Some(Self { settings, files, digest: &stack.digest })
     }
 
-    /// Opens the part. `name` is the name of the stack.
+    /// Opens the part. `name` is the name of the stack; colors and painted regions of facets are kept
+    /// on request.
     ///
     /// # Errors
     /// Returns an error if the stack was not sliced from these files as they are and stand.
@@ -34,9 +35,10 @@ impl<'a> RecordedSlicing<'a> {
         &self,
         parts: &[PartFile],
         name: &str,
+        keep_marks: bool,
         watcher: &dyn Watcher,
     ) -> Result<Part, Error> {
-        let reading = Reading { dpi: self.settings.dpi, may_be_open: false, watcher };
+        let reading = Reading { dpi: self.settings.dpi, may_be_open: false, keep_marks, watcher };
         let model = self.settings.solid.open(parts, &reading)?;
         if model.digest() != self.digest {
             let part = name_of_all(parts);

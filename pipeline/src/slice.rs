@@ -260,7 +260,12 @@ impl SliceStage {
                 .check_machine(machine)
                 .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
         }
-        let reading = Reading { dpi: settings.dpi, may_be_open: self.fallback.is_some(), watcher };
+        let reading = Reading {
+            dpi: settings.dpi,
+            may_be_open: self.fallback.is_some(),
+            keep_marks: false,
+            watcher,
+        };
         let part = settings.solid.open(parts, &reading)?;
         if self.fallback.is_some() && part.prepared().next().is_none() {
             return Err(Error::settings("--fallback needs a STEP part"));

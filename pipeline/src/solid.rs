@@ -3,14 +3,16 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use lamp_slicing::brep::vector::Vec3;
 use lamp_slicing::{
-    Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, Units,
+    Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, SurfaceError,
+    SurfaceName, Units,
 };
 use lamp_stack::Dpi;
 use serde::{Deserialize, Serialize};
 
 use crate::documents::is_stream;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::part_file::{PartFile, PartPlacement, paths};
 use crate::placement::PlacementSettings;
 use crate::size::PartSize;
@@ -109,6 +111,19 @@ impl SolidSettings {
         FacetIndex::new(model, &self.placement(), self.units)
     }
 
+    /// Returns the facets of surfaces of the part in its place: corners in millimeters. Colors and
+    /// painted regions are known if the part was read to [keep](Reading::keep_marks) them.
+    ///
+    /// # Errors
+    /// Returns an error if the part has no such surface, or cannot be read.
+    pub fn surface(&self, model: &Part, name: SurfaceName) -> Result<Vec<[Vec3; 3]>, Error> {
+        let found = model.surface(name, &self.placement(), self.units);
+        found.map_err(|error| match error {
+            SurfaceError::Part(error) => error.into(),
+            error => Error::new(ErrorKind::Settings, error),
+        })
+    }
+
     /// Opens all files of a part.
     pub fn open(&self, parts: &[PartFile], reading: &Reading<'_>) -> Result<Part, Error> {
         if self.bodies == Bodies::Xor && self.fill == Fill::Solid {
@@ -139,6 +154,7 @@ impl SolidSettings {
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
             trust_extent: self.trust_extent,
+            keep_marks: reading.keep_marks,
             ..self.step.reader.for_opening(tolerance)?
         };
         let model = match is_stream(path) {
@@ -174,6 +190,8 @@ pub struct Reading<'a> {
     pub dpi: Dpi,
     /// Whether bodies of STEP files may have gaps.
     pub may_be_open: bool,
+    /// Whether colors and painted regions of facets are kept.
+    pub keep_marks: bool,
     /// Takes notes about the files.
     pub watcher: &'a dyn Watcher,
 }

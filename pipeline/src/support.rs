@@ -4,8 +4,9 @@ use std::fmt;
 use std::num::{NonZeroU8, NonZeroU32};
 use std::str::FromStr;
 
+use lamp_slicing::SurfaceName;
 use lamp_stack::Length;
-use lamp_supports::{AvoidedBox, CheckOptions, PillarSizes, SupportFoot, SupportOptions};
+use lamp_supports::{AvoidedSurface, CheckOptions, PillarSizes, SupportFoot, SupportOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::words::{list, optional, text, words_of};
@@ -26,9 +27,9 @@ pub struct SupportSettings {
     /// Distance of supports of such undersides.
     #[serde(with = "text")]
     pub spacing: Length,
-    /// Boxes whose surfaces no support may touch.
+    /// Surfaces that no support may touch.
     #[serde(with = "list", skip_serializing_if = "Vec::is_empty")]
-    pub avoid: Vec<AvoidedBox>,
+    pub avoid: Vec<AvoidedSurface>,
     /// Least diameter of the tips of pillars.
     #[serde(with = "text")]
     pub tip: Length,
@@ -84,7 +85,7 @@ impl Default for SupportSettings {
             to: options.to,
             overhangs: options.overhangs.map(Degrees),
             spacing: options.spacing,
-            avoid: options.avoid,
+            avoid: options.avoid.into_iter().map(AvoidedSurface::Box).collect(),
             tip: options.pillar.tip,
             pillar: options.pillar.diameter,
             base: options.pillar.base,
@@ -111,13 +112,18 @@ impl SupportSettings {
         format!("support{}", words_of(self))
     }
 
-    /// Returns the options of the search for supports.
+    /// Returns the options of the search for supports. Surfaces that are named, to be avoided, are of
+    /// the part.
     pub fn options(&self) -> SupportOptions {
+        let of_box = |surface: &AvoidedSurface| match surface {
+            AvoidedSurface::Box(of_box) => Some(*of_box),
+            AvoidedSurface::Named(_) => None,
+        };
         SupportOptions {
             to: self.to,
             overhangs: self.overhangs.map(|angle| angle.0),
             spacing: self.spacing,
-            avoid: self.avoid.clone(),
+            avoid: self.avoid.iter().filter_map(of_box).collect(),
             pillar: PillarSizes {
                 tip: self.tip,
                 diameter: self.pillar,
@@ -135,6 +141,14 @@ impl SupportSettings {
             least_support: self.least_support,
             threshold: self.threshold,
         }
+    }
+
+    /// Returns the names of surfaces to avoid.
+    pub fn avoided_names(&self) -> impl Iterator<Item = SurfaceName> {
+        self.avoid.iter().filter_map(|surface| match surface {
+            AvoidedSurface::Box(_) => None,
+            AvoidedSurface::Named(name) => Some(*name),
+        })
     }
 
     /// Returns the options of the search for islands.

@@ -42,7 +42,8 @@ pub use record::{
     PocketRecord, PointRecord, Scale, Shown, ShownMoment, StrayRowsRecord, records,
 };
 pub use support::{
-    AvoidError, AvoidedBox, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection, Rod, Support,
-    SupportError, SupportFoot, SupportOptions, SupportPlan, SupportShare, Surface, Vent, VentPlan,
-    avoided_boxes, flood_supports, padded, plan_braces, plan_supports, plan_vents, room_for,
+    AvoidError, AvoidedBox, AvoidedSurface, Braces, HeldPlace, IslandPlan, PillarSizes, Rejection,
+    Rod, Support, SupportError, SupportFoot, SupportOptions, SupportPlan, SupportShare, Surface,
+    Vent, VentPlan, avoided_surfaces, flood_supports, padded, plan_braces, plan_supports,
+    plan_vents, room_for,
 };

@@ -1,6 +1,6 @@
 //! Checks that `lamp support` holds islands, and that its plan draws the same supports.
 
-use lamp_fixtures::Sample;
+use lamp_fixtures::{Mesh, Sample};
 use lamp_stack::Image;
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
@@ -268,9 +268,127 @@ fn undersides_are_held_and_surfaces_avoided() {
             }
         }
     }
-    scratch.write("color.toml", b"[[avoid]]\ncolor = \"red\"\n");
-    let colors = scratch.run(&format!("{line} --avoid color.toml -o out.tif"));
-    colors.is_wrong_usage(&["parts are read without their colors"]);
+    scratch.write("two.toml", b"[[avoid]]\ncolor = \"red\"\nface = 3\n");
+    let two = scratch.run(&format!("{line} --avoid two.toml -o out.tif"));
+    two.is_wrong_usage(&["two.toml", "line 1", "in a table of its own"]);
+    let vent = scratch.run("lamp support core.tif --vent 2mm --plan vents.toml --avoid avoid.toml");
+    vent.is_wrong_usage(&["--vent", "--avoid"]);
+}
+
+/// Returns the cores in their cavity, and which facets are of the floor below them, which is level
+/// at 2 mm and has |x| < 10 mm and |y| < 6 mm.
+fn cores_and_floor() -> (Mesh, Vec<bool>) {
+    let mesh = lamp_fixtures::build(Sample::Core, 2_000).unwrap();
+    let is_floor = |facet: &[[f32; 3]; 3]| {
+        facet.iter().all(|[x, y, z]| *z == 2.0 && x.abs() <= 10.0 && y.abs() <= 6.0)
+    };
+    let floor = mesh.facets.iter().map(is_floor).collect();
+    (mesh, floor)
+}
+
+/// Returns the distances of all contacts of a report from a level rectangle, in millimeters: of
+/// supports that are drawn, and of their alternatives.
+fn distances_mm(report: &Value, [low, high]: [[f64; 3]; 2]) -> Vec<f64> {
+    let distance = |support: &Value| {
+        let at = |k: usize| support["contact_mm"][k].as_f64().unwrap();
+        (0..3).map(|k| (at(k) - at(k).clamp(low[k], high[k])).powi(2)).sum::<f64>().sqrt()
+    };
+    let places =
+        report["plans"].as_array().unwrap().iter().flat_map(|plan| plan["places"].as_array());
+    let supports = places.flatten().flat_map(|place| place["supports"].as_array().unwrap());
+    supports.map(distance).collect()
+}
+
+#[test]
+fn colored_and_painted_floors_have_no_contacts() {
+    let (mesh, floor) = cores_and_floor();
+    assert!(floor.iter().filter(|is_floor| **is_floor).count() > 10);
+    let scratch = Scratch::new();
+    // Red on the floor, as VisCAM writes it.
+    let mut stl = vec![b' '; 80];
+    stl.extend((mesh.facets.len() as u32).to_le_bytes());
+    for (facet, is_floor) in mesh.facets.iter().zip(&floor) {
+        stl.extend([0; 12]);
+        stl.extend(facet.iter().flatten().flat_map(|number| number.to_le_bytes()));
+        stl.extend(if *is_floor { 0xFC00u16 } else { 0x83FF }.to_le_bytes());
+    }
+    scratch.write("core.stl", &stl);
+    let mut object = mesh.three_mf_object(1);
+    let mut triangles = object.split("<triangle v1").map(str::to_owned).collect::<Vec<_>>();
+    for (triangle, is_floor) in triangles[1..].iter_mut().zip(&floor) {
+        // Divided in four, all of which are blocked.
+        let paint = if *is_floor { "paint_supports=\"88883\"/>" } else { "paint_supports=\"4\"/>" };
+        *triangle = triangle.replacen("/>", paint, 1);
+    }
+    object = triangles.join("<triangle v1");
+    let item = "<item objectid=\"1\"/>";
+    let model = lamp_fixtures::three_mf_model("millimeter", &object, item);
+    scratch.write("core.3mf", &lamp_fixtures::three_mf(&model, &[]));
+    scratch.write("red.toml", b"[[avoid]]\ncolor = \"#FF0000\"\n");
+    scratch.write("blocked.toml", b"[[avoid]]\npainted = \"blocked\"\n");
+
+    for (part, list) in [("core.stl", "red.toml"), ("core.3mf", "blocked.toml")] {
+        // A quarter turn, and three quarters as high.
+        let place = "--scale 1,1,0.75 --rotate z:90 --translate 5,3,1";
+        scratch.run(&format!("slice {part} --dpi 254 {place} -q -o core.tif")).succeeds_quietly();
+        let floor = [[-1.0, -7.0, 2.5], [11.0, 13.0, 2.5]];
+        let line = format!(
+            "lamp support core.tif --part {part} --hold 5mm --least-support 0 --report report.json --plan plan.toml"
+        );
+        scratch.run(&format!("{line} -o held.tif")).succeeds();
+        let before = distances_mm(&report(&scratch, "report.json"), floor);
+        assert!(before.contains(&0.0), "{before:?}");
+        let ran = scratch.run(&format!("{line} --avoid {list} -o held.tif")).succeeds();
+        assert!(ran.stderr.contains("on a surface to avoid"), "{}", ran.stderr);
+        let after = distances_mm(&report(&scratch, "report.json"), floor);
+        assert!(!after.is_empty() && after.iter().all(|distance| *distance > 0.25), "{after:?}");
+        scratch.run("lamp edit core.tif plan.toml -q -o edited.tif").succeeds_quietly();
+        assert!(scratch.bytes("edited.tif") == scratch.bytes("held.tif"));
+    }
+
+    let line = "lamp support core.tif --part core.3mf -o held.tif";
+    let refused = |text: &str, words: &[&str]| {
+        scratch.write("other.toml", format!("[[avoid]]\n{text}\n").as_bytes());
+        scratch.run(&format!("{line} --avoid other.toml --force")).is_wrong_usage(words);
+    };
+    refused(
+        "color = \"red\"",
+        &["core.3mf: no surface is `color #ff0000`", "no facet of the part has a color"],
+    );
+    refused("face = 42", &["`face #42`", "only faces of STEP parts"]);
+}
+
+#[test]
+fn tips_of_pillars_avoid_colored_undersides() {
+    let (mesh, _) = cores_and_floor();
+    let scratch = Scratch::new();
+    // The undersides of the cores, at 8 and 12 mm.
+    let obj = mesh.obj();
+    let faces = obj.lines().filter(|line| line.starts_with('f')).zip(&mesh.facets);
+    let mut colored: String =
+        obj.lines().filter(|line| line.starts_with('v')).map(|line| format!("{line}\n")).collect();
+    colored.insert_str(0, "mtllib core.mtl\n");
+    for (face, facet) in faces {
+        let is_underside = facet.iter().all(|[.., z]| *z == 8.0);
+        let material = if is_underside { "under" } else { "rest" };
+        colored += &format!("usemtl {material}\n{face}\n");
+    }
+    scratch.write("core.obj", colored.as_bytes());
+    scratch.write("core.mtl", b"newmtl under\nKd 0 1 0\nnewmtl rest\nKd 0.5 0.5 0.5\n");
+    scratch.write("under.toml", b"[[avoid]]\ncolor = \"green\"\n");
+    // The underside is at the bottom of a layer, and between bottom and top.
+    for options in ["", "--translate 0,0,0.05", "--plane middle --translate 0,0,0.03"] {
+        scratch
+            .run(&format!("slice core.obj --dpi 254 {options} -q -o core.tif"))
+            .succeeds_quietly();
+        // Tips much thinner than a layer.
+        let line = "lamp support core.tif --part core.obj --to both --tip 50um --report report.json \
+                    --avoid under.toml -o held.tif";
+        scratch.run(line).succeeds();
+        let plans = report(&scratch, "report.json")["plans"].clone();
+        let lefts: Vec<_> = plans.as_array().unwrap().iter().map(|plan| &plan["left"]).collect();
+        assert_eq!(lefts, [true, false]);
+    }
 }
 
 #[test]

@@ -15,7 +15,8 @@ use lamp_pipeline::fix::FixSettings;
 use lamp_pipeline::support::{Curvature, Degrees, SupportSettings};
 use lamp_stack::{Length, Op};
 use lamp_supports::{
-    AvoidedBox, CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions, avoided_boxes,
+    AvoidedSurface, CheckOptions, FindingGroup, PillarSizes, SupportFoot, SupportOptions,
+    avoided_surfaces,
 };
 
 use crate::args::lamp_option::LampOption;
@@ -144,14 +145,14 @@ pub(crate) struct CheckStageArgs {
     machine: PathBuf,
 }
 
-/// The boxes of a file.
+/// The surfaces of a file.
 #[derive(Clone)]
-struct Avoided(Vec<AvoidedBox>);
+struct Avoided(Vec<AvoidedSurface>);
 
-/// Reads a list of boxes.
+/// Reads a list of surfaces.
 fn parse_avoided(path: &str) -> Result<Avoided, String> {
     let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
-    avoided_boxes(&text).map(Avoided).map_err(|error| error.to_string())
+    avoided_surfaces(&text).map(Avoided).map_err(|error| error.to_string())
 }
 
 /// Parses an angle above zero.
@@ -189,7 +190,7 @@ pub(crate) struct SupportStageArgs {
     #[arg(value_parser = parse_thickness, help_heading = CHOICE)]
     spacing: Length,
 
-    /// Boxes whose surfaces no support may touch, a TOML file
+    /// Surfaces that no support may touch, by box, color, face or paint, a TOML file
     #[arg(long, value_name = "FILE.toml", value_parser = parse_avoided, help_heading = CHOICE)]
     avoid: Option<Avoided>,
 

@@ -174,7 +174,7 @@ fn outline(
     let sliced = RecordedSlicing::of(stack).with_context(|| {
         format!("{name} does not record how its part was sliced: leave out --part")
     })?;
-    let model = sliced.open(parts, name, progress)?;
+    let model = sliced.open(parts, name, false, progress)?;
     let part = name_of_all(parts);
     course
         .outline(model, &sliced.settings.for_slicing())

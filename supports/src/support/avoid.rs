@@ -4,9 +4,19 @@ use std::fmt;
 use std::str::FromStr;
 
 use lamp_slicing::brep::vector::Vec3;
-use lamp_stack::{Length, line_of, one_line};
+use lamp_slicing::{Paint, SurfaceName};
+use lamp_stack::{Length, UnknownName, line_of, one_line};
 use serde::Deserialize;
 use thiserror::Error;
+
+/// Surfaces that no support may touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AvoidedSurface {
+    /// All surfaces in a box.
+    Box(AvoidedBox),
+    /// The surfaces of a name.
+    Named(SurfaceName),
+}
 
 /// A box in part coordinates whose surfaces no support may touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,75 +27,118 @@ pub struct AvoidedBox {
 
 /// An error in a list of surfaces to avoid.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum AvoidError {
-    /// It is no list of boxes.
-    #[error("line {line}: {problem}")]
-    Syntax {
-        /// The line, from 1.
-        line: usize,
-        /// The fault in it.
-        problem: String,
-    },
-    /// A box is named by something that parts do not keep.
-    #[error(
-        "line {line}: parts are read without their {key}s: name the surface by a box, as \
-         x = [\"0mm\", \"5mm\"], y and z"
-    )]
-    NotKept {
-        /// The line, from 1.
-        line: usize,
-        /// The key.
-        key: &'static str,
-    },
+#[error("line {line}: {problem}")]
+pub struct AvoidError {
+    /// The line, from 1.
+    pub line: usize,
+    /// The fault in it.
+    pub problem: String,
 }
 
-/// Reads a list of boxes from TOML.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AvoidFile {
+    avoid: Vec<toml::Spanned<AvoidTable>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AvoidTable {
+    x: Option<[String; 2]>,
+    y: Option<[String; 2]>,
+    z: Option<[String; 2]>,
+    color: Option<String>,
+    face: Option<toml::Value>,
+    painted: Option<String>,
+}
+
+/// Reads a list of surfaces from TOML.
 ///
 /// # Errors
 /// Returns an error with the line if the text is no such list.
-pub fn avoided_boxes(text: &str) -> Result<Vec<AvoidedBox>, AvoidError> {
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct AvoidFile {
-        avoid: Vec<toml::Spanned<AvoidTable>>,
-    }
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct AvoidTable {
-        x: Option<[String; 2]>,
-        y: Option<[String; 2]>,
-        z: Option<[String; 2]>,
-        color: Option<toml::Value>,
-        face: Option<toml::Value>,
-    }
-    let file: AvoidFile = toml::from_str(text).map_err(|error| AvoidError::Syntax {
+pub fn avoided_surfaces(text: &str) -> Result<Vec<AvoidedSurface>, AvoidError> {
+    let file: AvoidFile = toml::from_str(text).map_err(|error| AvoidError {
         line: line_of(text, error.span()),
         problem: one_line(error.message()),
     })?;
-    let read = |table: toml::Spanned<AvoidTable>| {
+    let mut surfaces = Vec::new();
+    for table in file.avoid {
         let line = line_of(text, Some(table.span()));
-        let table = table.into_inner();
-        for (key, value) in [("color", &table.color), ("face", &table.face)] {
-            if value.is_some() {
-                return Err(AvoidError::NotKept { line, key });
+        let named = table.into_inner().surfaces();
+        surfaces.extend(named.map_err(|problem| AvoidError { line, problem })?);
+    }
+    Ok(surfaces)
+}
+
+impl AvoidTable {
+    /// Returns the surfaces of the table: several if it lists faces.
+    fn surfaces(self) -> Result<Vec<AvoidedSurface>, String> {
+        let Self { x, y, z, color, face, painted } = self;
+        let is_box = x.is_some() || y.is_some() || z.is_some();
+        let kinds = [is_box, color.is_some(), face.is_some(), painted.is_some()];
+        if kinds.iter().filter(|is_given| **is_given).count() != 1 {
+            return Err("write a box (x, y and z), a color, a face or painted, in a table of its \
+                        own"
+            .to_owned());
+        }
+        let mut names = Vec::new();
+        if let Some(color) = color {
+            names.push(SurfaceName::Color(color.parse()?));
+        }
+        if let Some(paint) = painted {
+            let paint: Paint = paint.parse().map_err(|error: UnknownName| error.to_string())?;
+            names.push(SurfaceName::Painted(paint));
+        }
+        if let Some(face) = face {
+            let faces = match face {
+                toml::Value::Array(faces) => faces,
+                face => vec![face],
+            };
+            for face in faces {
+                let number = face.as_integer().and_then(|number| u64::try_from(number).ok());
+                let number = number.ok_or_else(|| {
+                    let face = one_line(&face.to_string());
+                    format!(
+                        "{face} is no face: write its number in the STEP file, such as 42 for #42"
+                    )
+                })?;
+                names.push(SurfaceName::Face(number));
             }
         }
-        let syntax = |problem: String| AvoidError::Syntax { line, problem };
+        if !is_box {
+            return Ok(names.into_iter().map(AvoidedSurface::Named).collect());
+        }
         let side = |name: &str, side: Option<[String; 2]>| {
-            let side = side.ok_or_else(|| syntax(format!("a box without {name}")))?;
-            let [from, to] = side.map(|text| text.parse::<Length>());
-            let from = from.map_err(|error| syntax(error.to_string()))?;
-            let to = to.map_err(|error| syntax(error.to_string()))?;
-            if from < to {
-                Ok([from, to])
-            } else {
-                Err(syntax(format!("{from} is not below {to}")))
-            }
+            let [from, to] = side.ok_or_else(|| format!("a box without {name}"))?;
+            let length = |text: &str| text.parse::<Length>().map_err(|error| error.to_string());
+            let (from, to) = (length(&from)?, length(&to)?);
+            if from < to { Ok([from, to]) } else { Err(format!("{from} is not below {to}")) }
         };
-        Ok(AvoidedBox { sides: [side("x", table.x)?, side("y", table.y)?, side("z", table.z)?] })
-    };
-    file.avoid.into_iter().map(read).collect()
+        let sides = [side("x", x)?, side("y", y)?, side("z", z)?];
+        Ok(vec![AvoidedSurface::Box(AvoidedBox { sides })])
+    }
+}
+
+impl fmt::Display for AvoidedSurface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Box(of_box) => of_box.fmt(f),
+            Self::Named(name) => name.fmt(f),
+        }
+    }
+}
+
+impl FromStr for AvoidedSurface {
+    type Err = String;
+
+    /// Parses a box, such as `0mm..5mm x 0mm..5mm x 2mm..3mm`, or the name of a surface, such as
+    /// `color #ff0000`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.contains("..") {
+            true => text.parse().map(Self::Box),
+            false => text.parse().map(Self::Named),
+        }
+    }
 }
 
 impl AvoidedBox {
@@ -130,24 +183,58 @@ mod tests {
     #[test]
     fn boxes_are_read_and_written() {
         let text = "[[avoid]]\nx = [\"-1mm\", \"5mm\"]\ny = [\"0mm\", \"500um\"]\nz = [\"2mm\", \"3mm\"]\n";
-        let boxes = avoided_boxes(text).unwrap();
-        assert_eq!(boxes[0].to_string(), "-1mm..5mm x 0um..500um x 2mm..3mm");
-        assert_eq!(boxes[0].to_string().parse(), Ok(boxes[0]));
+        let [AvoidedSurface::Box(first)] = avoided_surfaces(text).unwrap()[..] else {
+            panic!("a box")
+        };
+        assert_eq!(first.to_string(), "-1mm..5mm x 0um..500um x 2mm..3mm");
+        assert_eq!(first.to_string().parse(), Ok(AvoidedSurface::Box(first)));
         for (x, is_met) in [(5.0, true), (5.3, true), (5.4, false), (2.0, true), (-1.4, false)] {
-            assert_eq!(boxes[0].is_met([x, 0.2, 2.5], 0.35), is_met, "{x}");
+            assert_eq!(first.is_met([x, 0.2, 2.5], 0.35), is_met, "{x}");
         }
         // At a corner, by the distance in space.
-        assert!(!boxes[0].is_met([5.3, 0.8, 2.5], 0.35));
-        let error = |text: &str| avoided_boxes(text).unwrap_err().to_string();
-        assert!(error("[[avoid]]\ncolor = \"red\"\n").contains("without their colors"));
-        assert!(
-            error(
-                "[[avoid]]\nx = [\"1mm\", \"0mm\"]\ny = [\"0mm\", \"1mm\"]\nz = [\"0mm\", \"1mm\"]"
-            )
-            .contains("not below")
+        assert!(!first.is_met([5.3, 0.8, 2.5], 0.35));
+    }
+
+    #[test]
+    fn names_are_read_and_written() {
+        let text = "[[avoid]]\ncolor = \"#FF8000\"\n[[avoid]]\nface = [42, 43]\n[[avoid]]\n\
+                    face = 7\n[[avoid]]\npainted = \"blocked\"\n[[avoid]]\ncolor = \"red\"\n";
+        let surfaces = avoided_surfaces(text).unwrap();
+        let written: Vec<String> = surfaces.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            written,
+            [
+                "color #ff8000",
+                "face #42",
+                "face #43",
+                "face #7",
+                "painted blocked",
+                "color #ff0000"
+            ]
         );
-        assert!(error("[[avoid]]\nx = [\"1mm\", \"2mm\"]").contains("without y"));
-        assert!(error("[[avoid]]\nq = 1").starts_with("line 2"));
-        assert!(error("nonsense").starts_with("line 1"));
+        assert!(written.iter().zip(surfaces).all(|(text, surface)| text.parse() == Ok(surface)));
+    }
+
+    #[test]
+    fn faults_have_lines() {
+        for (text, words) in [
+            ("color = \"teal\"", "`teal` is not a color"),
+            ("face = \"#42\"", "such as 42 for #42"),
+            ("face = [1, -1]", "-1 is no face"),
+            ("face = [[1]]", "[1] is no face"),
+            ("painted = \"red\"", "none of enforced, blocked"),
+            ("", "write a box"),
+            ("color = \"red\"\nface = 1", "in a table of its own"),
+            ("color = \"red\"\nx = [\"1mm\", \"2mm\"]", "in a table of its own"),
+            ("x = [\"1mm\", \"0mm\"]\ny = [\"0mm\", \"1mm\"]\nz = [\"0mm\", \"1mm\"]", "not below"),
+            ("x = [\"1mm\", \"2mm\"]", "without y"),
+            ("x = [\"1mm\", \"2\"]", "unit"),
+            ("q = 1", "unknown field"),
+        ] {
+            let error = avoided_surfaces(&format!("[[avoid]]\n{text}\n")).unwrap_err();
+            assert!(error.problem.contains(words) && !error.problem.contains('\n'), "{error}");
+            assert!((1..=3).contains(&error.line), "{error}");
+        }
+        assert!(avoided_surfaces("nonsense").unwrap_err().to_string().starts_with("line 1"));
     }
 }

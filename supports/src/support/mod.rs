@@ -11,6 +11,7 @@
 //! Source: 002 section 4.4, algorithm 17.
 
 mod avoid;
+mod avoided_facets;
 mod brace;
 mod cone;
 mod divide;
@@ -39,7 +40,7 @@ use lamp_stack::Length;
 use std::num::{NonZeroU8, NonZeroU32};
 
 use crate::check::Island;
-pub use avoid::{AvoidError, AvoidedBox, avoided_boxes};
+pub use avoid::{AvoidError, AvoidedBox, AvoidedSurface, avoided_surfaces};
 pub use brace::{Braces, plan_braces};
 pub use error::SupportError;
 pub use flood::flood_supports;
@@ -104,7 +105,8 @@ pub struct SupportOptions {
     pub overhangs: Option<f64>,
     /// The distance of supports of such undersides.
     pub spacing: Length,
-    /// Boxes whose surfaces no support may touch.
+    /// Boxes whose surfaces no support may touch; the [`Surface`] has the facets that none may
+    /// touch.
     pub avoid: Vec<AvoidedBox>,
     /// The sizes of supports that end on the platform.
     pub pillar: PillarSizes,

@@ -134,7 +134,7 @@ impl SupportPlanner<'_> {
         let pillar = |pixel: &[u32; 2]| {
             let [x, y] = self.raster.place_mm(pixel.map(|place| f64::from(place) + 0.5));
             let foot = [x, y, self.bottom_mm(0)];
-            if self.is_avoided([x, y, z], ground.tip.mm() / 2.0) {
+            if self.is_origin_avoided([x, y, z], ground.tip.mm() / 2.0, layer) {
                 why = Rejection::Avoided;
                 return None;
             }
@@ -198,7 +198,7 @@ impl SupportPlanner<'_> {
         let middle = piece.middle.map(|place| place.floor() + 0.5);
         let [x, y] = self.raster.place_mm(middle);
         let origin = [x, y, self.bottom_mm(around.layer)];
-        if self.is_avoided(origin, ground.tip.mm() / 2.0) {
+        if self.is_origin_avoided(origin, ground.tip.mm() / 2.0, around.layer) {
             return vec![Err(Rejection::Avoided)];
         }
         let ways = self.directions.iter();

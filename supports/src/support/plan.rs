@@ -285,9 +285,20 @@ impl<'a> SupportPlanner<'a> {
         }
     }
 
-    /// Returns whether a support must not touch a surface at a point.
+    /// Returns whether a support must not touch the part at a contact of this radius.
     pub(super) fn is_avoided(&self, at_mm: Vec3, radius_mm: f64) -> bool {
         self.options.avoid.iter().any(|avoided| avoided.is_met(at_mm, radius_mm))
+            || self.surface.is_avoided([at_mm; 2], radius_mm)
+    }
+
+    /// Returns whether a support must not begin at a point of a layer's bottom.
+    pub(super) fn is_origin_avoided(&self, at_mm: Vec3, radius_mm: f64, layer: u32) -> bool {
+        let [x, y, z] = at_mm;
+        // Where in its layer a section is taken, the stack need not say: the island's underside is
+        // within a thickness of the layer's bottom.
+        let thickness = self.thickness_mm(layer);
+        let span = [[x, y, z - thickness], [x, y, z + thickness]];
+        self.is_avoided(at_mm, radius_mm) || self.surface.is_avoided(span, radius_mm)
     }
 
     /// Keeps other supports away from one.

@@ -60,7 +60,9 @@ impl SupportPlanner<'_> {
             return Err(Rejection::Edge);
         }
         let radius = options.radius.mm();
-        if [origin_mm, contact.at_mm].iter().any(|at| self.is_avoided(*at, radius)) {
+        if self.is_origin_avoided(origin_mm, radius, around.layer)
+            || self.is_avoided(contact.at_mm, radius)
+        {
             return Err(Rejection::Avoided);
         }
         let curvature = near.curvature(&contact, options.radius.mm());

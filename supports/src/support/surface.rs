@@ -5,6 +5,8 @@ use lamp_slicing::{FacetIndex, PlacedFacet};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree, RTreeObject, SelectionFunction};
 
+use super::avoided_facets::AvoidedFacets;
+
 /// Edges where the surface turns by more are creases; smoother ones stand for a curve.
 const CREASE: f64 = std::f64::consts::FRAC_PI_6;
 
@@ -14,6 +16,8 @@ pub struct Surface {
     facets: FacetIndex,
     /// Whether facets are clockwise seen from outside: mirrored, or inside out.
     is_turned: bool,
+    /// The facets that no support may touch.
+    avoided: AvoidedFacets,
 }
 
 impl Surface {
@@ -27,7 +31,18 @@ impl Surface {
             // Six times the volume of a tetrahedron; the sum is negative if facets are clockwise.
             volume += dot(a, cross(b, c));
         });
-        Self { facets, is_turned: volume < 0.0 }
+        Self { facets, is_turned: volume < 0.0, avoided: AvoidedFacets::default() }
+    }
+
+    /// Sets the facets that no support may touch: corners in millimeters, in the part's place.
+    #[must_use]
+    pub fn avoiding(self, facets: Vec<[Vec3; 3]>) -> Self {
+        Self { avoided: AvoidedFacets::new(facets), ..self }
+    }
+
+    /// Returns whether a facet to avoid is at most as far from a segment or point.
+    pub(super) fn is_avoided(&self, segment: [Vec3; 2], distance_mm: f64) -> bool {
+        self.avoided.are_within(segment, distance_mm)
     }
 
     /// Returns the surface in a box.

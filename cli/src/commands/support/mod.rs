@@ -85,7 +85,7 @@ pub(crate) struct SupportArgs {
         long,
         value_name = "DIAMETER",
         requires = "plan",
-        conflicts_with_all = ["part", "stl", "report", "output"],
+        conflicts_with_all = ["part", "stl", "report", "output", "avoid"],
         value_parser = parse_thickness,
         hide_short_help = true
     )]
@@ -248,9 +248,17 @@ impl SupportArgs {
                 "{name} {why}, so its position differs from its part: support it before that"
             )));
         }
-        let part = sliced.open(&self.part, name, progress)?;
-        let facets = sliced.settings.solid.body(part);
-        Ok(Surface::new(facets.map_err(|error| Exit::from(error).at(name_of_all(&self.part)))?))
+        let keep_marks = self.settings.avoided_names().next().is_some();
+        let part = sliced.open(&self.part, name, keep_marks, progress)?;
+        let solid = &sliced.settings.solid;
+        let of_part = |error: Exit| error.at(name_of_all(&self.part));
+        let facets = solid.body(part.clone()).map_err(|error| of_part(error.into()))?;
+        let mut avoided = Vec::new();
+        for name in self.settings.avoided_names() {
+            let surface = solid.surface(&part, name).map_err(|error| of_part(error.into()))?;
+            avoided.extend(surface);
+        }
+        Ok(Surface::new(facets).avoiding(avoided))
     }
 
     /// Finds the islands, with some pixels of black around the images.
