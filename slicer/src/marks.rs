@@ -1,4 +1,4 @@
-//! Marks of facets by which people name surfaces: colors, and what is painted on them.
+//! Marks of facets by which people name surfaces: colors and paint.
 
 use std::ops::Range;
 
@@ -9,7 +9,8 @@ use lamp_brep::Color;
 pub(crate) struct FacetMarks {
     /// The color of each facet; empty if none has one.
     pub(crate) colors: Vec<Option<Color>>,
-    /// Facets that are painted for supports, in order, and the digits that [`divided`] decodes.
+    /// The facets that are painted for supports, in ascending order, and the digits that [`divided`]
+    /// decodes.
     ///
     /// [`divided`]: crate::paint::divided
     pub(crate) painted: Vec<(usize, Box<str>)>,
@@ -25,7 +26,7 @@ impl FacetMarks {
     }
 }
 
-/// Returns the color of three corners, if they all have the same.
+/// Returns the color of three corners, if all have the same.
 pub(crate) fn of_corners([a, b, c]: [Option<Color>; 3]) -> Option<Color> {
     a.filter(|_| a == b && b == c)
 }

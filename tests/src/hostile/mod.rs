@@ -15,7 +15,9 @@ use std::path::Path;
 use fax::decoder::decode_g4;
 use lamp_gantry::{FrameReader, FrameWriter, Job};
 use lamp_slicing::topology::{CornerTable, Crossings, MeshCheck, RepairOptions, Repaired, repair};
-use lamp_slicing::{Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, Units};
+use lamp_slicing::{
+    Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, SurfaceName, Units,
+};
 use lamp_stack::{
     Dpi, EncodedPage, Format, Image, IndexedStack, Layer, Length, Mask, MaskBuilder, PageWriter,
     Pages, StackError, g4 as codec,
@@ -32,6 +34,8 @@ pub use seeds::{Seed, classic_tiff, seeds};
 const MAX_ROWS: u32 = 1000;
 /// Meshes are checked only where they have at most so many facets.
 const MAX_MESH: usize = 3000;
+/// Surfaces are looked for by at most so many names of a kind.
+const MAX_NAMES: usize = 20;
 /// Images are encoded only if that takes about this many codes at most: a
 /// run costs one for every 2560 pixels.
 const MAX_CODES: u64 = 1 << 20;
@@ -80,7 +84,37 @@ fn part(bytes: &[u8]) {
     }
     if let Ok(part) = Part::open(file.path(), &OpenOptions::default()) {
         mesh(&part);
+        let options = OpenOptions { keep_marks: true, ..OpenOptions::default() };
+        match Part::open(file.path(), &options) {
+            Ok(marked) => {
+                assert_eq!(marked.facet_count(), part.facet_count(), "marks change the shape");
+                surfaces(&marked);
+            }
+            Err(error) => drop(one_line(&error)),
+        }
     }
+}
+
+/// Looks for the surfaces of a part by all their names. Each has the facets that are counted.
+fn surfaces(part: &Part) {
+    let names = match part.surface_names() {
+        Ok(names) => names,
+        Err(error) => return drop(one_line(&error)),
+    };
+    let facets = |name: SurfaceName| {
+        part.surface(name, &Placement::default(), Units::Inches).expect("it is listed").len()
+    };
+    for (color, count) in names.colors.into_iter().take(MAX_NAMES) {
+        assert_eq!(facets(SurfaceName::Color(color)), count);
+    }
+    for (face, count) in names.faces.into_iter().take(MAX_NAMES) {
+        assert_eq!(facets(SurfaceName::Face(face)), count);
+    }
+    for (paint, count) in names.painted {
+        assert!(facets(SurfaceName::Painted(paint)) >= count);
+    }
+    let none = part.surface(SurfaceName::Face(0), &Placement::default(), Units::Inches);
+    one_line(&none.expect_err("no face has this number"));
 }
 
 /// Checks and repairs a mesh. Repairing a repaired mesh changes nothing.
@@ -130,6 +164,7 @@ pub fn step(bytes: &[u8]) {
         Ok(model) => model,
         Err(error) => return drop(one_line(&error)),
     };
+    surfaces(&model);
     for polish in [false, true] {
         let options = SliceOptions {
             dpi: Dpi::new(25.4).expect("a resolution"),

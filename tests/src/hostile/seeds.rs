@@ -88,6 +88,7 @@ fn stl() -> Named {
         ("four_billion.stl", with(good.clone(), 80, &[0xFF; 4])),
         ("nan.stl", with(good.clone(), 84 + 50 * 5 + 12, &f32::NAN.to_le_bytes())),
         ("huge.stl", with(good.clone(), 84 + 50 * 5 + 12, &f32::MAX.to_le_bytes())),
+        ("colors.stl", colored(good.clone(), b"COLOR=\x40\x80\xC0\xFF")),
         ("cut.stl", good[..good.len() - 17].to_vec()),
         ("none.stl", binary(&Mesh::default())),
         ("ball_ascii.stl", text(&ball)),
@@ -97,14 +98,25 @@ fn stl() -> Named {
     ]
 }
 
+/// A binary STL with colors in its attributes, and with another header.
+fn colored(mut stl: Vec<u8>, header: &[u8]) -> Vec<u8> {
+    for (number, facet) in (0u16..).zip(stl[84..].as_chunks_mut::<50>().0) {
+        facet[48..].copy_from_slice(&(number << 13 | number).to_le_bytes());
+    }
+    with(stl, 0, header)
+}
+
 fn objs() -> Named {
     let ball = sphere(3.0, 24);
     let obj = ball.obj();
     let polygons = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 2 2 5\nvt 0 0\nvn 0 0 1\n\
                     f 4 3 2 1\nf 1/1/1 2/1/1 5/1/1\nf 2//1 3//1 5//1\nf -3 -2 -1\nf -2/-1 -5 -1\n";
+    let colors = "mtllib a b.mtl ../c.mtl\nv 0 0 0 1 0 0\nv 4 0 0 1 0 0\nv 0 4 0 1 0 0.0\nv 0 0 4 1\n\
+                  f 1 3 2\nusemtl a b\nf 1 2 4\nf 2 3 4\nusemtl\nf 3 1 4\n";
     vec![
         ("ball.obj", obj.clone().into_bytes()),
         ("polygons.obj", polygons.into()),
+        ("colors.obj", colors.into()),
         ("cut.obj", obj.as_bytes()[..obj.len() / 2].to_vec()),
         ("no_vertex.obj", obj.replace("f 1 ", "f 99999999999999999999 ").into_bytes()),
         ("backwards.obj", obj.replace("f 1 ", "f -9223372036854775808 ").into_bytes()),
@@ -125,6 +137,21 @@ fn three_mfs() -> Named {
     let ball = sphere(3.0, 24).three_mf_object(1);
     let item = "<item objectid=\"1\" transform=\"0 1 0 -1 0 0 0 0 1 10 0 0\"/>\n";
     let model = three_mf_model("millimeter", &ball, item);
+    let painted = ["8\" pid=\"5\" p1=\"0", "08003", "4", "80043", "000080033", "6C", "048A"];
+    let (mut triangles, mut paints) =
+        (ball.split("/>\n<triangle").map(str::to_owned), painted.iter().cycle());
+    let first = triangles.next().expect("a text has a first piece");
+    let painted = triangles.fold(first, |text, triangle| {
+        let paint = paints.next().expect("they are repeated");
+        format!("{text} paint_supports=\"{paint}\"/>\n<triangle{triangle}")
+    });
+    let colors = "<m:colorgroup id=\"5\"><m:color color=\"#ff0000\"/></m:colorgroup>\n\
+                  <basematerials id=\"6\"><base name=\"a\" displaycolor=\"#00ff0080\"/></basematerials>\n";
+    let painted = painted.replace("<object", "<object pid=\"6\" pindex=\"0\"");
+    let painted = three_mf_model("millimeter", &(colors.to_owned() + &painted), item);
+    let materials =
+        "<model xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\"";
+    let painted = painted.replace("<model", materials);
     let nested = |inner: u32, outer: u32, times: usize| {
         let component = format!("<component objectid=\"{inner}\"/>").repeat(times);
         format!("<object id=\"{outer}\"><components>{component}</components></object>\n")
@@ -140,6 +167,7 @@ fn three_mfs() -> Named {
         ("two_models.3mf", three_mf(&referring, &[("3D/a.model", &model)])),
         ("blanks.3mf", three_mf(&" ".repeat(1 << 20), &[])),
         ("cut.model", model.as_bytes()[..model.len() / 2].to_vec()),
+        ("painted.model", painted.into_bytes()),
         ("ball.model", model.into_bytes()),
         ("laughs.model", laughs.into_bytes()),
         ("itself.model", itself.into_bytes()),
@@ -153,8 +181,30 @@ fn steps() -> Named {
         ("cone.step", part(StepSample::Cone)),
         ("block.step", part(StepSample::Block)),
         ("pair.step", step(StepSample::Pair, StepUnit::Inch).into_bytes()),
+        ("colors.step", colored_block().into_bytes()),
         ("apart.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).into_bytes()),
     ]
+}
+
+/// A block whose solid is red and whose first face is blue.
+fn colored_block() -> String {
+    let text = step(StepSample::Block, StepUnit::Millimetre);
+    let of = |name: &str| {
+        let line = text.lines().find(|line| line.contains(&format!("={name}(")));
+        line.and_then(|line| line.split_once('=')).expect("a block has one").0.to_owned()
+    };
+    let (solid, face) = (of("MANIFOLD_SOLID_BREP"), of("ADVANCED_FACE"));
+    let styles = format!(
+        "#900=STYLED_ITEM('',(#902),{solid});#901=OVER_RIDING_STYLED_ITEM('',(#903),{face},#900);\n\
+         #902=PRESENTATION_STYLE_ASSIGNMENT((#904));#903=PRESENTATION_STYLE_ASSIGNMENT((#905));\n\
+         #904=SURFACE_STYLE_USAGE(.BOTH.,#906);#905=SURFACE_STYLE_USAGE(.BOTH.,#907);\n\
+         #906=SURFACE_SIDE_STYLE('',(#908));#907=SURFACE_SIDE_STYLE('',(#909));\n\
+         #908=SURFACE_STYLE_FILL_AREA(#910);#909=SURFACE_STYLE_FILL_AREA(#911);\n\
+         #910=FILL_AREA_STYLE('',(#912));#911=FILL_AREA_STYLE('',(#913));\n\
+         #912=FILL_AREA_STYLE_COLOUR('',#914);#913=FILL_AREA_STYLE_COLOUR('',#915);\n\
+         #914=COLOUR_RGB('',1.,0.,0.);#915=DRAUGHTING_PRE_DEFINED_COLOUR('blue');\n"
+    );
+    text.replace("ENDSEC;\nEND-ISO", &(styles + "ENDSEC;\nEND-ISO"))
 }
 
 /// Layers of a ball with holes, so that some rows are stray.
