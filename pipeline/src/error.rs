@@ -4,6 +4,7 @@ use std::error::Error as StdError;
 use std::fmt;
 
 use lamp_adaptive::HeightsError;
+use lamp_build::TileError;
 use lamp_edit::EditError;
 use lamp_grayscale::DitherError;
 use lamp_grayscale::exposure::ExposureError;
@@ -108,6 +109,7 @@ of_work!(
     CompensateError,
     EditError,
     CheckError,
+    TileError,
     MachineLimit,
     std::io::Error,
 );

@@ -8,6 +8,7 @@
 #![cfg_attr(not(windows), forbid(unsafe_code))]
 
 pub mod build_copies;
+pub mod build_findings;
 pub mod check;
 pub mod compensate;
 pub mod dither;

@@ -320,6 +320,20 @@ impl LayerFacts {
 }
 
 impl Findings {
+    /// Returns the number of findings and specks that are not listed, for there are too many.
+    pub fn left_out(&self) -> u64 {
+        [
+            self.islands.left_out,
+            self.specks.left_out,
+            self.weak_joints.left_out,
+            self.overhangs.left_out,
+            self.pockets.left_out,
+            self.off_balance.left_out,
+        ]
+        .iter()
+        .sum()
+    }
+
     /// Puts the worst of each kind first; equals stay in the order of the layers.
     pub(super) fn sort(&mut self) {
         self.islands.list.sort_by_key(|island| (Reverse(island.floating_pixels), island.number));

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
-use lamp_supports::{Feature, FindingRecord, Findings, IslandRecord, Scale};
+use lamp_supports::{Feature, FindingRecord, IslandRecord, Scale};
 use serde::Serialize;
 use serde_json::json;
 
@@ -32,7 +32,7 @@ pub(super) fn write_report(
             "specks": findings.specks.count(),
             "accepted": checked.found.accepted,
             "note": checked.found.whole_build(),
-            "left_out": left_out(findings),
+            "left_out": findings.left_out(),
         })
     });
     let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
@@ -85,18 +85,4 @@ struct FeatureOfInput {
     #[serde(flatten)]
     feature: Feature,
     input: usize,
-}
-
-/// The number of findings and specks that are not listed, for there are too many.
-fn left_out(findings: &Findings) -> u64 {
-    [
-        findings.islands.left_out,
-        findings.specks.left_out,
-        findings.weak_joints.left_out,
-        findings.overhangs.left_out,
-        findings.pockets.left_out,
-        findings.off_balance.left_out,
-    ]
-    .iter()
-    .sum()
 }

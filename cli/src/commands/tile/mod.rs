@@ -2,7 +2,6 @@
 
 mod check;
 mod fields;
-mod found;
 mod mesh;
 mod placing;
 mod plan;
@@ -19,6 +18,7 @@ use std::rc::Rc;
 use clap::Args;
 use lamp_build::{BuildFinding, BuildWanted, Layout, PartStack, Recipe};
 use lamp_machine::Machine;
+use lamp_pipeline::build_findings::{NoMesh, StrayTotals, describe_stray, within_height};
 use lamp_pipeline::documents::document_and_word;
 use lamp_pipeline::tile::TileSettings;
 
@@ -33,7 +33,6 @@ use crate::streams::{progress, unless_found, write_file};
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::doubts;
 use fields::CutArgs;
-use found::{NoMesh, StrayTotals, describe_stray, within_height};
 use mesh::template;
 use placing::read_layout;
 use report::BuildTotals;

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use lamp_build::{Layout, LayoutFile, MeshOptions, PartStack};
 use lamp_machine::Machine;
+use lamp_pipeline::build_findings::left_over;
 use lamp_stack::Size;
 
 use crate::catalogue::read_text;
@@ -14,7 +15,6 @@ use crate::terminal::progress::Progress;
 use lamp_plots as plots;
 
 use super::TileArgs;
-use super::found::left_over;
 
 impl TileArgs {
     /// Places the copies.

@@ -1,14 +1,14 @@
-//! Errors of a build: stray rows, copies without a place, too great a height.
+//! Findings of a build as people read them: stray rows, copies without a place, too great a height.
 
 use lamp_build::StrayRows;
-use lamp_machine::Machine;
-use lamp_pipeline::ranges;
+use lamp_machine::{Machine, MachineLimit};
 use lamp_stack::{Layer, Length};
 
-use crate::exit::Exit;
+use crate::ranges::ranges;
 
-/// `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no place.
-pub(super) fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<String> {
+/// Returns `torus.tif: 3 of 5 copies are placed; tower.tif: ...`, if some of several parts found no
+/// place. `placed` has the name of each part and how many of its copies are placed.
+pub fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<String> {
     let short = placed.iter().zip(counts).filter_map(|((name, placed), count)| {
         let asked = (*count)? as usize;
         (*placed < asked).then(|| format!("{name}: {placed} of {asked} copies are placed"))
@@ -17,11 +17,12 @@ pub(super) fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> O
     (!short.is_empty()).then(|| format!("{}: no more fit", short.join("; ")))
 }
 
-/// Checks that a build is no higher than the machine's are.
-pub(super) fn within_height(
-    build: impl Iterator<Item = Result<Layer, Exit>>,
+/// Passes the layers of a build on. A layer above the greatest height that the machine builds is an
+/// error.
+pub fn within_height<E: From<MachineLimit>>(
+    build: impl Iterator<Item = Result<Layer, E>>,
     machine: Option<Machine>,
-) -> impl Iterator<Item = Result<Layer, Exit>> {
+) -> impl Iterator<Item = Result<Layer, E>> {
     let mut bottom_um = None;
     build.map(move |layer| {
         let layer = layer?;
@@ -38,7 +39,7 @@ pub(super) fn within_height(
 
 /// The stray rows that the parts' pages list.
 #[derive(Default)]
-pub(crate) struct StrayTotals {
+pub struct StrayTotals {
     rows: usize,
     layers: usize,
     /// The part and the layer of the first.
@@ -46,14 +47,16 @@ pub(crate) struct StrayTotals {
 }
 
 impl StrayTotals {
-    pub(super) fn add(&mut self, StrayRows { part, layer, rows }: &StrayRows) {
+    /// Adds the rows of a layer.
+    pub fn add(&mut self, StrayRows { part, layer, rows }: &StrayRows) {
         self.rows += rows.len();
         self.layers += 1;
         self.first.get_or_insert_with(|| (part.clone(), layer.clone()));
     }
 
-    /// `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`.
-    pub(crate) fn text(&self) -> Option<String> {
+    /// Returns `blade.tif: 14 stray rows in 3 layers, the first in layer 12 (z 1.20 mm): ...`, if
+    /// there are any.
+    pub fn text(&self) -> Option<String> {
         let (part, layer) = self.first.as_ref()?;
         let counted = |count, one: &str, more| match count {
             1 => format!("1 {one}"),
@@ -70,21 +73,23 @@ impl StrayTotals {
 
 /// The layers of a build in which nothing is left of its mesh.
 #[derive(Default)]
-pub(crate) struct NoMesh {
+pub struct NoMesh {
     layers: u32,
     first: String,
 }
 
 impl NoMesh {
-    pub(super) fn add(&mut self, layer: String) {
+    /// Adds a layer by its name.
+    pub fn add(&mut self, layer: String) {
         if self.layers == 0 {
             self.first = layer;
         }
         self.layers += 1;
     }
 
-    /// `nothing is left of the mesh in 14 layers, the first layer 12 (z 1.20 mm): ...`.
-    pub(crate) fn text(&self) -> Option<String> {
+    /// Returns `nothing is left of the mesh in 14 layers, the first layer 12 (z 1.20 mm): ...`, if
+    /// there are any.
+    pub fn text(&self) -> Option<String> {
         let Self { layers, first } = self;
         let found = match layers {
             0 => return None,
@@ -98,8 +103,8 @@ impl NoMesh {
     }
 }
 
-/// `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
-pub(super) fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
+/// Returns `blade.tif: layer 12 (z 1.20 mm) has 3 stray rows: 1034-1036`.
+pub fn describe_stray(StrayRows { part, layer, rows }: &StrayRows) -> String {
     let word = if rows.len() == 1 { "row" } else { "rows" };
     format!("{part}: {layer} has {} stray {word}: {}", rows.len(), ranges(rows))
 }
