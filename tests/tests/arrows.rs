@@ -17,7 +17,7 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-pipeline"],
     &["lamp-batch"],
     &["lamp-slicer"],
-    &["lamp-cli"],
+    &["lamp-cli", "lamp-python"],
     // Crates that test the others. Nothing is built on them.
     &["lamp-truck-fixtures", "lamp-tests", "lamp-benches"],
 ];

@@ -192,8 +192,13 @@ impl<C: Change> RunImage<C> {
     }
 
     /// Returns where the changes of each row start, and where the last row's changes end.
-    pub(crate) fn row_offsets(&self) -> &[u32] {
+    pub fn row_offsets(&self) -> &[u32] {
         &self.row_offsets
+    }
+
+    /// Returns the changes of all rows, from the top.
+    pub fn changes(&self) -> &[C] {
+        &self.changes
     }
 
     /// Returns the number of changes in all rows, which determines the cost of processing.

@@ -1,0 +1,319 @@
+//! Chains of stages in one process: a source of layers, and the stages after it.
+
+use std::fs::File;
+use std::io::Seek;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use lamp_pipeline::documents::input_name;
+use lamp_pipeline::watcher::{KeptRemarks, Remark};
+use lamp_pipeline::{Error, Stage, Working, named};
+use lamp_stack::{
+    Dpi, IndexedStack, Layer, Page, PageInfo, Pages, PassingLayer, StackError, StackInfo,
+    map_in_order,
+};
+use pyo3::prelude::*;
+use serde_json::{Value, json};
+
+use crate::error::{raised, stopped};
+use crate::layer::layer_of;
+use crate::slice::PartSource;
+use crate::tile::BuildSource;
+use crate::work::{Flow, Work};
+
+/// A source of layers.
+pub(crate) enum Source {
+    /// A stack; the range of its pages, counted from its bottom.
+    Stack(PathBuf, Option<Range<usize>>),
+    /// A stack that is kept in a temporary file, and the name of what it was.
+    Kept(File, String),
+    /// A part, which is sliced.
+    Part(Box<PartSource>),
+    /// A build of other chains.
+    Build(Box<BuildSource>),
+    /// Layers or arrays that Python code gives.
+    Given(GivenLayers),
+}
+
+/// An iterator of Python over layers or arrays, and what arrays get as their metadata.
+pub(crate) struct GivenLayers {
+    pub(crate) iterator: Py<PyAny>,
+    pub(crate) dpi: Option<Dpi>,
+    pub(crate) thickness_um: Option<f64>,
+    pub(crate) part: Option<String>,
+}
+
+/// A source of layers, and the stages after it.
+pub(crate) struct Chain {
+    pub(crate) source: Source,
+    pub(crate) stages: Vec<Stage>,
+}
+
+impl Chain {
+    /// Returns layers as they come.
+    pub(crate) fn of(source: Source) -> Self {
+        Self { source, stages: Vec::new() }
+    }
+
+    /// Returns the name of the source, for messages.
+    pub(crate) fn name(&self) -> String {
+        match &self.source {
+            Source::Stack(path, _) => input_name(path),
+            Source::Kept(_, name) => name.clone(),
+            Source::Part(part) => part.name(),
+            Source::Build(_) => "the build".to_owned(),
+            Source::Given(_) => "the layers".to_owned(),
+        }
+    }
+
+    /// Returns the stages as words of a command.
+    pub(crate) fn words(&self) -> String {
+        let source = match &self.source {
+            Source::Stack(path, None) => input_name(path),
+            Source::Stack(path, Some(pages)) => format!("{}[{pages:?}]", path.display()),
+            Source::Kept(_, name) => name.clone(),
+            Source::Part(part) => part.words(),
+            Source::Build(build) => build.words(),
+            Source::Given(_) => "layers".to_owned(),
+        };
+        let stages = self.stages.iter().map(Stage::canonical);
+        [source].into_iter().chain(stages).collect::<Vec<_>>().join(" | ")
+    }
+
+    /// Makes the layers, and gives them to `then`, as pages have them unless they are wanted
+    /// `decoded`. Returns what the source and each stage report.
+    pub(crate) fn run(
+        self,
+        work: &Work,
+        decoded: bool,
+        then: &mut dyn FnMut(Flow<'_>) -> Result<(), Error>,
+    ) -> Result<Vec<Value>, Error> {
+        let name = self.name();
+        let Self { source, stages } = self;
+        let source_decoded = decoded && stages.is_empty();
+        let mut reports = Vec::new();
+        let of_source = source.run(work, source_decoded, &mut |layers| {
+            let remarks = KeptRemarks::default();
+            let working = stages.iter().map(|stage| stage.start(&remarks));
+            let working = working.collect::<Result<Vec<Working<'_>>, _>>()?;
+            let mut layers: Flow<'_> = work.watched(layers);
+            let mut count = 0;
+            if !stages.is_empty() {
+                layers = Box::new(layers.inspect(|_| count += 1));
+            }
+            for stage in &working {
+                layers = stage.layers(layers, 0..u32::MAX, [true, true])?;
+            }
+            if !stages.is_empty() {
+                layers = Box::new(layers.inspect(|_| say_all(work, &remarks)));
+                if decoded {
+                    layers = decode(layers);
+                }
+                layers = Box::new(
+                    layers.map(|layer| layer.map_err(|error| named(error, Path::new(&name)))),
+                );
+            }
+            then(layers)?;
+            say_all(work, &remarks);
+            reports.extend(working.iter().map(|stage| report_of(stage, work, &name, count)));
+            Ok(())
+        })?;
+        Ok(of_source.into_iter().chain(reports).collect())
+    }
+
+    /// Keeps the layers in a temporary file, to be read twice.
+    pub(crate) fn kept(self, work: &Work) -> Result<(File, Vec<Value>), Error> {
+        let file = tempfile::tempfile()?;
+        let to = file.try_clone()?;
+        let mut to = Some(lamp_stack::Destination::Stream(Box::new(to)));
+        let reports = self.run(work, false, &mut |layers| {
+            let to = to.take().ok_or_else(stopped)?;
+            lamp_stack::write_stack(layers, to, lamp_stack::Format::Big)
+        })?;
+        Ok((file, reports))
+    }
+}
+
+fn say_all(work: &Work, remarks: &KeptRemarks) {
+    for line in remarks.take() {
+        let (stage, text) = line.split_once(": ").unwrap_or(("", &line));
+        work.say(stage, Remark::note(text));
+    }
+}
+
+/// Says what a stage found, and returns it as the program's report has it.
+fn report_of(stage: &Working<'_>, work: &Work, name: &str, layers: usize) -> Value {
+    let with = |stage: &str, head: Value, list: &str, items: Value| {
+        let mut report = json!({ "stage": stage });
+        if let (Value::Object(report), Value::Object(head)) = (&mut report, head) {
+            report.extend(head);
+            report.insert(list.to_owned(), items);
+        }
+        report
+    };
+    match stage {
+        Working::Fix(fixing) => {
+            let found = fixing.report();
+            let corrected = found.text_of_corrected().map(Remark::note);
+            let left = found.text_of_left().map(Remark::warning);
+            corrected.into_iter().chain(left).for_each(|remark| work.say("fix", remark));
+            with("fix", json!(found.head(layers)), "bands", json!(found.bands()))
+        }
+        Working::Compensate(compensating) => {
+            for line in compensating.lines(name) {
+                work.say("compensate", Remark::note(line));
+            }
+            let (walls, layers) = compensating.report();
+            let (head, listed) = (walls.head(layers), walls.listed());
+            with("compensate", json!(head), "walls", json!(listed))
+        }
+        Working::Dither(settings, _) => {
+            json!({ "stage": "dither", "method": settings.method.name() })
+        }
+        Working::Edit(editing, _) => {
+            json!({ "stage": "edit", "unused": editing.unused().collect::<Vec<_>>() })
+        }
+    }
+}
+
+/// Decodes layers on all threads.
+pub(crate) fn decode(layers: Flow<'_>) -> Flow<'_> {
+    Box::new(map_in_order(layers, |layer: PassingLayer| Ok(layer.decode()?.into())))
+}
+
+impl Source {
+    fn run(
+        self,
+        work: &Work,
+        decoded: bool,
+        then: &mut dyn FnMut(Flow<'_>) -> Result<(), Error>,
+    ) -> Result<Vec<Value>, Error> {
+        match self {
+            Self::Stack(path, range) => {
+                let name = input_name(&path);
+                match range {
+                    None => {
+                        let pages = Pages::open(&path).map_err(|error| at(&name, error))?;
+                        then(stack_layers(pages, &name, work, decoded))?;
+                    }
+                    Some(range) => {
+                        let stack = IndexedStack::open(&path).map_err(|error| at(&name, error))?;
+                        then(some_layers(&stack, range, &name, decoded))?;
+                    }
+                }
+                Ok(Vec::new())
+            }
+            Self::Kept(mut file, name) => {
+                // A clone of it may have been read, and shares its position.
+                file.rewind()?;
+                let pages = Pages::from_file(file).map_err(|error| at(&name, error))?;
+                then(stack_layers(pages, &name, work, decoded))?;
+                Ok(Vec::new())
+            }
+            Self::Part(part) => part.run(work, then),
+            Self::Build(build) => build.run(work, then),
+            Self::Given(given) => {
+                then(given.layers())?;
+                Ok(Vec::new())
+            }
+        }
+    }
+}
+
+fn at(name: &str, error: StackError) -> Error {
+    Error::from(error).at(name)
+}
+
+/// Returns the layers of a stack, and has its notes said as they are found.
+fn stack_layers<'a>(pages: Pages, name: &'a str, work: &Work, decoded: bool) -> Flow<'a> {
+    let (listener, place) = (work.clone(), name.to_owned());
+    let pages = pages.with_listener(move |note| {
+        listener.say(
+            &place,
+            if note.is_doubt() {
+                Remark::warning(note.to_string())
+            } else {
+                Remark::note(note.to_string())
+            },
+        );
+    });
+    let pages = pages.map(move |page| page.map_err(|error| at(name, error)));
+    Box::new(map_in_order(pages, move |page: Page| passing(page, name, decoded)))
+}
+
+/// Returns some layers of a stack. The first one gets the record of the stack.
+fn some_layers<'a>(
+    stack: &'a IndexedStack,
+    range: Range<usize>,
+    name: &'a str,
+    decoded: bool,
+) -> Flow<'a> {
+    let headers = stack.headers();
+    let record = headers.first().and_then(|first| {
+        let of_stack: StackInfo = first.info.stack.clone()?;
+        let wanted = headers.get(range.clone())?;
+        let (from, to) = (wanted.first()?.info.index, wanted.last()?.info.index);
+        Some(of_stack.of_range(first.info.index, &(from..to.saturating_add(1))))
+    });
+    let start = range.start;
+    let pages = range.map(move |position| {
+        let page = stack.page(position).map_err(|error| at(name, error))?;
+        Ok((page, position))
+    });
+    Box::new(map_in_order(pages, move |(page, position): (Page, _)| {
+        let mut layer = passing(page, name, decoded)?;
+        layer.info_mut().stack = if position == start { record.clone() } else { None };
+        Ok(layer)
+    }))
+}
+
+fn passing(page: Page, name: &str, decoded: bool) -> Result<PassingLayer, Error> {
+    let layer = match decoded {
+        true => page.decode().map(PassingLayer::from),
+        false => PassingLayer::of_page(page, name),
+    };
+    layer.map_err(|error| at(name, error))
+}
+
+impl GivenLayers {
+    /// Returns what Python gives, a layer at a time, each under Python's lock.
+    fn layers(self) -> Flow<'static> {
+        let mut count = 0;
+        let mut ended = false;
+        Box::new(std::iter::from_fn(move || {
+            if ended {
+                return None;
+            }
+            // None once Python ends.
+            let next = Python::try_attach(|py| self.next(py, count));
+            let next = next.unwrap_or_else(|| Some(Err(stopped())));
+            count += 1;
+            ended = !matches!(next, Some(Ok(_)));
+            next
+        }))
+    }
+
+    fn next(&self, py: Python<'_>, count: u32) -> Option<Result<PassingLayer, Error>> {
+        let mut iterator = match self.iterator.bind(py).try_iter() {
+            Ok(iterator) => iterator,
+            Err(error) => return Some(Err(raised(error))),
+        };
+        let layer = iterator.next()?.and_then(|given| self.layer(&given, count));
+        Some(layer.map(PassingLayer::from).map_err(raised))
+    }
+
+    fn layer(&self, given: &Bound<'_, PyAny>, count: u32) -> PyResult<Layer> {
+        let info = || PageInfo {
+            index: count,
+            z_um: self.thickness_um.map(|um| um * f64::from(count)),
+            thickness_um: self.thickness_um,
+            stack: self
+                .part
+                .clone()
+                .filter(|_| count == 0)
+                .map(|part| StackInfo { part, ..StackInfo::default() }),
+            ..PageInfo::default()
+        };
+        layer_of(given, info, self.dpi)
+    }
+}

@@ -1,0 +1,174 @@
+//! Work in a thread of its own, without Python's lock. The thread that waits for it looks for
+//! signals, so Ctrl-C ends the wait and the work.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use lamp_pipeline::Error;
+use lamp_pipeline::watcher::{Importance, Remark, Watcher};
+use lamp_stack::{Layer, PassingLayer};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::error::{exception, stopped};
+
+/// Layers on their way from stage to stage.
+pub(crate) type Flow<'a> = Box<dyn Iterator<Item = Result<PassingLayer, Error>> + 'a>;
+
+/// Layers that wait for a slow reader: more would only take memory.
+const WAITING: usize = 4;
+/// How often a wait looks for signals.
+const LOOK: Duration = Duration::from_millis(50);
+/// How long stopped work may take to remove its temporary files.
+const GRACE: Duration = Duration::from_secs(1);
+
+enum Message {
+    Layer(Box<Layer>),
+    Remark(String, Importance),
+    Done(Result<Value, Error>),
+}
+
+/// The end of work that is in the thread.
+#[derive(Clone)]
+pub(crate) struct Work {
+    sender: SyncSender<Message>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Work {
+    /// Gives a layer to the waiting thread.
+    pub(crate) fn give(&self, layer: Layer) -> Result<(), Error> {
+        self.sender.send(Message::Layer(Box::new(layer))).map_err(|_| stopped())
+    }
+
+    /// Gives a line of a stage, unless it is a detail.
+    pub(crate) fn say(&self, stage: &str, Remark { importance, text }: Remark) {
+        if importance > Importance::Detail {
+            // Nobody may be waiting anymore.
+            let _ = self.sender.send(Message::Remark(format!("{stage}: {text}"), importance));
+        }
+    }
+
+    /// Returns a watcher of a stage.
+    pub(crate) fn watcher(&self, stage: &'static str) -> StageWatcher {
+        StageWatcher { work: self.clone(), stage }
+    }
+
+    /// Returns layers that end with an error once nobody waits for the work.
+    pub(crate) fn watched<'a>(&self, layers: Flow<'a>) -> Flow<'a> {
+        let stop = self.stop.clone();
+        Box::new(layers.map(move |layer| match stop.load(Ordering::Relaxed) {
+            true => Err(stopped()),
+            false => layer,
+        }))
+    }
+}
+
+/// Passes the remarks of a stage on.
+pub(crate) struct StageWatcher {
+    work: Work,
+    stage: &'static str,
+}
+
+impl Watcher for StageWatcher {
+    fn remark(&self, remark: Remark) {
+        self.work.say(self.stage, remark);
+    }
+}
+
+/// Work that goes on in a thread.
+pub(crate) struct Running {
+    receiver: Receiver<Message>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<()>,
+}
+
+/// A layer, or the report at the end.
+pub(crate) enum Next {
+    Layer(Box<Layer>),
+    End(Value),
+}
+
+impl Running {
+    /// Starts work.
+    pub(crate) fn start(
+        job: impl FnOnce(&Work) -> Result<Value, Error> + Send + 'static,
+    ) -> PyResult<Self> {
+        let (sender, receiver) = sync_channel(WAITING);
+        let stop = Arc::new(AtomicBool::new(false));
+        let work = Work { sender, stop: stop.clone() };
+        let thread = thread::Builder::new().name("lamp".to_owned()).spawn(move || {
+            let done = job(&work);
+            let _ = work.sender.send(Message::Done(done));
+        })?;
+        Ok(Self { receiver, stop, thread })
+    }
+
+    /// Waits for the next layer or the end. Remarks on the way become warnings of the code that asks
+    /// for it.
+    pub(crate) fn next(&mut self, py: Python<'_>) -> PyResult<Next> {
+        self.next_for(py, 1)
+    }
+
+    fn next_for(&mut self, py: Python<'_>, caller: u8) -> PyResult<Next> {
+        let next = self.message(py, caller);
+        if next.is_err() {
+            self.stop(py);
+        }
+        next
+    }
+
+    /// Waits for the end of work that gives no layers.
+    pub(crate) fn finish(mut self, py: Python<'_>) -> PyResult<Value> {
+        loop {
+            if let Next::End(report) = self.next_for(py, WRAPPED)? {
+                return Ok(report);
+            }
+        }
+    }
+
+    fn message(&mut self, py: Python<'_>, caller: u8) -> PyResult<Next> {
+        loop {
+            py.check_signals()?;
+            // Shared references to a receiver stay in one thread, so it goes in as a whole.
+            let receiver = &mut self.receiver;
+            match py.detach(move || receiver.recv_timeout(LOOK)) {
+                Ok(Message::Layer(layer)) => return Ok(Next::Layer(layer)),
+                Ok(Message::Remark(text, importance)) => warn(py, &text, importance, caller)?,
+                Ok(Message::Done(Ok(report))) => return Ok(Next::End(report)),
+                Ok(Message::Done(Err(error))) => return Err(exception(py, &error)),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(exception(py, &Error::work("an internal error ended the work")));
+                }
+            }
+        }
+    }
+
+    /// Ends the work, and waits a moment for it to clean up.
+    fn stop(&mut self, py: Python<'_>) {
+        self.stop.store(true, Ordering::Relaxed);
+        let Self { receiver, thread, .. } = self;
+        py.detach(move || {
+            let begun = Instant::now();
+            while !thread.is_finished() && begun.elapsed() < GRACE {
+                // Work that waits for a reader goes on to its end.
+                let _ = receiver.recv_timeout(Duration::from_millis(10));
+            }
+        });
+    }
+}
+
+/// The caller of a function of the package, by the number of Python's frames from here.
+pub(crate) const WRAPPED: u8 = 2;
+
+/// Warns in Python's way: a remark is shown once for each place that calls.
+pub(crate) fn warn(py: Python<'_>, text: &str, importance: Importance, caller: u8) -> PyResult<()> {
+    let name = if importance > Importance::Note { "LampWarning" } else { "LampNote" };
+    let class = py.import("lamp_slicer._errors")?.getattr(name)?;
+    py.import("warnings")?.call_method1("warn", (text, class, caller))?;
+    Ok(())
+}
