@@ -25,8 +25,8 @@ class Runs(NamedTuple):
 class Record(dict[str, Any]):
     """A JSON object. Its keys are attributes, too: `band.first_row` is `band["first_row"]`.
 
-    The keys are those of the program's reports, which docs/json.md lists. A key that a report
-    leaves out raises AttributeError.
+    The program's reports have the same keys. A key that a report leaves out raises AttributeError,
+    and a key that is a method of dict, such as copy, is only an item: `record["copy"]`.
     """
 
     def __getattr__(self, key: str) -> Any:

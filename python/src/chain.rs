@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Seek;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use lamp_pipeline::documents::input_name;
 use lamp_pipeline::watcher::{KeptRemarks, Remark};
@@ -23,8 +24,10 @@ use crate::work::{Flow, Work};
 
 /// A source of layers.
 pub(crate) enum Source {
-    /// A stack; the range of its pages, counted from its bottom.
-    Stack(PathBuf, Option<Range<usize>>),
+    /// The path of a stack.
+    Stack(PathBuf),
+    /// Pages of a stack that is open, counted from its bottom.
+    Opened(Arc<IndexedStack>, PathBuf, Range<usize>),
     /// A stack that is kept in a temporary file, and the name of what it was.
     Kept(File, String),
     /// A part, which is sliced.
@@ -58,7 +61,7 @@ impl Chain {
     /// Returns the name of the source, for messages.
     pub(crate) fn name(&self) -> String {
         match &self.source {
-            Source::Stack(path, _) => input_name(path),
+            Source::Stack(path) | Source::Opened(_, path, _) => input_name(path),
             Source::Kept(_, name) => name.clone(),
             Source::Part(part) => part.name(),
             Source::Build(_) => "the build".to_owned(),
@@ -69,8 +72,13 @@ impl Chain {
     /// Returns the stages as words of a command.
     pub(crate) fn words(&self) -> String {
         let source = match &self.source {
-            Source::Stack(path, None) => input_name(path),
-            Source::Stack(path, Some(pages)) => format!("{}[{pages:?}]", path.display()),
+            Source::Stack(path) => input_name(path),
+            Source::Opened(stack, path, pages) if *pages == (0..stack.headers().len()) => {
+                input_name(path)
+            }
+            Source::Opened(_, path, Range { start, end }) => {
+                format!("{}[{start}:{end}]", path.display())
+            }
             Source::Kept(_, name) => name.clone(),
             Source::Part(part) => part.words(),
             Source::Build(build) => build.words(),
@@ -189,18 +197,14 @@ impl Source {
         then: &mut dyn FnMut(Flow<'_>) -> Result<(), Error>,
     ) -> Result<Vec<Value>, Error> {
         match self {
-            Self::Stack(path, range) => {
+            Self::Stack(path) => {
                 let name = input_name(&path);
-                match range {
-                    None => {
-                        let pages = Pages::open(&path).map_err(|error| at(&name, error))?;
-                        then(stack_layers(pages, &name, work, decoded))?;
-                    }
-                    Some(range) => {
-                        let stack = IndexedStack::open(&path).map_err(|error| at(&name, error))?;
-                        then(some_layers(&stack, range, &name, decoded))?;
-                    }
-                }
+                let pages = Pages::open(&path).map_err(|error| at(&name, error))?;
+                then(stack_layers(pages, &name, work, decoded))?;
+                Ok(Vec::new())
+            }
+            Self::Opened(stack, path, range) => {
+                then(some_layers(&stack, range, &input_name(&path), decoded))?;
                 Ok(Vec::new())
             }
             Self::Kept(mut file, name) => {

@@ -129,7 +129,7 @@ pub(crate) fn chain_of(layers: &Bound<'_, PyAny>) -> PyResult<Chain> {
         return Ok(stack.get().chain());
     }
     if let Ok(path) = layers.extract::<PathBuf>() {
-        return Ok(Chain::of(Source::Stack(path, None)));
+        return Ok(Chain::of(Source::Stack(path)));
     }
     given_layers(layers, None, None, None)
 }

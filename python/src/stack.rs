@@ -1,5 +1,6 @@
 //! Stacks that Python opens: their pages in any order, from several threads.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,7 +27,12 @@ pub(crate) struct PyStack {
 impl PyStack {
     /// Returns the layers.
     pub(crate) fn chain(&self) -> Chain {
-        Chain::of(Source::Stack(self.path.clone(), None))
+        self.pages(0..self.stack.headers().len())
+    }
+
+    /// Returns the layers of a range of pages.
+    fn pages(&self, range: Range<usize>) -> Chain {
+        Chain::of(Source::Opened(self.stack.clone(), self.path.clone(), range))
     }
 
     /// Returns the position of a page; negative ones count from the top.
@@ -79,8 +85,8 @@ impl PyStack {
                 ));
             }
             let (start, length) = (range.start as usize, range.slicelength);
-            let source = Source::Stack(self.path.clone(), Some(start..start + length));
-            return Ok(Bound::new(py, PyLayers::new(Chain::of(source)))?.into_any());
+            let layers = PyLayers::new(self.pages(start..start + length));
+            return Ok(Bound::new(py, layers)?.into_any());
         }
         let layer = self.read(py, index.extract()?)?;
         Ok(Bound::new(py, PyLayer::from(layer))?.into_any())

@@ -160,9 +160,13 @@ fn outlined(
     work: &Work,
     reports: &mut Vec<Value>,
 ) -> Result<(PartStack, Chain), Error> {
-    let [mut chain, again] = match (&chain.source, chain.stages.is_empty()) {
-        (Source::Stack(path, range), true) => {
-            let again = Source::Stack(path.clone(), range.clone());
+    let [chain, again] = match (&chain.source, chain.stages.is_empty()) {
+        (Source::Stack(path), true) => {
+            let again = Source::Stack(path.clone());
+            [chain, Chain::of(again)]
+        }
+        (Source::Opened(stack, path, pages), true) => {
+            let again = Source::Opened(stack.clone(), path.clone(), pages.clone());
             [chain, Chain::of(again)]
         }
         _ => {
@@ -173,7 +177,6 @@ fn outlined(
         }
     };
     let mut part = None;
-    chain.stages.clear();
     chain.run(work, true, &mut |flow| {
         let layers = flow.map(|layer| Ok(layer?.decode()?));
         part = PartStack::of_outline::<Error>(name, layers)?;

@@ -47,7 +47,7 @@ def stack(folder, stl) -> lamp.Stack:
 def program():
     """Runs a program, and returns what it did. Tests that compare with it need it built."""
     programs = os.environ.get("LAMP_PROGRAMS")
-    if programs is None:
+    if not programs:
         pytest.skip("LAMP_PROGRAMS names no folder of programs")
 
     def run(*words, check=False):

@@ -1,6 +1,7 @@
 """Errors: types, sentences of the program, and what Python code raises on the way."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -95,6 +96,23 @@ def test_a_stack_that_is_written_over_itself_is_whole(tmp_path, stack):
     path.write_bytes(stack.path.read_bytes())
     lamp.write(path, lamp.fix(path))
     assert list(lamp.open(path)) == list(stack)
+
+
+def test_an_opened_stack_is_one_file(tmp_path, stack):
+    path = tmp_path / "one.tif"
+    path.write_bytes(stack.path.read_bytes())
+    opened = lamp.open(path)
+    # Another file takes its name: the opened one stays.
+    other = tmp_path / "other.tif"
+    lamp.write(other, np.zeros((3, 4, 5), bool))
+    if sys.platform != "win32":
+        other.replace(path)
+        assert list(opened) == list(stack) and opened[2] == stack[2]
+    # The file itself is written to.
+    opened = lamp.open(path)
+    path.write_bytes(stack.path.read_bytes())
+    with pytest.raises(lamp.LampError, match="changed"):
+        list(opened)
 
 
 def test_damage_is_an_error_not_a_layer(tmp_path, stack):
