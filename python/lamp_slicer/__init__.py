@@ -25,6 +25,7 @@ from lamp_slicer._errors import (
 )
 from lamp_slicer._native import VERSION as __version__
 from lamp_slicer._native import Layer, Layers, Stack
+from lamp_slicer._plan import plan_speed, plan_voxels
 from lamp_slicer._records import Feature, Finding, Findings, Record, Runs
 from lamp_slicer._slice import slice
 from lamp_slicer._stages import check, compensate, dither, edit, fix, layers, open, tile, write
@@ -52,6 +53,8 @@ __all__ = [
     "fix",
     "layers",
     "open",
+    "plan_speed",
+    "plan_voxels",
     "slice",
     "tile",
     "write",

@@ -7,17 +7,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lamp_pipeline::documents::input_name;
-use lamp_pipeline::watcher::{KeptRemarks, Remark};
+use lamp_pipeline::watcher::{Importance, KeptRemarks, Remark};
 use lamp_pipeline::{Error, Stage, Working, named};
 use lamp_stack::{
     Dpi, IndexedStack, Layer, Page, PageInfo, Pages, PassingLayer, StackError, StackInfo,
-    map_in_order,
+    StackNote, map_in_order,
 };
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 
 use crate::error::{raised, stopped};
 use crate::layer::layer_of;
+use crate::plan::PlanSource;
 use crate::slice::PartSource;
 use crate::tile::BuildSource;
 use crate::work::{Flow, Work};
@@ -34,6 +35,8 @@ pub(crate) enum Source {
     Part(Box<PartSource>),
     /// A build of other chains.
     Build(Box<BuildSource>),
+    /// Layers for which times or levels are planned.
+    Plan(Box<PlanSource>),
     /// Layers or arrays that Python code gives.
     Given(GivenLayers),
 }
@@ -65,6 +68,7 @@ impl Chain {
             Source::Kept(_, name) => name.clone(),
             Source::Part(part) => part.name(),
             Source::Build(_) => "the build".to_owned(),
+            Source::Plan(plan) => plan.name(),
             Source::Given(_) => "the layers".to_owned(),
         }
     }
@@ -82,6 +86,7 @@ impl Chain {
             Source::Kept(_, name) => name.clone(),
             Source::Part(part) => part.words(),
             Source::Build(build) => build.words(),
+            Source::Plan(plan) => plan.words(),
             Source::Given(_) => "layers".to_owned(),
         };
         let stages = self.stages.iter().map(Stage::canonical);
@@ -129,8 +134,27 @@ impl Chain {
         Ok(of_source.into_iter().chain(reports).collect())
     }
 
-    /// Keeps the layers in a temporary file, to be read twice.
-    pub(crate) fn kept(self, work: &Work) -> Result<(File, Vec<Value>), Error> {
+    /// Returns the chain twice, the first to be run before the second. Layers that come once are
+    /// kept in a temporary file; then their reports come, too.
+    pub(crate) fn twice(self, work: &Work) -> Result<(Self, Self, Vec<Value>), Error> {
+        let again = match (&self.source, self.stages.is_empty()) {
+            (Source::Stack(path), true) => Source::Stack(path.clone()),
+            (Source::Opened(stack, path, pages), true) => {
+                Source::Opened(stack.clone(), path.clone(), pages.clone())
+            }
+            _ => {
+                let name = self.name();
+                let (file, reports) = self.kept(work)?;
+                let first = Source::Kept(file.try_clone()?, name.clone());
+                let again = Source::Kept(file, name);
+                return Ok((Self::of(first), Self::of(again), reports));
+            }
+        };
+        Ok((self, Self::of(again), Vec::new()))
+    }
+
+    /// Keeps the layers in a temporary file.
+    fn kept(self, work: &Work) -> Result<(File, Vec<Value>), Error> {
         let file = tempfile::tempfile()?;
         let to = file.try_clone()?;
         let mut to = Some(lamp_stack::Destination::Stream(Box::new(to)));
@@ -143,10 +167,7 @@ impl Chain {
 }
 
 fn say_all(work: &Work, remarks: &KeptRemarks) {
-    for line in remarks.take() {
-        let (stage, text) = line.split_once(": ").unwrap_or(("", &line));
-        work.say(stage, Remark::note(text));
-    }
+    remarks.take().into_iter().for_each(|line| work.say_line(line, Importance::Note));
 }
 
 /// Says what a stage found, and returns it as the program's report has it.
@@ -216,6 +237,7 @@ impl Source {
             }
             Self::Part(part) => part.run(work, then),
             Self::Build(build) => build.run(work, then),
+            Self::Plan(plan) => plan.run(work, then),
             Self::Given(given) => {
                 then(given.layers())?;
                 Ok(Vec::new())
@@ -228,18 +250,16 @@ fn at(name: &str, error: StackError) -> Error {
     Error::from(error).at(name)
 }
 
+/// Returns how much a note on a stack matters.
+pub(crate) fn importance_of(note: &StackNote) -> Importance {
+    if note.is_doubt() { Importance::Warning } else { Importance::Note }
+}
+
 /// Returns the layers of a stack, and has its notes said as they are found.
 fn stack_layers<'a>(pages: Pages, name: &'a str, work: &Work, decoded: bool) -> Flow<'a> {
     let (listener, place) = (work.clone(), name.to_owned());
     let pages = pages.with_listener(move |note| {
-        listener.say(
-            &place,
-            if note.is_doubt() {
-                Remark::warning(note.to_string())
-            } else {
-                Remark::note(note.to_string())
-            },
-        );
+        listener.say_line(format!("{place}: {note}"), importance_of(&note));
     });
     let pages = pages.map(move |page| page.map_err(|error| at(name, error)));
     Box::new(map_in_order(pages, move |page: Page| passing(page, name, decoded)))

@@ -9,6 +9,7 @@ mod check;
 mod error;
 mod layer;
 mod layers;
+mod plan;
 mod settings;
 mod slice;
 mod stack;
@@ -27,6 +28,8 @@ mod _native {
     use crate::layer::PyLayer;
     #[pymodule_export]
     use crate::layers::{PyLayers, compensate, dither, edit, fix, layers};
+    #[pymodule_export]
+    use crate::plan::{plan_speed, plan_voxels};
     #[pymodule_export]
     use crate::slice::slice;
     #[pymodule_export]

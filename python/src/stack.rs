@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lamp_pipeline::Error;
-use lamp_pipeline::watcher::Importance;
 use lamp_stack::{Dpi, IndexedStack, Layer};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
-use crate::chain::{Chain, Source};
+use crate::chain::{Chain, Source, importance_of};
 use crate::error::{exception, settings};
 use crate::layer::{PyLayer, array_of, record_of, runs_of};
 use crate::layers::PyLayers;
@@ -60,8 +59,7 @@ pub(crate) fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyStack> {
     let stack = py.detach(|| IndexedStack::open(&path).and_then(IndexedStack::into_whole));
     let stack = stack.map_err(|error| exception(py, &Error::from(error).at(name.clone())))?;
     for note in stack.notes() {
-        let importance = if note.is_doubt() { Importance::Warning } else { Importance::Note };
-        warn(py, &format!("{name}: {note}"), importance, WRAPPED)?;
+        warn(py, &format!("{name}: {note}"), importance_of(note), WRAPPED)?;
     }
     Ok(PyStack { path, stack: Arc::new(stack) })
 }

@@ -160,22 +160,8 @@ fn outlined(
     work: &Work,
     reports: &mut Vec<Value>,
 ) -> Result<(PartStack, Chain), Error> {
-    let [chain, again] = match (&chain.source, chain.stages.is_empty()) {
-        (Source::Stack(path), true) => {
-            let again = Source::Stack(path.clone());
-            [chain, Chain::of(again)]
-        }
-        (Source::Opened(stack, path, pages), true) => {
-            let again = Source::Opened(stack.clone(), path.clone(), pages.clone());
-            [chain, Chain::of(again)]
-        }
-        _ => {
-            let (file, of_chain) = chain.kept(work)?;
-            reports.extend(of_chain);
-            let again = file.try_clone()?;
-            [file, again].map(|file| Chain::of(Source::Kept(file, name.to_owned())))
-        }
-    };
+    let (chain, again, of_chain) = chain.twice(work)?;
+    reports.extend(of_chain);
     let mut part = None;
     chain.run(work, true, &mut |flow| {
         let layers = flow.map(|layer| Ok(layer?.decode()?));

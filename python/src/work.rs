@@ -47,9 +47,14 @@ impl Work {
     /// Gives a line of a stage, unless it is a detail.
     pub(crate) fn say(&self, stage: &str, Remark { importance, text }: Remark) {
         if importance > Importance::Detail {
-            // Nobody may be waiting anymore.
-            let _ = self.sender.send(Message::Remark(format!("{stage}: {text}"), importance));
+            self.say_line(format!("{stage}: {text}"), importance);
         }
+    }
+
+    /// Gives a line that names its stage.
+    pub(crate) fn say_line(&self, line: String, importance: Importance) {
+        // Nobody may be waiting anymore.
+        let _ = self.sender.send(Message::Remark(line, importance));
     }
 
     /// Returns a watcher of a stage.
