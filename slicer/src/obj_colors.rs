@@ -134,6 +134,8 @@ pub(crate) fn add_word(name: &mut Vec<u8>, word: &[u8]) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -145,6 +147,23 @@ mod tests {
         let of = |name: &str| colors.materials.get(name.as_bytes()).copied();
         let [orange, blue] = [[255, 128, 0], [0, 0, 255]].map(|levels| Some(Color(levels)));
         assert_eq!(["red one", "b", "c", "d"].map(of), [orange, blue, None, None]);
+    }
+
+    proptest! {
+        #[test]
+        fn any_materials_end(words in prop::collection::vec(word(), 0..60)) {
+            ObjColors::default().read(words.concat().as_bytes()).unwrap();
+        }
+    }
+
+    fn word() -> impl Strategy<Value = String> {
+        prop_oneof![
+            prop::sample::select(vec![
+                "newmtl ", "kd ", "\n", "1 ", "0.5 ", "\r", "#", "\\\n", "\0"
+            ])
+            .prop_map(str::to_owned),
+            ".{0,6}",
+        ]
     }
 
     #[test]
