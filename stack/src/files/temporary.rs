@@ -159,12 +159,13 @@ impl FileBeside {
 
 /// A temporary folder, otherwise like [`FileBeside`].
 pub struct FolderBeside {
+    /// Holds the lock, where the system locks folders. Dropped first: Windows removes no folder that
+    /// is open.
+    _handle: Option<File>,
     folder: TempDir,
     registered: Registered,
     path: PathBuf,
     replaces: bool,
-    /// Holds the lock, where the system locks folders.
-    _handle: Option<File>,
 }
 
 impl FolderBeside {
@@ -202,7 +203,7 @@ impl FolderBeside {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(_) => None,
             };
-            return Ok(Self { folder, registered, path, replaces, _handle: handle });
+            return Ok(Self { _handle: handle, folder, registered, path, replaces });
         }
         Err(cannot_claim().into())
     }
@@ -318,6 +319,10 @@ fn put_in_place(
     let _turn = turn_in(folder_of(to)?);
     loop {
         let replaced = check_replaceable(to, replaces)? == Existing::Replaceable;
+        if cfg!(windows) && !replaced {
+            // Only an empty folder goes, which other systems replace by themselves.
+            let _ = fs::remove_dir(to);
+        }
         match if replaced { exchange(from, to) } else { fs::rename(from, to) } {
             // Another process was faster.
             Err(error)
