@@ -9,6 +9,7 @@ use lamp_stack::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyByteArray, PyBytes};
 
 /// One layer: its image and the metadata of its page. It is not changed once made.
@@ -161,7 +162,17 @@ fn filled<'py>(
         py.detach(|| fill(memory));
         Ok(())
     })?;
-    py.import("numpy")?.call_method1("frombuffer", (memory, dtype))
+    array_over(py, &memory, dtype)
+}
+
+/// Returns an array of numpy over memory.
+fn array_over<'py>(
+    py: Python<'py>,
+    memory: &Bound<'py, PyByteArray>,
+    dtype: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    static FROM_BUFFER: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    FROM_BUFFER.import(py, "numpy", "frombuffer")?.call1((memory, dtype))
 }
 
 /// Returns an image as an array.
@@ -193,11 +204,8 @@ pub(crate) fn array_of<'py>(py: Python<'py>, image: &Image) -> PyResult<Bound<'p
 /// Returns an image as arrays of runs.
 pub(crate) fn runs_of<'py>(py: Python<'py>, image: &Image) -> PyResult<Bound<'py, PyAny>> {
     let numbers = |numbers: &[u32]| {
-        filled(py, 4 * numbers.len(), "uint32", |memory| {
-            for (place, number) in memory.as_chunks_mut::<4>().0.iter_mut().zip(numbers) {
-                *place = number.to_ne_bytes();
-            }
-        })
+        let memory = PyByteArray::new(py, bytemuck::cast_slice(numbers));
+        array_over(py, &memory, "uint32")
     };
     let (starts, columns, levels) = match image {
         Image::Mask(mask) => (numbers(mask.row_offsets())?, numbers(mask.changes())?, None),
@@ -210,7 +218,8 @@ pub(crate) fn runs_of<'py>(py: Python<'py>, image: &Image) -> PyResult<Bound<'py
             (numbers(gray.row_offsets())?, numbers(&columns)?, Some(levels))
         }
     };
-    py.import("lamp_slicer._records")?.call_method1("Runs", (starts, columns, levels))
+    static RUNS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    RUNS.import(py, "lamp_slicer._records", "Runs")?.call1((starts, columns, levels))
 }
 
 /// The rows of an array: a byte for each pixel.

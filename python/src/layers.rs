@@ -78,9 +78,7 @@ impl PyLayers {
                 return Ok(None);
             };
             *state = State::Running(Running::start(move |work| {
-                let reports = chain.run(work, true, &mut |mut layers| {
-                    layers.try_for_each(|layer| work.give(layer?.decode()?))
-                })?;
+                let reports = chain.run(work, true, &mut |layers| work.give(layers))?;
                 Ok(reports.into())
             })?);
         }

@@ -1,6 +1,7 @@
 //! Work in a thread of its own, without Python's lock. The thread that waits for it looks for
 //! signals, so Ctrl-C ends the wait and the work.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -9,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use lamp_pipeline::Error;
 use lamp_pipeline::watcher::{Importance, Remark, Watcher};
-use lamp_stack::{Layer, PassingLayer};
+use lamp_stack::{Layer, MemorySize, PassingLayer};
 use pyo3::prelude::*;
 use serde_json::Value;
 
@@ -18,15 +19,19 @@ use crate::error::{exception, stopped};
 /// Layers on their way from stage to stage.
 pub(crate) type Flow<'a> = Box<dyn Iterator<Item = Result<PassingLayer, Error>> + 'a>;
 
-/// Layers that wait for a slow reader: more would only take memory.
-const WAITING: usize = 4;
+/// Groups of layers that wait for a slow reader: more would only take memory.
+const WAITING: usize = 2;
+/// A group of layers: small layers would otherwise take less time than to hand them over.
+const GROUP_LAYERS: usize = 16;
+const GROUP_BYTES: usize = 1 << 20;
+const GROUP_TIME: Duration = Duration::from_millis(10);
 /// How often a wait looks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 /// How long stopped work may take to remove its temporary files.
 const GRACE: Duration = Duration::from_secs(1);
 
 enum Message {
-    Layer(Box<Layer>),
+    Layers(Vec<Layer>),
     Remark(String, Importance),
     Done(Result<Value, Error>),
 }
@@ -39,9 +44,28 @@ pub(crate) struct Work {
 }
 
 impl Work {
-    /// Gives a layer to the waiting thread.
-    pub(crate) fn give(&self, layer: Layer) -> Result<(), Error> {
-        self.sender.send(Message::Layer(Box::new(layer))).map_err(|_| stopped())
+    /// Gives layers to the waiting thread, also those before an error.
+    pub(crate) fn give(&self, mut layers: Flow<'_>) -> Result<(), Error> {
+        let (mut group, mut bytes, mut begun) = (Vec::new(), 0, Instant::now());
+        let send = |group: &mut Vec<Layer>| match group.is_empty() {
+            true => Ok(()),
+            false => {
+                let group = Message::Layers(std::mem::take(group));
+                self.sender.send(group).map_err(|_| stopped())
+            }
+        };
+        let given = layers.try_for_each(|layer| {
+            let layer = layer?.decode()?;
+            if group.is_empty() {
+                (bytes, begun) = (0, Instant::now());
+            }
+            bytes += layer.bytes();
+            group.push(layer);
+            let is_full = group.len() >= GROUP_LAYERS || bytes >= GROUP_BYTES;
+            if is_full || begun.elapsed() > GROUP_TIME { send(&mut group) } else { Ok(()) }
+        });
+        send(&mut group)?;
+        given
     }
 
     /// Gives a line of a stage, unless it is a detail.
@@ -89,6 +113,8 @@ pub(crate) struct Running {
     receiver: Receiver<Message>,
     stop: Arc<AtomicBool>,
     thread: JoinHandle<()>,
+    /// Layers that have come.
+    ready: VecDeque<Layer>,
 }
 
 /// A layer, or the report at the end.
@@ -109,7 +135,7 @@ impl Running {
             let done = job(&work);
             let _ = work.sender.send(Message::Done(done));
         })?;
-        Ok(Self { receiver, stop, thread })
+        Ok(Self { receiver, stop, thread, ready: VecDeque::new() })
     }
 
     /// Waits for the next layer or the end. Remarks on the way become warnings of the code that asks
@@ -138,10 +164,13 @@ impl Running {
     fn message(&mut self, py: Python<'_>, caller: u8) -> PyResult<Next> {
         loop {
             py.check_signals()?;
+            if let Some(layer) = self.ready.pop_front() {
+                return Ok(Next::Layer(Box::new(layer)));
+            }
             // Shared references to a receiver stay in one thread, so it goes in as a whole.
             let receiver = &mut self.receiver;
             match py.detach(move || receiver.recv_timeout(LOOK)) {
-                Ok(Message::Layer(layer)) => return Ok(Next::Layer(layer)),
+                Ok(Message::Layers(layers)) => self.ready.extend(layers),
                 Ok(Message::Remark(text, importance)) => warn(py, &text, importance, caller)?,
                 Ok(Message::Done(Ok(report))) => return Ok(Next::End(report)),
                 Ok(Message::Done(Err(error))) => return Err(exception(py, &error)),
