@@ -139,7 +139,7 @@ impl fmt::Display for Speeds {
     }
 }
 
-/// What is planned for layers.
+/// The plans of layers.
 #[derive(Clone)]
 enum Planner {
     Speed(SpeedSettings),

@@ -20,7 +20,7 @@ pub struct Scratch {
     folder: TempDir,
 }
 
-/// The folder, below that of [`Scratch`], whose `lamp` has the settings of commands.
+/// The folder in a [`Scratch`] whose `lamp` has the settings of commands.
 pub const OWN_SETTINGS: &str = "own-settings";
 
 /// The result of a pipeline.

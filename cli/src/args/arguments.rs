@@ -113,7 +113,7 @@ impl Arguments {
     }
 
     /// Adds what files say: the file that the command line names, then files that apply to every
-    /// command, each followed by the machine that it names, if any. What is said first holds.
+    /// command, each followed by the machine that it names, if any. The first file that has an option decides.
     fn fill_in_all(&mut self, file: Option<&Path>, with_config: bool) -> Result<(), Exit> {
         if let Some(file) = file {
             self.fill_in_file(file)?;

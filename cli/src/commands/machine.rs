@@ -31,8 +31,8 @@ pub(crate) struct MachineArgs {
 
 #[derive(Subcommand)]
 enum MachineAction {
-    /// List the built-in machines, those of your settings folder, and the built-in displays that a
-    /// machine's [scan] can name
+    /// List the built-in machines, your own machines, and the built-in displays that a machine's
+    /// [scan] can name
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]

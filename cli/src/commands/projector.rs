@@ -28,7 +28,7 @@ pub(crate) struct ProjectorArgs {
 
 #[derive(Subcommand)]
 enum ProjectorAction {
-    /// List the built-in projectors, and those of your settings folder
+    /// List the built-in projectors and your own
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]

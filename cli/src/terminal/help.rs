@@ -136,7 +136,7 @@ fn few_examples(command: Command) -> Command {
     command.after_help(few.join("\n")).after_long_help(all)
 }
 
-/// What `--version` says after the program's name: version, commit, target and features.
+/// Version, commit, target and features, as `--version` prints them after the program's name.
 pub(crate) const LONG_VERSION: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\ncommit: ",

@@ -35,7 +35,7 @@ pub(crate) struct MaterialArgs {
 
 #[derive(Subcommand)]
 enum MaterialAction {
-    /// List the built-in materials, and those of your settings folder
+    /// List the built-in materials and your own
     List {
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
