@@ -1,6 +1,7 @@
 """The interface itself: keywords, descriptions and types."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -63,9 +64,10 @@ def test_types_hold(tmp_path):
         "for feature in lamp.check(stack): print(feature.finding.text)\n",
         encoding="utf-8",
     )
-    package = Path(lamp.__file__).parent
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path)]
-    answer = subprocess.run([*command, str(package), str(use)], capture_output=True, text=True)
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache")]
+    command += ["-p", "lamp_slicer", "-m", "use"]
+    environment = {**os.environ, "MYPYPATH": str(tmp_path)}
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert answer.returncode == 0, answer.stdout
 
 
@@ -73,9 +75,7 @@ def test_the_version_is_one(program):
     assert program("lamp", "--version", check=True).stdout.split()[1] == lamp.__version__
 
 
-def test_the_module_starts_the_program(monkeypatch, tmp_path, program):
-    import os
-
+def test_the_module_starts_the_program(monkeypatch, program):
     monkeypatch.setenv("PATH", os.environ["LAMP_PROGRAMS"] + os.pathsep + os.environ["PATH"])
     command = [sys.executable, "-m", "lamp_slicer", "--version"]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -66,7 +66,7 @@ def test_python_runs_while_layers_are_made(tmp_path, stl):
 def test_control_c_ends_work(tmp_path, stl, work):
     code = f"""
         import sys, lamp_slicer as lamp
-        layers = lamp.slice(sys.argv[1], dpi=9600, thickness="1um")
+        layers = lamp.slice(sys.argv[1], dpi=9600, thickness="0.1um", trust_extent=True)
         print("begins", flush=True)
         try:
             {work}
