@@ -19,7 +19,6 @@ pub(crate) fn named<T: Document>() -> Vec<T> {
         let read = documents::document(Path::new(&name));
         read.inspect_err(|error| say(&format!("warning: {error}"))).ok()
     });
-    let own = own.filter(|own: &T| T::BUILTINS.iter().all(|builtin| builtin.name != own.name()));
     T::builtins().chain(own).collect()
 }
 

@@ -186,8 +186,11 @@ pub fn own_names<T: Document>() -> Vec<OsString> {
     let files =
         own_folder::<T>().and_then(|folder| fs::read_dir(folder).ok()).into_iter().flatten();
     let paths = files.filter_map(|file| Some(file.ok()?.path()));
-    let toml = paths.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
-    let mut names: Vec<_> = toml.filter_map(|path| Some(path.file_stem()?.to_owned())).collect();
+    let toml = paths
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml") && path.is_file());
+    let names = toml.filter_map(|path| Some(path.file_stem()?.to_owned()));
+    // Built-in names win.
+    let mut names: Vec<_> = names.filter(|name| builtin::<T>(name.as_ref()).is_none()).collect();
     names.sort();
     names
 }

@@ -97,6 +97,12 @@ fn documents_of_ones_own_have_names() {
           [[part]]\nfile = \"tower.stl\"\n",
     );
     scratch.run("lamp batch night.toml -q").succeeds();
+    // Its tasks read no file of options, also while somebody edits one.
+    scratch.write("lamp.toml", b"dpj = 600\n");
+    let again = String::from_utf8(scratch.bytes("night.toml")).unwrap().replace("4mm", "3mm");
+    scratch.write("again.toml", again.as_bytes());
+    scratch.run("lamp batch again.toml -q --no-config").succeeds();
+    fs::remove_file(scratch.path("lamp.toml")).unwrap();
     // A file whose name within is another one would be listed under that.
     let own = scratch.path(OWN_SETTINGS).join("lamp/machines");
     fs::rename(own.join("mine.toml"), own.join("other.toml")).unwrap();
@@ -117,5 +123,12 @@ fn faults_of_settings_are_named_and_reported() {
     for word in ["target: ", "memory: ", "STEP kernels: lamp", "locks work", "line 2: margin"] {
         assert!(text.contains(word), "no {word} in {text}");
     }
+    // What may stand in a command's table is no fault; a file that breaks every pipe is.
+    let fine = scratch.path(OWN_SETTINGS).join("lamp/config.toml");
+    fs::write(&fine, "[slice]\nthreads = 1\nquiet = true\n").unwrap();
+    scratch.run("lamp config").succeeds_quietly();
+    fs::write(&fine, "output = \"o.tif\"\n").unwrap();
+    scratch.run("slice tower.stl --dpi 50").is_wrong_usage(&["config.toml: output: it is only"]);
+    scratch.run("lamp completions bash").succeeds_quietly();
     scratch.run("lamp config nonsense").is_wrong_usage(&["no command nonsense"]);
 }

@@ -26,7 +26,8 @@ impl Launcher {
     pub fn words(&self, key: Key, store: &Store, engine: &str, threads: usize) -> Vec<OsString> {
         let (key, threads) = (key.to_string(), threads.to_string());
         let before = ["batch", "task", &key, "--store"].map(OsString::from);
-        let after = ["--engine", engine, "--threads", &threads].map(OsString::from);
+        // A night is the same for everybody, and while somebody edits files of options.
+        let after = ["--engine", engine, "--threads", &threads, "--no-config"].map(OsString::from);
         before.into_iter().chain([store.root().into()]).chain(after).collect()
     }
 }

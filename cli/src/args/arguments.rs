@@ -30,9 +30,10 @@ pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Ex
     let given = arguments.parsed_so_far();
     let (path, of_command) = arguments.command(&given);
     let common = Common::from_arg_matches(of_command).expect("every command has these options");
-    // They report faults of these files themselves.
-    let reports = [["config"], ["doctor"]].iter().any(|command| path == *command);
-    if !reports {
+    // Some report faults of these files themselves, and shells start with the others.
+    let works_without =
+        ["config", "doctor", "completions", "man"].iter().any(|name| path == [*name]);
+    if !works_without {
         arguments.fill_in_all(common.file().map(PathBuf::as_path), !common.ignores_config())?;
     }
     // The arguments are parsed once.
@@ -66,10 +67,11 @@ pub(crate) fn words_of_files(
     lamp: &Command,
     path: &[String],
     file: Option<&Path>,
+    with_config: bool,
 ) -> Result<Vec<(String, Vec<OsString>)>, Exit> {
     let words = ["lamp".to_owned()].iter().chain(path).map(OsString::from).collect();
     let mut arguments = Arguments::new(lamp, lamp.clone(), words);
-    arguments.fill_in_all(file, true)?;
+    arguments.fill_in_all(file, with_config)?;
     Ok(arguments.from)
 }
 
@@ -122,6 +124,7 @@ impl Arguments {
         for (from, file) in config_files().into_iter().filter(|_| with_config) {
             if from == OPTIONS_VARIABLE || file.exists() {
                 self.fill_in_file(&file)?;
+                self.refuse_output(&file)?;
                 has_machine = has_machine
                     || self.fill_in_machine(|source| source == ValueSource::CommandLine)?;
             }
@@ -138,6 +141,16 @@ impl Arguments {
         let (path, of_command) = self.command(&given);
         let settings = settings_of_file(&self.lamp, &path, file)?;
         self.fill_in(&path, of_command, &settings, file);
+        Ok(())
+    }
+
+    /// Refuses an output that a file of all commands names: each command of a pipe would write it.
+    fn refuse_output(&self, file: &Path) -> Result<(), Exit> {
+        let words = self.from.last().map_or(&[][..], |(_, words)| words);
+        if words.iter().any(|word| word.to_string_lossy().starts_with("--output=")) {
+            let why = "output: it is only for the command line and the file of --options";
+            return Err(Exit::usage(why).at(input_name(file)));
+        }
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Options of the stages from layers to layers.
 
 use std::num::{NonZeroU8, NonZeroU32};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 use lamp_fix::FixMethod;
@@ -21,6 +21,7 @@ use lamp_supports::{
 
 use crate::args::lamp_option::LampOption;
 use crate::args::options::{one_of_described, parse_distance, parse_thickness};
+use crate::catalogue::read_text;
 
 /// How rows are corrected.
 #[derive(Args, Clone)]
@@ -149,9 +150,13 @@ pub(crate) struct CheckStageArgs {
 #[derive(Clone)]
 struct Avoided(Vec<AvoidedSurface>);
 
+/// A list has a few lines for each surface.
+const MAX_AVOID_BYTES: u64 = 1 << 20;
+
 /// Reads a list of surfaces.
 fn parse_avoided(path: &str) -> Result<Avoided, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let text = read_text(Path::new(path), MAX_AVOID_BYTES, "a list of surfaces");
+    let text = text.map_err(|error| error.to_string())?;
     avoided_surfaces(&text).map(Avoided).map_err(|error| error.to_string())
 }
 

@@ -46,11 +46,11 @@ pub(crate) fn run(args: &ConfigArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage(format!("lamp has no command {name}: lamp -h lists them")));
     }
     let file = common.file().map(std::path::PathBuf::as_path);
-    let words = words_of_files(&lamp, &args.command, file)?;
+    let words = words_of_files(&lamp, &args.command, file, !common.ignores_config())?;
     let mut text = String::new();
     for (file, words) in &words {
         for word in words {
-            text += &format!("{:<30} {file}\n", word.to_string_lossy());
+            text += &format!("{:<30} {}\n", printable(&word.to_string_lossy()), printable(file));
         }
     }
     if text.is_empty() {
@@ -64,7 +64,9 @@ pub(crate) fn run(args: &ConfigArgs, common: &Common) -> Result<(), Exit> {
 pub(crate) fn listing() -> (String, Option<Exit>) {
     let mut text = "Options, from the first file that has them:\n".to_owned();
     let mut fault = None;
-    let lamp = formed(Lamp::command());
+    let mut lamp = formed(Lamp::command());
+    // Commands have the general options from here on.
+    lamp.build();
     for (from, path) in config_files() {
         let is_there = from == OPTIONS_VARIABLE || path.exists();
         let state = if is_there { "" } else { ": not there" };

@@ -62,10 +62,18 @@ pub fn avoided_surfaces(text: &str) -> Result<Vec<AvoidedSurface>, AvoidError> {
         problem: one_line(error.message()),
     })?;
     let mut surfaces = Vec::new();
+    let nothing = |line| AvoidError { line, problem: "it names no surface".to_owned() };
+    if file.avoid.is_empty() {
+        return Err(nothing(1));
+    }
     for table in file.avoid {
         let line = line_of(text, Some(table.span()));
         let named = table.into_inner().surfaces();
-        surfaces.extend(named.map_err(|problem| AvoidError { line, problem })?);
+        let named = named.map_err(|problem| AvoidError { line, problem })?;
+        if named.is_empty() {
+            return Err(nothing(line));
+        }
+        surfaces.extend(named);
     }
     Ok(surfaces)
 }
