@@ -10,8 +10,8 @@ use lamp_pipeline::documents::input_name;
 use lamp_pipeline::watcher::{Importance, KeptRemarks, Remark};
 use lamp_pipeline::{Error, Stage, Working, named};
 use lamp_stack::{
-    Dpi, IndexedStack, Layer, Page, PageInfo, Pages, PassingLayer, StackError, StackInfo,
-    StackNote, map_in_order,
+    Dpi, IndexedStack, Layer, Page, PageFault, PageInfo, Pages, PassingLayer, StackError,
+    StackInfo, StackNote, map_in_order,
 };
 use pyo3::prelude::*;
 use serde_json::{Value, json};
@@ -304,6 +304,7 @@ impl GivenLayers {
     fn layers(self) -> Flow<'static> {
         let mut count = 0;
         let mut ended = false;
+        let mut order = GivenOrder::default();
         Box::new(std::iter::from_fn(move || {
             if ended {
                 return None;
@@ -311,19 +312,24 @@ impl GivenLayers {
             // None once Python ends.
             let next = Python::try_attach(|py| self.next(py, count));
             let next = next.unwrap_or_else(|| Some(Err(stopped())));
+            let next = next.map(|layer| {
+                let layer = layer?;
+                order.check(&layer, count)?;
+                Ok(layer.into())
+            });
             count += 1;
             ended = !matches!(next, Some(Ok(_)));
             next
         }))
     }
 
-    fn next(&self, py: Python<'_>, count: u32) -> Option<Result<PassingLayer, Error>> {
+    fn next(&self, py: Python<'_>, count: u32) -> Option<Result<Layer, Error>> {
         let mut iterator = match self.iterator.bind(py).try_iter() {
             Ok(iterator) => iterator,
             Err(error) => return Some(Err(raised(error))),
         };
         let layer = iterator.next()?.and_then(|given| self.layer(&given, count));
-        Some(layer.map(PassingLayer::from).map_err(raised))
+        Some(layer.map_err(raised))
     }
 
     fn layer(&self, given: &Bound<'_, PyAny>, count: u32) -> PyResult<Layer> {
@@ -340,4 +346,36 @@ impl GivenLayers {
         };
         layer_of(given, info, self.dpi)
     }
+}
+
+/// The order and size of the layers that were given. Readers of a stack refuse others.
+#[derive(Default)]
+struct GivenOrder {
+    last: Option<u32>,
+    first_size: Option<[u32; 2]>,
+}
+
+impl GivenOrder {
+    /// Checks that a layer, which is `page` of those given, makes a stack with the ones before it.
+    fn check(&mut self, layer: &Layer, page: u32) -> Result<(), Error> {
+        let index = layer.info.index;
+        if let Some(before) = self.last.replace(index).filter(|&before| index <= before) {
+            return Err(StackError::Order { layer: index, before }.into());
+        }
+        let size = [layer.image.width(), layer.image.height()];
+        if size.contains(&0) {
+            return Err(StackError::Malformed { page, fault: PageFault::Side(0) }.into());
+        }
+        let first = *self.first_size.get_or_insert(size);
+        if size == first { Ok(()) } else { Err(other_size(&layer.info, size, first)) }
+    }
+}
+
+/// Returns the error of a layer whose width and height differ from the first layer's.
+pub(crate) fn other_size(layer: &PageInfo, size: [u32; 2], first: [u32; 2]) -> Error {
+    let ([width, height], [first_width, first_height]) = (size, first);
+    Error::work(format!(
+        "{} has {width} x {height} pixels, and the first layer has {first_width} x {first_height}",
+        layer.name()
+    ))
 }

@@ -260,7 +260,10 @@ fn pixels_of(given: &Bound<'_, PyAny>) -> PyResult<Pixels> {
     let dtype: String = array.getattr("dtype")?.str()?.extract()?;
     let shape: Vec<u64> = array.getattr("shape")?.extract()?;
     let &[height, width] = &shape[..] else {
-        return Err(wrong(format!("an object of type {}", given.get_type().name()?)));
+        return Err(wrong(match given.getattr("shape") {
+            Ok(shape) => format!("an array of shape {shape}"),
+            Err(_) => format!("an object of type {}", given.get_type().name()?),
+        }));
     };
     let is_gray = match &*dtype {
         "bool" => false,

@@ -140,6 +140,12 @@ pub(crate) fn given_layers(
     part: Option<String>,
 ) -> PyResult<Chain> {
     let py = layers.py();
+    // A text would give its letters.
+    if let Ok(path) = layers.extract::<PathBuf>() {
+        let why = "is a path: for the layers of that stack, open it with lamp_slicer.open; dpi, \
+                   thickness and name are for arrays";
+        return Err(error::settings(py, format!("{} {why}", path.display())));
+    }
     let iterator = layers.try_iter().map_err(|_| {
         let kind = layers.get_type().to_string();
         let why = "give a stack, a path of one, or what iterates over layers or arrays";

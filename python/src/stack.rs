@@ -10,7 +10,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
-use crate::chain::{Chain, Source, importance_of};
+use crate::chain::{Chain, Source, importance_of, other_size};
 use crate::error::{exception, settings};
 use crate::layer::{PyLayer, array_of, record_of, runs_of};
 use crate::layers::PyLayers;
@@ -121,18 +121,12 @@ impl PyStack {
     #[getter]
     fn shape(&self, py: Python<'_>) -> PyResult<(usize, u32, u32)> {
         let headers = self.stack.headers();
-        let [width, height] = headers[0].size;
-        match headers.iter().find(|header| header.size != headers[0].size) {
-            None => Ok((headers.len(), height, width)),
+        let first = headers[0].size;
+        match headers.iter().find(|header| header.size != first) {
+            None => Ok((headers.len(), first[1], first[0])),
             Some(other) => {
-                let [other_width, other_height] = other.size;
-                let why = format!(
-                    "{}: {} has {other_width} x {other_height} pixels, and the first layer has \
-                     {width} x {height}",
-                    self.path.display(),
-                    other.info.name()
-                );
-                Err(exception(py, &Error::work(why)))
+                let error = other_size(&other.info, other.size, first);
+                Err(exception(py, &error.at(self.path.display().to_string())))
             }
         }
     }

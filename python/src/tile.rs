@@ -1,6 +1,7 @@
 //! Builds: copies of parts on a machine's area.
 
 use std::cell::RefCell;
+use std::fmt;
 use std::path::Path;
 use std::vec;
 
@@ -44,11 +45,19 @@ pub(crate) fn tile(parts: &Bound<'_, PyAny>, keywords: &Bound<'_, PyDict>) -> Py
     {
         *area = number.trim_end().to_owned();
     }
-    let settings: TileSettings = settings(py, &given, |_, _| Ok(()))?;
+    let settings: TileSettings = settings(py, &given, |key, text| match key {
+        "copies" if text.parse::<u32>().is_err() => Err(no_count(text)),
+        _ => Ok(()),
+    })?;
     let part = |part: Bound<'_, PyAny>| -> PyResult<(Chain, Option<u32>)> {
         if part.is_instance_of::<PyTuple>() {
-            let (layers, copies): (Bound<'_, PyAny>, u32) = part.extract()?;
-            return Ok((chain_of(&layers)?, Some(copies)));
+            let pair = part.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>();
+            let (layers, copies) = pair.map_err(|_| {
+                wrong(py, format!("{part} is no part: give layers, or (layers, copies)"))
+            })?;
+            let count = copies.extract::<u32>();
+            let count = count.map_err(|_| wrong(py, format!("copies: {}", no_count(&copies))))?;
+            return Ok((chain_of(&layers)?, Some(count)));
         }
         Ok((chain_of(&part)?, None))
     };
@@ -67,6 +76,10 @@ pub(crate) fn tile(parts: &Bound<'_, PyAny>, keywords: &Bound<'_, PyDict>) -> Py
         return Err(wrong(py, why));
     }
     Ok(PyLayers::new(Chain::of(Source::Build(Box::new(BuildSource { parts, settings })))))
+}
+
+fn no_count(given: impl fmt::Display) -> String {
+    format!("{given} is no number of copies: give a whole number from 1")
 }
 
 /// A layout takes a line for each copy.

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use lamp_pipeline::Error;
 use lamp_stack::{
-    Destination, FolderBeside, Format, PackLevel, PassingLayer, map_in_order, write_packed,
-    write_stack,
+    Destination, FolderBeside, Format, PackLevel, PassingLayer, StackError, StackInfo,
+    map_in_order, write_packed, write_stack,
 };
 use pyo3::prelude::*;
 
@@ -84,8 +84,29 @@ fn written(layers: Flow<'_>, to: Destination, kind: Kind, format: Format) -> Res
             let layers = map_in_order(layers, |layer: PassingLayer| Ok(layer.decode()?));
             write_packed(layers, to, format, PackLevel::default())
         }
-        Kind::Tiff | Kind::Folder => write_stack(layers, to, format),
+        Kind::Tiff => write_stack(layers, to, format),
+        Kind::Folder => write_stack(in_folder(layers), to, format),
     }
+}
+
+/// Returns layers as readers of a folder want them: the first has the record of the stack, and
+/// indices have no gap, which would be a lost file.
+fn in_folder(layers: Flow<'_>) -> Flow<'_> {
+    let mut last = None;
+    Box::new(layers.map(move |layer| {
+        let mut layer = layer?;
+        let info = layer.info_mut();
+        match last.replace(info.index) {
+            None if info.z_um.is_some() && info.stack.is_none() => {
+                info.stack = Some(StackInfo::default());
+            }
+            Some(before) if u32::checked_add(before, 1) != Some(info.index) => {
+                return Err(StackError::MissingPage { layer: info.index }.into());
+            }
+            _ => {}
+        }
+        Ok(layer)
+    }))
 }
 
 /// Names the output in an error that has no place yet, as errors of inputs have.

@@ -118,7 +118,7 @@ def test_views_of_arrays_are_taken_as_they_look():
     ("given", "why"),
     [
         (np.zeros((2, 2)), "an array of float64 is no layer"),
-        (np.zeros((2, 2, 2), bool), "of two dimensions"),
+        (np.zeros((2, 2, 2), bool), r"an array of shape \(2, 2, 2\) is no layer"),
         (np.zeros(5, np.uint8), "of two dimensions"),
         ("a text", "no layer"),
         (None, "no layer"),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import zarr
 from conftest import noise
+from PIL import Image
 
 import lamp_slicer as lamp
 
@@ -57,6 +58,8 @@ def test_a_store_is_read_only_and_has_one_size(tmp_path, stack):
     with pytest.raises(Exception, match="read-only|read only"):
         zarr.open_group(store, mode="a").create_array("1", shape=(1,), dtype="u1")
     path = tmp_path / "sizes.tif"
-    lamp.write(path, [np.zeros((3, 4), bool), np.zeros((4, 4), bool)])
+    # Such stacks are only of other writers.
+    pages = [Image.fromarray(np.zeros(shape, bool)) for shape in [(3, 4), (4, 4)]]
+    pages[0].save(path, save_all=True, append_images=pages[1:], compression="group4")
     with pytest.raises(lamp.LampError, match="layer 1 has 4 x 4 pixels"):
         lamp.zarr(path)
