@@ -16,7 +16,7 @@ from lamp_slicer import _native
 # ways, or leaves them to the program.
 OF_COMMANDS = {
     "classic", "evidence", "fields", "force", "help", "layers", "layout-out",
-    "layout-picture", "memory", "mirrors", "no-sync", "options", "output", "overlap", "packbits",
+    "layout-picture", "memory", "mirrors", "no-config", "no-sync", "options", "output", "overlap", "packbits",
     "quiet", "recipe", "report", "seam", "strict", "strips", "threads", "time", "timeout", "verbose",
     "version",
 }
