@@ -168,7 +168,7 @@ fn what_cannot_be_exposed_is_refused() {
         is_wrong_usage(&scratch.run(&line), word);
     }
     for (options, words) in [
-        ("--gray --material none", &["nor a built-in material", "lamp-suspension"][..]),
+        ("--gray --material none", &["nor a material of that name", "lamp-suspension"][..]),
         ("--gray --material none.toml", &["none.toml"]),
         ("--material lamp-no-absorber", &["how bright"]),
         ("--gray --material tmpta", &["no cure model"]),
