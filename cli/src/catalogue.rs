@@ -13,7 +13,8 @@ pub(crate) fn show<T: Document>(path: &Path) -> Result<(), Exit> {
     print(&document_and_text::<T>(path)?.1)
 }
 
-/// Returns all documents of a kind that have a name: the built-in ones, then the user's own. A warning names each file there that is wrong.
+/// Returns all documents of a kind that have a name: the built-in ones, then the user's own. A
+/// warning names each file of the user's that is wrong.
 pub(crate) fn named<T: Document>() -> Vec<T> {
     let own = own_names::<T>().into_iter().filter_map(|name| {
         let read = documents::document(Path::new(&name));

@@ -158,7 +158,8 @@ pub fn config_folder() -> Option<PathBuf> {
     Some(etcetera::choose_base_strategy().ok()?.config_dir().join("lamp"))
 }
 
-fn own_folder<T: Document>() -> Option<PathBuf> {
+/// Returns the folder of one's own documents of a kind, such as `machines`.
+pub fn own_folder<T: Document>() -> Option<PathBuf> {
     Some(config_folder()?.join(format!("{}s", T::KIND)))
 }
 

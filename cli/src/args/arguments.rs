@@ -115,16 +115,16 @@ impl Arguments {
     }
 
     /// Adds what files say: the file that the command line names, then files that apply to every
-    /// command, each followed by the machine that it names, if any. The first file that has an option decides.
+    /// command, each followed by the machine that it names, if any. The first file that has an
+    /// option decides.
     fn fill_in_all(&mut self, file: Option<&Path>, with_config: bool) -> Result<(), Exit> {
         if let Some(file) = file {
-            self.fill_in_file(file)?;
+            self.fill_in_file(file, false)?;
         }
         let mut has_machine = self.fill_in_machine(|source| source == ValueSource::CommandLine)?;
         for (from, file) in config_files().into_iter().filter(|_| with_config) {
             if from == OPTIONS_VARIABLE || file.exists() {
-                self.fill_in_file(&file)?;
-                self.refuse_output(&file)?;
+                self.fill_in_file(&file, true)?;
                 has_machine = has_machine
                     || self.fill_in_machine(|source| source == ValueSource::CommandLine)?;
             }
@@ -136,21 +136,17 @@ impl Arguments {
         Ok(())
     }
 
-    fn fill_in_file(&mut self, file: &Path) -> Result<(), Exit> {
+    /// Adds what a file says. A file that is for all commands names no output: each command of a pipe
+    /// would write it.
+    fn fill_in_file(&mut self, file: &Path, is_for_all: bool) -> Result<(), Exit> {
         let given = self.parsed_so_far();
         let (path, of_command) = self.command(&given);
         let settings = settings_of_file(&self.lamp, &path, file)?;
-        self.fill_in(&path, of_command, &settings, file);
-        Ok(())
-    }
-
-    /// Refuses an output that a file of all commands names: each command of a pipe would write it.
-    fn refuse_output(&self, file: &Path) -> Result<(), Exit> {
-        let words = self.from.last().map_or(&[][..], |(_, words)| words);
-        if words.iter().any(|word| word.to_string_lossy().starts_with("--output=")) {
+        if is_for_all && settings.iter().any(|setting| setting.key == "output") {
             let why = "output: it is only for the command line and the file of --options";
             return Err(Exit::usage(why).at(input_name(file)));
         }
+        self.fill_in(&path, of_command, &settings, file);
         Ok(())
     }
 

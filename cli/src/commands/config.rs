@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::{Args, CommandFactory};
 use lamp_grayscale::material::Material;
 use lamp_machine::Machine;
-use lamp_pipeline::documents::{Document, config_folder, own_names};
+use lamp_pipeline::documents::{Document, own_folder, own_names};
 use lamp_planning::projector::Projector;
 
 use crate::Lamp;
@@ -83,9 +83,9 @@ pub(crate) fn listing() -> (String, Option<Exit>) {
             }
         }
     }
-    text += &own::<Machine>("machines");
-    text += &own::<Material>("materials");
-    text += &own::<Projector>("projectors");
+    text += &own::<Machine>();
+    text += &own::<Material>();
+    text += &own::<Projector>();
     (text, fault)
 }
 
@@ -110,11 +110,11 @@ fn printable_lines(text: &str) -> String {
 }
 
 /// Returns a line for one's own documents of a kind.
-fn own<T: Document>(kinds: &str) -> String {
+fn own<T: Document>() -> String {
     let names: Vec<_> =
         own_names::<T>().iter().map(|name| name.to_string_lossy().into_owned()).collect();
-    let place = config_folder().map(|folder| folder.join(kinds).display().to_string());
+    let place = own_folder::<T>().map(|folder| folder.display().to_string());
     let place = place.unwrap_or_else(|| "no home folder is known".to_owned());
     let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    printable_lines(&format!("Your {kinds} ({place}): {names}"))
+    printable_lines(&format!("Your {}s ({place}): {names}", T::KIND))
 }

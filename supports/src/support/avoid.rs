@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use lamp_slicing::brep::vector::Vec3;
 use lamp_slicing::{Paint, SurfaceName};
-use lamp_stack::{Length, UnknownName, line_of, one_line};
+use lamp_stack::{Length, TomlError, UnknownName, line_of, one_line, read_toml};
 use serde::Deserialize;
 use thiserror::Error;
 
@@ -57,10 +57,8 @@ struct AvoidTable {
 /// # Errors
 /// Returns an error with the line if the text is no such list.
 pub fn avoided_surfaces(text: &str) -> Result<Vec<AvoidedSurface>, AvoidError> {
-    let file: AvoidFile = toml::from_str(text).map_err(|error| AvoidError {
-        line: line_of(text, error.span()),
-        problem: one_line(error.message()),
-    })?;
+    let file: AvoidFile =
+        read_toml(text).map_err(|TomlError { line, problem, .. }| AvoidError { line, problem })?;
     let mut surfaces = Vec::new();
     let nothing = |line| AvoidError { line, problem: "it names no surface".to_owned() };
     if file.avoid.is_empty() {
@@ -237,7 +235,7 @@ mod tests {
             ("x = [\"1mm\", \"0mm\"]\ny = [\"0mm\", \"1mm\"]\nz = [\"0mm\", \"1mm\"]", "not below"),
             ("x = [\"1mm\", \"2mm\"]", "without y"),
             ("x = [\"1mm\", \"2\"]", "unit"),
-            ("q = 1", "unknown field"),
+            ("q = 1", "unknown key"),
         ] {
             let error = avoided_surfaces(&format!("[[avoid]]\n{text}\n")).unwrap_err();
             assert!(error.problem.contains(words) && !error.problem.contains('\n'), "{error}");
