@@ -10,6 +10,7 @@ use crate::files::file_format::FileFormat;
 use crate::files::folder_list::FOLDER_LIST;
 use crate::layer::check::CheckFault;
 use crate::note::ImagesBeside;
+use crate::printer::fault::PrinterFault;
 
 /// The words before the reason of a stage that gave up.
 pub(crate) const GAVE_UP: &str = "the stage before gave up: ";
@@ -179,6 +180,9 @@ pub enum StackError {
         /// The layer that does not fit.
         layer: u32,
     },
+    /// A printer's file cannot be read or written.
+    #[error(transparent)]
+    Printer(#[from] PrinterFault),
     /// A packed stack was to be written to a folder.
     #[error("a packed stack is one file, not a folder")]
     PackedFolder,
@@ -282,6 +286,9 @@ pub enum PageFault {
     /// A part of a packed stack is damaged, or passes a reader's limit.
     #[error("its packed {0} is damaged")]
     Packed(&'static str),
+    /// The run lengths of a printer's file are damaged.
+    #[error("its run lengths are damaged: {0}")]
+    RunLengths(&'static str),
     /// An image has more rows than a packed stack takes.
     #[error("its image has {0} rows, too many to pack: write a TIFF")]
     TooTallToPack(u32),

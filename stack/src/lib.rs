@@ -40,6 +40,7 @@ mod named;
 mod note;
 mod ordered;
 mod plain_text;
+mod printer;
 mod record;
 mod shell;
 mod significant;
@@ -99,9 +100,11 @@ pub use named::{Named, UnknownName};
 pub use note::{ImagesBeside, PageGap, StackNote};
 pub use ordered::{MemorySize, map_in_order, take_batch};
 pub use plain_text::PlainText;
+pub use printer::fault::PrinterFault;
+pub use printer::write::{PrinterFormat, write_printer_file};
 pub use record::{
     BuildRecord, BuiltPart, BuiltParts, CompensateRecord, DitherRecord, FieldRecord, FixRecord,
-    FixedBand, PageRecord, SliceRecord, StripRecord,
+    FixedBand, PageRecord, PrintRecord, PrintStep, SliceRecord, StripRecord,
 };
 pub use shell::{file_word, quoted, words};
 pub use significant::{format_significant, round_significant, to_nm};

@@ -82,5 +82,6 @@ pub(crate) fn compression_name(compression: Compression) -> &'static str {
         Compression::Png => "PNG",
         Compression::Picture(format) => format.name(),
         Compression::Packed => "packed against the layer below",
+        Compression::Goo => "run lengths of GOO",
     }
 }

@@ -27,4 +27,6 @@ pub enum Compression {
     Picture(PictureFormat),
     /// The page is one of a packed stack.
     Packed,
+    /// The run lengths of GOO files.
+    Goo,
 }

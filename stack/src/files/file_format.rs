@@ -126,7 +126,7 @@ const SIGNATURES: &[(&[u8], FileFormat)] = &[
     (b"\x86\0\xFD\x12", PrintJob("a CTB file of a resin printer")),
     (b"\x07\x01\xFD\x12", PrintJob("a CTB file of a resin printer")),
     (b"ANYCUBIC\0", PrintJob("a Photon file of a resin printer")),
-    (b"V3.0\x07\0\0\0DLP\0", PrintJob("a GOO file of a resin printer")),
+    (b"V3.0\x07\0\0\0DLP\0", Layers("a GOO file of a resin printer")),
 ];
 
 /// First words of texts, in small letters.

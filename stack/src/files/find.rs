@@ -12,7 +12,7 @@ use crate::files::page_names::PageFiles;
 use crate::note::StackNote;
 
 /// The endings of names of stacks in one file, in small letters.
-pub const STACK_ENDINGS: [&str; 5] = ["tif", "tiff", "btf", "tf8", "lamp"];
+pub const STACK_ENDINGS: [&str; 6] = ["tif", "tiff", "btf", "tf8", "lamp", "goo"];
 
 /// Returns whether a file has the extension of a stack in one file.
 pub fn is_stack_name(path: &Path) -> bool {

@@ -14,6 +14,7 @@ mod build;
 mod compensate;
 mod dither;
 mod fix;
+mod print;
 mod slice;
 mod strip;
 
@@ -25,6 +26,7 @@ pub use build::{BuildRecord, BuiltPart, BuiltParts};
 pub use compensate::CompensateRecord;
 pub use dither::DitherRecord;
 pub use fix::{FixRecord, FixedBand};
+pub use print::{PrintRecord, PrintStep};
 pub use slice::SliceRecord;
 pub use strip::{FieldRecord, StripRecord};
 

@@ -23,7 +23,7 @@ mod tiles;
 mod unpack;
 mod write;
 
-pub(crate) use page::{PackedShape, PassedCode};
+pub(crate) use page::{PackedShape, PanelPage, PassedCode};
 pub use page::{Page, PageHeader};
 pub use read::PageReader;
 pub(crate) use source::ByteSource;

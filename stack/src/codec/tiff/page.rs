@@ -25,6 +25,7 @@ use crate::layer::{Layer, LayerImage, Strip};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::ordered::MemorySize;
+use crate::printer::goo;
 
 /// A page that is not decoded yet.
 #[derive(Clone, Debug)]
@@ -65,6 +66,19 @@ pub(crate) struct PassedCode {
 pub(crate) struct PackedShape {
     pub(crate) size: [u32; 2],
     pub(crate) gray: bool,
+}
+
+/// A page of a printer's file.
+pub(crate) struct PanelPage {
+    pub(crate) number: u32,
+    pub(crate) info: PageInfo,
+    pub(crate) dpi: Option<Dpi>,
+    /// The columns and rows of the panel.
+    pub(crate) size: [u32; 2],
+    pub(crate) gray: bool,
+    /// The orientation that turns the image upright.
+    pub(crate) orientation: Orientation,
+    pub(crate) compression: Compression,
 }
 
 /// A page's statements about its layer, without the image.
@@ -169,6 +183,30 @@ impl Page {
             data_bytes,
             pieces: strip.into_iter().collect(),
             image,
+        }
+    }
+
+    /// Creates a page of a printer's file from the data of its image, which is kept only to be
+    /// decoded.
+    pub(crate) fn of_panel(page: PanelPage, limits: Limits, data: Vec<u8>, is_kept: bool) -> Self {
+        let PanelPage { number, info, dpi, size, gray, orientation, compression } = page;
+        let [width, height] = size;
+        Self {
+            number,
+            limits,
+            info,
+            check: None,
+            dpi,
+            width,
+            gray,
+            white_is_zero: false,
+            orientation,
+            compression,
+            differences: false,
+            layout: PageLayout::strips(width, height, height),
+            data_bytes: data.len() as u64,
+            pieces: if is_kept { vec![data] } else { Vec::new() },
+            image: None,
         }
     }
 
@@ -296,6 +334,11 @@ impl Page {
             Compression::Picture(format) => {
                 picture_page::decode(format, &self.pieces[0], &self.limits)
                     .map_err(|fault| fault.on(self.number))?
+            }
+            Compression::Goo => {
+                let size = [self.width, self.layout.page_height];
+                goo::rle::decode(&self.pieces[0], size, self.gray, self.limits.runs)
+                    .map_err(|fault| malformed(self.number, fault))?
             }
             _ if self.gray => Image::Gray(self.decode_gray()?),
             _ => Image::Mask(self.decode_mask()?),

@@ -21,6 +21,7 @@ use crate::error::{PageFault, StackError, malformed};
 use crate::files::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
 use crate::note::ImagesBeside;
+use crate::printer::goo::read::GooReader;
 use crate::text::one_line;
 
 /// Reads pages in order from a stream (forward only) or a file (parts in any order). A
@@ -153,18 +154,22 @@ impl PageReader {
     }
 
     /// Returns where [`at_place`](Self::at_place) finds the next page: the offset of its
-    /// directory, or in a packed stack its number.
+    /// directory, or in a packed stack or a GOO file its number.
     pub(crate) fn next_place(&self) -> u64 {
         match self.kind {
-            FileKind::Packed(_) => self.number.into(),
+            FileKind::Packed(_) | FileKind::Goo(_) => self.number.into(),
             _ => self.next,
         }
     }
 
     /// Reads the page of a file at a place.
     pub(crate) fn at_place(&mut self, place: u64) -> Result<Option<Page>, StackError> {
-        if let FileKind::Packed(unpacker) = &mut self.kind {
-            return unpacker.page(place as u32, &mut self.source, &self.limits);
+        match &mut self.kind {
+            FileKind::Packed(unpacker) => {
+                return unpacker.page(place as u32, &mut self.source, &self.limits);
+            }
+            FileKind::Goo(goo) => return goo.page(place as u32, &mut self.source, &self.limits),
+            _ => {}
         }
         // A page that is asked for again is no loop.
         self.seen.clear();
@@ -214,6 +219,10 @@ impl PageReader {
                     None => return Ok(None),
                 }
             }
+            FileKind::Goo(goo) => match goo.next(&mut self.source, &self.limits, self.images)? {
+                Some(page) => (page, self.next),
+                None => return Ok(None),
+            },
             FileKind::Tiff => match self.read_tiff_page()? {
                 Some(page) => page,
                 None if self.has_layer => return Ok(None),
@@ -483,6 +492,7 @@ enum FileKind {
     Tiff,
     Png,
     Packed(Box<Unpacker>),
+    Goo(Box<GooReader>),
     /// Another picture, with its first bytes, which a stream gives only once.
     Picture {
         format: PictureFormat,
@@ -496,6 +506,7 @@ impl FileKind {
             Some(format) => Self::Picture { format, start: start.to_owned() },
             None if start == png_page::SIGNATURE => Self::Png,
             None if start == packed::SIGNATURE => Self::Packed(Box::new(Unpacker::new(0))),
+            None if GooReader::is_start(start) => Self::Goo(Box::new(GooReader::new(start))),
             None => Self::Tiff,
         }
     }

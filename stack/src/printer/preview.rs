@@ -1,0 +1,116 @@
+//! The picture of a print on the printer's screen: the print from above, the higher the lighter.
+
+use std::num::NonZeroU32;
+
+use crate::image::Image;
+use crate::image::coverage::mean_levels;
+
+/// The most columns and rows of boxes that a picture is made of.
+const SIDE: u32 = 400;
+/// The level of the lowest layer in a picture.
+const LOWEST: u64 = 70;
+
+/// The highest layer in each box of the panel.
+pub(crate) struct TopView {
+    columns: u32,
+    rows: u32,
+    /// For each box, row by row: one more than the number of its highest layer, 0 without any.
+    tops: Vec<u32>,
+    layers: u32,
+}
+
+/// The boxes that a layer covers by half, row by row.
+pub(crate) struct Covered([u32; 2], Vec<bool>);
+
+impl Covered {
+    /// Finds them; the cost grows with the image's runs.
+    pub(crate) fn of(image: &Image) -> Self {
+        let [width, height] = [image.width(), image.height()];
+        let side = width.max(height).div_ceil(SIDE).max(1);
+        let boxes = NonZeroU32::new(side).expect("it is at least 1");
+        let rows = mean_levels(image, 0..width, 0..height, boxes);
+        let covered = rows.flatten().map(|level| level >= 128).collect();
+        Self([width.div_ceil(side), height.div_ceil(side)], covered)
+    }
+}
+
+impl TopView {
+    pub(crate) fn new() -> Self {
+        Self { columns: 0, rows: 0, tops: Vec::new(), layers: 0 }
+    }
+
+    /// Adds the next layer above the others. All layers have one size.
+    pub(crate) fn add(&mut self, Covered([columns, rows], covered): &Covered) {
+        if self.tops.is_empty() {
+            (self.columns, self.rows) = (*columns, *rows);
+            self.tops = vec![0; covered.len()];
+        }
+        self.layers += 1;
+        for (top, _) in self.tops.iter_mut().zip(covered).filter(|(_, covered)| **covered) {
+            *top = self.layers;
+        }
+    }
+
+    /// Draws gray levels, row by row, into a picture of this size: as much of the panel as the
+    /// print needs, in the middle.
+    pub(crate) fn draw(&self, [width, height]: [u32; 2]) -> Vec<u8> {
+        let mut levels = vec![0; width as usize * height as usize];
+        let Some([left, top, right, bottom]) = self.extent() else { return levels };
+        // Boxes of a pixel of the picture: the same number across and down.
+        let across = f64::from(right - left) / f64::from(width);
+        let step = across.max(f64::from(bottom - top) / f64::from(height)) * 1.1;
+        let middle = [left + right, top + bottom].map(|sum| f64::from(sum) / 2.0);
+        let place = |pixel: u32, of: u32, middle: f64| {
+            (middle + (f64::from(pixel) + 0.5 - f64::from(of) / 2.0) * step).floor()
+        };
+        for (index, level) in levels.iter_mut().enumerate() {
+            let (x, y) = (index as u32 % width, index as u32 / width);
+            let [x, y] = [place(x, width, middle[0]), place(y, height, middle[1])];
+            let inside = x >= 0.0 && y >= 0.0 && x < self.columns.into() && y < self.rows.into();
+            if inside {
+                let at = y as usize * self.columns as usize + x as usize;
+                *level = self.level(self.tops[at]);
+            }
+        }
+        levels
+    }
+
+    fn level(&self, top: u32) -> u8 {
+        let share = u64::from(top) * (255 - LOWEST) / u64::from(self.layers.max(1));
+        if top == 0 { 0 } else { (LOWEST + share) as u8 }
+    }
+
+    /// Returns the first column and row of boxes with a layer, and those behind the last.
+    fn extent(&self) -> Option<[u32; 4]> {
+        let of_box = |index: usize| {
+            let [x, y] = [index as u32 % self.columns, index as u32 / self.columns];
+            [x, y, x + 1, y + 1]
+        };
+        let boxes = self.tops.iter().enumerate().filter(|(_, top)| **top > 0);
+        boxes
+            .map(|(index, _)| of_box(index))
+            .reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mask_of;
+
+    #[test]
+    fn a_higher_layer_is_lighter() {
+        let mut view = TopView::new();
+        let wide: &[u32] = &[2, 8];
+        let thin: &[u32] = &[4, 6];
+        for layer in [[wide; 6], [thin; 6]] {
+            view.add(&Covered::of(&Image::Mask(mask_of(10, layer))));
+        }
+        let drawn = view.draw([20, 20]);
+        // From the middle row: the upper layer in the middle, the lower one around.
+        assert_eq!(drawn[10 * 20 + 10], 255);
+        assert_eq!(drawn[10 * 20 + 3], 162);
+        assert_eq!(drawn[0], 0);
+        assert!(TopView::new().draw([4, 4]).iter().all(|level| *level == 0));
+    }
+}
