@@ -13,8 +13,8 @@ pub(crate) use lamp_pipeline::documents::is_stream;
 use lamp_pipeline::documents::{open_stack, refuse_terminal};
 use lamp_stack::{
     Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
-    PageWriter, Pages, PassingLayer, StackError, StackInfo, close, map_in_order, sync,
-    write_packed, write_stack,
+    PageWriter, Pages, PassingLayer, PrinterFormat, StackError, StackInfo, close, map_in_order,
+    sync, write_packed, write_printer_file, write_stack,
 };
 
 use crate::args::options::{Common, InputArgs, Output};
@@ -295,6 +295,10 @@ pub(crate) fn write_layers(
         let layers = map_in_order(layers, decode);
         return write_packed_layers(layers, output, PackLevel::default(), progress);
     }
+    if let Some(format) = PrinterFormat::of_name(&output.output) {
+        let layers = map_in_order(layers, decode);
+        return write_print(layers, output, format, progress);
+    }
     let to = destination(output)?;
     let (counted, format) = (layers.inspect(|_| progress.layer_done()), format(output.classic));
     let written = if output.packbits {
@@ -323,6 +327,23 @@ pub(crate) fn write_packed_layers(
     let counted = layers.inspect(|_| progress.layer_done());
     let written = write_packed(counted, to, format(output.classic), level);
     written_to(&output.output, written, progress)
+}
+
+/// Writes layers as a printer's file where `output` says, counting them in `progress`.
+fn write_print(
+    layers: impl Iterator<Item = Result<Layer, Exit>>,
+    output: &Output,
+    format: PrinterFormat,
+    progress: &Progress,
+) -> Result<(), Exit> {
+    match output {
+        Output { classic: true, .. } => return Err(for_tiffs("--classic")),
+        Output { packbits: true, .. } => return Err(for_tiffs("--packbits")),
+        _ => {}
+    }
+    let to = destination(output)?;
+    let counted = layers.inspect(|_| progress.layer_done());
+    written_to(&output.output, write_printer_file(counted, to, format), progress)
 }
 
 /// Refuses an option that other files than TIFFs do not have.
