@@ -79,7 +79,7 @@ pub(crate) fn compression_name(compression: Compression) -> &'static str {
         Compression::Lzw => "LZW",
         Compression::Deflate => "Deflate",
         Compression::PackBits => "PackBits",
-        Compression::Png => "PNG",
+        Compression::Png | Compression::PrinterPng => "PNG",
         Compression::Picture(format) => format.name(),
         Compression::Packed => "packed against the layer below",
         Compression::Goo => "run lengths of GOO",

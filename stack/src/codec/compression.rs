@@ -29,4 +29,6 @@ pub enum Compression {
     Packed,
     /// The run lengths of GOO files.
     Goo,
+    /// The page is a PNG in a printer's file.
+    PrinterPng,
 }

@@ -17,6 +17,58 @@ pub enum PrinterFault {
     /// A part of the file contradicts the format.
     #[error("its {0} is damaged")]
     Damaged(&'static str),
+    /// The file's ZIP archive cannot be read.
+    #[error("its ZIP archive cannot be read: {0}")]
+    Archive(String),
+    /// An archive on a pipe.
+    #[error("a ZIP archive cannot be read from a pipe: give the file's name instead")]
+    Piped,
+    /// A file of an archive is missing.
+    #[error("its ZIP archive lacks {0}")]
+    Missing(String),
+    /// A text of an archive cannot be read.
+    #[error("its {file} cannot be read: {problem}")]
+    Text {
+        /// The name of the file in the archive.
+        file: String,
+        /// The parser's message.
+        problem: String,
+    },
+    /// A file states what is not read.
+    #[error("it states {0}, which is not read")]
+    Unread(&'static str),
+    /// Two images of an archive differ in size.
+    #[error(
+        "the image of layer {layer} has {} x {} pixels, but the panel has {} x {}",
+        size[0], size[1], panel[0], panel[1]
+    )]
+    OtherSize {
+        /// The layer's index.
+        layer: u32,
+        /// The image's width and height.
+        size: [u32; 2],
+        /// The panel's columns and rows.
+        panel: [u32; 2],
+    },
+    /// A format states one thickness for all layers.
+    #[error("{format} has one thickness for all layers: layer {layer} has another than the first")]
+    Uneven {
+        /// The format's name.
+        format: &'static str,
+        /// The layer's index.
+        layer: u32,
+    },
+    /// A format states the steps of the printer alone, not of single layers.
+    #[error(
+        "{format} has no times and moves of single layers: layer {layer} has others than its \
+         printer's"
+    )]
+    OwnStep {
+        /// The format's name.
+        format: &'static str,
+        /// The layer's index.
+        layer: u32,
+    },
     /// The stack does not say which printer it is for.
     #[error(
         "the stack does not say which printer it is for: slice it with --machine and a machine \
@@ -68,15 +120,15 @@ pub enum PrinterFault {
         /// The height that it builds.
         most_mm: f64,
     },
+    /// The format cannot state what the printer needs.
+    #[error("{format} cannot state {what}")]
+    Unstated {
+        /// The format's name.
+        format: &'static str,
+        /// The printer's property.
+        what: &'static str,
+    },
     /// A file cannot be written to a pipe.
     #[error("{0} cannot be written to a pipe or a folder: name a file with -o")]
     NotAFile(&'static str),
-    /// The file is larger than the format can be.
-    #[error("{format} holds at most {most}")]
-    TooLarge {
-        /// The format's name.
-        format: &'static str,
-        /// What it holds.
-        most: &'static str,
-    },
 }

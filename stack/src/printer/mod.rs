@@ -3,6 +3,7 @@
 //! Readers give the layers as any stack's, with the images as seen from above. Writers turn and
 //! mirror them as the printer shows them, and add up what the files state of the whole print.
 
+pub(crate) mod archive;
 pub(crate) mod fault;
 pub(crate) mod goo;
 pub(crate) mod panel;

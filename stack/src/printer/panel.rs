@@ -14,10 +14,10 @@ pub(crate) fn resolution(record: &PrintRecord) -> Option<Dpi> {
     }
     // Sides in hundredths of a millimeter round the pitch; the longer one rounds it less.
     let dpi = if record.panel_px[0] >= record.panel_px[1] { across } else { down };
-    // A whole number of nanometers, as panels have them.
-    let pitch_nm = (25.4e6 / dpi).round();
-    let whole = 25.4e6 / pitch_nm;
-    Dpi::new(if ((whole - dpi) / dpi).abs() < 1e-4 { whole } else { dpi })
+    // A whole number of nanometers, as panels have them, and then what TIFF states exactly.
+    let of_whole_nm = 25.4e6 / (25.4e6 / dpi).round();
+    let meant = if ((of_whole_nm - dpi) / dpi).abs() < 1e-4 { of_whole_nm } else { dpi };
+    Dpi::new((meant * 1e4).round() / 1e4)
 }
 
 /// Returns the orientation that turns an image of the panel's files upright, and an upright image
@@ -52,13 +52,12 @@ mod tests {
 
     #[test]
     fn square_pixels_have_a_resolution() {
-        let pitch =
-            |px, mm| resolution(&panel(px, mm)).map(|dpi| (dpi.pitch().um() * 1e6).round() / 1e6);
-        assert_eq!(pitch([4098, 2560], [143.43, 89.6]), Some(35.0));
-        assert_eq!(pitch([7680, 4320], [330.24, 185.76]), Some(43.0));
-        assert_eq!(pitch([15120, 6230], [211.68, 118.37]), None);
+        let dpi = |px, mm| resolution(&panel(px, mm)).map(Dpi::get);
+        assert_eq!(dpi([4098, 2560], [143.43, 89.6]), Some(725.7143));
+        assert_eq!(dpi([7680, 4320], [330.24, 185.76]), Some(590.6977));
+        assert_eq!(dpi([15120, 6230], [211.68, 118.37]), None);
         for mm in [[0.0, 1.0], [-1.0, 1.0], [f64::NAN, 1.0]] {
-            assert_eq!(pitch([10, 10], mm), None, "{mm:?}");
+            assert_eq!(dpi([10, 10], mm), None, "{mm:?}");
         }
     }
 

@@ -97,6 +97,9 @@ impl ReadHeight {
             exposure_ms: Some(thousandths(step.exposure_s)),
             ..PageInfo::default()
         };
+        if !info.exposure_ms.is_some_and(f64::is_finite) {
+            return Err(PrinterFault::Damaged("exposure of a layer"));
+        }
         self.um = top_um;
         let usual = PrintStep { exposure_s: step.exposure_s, ..record.step(index) };
         if step != usual {

@@ -12,13 +12,15 @@ use crate::files::temporary::FileBeside;
 use crate::image::Image;
 use crate::layer::Layer;
 use crate::layer::page_info::{PageInfo, StackInfo};
+use crate::limits::MAX_SIDE;
 use crate::ordered::map_in_order;
+use crate::printer::archive::write::ArchiveWriter;
 use crate::printer::fault::PrinterFault;
 use crate::printer::goo::write::GooWriter;
 use crate::printer::panel::orientation;
 use crate::printer::preview::{Covered, TopView};
 use crate::printer::total::{PrintLayer, PrintTotals};
-use crate::record::PrintRecord;
+use crate::record::{PrintRecord, PrintStep};
 
 /// A format of the files of printers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,11 +28,22 @@ use crate::record::PrintRecord;
 pub enum PrinterFormat {
     /// Elegoo's GOO, version 3.
     Goo,
+    /// NanoDLP's plates.
+    NanoDlp,
+    /// Prusa's SL1 and SL1S.
+    Sl1,
+    /// UVtools' own format, for any printer.
+    Uvj,
 }
 
 impl PrinterFormat {
     /// All formats, and the endings of the names of their files.
-    pub const ALL: [(Self, &'static [&'static str]); 1] = [(Self::Goo, &["goo"])];
+    pub const ALL: [(Self, &'static [&'static str]); 4] = [
+        (Self::Goo, &["goo"]),
+        (Self::NanoDlp, &["nanodlp"]),
+        (Self::Sl1, &["sl1", "sl1s"]),
+        (Self::Uvj, &["uvj"]),
+    ];
 
     /// Returns the format that a file's name ends in.
     pub fn of_name(path: &Path) -> Option<Self> {
@@ -43,6 +56,45 @@ impl PrinterFormat {
     fn most_side(self) -> u32 {
         match self {
             Self::Goo => super::goo::header::MOST_SIDE,
+            Self::NanoDlp | Self::Sl1 | Self::Uvj => MAX_SIDE,
+        }
+    }
+
+    /// Returns whether images are mirrored as the panel shows them.
+    fn mirrored(self, record: &PrintRecord) -> [bool; 2] {
+        if self == Self::Uvj { [false; 2] } else { record.mirrored }
+    }
+
+    /// Checks that a file can state the layer, which was added to `totals`.
+    fn check(
+        self,
+        record: &PrintRecord,
+        totals: &PrintTotals,
+        added: &PrintLayer,
+        layer: u32,
+    ) -> Result<(), PrinterFault> {
+        let format = self.name();
+        if matches!(self, Self::Goo | Self::Uvj) {
+            return Ok(());
+        }
+        if !totals.is_even {
+            return Err(PrinterFault::Uneven { format, layer });
+        }
+        let usual = record.step(totals.layers - 1);
+        // Times in milliseconds, which pages have, are rounded.
+        let is_usual = (usual.exposure_s - added.step.exposure_s).abs() < 1e-6
+            && PrintStep { exposure_s: usual.exposure_s, ..added.step } == usual;
+        if !is_usual {
+            return Err(PrinterFault::OwnStep { format, layer });
+        }
+        match self {
+            Self::NanoDlp if record.mirrored[1] => {
+                Err(PrinterFault::Unstated { format, what: "a panel mirrored top to bottom" })
+            }
+            Self::Sl1 if record.first_layers > 1 => {
+                Err(PrinterFault::Unstated { format, what: "more than one first layer" })
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -58,25 +110,30 @@ impl PrinterFormat {
     fn name(self) -> &'static str {
         match self {
             Self::Goo => "a GOO file",
+            Self::NanoDlp => "a NanoDLP file",
+            Self::Sl1 => "an SL1 file",
+            Self::Uvj => "a UVJ file",
         }
     }
 }
 
 /// The file that is being written.
-pub(super) type PrinterFile = BufWriter<Arc<File>>;
+pub(crate) type PrinterFile = BufWriter<Arc<File>>;
 
-/// What the files of all formats state at their end, or once they are whole.
-pub(super) struct Print<'a> {
-    pub(super) record: &'a PrintRecord,
-    pub(super) totals: &'a PrintTotals,
-    pub(super) view: &'a TopView,
+/// The facts that files of all formats state once all layers are known.
+pub(crate) struct Print<'a> {
+    /// The part's name.
+    pub(crate) part: &'a str,
+    pub(crate) record: &'a PrintRecord,
+    pub(crate) totals: &'a PrintTotals,
+    pub(crate) view: &'a TopView,
 }
 
 /// A layer that is coded.
-pub(super) struct CodedLayer {
-    pub(super) info: PageInfo,
-    pub(super) size: [u32; 2],
-    pub(super) code: Vec<u8>,
+pub(crate) struct CodedLayer {
+    pub(crate) info: PageInfo,
+    pub(crate) size: [u32; 2],
+    pub(crate) code: Vec<u8>,
     covered: Covered,
     /// White pixels, and gray ones in part.
     exposed_px: f64,
@@ -89,6 +146,7 @@ impl CodedLayer {
             .then(|| image.oriented(orientation(mirrored)).expect("a mirrored image has its runs"));
         let code = match format {
             PrinterFormat::Goo => super::goo::rle::encode(turned.as_ref().unwrap_or(image)),
+            _ => super::archive::png::encode(turned.as_ref().unwrap_or(image), layer.dpi),
         };
         Self {
             info: layer.info.clone(),
@@ -137,23 +195,28 @@ where
         Some(error) => return error.map(drop),
         None => layers.peek().and_then(|layer| layer.as_ref().ok()),
     };
-    let record = first.map(|layer| record_of(layer, format)).ok_or(StackError::NoLayers)??;
+    let first = first.ok_or(StackError::NoLayers)?;
+    let record = record_of(first, format)?;
+    let part = first.info.stack.as_ref().map(|stack| stack.part.clone()).unwrap_or_default();
     let temporary = FileBeside::new(&path).map_err(StackError::from)?;
     let out = BufWriter::with_capacity(1 << 18, temporary.file());
-    let mut file = match format {
-        PrinterFormat::Goo => GooWriter::new(out)?,
+    let mut file: Box<dyn PrinterWriter> = match format {
+        PrinterFormat::Goo => Box::new(GooWriter::new(out)?),
+        _ => Box::new(ArchiveWriter::new(out, format, &part)),
     };
     let (mut totals, mut view) = (PrintTotals::default(), TopView::new());
-    let mirrored = record.mirrored;
+    let mirrored = format.mirrored(&record);
     for layer in map_in_order(layers, |layer: Layer| Ok(CodedLayer::new(&layer, format, mirrored)))
     {
         let layer = layer?;
         check_size(&layer, &record).map_err(StackError::from)?;
         let added = totals.add(&record, &layer.info, layer.exposed_px).map_err(StackError::from)?;
+        let checked = format.check(&record, &totals, &added, layer.info.index);
+        checked.map_err(StackError::from)?;
         view.add(&layer.covered);
         file.push(&added, &layer)?;
     }
-    file.finish(&Print { record: &record, totals: &totals, view: &view })?;
+    file.finish(&Print { part: &part, record: &record, totals: &totals, view: &view })?;
     Ok(temporary.persist().map_err(StackError::from)?)
 }
 
@@ -181,10 +244,10 @@ fn check_size(layer: &CodedLayer, record: &PrintRecord) -> Result<(), PrinterFau
 }
 
 /// The writer of a format.
-pub(super) trait PrinterWriter {
+pub(crate) trait PrinterWriter {
     /// Adds the next layer.
     fn push(&mut self, added: &PrintLayer, layer: &CodedLayer) -> Result<(), StackError>;
 
     /// Writes what is known only behind the last layer.
-    fn finish(self, print: &Print<'_>) -> Result<(), StackError>;
+    fn finish(self: Box<Self>, print: &Print<'_>) -> Result<(), StackError>;
 }

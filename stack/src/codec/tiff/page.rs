@@ -25,7 +25,7 @@ use crate::layer::{Layer, LayerImage, Strip};
 use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::ordered::MemorySize;
-use crate::printer::goo;
+use crate::printer::{archive, goo};
 
 /// A page that is not decoded yet.
 #[derive(Clone, Debug)]
@@ -117,6 +117,7 @@ impl MemorySize for Page {
             Compression::Lzw
             | Compression::Deflate
             | Compression::Png
+            | Compression::PrinterPng
             | Compression::Picture(_) => 64,
             _ => 16,
         };
@@ -333,6 +334,11 @@ impl Page {
                 .map_err(|fault| fault.on(self.number))?,
             Compression::Picture(format) => {
                 picture_page::decode(format, &self.pieces[0], &self.limits)
+                    .map_err(|fault| fault.on(self.number))?
+            }
+            Compression::PrinterPng => {
+                let size = [self.width, self.layout.page_height];
+                archive::png::decode(&self.pieces[0], size, &self.limits)
                     .map_err(|fault| fault.on(self.number))?
             }
             Compression::Goo => {

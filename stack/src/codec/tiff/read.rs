@@ -21,6 +21,8 @@ use crate::error::{PageFault, StackError, malformed};
 use crate::files::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
 use crate::note::ImagesBeside;
+use crate::printer::archive::read::ArchiveReader;
+use crate::printer::fault::PrinterFault;
 use crate::printer::goo::read::GooReader;
 use crate::text::one_line;
 
@@ -92,6 +94,11 @@ impl PageReader {
                 let format = format.first().ok_or(StackError::CutOff { last_whole: None })?;
                 FileKind::Packed(Box::new(Unpacker::new(*format)))
             }
+            FileKind::Tiff if ArchiveReader::is_start(&start) => {
+                let file = source.file()?.ok_or(PrinterFault::Piped)?;
+                let archive = ArchiveReader::new(file)?;
+                archive.map_or(FileKind::Tiff, |archive| FileKind::Archive(Box::new(archive)))
+            }
             kind => kind,
         };
         let (little_endian, big) = match start.as_slice() {
@@ -154,10 +161,10 @@ impl PageReader {
     }
 
     /// Returns where [`at_place`](Self::at_place) finds the next page: the offset of its
-    /// directory, or in a packed stack or a GOO file its number.
+    /// directory, or in a packed stack or a printer's file its number.
     pub(crate) fn next_place(&self) -> u64 {
         match self.kind {
-            FileKind::Packed(_) | FileKind::Goo(_) => self.number.into(),
+            FileKind::Packed(_) | FileKind::Goo(_) | FileKind::Archive(_) => self.number.into(),
             _ => self.next,
         }
     }
@@ -169,6 +176,7 @@ impl PageReader {
                 return unpacker.page(place as u32, &mut self.source, &self.limits);
             }
             FileKind::Goo(goo) => return goo.page(place as u32, &mut self.source, &self.limits),
+            FileKind::Archive(archive) => return archive.page(place as u32, &self.limits, true),
             _ => {}
         }
         // A page that is asked for again is no loop.
@@ -220,6 +228,10 @@ impl PageReader {
                 }
             }
             FileKind::Goo(goo) => match goo.next(&mut self.source, &self.limits, self.images)? {
+                Some(page) => (page, self.next),
+                None => return Ok(None),
+            },
+            FileKind::Archive(archive) => match archive.next(&self.limits, self.images)? {
                 Some(page) => (page, self.next),
                 None => return Ok(None),
             },
@@ -493,6 +505,7 @@ enum FileKind {
     Png,
     Packed(Box<Unpacker>),
     Goo(Box<GooReader>),
+    Archive(Box<ArchiveReader>),
     /// Another picture, with its first bytes, which a stream gives only once.
     Picture {
         format: PictureFormat,

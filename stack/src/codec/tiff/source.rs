@@ -28,6 +28,14 @@ impl ByteSource {
         }
     }
 
+    /// Returns another handle of a file, which shares its position; `None` of a stream.
+    pub(crate) fn file(&self) -> io::Result<Option<File>> {
+        match self {
+            Self::Stream { .. } => Ok(None),
+            Self::File { file, .. } => file.get_ref().try_clone().map(Some),
+        }
+    }
+
     /// Returns the length in bytes of a file, `None` of a stream.
     pub(crate) fn length(&self) -> io::Result<Option<u64>> {
         match self {

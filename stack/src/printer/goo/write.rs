@@ -26,7 +26,7 @@ impl PrinterWriter for GooWriter {
         Ok(self.out.write_all(&layer(added, pauses, &coded.code))?)
     }
 
-    fn finish(mut self, print: &Print<'_>) -> Result<(), StackError> {
+    fn finish(mut self: Box<Self>, print: &Print<'_>) -> Result<(), StackError> {
         self.out.write_all(&footer())?;
         let previews = PREVIEWS.map(|side| print.view.draw([side, side]));
         self.out.seek(SeekFrom::Start(0))?;
