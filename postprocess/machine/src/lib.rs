@@ -16,6 +16,7 @@ mod file;
 mod light;
 mod limit;
 mod motion;
+mod panel;
 mod scan;
 mod times;
 
@@ -28,6 +29,7 @@ pub use file::MachineError;
 pub use light::{LightError, LightTable};
 pub use limit::MachineLimit;
 pub use motion::{Acceleration, MotionError, Speed};
+pub use panel::{Panel, PanelStep};
 pub use scan::{MirrorFaults, Scan, ScanDirection, ScanError, ScanLight, ScanTilt};
 pub use times::Times;
 
@@ -54,6 +56,8 @@ pub struct Machine {
     pub scan: Option<Scan>,
     /// The fields that a projector exposes step by step, in place of `strips` and `scan`.
     pub fields: Option<MachineFields>,
+    /// The panel that exposes a layer at once, in place of `strips`, `scan` and `fields`.
+    pub panel: Option<Panel>,
     /// How a blade spreads the next layer.
     pub recoating: Option<Recoating>,
     /// How long the steps of a layer take.

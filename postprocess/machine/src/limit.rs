@@ -73,6 +73,40 @@ pub enum MachineLimit {
         /// The thickest that it builds in.
         most: Length,
     },
+    /// A panel whose pixels are not square.
+    #[error(
+        "the panel of the machine {machine} has pixels of {} x {} um, and the pixels of a stack \
+         are square: it cannot be sliced for yet", pitch_um[0], pitch_um[1]
+    )]
+    RectangularPixels {
+        /// The machine's name.
+        machine: String,
+        /// The width and height of its pixels in micrometers.
+        pitch_um: [f64; 2],
+    },
+    /// Another resolution than the panel's.
+    #[error("the stack has {dpi} dpi, and the panel of the machine {machine} has {panel} dpi")]
+    PanelDpi {
+        /// The resolution.
+        dpi: f64,
+        /// The machine's name.
+        machine: String,
+        /// The resolution of its panel.
+        panel: f64,
+    },
+    /// A part that is larger than the panel.
+    #[error(
+        "the part takes {footprint}, and the panel of the machine {machine} has {}x{}mm: turn the \
+         part, or cut it", panel_mm[0], panel_mm[1]
+    )]
+    Panel {
+        /// The part's size along x and y.
+        footprint: Size,
+        /// The machine's name.
+        machine: String,
+        /// The width and height of its panel in millimeters.
+        panel_mm: [f64; 2],
+    },
 }
 
 /// The amount by which lengths may miss a limit, in micrometers: they are sums and differences of
