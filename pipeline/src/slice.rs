@@ -22,6 +22,7 @@ use crate::fallback::Bridged;
 use crate::heights;
 use crate::memory::{available, in_words};
 use crate::overlaps::overlap_text;
+use crate::panel::PanelFrame;
 use crate::part_file::{PartFile, paths};
 use crate::size::short;
 use crate::slice_settings::{GrayRule, SliceSettings, SlicingRecord, Thickness};
@@ -85,6 +86,7 @@ pub struct Slicing<'a> {
     /// The layers with pixels that white does not cure down to the underside, and those pixels.
     short: Cell<[u64; 2]>,
     is_blank: Cell<bool>,
+    panel: Option<PanelFrame>,
 }
 
 /// Text that slicing writes on pages besides their images.
@@ -231,7 +233,7 @@ impl SliceStage {
             let name = fallback.file_name().unwrap_or_default().to_string_lossy();
             words.push_str(&option("fallback", &name));
         }
-        // It changes no image, but refuses some.
+        // Without a panel it changes no image, but refuses some.
         if let Some(machine) = &self.machine {
             let name = recorded_name::<Machine>(machine);
             words.push_str(&option("machine", &name.to_string_lossy()));
@@ -283,6 +285,7 @@ impl SliceStage {
             check_part(machine, &slices)
                 .map_err(|limit| Error::from(limit).at(name_of_all(parts)))?;
         }
+        let panel = machine.and_then(|it| PanelFrame::new(&it, &slices, &settings.frame));
         let fallback = self.fallback.as_deref();
         let bridged = Bridged::new(slices, fallback, settings, self.layers.clone(), watcher)?;
         pages.record.fallback = bridged.word();
@@ -297,6 +300,7 @@ impl SliceStage {
             counts: Cell::default(),
             short: Cell::default(),
             is_blank: Cell::new(true),
+            panel,
         })
     }
 }
@@ -339,6 +343,10 @@ impl Slicing<'_> {
                     self.short.set([layers + 1, all + pixels]);
                 }
                 see(&layer.info);
+            }
+            // Last: reports point into the images of the part alone.
+            if let Some(panel) = &self.panel {
+                panel.place(&mut layer);
             }
             Ok(layer)
         })
@@ -470,7 +478,9 @@ fn check_part(machine: &Machine, slices: &Slices) -> Result<(), MachineLimit> {
     let [low, high] = slices.box_mm();
     // Differences of coordinates are off by rounding: a part as large as the area must fit.
     let side = |k: usize| Length::from_mm(high[k] - low[k]).to_whole_nm();
-    machine.check_footprint(Size { width: side(0), height: side(1) }, "the part")?;
+    let footprint = Size { width: side(0), height: side(1) };
+    machine.check_footprint(footprint, "the part")?;
+    machine.check_on_panel(footprint)?;
     let thicknesses = slices.layer_heights();
     let height = Length::from_um(thicknesses.thicknesses_um().sum()).to_whole_nm();
     machine.check_height(height, "the part")

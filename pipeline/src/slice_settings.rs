@@ -188,7 +188,7 @@ impl SliceSettings {
     /// defaults.
     pub fn stated(&self, machine: Option<&Machine>) -> Option<String> {
         let Defaults { dpi, thickness, margin } =
-            machine.map(|machine| machine.defaults.clone()).unwrap_or_default();
+            machine.map(Machine::slicing_defaults).unwrap_or_default();
         let usual = Self::default();
         let usual = Self {
             dpi: dpi.and_then(Dpi::new).unwrap_or(usual.dpi),
@@ -232,6 +232,7 @@ impl SliceSettings {
     /// Returns the exceeded limit.
     pub fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
         machine.check_dpi(self.dpi, "the stack")?;
+        machine.check_panel_dpi(self.dpi)?;
         if let SliceFrame::At { size, .. } = self.frame {
             machine.check_footprint(size, "the image")?;
         }

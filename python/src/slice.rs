@@ -111,7 +111,7 @@ pub(crate) fn slice(
     if let Some(machine) = &machine {
         let machine: Machine =
             py.detach(|| document(machine)).map_err(|error| error::exception(py, &error))?;
-        let defaults = machine.defaults;
+        let defaults = machine.slicing_defaults();
         let mut usual = |key: &str, of_machine: Option<Value>, others: &[&str]| {
             if let Some(value) = of_machine
                 && !others.iter().any(|other| given.contains_key(*other))

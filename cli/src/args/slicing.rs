@@ -110,11 +110,11 @@ pub(crate) struct SliceStageArgs {
     #[command(flatten)]
     options: SlicingArgs,
 
-    /// Machine to build on: alpha, beta or a file (see lamp machine)
+    /// Machine to build on: alpha, beta, another built-in one or a file (see lamp machine)
     ///
     /// A part, a resolution or a layer thickness beyond the machine's limits is refused at the
     /// start. The machine's defaults apply to resolution, thickness and margin unless you give
-    /// others
+    /// others. On a machine with a panel, images have its size, with the part in the middle
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 
