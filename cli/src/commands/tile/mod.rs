@@ -264,10 +264,14 @@ impl TileArgs {
         });
         let timed = Rc::clone(&totals);
         let size = [placed.pixels().width, placed.pixels().height];
-        let layers = Box::new(within_height(build, machine).inspect(move |layer| {
-            if let Ok(layer) = layer {
-                timed.borrow_mut().time(layer, size);
+        let print = machine.as_ref().and_then(Machine::print_record);
+        let layers = Box::new(within_height(build, machine).map(move |layer| {
+            let mut layer = layer?;
+            timed.borrow_mut().time(&layer, size);
+            if let Some((print, stack)) = print.as_ref().zip(layer.info.stack.as_mut()) {
+                stack.set_print_record(print);
             }
+            Ok(layer)
         }));
         Ok(Build { layers, layout: placed, stray_rows, no_mesh, recipe, totals })
     }
