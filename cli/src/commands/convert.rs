@@ -38,6 +38,7 @@ Examples:
   lamp convert pages/ --classic -o build.tif
   lamp convert build.tif --layers 100..200 --png -o pictures/
   lamp convert build.tif --layers 600 -o layer.png
+  lamp convert plate.goo -o plate.uvj
   lamp convert part.step part.stl --chord 5um
   lamp convert part.stl part.step")]
 pub(crate) struct ConvertArgs {

@@ -118,7 +118,7 @@ fn checked(path: &Path) -> Result<Machine, Exit> {
 /// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> Value {
     let Machine { name, description, area, height, dpi, thickness, .. } = machine;
-    let Machine { strips, scan, fields, recoating, times, defaults, .. } = machine;
+    let Machine { strips, scan, fields, panel, recoating, times, defaults, .. } = machine;
     let swaths = machine.swaths();
     json!({
         "name": name,
@@ -135,6 +135,16 @@ fn fields(machine: &Machine) -> Value {
             "overlap": fields.overlap,
             "step_s": fields.step_s,
             "source": fields.source,
+        })),
+        "panel": panel.as_ref().map(|panel| json!({
+            "pixels": panel.pixels,
+            "pitch_um": panel.pitch_um,
+            "mirrored": panel.mirrored,
+            "printer": panel.printer,
+            "first_layers": panel.first_layers,
+            "transition_layers": panel.transition_layers,
+            "exposure_s": [panel.first.exposure_s, panel.normal.exposure_s],
+            "source": panel.source,
         })),
         "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
         "times": times.as_ref().map(|times| json!({
@@ -225,17 +235,21 @@ fn display_table() -> String {
 /// A line for each built-in machine.
 fn machine_table() -> String {
     let mut text = format!(
-        "{:<8}{:<18}{:<10}{:<14}{:<16}description\n",
+        "{:<17}{:<18}{:<10}{:<14}{:<16}description\n",
         "name", "area", "height", "dpi", "layers"
     );
     for machine in named::<Machine>() {
-        let Machine { name, description, area, height, dpi, thickness, .. } = machine;
+        let Machine { name, description, area, height, dpi, thickness, panel, .. } = machine;
         let area = area.value.to_string();
         let height = height.map_or("unknown".to_owned(), |height| height.value.to_string());
-        let dpi = dpi.map_or("any".to_owned(), |dpi| format!("{}-{}", dpi.least, dpi.most));
+        let any = || match &panel {
+            Some(panel) => panel.dpi().map_or("none".to_owned(), |dpi| dpi.to_string()),
+            None => "any".to_owned(),
+        };
+        let dpi = dpi.map_or_else(any, |dpi| format!("{}-{}", dpi.least, dpi.most));
         let layers = thickness
             .map_or("any".to_owned(), |limits| format!("{}-{}", limits.least, limits.most));
-        text += &format!("{name:<8}{area:<18}{height:<10}{dpi:<14}{layers:<16}{description}\n");
+        text += &format!("{name:<17}{area:<18}{height:<10}{dpi:<14}{layers:<16}{description}\n");
     }
     text
 }

@@ -194,7 +194,7 @@ mod tests {
         for name in ["-", "x", "x.part", "blade.v2", "x.out", "x.7", ".hidden", "a.b/x", "x.TIF"] {
             assert!(check_ending(Path::new(name), &STACK).is_ok(), "{name}");
         }
-        for name in ["x.sl1", "x.PNG", "a.tif.gz", "x.obj", "x.json"] {
+        for name in ["x.ctb", "x.PNG", "a.tif.gz", "x.obj", "x.json"] {
             let message = check_ending(Path::new(name), &STACK).unwrap_err().to_string();
             assert!(message.starts_with(&format!("{name}: a stack is a TIFF")), "{message}");
         }
