@@ -73,6 +73,11 @@ fn no_packed_stack_makes_the_reader_panic_or_contradict_itself() {
 }
 
 #[test]
+fn no_printer_s_file_makes_a_reader_panic_or_contradict_itself() {
+    survives("printer", hostile::printer);
+}
+
+#[test]
 fn no_codes_make_the_codec_panic_or_contradict_itself() {
     survives("g4", hostile::g4);
 }

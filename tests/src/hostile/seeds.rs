@@ -14,9 +14,12 @@ use lamp_machine::ScanDirection;
 use lamp_slicing::{Part, SliceOptions, Slices};
 use lamp_stack::{
     Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder,
-    PackLevel, PageInfo, PageWriter, StackError, g4, png_of_layer, write_packed,
+    PackLevel, PageInfo, PageWriter, PrintRecord, PrintStep, PrinterFormat, StackError, StackInfo,
+    g4, png_of_layer, write_packed, write_printer_file,
 };
 use tempfile::NamedTempFile;
+
+use super::GOO_PREVIEWS;
 
 /// An input that a fuzz target starts from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,6 +46,7 @@ pub fn seeds() -> Vec<Seed> {
         .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
         .chain(packed_stacks().into_iter().map(of("packed")))
+        .chain(prints().into_iter().map(of("printer")))
         .chain(g4_codes().into_iter().map(of("g4")))
         .chain(blocks().into_iter().map(of("check")))
         .chain(meshes().into_iter().map(of("mesh")))
@@ -104,6 +108,55 @@ fn colored(mut stl: Vec<u8>, header: &[u8]) -> Vec<u8> {
         facet[48..].copy_from_slice(&(number << 13 | number).to_le_bytes());
     }
     with(stl, 0, header)
+}
+
+/// Files of every format of printers, of masks and of a gray layer.
+fn prints() -> Named {
+    let step = PrintStep { exposure_s: 2.0, light: 255, ..PrintStep::default() };
+    let print = PrintRecord {
+        printer: "mine".to_owned(),
+        panel_px: [40, 6],
+        panel_mm: [2.0, 0.3],
+        mirrored: [true, false],
+        first_layers: 1,
+        first: PrintStep { exposure_s: 20.0, ..step },
+        normal: step,
+        ..PrintRecord::default()
+    };
+    let layer = |index: u32| {
+        let mut stack = StackInfo::default();
+        stack.set_print_record(&print);
+        let info = PageInfo {
+            index,
+            thickness_um: Some(50.0),
+            stack: (index == 0).then_some(stack),
+            ..PageInfo::default()
+        };
+        let mut gray = GrayMask::new(40);
+        for row in 0..6 {
+            let level = if index == 1 { 90 } else { 255 };
+            gray.push_runs([(row, 0), (4 + index, level), (1, 255)]).expect("it is 40 wide");
+        }
+        let image = gray.to_mask().map_or(Image::Gray(gray), Image::Mask);
+        Layer { info, dpi: None, image: image.into() }
+    };
+    let file = |format| {
+        let file = NamedTempFile::new().expect("there is room");
+        let layers = (0..3).map(layer).map(Ok::<_, StackError>);
+        write_printer_file(layers, Destination::File(file.path().to_owned()), format)
+            .expect("there is room");
+        std::fs::read(file.path()).expect("it was written")
+    };
+    let mut goo = file(PrinterFormat::Goo);
+    let (start, previews) = GOO_PREVIEWS;
+    drop(goo.drain(start..start + previews));
+    vec![
+        ("plate.goo", goo.clone()),
+        ("many_layers.goo", with(goo, start, &[0xFF; 4])),
+        ("plate.nanodlp", file(PrinterFormat::NanoDlp)),
+        ("plate.sl1", file(PrinterFormat::Sl1)),
+        ("plate.uvj", file(PrinterFormat::Uvj)),
+    ]
 }
 
 fn objs() -> Named {
