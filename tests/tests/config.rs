@@ -89,7 +89,9 @@ fn documents_of_ones_own_have_names() {
     }
     let listed = scratch.run("lamp material list --json").succeeds().stdout;
     assert!(String::from_utf8(listed).unwrap().contains("\"my-resin\""));
-    scratch.run("lamp machine show nobody").is_refused_with(&["alpha, beta, mine"]);
+    scratch
+        .run("lamp machine show nobody")
+        .is_refused_with(&["alpha, beta, athena8k", "sonicmega8k, mine"]);
     // A night finds them, too, with their content in the key.
     scratch.write(
         "night.toml",

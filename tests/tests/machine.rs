@@ -127,6 +127,7 @@ fn json_says_what_is_known_of_machines() {
             "overlap": 8,
             "scan": null,
                 "fields": null,
+            "panel": null,
             "recoating_pa": null,
             "times": {
                 "recoat_s": 8.0,

@@ -59,6 +59,7 @@ mod plan_ecpl;
 mod plan_simulate;
 mod plan_speed;
 mod povray;
+mod printers;
 mod projector;
 mod ranges;
 mod records;

@@ -1,0 +1,237 @@
+//! Slices for printers with a panel, and reads their files by every command and by other programs.
+
+use lamp_stack::{Dpi, GrayMask, Layer, Mask, white_in_both};
+use lamp_tests::{Scratch, ask_python, masks};
+
+/// A printer of which every format can state all but moves. Its panel is wider than the tower and
+/// the torus.
+const PRINTER: &str = r#"name = "mine"
+description = "A printer of mine"
+
+[area]
+value = "80x60mm"
+source = "measured"
+
+[height]
+value = "90mm"
+source = "measured"
+
+[panel]
+pixels = [400, 300]
+pitch_um = [200, 200]
+mirrored = [true, false]
+printer = "Mine 400"
+source = "measured"
+first_layers = 1
+transition_layers = 2
+
+[panel.first]
+exposure_s = 30
+source = "measured"
+
+[panel.normal]
+exposure_s = 3
+source = "measured"
+"#;
+
+/// A part without symmetry, in layers of 2 mm.
+const SLICE: &str = "slice torus.stl tower.stl@26,0 --thickness 2mm -q";
+
+const ENDINGS: [&str; 5] = ["goo", "nanodlp", "sl1", "sl1s", "uvj"];
+
+fn with_printer() -> Scratch {
+    let scratch = Scratch::with_tower_and_torus();
+    scratch.write("mine.toml", PRINTER.as_bytes());
+    scratch.run(&format!("{SLICE} --machine mine.toml -o part.tif")).succeeds_quietly();
+    scratch
+}
+
+fn exposures(layers: &[Layer]) -> Vec<Option<f64>> {
+    layers.iter().map(|layer| layer.info.exposure_ms).collect()
+}
+
+fn levels(layers: &[Layer]) -> Vec<GrayMask> {
+    layers.iter().map(|layer| layer.image.to_gray().into_owned()).collect()
+}
+
+#[test]
+fn a_part_lies_in_the_middle_of_the_panel() {
+    let scratch = with_printer();
+    scratch.run(&format!("{SLICE} --dpi 127 -o plain.tif")).succeeds_quietly();
+    let [placed, plain] = ["part.tif", "plain.tif"].map(|name| scratch.layers(name));
+    assert_eq!(placed.len(), plain.len());
+    let (mut left, mut right, mut top, mut bottom) = (400, 0, 300, 0);
+    for (placed, plain) in masks(&placed).into_iter().zip(masks(&plain)) {
+        assert_eq!((placed.width(), placed.height()), (400, 300));
+        assert_eq!(placed.white_pixels(), plain.white_pixels());
+        for row in (0..300).filter(|row| !placed.row(*row).is_empty()) {
+            (top, bottom) = (top.min(row), bottom.max(row + 1));
+            left = left.min(placed.row(row)[0]);
+            right = right.max(*placed.row(row).last().unwrap());
+        }
+    }
+    assert!((left + right).abs_diff(400) <= 1, "columns {left} to {right}");
+    assert!((top + bottom).abs_diff(300) <= 1, "rows {top} to {bottom}");
+    // The corner is where the part's own is, less the black around it.
+    let [ours, theirs] = [&placed, &plain].map(|layers| layers[0].info.origin_mm.unwrap());
+    let first = |layers: &[Layer]| {
+        let mask = masks(layers)[3].clone();
+        let row = (0..mask.height()).find(|row| !mask.row(*row).is_empty()).unwrap();
+        [f64::from(mask.row(row)[0]) * 0.2, -f64::from(row) * 0.2]
+    };
+    for axis in 0..2 {
+        let [a, b] = [ours[axis] + first(&placed)[axis], theirs[axis] + first(&plain)[axis]];
+        assert!((a - b).abs() < 1e-5, "{a} {b}");
+    }
+}
+
+#[test]
+fn every_format_comes_back_with_its_images_and_times() {
+    let scratch = with_printer();
+    let wanted = scratch.layers("part.tif");
+    for ending in ENDINGS {
+        let slice = format!("{SLICE} --machine mine.toml -o plate.{ending}");
+        scratch.run(&slice).succeeds_quietly();
+        scratch.run(&format!("lamp compare part.tif plate.{ending}")).succeeds();
+        scratch.run(&format!("lamp convert plate.{ending} -q -o back.tif")).succeeds_quietly();
+        let read = scratch.layers("back.tif");
+        assert_eq!(masks(&read), masks(&wanted), "{ending}");
+        let times = exposures(&read);
+        assert_eq!(times[..4], [30_000.0, 21_000.0, 12_000.0, 3000.0].map(Some), "{ending}");
+        assert!(times[4..].iter().all(|time| *time == Some(3000.0)));
+        assert_eq!(read[9].info.z_um, Some(18_000.0));
+        assert_eq!(read[0].dpi.map(Dpi::get), Some(127.0));
+        // A stack that came from a file makes the same file.
+        scratch.run(&format!("lamp convert back.tif -q -o again.{ending}")).succeeds_quietly();
+        let [file, again] =
+            ["plate", "again"].map(|name| scratch.bytes(&format!("{name}.{ending}")));
+        assert!(file == again, "{ending}");
+    }
+}
+
+#[test]
+fn every_command_reads_and_writes_the_files() {
+    let scratch = with_printer();
+    for ending in ENDINGS {
+        scratch.run(&format!("lamp convert part.tif -q -o plate.{ending}")).succeeds_quietly();
+        for line in ["fix", "dither", "lamp compensate --uniform 200um"] {
+            let command = format!("{line} plate.{ending} -q -o out.{ending}");
+            let plain = format!("{line} part.tif -q -o out.tif");
+            for line in [command, plain] {
+                scratch.run(&line).succeeds();
+            }
+            let [a, b] = [format!("out.{ending}"), "out.tif".to_owned()].map(|name| {
+                scratch.run(&format!("lamp convert {name} -q -o images.tif")).succeeds_quietly();
+                levels(&scratch.layers("images.tif"))
+            });
+            assert!(a == b, "{line} {ending}");
+        }
+        for line in ["info", "check", "verify", "show", "report"] {
+            let output = match line {
+                "show" => " --layer 3 -o picture.png",
+                "report" => " -o report.html",
+                _ => "",
+            };
+            scratch.run(&format!("lamp {line} plate.{ending}{output}")).succeeds();
+        }
+    }
+    // A pipe brings GOO files, and no archives.
+    let goo = scratch.bytes("plate.goo");
+    scratch.run_on("lamp convert - -q -o piped.tif", &goo).succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("piped.tif")), masks(&scratch.layers("part.tif")));
+    let uvj = scratch.bytes("plate.uvj");
+    scratch.run_on("lamp info -", &uvj).is_refused_with(&["cannot be read from a pipe"]);
+}
+
+/// Prints the white pixels of each layer of a GOO file: a decoder of its own.
+const GOO_IN_PYTHON: &str = "
+import struct
+data = open('plate.goo', 'rb').read()
+count, width, height = struct.unpack('>IHH', data[195310:195318])
+at = struct.unpack('>I', data[195470:195474])[0]
+for layer in range(count):
+    top, exposure = struct.unpack('>ff', data[at + 6:at + 14])
+    length = struct.unpack('>I', data[at + 66:at + 70])[0]
+    code = data[at + 70:at + 70 + length]
+    at += 70 + length + 2
+    assert code[0] == 0x55 and code[-1] == 255 - sum(code[1:-1]) % 256
+    k, white, pixels = 1, 0, 0
+    while k < length - 1:
+        first = code[k]
+        assert first >> 6 in (0, 3)
+        more = first >> 4 & 3
+        run = int.from_bytes(code[k + 1:k + 1 + more], 'big') * 16 + first % 16
+        k += 1 + more
+        pixels += run
+        white += run if first >> 6 == 3 else 0
+    assert pixels == width * height
+    print(white, round(top * 1000), round(exposure * 1000))
+assert data[at:] == bytes(3) + b'\\x07\\0\\0\\0DLP\\0'
+";
+
+/// Prints the white pixels of each image of an archive, whose names have `%d` for the number.
+fn images_in_python(file: &str, names: &str, first: u32, layers: usize) -> String {
+    format!(
+        "
+import io, zipfile
+from PIL import Image
+archive = zipfile.ZipFile('{file}')
+assert archive.testzip() is None
+for layer in range({first}, {first} + {layers}):
+    image = Image.open(io.BytesIO(archive.read('{names}' % layer)))
+    assert image.mode == 'L' and image.size == (400, 300)
+    histogram = image.histogram()
+    assert histogram[0] + histogram[255] == 400 * 300
+    print(histogram[255], sum(image.crop((0, 0, 200, 300)).histogram()[255:]))
+"
+    )
+}
+
+#[test]
+fn other_programs_see_the_same_layers() {
+    let scratch = with_printer();
+    for ending in ENDINGS {
+        scratch.run(&format!("lamp convert part.tif -q -o plate.{ending}")).succeeds_quietly();
+    }
+    let layers = scratch.layers("part.tif");
+    let line = |layer: &Layer| {
+        let top = layer.info.z_um.unwrap() + 2000.0;
+        let exposure = [30_000, 21_000, 12_000].get(layer.info.index as usize).unwrap_or(&3000);
+        format!("{} {top} {exposure}\n", masks(std::slice::from_ref(layer))[0].white_pixels())
+    };
+    let Some(said) = ask_python(&scratch, GOO_IN_PYTHON) else { return };
+    assert_eq!(said, layers.iter().map(line).collect::<String>());
+    if ask_python(&scratch, "import PIL").is_none() {
+        return;
+    }
+    for (file, names, first, is_mirrored) in [
+        ("plate.nanodlp", "%d.png", 1, true),
+        ("plate.sl1", "torustower%05d.png", 0, true),
+        ("plate.uvj", "slice/%08d.png", 0, false),
+    ] {
+        let script = images_in_python(file, names, first, layers.len());
+        let line = |mask: &&Mask| {
+            let left = (0..300).map(|row| white_in_both(mask.row(row), &[0, 200], 400));
+            let (all, left) = (mask.white_pixels(), left.sum::<u64>());
+            format!("{all} {}\n", if is_mirrored { all - left } else { left })
+        };
+        let expected: String = masks(&layers).iter().map(line).collect();
+        assert_eq!(ask_python(&scratch, &script).unwrap(), expected, "{file}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_a_printer_is_refused() {
+    let scratch = with_printer();
+    let slice = |more: &str| scratch.run(&format!("slice tower.stl {more} -q -o plate.goo"));
+    slice("--machine saturn4ultra16k").is_wrong_usage(&["14 x 19 um", "square"]);
+    slice("--machine mine.toml --dpi 300").is_wrong_usage(&["300 dpi", "mine", "127 dpi"]);
+    slice("--machine mine.toml --scale 1.3").is_refused_with(&["99.1mm", "90mm"]);
+    slice("--machine mine.toml --scale 4").is_refused_with(&["the part takes"]);
+    slice("--dpi 100 --thickness 1mm").is_refused_with(&["does not say which printer", "[panel]"]);
+    slice("--machine mine.toml --classic").is_wrong_usage(&["--classic is for TIFFs"]);
+    scratch
+        .run("slice torus.stl --machine mine.toml --origin -30,30 --size 60x60mm -q -o plate.goo")
+        .is_refused_with(&["300 x 300 pixels", "Mine 400 has 400 x 300"]);
+    assert!(!scratch.names().contains(&"plate.goo".to_owned()));
+}
