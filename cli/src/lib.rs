@@ -12,17 +12,17 @@ mod kept_stack;
 mod output;
 mod second_opinion;
 mod stages;
+mod started;
 mod streams;
 
 mod terminal;
-
-use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 
 use args::options::{Common, GENERAL};
 use commands::Command;
 use exit::Exit;
+pub use started::Host;
 use streams::{give_up, print, settle_output};
 use terminal::allocator::keep_freed_memory;
 use terminal::help::{LONG_VERSION, formed, version};
@@ -56,8 +56,9 @@ Examples:
 
 slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and lamp tile.";
 
-/// Runs `lamp` with the process's arguments.
-pub fn run_lamp() -> ExitCode {
+/// Runs `lamp` with the process's arguments, and returns its status. Where the process must end early,
+/// as with a wrong command line, it does not return.
+pub fn run_lamp() -> u8 {
     // Before the words are parsed, which need a command.
     if terminal::licences::are_asked_for() {
         return finish("lamp", print_licences());
@@ -76,15 +77,15 @@ pub fn run_lamp() -> ExitCode {
     finish(name, run(name, &command, &common))
 }
 
-fn print_licences() -> Result<ExitCode, Exit> {
-    print(&terminal::licences::licences()).map(|()| ExitCode::SUCCESS)
+fn print_licences() -> Result<u8, Exit> {
+    print(&terminal::licences::licences()).map(|()| SUCCESS)
 }
 
-/// Runs one of the pipeline's stages with the process's arguments.
+/// Runs one of the pipeline's stages as [`run_lamp`] does.
 ///
 /// # Panics
 /// If `lamp` has no command of that name.
-pub fn run_stage(name: &str) -> ExitCode {
+pub fn run_stage(name: &str) -> u8 {
     let lamp = formed(Lamp::command());
     let matches = match args::arguments::matches(&lamp, stage(&lamp, name)) {
         Ok(matches) => matches,
@@ -120,7 +121,10 @@ fn programs() -> Vec<clap::Command> {
     programs
 }
 
-fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit> {
+/// The status of a command that did all that it was asked for.
+const SUCCESS: u8 = 0;
+
+fn run(name: &str, command: &Command, common: &Common) -> Result<u8, Exit> {
     // First, so that an end by lack of memory has the command's name.
     note_command(name);
     print_notes_of(name, common.quiet);
@@ -134,22 +138,22 @@ fn run(name: &str, command: &Command, common: &Common) -> Result<ExitCode, Exit>
     command.run(common)?;
     // A full disk may show only here: the status must not say success before.
     settle_output()?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Prints why a command exits early, and returns its status.
-fn finish(name: &str, result: Result<ExitCode, Exit>) -> ExitCode {
+fn finish(name: &str, result: Result<u8, Exit>) -> u8 {
     wait_if_ending();
     match result {
         // The differences are on standard output.
-        Err(error @ Exit::Different) => ExitCode::from(error.status()),
+        Err(error @ Exit::Different) => error.status(),
         Err(error) if !error.is_reader_gone() => {
             say(&format!("{name}: {error}"));
             give_up(&error);
-            ExitCode::from(error.status())
+            error.status()
         }
         // The reader has all that it wanted, as `head` does.
-        Err(_) => ExitCode::SUCCESS,
+        Err(_) => SUCCESS,
         Ok(status) => status,
     }
 }

@@ -93,6 +93,7 @@ class Stack:
 
 Path = Union[str, os.PathLike[str]]
 
+def run_program(program: str, words: list[str], stage: Optional[str]) -> int: ...
 def open(path: Path) -> Stack: ...
 def layers(
     arrays: Any, *, dpi: Optional[float], thickness: Optional[str], name: Optional[str]

@@ -10,6 +10,7 @@ mod error;
 mod layer;
 mod layers;
 mod plan;
+mod program;
 mod settings;
 mod slice;
 mod stack;
@@ -30,6 +31,8 @@ mod _native {
     use crate::layers::{PyLayers, compensate, dither, edit, fix, layers};
     #[pymodule_export]
     use crate::plan::{plan_speed, plan_voxels};
+    #[pymodule_export]
+    use crate::program::run_program;
     #[pymodule_export]
     use crate::slice::slice;
     #[pymodule_export]

@@ -73,10 +73,3 @@ def test_types_hold(tmp_path):
 
 def test_the_version_is_one(program):
     assert program("lamp", "--version", check=True).stdout.split()[1] == lamp.__version__
-
-
-def test_the_module_starts_the_program(monkeypatch, program):
-    monkeypatch.setenv("PATH", os.environ["LAMP_PROGRAMS"] + os.pathsep + os.environ["PATH"])
-    command = [sys.executable, "-m", "lamp_slicer", "--version"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert answer.stdout.split()[1] == lamp.__version__

@@ -26,7 +26,7 @@ const MAX_OPTIONS_BYTES: u64 = 1 << 20;
 /// Parses a program's arguments. `lamp` has all commands, and `program` is it or one of its stages.
 /// Ends the process where clap does: with a wrong command line, or with help that was asked for.
 pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Exit> {
-    let mut arguments = Arguments::new(lamp, program, std::env::args_os().collect());
+    let mut arguments = Arguments::new(lamp, program, crate::started::words());
     let given = arguments.parsed_so_far();
     let (path, of_command) = arguments.command(&given);
     let common = Common::from_arg_matches(of_command).expect("every command has these options");

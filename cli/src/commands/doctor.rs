@@ -13,6 +13,7 @@ use lamp_pipeline::memory::{available, in_words};
 
 use crate::commands::config::listing;
 use crate::exit::Exit;
+use crate::started;
 use crate::streams::print;
 use crate::terminal::help::LONG_VERSION;
 use crate::terminal::progress::printable;
@@ -32,7 +33,7 @@ pub(crate) struct DoctorArgs {}
 
 pub(crate) fn run() -> Result<(), Exit> {
     let mut faults = 0;
-    let program = env::current_exe().map_or_else(|error| error.to_string(), |path| shown(&path));
+    let program = started::program().map_or_else(|error| error.to_string(), |path| shown(&path));
     let processors = thread::available_parallelism().map_or(1, usize::from);
     let mut text = format!("lamp {LONG_VERSION}\nprogram: {program}\n");
     text += &format!("system: {}\n", system());

@@ -1,5 +1,7 @@
 //! The licenses of all that is in the program: `lamp --licenses`.
 
+use crate::started;
+
 /// The notices of the crates, as `licences/update` wrote them.
 const CRATES: &str = include_str!("../../licences/notices.txt");
 
@@ -10,9 +12,8 @@ const RULE: &str =
 
 /// Whether the process is only to print [`licences`]. This is not a command, and clap wants one.
 pub(crate) fn are_asked_for() -> bool {
-    let words: Vec<_> = std::env::args_os().skip(1).collect();
     // Alone only: behind a command, it is an option of that.
-    matches!(&words[..], [word] if word == "--licenses" || word == "--licences")
+    matches!(&started::words()[..], [_, word] if word == "--licenses" || word == "--licences")
 }
 
 /// Returns the name, version, license and notice of all that is in the program.

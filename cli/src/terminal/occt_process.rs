@@ -2,12 +2,13 @@
 
 use std::env;
 use std::ffi::OsString;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use anyhow::{Context, anyhow};
 
 use crate::args::arguments::words_in_effect;
 use crate::exit::Exit;
+use crate::started;
 
 /// Set in the environment of the process that does the work.
 const MARK: &str = "LAMP_SUPERVISED";
@@ -27,7 +28,7 @@ fn asks(words: &[OsString]) -> bool {
 /// Runs this command once more, as a child that ends with this process, and returns
 /// its status; nothing where this is the child, or OpenCASCADE is not asked for. A
 /// child that crashes is a failure as any other: it has not written anything.
-pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
+pub(crate) fn supervised() -> Result<Option<u8>, Exit> {
     // The mark keeps the child from starting a child of its own.
     if env::var_os(MARK).is_some() {
         // OpenCASCADE may hang: it must not outlive a parent that was killed.
@@ -40,11 +41,12 @@ pub(crate) fn supervised() -> Result<Option<ExitCode>, Exit> {
     if !asks(words_in_effect()) {
         return Ok(None);
     }
-    let program = env::current_exe().context("this program's own file")?;
-    let status = Command::new(program).args(env::args_os().skip(1)).env(MARK, "1").status();
+    let program = started::program().context("this program's own file")?;
+    let status =
+        Command::new(program).args(started::words().into_iter().skip(1)).env(MARK, "1").status();
     let status = status.context("a process for OpenCASCADE")?;
     match status.code() {
-        Some(code) => Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1)))),
+        Some(code) => Ok(Some(u8::try_from(code).unwrap_or(1))),
         None => Err(Exit::Failed(anyhow!(
             "OpenCASCADE failed ({status}), as it does on some broken files: try --kernel lamp"
         ))),

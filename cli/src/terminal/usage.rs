@@ -1,11 +1,11 @@
 //! Shows errors of usage, in words that people know.
 
-use std::env;
 use std::error::Error as _;
 use std::num::{IntErrorKind, ParseIntError};
 
 use clap::error::{ContextKind, ErrorKind};
 
+use crate::started;
 use crate::terminal::progress::{printable, say};
 
 /// Shows an error of usage, or the help that was asked for, and ends the process.
@@ -22,7 +22,7 @@ pub(crate) fn show(error: &clap::Error) {
         let arg = arg.to_string_lossy();
         printable(&arg) != arg
     };
-    if error.use_stderr() && env::args_os().any(steers_terminal) {
+    if error.use_stderr() && started::words().into_iter().any(steers_terminal) {
         // One line, since a line break may be the argument's.
         say(error.render().to_string().trim_end().trim_end_matches(MORE).trim_end());
     } else {

@@ -1,6 +1,5 @@
 //! `lamp batch night.toml`: does what is missing.
 
-use std::env;
 use std::thread;
 
 use anyhow::{Context, anyhow};
@@ -16,6 +15,7 @@ use super::report;
 use super::{EngineName, RunArgs};
 use crate::args::options::Common;
 use crate::exit::Exit;
+use crate::started;
 use crate::terminal::progress::Progress;
 
 pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
@@ -45,7 +45,7 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
         progress.warn(&shortage);
     }
     let report = file.night.output.folder.join("report.html");
-    let launcher = Launcher { program: env::current_exe().context("this program")? };
+    let launcher = Launcher { program: started::program().context("this program")? };
     let work = Work { graph: &plan.graph, store: &store, launcher: &launcher };
     let mut running = Running { plan: &plan, progress: &progress, engine: args.engine(), done: 0 };
     running.begin(&ledger);
