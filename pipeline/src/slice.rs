@@ -170,6 +170,7 @@ impl SliceSettings {
         let thickness = self.uniform_thickness().unwrap_or_default();
         Ok(match self.gray {
             GrayRule::None => Shading::White,
+            GrayRule::Coverage => Shading::Coverage,
             GrayRule::ByDepth => {
                 let levels = |um| known()?.levels(um).map_err(Error::from);
                 Shading::ByDepth(match heights {

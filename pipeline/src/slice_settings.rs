@@ -79,6 +79,8 @@ pub enum GrayRule {
     /// Black and white.
     #[default]
     None,
+    /// The level of a pixel is the share of its area within the section.
+    Coverage,
     /// Each pixel has the level that cures down to where the part ends below it, by its layer
     /// alone.
     ByDepth,
@@ -95,6 +97,8 @@ struct GrayFlags {
     gray: bool,
     #[serde(skip_serializing_if = "is_default")]
     print_through: bool,
+    #[serde(skip_serializing_if = "is_default")]
+    antialias: bool,
 }
 
 /// The part of the plane that images show.
@@ -124,6 +128,7 @@ impl From<GrayFlags> for GrayRule {
             // Print-through is a kind of gray, so its flag decides, whatever `gray` says.
             GrayFlags { print_through: true, .. } => Self::PrintThrough,
             GrayFlags { gray: true, .. } => Self::ByDepth,
+            GrayFlags { antialias: true, .. } => Self::Coverage,
             GrayFlags { .. } => Self::None,
         }
     }
@@ -131,7 +136,11 @@ impl From<GrayFlags> for GrayRule {
 
 impl From<GrayRule> for GrayFlags {
     fn from(rule: GrayRule) -> Self {
-        Self { gray: rule != GrayRule::None, print_through: rule == GrayRule::PrintThrough }
+        Self {
+            gray: matches!(rule, GrayRule::ByDepth | GrayRule::PrintThrough),
+            print_through: rule == GrayRule::PrintThrough,
+            antialias: rule == GrayRule::Coverage,
+        }
     }
 }
 
@@ -278,7 +287,7 @@ impl SliceSettings {
     /// # Errors
     /// Returns an error if settings contradict each other, or the material cannot be read.
     pub fn exposure(&self) -> Result<Option<RecordedExposure>, Error> {
-        let is_gray = self.gray != GrayRule::None;
+        let is_gray = matches!(self.gray, GrayRule::ByDepth | GrayRule::PrintThrough);
         let heights = match &self.thickness {
             Thickness::Adaptive { heights, .. } => Some(heights),
             Thickness::Uniform { .. } => None,

@@ -66,6 +66,7 @@ def slice(
     exposure_table: Optional[Path] = None,
     gray: bool = False,
     print_through: bool = False,
+    antialias: bool = False,
     tolerance: Optional[str] = None,
     kernel: Optional[Literal["lamp", "occt", "both"]] = None,
     no_polish: bool = False,
@@ -94,6 +95,7 @@ def slice(
         layer_overhead, snap, row_pitch: layers as thick as the part's slopes allow.
     material, overcure, lamp_intensity, or exposure_table: exposure times of the layers.
     gray, print_through: gray layers, which cure down to where the part ends.
+    antialias: gray edges, whose levels are the shares of pixels within the part.
     tolerance, kernel, no_polish, fallback: how STEP parts are read.
     memory_bytes: memory for the table of crossings; a quarter of what is free.
     """
@@ -133,6 +135,7 @@ def slice(
         "exposure_table": exposure_table,
         "gray": gray or None,
         "print_through": print_through or None,
+        "antialias": antialias or None,
         "tolerance": tolerance,
         "kernel": kernel,
         "no_polish": no_polish or None,

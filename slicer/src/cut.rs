@@ -18,7 +18,7 @@ use std::ops::Range;
 use crate::crossing::{Crossing, RowSegment, ShortCrossing};
 use crate::cutter::Cutter;
 use crate::facet::{PlacedFacet, facet_heights};
-use crate::gray::{DepthSpan, Sheet};
+use crate::gray::{DepthSpan, Edge, Sheet};
 use crate::layer_share::LayerShare;
 use crate::scan::{SortedFacet, Z, ceil_clamped};
 
@@ -42,13 +42,15 @@ pub(crate) struct SegmentEnd {
 impl Cutter<'_> {
     /// Adds the crossings of a body's facet in `layers` to the shares of those layers, and returns
     /// the number of crossings that need the same memory. If `needs_no_body`, segments that cross
-    /// many rows are kept as segments, and crossings of small images are short.
+    /// many rows are kept as segments, and crossings of small images are short. If
+    /// `has_gray_edges`, edges are kept, too.
     #[inline]
     pub(crate) fn cut(
         &self,
         facet: &PlacedFacet,
         body: u32,
         needs_no_body: bool,
+        has_gray_edges: bool,
         layers: &Range<usize>,
         shares: &mut [LayerShare],
     ) -> usize {
@@ -61,6 +63,10 @@ impl Cutter<'_> {
             let share = &mut shares[layer - layers.start];
             let [a, b] = segment.ends.map(|end| end.at);
             share.ends.add([a, b], salt);
+            if has_gray_edges {
+                count += size_of::<Edge>() / size_of::<Crossing>();
+                share.edges.push(Edge::new([a, b], segment.is_reversed, body));
+            }
             let Some(segment) = self.row_segment(a, b, segment.is_reversed) else { return };
             let (rows, crossing) = (segment.rows(), |row| segment.crossing(self.grid, row));
             if needs_no_body && rows.len() > AS_MUCH {
@@ -100,6 +106,24 @@ impl Cutter<'_> {
             count += 1;
         });
         count * size_of::<DepthSpan>() / size_of::<Crossing>()
+    }
+
+    /// Adds the edges of a body's facet in the contours of `layers`. Returns the number of crossings
+    /// that need the same memory.
+    pub(crate) fn add_edges(
+        &self,
+        facet: &PlacedFacet,
+        body: u32,
+        layers: &Range<usize>,
+        shares: &mut [LayerShare],
+    ) -> usize {
+        let mut count = 0;
+        self.for_each_segment(facet, layers, |layer, segment| {
+            let ends = segment.ends.map(|end| end.at);
+            shares[layer - layers.start].edges.push(Edge::new(ends, segment.is_reversed, body));
+            count += 1;
+        });
+        count * size_of::<Edge>() / size_of::<Crossing>()
     }
 
     /// Calls `each` with the facet's segments in `layers`, from below.

@@ -91,6 +91,11 @@ impl PixelGrid {
             && bottom <= f64::from(self.height) - 0.5
     }
 
+    /// Returns true if all of the last column is right of a point.
+    pub(crate) fn leaves_last_column(&self, max_mm: [f64; 2]) -> bool {
+        self.to_pixels(max_mm[0], max_mm[1])[0] + 0.5 <= f64::from(self.width - 1)
+    }
+
     /// Returns a point in pixels: its column is at most c exactly if it is left of or on the center
     /// of column c, and its row is at most r exactly if it is above or on the center of row r.
     ///

@@ -4,7 +4,7 @@ use std::iter;
 
 use crate::closure::EndSum;
 use crate::crossing::{Crossing, RowSegment, ShortCrossing};
-use crate::gray::DepthSpan;
+use crate::gray::{DepthSpan, Edge};
 
 /// The share of a layer that one worker finds.
 #[derive(Debug, Default)]
@@ -24,6 +24,8 @@ pub(crate) struct LayerShare {
     pub(crate) ends: EndSum,
     /// Facets below the section, for gray layers.
     pub(crate) spans: Vec<DepthSpan>,
+    /// Edges of contours, for gray edges.
+    pub(crate) edges: Vec<Edge>,
 }
 
 impl LayerShare {
@@ -35,6 +37,7 @@ impl LayerShare {
         self.bodies.clear();
         self.kept.clear();
         self.spans.clear();
+        self.edges.clear();
         self.ends = EndSum::default();
     }
 

@@ -17,7 +17,7 @@ use crate::error::SliceError;
 use crate::exact::{PlacedSurfaces, Polished};
 use crate::facet::{PlacedFacet, Units};
 use crate::fill::Fill;
-use crate::gray::{Columns, DepthRows, DepthSpan, PlacedShading, PrintThrough, Shading};
+use crate::gray::{Columns, DepthRows, DepthSpan, Edge, PlacedShading, PrintThrough, Shading};
 use crate::grid::PixelGrid;
 use crate::part::Part;
 use crate::placed_part::PlacedPart;
@@ -182,8 +182,8 @@ impl Slices {
     }
 
     fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
-        let is_gray = options.shading != Shading::White;
-        if is_gray && options.plane != PlaneRule::Top {
+        let by_depth = !matches!(options.shading, Shading::White | Shading::Coverage);
+        if by_depth && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
         let model = PlacedPart::new(model, &options.placement, options.units);
@@ -195,6 +195,10 @@ impl Slices {
         let rule = model.model.fill_rule(options.fill).placed(&options.placement);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
+        // The pixel of an edge may be gray, and the last column must be black.
+        if options.shading == Shading::Coverage && !grid.leaves_last_column(max_mm) {
+            return Err(SliceError::OutsideFrame { part_mm: [min_mm, max_mm] });
+        }
         let part_um = [survey.min[2], survey.max[2]];
         let planes = match &options.heights {
             Some(heights) => Planes::of(heights, part_um, options.plane, options.plane_tolerance),
@@ -226,12 +230,18 @@ impl Slices {
             let crossings = expected[layer];
             return Err(SliceError::TooManyCrossings { layer, crossings });
         }
-        if is_gray {
+        if by_depth {
             let cutter = Cutter { grid: &grid, planes: &planes, rule: &rule };
             model.surfaces().iter().for_each(|surfaces| surfaces.examine_rims(cutter));
             for (layer, crossings) in expected.iter_mut().enumerate() {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }
+        }
+        if options.shading == Shading::Coverage {
+            // About one edge for each crossing; more, where facets are smaller than pixels, end a
+            // slab early.
+            let each = 1 + size_of::<Edge>() / size_of::<Crossing>();
+            expected.iter_mut().for_each(|crossings| *crossings *= each as f64);
         }
         let largest = expected[cut.clone()].iter().copied().fold(0.0, f64::max);
         let slabs = slabs(&cut, &expected, max_crossings);
@@ -307,13 +317,12 @@ impl Slices {
         }
         let planes = self.planes.moved(index, up.um(), [self.survey.min[2], self.survey.max[2]]);
         let cutter = Cutter { grid: &self.grid, planes: &planes, rule: &self.rule };
-        let reach_um = self.shading.reach_um();
         let layers = index..index + 1;
-        let below = reach_um.unwrap_or(0.0);
+        let below = self.shading.reach_um().unwrap_or(0.0);
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
         // A single layer cannot become smaller, so it has no limit.
-        let open = fill(&mut table, &facets, cutter, reach_um, layers, usize::MAX)?;
+        let open = fill(&mut table, &facets, cutter, &self.shading, layers, usize::MAX)?;
         let MadeLayer { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
         if let (Some(light), Some(depths)) = (self.shading.print_through(), depths) {
@@ -386,8 +395,8 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
-        let gray = self.shading.reach_um();
-        let reach_um = gray.unwrap_or(0.0);
+        let shading = &self.shading;
+        let reach_um = shading.reach_um().unwrap_or(0.0);
         // The table forgets its counts when it is filled.
         self.polished = self.polished.joined(self.table.polished());
         loop {
@@ -395,11 +404,11 @@ impl Slices {
             let max = self.max_crossings;
             let open_rows = if let Some(buckets) = &self.buckets {
                 let facets = buckets.of_slab(slab, &self.model);
-                fill(&mut self.table, &facets, cutter, gray, layers, max)?
+                fill(&mut self.table, &facets, cutter, shading, layers, max)?
             } else {
                 let facets =
                     MetBlocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
-                fill(&mut self.table, &facets, cutter, gray, layers, max)?
+                fill(&mut self.table, &facets, cutter, shading, layers, max)?
             };
             if let Some(open_rows) = open_rows {
                 self.open_rows = open_rows;
@@ -605,11 +614,11 @@ fn fill(
     table: &mut Table,
     facets: &impl FacetSource,
     cutter: Cutter<'_>,
-    reach_um: Option<f64>,
+    shading: &PlacedShading,
     layers: Range<usize>,
     max_crossings: usize,
 ) -> io::Result<Option<OpenRows>> {
-    if !table.fill(facets, cutter, reach_um, layers, max_crossings)? {
+    if !table.fill(facets, cutter, shading, layers, max_crossings)? {
         return Ok(None);
     }
     // A row takes as much memory as one crossing.

@@ -18,7 +18,7 @@ use crate::cutter::Cutter;
 use crate::exact::{ExactCut, PlacedSurfaces, Polished, SolverTally, settle};
 use crate::facet::PlacedFacet;
 use crate::fill::Fill;
-use crate::gray::{DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader};
+use crate::gray::{DepthRows, DepthSpan, LevelRows, PlacedShading, ShadedRows, Shader, covered};
 use crate::grid::PixelGrid;
 use crate::image_rows::{MaskRows, RowMaker, by_body, even_odd, make_rows, solid, sort_by};
 use crate::layer_share::LayerShare;
@@ -98,10 +98,12 @@ impl Table {
         &mut self,
         facets: &impl FacetSource,
         cutter: Cutter<'_>,
-        reach_um: Option<f64>,
+        shading: &PlacedShading,
         layers: Range<usize>,
         max: usize,
     ) -> io::Result<bool> {
+        let reach_um = shading.reach_um();
+        let has_gray_edges = matches!(shading, PlacedShading::Coverage);
         self.shares.resize_with(rayon::current_num_threads(), Vec::new);
         let budget = CrossingLimit { used: AtomicUsize::new(0), max, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
@@ -123,13 +125,17 @@ impl Table {
                 let cutter = cutter.of_body(facets.body(piece));
                 let body = cutter.rule.name_of(facets.body(piece));
                 if let Some((surfaces, first)) = facets.surfaces(piece) {
-                    let layers = layers.clone();
+                    let (layers, of_edges) = (layers.clone(), layers.clone());
                     let mut cut =
                         ExactCut::new(surfaces, first, body, tally, cutter, layers, reach_um);
                     facets.for_each_in(piece, |facet| {
                         // The loop over a piece cannot be left, so its rest is passed over.
                         if !budget.is_spent() {
                             unclaimed += cut.cut(facet, shares);
+                            if has_gray_edges {
+                                // The facets' own, within their tolerance of the surface.
+                                unclaimed += cutter.add_edges(facet, body, &of_edges, shares);
+                            }
                             budget.claim(&mut unclaimed);
                         }
                     })?;
@@ -138,7 +144,8 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        unclaimed += cutter.cut(facet, body, needs_no_body, &layers, shares);
+                        let (bodiless, edges) = (needs_no_body, has_gray_edges);
+                        unclaimed += cutter.cut(facet, body, bodiless, edges, &layers, shares);
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, body, reach_um, &layers, shares);
                         }
@@ -239,6 +246,12 @@ impl Table {
             PlacedShading::White => {
                 let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
                 cut.with(CutImage::Image(Image::Mask(mask)))
+            }
+            PlacedShading::Coverage => {
+                let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
+                let edges = || self.shares(layer).flat_map(|share| &share.edges);
+                let image = covered(edges, cutter.grid, cutter.rule, &mask, &cut.stray_rows);
+                cut.with(CutImage::Image(image))
             }
             PlacedShading::ByDepth(levels) => {
                 let rows = LevelRows::new(levels.of_layer(layer), width);

@@ -40,6 +40,38 @@ fn levels(image: &Image) -> Vec<u8> {
 }
 
 #[test]
+fn gray_edges_go_through_the_pipeline() {
+    let scratch = with_tower();
+    scratch.run(&format!("slice tower.stl {COARSE} -o white.tif")).succeeds_quietly();
+    scratch.run(&format!("slice tower.stl {COARSE} --antialias -o edges.tif")).succeeds_quietly();
+    let (white, edges) = (scratch.layers("white.tif"), scratch.layers("edges.tif"));
+    assert_eq!(white.len(), edges.len());
+    for (white, edges) in white.iter().zip(&edges) {
+        let (white, edges) = (levels(&white.image), levels(&edges.image));
+        let sum = |levels: &[u8]| levels.iter().map(|&level| f64::from(level)).sum::<f64>();
+        // Centers miss areas by a share of the outline, a few of thousands of pixels.
+        assert!((sum(&edges) / sum(&white) - 1.0).abs() < 0.02);
+        assert!(white.iter().zip(&edges).all(|(white, level)| white.abs_diff(*level) < 255));
+    }
+    assert!(edges.iter().map(|layer| gray_pixels(&layer.image)).sum::<u64>() > 10_000);
+    let stack = edges[0].info.stack.as_ref().unwrap();
+    assert!(stack.commands[0].ends_with("--antialias"), "{}", stack.commands[0]);
+
+    scratch.run("dither edges.tif -q -o dots.tif").succeeds_quietly();
+    let dots = scratch.layers("dots.tif");
+    let white = |layer: &Layer| levels(&layer.image).iter().filter(|level| **level > 0).count();
+    for (dots, edges) in dots.iter().zip(&edges) {
+        assert!(matches!(*dots.image, Image::Mask(_)));
+        let sum: f64 = levels(&edges.image).iter().map(|&level| f64::from(level)).sum();
+        assert!((white(dots) as f64 / (sum / 255.0) - 1.0).abs() < 0.02);
+    }
+
+    let line =
+        format!("slice tower.stl {COARSE} --antialias --gray --material lamp-suspension -o x.tif");
+    is_wrong_usage(&scratch.run(&line), "--gray");
+}
+
+#[test]
 fn gray_stacks_go_through_the_pipeline() {
     let scratch = with_tower();
     let line = format!("slice tower.stl {COARSE} --gray --material lamp-suspension -o gray.tif");

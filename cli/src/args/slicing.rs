@@ -91,6 +91,12 @@ pub(crate) struct SlicingArgs {
     /// underside in place, starting with the lowest layers
     #[arg(long, requires = "gray", help_heading = EXPOSURE)]
     print_through: bool,
+
+    /// Write gray edges: the level of a pixel is the share of its area that is part
+    ///
+    /// Edges are then finer than pixels. dither makes dots of the levels
+    #[arg(long, alias = "anti-alias", conflicts_with = "gray", help_heading = EXPOSURE)]
+    antialias: bool,
 }
 
 /// The part to slice, and the options of slicing.
@@ -158,10 +164,11 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
             plane_tolerance: args.plane_tolerance,
             solid: (&args.solid).into(),
             no_polish: args.no_polish,
-            gray: match (args.gray, args.print_through) {
-                (false, _) => GrayRule::None,
-                (true, false) => GrayRule::ByDepth,
-                (true, true) => GrayRule::PrintThrough,
+            gray: match (args.gray, args.print_through, args.antialias) {
+                (false, _, false) => GrayRule::None,
+                (false, _, true) => GrayRule::Coverage,
+                (true, false, _) => GrayRule::ByDepth,
+                (true, true, _) => GrayRule::PrintThrough,
             },
             exposure: (&args.exposure).into(),
             frame: match (args.origin, args.size) {

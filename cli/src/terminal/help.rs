@@ -49,6 +49,7 @@ const USUAL: [(&str, &[&str]); 5] = [
             "adaptive",
             "material",
             "gray",
+            "antialias",
             "machine",
             "output",
         ],

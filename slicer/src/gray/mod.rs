@@ -11,6 +11,9 @@
 //! follows from the edge's ends alone. So a line through a closed sheet of facets meets exactly one
 //! facet.
 //!
+//! Where only edges are gray ([`coverage`](self::coverage)), levels are shares of pixels' areas, and
+//! facets below do not count.
+//!
 //! Where doses add up ([`print_through`](self::print_through)), rows keep the depths instead, and
 //! levels are chosen down columns ([`columns`](self::columns)).
 //!
@@ -21,6 +24,7 @@ mod above;
 mod band;
 mod below;
 mod columns;
+mod coverage;
 mod depth_span;
 mod levels;
 mod print_through;
@@ -33,6 +37,7 @@ mod solid;
 mod stretch;
 
 pub(crate) use columns::Columns;
+pub(crate) use coverage::{Edge, covered};
 pub(crate) use depth_span::DepthSpan;
 pub use levels::LayerLevels;
 pub(crate) use print_through::PrintThrough;
