@@ -12,9 +12,9 @@ use anyhow::{Context, anyhow};
 pub(crate) use lamp_pipeline::documents::is_stream;
 use lamp_pipeline::documents::{open_stack, refuse_terminal};
 use lamp_stack::{
-    Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
-    PageWriter, Pages, PassingLayer, PrinterFormat, StackError, StackInfo, close, map_in_order,
-    sync, write_packed, write_printer_file, write_stack,
+    ContourFormat, Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel,
+    Page, PageInfo, PageWriter, Pages, PassingLayer, PrinterFormat, StackError, StackInfo, close,
+    map_in_order, sync, write_contours, write_packed, write_printer_file, write_stack,
 };
 
 use crate::args::options::{Common, InputArgs, Output};
@@ -300,6 +300,11 @@ pub(crate) fn write_layers(
         return write_print(layers, output, format, progress);
     }
     let to = destination(output)?;
+    if let (Some(format), Destination::File(path)) = (ContourFormat::of_name(&output.output), &to) {
+        refuse_tiff_options(output)?;
+        let counted = map_in_order(layers, decode).inspect(|_| progress.layer_done());
+        return written_to(&output.output, write_contours(counted, path, format), progress);
+    }
     let (counted, format) = (layers.inspect(|_| progress.layer_done()), format(output.classic));
     let written = if output.packbits {
         let coded = map_in_order(counted, |layer| {
@@ -336,14 +341,18 @@ fn write_print(
     format: PrinterFormat,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    match output {
-        Output { classic: true, .. } => return Err(for_tiffs("--classic")),
-        Output { packbits: true, .. } => return Err(for_tiffs("--packbits")),
-        _ => {}
-    }
+    refuse_tiff_options(output)?;
     let to = destination(output)?;
     let counted = layers.inspect(|_| progress.layer_done());
     written_to(&output.output, write_printer_file(counted, to, format), progress)
+}
+
+fn refuse_tiff_options(output: &Output) -> Result<(), Exit> {
+    match output {
+        Output { classic: true, .. } => Err(for_tiffs("--classic")),
+        Output { packbits: true, .. } => Err(for_tiffs("--packbits")),
+        _ => Ok(()),
+    }
 }
 
 /// Refuses an option that other files than TIFFs do not have.
@@ -390,6 +399,9 @@ pub(crate) fn written_to(
 
 /// Refuses to write a stack under the name of another kind of file.
 pub(crate) fn check_stack_name(path: &Path) -> Result<(), Exit> {
+    if ContourFormat::of_name(path).is_some() {
+        return Ok(());
+    }
     check_ending(path, &STACK).map_err(|error| match &*extension(path) {
         "png" => {
             let path = path.display();

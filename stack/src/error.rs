@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::codec::g4::G4Error;
 use crate::codec::picture_format::PictureFormat;
+use crate::files::contours::ContourError;
 use crate::files::file_format::FileFormat;
 use crate::files::folder_list::FOLDER_LIST;
 use crate::layer::check::CheckFault;
@@ -180,6 +181,9 @@ pub enum StackError {
         /// The layer that does not fit.
         layer: u32,
     },
+    /// A contour file cannot be written.
+    #[error(transparent)]
+    Contours(#[from] ContourError),
     /// A printer's file cannot be read or written.
     #[error(transparent)]
     Printer(#[from] PrinterFault),

@@ -17,6 +17,42 @@ fn with_build() -> Scratch {
     scratch
 }
 
+/// Polygons of contour files enclose the white area of each layer.
+#[test]
+fn contours_enclose_what_is_white() {
+    let scratch = with_build();
+    let layers = scratch.layers("build.tif");
+    scratch.run("lamp convert build.tif -o contours.cli").succeeds_quietly();
+    let text = String::from_utf8(scratch.bytes("contours.cli")).unwrap();
+    let pixel = 25.4 / 100.0;
+    let sections: Vec<_> = text.split("$$LAYER/").skip(1).collect();
+    assert_eq!(sections.len(), layers.len());
+    for (section, layer) in sections.iter().zip(&layers) {
+        let top: f64 = section.lines().next().unwrap().parse().unwrap();
+        let info = &layer.info;
+        assert!((top * 1000.0 - info.z_um.unwrap() - info.thickness_um.unwrap()).abs() < 1e-3);
+        let mut mm2 = 0.0;
+        for line in section.lines().filter_map(|line| line.strip_prefix("$$POLYLINE/1,")) {
+            let numbers: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
+            let points: Vec<_> = numbers[2..].chunks(2).map(|p| (p[0], p[1])).collect();
+            assert!(points.len() == numbers[1] as usize && points[0] == points[points.len() - 1]);
+            let area: f64 = points.windows(2).map(|p| p[0].0 * p[1].1 - p[1].0 * p[0].1).sum();
+            assert_eq!(area > 0.0, numbers[0] == 1.0);
+            mm2 += area / 2.0;
+        }
+        let white = mask(layer).white_pixels() as f64 * pixel * pixel;
+        assert!((mm2 - white).abs() < 1e-6 * white.max(1.0), "{mm2}, not {white}");
+    }
+    for name in ["contours.svg", "contours.dxf"] {
+        scratch.run(&format!("slice t.stl --dpi 100 --thickness 2mm -q -o {name}")).succeeds();
+        assert!(!scratch.bytes(name).is_empty());
+    }
+    let gray = "slice t.stl --dpi 100 --thickness 2mm --antialias -q -o gray.svg";
+    let ran = scratch.run(gray);
+    assert!(ran.stderr.contains("is gray, and contours are edges"), "{ran:?}");
+    assert!(!scratch.names_in(".").iter().any(|name| name.contains("gray.svg")));
+}
+
 #[test]
 fn every_shape_goes_back_to_the_same_bytes() {
     let scratch = with_build();

@@ -24,7 +24,7 @@ use crate::streams::{
 use crate::terminal::progress::say;
 use crate::terminal::stack_notes::doubts;
 
-/// Convert a stack to a file or a folder of pages or PNGs, a STEP part to STL, or a mesh to STEP
+/// Convert a stack to pages, PNGs or contours, a STEP part to STL, or a mesh to STEP
 ///
 /// Images and their metadata stay unchanged, and the command is not recorded: a stack converted
 /// from file to folder and back has the same bytes.
@@ -39,6 +39,7 @@ Examples:
   lamp convert build.tif --layers 100..200 --png -o pictures/
   lamp convert build.tif --layers 600 -o layer.png
   lamp convert plate.goo -o plate.uvj
+  lamp convert build.tif -o contours.cli
   lamp convert part.step part.stl --chord 5um
   lamp convert part.stl part.step")]
 pub(crate) struct ConvertArgs {

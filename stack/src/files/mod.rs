@@ -1,5 +1,6 @@
 //! Stacks as files, folders and streams, read and written whole.
 
+pub(crate) mod contours;
 pub(crate) mod durable;
 pub(crate) mod file_format;
 pub(crate) mod find;

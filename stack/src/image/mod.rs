@@ -8,6 +8,7 @@ pub(crate) mod frame;
 pub(crate) mod gray;
 pub(crate) mod mask;
 pub(crate) mod orientation;
+pub(crate) mod outline;
 pub(crate) mod runs;
 pub mod sets;
 pub(crate) mod threshold;
