@@ -170,7 +170,6 @@ impl SliceSettings {
         let thickness = self.uniform_thickness().unwrap_or_default();
         Ok(match self.gray {
             GrayRule::None => Shading::White,
-            GrayRule::Coverage => Shading::Coverage,
             GrayRule::ByDepth => {
                 let levels = |um| known()?.levels(um).map_err(Error::from);
                 Shading::ByDepth(match heights {
@@ -253,6 +252,11 @@ impl SliceStage {
         if settings.gray == GrayRule::PrintThrough && self.fallback.is_some() {
             let why = "--print-through needs all layers above a layer, and --fallback repairs \
                        single layers: leave out one";
+            return Err(Error::settings(why));
+        }
+        if settings.gray == GrayRule::PrintThrough && settings.antialias {
+            let why = "--print-through chooses levels for summed doses, and --antialias would \
+                       change them: leave out one";
             return Err(Error::settings(why));
         }
         let exposure = settings.exposure()?;

@@ -44,6 +44,9 @@ pub struct SliceSettings {
     /// Whether layers are gray.
     #[serde(flatten)]
     pub gray: GrayRule,
+    /// Whether pixels at edges have the level of their area within the part.
+    #[serde(skip_serializing_if = "is_default")]
+    pub antialias: bool,
     /// The exposure of the layers.
     #[serde(flatten)]
     pub exposure: ExposureSettings,
@@ -79,8 +82,6 @@ pub enum GrayRule {
     /// Black and white.
     #[default]
     None,
-    /// The level of a pixel is the share of its area within the section.
-    Coverage,
     /// Each pixel has the level that cures down to where the part ends below it, by its layer
     /// alone.
     ByDepth,
@@ -97,8 +98,6 @@ struct GrayFlags {
     gray: bool,
     #[serde(skip_serializing_if = "is_default")]
     print_through: bool,
-    #[serde(skip_serializing_if = "is_default")]
-    antialias: bool,
 }
 
 /// The part of the plane that images show.
@@ -128,7 +127,6 @@ impl From<GrayFlags> for GrayRule {
             // Print-through is a kind of gray, so its flag decides, whatever `gray` says.
             GrayFlags { print_through: true, .. } => Self::PrintThrough,
             GrayFlags { gray: true, .. } => Self::ByDepth,
-            GrayFlags { antialias: true, .. } => Self::Coverage,
             GrayFlags { .. } => Self::None,
         }
     }
@@ -136,11 +134,7 @@ impl From<GrayFlags> for GrayRule {
 
 impl From<GrayRule> for GrayFlags {
     fn from(rule: GrayRule) -> Self {
-        Self {
-            gray: matches!(rule, GrayRule::ByDepth | GrayRule::PrintThrough),
-            print_through: rule == GrayRule::PrintThrough,
-            antialias: rule == GrayRule::Coverage,
-        }
+        Self { gray: rule != GrayRule::None, print_through: rule == GrayRule::PrintThrough }
     }
 }
 
@@ -158,6 +152,7 @@ impl Default for SliceSettings {
             solid: SolidSettings::default(),
             no_polish: false,
             gray: GrayRule::default(),
+            antialias: false,
             exposure: ExposureSettings::default(),
             frame: SliceFrame::Around { margin: 1 },
         }
@@ -170,6 +165,7 @@ impl SliceSettings {
         let usual = SliceOptions::default();
         SliceOptions {
             dpi: self.dpi,
+            antialias: self.antialias,
             thickness: self.uniform_thickness().unwrap_or(usual.thickness),
             plane: self.plane,
             plane_tolerance: self.plane_tolerance,
@@ -287,7 +283,7 @@ impl SliceSettings {
     /// # Errors
     /// Returns an error if settings contradict each other, or the material cannot be read.
     pub fn exposure(&self) -> Result<Option<RecordedExposure>, Error> {
-        let is_gray = matches!(self.gray, GrayRule::ByDepth | GrayRule::PrintThrough);
+        let is_gray = self.gray != GrayRule::None;
         let heights = match &self.thickness {
             Thickness::Adaptive { heights, .. } => Some(heights),
             Thickness::Uniform { .. } => None,
@@ -388,13 +384,13 @@ mod tests {
                         "row-pitch": "1.5mm", "snap": true, "plane": "top", "units": "inch",
                         "fill": "solid", "scale": "1,2,0.5", "mirror": "x,y",
                         "rotate": "x:90,z:-12.5", "translate": "-5,0,12.7", "tolerance": "1um",
-                        "no-polish": true, "gray": true, "print-through": true,
+                        "no-polish": true, "gray": true, "antialias": true,
                         "material": "lamp-suspension", "overcure": "1.5", "origin": "-1,77.2",
                         "size": "80x80.5mm" }),
                 "--dpi 72.25 --adaptive --min 0.5um --step 1um --criterion cusp --cusp 10um \
                  --time-budget 28800s --row-pitch 1.5mm --snap --plane top --units inch \
                  --fill solid --scale 1,2,0.5 --mirror x,y --rotate x:90,z:-12.5 \
-                 --translate -5,0,12.7 --tolerance 1um --no-polish --gray --print-through \
+                 --translate -5,0,12.7 --tolerance 1um --no-polish --gray --antialias \
                  --material lamp-suspension --overcure 1.5 --origin -1,77.2 --size 80x80.5mm",
             ),
             (

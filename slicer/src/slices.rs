@@ -49,6 +49,9 @@ pub struct SliceOptions {
     /// The gray of layers where the part is less deep. The plane must then be
     /// [`PlaneRule::Top`].
     pub shading: Shading,
+    /// Makes edges gray: the level of a pixel is the share of its area within the section, times its
+    /// level by [`shading`](Self::shading). Not where doses add up.
+    pub antialias: bool,
     /// Moves crossings of B-rep parts from facets onto the exact surfaces.
     pub polish: bool,
     /// The layers to make; all if `None`.
@@ -106,6 +109,7 @@ impl Default for SliceOptions {
             placement: Placement::default(),
             fill: Fill::default(),
             shading: Shading::default(),
+            antialias: false,
             polish: true,
             layers: None,
             grid: GridRule::Around { margin: 1 },
@@ -143,6 +147,7 @@ pub struct Slices {
     planes: Planes,
     rule: FillRule,
     shading: PlacedShading,
+    antialias: bool,
     wanted: Range<usize>,
     /// The layers that are cut: the requested layers, the layers above them whose light counts, and
     /// the layers below that contain their undersides.
@@ -182,7 +187,7 @@ impl Slices {
     }
 
     fn prepared(model: Part, options: &SliceOptions) -> Result<Self, SliceError> {
-        let by_depth = !matches!(options.shading, Shading::White | Shading::Coverage);
+        let by_depth = options.shading != Shading::White;
         if by_depth && options.plane != PlaneRule::Top {
             return Err(SliceError::GrayPlane);
         }
@@ -196,7 +201,7 @@ impl Slices {
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
         let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
         // The pixel of an edge may be gray, and the last column must be black.
-        if options.shading == Shading::Coverage && !grid.leaves_last_column(max_mm) {
+        if options.antialias && !grid.leaves_last_column(max_mm) {
             return Err(SliceError::OutsideFrame { part_mm: [min_mm, max_mm] });
         }
         let part_um = [survey.min[2], survey.max[2]];
@@ -237,7 +242,7 @@ impl Slices {
                 *crossings *= 1.0 + spans_per_crossing(reach_um / planes.thickness_um(layer));
             }
         }
-        if options.shading == Shading::Coverage {
+        if options.antialias {
             // About one edge for each crossing; more, where facets are smaller than pixels, end a
             // slab early.
             let each = 1 + size_of::<Edge>() / size_of::<Crossing>();
@@ -259,6 +264,7 @@ impl Slices {
             grid,
             rule,
             shading,
+            antialias: options.antialias,
             max_crossings,
             largest,
             pending: cut.start..cut.start,
@@ -322,7 +328,8 @@ impl Slices {
         let facets = MetBlocks::of(&self.model, &self.survey, &layers, &planes, below);
         let mut table = Table::default();
         // A single layer cannot become smaller, so it has no limit.
-        let open = fill(&mut table, &facets, cutter, &self.shading, layers, usize::MAX)?;
+        let open =
+            fill(&mut table, &facets, cutter, &self.shading, self.antialias, layers, usize::MAX)?;
         let MadeLayer { mut layer, depths, .. } =
             self.image_of(index, &table, cutter, &open.unwrap_or_default());
         if let (Some(light), Some(depths)) = (self.shading.print_through(), depths) {
@@ -346,7 +353,7 @@ impl Slices {
 
     /// Returns whether layers are gray.
     pub fn is_gray(&self) -> bool {
-        !matches!(self.shading, PlacedShading::White)
+        self.antialias || !matches!(self.shading, PlacedShading::White)
     }
 
     /// Returns the gray of the layers.
@@ -395,7 +402,7 @@ impl Slices {
         let slab = self.slabs.partition_point(|slab| slab.end <= start);
         let mut end = self.slabs[slab].end;
         let cutter = Cutter { grid: &self.grid, planes: &self.planes, rule: &self.rule };
-        let shading = &self.shading;
+        let (shading, antialias) = (&self.shading, self.antialias);
         let reach_um = shading.reach_um().unwrap_or(0.0);
         // The table forgets its counts when it is filled.
         self.polished = self.polished.joined(self.table.polished());
@@ -404,11 +411,11 @@ impl Slices {
             let max = self.max_crossings;
             let open_rows = if let Some(buckets) = &self.buckets {
                 let facets = buckets.of_slab(slab, &self.model);
-                fill(&mut self.table, &facets, cutter, shading, layers, max)?
+                fill(&mut self.table, &facets, cutter, shading, antialias, layers, max)?
             } else {
                 let facets =
                     MetBlocks::of(&self.model, &self.survey, &layers, &self.planes, reach_um);
-                fill(&mut self.table, &facets, cutter, shading, layers, max)?
+                fill(&mut self.table, &facets, cutter, shading, antialias, layers, max)?
             };
             if let Some(open_rows) = open_rows {
                 self.open_rows = open_rows;
@@ -507,7 +514,7 @@ impl Slices {
         open_rows: &OpenRows,
     ) -> MadeLayer {
         let CutLayer { image, stray_rows, closed, shared, mut doubts } =
-            table.layer(layer, cutter, self.model.surfaces(), &self.shading);
+            table.layer(layer, cutter, self.model.surfaces(), &self.shading, self.antialias);
         let (image, depths) = match image {
             CutImage::Image(image) => (image, None),
             CutImage::Depths(depths) => {
@@ -615,10 +622,11 @@ fn fill(
     facets: &impl FacetSource,
     cutter: Cutter<'_>,
     shading: &PlacedShading,
+    antialias: bool,
     layers: Range<usize>,
     max_crossings: usize,
 ) -> io::Result<Option<OpenRows>> {
-    if !table.fill(facets, cutter, shading, layers, max_crossings)? {
+    if !table.fill(facets, cutter, shading, antialias, layers, max_crossings)? {
         return Ok(None);
     }
     // A row takes as much memory as one crossing.

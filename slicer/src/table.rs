@@ -99,11 +99,11 @@ impl Table {
         facets: &impl FacetSource,
         cutter: Cutter<'_>,
         shading: &PlacedShading,
+        antialias: bool,
         layers: Range<usize>,
         max: usize,
     ) -> io::Result<bool> {
         let reach_um = shading.reach_um();
-        let has_gray_edges = matches!(shading, PlacedShading::Coverage);
         self.shares.resize_with(rayon::current_num_threads(), Vec::new);
         let budget = CrossingLimit { used: AtomicUsize::new(0), max, must_fit: layers.len() > 1 };
         let next = AtomicUsize::new(0);
@@ -132,7 +132,7 @@ impl Table {
                         // The loop over a piece cannot be left, so its rest is passed over.
                         if !budget.is_spent() {
                             unclaimed += cut.cut(facet, shares);
-                            if has_gray_edges {
+                            if antialias {
                                 // The facets' own, within their tolerance of the surface.
                                 unclaimed += cutter.add_edges(facet, body, &of_edges, shares);
                             }
@@ -144,7 +144,7 @@ impl Table {
                 }
                 facets.for_each_in(piece, |facet| {
                     if !budget.is_spent() {
-                        let (bodiless, edges) = (needs_no_body, has_gray_edges);
+                        let (bodiless, edges) = (needs_no_body, antialias);
                         unclaimed += cutter.cut(facet, body, bodiless, edges, &layers, shares);
                         if let Some(reach_um) = reach_um {
                             unclaimed += cutter.look_down(facet, body, reach_um, &layers, shares);
@@ -238,33 +238,34 @@ impl Table {
         cutter: Cutter<'_>,
         surfaces: &[PlacedSurfaces],
         shading: &PlacedShading,
+        antialias: bool,
     ) -> CutLayer {
         let width = cutter.grid.width;
         let spans = shading.reach_um().map(|um| self.spans(layer, cutter, surfaces, um));
         let spans = spans.unwrap_or_default();
-        match shading {
+        let (image, cut) = match shading {
             PlacedShading::White => {
                 let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
-                cut.with(CutImage::Image(Image::Mask(mask)))
-            }
-            PlacedShading::Coverage => {
-                let (mask, cut) = self.rows(layer, cutter, surfaces, MaskRows::new(cutter.grid));
-                let edges = || self.shares(layer).flat_map(|share| &share.edges);
-                let image = covered(edges, cutter.grid, cutter.rule, &mask, &cut.stray_rows);
-                cut.with(CutImage::Image(image))
+                (Image::Mask(mask), cut)
             }
             PlacedShading::ByDepth(levels) => {
                 let rows = LevelRows::new(levels.of_layer(layer), width);
                 let shader = shader(rows, layer, cutter, &spans);
                 let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
-                cut.with(CutImage::Image(rows.finish()))
+                (rows.finish(), cut)
             }
             PlacedShading::PrintThrough(_) => {
                 let shader = shader(DepthRows::new(width), layer, cutter, &spans);
                 let (rows, cut) = self.rows(layer, cutter, surfaces, shader);
-                cut.with(CutImage::Depths(rows))
+                return cut.with(CutImage::Depths(rows));
             }
+        };
+        if !antialias {
+            return cut.with(CutImage::Image(image));
         }
+        let edges = || self.shares(layer).flat_map(|share| &share.edges);
+        let image = covered(edges, cutter.grid, cutter.rule, &image, &cut.stray_rows);
+        cut.with(CutImage::Image(image))
     }
 
     /// Returns a layer's crossings by row: crossings of facets, and other crossings.

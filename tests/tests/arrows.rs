@@ -17,7 +17,8 @@ const FLOORS: &[&[&str]] = &[
     &["lamp-pipeline"],
     &["lamp-batch"],
     &["lamp-slicer"],
-    &["lamp-cli", "lamp-python"],
+    &["lamp-cli"],
+    &["lamp-python"],
     // Crates that test the others. Nothing is built on them.
     &["lamp-truck-fixtures", "lamp-tests", "lamp-benches"],
 ];

@@ -55,7 +55,7 @@ fn gray_edges_go_through_the_pipeline() {
     }
     assert!(edges.iter().map(|layer| gray_pixels(&layer.image)).sum::<u64>() > 10_000);
     let stack = edges[0].info.stack.as_ref().unwrap();
-    assert!(stack.commands[0].ends_with("--antialias"), "{}", stack.commands[0]);
+    assert!(stack.commands[0].contains(" --antialias"), "{}", stack.commands[0]);
 
     scratch.run("dither edges.tif -q -o dots.tif").succeeds_quietly();
     let dots = scratch.layers("dots.tif");
@@ -66,9 +66,20 @@ fn gray_edges_go_through_the_pipeline() {
         assert!((white(dots) as f64 / (sum / 255.0) - 1.0).abs() < 0.02);
     }
 
-    let line =
-        format!("slice tower.stl {COARSE} --antialias --gray --material lamp-suspension -o x.tif");
-    is_wrong_usage(&scratch.run(&line), "--gray");
+    let gray = "--gray --material lamp-suspension";
+    scratch.run(&format!("slice tower.stl {COARSE} {gray} -o gray.tif")).succeeds_quietly();
+    let line = format!("slice tower.stl {COARSE} {gray} --antialias -o both.tif");
+    scratch.run(&line).succeeds_quietly();
+    let (by_depth, both) = (scratch.layers("gray.tif"), scratch.layers("both.tif"));
+    for ((both, by_depth), edges) in both.iter().zip(&by_depth).zip(&edges) {
+        let [both, by_depth, shares] = [both, by_depth, edges].map(|layer| levels(&layer.image));
+        for ((level, depth), share) in both.into_iter().zip(by_depth).zip(shares) {
+            let product = (u32::from(depth) * u32::from(share) + 127) / 255;
+            assert!(level <= share && (depth == 0 || u32::from(level) == product));
+        }
+    }
+    let line = format!("slice tower.stl {COARSE} {gray} --print-through --antialias -o x.tif");
+    is_wrong_usage(&scratch.run(&line), "--antialias");
 }
 
 #[test]

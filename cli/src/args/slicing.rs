@@ -92,10 +92,11 @@ pub(crate) struct SlicingArgs {
     #[arg(long, requires = "gray", help_heading = EXPOSURE)]
     print_through: bool,
 
-    /// Write gray edges: the level of a pixel is the share of its area that is part
+    /// Write gray edges: levels are shares of pixels within the part
     ///
-    /// Edges are then finer than pixels. dither makes dots of the levels
-    #[arg(long, alias = "anti-alias", conflicts_with = "gray", help_heading = EXPOSURE)]
+    /// Edges are then finer than pixels. With --gray, levels by depth are multiplied by the shares.
+    /// dither makes dots of the levels
+    #[arg(long, alias = "anti-alias", conflicts_with = "print_through", help_heading = EXPOSURE)]
     antialias: bool,
 }
 
@@ -164,12 +165,12 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
             plane_tolerance: args.plane_tolerance,
             solid: (&args.solid).into(),
             no_polish: args.no_polish,
-            gray: match (args.gray, args.print_through, args.antialias) {
-                (false, _, false) => GrayRule::None,
-                (false, _, true) => GrayRule::Coverage,
-                (true, false, _) => GrayRule::ByDepth,
-                (true, true, _) => GrayRule::PrintThrough,
+            gray: match (args.gray, args.print_through) {
+                (false, _) => GrayRule::None,
+                (true, false) => GrayRule::ByDepth,
+                (true, true) => GrayRule::PrintThrough,
             },
+            antialias: args.antialias,
             exposure: (&args.exposure).into(),
             frame: match (args.origin, args.size) {
                 (Some(origin), Some(size)) => SliceFrame::At { origin, size },

@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use lamp_stack::{Image, KeyCounts, LevelChange, Mask, white_runs};
+use lamp_stack::{GrayMask, Image, KeyCounts, LevelChange};
 
 use super::row_lists::RowLists;
 use super::rows::finished;
@@ -172,13 +172,14 @@ struct Cell {
     cover: i32,
 }
 
-/// Returns a layer whose levels are the shares of pixels within the section. Rows whose edges do
-/// not add up, because facets are missing, are rows of `mask`.
+/// Returns a layer whose levels are those of `image`, which has the pixels whose centers are within the
+/// section, times the shares of pixels within the section. Rows whose edges do not add up, because
+/// facets are missing, are rows of `image`.
 pub(crate) fn covered<'a, I: Iterator<Item = &'a Edge>>(
     edges: impl Fn() -> I,
     grid: &PixelGrid,
     rule: &FillRule,
-    mask: &Mask,
+    image: &Image,
     stray_rows: &[u32],
 ) -> Image {
     let height = grid.height;
@@ -195,7 +196,9 @@ pub(crate) fn covered<'a, I: Iterator<Item = &'a Edge>>(
     for row in 0..height {
         let is_stray = stray_rows.binary_search(&row).is_ok();
         if is_stray || !rows.add(by_row.group_mut(row as usize)) {
-            rows.add_white(mask.row(row));
+            rows.copy(image, row);
+        } else if let Image::Gray(gray) = image {
+            rows.dim(gray, row);
         }
         rows.end();
     }
@@ -396,12 +399,36 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Adds the levels of a row of a mask.
-    fn add_white(&mut self, transitions: &[u32]) {
-        for (start, end) in white_runs(transitions, self.width) {
-            self.push(start, u8::MAX);
+    /// Adds the levels of a row of an image.
+    fn copy(&mut self, image: &Image, row: u32) {
+        for (start, end, level) in image.runs(row) {
+            self.push(start, level);
             if end < self.width {
                 self.push(end, 0);
+            }
+        }
+    }
+
+    /// Multiplies the shares of a row by levels. A pixel whose center is outside gets the level of a
+    /// pixel beside it, above it or below it.
+    fn dim(&mut self, levels: &GrayMask, row: u32) {
+        let shares = std::mem::take(&mut self.changes);
+        let mut next = shares.iter().skip(1).map(|change| change.column);
+        for &LevelChange { column, level: share } in &shares {
+            let end = next.next().unwrap_or(self.width);
+            if share == 0 {
+                self.push(column, 0);
+                continue;
+            }
+            let mut at = column;
+            while at < end {
+                let (level, same_until) = level_from(levels, row, at);
+                // Beyond the pixel itself, neighbors differ.
+                let until = if level > 0 { same_until.min(end) } else { at + 1 };
+                let level = if level > 0 { level } else { level_beside(levels, row, at) };
+                let level = (u32::from(share) * u32::from(level) + 127) / 255;
+                self.push(at, level as u8);
+                at = until;
             }
         }
     }
@@ -417,4 +444,23 @@ impl<'a> Rows<'a> {
 fn level(area: i64) -> u8 {
     let unit = i64::from(UNIT);
     ((area.clamp(0, unit) * 255 + unit / 2) / unit) as u8
+}
+
+/// Returns the level of a pixel, and the column up to which it holds.
+fn level_from(levels: &GrayMask, row: u32, column: u32) -> (u8, u32) {
+    let changes = levels.row(row);
+    let after = changes.partition_point(|change| change.column <= column);
+    let level = after.checked_sub(1).map_or(0, |last| changes[last].level);
+    (level, changes.get(after).map_or(levels.width(), |change| change.column))
+}
+
+/// Returns the level of the first pixel beside, above or below one that is not black; white if all
+/// are black, as thin walls are between centers.
+fn level_beside(levels: &GrayMask, row: u32, column: u32) -> u8 {
+    let beside = [(0, -1), (0, 1), (-1, 0), (1, 0)].map(|(down, right)| {
+        let row = row.checked_add_signed(down).filter(|row| *row < levels.height())?;
+        let column = column.checked_add_signed(right).filter(|column| *column < levels.width())?;
+        Some(level_from(levels, row, column).0)
+    });
+    beside.into_iter().flatten().find(|level| *level > 0).unwrap_or(u8::MAX)
 }

@@ -6,17 +6,14 @@ use super::levels::LayerLevels;
 use super::print_through::PrintThrough;
 use crate::planes::Planes;
 
-/// The gray of layers. Layers that are gray where the part is less deep than the light reaches are
-/// swept down from their sections, which must be at their tops
+/// The gray of layers where the part is less deep than the light reaches. Gray layers are swept
+/// down from their sections, which must be at their tops
 /// ([`PlaneRule::Top`](crate::PlaneRule::Top)).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Shading {
     /// No gray: pixels are white or black.
     #[default]
     White,
-    /// Gray edges: the level is the share of the pixel's area within the section. Sections may be
-    /// anywhere in their layers.
-    Coverage,
     /// Each layer alone: the level that cures the depth of the part below its top.
     ByDepth(LayerLevels),
     /// Layers whose doses add up, by the light that each level leaves in the resin below: down each
@@ -28,7 +25,6 @@ pub enum Shading {
 #[derive(Debug)]
 pub(crate) enum PlacedShading {
     White,
-    Coverage,
     ByDepth(LayerLevels),
     PrintThrough(PrintThrough),
 }
@@ -37,7 +33,6 @@ impl PlacedShading {
     pub(crate) fn new(shading: &Shading, planes: &Planes) -> Self {
         match shading {
             Shading::White => Self::White,
-            Shading::Coverage => Self::Coverage,
             Shading::ByDepth(levels) => Self::ByDepth(levels.clone()),
             Shading::PrintThrough(levels) => {
                 Self::PrintThrough(PrintThrough::new(levels.clone(), planes))
@@ -49,7 +44,6 @@ impl PlacedShading {
     pub(crate) fn unplaced(&self) -> Shading {
         match self {
             Self::White => Shading::White,
-            Self::Coverage => Shading::Coverage,
             Self::ByDepth(levels) => Shading::ByDepth(levels.clone()),
             Self::PrintThrough(light) => Shading::PrintThrough(light.levels().clone()),
         }
@@ -58,7 +52,7 @@ impl PlacedShading {
     /// Returns the distance below their sections down to which layers examine facets, if they do.
     pub(crate) fn reach_um(&self) -> Option<f64> {
         match self {
-            Self::White | Self::Coverage => None,
+            Self::White => None,
             Self::ByDepth(levels) => Some(levels.reach_um()),
             Self::PrintThrough(light) => Some(light.within_um()),
         }

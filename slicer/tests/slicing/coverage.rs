@@ -2,7 +2,7 @@
 
 use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus};
 use lamp_slicing::{Fill, GridRule, PlaneRule, Shading, SliceError, SliceOptions, Slices};
-use lamp_stack::{Image, Layer, gray_runs};
+use lamp_stack::{DepthLevels, Image, Layer, Length, gray_runs};
 use proptest::prelude::*;
 
 use super::common::{
@@ -15,7 +15,7 @@ type Point = [f64; 2];
 /// Pixels of 1/8 mm, which floating point represents exactly.
 fn eighths() -> SliceOptions {
     let plane = PlaneRule::Middle;
-    SliceOptions { shading: Shading::Coverage, plane, ..options(203.2, 1000.0) }
+    SliceOptions { antialias: true, plane, ..options(203.2, 1000.0) }
 }
 
 /// Returns the level of each pixel, row by row.
@@ -208,7 +208,7 @@ fn voids_and_even_odd_take_area_away() {
 #[test]
 fn only_pixels_at_edges_are_gray() {
     let mesh = turned(&cube_with_hole(6.0, 1.5, 500), [0.3, 0.2, 0.1]);
-    let white = slice(&mesh, &SliceOptions { shading: Shading::White, ..eighths() });
+    let white = slice(&mesh, &SliceOptions { antialias: false, ..eighths() });
     let gray = slice(&mesh, &eighths());
     assert_eq!(white.len(), gray.len());
     for (white, gray) in white.iter().zip(&gray) {
@@ -248,6 +248,38 @@ fn a_box_on_pixel_edges_is_white() {
     assert_eq!(white_pixels(&layers[..1]), 16 * 8);
 }
 
+/// Levels by depth are multiplied by the shares of pixels.
+#[test]
+fn levels_by_depth_are_multiplied() {
+    let mesh = sphere(3.0, 20_000);
+    let options = SliceOptions { plane: PlaneRule::Top, ..eighths() };
+    let of_depth = |level: f64| Length::from_um(1000.0 * level);
+    let shading = Shading::ByDepth(DepthLevels::new(Length::from_um(1000.0), of_depth).into());
+    let by_depth = SliceOptions { shading, ..options.clone() };
+    let share = slice(&mesh, &options);
+    let depth = slice(&mesh, &SliceOptions { antialias: false, ..by_depth.clone() });
+    let both = slice(&mesh, &by_depth);
+    let mut outside = 0;
+    for ((share, depth), both) in share.iter().zip(&depth).zip(&both) {
+        let [share, depth, both] = [share, depth, both].map(levels);
+        for (r, row) in both.iter().enumerate() {
+            for (c, &level) in row.iter().enumerate() {
+                let share = u32::from(share[r][c]);
+                let of = |depth: u8| ((share * u32::from(depth) + 127) / 255) as u8;
+                if depth[r][c] > 0 || share == 0 {
+                    assert_eq!(level, of(depth[r][c]));
+                    continue;
+                }
+                outside += 1;
+                let beside = [depth[r][c - 1], depth[r][c + 1], depth[r - 1][c], depth[r + 1][c]];
+                let is_alone = beside == [0; 4] && u32::from(level) == share;
+                assert!(is_alone || beside.iter().any(|&depth| depth > 0 && level == of(depth)));
+            }
+        }
+    }
+    assert!(outside > 200);
+}
+
 /// Facets in another order, other numbers of threads and less memory change nothing.
 #[test]
 fn levels_depend_on_the_part_alone() {
@@ -268,7 +300,7 @@ fn levels_depend_on_the_part_alone() {
 fn stray_rows_are_white() {
     let mut mesh = prism(&regular(5, 1.5, 0.1, [0.0, 0.0]));
     mesh.facets.remove(0);
-    let white = slice(&mesh, &SliceOptions { shading: Shading::White, ..eighths() });
+    let white = slice(&mesh, &SliceOptions { antialias: false, ..eighths() });
     let gray = slice(&mesh, &eighths());
     let stray = &gray[0].info.stray_rows;
     assert!(!stray.is_empty() && *stray == white[0].info.stray_rows);

@@ -184,8 +184,10 @@ fn even_heights_as_a_list_make_the_same_layers() {
     let mesh = part();
     let heights = Some(even_heights(&mesh));
     let gray = DepthLevels::new(Length::from_um(900.0), |g| Length::from_um(900.0 * g));
-    for shading in [Shading::White, Shading::Coverage, Shading::ByDepth(gray.into())] {
-        let uniform = SliceOptions { shading, ..coarse() };
+    let shadings = [Shading::White, Shading::ByDepth(gray.into())];
+    let cases = shadings.into_iter().flat_map(|it| [(it.clone(), false), (it, true)]);
+    for (shading, antialias) in cases {
+        let uniform = SliceOptions { shading, antialias, ..coarse() };
         let given = SliceOptions { heights: heights.clone(), ..uniform.clone() };
         assert!(slice(&mesh, &given) == slice(&mesh, &uniform));
     }
