@@ -92,9 +92,10 @@ pub(crate) struct SlicingArgs {
     #[arg(long, requires = "gray", help_heading = EXPOSURE)]
     print_through: bool,
 
-    /// Write gray edges: levels are shares of pixels within the part
+    /// Write gray edges, finer than pixels
     ///
-    /// Edges are then finer than pixels. With --gray, levels by depth are multiplied by the shares.
+    /// The level of a pixel is the share of its area within the part. With --gray, levels by depth are
+    /// multiplied by the shares.
     /// dither makes dots of the levels
     #[arg(long, alias = "anti-alias", conflicts_with = "print_through", help_heading = EXPOSURE)]
     antialias: bool,
