@@ -4,7 +4,8 @@ use crate::image::mask::Mask;
 
 /// A closed polygon along the edges of pixels: its corners as (column, row), from the image's top
 /// left corner. White is on the left of the way along it, seen with y up: outlines of areas turn
-/// left, and outlines of holes turn right. The last corner is not the first one again.
+/// left, and outlines of holes turn right. The last corner is not the first one again. No outline
+/// passes a point twice, but two may touch at a corner.
 pub type Outline = Vec<[u32; 2]>;
 
 /// A vertical side between white and black pixels, as long as it is straight.
@@ -31,7 +32,7 @@ impl Mask {
     /// # Ok::<(), lamp_stack::RunError>(())
     /// ```
     pub fn outlines(&self) -> Vec<Outline> {
-        let sides = self.sides();
+        let (sides, touched) = self.sides();
         let mut passed = vec![false; sides.len()];
         let mut outlines = Vec::new();
         for first in 0..sides.len() {
@@ -39,11 +40,35 @@ impl Mask {
                 continue;
             }
             let (mut outline, mut at) = (Outline::new(), first);
+            // The touched corners of the outline so far, and their places in it.
+            let mut open: Vec<([u32; 2], usize)> = Vec::new();
             while !passed[at] {
                 passed[at] = true;
                 let side = &sides[at];
                 let [from, to] = if side.goes_down { [0, 1] } else { [1, 0] };
-                outline.extend([from, to].map(|end| [side.column, side.ends[end]]));
+                for corner in [from, to].map(|end| [side.column, side.ends[end]]) {
+                    outline.push(corner);
+                    if touched
+                        .binary_search_by_key(&(corner[1], corner[0]), |it| (it[1], it[0]))
+                        .is_err()
+                    {
+                        continue;
+                    }
+                    match open.iter().position(|(known, _)| *known == corner) {
+                        // The way back to it is an outline of its own.
+                        Some(known) => {
+                            outlines.push(outline.split_off(open[known].1));
+                            open.truncate(known + 1);
+                            let place = outline.len();
+                            outline.push(corner);
+                            open[known].1 = place;
+                            // Its first corner is the last one.
+                            let last = outlines.len() - 1;
+                            outlines[last].pop();
+                        }
+                        None => open.push((corner, outline.len() - 1)),
+                    }
+                }
                 at = side.next[to] as usize;
             }
             outlines.push(outline);
@@ -51,10 +76,11 @@ impl Mask {
         outlines
     }
 
-    /// Returns all vertical sides, joined.
-    fn sides(&self) -> Vec<Side> {
+    /// Returns all vertical sides, joined, and the corners at which white pixels only touch, from the
+    /// top left.
+    fn sides(&self) -> (Vec<Side>, Vec<[u32; 2]>) {
         let width = self.width();
-        let mut sides: Vec<Side> = Vec::new();
+        let (mut sides, mut touched) = (Vec::<Side>::new(), Vec::new());
         // The columns and sides that the row above has, and that this row has.
         let (mut above, mut here) = (Vec::<(u32, u32)>::new(), Vec::new());
         // The corners on a line from the left: a side, and which of its ends is there.
@@ -87,6 +113,7 @@ impl Mask {
                             continue;
                         }
                         let new = start(&mut sides, column, row, goes_down);
+                        touched.push([column, row]);
                         // Four pixels meet like a checkerboard. The side with white on its left comes
                         // first, so that the white pixels are apart.
                         match goes_down {
@@ -112,7 +139,7 @@ impl Mask {
             }
             std::mem::swap(&mut above, &mut here);
         }
-        sides
+        (sides, touched)
     }
 }
 
@@ -150,6 +177,10 @@ mod tests {
         let corners = mask_of(&["#.#", ".#.", "#.#"]);
         assert_eq!(corners.outlines().len(), 5);
         assert!(corners.outlines().iter().all(|outline| doubled_area(outline) == 2));
+        let pinched = mask_of(&["###.", "#.##", "####"]);
+        let mut areas: Vec<_> = pinched.outlines().iter().map(doubled_area).collect();
+        areas.sort_unstable();
+        assert_eq!(areas, [-2, 22]);
         assert!(mask_of(&["...", "..."]).outlines().is_empty());
     }
 
@@ -168,6 +199,9 @@ mod tests {
                     // Vertical sides left of the pixel's center.
                     let mut winding = 0;
                     for outline in &outlines {
+                        let mut corners = outline.clone();
+                        corners.sort_unstable();
+                        prop_assert!(corners.windows(2).all(|pair| pair[0] != pair[1]));
                         for (k, a) in outline.iter().enumerate() {
                             let b = outline[(k + 1) % outline.len()];
                             prop_assert!((a[0] == b[0]) != (a[1] == b[1]));
