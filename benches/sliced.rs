@@ -53,13 +53,13 @@ pub fn mask(layer: &Layer) -> &Mask {
 #[cfg(test)]
 mod tests {
     use lamp_fixtures::tower;
-    use lamp_stack::{Dpi, Length};
+    use lamp_stack::{Length, Pitch};
 
     use super::*;
 
     fn coarse() -> SliceOptions {
         SliceOptions {
-            dpi: Dpi::new(150.0).unwrap(),
+            pitch: Pitch::of_dpi(150.0).unwrap(),
             thickness: Length::from_um(500.0),
             ..SliceOptions::default()
         }

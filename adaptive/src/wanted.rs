@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 
 use crate::criterion::{AreaDeviation, Criterion, CuspHeight, VolumeDeviation};
 use crate::error::HeightsError;
@@ -15,8 +15,8 @@ use crate::thicknesses::Thicknesses;
 const PIXELS_PER_ROW: f64 = 4.0;
 
 /// Returns how far apart rows are measured for images of a resolution.
-pub fn row_pitch(dpi: Dpi) -> Length {
-    Length::from_um(dpi.pitch().um() * PIXELS_PER_ROW)
+pub fn row_pitch(pitch: Pitch) -> Length {
+    Length::from_um(pitch.y.pitch().um() * PIXELS_PER_ROW)
 }
 
 /// The measure of a layer's error, by name.
@@ -165,7 +165,7 @@ mod tests {
         let facets = vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]];
         let model = Part::from_facets("tetra", facets);
         let facets = FacetIndex::new(model, &Placement::default(), Units::Millimetres).unwrap();
-        let pitch = row_pitch(Dpi::new(10_160.0).unwrap());
+        let pitch = row_pitch(Pitch::of_dpi(10_160.0).unwrap());
         let part = LayeredPart::new(facets, pitch, Fill::EvenOdd).unwrap();
         let [min, max, step] = [10.0, 100.0, 1.0].map(Length::from_um);
         let thicknesses = Thicknesses::new(min, max, step).unwrap();

@@ -6,7 +6,7 @@ use lamp_fixtures::{Mesh, cube_with_hole, sphere, torus, tower};
 use lamp_slicing::{
     Axis, FacetIndex, Fill, Inside, Part, Placement, SectionOptions, Units, section,
 };
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 
 /// 1270 dpi: rows 0.02 mm apart, so that sums over them are near what facets say exactly.
 const PITCH_MM: f64 = 0.02;
@@ -30,7 +30,7 @@ impl Twin {
             placement: self.placement,
             fill: self.fill,
             z: Length::from_um(z_um),
-            dpi: Dpi::new(DPI).unwrap(),
+            pitch: Pitch::of_dpi(DPI).unwrap(),
             top_mm,
             rows,
         };

@@ -14,8 +14,8 @@ use lamp_grayscale::{DitherMethod, dither_image};
 use lamp_offset::{Widths, offset, offset_one_bit, shrink};
 use lamp_slicing::{FacetIndex, Fill, Part, Placement, Shading, SliceOptions, Slices, Units};
 use lamp_stack::{
-    DepthLevels, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask,
-    PageInfo, PageWriter, g4,
+    DepthLevels, EncodedPage, Format, GrayMask, Image, Layer, LayerImage, Length, Mask, PageInfo,
+    PageWriter, Pitch, g4,
 };
 
 /// Layers with pins and holes, 1500 dpi.
@@ -237,8 +237,11 @@ fn compensation(criterion: &mut Criterion) {
 
 /// Encodes a stack of one page in memory.
 fn tiff_file(mask: &Mask) -> Vec<u8> {
-    let layer =
-        Layer { info: PageInfo::default(), dpi: Dpi::new(1500.0), image: mask.clone().into() };
+    let layer = Layer {
+        info: PageInfo::default(),
+        pitch: Pitch::of_dpi(1500.0),
+        image: mask.clone().into(),
+    };
     let mut file = Vec::new();
     let mut writer = PageWriter::new(&mut file, Format::Classic);
     writer.push(EncodedPage::new(&layer)).expect("memory takes all");

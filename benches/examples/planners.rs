@@ -15,7 +15,7 @@ use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::solver::{Operator, Shape};
 use lamp_planning::voxels::{Options, Outcome, VoxelPlanError, Window, plan};
 use lamp_planning::{Blur, IntensityOf, LayerLight, Light, SampleHeight};
-use lamp_stack::{Dpi, Layer, Length, MaskBuilder, PageInfo};
+use lamp_stack::{Layer, Length, MaskBuilder, PageInfo, Pitch};
 
 /// A crop of a part, and its light.
 struct Problem {
@@ -149,7 +149,11 @@ impl Problem {
                 exposure_ms: Some(1000.0),
                 ..PageInfo::default()
             };
-            Ok(Layer { info, dpi: Dpi::new(25_400.0 / PITCH_UM), image: image(voxels).into() })
+            Ok(Layer {
+                info,
+                pitch: Pitch::of_dpi(25_400.0 / PITCH_UM),
+                image: image(voxels).into(),
+            })
         })
     }
 }

@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The defects, each with the fill rule that shows it: flipped facets change nothing under
 /// even-odd.
 fn defects() -> Vec<(String, Defect, Fill)> {
-    let pixel_mm = SliceOptions::default().dpi.pitch().mm() as f32;
+    let pixel_mm = SliceOptions::default().pitch.mm()[0] as f32;
     let gap = |pixels| {
         let defect = Defect::Gap { by_mm: pixels * pixel_mm };
         (format!("gap, {pixels} px"), defect, Fill::EvenOdd)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use lamp_build::{FieldsError, SwathsError};
 use lamp_machine::MachineLimit;
-use lamp_stack::StackError;
+use lamp_stack::{NotSquare, StackError};
 use thiserror::Error;
 
 use crate::clock::ExposureLimit;
@@ -39,6 +39,9 @@ pub enum GantryError {
     /// The size of pixels is unknown.
     #[error("its pages state no resolution, so no speed follows from their exposures")]
     NoResolution,
+    /// Pixels are not square.
+    #[error(transparent)]
+    NotSquare(#[from] NotSquare),
     /// The machine's file says nothing of a scan.
     #[error("the machine {machine} has no [scan]: add it to its file (docs/gantry.md)")]
     NoScan {

@@ -248,7 +248,7 @@ impl Job {
     ) -> Result<Self, GantryError> {
         let scan = scan_of(machine)?;
         let layout = layout(pages, machine, scan, options)?;
-        machine.check_dpi(pages.dpi(), "the build")?;
+        machine.check_pitch(pages.dpi().into(), "the build")?;
         let chosen: Vec<(usize, &PageHeader)> = pages
             .headers()
             .iter()

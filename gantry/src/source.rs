@@ -59,7 +59,8 @@ impl BuildPages {
         };
         let first = &stacks[0].headers()[0];
         let is_alike = |(page, of_first): (&PageHeader, &PageHeader)| {
-            (page.info.index, page.size, page.dpi) == (of_first.info.index, first.size, first.dpi)
+            (page.info.index, page.size, page.pitch)
+                == (of_first.info.index, first.size, first.pitch)
         };
         for (number, strip) in stacks.iter().enumerate() {
             let (pages, of_first) = (strip.headers(), stacks[0].headers());
@@ -70,7 +71,8 @@ impl BuildPages {
                 pages.iter().try_for_each(|page| file.check(&page.info))?;
             }
         }
-        let dpi = first.dpi.ok_or(GantryError::NoResolution)?;
+        let pitch = first.pitch.ok_or(GantryError::NoResolution)?;
+        let dpi = pitch.square("scans need")?;
         let size = [width.unwrap_or(first.size[0]), first.size[1]];
         Ok(Self { path: path.to_owned(), files, form, size, dpi, stacks })
     }

@@ -2,7 +2,7 @@
 
 use lamp_build::{FieldForm, FieldsError, Seam, Swaths, SwathsError};
 use lamp_machine::Machine;
-use lamp_stack::{Dpi, Image, PageInfo};
+use lamp_stack::{Dpi, Image, PageInfo, Pitch};
 
 use crate::clock::RowClock;
 use crate::error::GantryError;
@@ -143,7 +143,7 @@ impl BuildClock {
 
     /// Adds a layer of so many columns and rows. Its image counts only if images are
     /// [needed](Self::needs_images).
-    pub fn add(&mut self, info: &PageInfo, dpi: Option<Dpi>, size: [u32; 2], image: &Image) {
+    pub fn add(&mut self, info: &PageInfo, pitch: Option<Pitch>, size: [u32; 2], image: &Image) {
         let times = self.machine.as_ref().and_then(|machine| machine.times.as_ref());
         let usual_ms = times.and_then(|times| times.expose_s).map(|seconds| seconds * 1000.0);
         let exposure_ms = info.exposure_ms.or(usual_ms);
@@ -156,7 +156,14 @@ impl BuildClock {
             }
             return;
         }
-        let Some(dpi) = dpi else { return };
+        let dpi = match pitch.map(|pitch| pitch.square("scans need")) {
+            Some(Ok(dpi)) => dpi,
+            Some(Err(why)) => {
+                self.unscanned.get_or_insert_with(|| why.to_string());
+                return;
+            }
+            None => return,
+        };
         match (&self.machine, self.mirrors.is_some()) {
             (Some(machine), false) => {
                 let swaths = steady_swaths(machine, size, dpi);
@@ -319,7 +326,7 @@ mod tests {
         for &exposure_ms in exposures_ms {
             // 10 pixels a millimeter.
             let info = PageInfo { exposure_ms, ..PageInfo::default() };
-            clock.add(&info, Dpi::new(254.0), [1000, 400], &image);
+            clock.add(&info, Pitch::of_dpi(254.0), [1000, 400], &image);
         }
         clock.time()
     }

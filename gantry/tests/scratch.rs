@@ -8,7 +8,8 @@ use lamp_gantry::{
 };
 use lamp_machine::Machine;
 use lamp_stack::{
-    Catalogued, Destination, Dpi, Format, GrayMask, Image, Layer, PageInfo, StackError, write_stack,
+    Catalogued, Destination, Format, GrayMask, Image, Layer, PageInfo, Pitch, StackError,
+    write_stack,
 };
 
 /// A pixel is 0.1 mm.
@@ -42,7 +43,11 @@ impl Build {
         let layers = images.iter().zip(0_u32..).map(|(image, index)| {
             let exposure_ms = Some(100.0 * f64::from(index + 1));
             let info = PageInfo { index, exposure_ms, ..PageInfo::default() };
-            Ok::<_, StackError>(Layer { info, dpi: Dpi::new(DPI), image: image.clone().into() })
+            Ok::<_, StackError>(Layer {
+                info,
+                pitch: Pitch::of_dpi(DPI),
+                image: image.clone().into(),
+            })
         });
         write_stack(layers, Destination::File(path.clone()), Format::Big).unwrap();
         let pages = BuildPages::open(&path).unwrap();

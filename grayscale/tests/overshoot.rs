@@ -9,7 +9,7 @@ use lamp_slicing::{
     Axis, Fill, Part, PixelGrid, Placement, SectionOptions, Shading, SliceOptions, Slices, Units,
     section,
 };
-use lamp_stack::{Catalogued, Dpi, Layer, Length};
+use lamp_stack::{Catalogued, Layer, Length, Pitch};
 
 const DPI: f64 = 1500.0;
 const THICKNESS_UM: f64 = 200.0;
@@ -26,12 +26,12 @@ fn slices(mesh: &Mesh, overcure: f64, gray: bool) -> Slices {
     let thickness = Length::from_um(THICKNESS_UM);
     let resin = resin();
     let time = resin.exposure_time(thickness, overcure).unwrap();
-    let dpi = Dpi::new(DPI).unwrap();
+    let pitch = Pitch::of_dpi(DPI).unwrap();
     let shading = match gray {
         true => Shading::ByDepth(resin.depth_levels(time).unwrap().into()),
         false => Shading::White,
     };
-    Slices::new(model(mesh), &SliceOptions { dpi, thickness, shading, ..SliceOptions::default() })
+    Slices::new(model(mesh), &SliceOptions { pitch, thickness, shading, ..SliceOptions::default() })
         .unwrap()
 }
 
@@ -51,8 +51,8 @@ fn errors(
     let depths: Vec<_> =
         (0..=255).map(|level| resin.depth(GrayLevel::from_u8(level), time)).collect();
     let platform_um = layers[0].info.z_um.unwrap();
-    let dpi = Dpi::new(DPI * f64::from(fine)).unwrap();
-    let step_mm = dpi.pitch().mm();
+    let pitch = Pitch::of_dpi(DPI * f64::from(fine)).unwrap();
+    let step_mm = pitch.mm()[0];
     let mut sums = [0.0; 2];
     for row in rows {
         let mut cured = CuredLine::default();
@@ -70,8 +70,8 @@ fn errors(
                     placement: Placement::default().rotated(Axis::Y, 90.0).rotated(Axis::X, 90.0),
                     fill: Fill::EvenOdd,
                     z: Length::from_mm(y),
-                    dpi,
-                    top_mm: grid.origin_mm[0] + f64::from(grid.width) * grid.dpi.pitch().mm(),
+                    pitch,
+                    top_mm: grid.origin_mm[0] + f64::from(grid.width) * grid.pitch.mm()[0],
                     rows: grid.width * fine,
                 },
             )

@@ -9,7 +9,7 @@ use lamp_slicing::{
     Axis, Fill, LayerHeights, LayerLevels, Part, PixelGrid, Placement, SectionOptions, Shading,
     SliceOptions, Slices, Units, section,
 };
-use lamp_stack::{Catalogued, Dpi, Image, Layer, Length};
+use lamp_stack::{Catalogued, Image, Layer, Length, Pitch};
 
 const DPI: f64 = 600.0;
 
@@ -48,7 +48,7 @@ impl Build {
         };
         let shading = if gray { Shading::PrintThrough(of_layers()) } else { Shading::White };
         let options = SliceOptions {
-            dpi: Dpi::new(DPI).unwrap(),
+            pitch: Pitch::of_dpi(DPI).unwrap(),
             thickness: self.thickness,
             heights: self.heights.clone(),
             shading,
@@ -82,8 +82,8 @@ impl Build {
             placement: Placement::default().rotated(Axis::Y, 90.0).rotated(Axis::X, 90.0),
             fill: Fill::EvenOdd,
             z: Length::from_mm(grid.to_mm(0.0, f64::from(row))[1]),
-            dpi: grid.dpi,
-            top_mm: grid.origin_mm[0] + f64::from(grid.width) * grid.dpi.pitch().mm(),
+            pitch: grid.pitch,
+            top_mm: grid.origin_mm[0] + f64::from(grid.width) * grid.pitch.mm()[0],
             rows: grid.width,
         };
         let lines = section(self.part(), &options).unwrap();

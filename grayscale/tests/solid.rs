@@ -43,8 +43,8 @@ proptest! {
 fn masks_pass_unchanged_and_gray_pages_name_the_method() {
     let info = PageInfo { index: 3, ..PageInfo::default() };
     let mask = Image::Mask(Mask::new(8, vec![0, 2], vec![1, 4]).unwrap());
-    let masked = Layer { info: info.clone(), dpi: None, image: mask.into() };
-    let gray = Layer { info, dpi: None, image: GrayMask::new(8).into() };
+    let masked = Layer { info: info.clone(), pitch: None, image: mask.into() };
+    let gray = Layer { info, pitch: None, image: GrayMask::new(8).into() };
     let layers = [masked.clone(), gray].into_iter().map(Ok::<_, Box<dyn Error + Send + Sync>>);
     let dots = dither(layers, DitherMethod::FloydSteinberg);
     let out: Vec<_> = dots.map(|layer| layer.unwrap().decode().unwrap()).collect();

@@ -4,14 +4,14 @@ use std::env;
 use std::error::Error;
 
 use lamp_slicer::slicer::{OpenOptions, Part, SliceOptions, Slices};
-use lamp_slicer::stack::{Destination, Dpi, Format, Length, write_stack};
+use lamp_slicer::stack::{Destination, Format, Length, Pitch, write_stack};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<_> = env::args().collect();
     let [_, part, to] = &words[..] else { return Err("name a part and a TIFF to write".into()) };
     let part = Part::open(part.as_ref(), &OpenOptions::default())?;
     let options = SliceOptions {
-        dpi: Dpi::new(600.0).ok_or("a resolution is above zero")?,
+        pitch: Pitch::of_dpi(600.0).ok_or("a resolution is above zero")?,
         thickness: Length::from_um(100.0),
         ..SliceOptions::default()
     };

@@ -23,7 +23,7 @@
 //! ```
 //! use lamp_slicer::fix::{FixOptions, fix};
 //! use lamp_slicer::slicer::{OpenOptions, Part, SliceOptions, Slices};
-//! use lamp_slicer::stack::{Destination, Dpi, Format, Length, Pages, write_stack};
+//! use lamp_slicer::stack::{Destination, Pitch, Format, Length, Pages, write_stack};
 //!
 //! # let folder = tempfile::tempdir()?;
 //! # let stl = folder.path().join("wedge.stl");
@@ -39,7 +39,7 @@
 //! // wedge.stl is 9 mm high.
 //! let part = Part::open(&stl, &OpenOptions::default())?;
 //! let options = SliceOptions {
-//!     dpi: Dpi::new(600.0).expect("it is positive"),
+//!     pitch: Pitch::of_dpi(600.0).expect("it is positive"),
 //!     thickness: Length::from_um(100.0),
 //!     ..SliceOptions::default()
 //! };
@@ -61,11 +61,11 @@
 //! ```
 //! use lamp_slicer::build::{TileOptions, tile};
 //! use lamp_slicer::fix::{FixOptions, fix};
-//! use lamp_slicer::stack::{Dpi, Image, Layer, Mask, PageInfo};
+//! use lamp_slicer::stack::{Pitch, Image, Layer, Mask, PageInfo};
 //!
 //! // Row 1 missed its second crossing and runs to the image's edge.
 //! let mask = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5]).unwrap();
-//! let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: mask.into() };
+//! let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(100.0), image: mask.into() };
 //!
 //! let layers = std::iter::once(Ok::<_, lamp_slicer::Error>(layer));
 //! let fixed = fix(layers, FixOptions::default(), |fixed| {
@@ -83,7 +83,7 @@
 //! # Check for what floats
 //!
 //! ```
-//! use lamp_slicer::stack::{Dpi, Layer, Mask, PageInfo};
+//! use lamp_slicer::stack::{Pitch, Layer, Mask, PageInfo};
 //! use lamp_slicer::supports::{CheckOptions, check};
 //!
 //! let layer = |index: u32, changes: Vec<u32>| {
@@ -92,7 +92,7 @@
 //!     let image = Mask::new(20, rows, changes.repeat(10)).unwrap().into();
 //!     let z_um = Some(100.0 * f64::from(index));
 //!     let info = PageInfo { index, z_um, thickness_um: Some(100.0), ..PageInfo::default() };
-//!     Layer { info, dpi: Dpi::new(254.0), image }
+//!     Layer { info, pitch: Pitch::of_dpi(254.0), image }
 //! };
 //! // The second piece of layer 1 stands on nothing.
 //! let layers = [layer(0, vec![2, 8]), layer(1, vec![2, 8, 12, 18])];

@@ -192,7 +192,7 @@ impl CheckSettings {
             Ok(layer)
         };
         let parts = |layer: &Layer| {
-            let Layer { info, dpi, image } = layer;
+            let Layer { info, pitch, image } = layer;
             let mask = image.clone().into_image().into_mask(self.threshold);
             let found = build.divide(&mask, info.index, base.get());
             let mut all = differing.lock().unwrap_or_else(PoisonError::into_inner);
@@ -203,7 +203,7 @@ impl CheckSettings {
                 *sum += pixels;
             }
             let parts = found.parts?;
-            Some(Layer { info: info.clone(), dpi: *dpi, image: parts.into() })
+            Some(Layer { info: info.clone(), pitch: *pitch, image: parts.into() })
         };
         let (whole, parts) = lamp_supports::check_build(layers, decode, parts, &self.options())?;
         let mut findings = whole;

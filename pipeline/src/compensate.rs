@@ -9,8 +9,8 @@ use std::str::FromStr;
 use lamp_grayscale::exposure::{LampLight, MeasuredDoses};
 use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{CureWidth, Dose, EdgeLight, ExposureTime};
-use lamp_offset::{CompensateError, CompensateOptions, Shrinkage, Widths};
-use lamp_stack::{CompensateRecord, Dpi, Layer, Length, LengthError};
+use lamp_offset::{CompensateError, CompensateOptions, CompensateProblem, Shrinkage, Widths};
+use lamp_stack::{CompensateRecord, Layer, Length, LengthError, Pitch};
 use serde::{Deserialize, Serialize};
 
 use crate::documents::{canonical_word, document, is_file};
@@ -131,7 +131,7 @@ impl<'a> Compensating<'a> {
         });
         let options = CompensateOptions { min_feature, one_bit, shrinkage };
         let by = &self.by;
-        let widths = |layer: &Layer, dpi| Ok(by.widths(layer, dpi)?);
+        let widths = |layer: &Layer, pitch| Ok(by.widths(layer, pitch)?);
         lamp_offset::compensate(layers, options, widths, move |done| {
             if counted.contains(&done.layer.info.index) {
                 self.walls.borrow_mut().add(done);
@@ -284,9 +284,9 @@ impl EdgeMove {
         }
     }
 
-    fn widths(&self, layer: &Layer, dpi: Dpi) -> Result<Widths, Error> {
+    fn widths(&self, layer: &Layer, pitch: Pitch) -> Result<Widths, Error> {
         let (width, dose) = match self {
-            Self::Uniform(by) => return Ok(Widths::elliptic(by.xy.map(|by| by.pixels(dpi)))),
+            Self::Uniform(by) => return Ok(elliptic(by.xy, pitch)),
             Self::Spread(by) => {
                 let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
                 let edges = by.light.edges(dose).ok_or_else(|| {
@@ -299,7 +299,7 @@ impl EdgeMove {
                         )),
                     )
                 })?;
-                return Ok(Widths::elliptic(edges.map(|by| by.pixels(dpi))));
+                return Ok(elliptic(edges, pitch));
             }
             Self::CureWidth(by) => {
                 let dose = by.dose.map_or_else(|| dose_of(layer, &by.material), Ok)?;
@@ -309,11 +309,20 @@ impl EdgeMove {
             }
         };
         // The image has the wanted sizes, not the sizes to expose.
+        let dpi = pitch.square("widths by size need").map_err(|why| {
+            let (layer, problem) = (layer.info.name(), CompensateProblem::NotSquare(why));
+            CompensateError { layer, problem }
+        })?;
         let sizes: Vec<f64> = width.cured_sizes(dose).iter().map(|size| size.pixels(dpi)).collect();
         let pitch = dpi.pitch().um();
         let size = |pixels: f64| Length::from_um(pixels * pitch);
         Ok(Widths::by_size(&sizes, |pixels| width.width_of_cured(dose, size(pixels)).pixels(dpi)))
     }
+}
+
+/// Returns distances along x and y in pixels.
+fn elliptic([x, y]: [Length; 2], pitch: Pitch) -> Widths {
+    Widths::elliptic([x.pixels(pitch.x), y.pixels(pitch.y)])
 }
 
 /// Returns the dose of a layer from its page's exposure time.

@@ -1,7 +1,7 @@
 //! The stage that turns gray layers into dots.
 
 use lamp_grayscale::{DitherError, DitherMethod, EVEN_DOTS, Homogeneity, UNEVEN_DOTS, homogeneity};
-use lamp_stack::{Dpi, Length, PassingLayer, StackError};
+use lamp_stack::{Length, PassingLayer, Pitch, StackError};
 use serde::{Deserialize, Serialize};
 
 use crate::watcher::{Remark, Watcher};
@@ -35,8 +35,8 @@ impl DitherSettings {
         let mut has_warned = self.method == DitherMethod::Threshold;
         let layers = layers.inspect(move |layer| {
             if let Ok(layer) = layer
-                && let Some(dpi) = layer.dpi().filter(|_| !has_warned && layer.is_gray())
-                && let Some(line) = unevenness(dpi)
+                && let Some(pitch) = layer.pitch().filter(|_| !has_warned && layer.is_gray())
+                && let Some(line) = unevenness(pitch)
             {
                 has_warned = true;
                 watcher.remark(Remark::note(line));
@@ -47,8 +47,8 @@ impl DitherSettings {
 }
 
 /// Returns a warning if the pixels of gray layers are wider than dots known to cure evenly.
-fn unevenness(dpi: Dpi) -> Option<String> {
-    let pitch = dpi.pitch();
+fn unevenness(pitch: Pitch) -> Option<String> {
+    let pitch = pitch.long_side();
     let fear = match homogeneity(pitch) {
         Homogeneity::Even => return None,
         Homogeneity::Unknown => {
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     fn told(dpi: f64) -> Option<String> {
-        unevenness(Dpi::new(dpi).unwrap())
+        unevenness(Pitch::of_dpi(dpi).unwrap())
     }
 
     #[test]

@@ -107,7 +107,7 @@ impl Fallback {
     ) -> Result<Self, Error> {
         let grid = slices.grid();
         let step = &options.solid.step;
-        let opening = step.reader.for_opening(step.tolerance(options.dpi))?;
+        let opening = step.reader.for_opening(step.tolerance(options.pitch))?;
         let options = SliceOptions {
             // Both must cut the same planes on the same pixels, so that a layer can replace the
             // other's.

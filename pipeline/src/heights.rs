@@ -10,7 +10,7 @@ use lamp_adaptive::{
 use lamp_grayscale::exposure::Exposure;
 use lamp_slicing::{FacetIndex, Fill};
 use lamp_stack::format_significant;
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, ErrorKind};
@@ -98,9 +98,9 @@ impl HeightSettings {
     }
 
     /// Returns the part as measured along rows.
-    pub fn part(&self, body: FacetIndex, dpi: Dpi, fill: Fill) -> Result<LayeredPart, Error> {
-        let pitch = self.row_pitch.unwrap_or_else(|| row_pitch(dpi));
-        let part = LayeredPart::new(body, pitch, fill);
+    pub fn part(&self, body: FacetIndex, pitch: Pitch, fill: Fill) -> Result<LayeredPart, Error> {
+        let row_pitch = self.row_pitch.unwrap_or_else(|| row_pitch(pitch));
+        let part = LayeredPart::new(body, row_pitch, fill);
         Ok(part?)
     }
 

@@ -11,20 +11,20 @@ pub(crate) struct PanelFrame {
     record: PrintRecord,
     /// `None` if the images lie where they are wanted already.
     frame: Option<Frame>,
-    pitch_mm: f64,
+    pitch_mm: [f64; 2],
 }
 
 impl PanelFrame {
     /// Centers the part on the machine's panel, if it has one and no other place is given.
     pub(crate) fn new(machine: &Machine, slices: &Slices, frame: &SliceFrame) -> Option<Self> {
         let record = machine.print_record()?;
-        let PixelGrid { origin_mm, dpi, .. } = *slices.grid();
-        let pitch_mm = dpi.pitch().mm();
+        let PixelGrid { origin_mm, pitch, .. } = *slices.grid();
+        let pitch_mm = pitch.mm();
         let [low, high] = slices.box_mm();
         let [width, height] = record.panel_px;
         // The part's middle in pixels of its images; rows go down, where y goes up.
         let middle = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]) - origin_mm[axis]);
-        let [across, down] = [middle[0] / pitch_mm, -middle[1] / pitch_mm];
+        let [across, down] = [middle[0] / pitch_mm[0], -middle[1] / pitch_mm[1]];
         let first = |middle: f64, side: u32| (middle - f64::from(side) / 2.0).round() as i64;
         let centered =
             Frame { left: first(across, width), top: first(down, height), width, height };
@@ -41,9 +41,10 @@ impl PanelFrame {
         layer.image = layer.image.framed(frame).into();
         if let Some([left_mm, top_mm]) = &mut layer.info.origin_mm {
             // Six decimals, as the grid has them.
-            let moved =
-                |from: f64, by: i64| ((from + by as f64 * self.pitch_mm) * 1e6).round() / 1e6;
-            (*left_mm, *top_mm) = (moved(*left_mm, frame.left), moved(*top_mm, -frame.top));
+            let [x, y] = self.pitch_mm;
+            let moved = |from: f64, by: i64, mm: f64| ((from + by as f64 * mm) * 1e6).round() / 1e6;
+            *left_mm = moved(*left_mm, frame.left, x);
+            *top_mm = moved(*top_mm, -frame.top, y);
         }
         for rows in [&mut layer.info.stray_rows, &mut layer.info.open_rows] {
             let moved = rows.iter().map(|row| i64::from(*row) - frame.top);

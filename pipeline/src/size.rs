@@ -1,7 +1,7 @@
 //! Doubts about a part that can be sliced, but hardly as intended.
 
 use lamp_slicing::Units;
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 
 /// Images below this width or height, in pixels, show no shape; nor do stacks of fewer layers.
 const FEW: f64 = 3.0;
@@ -27,17 +27,18 @@ impl PartSize {
 
     /// Returns a doubt about the size, if there is one. `thickness` is the thickness of all layers,
     /// if they share one.
-    pub fn doubt(&self, dpi: Dpi, thickness: Option<Length>) -> Option<String> {
+    pub fn doubt(&self, pitch: Pitch, thickness: Option<Length>) -> Option<String> {
         let [x, y, z] = self.mm;
         let size = || self.text();
-        let pixels = |mm: f64| Length::from_mm(mm).pixels(dpi);
+        let columns = Length::from_mm(x).pixels(pitch.x);
+        let rows = Length::from_mm(y).pixels(pitch.y);
         // Adaptive heights choose the number of layers: nothing to doubt before.
         let layers = thickness.map_or(FEW, |thickness| (1000.0 * z / thickness.um()).round());
         let advice = self.advice();
         if let Some(doubt) = self.doubt_of_unit() {
             Some(doubt)
-        } else if pixels(x.min(y)) < FEW {
-            let [columns, rows] = [x, y].map(|mm| short(pixels(mm)));
+        } else if columns.min(rows) < FEW {
+            let [columns, rows] = [columns, rows].map(short);
             Some(format!("{}, only {columns} x {rows} pixels: {advice}", size()))
         } else if layers < FEW {
             let layers = if layers > 1.0 { "2 layers" } else { "1 layer" };
@@ -119,7 +120,7 @@ mod tests {
 
     fn doubt(mm: [f64; 3], units: Option<Units>) -> Option<String> {
         let thickness = Some(Length::from_um(100.0));
-        PartSize::new([[0.0; 3], mm], units).doubt(Dpi::new(1500.0).unwrap(), thickness)
+        PartSize::new([[0.0; 3], mm], units).doubt(Pitch::of_dpi(1500.0).unwrap(), thickness)
     }
 
     #[test]

@@ -198,7 +198,7 @@ impl SliceSettings {
             return Ok(None);
         };
         let body = self.solid.body(model.clone())?;
-        let part = settings.part(body, self.dpi, self.solid.fill)?;
+        let part = settings.part(body, self.pitch, self.solid.fill)?;
         let found = settings.find(&part, exposure, watcher)?;
         let notes = heights::doubts(&found, exposure);
         notes.into_iter().for_each(|note| watcher.remark(Remark::note(note)));
@@ -268,7 +268,7 @@ impl SliceStage {
                 .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
         }
         let reading = Reading {
-            dpi: settings.dpi,
+            pitch: settings.pitch,
             may_be_open: self.fallback.is_some(),
             keep_marks: false,
             watcher,
@@ -317,7 +317,7 @@ impl Slicing<'_> {
         let slices = &self.bridged.borrow().slices;
         let size = settings.solid.size(&self.part, slices.box_mm());
         let doubts = [
-            size.doubt(settings.dpi, settings.uniform_thickness()),
+            size.doubt(settings.pitch, settings.uniform_thickness()),
             settings.solid.overlap_doubt(parts, slices.overlap()),
         ];
         doubts.into_iter().flatten().collect()

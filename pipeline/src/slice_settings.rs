@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use lamp_build::TurnedSlicing;
 use lamp_machine::{Defaults, Machine, MachineLimit};
 use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
-use lamp_stack::{Dpi, Length, Size, StackInfo, quoted};
+use lamp_stack::{Length, Pitch, Size, StackInfo, quoted};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -24,8 +24,8 @@ use crate::words::{differing, optional, parts, text, words_of};
 #[serde(default, rename_all = "kebab-case")]
 pub struct SliceSettings {
     /// Resolution of the images.
-    #[serde(with = "text")]
-    pub dpi: Dpi,
+    #[serde(rename = "dpi", alias = "pitch", with = "text")]
+    pub pitch: Pitch,
     /// Thickness of the layers.
     #[serde(flatten)]
     pub thickness: Thickness,
@@ -145,7 +145,7 @@ fn is_usual_tolerance(tolerance: &Length) -> bool {
 impl Default for SliceSettings {
     fn default() -> Self {
         Self {
-            dpi: Dpi::new(1500.0).expect("it is a resolution"),
+            pitch: Pitch::of_dpi(1500.0).expect("it is a resolution"),
             thickness: Thickness::Uniform { thickness: Length::from_um(100.0) },
             plane: PlaneRule::default(),
             plane_tolerance: PLANE_TOLERANCE,
@@ -164,7 +164,7 @@ impl SliceSettings {
     pub fn for_slicing(&self) -> SliceOptions {
         let usual = SliceOptions::default();
         SliceOptions {
-            dpi: self.dpi,
+            pitch: self.pitch,
             antialias: self.antialias,
             thickness: self.uniform_thickness().unwrap_or(usual.thickness),
             plane: self.plane,
@@ -182,8 +182,8 @@ impl SliceSettings {
         match self.frame {
             SliceFrame::At { origin: FiniteNumbers(origin_mm), size } => {
                 // A size of whole pixels may be a hair above: that must not add a pixel.
-                let side = |length: Length| (length.pixels(self.dpi) - 1e-6).ceil() as u32;
-                GridRule::At { origin_mm, pixels: [side(size.width), side(size.height)] }
+                let pixels = [size.width.pixels(self.pitch.x), size.height.pixels(self.pitch.y)];
+                GridRule::At { origin_mm, pixels: pixels.map(|side| (side - 1e-6).ceil() as u32) }
             }
             SliceFrame::Around { margin } => GridRule::Around { margin },
         }
@@ -192,11 +192,11 @@ impl SliceSettings {
     /// Returns the key of the first setting that differs from its default; `machine` may give
     /// defaults.
     pub fn stated(&self, machine: Option<&Machine>) -> Option<String> {
-        let Defaults { dpi, thickness, margin } =
+        let Defaults { pitch, thickness, margin } =
             machine.map(Machine::slicing_defaults).unwrap_or_default();
         let usual = Self::default();
         let usual = Self {
-            dpi: dpi.and_then(Dpi::new).unwrap_or(usual.dpi),
+            pitch: pitch.unwrap_or(usual.pitch),
             thickness: thickness
                 .map_or(usual.thickness, |thickness| Thickness::Uniform { thickness }),
             frame: margin.map_or(usual.frame, |margin| SliceFrame::Around { margin }),
@@ -236,8 +236,8 @@ impl SliceSettings {
     /// # Errors
     /// Returns the exceeded limit.
     pub fn check_machine(&self, machine: &Machine) -> Result<(), MachineLimit> {
-        machine.check_dpi(self.dpi, "the stack")?;
-        machine.check_panel_dpi(self.dpi)?;
+        machine.check_pitch(self.pitch, "the stack")?;
+        machine.check_panel_pitch(self.pitch)?;
         if let SliceFrame::At { size, .. } = self.frame {
             machine.check_footprint(size, "the image")?;
         }
@@ -457,7 +457,8 @@ mod tests {
     fn the_first_setting_that_is_stated_is_named() {
         let usual = SliceSettings::default();
         assert_eq!(usual.stated(None), None);
-        let at = |dpi| SliceSettings { dpi: Dpi::new(dpi).unwrap(), ..SliceSettings::default() };
+        let at =
+            |dpi| SliceSettings { pitch: Pitch::of_dpi(dpi).unwrap(), ..SliceSettings::default() };
         assert_eq!(at(300.0).stated(None).as_deref(), Some("dpi"));
         let mut both = SliceSettings::default();
         both.solid.step.reader.kernel = Kernel::Both;

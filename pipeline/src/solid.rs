@@ -8,7 +8,7 @@ use lamp_slicing::{
     Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, SurfaceError,
     SurfaceName, Units,
 };
-use lamp_stack::Dpi;
+use lamp_stack::Pitch;
 use serde::{Deserialize, Serialize};
 
 use crate::documents::is_stream;
@@ -150,7 +150,7 @@ impl SolidSettings {
     }
 
     fn open_one(&self, path: &Path, reading: &Reading<'_>) -> Result<Part, Error> {
-        let tolerance = self.step.tolerance(reading.dpi);
+        let tolerance = self.step.tolerance(reading.pitch);
         let options = OpenOptions {
             allow_gaps: reading.may_be_open,
             trust_extent: self.trust_extent,
@@ -167,7 +167,7 @@ impl SolidSettings {
             return Err(Error::settings(why));
         }
         // Crossings move onto the surfaces, but where faces meet, facets decide.
-        if model.prepared().next().is_some() && tolerance.um() > reading.dpi.pitch().um() {
+        if model.prepared().next().is_some() && tolerance.um() > reading.pitch.short_side().um() {
             reading.watcher.remark(Remark::note(format!(
                 "--tolerance {tolerance} is more than a pixel: pixels may be wrong where faces \
                  meet or run along rows"
@@ -187,7 +187,7 @@ pub fn part_notes(part: &Part) -> Vec<String> {
 /// The purpose that files are read for.
 pub struct Reading<'a> {
     /// The resolution of the images.
-    pub dpi: Dpi,
+    pub pitch: Pitch,
     /// Whether bodies of STEP files may have gaps.
     pub may_be_open: bool,
     /// Whether colors and painted regions of facets are kept.

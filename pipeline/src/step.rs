@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use lamp_slicing::brep::{BrepFinding, Prepared};
 use lamp_slicing::{KernelName, OpenOptions, SliceError, step_bytes};
-use lamp_stack::{Dpi, Length, open_ending};
+use lamp_stack::{Length, Pitch, open_ending};
 use serde::{Deserialize, Serialize};
 
 use crate::documents::is_stream;
@@ -85,8 +85,8 @@ impl Default for ReaderSettings {
 
 impl StepSettings {
     /// Returns the largest distance of facets from surfaces, for images of a resolution.
-    pub fn tolerance(&self, dpi: Dpi) -> Length {
-        self.tolerance.unwrap_or_else(|| Length::from_um(dpi.pitch().um() / 4.0))
+    pub fn tolerance(&self, pitch: Pitch) -> Length {
+        self.tolerance.unwrap_or_else(|| Length::from_um(pitch.short_side().um() / 4.0))
     }
 }
 

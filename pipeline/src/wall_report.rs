@@ -79,7 +79,7 @@ impl WallReport {
             let cut_off = self.cut_off.get_or_insert_with(|| (done.layer.info.name(), 0));
             cut_off.1 += 1;
         }
-        let pitch_um = done.layer.dpi.map_or(0.0, |dpi| dpi.pitch().um());
+        let pitch_um = done.layer.pitch.map_or(0.0, |pitch| pitch.x.pitch().um());
         for wall in done.walls {
             self.walls += 1;
             // The library clamps `asked` to zero where the wall would vanish, so the comparison is

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use lamp_stack::{
-    Destination, Dpi, FolderBeside, Format, Layer, Length, PageInfo, StackError, StackInfo,
+    Destination, FolderBeside, Format, Layer, Length, PageInfo, Pitch, StackError, StackInfo,
     write_stack,
 };
 use thiserror::Error;
@@ -123,15 +123,15 @@ impl PlanPages<'_> {
                 stack: (index == 0).then(|| stack.clone()),
                 ..PageInfo::default()
             };
-            let (dpi, image) = (resolution(self.pitch), bitmap.image.clone().into());
-            Ok(Layer { info, dpi, image })
+            let (pitch, image) = (resolution(self.pitch), bitmap.image.clone().into());
+            Ok(Layer { info, pitch, image })
         })
     }
 }
 
 /// Mirrors per inch on the glass, to the four decimals that stacks have.
-fn resolution(pitch: Length) -> Option<Dpi> {
-    Dpi::new((25_400.0 / pitch.um() * 1e4).round() / 1e4)
+fn resolution(pitch: Length) -> Option<Pitch> {
+    Pitch::of_dpi((25_400.0 / pitch.um() * 1e4).round() / 1e4)
 }
 
 #[cfg(test)]
@@ -158,6 +158,6 @@ mod tests {
         assert!(corners.eq([[-0.03, 0.02]; 2]));
         assert_eq!(layers[1].info.exposure_ms, Some(30.0));
         assert!(layers[0].info.stack.is_some() && layers[1].info.stack.is_none());
-        assert_eq!(layers[0].dpi, Dpi::new(2540.0));
+        assert_eq!(layers[0].pitch, Pitch::of_dpi(2540.0));
     }
 }

@@ -3,7 +3,7 @@
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::voxels::{Options, VoxelObjective, VoxelPlan, VoxelPlanError, plan};
 use lamp_planning::{IntensityOf, Light, SampleHeight};
-use lamp_stack::{Dpi, Layer, Length, Mask, PageInfo};
+use lamp_stack::{Layer, Length, Mask, PageInfo, Pitch};
 
 /// The cylinder of 5 pixels and 5 layers, in 7 x 7 pixels.
 fn cylinder() -> Vec<Result<Layer, VoxelPlanError>> {
@@ -18,7 +18,7 @@ fn cylinder() -> Vec<Result<Layer, VoxelPlanError>> {
             exposure_ms: Some(1000.0),
             ..PageInfo::default()
         },
-        dpi: Dpi::new(25_400.0 / 11.2),
+        pitch: Pitch::of_dpi(25_400.0 / 11.2),
         image: mask.clone().into(),
     };
     (0..5).map(|index| Ok(layer(index))).collect()

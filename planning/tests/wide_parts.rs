@@ -3,7 +3,7 @@
 use lamp_grayscale::resin::{Dose, Intensity};
 use lamp_planning::voxels::{Options, Outcome, VoxelPlanError, plan};
 use lamp_planning::{IntensityOf, Light, SampleHeight};
-use lamp_stack::{Dpi, Layer, Length, Mask, PageInfo};
+use lamp_stack::{Layer, Length, Mask, PageInfo, Pitch};
 
 const SIDE: u32 = 640;
 
@@ -21,7 +21,7 @@ fn slab() -> impl Iterator<Item = Result<Layer, VoxelPlanError>> {
             exposure_ms: Some(1000.0),
             ..PageInfo::default()
         };
-        Ok(Layer { info, dpi: Dpi::new(508.0), image: mask.into() })
+        Ok(Layer { info, pitch: Pitch::of_dpi(508.0), image: mask.into() })
     })
 }
 

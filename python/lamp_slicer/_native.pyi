@@ -31,8 +31,8 @@ class Layer:
     def origin_mm(self) -> Optional[tuple[float, float]]:
         """x and y of the image's top left corner in part coordinates in millimeters, if known."""
     @property
-    def dpi(self) -> Optional[float]:
-        """The resolution in dots per inch, if it is known."""
+    def dpi(self) -> Union[float, tuple[float, float], None]:
+        """The resolution in dots per inch, if it is known; along x and y if they differ."""
     @property
     def shape(self) -> tuple[int, int]:
         """The numbers of rows and columns, as of the array."""
@@ -79,8 +79,9 @@ class Stack:
     def info(self, index: int = 0) -> Record:
         """The metadata of a layer's page. Its image is not read."""
     @property
-    def dpi(self) -> Optional[float]:
-        """The resolution of the first layer in dots per inch, if it is known."""
+    def dpi(self) -> Union[float, tuple[float, float], None]:
+        """The resolution of the first layer in dots per inch, if it is known; along x and y if they
+        differ."""
     @property
     def shape(self) -> tuple[int, int, int]:
         """The numbers of layers, rows and columns. Raises an error if images differ in size."""
@@ -96,7 +97,7 @@ Path = Union[str, os.PathLike[str]]
 def run_program(program: str, words: list[str], stage: Optional[str]) -> int: ...
 def open(path: Path) -> Stack: ...
 def layers(
-    arrays: Any, *, dpi: Optional[float], thickness: Optional[str], name: Optional[str]
+    arrays: Any, *, dpi: Union[float, str, None], thickness: Optional[str], name: Optional[str]
 ) -> Layers: ...
 def slice(
     part: Any,
@@ -124,7 +125,7 @@ def write(
     path: Path,
     layers: Any,
     *,
-    dpi: Optional[float],
+    dpi: Union[float, str, None],
     thickness: Optional[str],
     name: Optional[str],
     classic: bool,

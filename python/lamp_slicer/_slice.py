@@ -28,7 +28,7 @@ Axis = Literal["x", "y", "z"]
 def slice(
     part: Union[Path, list[Path], Mesh, tuple[ArrayLike, ArrayLike]],
     *,
-    dpi: Optional[float] = None,
+    dpi: Union[float, str, None] = None,
     thickness: Optional[str] = None,
     name: Optional[str] = None,
     machine: Optional[Path] = None,
@@ -81,7 +81,8 @@ def slice(
 
     The keywords are the options of `lamp slice`, which `lamp slice --help` describes:
 
-    dpi: resolution in dots per inch; 1500, or the machine's.
+    dpi: resolution in dots per inch, or how far pixels are apart, "14x19um"; 1500, or the
+        machine's.
     thickness: thickness of the layers; "100um", or the machine's.
     name: the part's name in its stack; its file's name.
     machine: "alpha", "beta" or a file: its limits and defaults hold.

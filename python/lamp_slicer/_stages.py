@@ -34,13 +34,13 @@ def open(path: Path) -> Stack:
 def layers(
     arrays: Iterable[Image],
     *,
-    dpi: Optional[float] = None,
+    dpi: Union[float, str, None] = None,
     thickness: Optional[str] = None,
     name: Optional[str] = None,
 ) -> Layers:
     """Returns layers of arrays, bottom first: bool for black and white, uint8 for gray.
 
-    dpi: resolution in dots per inch.
+    dpi: resolution in dots per inch, or how far pixels are apart: "14x19um".
     thickness: thickness of the layers, such as "100um".
     name: name of the part.
     """
@@ -222,7 +222,7 @@ def write(
     path: Path,
     layers: LayersLike,
     *,
-    dpi: Optional[float] = None,
+    dpi: Union[float, str, None] = None,
     thickness: Optional[str] = None,
     name: Optional[str] = None,
     classic: bool = False,

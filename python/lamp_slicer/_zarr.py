@@ -36,14 +36,15 @@ def group_metadata(stack: Stack) -> dict[str, Any]:
     pages = [stack.info(page) for page in range(len(stack))]
     thicknesses = [page.get("thickness_um") for page in pages]
     known = [thickness for thickness in thicknesses if thickness is not None]
-    pitch_um = None if stack.dpi is None else 25_400 / stack.dpi
+    dpi = stack.dpi
+    x_dpi, y_dpi = dpi if isinstance(dpi, tuple) else (dpi, dpi)
     z_um = sum(known) / len(known) if len(known) == len(pages) else None
-    has_scale = pitch_um is not None and z_um is not None
     axes = [{"name": name, "type": "space"} for name in "zyx"]
-    if has_scale:
+    scale = [1.0, 1.0, 1.0]
+    if x_dpi is not None and y_dpi is not None and z_um is not None:
+        scale = [z_um, 25_400 / y_dpi, 25_400 / x_dpi]
         for axis in axes:
             axis["unit"] = "micrometer"
-    scale = [z_um, pitch_um, pitch_um] if has_scale else [1.0, 1.0, 1.0]
     transformations = [{"type": "scale", "scale": scale}]
     dataset = {"path": "0", "coordinateTransformations": transformations}
     name = first.get("stack", {}).get("part", "")

@@ -10,7 +10,7 @@ use lamp_pipeline::documents::input_name;
 use lamp_pipeline::watcher::{Importance, KeptRemarks, Remark};
 use lamp_pipeline::{Error, Stage, Working, named};
 use lamp_stack::{
-    Dpi, IndexedStack, Layer, Page, PageFault, PageInfo, Pages, PassingLayer, StackError,
+    IndexedStack, Layer, Page, PageFault, PageInfo, Pages, PassingLayer, Pitch, StackError,
     StackInfo, StackNote, map_in_order,
 };
 use pyo3::prelude::*;
@@ -44,7 +44,7 @@ pub(crate) enum Source {
 /// An iterator of Python over layers or arrays, and what arrays get as their metadata.
 pub(crate) struct GivenLayers {
     pub(crate) iterator: Py<PyAny>,
-    pub(crate) dpi: Option<Dpi>,
+    pub(crate) pitch: Option<Pitch>,
     pub(crate) thickness_um: Option<f64>,
     pub(crate) part: Option<String>,
 }
@@ -344,7 +344,7 @@ impl GivenLayers {
                 .map(|part| StackInfo { part, ..StackInfo::default() }),
             ..PageInfo::default()
         };
-        layer_of(given, info, self.dpi)
+        layer_of(given, info, self.pitch)
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lamp_pipeline::Error;
 use lamp_stack::{
-    Dpi, GrayMask, Image, Layer, LevelChange, MAX_SIDE, Mask, MaskBuilder, PageInfo, gray_runs,
+    GrayMask, Image, Layer, LevelChange, MAX_SIDE, Mask, MaskBuilder, PageInfo, Pitch, gray_runs,
     white_runs,
 };
 use pyo3::exceptions::PyValueError;
@@ -61,10 +61,11 @@ impl PyLayer {
         self.0.info.origin_mm.map(Into::into)
     }
 
-    /// The resolution in dots per inch, if it is known.
+    /// The resolution in dots per inch, if it is known: two numbers, along x and y, where pixels
+    /// are not square.
     #[getter]
-    fn dpi(&self) -> Option<f64> {
-        self.0.dpi.map(Dpi::get)
+    fn dpi(&self) -> Option<PyDpi> {
+        self.0.pitch.map(PyDpi::from)
     }
 
     /// The numbers of rows and columns, as of the array.
@@ -222,6 +223,22 @@ pub(crate) fn runs_of<'py>(py: Python<'py>, image: &Image) -> PyResult<Bound<'py
     RUNS.import(py, "lamp_slicer._records", "Runs")?.call1((starts, columns, levels))
 }
 
+/// A resolution in dots per inch, as Python shows it.
+#[derive(IntoPyObject)]
+pub(crate) enum PyDpi {
+    /// Of square pixels.
+    Square(f64),
+    /// Along x and y.
+    Two((f64, f64)),
+}
+
+impl From<Pitch> for PyDpi {
+    fn from(pitch: Pitch) -> Self {
+        let [x, y] = pitch.dpi();
+        if pitch.is_square() { Self::Square(x) } else { Self::Two((x, y)) }
+    }
+}
+
 /// The rows of an array: a byte for each pixel.
 struct Pixels {
     width: u32,
@@ -234,7 +251,7 @@ struct Pixels {
 pub(crate) fn layer_of(
     given: &Bound<'_, PyAny>,
     info: impl FnOnce() -> PageInfo,
-    dpi: Option<Dpi>,
+    pitch: Option<Pitch>,
 ) -> PyResult<Layer> {
     if let Ok(layer) = given.cast::<PyLayer>() {
         return Ok(layer.get().layer());
@@ -243,7 +260,7 @@ pub(crate) fn layer_of(
     let pixels = pixels_of(given)?;
     let image = py.detach(|| image_of(&pixels));
     let image = image.map_err(|error| crate::error::exception(py, &error))?;
-    Ok(Layer { info: info(), dpi, image: image.into() })
+    Ok(Layer { info: info(), pitch, image: image.into() })
 }
 
 fn pixels_of(given: &Bound<'_, PyAny>) -> PyResult<Pixels> {

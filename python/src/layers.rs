@@ -8,7 +8,7 @@ use lamp_pipeline::compensate::CompensateSettings;
 use lamp_pipeline::dither::DitherSettings;
 use lamp_pipeline::edit::EditSettings;
 use lamp_pipeline::fix::FixSettings;
-use lamp_stack::{Dpi, Length, LengthError};
+use lamp_stack::{Length, LengthError, Pitch};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
@@ -135,7 +135,7 @@ pub(crate) fn chain_of(layers: &Bound<'_, PyAny>) -> PyResult<Chain> {
 /// Returns a chain of layers or arrays that Python gives.
 pub(crate) fn given_layers(
     layers: &Bound<'_, PyAny>,
-    dpi: Option<f64>,
+    dpi: Option<&Bound<'_, PyAny>>,
     thickness: Option<&str>,
     part: Option<String>,
 ) -> PyResult<Chain> {
@@ -151,9 +151,9 @@ pub(crate) fn given_layers(
         let why = "give a stack, a path of one, or what iterates over layers or arrays";
         error::settings(py, format!("{kind} has no layers: {why}"))
     })?;
-    let dpi = dpi.map(|dpi| {
-        let text = dpi.to_string();
-        text.parse::<Dpi>().map_err(|why| error::settings(py, format!("dpi: {why}")))
+    let pitch = dpi.map(|dpi| {
+        let text = dpi.str()?.to_string();
+        text.parse::<Pitch>().map_err(|why| error::settings(py, format!("dpi: {why}")))
     });
     let thickness_um = thickness.map(|text| match text.parse::<Length>() {
         Ok(length) if length.um() > 0.0 => Ok(length.um()),
@@ -162,7 +162,7 @@ pub(crate) fn given_layers(
     });
     Ok(Chain::of(Source::Given(GivenLayers {
         iterator: iterator.into_any().unbind(),
-        dpi: dpi.transpose()?,
+        pitch: pitch.transpose()?,
         thickness_um: thickness_um.transpose()?,
         part,
     })))
@@ -173,7 +173,7 @@ pub(crate) fn given_layers(
 #[pyo3(signature = (arrays, *, dpi, thickness, name))]
 pub(crate) fn layers(
     arrays: &Bound<'_, PyAny>,
-    dpi: Option<f64>,
+    dpi: Option<&Bound<'_, PyAny>>,
     thickness: Option<&str>,
     name: Option<String>,
 ) -> PyResult<PyLayers> {

@@ -119,7 +119,7 @@ pub(crate) fn slice(
                 given.entry(key).or_insert(value);
             }
         };
-        usual("dpi", defaults.dpi.map(|dpi| dpi.to_string().into()), &[]);
+        usual("dpi", defaults.pitch.map(|pitch| pitch.to_string().into()), &[]);
         let thickness = defaults.thickness.map(|thickness| thickness.to_string().into());
         usual("thickness", thickness, &["adaptive"]);
         usual("margin", defaults.margin.map(|margin| margin.to_string().into()), &["origin"]);

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lamp_pipeline::Error;
-use lamp_stack::{Dpi, IndexedStack, Layer};
+use lamp_stack::{IndexedStack, Layer};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
 use crate::chain::{Chain, Source, importance_of, other_size};
 use crate::error::{exception, settings};
-use crate::layer::{PyLayer, array_of, record_of, runs_of};
+use crate::layer::{PyDpi, PyLayer, array_of, record_of, runs_of};
 use crate::layers::PyLayers;
 use crate::work::{WRAPPED, warn};
 
@@ -111,10 +111,11 @@ impl PyStack {
         record_of(py, &self.stack.headers()[self.position(index)?].info)
     }
 
-    /// The resolution of the first layer in dots per inch, if it is known.
+    /// The resolution of the first layer in dots per inch, if it is known: two numbers, along x and
+    /// y, where pixels are not square.
     #[getter]
-    fn dpi(&self) -> Option<f64> {
-        self.stack.headers()[0].dpi.map(Dpi::get)
+    fn dpi(&self) -> Option<PyDpi> {
+        self.stack.headers()[0].pitch.map(PyDpi::from)
     }
 
     /// The numbers of layers, rows and columns. Raises an error if images differ in size.

@@ -31,7 +31,7 @@ pub(crate) fn write<'py>(
     py: Python<'py>,
     path: PathBuf,
     layers: &Bound<'_, PyAny>,
-    dpi: Option<f64>,
+    dpi: Option<&Bound<'_, PyAny>>,
     thickness: Option<&str>,
     name: Option<String>,
     classic: bool,

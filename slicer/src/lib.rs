@@ -14,13 +14,13 @@
 //!
 //! ```
 //! use lamp_slicing::{Part, SliceOptions, Slices};
-//! use lamp_stack::{Dpi, Image, Length};
+//! use lamp_stack::{Pitch, Image, Length};
 //!
 //! // A tetrahedron: four facets, counter-clockwise seen from outside.
 //! let [o, x, y, z] = [[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 0.0, 10.0f32]];
 //! let part = Part::from_facets("tetra", vec![[o, y, x], [o, x, z], [o, z, y], [x, y, z]]);
 //! let options = SliceOptions {
-//!     dpi: Dpi::new(254.0).unwrap(), // 0.1 mm pixels
+//!     pitch: Pitch::of_dpi(254.0).unwrap(), // 0.1 mm pixels
 //!     thickness: Length::from_mm(2.0),
 //!     ..SliceOptions::default()
 //! };

@@ -1,6 +1,6 @@
 //! Cuts one section of a part along rows, not rounded to pixels.
 
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 use rayon::prelude::*;
 
 use crate::bodies::{FillRule, Position, Turn};
@@ -27,7 +27,7 @@ pub struct SectionOptions {
     /// The height of the plane.
     pub z: Length,
     /// The distance between rows, as a resolution.
-    pub dpi: Dpi,
+    pub pitch: Pitch,
     /// The upper edge of the first row, in millimeters.
     pub top_mm: f64,
     /// The number of rows.
@@ -84,7 +84,7 @@ impl CutPart {
         let survey = FacetSurvey::of(&model)?;
         survey.check_extent(&model)?;
         // One column is enough: crossings keep their x, and only rows are counted.
-        let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.dpi)?;
+        let grid = PixelGrid::at([0.0, options.top_mm], 1.0, options.rows.into(), options.pitch)?;
         let rule = model.model.fill_rule(options.fill);
         Ok(Self { model, survey, grid, planes: Planes::one(options.z, PLANE_TOLERANCE), rule })
     }
@@ -145,7 +145,7 @@ mod tests {
             placement: Placement::default(),
             fill: Fill::EvenOdd,
             z: Length::from_mm(z_mm),
-            dpi: Dpi::new(254.0).unwrap(),
+            pitch: Pitch::of_dpi(254.0).unwrap(),
             top_mm,
             rows,
         }
@@ -174,7 +174,7 @@ mod tests {
     fn rows_are_those_of_the_layer() {
         let model = || Part::from_facets("tower", tower(5_000).facets);
         let slicing = SliceOptions {
-            dpi: Dpi::new(254.0).unwrap(),
+            pitch: Pitch::of_dpi(254.0).unwrap(),
             thickness: Length::from_mm(5.0),
             ..SliceOptions::default()
         };

@@ -147,7 +147,7 @@ fn cut_between(
 #[cfg(test)]
 mod tests {
     use lamp_fixtures::{Mesh, cube_with_hole, sphere, tower};
-    use lamp_stack::{Dpi, Length};
+    use lamp_stack::{Length, Pitch};
 
     use super::*;
     use crate::facet::Units;
@@ -161,7 +161,7 @@ mod tests {
             placement: Placement::default(),
             fill,
             z: Length::from_mm(z_mm),
-            dpi: Dpi::new(25.4).unwrap(),
+            pitch: Pitch::of_dpi(25.4).unwrap(),
             top_mm: 14.3,
             rows: 28,
         }
@@ -187,7 +187,7 @@ mod tests {
             let pieces = section_area(part(), &options(z_mm, Fill::EvenOdd)).unwrap();
             // 37 lines per row.
             let fine = SectionOptions {
-                dpi: Dpi::new(25.4 * 37.0).unwrap(),
+                pitch: Pitch::of_dpi(25.4 * 37.0).unwrap(),
                 rows: 28 * 37,
                 ..options(z_mm, Fill::EvenOdd)
             };

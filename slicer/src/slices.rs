@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 use std::io;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Image, Layer, Length, LevelChange, Mask, PageInfo, SliceRecord, StackInfo};
+use lamp_stack::{
+    Image, Layer, Length, LevelChange, Mask, PageInfo, Pitch, SliceRecord, StackInfo,
+};
 use rayon::prelude::*;
 
 use crate::bodies::{
@@ -31,7 +33,7 @@ use crate::trace::{StrayBand, Trace, Tracer};
 #[derive(Clone, Debug)]
 pub struct SliceOptions {
     /// Resolution in the plane.
-    pub dpi: Dpi,
+    pub pitch: Pitch,
     /// Thickness of the layers, unless `heights` is given.
     pub thickness: Length,
     /// The layers' heights, if the thickness varies. Parts of the model outside them are left out.
@@ -81,11 +83,16 @@ pub enum GridRule {
 }
 
 impl GridRule {
-    fn grid(self, min_mm: [f64; 2], max_mm: [f64; 2], dpi: Dpi) -> Result<PixelGrid, SliceError> {
+    fn grid(
+        self,
+        min_mm: [f64; 2],
+        max_mm: [f64; 2],
+        pitch: Pitch,
+    ) -> Result<PixelGrid, SliceError> {
         match self {
-            Self::Around { margin } => PixelGrid::around(min_mm, max_mm, margin, dpi),
+            Self::Around { margin } => PixelGrid::around(min_mm, max_mm, margin, pitch),
             Self::At { origin_mm, pixels: [width, height] } => {
-                let grid = PixelGrid::at(origin_mm, width.into(), height.into(), dpi)?;
+                let grid = PixelGrid::at(origin_mm, width.into(), height.into(), pitch)?;
                 if grid.holds(min_mm, max_mm) {
                     Ok(grid)
                 } else {
@@ -100,7 +107,7 @@ impl Default for SliceOptions {
     /// 1500 dpi and 100 um, as in 002; the default of each other option.
     fn default() -> Self {
         Self {
-            dpi: Dpi::new(1500.0).expect("1500 is a resolution"),
+            pitch: Pitch::of_dpi(1500.0).expect("1500 is a resolution"),
             thickness: Length::from_um(100.0),
             heights: None,
             plane: PlaneRule::default(),
@@ -199,7 +206,7 @@ impl Slices {
         model.surfaces().iter().for_each(PlacedSurfaces::examine);
         let rule = model.model.fill_rule(options.fill).placed(&options.placement);
         let [min_mm, max_mm] = [survey.min, survey.max].map(|[x, y, _]| [x, y]);
-        let grid = options.grid.grid(min_mm, max_mm, options.dpi)?;
+        let grid = options.grid.grid(min_mm, max_mm, options.pitch)?;
         // The pixel of an edge may be gray, and the last column must be black.
         if options.antialias && !grid.leaves_last_column(max_mm) {
             return Err(SliceError::OutsideFrame { part_mm: [min_mm, max_mm] });
@@ -230,7 +237,7 @@ impl Slices {
         // A growing list takes up to twice the memory that it needs.
         let max_crossings = (options.memory as usize / (2 * size_of::<Crossing>())).max(1);
         let reach_um = shading.reach_um().unwrap_or(0.0);
-        let mut expected = survey.crossings_per_layer(&planes, options.dpi.pitch().mm());
+        let mut expected = survey.crossings_per_layer(&planes, options.pitch.y.pitch().mm());
         if let Some(layer) = cut.clone().find(|&layer| expected[layer] > MAX_CROSSINGS) {
             let crossings = expected[layer];
             return Err(SliceError::TooManyCrossings { layer, crossings });
@@ -343,7 +350,7 @@ impl Slices {
     /// Returns the estimated number of crossings of each layer of the part. The work is
     /// proportional to it.
     pub fn crossings_per_layer(&self) -> Vec<f64> {
-        self.survey.crossings_per_layer(&self.planes, self.grid.dpi.pitch().mm())
+        self.survey.crossings_per_layer(&self.planes, self.grid.pitch.y.pitch().mm())
     }
 
     /// Returns the heights of the layers.
@@ -467,8 +474,8 @@ impl Slices {
         for (index, MadeLayer { layer, depths, shared, doubts }) in batch.zip(made) {
             // Layers around the wanted ones only give light, or have undersides.
             if self.wanted.contains(&index) {
-                let pitch_mm = self.grid.dpi.pitch().mm();
-                let pixel_mm3 = pitch_mm * pitch_mm * self.planes.thickness_um(index) / 1000.0;
+                let [x_mm, y_mm] = self.grid.pitch.mm();
+                let pixel_mm3 = x_mm * y_mm * self.planes.thickness_um(index) / 1000.0;
                 self.shared.add(index, &shared, pixel_mm3);
                 self.doubts.add(&doubts, pixel_mm3);
             }
@@ -528,7 +535,7 @@ impl Slices {
         if let (Image::Mask(mask), false) = (&image, doubts.of_bodies.is_empty()) {
             doubts.white_px = mask.white_pixels();
         }
-        let layer = Layer { info, dpi: Some(self.grid.dpi), image: image.into() };
+        let layer = Layer { info, pitch: Some(self.grid.pitch), image: image.into() };
         MadeLayer { layer, depths, shared, doubts }
     }
 

@@ -35,6 +35,21 @@ fn a_torus_has_no_wrong_pixel() {
     }
 }
 
+#[test]
+fn rectangular_pixels_have_no_wrong_pixel() {
+    for text in ["14x19um", "31x14um"] {
+        let pitch = text.parse().unwrap();
+        let flat = SliceOptions { pitch, ..options(1500.0, 3.0, Placement::default()) };
+        let (wrong, white) = wrong_pixels(model(StepSample::Sphere, 0.0035), &flat, off_sphere);
+        assert!(wrong == 0 && white > 100_000, "{text}: {wrong} of {white}");
+        let outside = |[x, y, z]: [f64; 3]| (x.hypot(y) - 20.0).hypot(z - 8.0) - 8.0;
+        let tilted = SliceOptions { pitch, ..options(1500.0, 9.1, askew()) };
+        let (wrong, white) =
+            wrong_pixels(model(StepSample::Torus, 0.0035), &tilted, |point| outside(back(point)));
+        assert!(wrong == 0 && white > 100_000, "askew, {text}: {wrong} of {white}");
+    }
+}
+
 /// Facets near a sphere's poles are thin as needles.
 #[test]
 fn poles_have_no_wrong_pixel() {

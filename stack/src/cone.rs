@@ -1,6 +1,7 @@
 //! Cones and frustums between two points, and their sections in the rows of images.
 
 use crate::length::{Dpi, Length};
+use crate::pitch::Pitch;
 
 /// A round cone or frustum with flat ends, in part coordinates.
 ///
@@ -49,20 +50,22 @@ impl Cone {
         &self,
         height: Length,
         origin_mm: [f64; 2],
-        dpi: Dpi,
+        pitch: Pitch,
         size: [u32; 2],
     ) -> impl Iterator<Item = (u32, u32, u32)> + use<> {
         let (cone, [x0, y1]) = (*self, origin_mm);
-        let pitch_mm = dpi.pitch().mm();
         let up_mm = height.mm() - self.from_mm[2];
         // Pixel centers are whole numbers; the casts make negative values zero.
-        let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
+        let pixels = move |mm: f64, [by, of]: [f64; 2]| mm * by / of - 0.5;
+        let [x_scale, y_scale] = [pitch.x, pitch.y].map(Dpi::pixels_in_mm);
+        let row_mm = pitch.y.pitch().mm();
         let [low, high] = self.reach_mm(1);
-        let end = (pixels(y1 - low).floor() + 1.0) as u32;
-        (pixels(y1 - high).ceil() as u32..end.min(size[1])).filter_map(move |row| {
-            let y_mm = y1 - (f64::from(row) + 0.5) * pitch_mm;
+        let end = (pixels(y1 - low, y_scale).floor() + 1.0) as u32;
+        (pixels(y1 - high, y_scale).ceil() as u32..end.min(size[1])).filter_map(move |row| {
+            let y_mm = y1 - (f64::from(row) + 0.5) * row_mm;
             let run = cone.run_mm(y_mm - cone.from_mm[1], up_mm)?;
-            let column = |x: f64| (pixels(cone.from_mm[0] + x - x0).ceil() as u32).min(size[0]);
+            let column =
+                |x: f64| (pixels(cone.from_mm[0] + x - x0, x_scale).ceil() as u32).min(size[0]);
             let [start, end] = run.map(column);
             (start < end).then_some((row, start, end))
         })

@@ -66,7 +66,7 @@ pub enum StackError {
     },
     /// The pixels of a page are not square.
     #[error(
-        "page {page}: its pixels are not square (its resolution is {across} across and {down} down), so heights and areas would be wrong: resample the image to square pixels, or correct its resolution"
+        "page {page}: its pixels are not square (its resolution is {across} across and {down} down), and their size is not read from it: resample the image to square pixels, or store it as a TIFF or PNG whose resolution has a unit"
     )]
     RectangularPixels {
         /// The page, from 0.

@@ -89,6 +89,11 @@ pub enum LengthError {
         "`{0}` is not a resolution: write dots per inch, such as 1500, between 1 and 100000 and with at most four decimals"
     )]
     NotAResolution(String),
+    /// The text is neither a resolution nor a pitch of pixels.
+    #[error(
+        "`{0}` is not a resolution: write dots per inch, such as 1500 or 1814x1337, between 1 and 100000, or how far pixels are apart, such as 14um or 14x19um, with at most four decimals"
+    )]
+    NotAPitch(String),
 }
 
 /// Splits `100um` into its number and the micrometers in its unit (`None` without a unit).
@@ -171,26 +176,59 @@ impl fmt::Display for Size {
     }
 }
 
-/// A resolution in dots per inch, between 1 and 100 000.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub struct Dpi(f64);
+/// A resolution along one axis in dots per inch, between 1 and 100 000, exact as a fraction: a pitch
+/// of 14 um is 12700/7 dpi.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dpi {
+    /// The pixels in 127 mm, five inches, as a fraction of whole numbers in lowest terms: 25.4 mm
+    /// has no exact binary fraction.
+    in_five_inches: [f64; 2],
+}
+
+// Neither number is NaN.
+impl Eq for Dpi {}
 
 const METRES_PER_INCH: f64 = 0.0254;
 
 impl Dpi {
     /// Creates a resolution, or returns `None` if `dpi` is not between 1 and 100 000.
+    ///
+    /// The resolution is the simplest fraction that rounds to `dpi`. So a quotient of whole numbers
+    /// is held exactly if the square of its divisor is below some 10^12.
     pub fn new(dpi: f64) -> Option<Self> {
-        (1.0..=100_000.0).contains(&dpi).then_some(Self(dpi))
+        (1.0..=100_000.0).contains(&dpi).then(|| {
+            let [num, den] = simplest_fraction(dpi);
+            let in_five_inches = if den % 5.0 == 0.0 { [num, den / 5.0] } else { [num * 5.0, den] };
+            Self { in_five_inches }
+        })
+    }
+
+    /// Returns the resolution of pixels whose centers are `pitch` apart, or `None` if that has more
+    /// than four decimals in micrometers or is not between 0.254 um and 25.4 mm.
+    pub fn of_pitch(pitch: Length) -> Option<Self> {
+        let scaled = pitch.um * 1e4;
+        let is_whole = (scaled - scaled.round()).abs() <= 1e-12 * scaled.abs();
+        is_whole.then(|| Self::new(254_000_000.0 / scaled.round()))?
     }
 
     /// Returns the dots per inch.
     pub const fn get(self) -> f64 {
-        self.0
+        let [num, den] = self.in_five_inches;
+        num / (5.0 * den)
+    }
+
+    /// Returns a number of pixels and the millimeters that they take, both whole for resolutions of
+    /// few decimals. Multiplied by the first and then divided by the second, the position of a
+    /// pixel's edge or center that a double holds is exact in pixels.
+    #[inline]
+    pub fn pixels_in_mm(self) -> [f64; 2] {
+        let [num, den] = self.in_five_inches;
+        [num, den * 127.0]
     }
 
     /// Returns the pixels per meter, rounded to a whole number.
     pub(crate) fn per_metre(self) -> u32 {
-        (self.0 / METRES_PER_INCH).round() as u32
+        (self.get() / METRES_PER_INCH).round() as u32
     }
 
     /// Converts whole pixels per meter. Prefers whole dots per inch that round to the same
@@ -203,20 +241,46 @@ impl Dpi {
 
     /// Returns the distance between two pixel centers, 25.4 mm / dpi.
     pub fn pitch(self) -> Length {
-        Length::from_um(25_400.0 / self.0)
+        let [num, den] = self.in_five_inches;
+        Length::from_um(127_000.0 * den / num)
     }
 
-    /// Returns a fraction for TIFF's rational tags, with the smallest sufficient power of ten
-    /// (at most 10 000) as its denominator.
+    /// Returns the exact fraction for TIFF's rational tags, with the smallest sufficient power of
+    /// ten (at most 10 000) as its denominator if there is one. A number that does not fit is
+    /// rounded to four decimals.
     pub(crate) fn to_rational(self) -> (u32, u32) {
-        let holds = |den: &u32| {
-            let scaled = self.0 * f64::from(*den);
-            // The fourth decimal of 100 000 dpi is 1e-9 of it; rounding errors are far smaller.
-            (scaled - scaled.round()).abs() < 1e-9 * scaled
+        let fits = |numbers: [f64; 2]| {
+            let is_long = |n: f64| n.fract() == 0.0 && n <= f64::from(u32::MAX);
+            numbers.iter().all(|&n| is_long(n)).then(|| (numbers[0] as u32, numbers[1] as u32))
         };
-        let den = [1, 10, 100, 1000].into_iter().find(holds).unwrap_or(10_000);
-        // At most 100 000 times 10 000, which 32 bits hold.
-        ((self.0 * f64::from(den)).round() as u32, den)
+        let [num, den] = self.in_five_inches;
+        let ratio = if num % 5.0 == 0.0 { [num / 5.0, den] } else { [num, 5.0 * den] };
+        let [num, den] = ratio;
+        let decimal =
+            |power: f64| (power % den == 0.0).then(|| fits([power / den * num, power]))?;
+        let decimals = [1.0, 10.0, 100.0, 1000.0, 10_000.0].into_iter();
+        decimals.filter_map(decimal).next().or_else(|| fits(ratio)).unwrap_or_else(|| {
+            // At most 100 000 times 10 000, which 32 bits hold.
+            ((self.get() * 10_000.0).round() as u32, 10_000)
+        })
+    }
+}
+
+/// Returns the convergent of least denominator that rounds to `value`, by Euclid's algorithm.
+fn simplest_fraction(value: f64) -> [f64; 2] {
+    // A double of 1 or more is a whole number of 2^-52, so all of this is exact.
+    let one = 1_u128 << 52;
+    let (mut a, mut b) = ((value * one as f64) as u128, one);
+    let (mut before, mut last) = ([0, 1], [1, 0]);
+    loop {
+        let next = [0, 1].map(|k| a / b * last[k] + before[k]);
+        let [num, den] = next.map(|n: u128| n as f64);
+        // The last convergent is the value itself, so b never becomes zero here.
+        if num / den == value {
+            return [num, den];
+        }
+        (a, b) = (b, a % b);
+        (before, last) = (last, next);
     }
 }
 
@@ -234,14 +298,14 @@ impl FromStr for Dpi {
     /// Parses `1500` or `1500dpi`.
     ///
     /// # Errors
-    /// Returns an error if the number is missing or out of range.
+    /// Returns an error if the number is missing or out of range, or not a fraction that TIFF's
+    /// rational tags hold.
     fn from_str(text: &str) -> Result<Self, LengthError> {
         let number = text.trim().trim_end_matches("dpi").trim_end();
         number
             .parse()
             .ok()
             .and_then(Self::new)
-            // Accepts only what TIFF's rational tags store exactly.
             .filter(|dpi| {
                 let (num, den) = dpi.to_rational();
                 f64::from(num) / f64::from(den) == dpi.get()
@@ -252,7 +316,7 @@ impl FromStr for Dpi {
 
 impl fmt::Display for Dpi {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
+        self.get().fmt(f)
     }
 }
 
@@ -324,11 +388,16 @@ mod tests {
 
     #[test]
     fn resolutions_survive_as_rationals() {
-        for dpi in [1500.0, 2400.0, 203.2, 72.25, 1.0, 99_999.999] {
+        for dpi in [1500.0, 2400.0, 203.2, 72.25, 1.0, 99_999.999, 12_700.0 / 7.0] {
             let (num, den) = Dpi::new(dpi).unwrap().to_rational();
             assert_eq!(f64::from(num) / f64::from(den), dpi);
         }
-        assert_eq!(Dpi::new(1500.0).unwrap().to_rational(), (1500, 1));
+        let rational = |dpi| Dpi::new(dpi).unwrap().to_rational();
+        assert_eq!(rational(1500.0), (1500, 1));
+        assert_eq!(rational(203.2), (2032, 10));
+        assert_eq!(rational(12_700.0 / 7.0), (12_700, 7));
+        // A number without a fraction of two 32-bit numbers is rounded.
+        assert_eq!(rational(99_999.0 + 1e-7), (999_990_000, 10_000));
         assert!("0".parse::<Dpi>().is_err());
         assert!("1500.12345678".parse::<Dpi>().is_err());
         assert!("nan".parse::<Dpi>().is_err());

@@ -10,7 +10,7 @@
 //! # fn main() -> Result<(), lamp_stack::StackError> {
 //! // Two rows: `.##.` and `....`.
 //! let mask = Mask::new(4, vec![0, 2, 2], vec![1, 3]).unwrap();
-//! let layer = Layer { info: PageInfo::default(), dpi: None, image: mask.into() };
+//! let layer = Layer { info: PageInfo::default(), pitch: None, image: mask.into() };
 //!
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("one.tif");
@@ -39,6 +39,7 @@ mod limits;
 mod named;
 mod note;
 mod ordered;
+mod pitch;
 mod plain_text;
 mod printer;
 mod record;
@@ -101,6 +102,7 @@ pub use limits::{Limits, MAX_RUNS, MAX_SIDE};
 pub use named::{Named, UnknownName};
 pub use note::{ImagesBeside, PageGap, StackNote};
 pub use ordered::{MemorySize, map_in_order, take_batch};
+pub use pitch::{NotSquare, Pitch};
 pub use plain_text::PlainText;
 pub use printer::fault::PrinterFault;
 pub use printer::write::{PrinterFormat, write_printer_file};

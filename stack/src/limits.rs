@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn a_page_past_the_caller_s_limits_is_refused() {
         let image = Image::Mask(mask_of(40, [&[1, 5, 9][..], &[2]]));
-        let layer = Layer { info: PageInfo::default(), dpi: None, image: image.into() };
+        let layer = Layer { info: PageInfo::default(), pitch: None, image: image.into() };
         let mut tiff = PageWriter::new(Vec::new(), Format::Big);
         tiff.push(EncodedPage::new(&layer)).unwrap();
         for file in [tiff.finish().unwrap(), png_of_layer(&layer).unwrap()] {

@@ -1,6 +1,7 @@
 //! Struts: straight round rods, and their sections in the rows of images.
 
 use crate::length::{Dpi, Length};
+use crate::pitch::Pitch;
 
 /// A straight cylinder with flat ends, in part coordinates.
 ///
@@ -8,12 +9,12 @@ use crate::length::{Dpi, Length};
 /// through the ends that the axis stands on.
 ///
 /// ```
-/// use lamp_stack::{Dpi, Length, Strut};
+/// use lamp_stack::{Length, Pitch, Strut};
 ///
 /// let mm = |point: [f64; 3]| point.map(Length::from_mm);
 /// let strut = Strut::new(mm([0.5, 2.5, 0.0]), mm([4.5, 2.5, 4.0]), Length::from_mm(2.0)).unwrap();
 /// // At 25.4 dpi a pixel is a millimetre.
-/// let runs = strut.section(Length::from_mm(2.0), [0.0, 5.0], Dpi::new(25.4).unwrap(), [6, 5]);
+/// let runs = strut.section(Length::from_mm(2.0), [0.0, 5.0], Pitch::of_dpi(25.4).unwrap(), [6, 5]);
 /// // An ellipse: sqrt(2) to each side along x, and 1 along y.
 /// assert_eq!(runs.collect::<Vec<_>>(), [(2, 1, 4)]);
 /// ```
@@ -49,23 +50,24 @@ impl Strut {
         &self,
         height: Length,
         origin_mm: [f64; 2],
-        dpi: Dpi,
+        pitch: Pitch,
         size: [u32; 2],
     ) -> impl Iterator<Item = (u32, u32, u32)> + use<> {
         let strut = *self;
         let up_mm = height.mm() - self.from_mm[2];
         let [x0, y1] = origin_mm;
-        let pitch_mm = dpi.pitch().mm();
         // Pixel centers are whole numbers; the casts make negative values zero.
-        // An inch is 127/5 mm: whole numbers, which doubles hold exactly, unlike 25.4.
-        let pixels = move |mm: f64| mm * (dpi.get() * 5.0) / 127.0 - 0.5;
+        let pixels = move |mm: f64, [by, of]: [f64; 2]| mm * by / of - 0.5;
+        let [x_scale, y_scale] = [pitch.x, pitch.y].map(Dpi::pixels_in_mm);
+        let row_mm = pitch.y.pitch().mm();
         let [low, high] = self.rows_mm(up_mm);
-        let rows = pixels(y1 - high).ceil() as u32..(pixels(y1 - low).floor() + 1.0) as u32;
+        let rows = pixels(y1 - high, y_scale).ceil() as u32
+            ..(pixels(y1 - low, y_scale).floor() + 1.0) as u32;
         (rows.start..rows.end.min(size[1])).filter_map(move |row| {
-            let y_mm = y1 - (f64::from(row) + 0.5) * pitch_mm;
+            let y_mm = y1 - (f64::from(row) + 0.5) * row_mm;
             let run = strut.run_mm(y_mm - strut.from_mm[1], up_mm)?;
             let [start, end] = run.map(|x| {
-                let column = pixels(strut.from_mm[0] + x - x0).ceil() as u32;
+                let column = pixels(strut.from_mm[0] + x - x0, x_scale).ceil() as u32;
                 column.min(size[0])
             });
             (start < end).then_some((row, start, end))
@@ -152,7 +154,7 @@ mod tests {
                 return Ok(());
             };
             let z = f64::from(height) / 4.0;
-            let dpi = Dpi::new(25.4).unwrap();
+            let dpi = Pitch::of_dpi(25.4).unwrap();
             let runs: Vec<_> = strut.section(Length::from_mm(z), [3.0, 7.0], dpi, [12, 9]).collect();
             prop_assert!(runs.is_sorted_by(|a, b| a.0 < b.0));
             let along: Vec<f64> = to.iter().zip(from).map(|(b, a)| b - a).collect();
@@ -180,7 +182,7 @@ mod tests {
             let end = |mm: [f64; 3]| mm.map(Length::from_mm);
             let strut =
                 Strut::new(end([1.0, 4.3, 2.1]), end([7.0, 4.3, 2.1 + rise]), Length::from_mm(3.0));
-            let dpi = Dpi::new(25.4).unwrap();
+            let dpi = Pitch::of_dpi(25.4).unwrap();
             let runs = strut.unwrap().section(Length::from_mm(2.5), [0.0, 9.0], dpi, [9, 9]);
             runs.collect::<Vec<_>>()
         };
@@ -194,7 +196,7 @@ mod tests {
     fn what_is_far_outside_costs_nothing() {
         let far = |mm: f64| [mm; 3].map(Length::from_mm);
         let strut = Strut::new(far(-1e9), far(1e9), Length::from_mm(1e9)).unwrap();
-        let dpi = Dpi::new(100_000.0).unwrap();
+        let dpi = Pitch::of_dpi(100_000.0).unwrap();
         assert_eq!(strut.section(Length::from_mm(0.0), [0.0, 0.0], dpi, [7, 3]).count(), 3);
         assert_eq!(strut.section(Length::from_mm(3e9), [0.0, 0.0], dpi, [7, 3]).count(), 0);
     }

@@ -3,8 +3,8 @@
 use std::io::Cursor;
 
 use lamp_stack::{
-    CheckFault, Dpi, EncodedPage, Format, GrayMask, Image, Layer, LevelChange, Mask, PageInfo,
-    PageWriter, Pages, PassingLayer, StackError, StackInfo,
+    CheckFault, EncodedPage, Format, GrayMask, Image, Layer, LevelChange, Mask, PageInfo,
+    PageWriter, Pages, PassingLayer, Pitch, StackError, StackInfo,
 };
 
 fn mask_layer(index: u32) -> Layer {
@@ -36,7 +36,7 @@ fn layer(index: u32, image: Image) -> Layer {
         stack,
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(1500.0), image: image.into() }
+    Layer { info, pitch: Pitch::of_dpi(1500.0), image: image.into() }
 }
 
 fn layers(kind: fn(u32) -> Layer) -> Vec<Layer> {
@@ -125,7 +125,9 @@ fn a_directory_that_other_programs_would_read_otherwise_is_an_error() {
     }
     let mut changed = whole.clone();
     changed[field(283) + 12] ^= 1;
-    assert_eq!(fault(&changed), (0, CheckFault::Directory), "another resolution along columns");
+    let (layer, fault) = fault(&changed);
+    let words = "its resolution is 1500 x 1501 dpi, but it was written with 1500 dpi";
+    assert_eq!((layer, fault.to_string().as_str()), (0, words));
 }
 
 #[test]
@@ -207,7 +209,7 @@ fn headers_say_what_pages_do_without_images() {
             let image = &layer.image;
             let exposed = (0..image.height()).flat_map(|row| image.runs(row));
             let exposed: u32 = exposed.map(|(start, end, _)| end - start).sum();
-            assert_eq!((&header.info, header.dpi), (&layer.info, layer.dpi));
+            assert_eq!((&header.info, header.pitch), (&layer.info, layer.pitch));
             assert_eq!(header.size, [image.width(), image.height()]);
             assert_eq!(header.exposed_px, Some(exposed.into()));
         }

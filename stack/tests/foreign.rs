@@ -3,8 +3,8 @@
 use std::io::{Cursor, Write};
 
 use lamp_stack::{
-    Destination, Format, GrayMask, Image, IndexedStack, Layer, MaskBuilder, Pages, StackError, g4,
-    write_stack,
+    Destination, Format, GrayMask, Image, IndexedStack, Layer, MaskBuilder, Pages, Pitch,
+    StackError, g4, write_stack,
 };
 use proptest::prelude::*;
 
@@ -558,7 +558,7 @@ fn images_that_are_no_layers_are_left_out_with_a_note() {
 
 /// Returns a page with resolutions as rationals after its data.
 fn with_resolution(unit: Option<u32>, across: [u32; 2], down: [u32; 2]) -> Vec<u8> {
-    let mut page = Tiff::new((8, 1), 1, 1, vec![vec![0x55]]).with(282, 0).with(283, 0);
+    let mut page = Tiff::new((8, 1), 1, 1, vec![vec![0x55]]).with(274, 1).with(282, 0).with(283, 0);
     if let Some(unit) = unit {
         page = page.with(296, unit);
     }
@@ -574,29 +574,41 @@ fn with_resolution(unit: Option<u32>, across: [u32; 2], down: [u32; 2]) -> Vec<u
 }
 
 #[test]
-fn pixels_that_are_not_square_are_refused() {
-    for (unit, across, down, is_read) in [
-        (None, [300, 1], [300, 1], true),
-        (None, [204, 1], [98, 1], false),
-        (None, [204, 1], [196, 1], false),
-        (Some(3), [3779, 100], [3780, 100], true),
-        (Some(3), [80, 1], [39, 1], false),
-        (Some(1), [1, 1], [1, 1], true),
-        (Some(1), [2, 1], [1, 1], false),
-        (Some(2), [1500, 1], [15_001, 10], true),
-        (Some(2), [1500, 1], [1502, 1], false),
+fn pixels_that_are_not_square_are_read_where_their_size_is_known() {
+    let pitch = |text: &str| Some(Some(text.parse::<Pitch>().unwrap()));
+    for (unit, across, down, found) in [
+        (None, [300, 1], [300, 1], pitch("300")),
+        (None, [204, 1], [98, 1], pitch("204x98")),
+        (None, [204, 1], [196, 1], pitch("204x196")),
+        (Some(3), [3779, 100], [3780, 100], pitch("95.9866")),
+        (Some(3), [80, 1], [39, 1], pitch("203.2x99.06")),
+        // 10 000 / 14 and 10 000 / 19 pixels a centimeter.
+        (Some(3), [5000, 7], [10_000, 19], pitch("14x19um")),
+        (Some(1), [1, 1], [1, 1], Some(None)),
+        (Some(1), [2, 1], [1, 1], None),
+        (Some(2), [2, 1], [1, 2], None),
+        (Some(2), [12_700, 7], [25_400, 19], pitch("14x19um")),
+        // Rounding of other programs.
+        (Some(2), [1500, 1], [15_001, 10], pitch("1500")),
+        (Some(2), [1500, 1], [1502, 1], pitch("1500x1502")),
         // What states nothing is no contradiction.
-        (Some(2), [300, 1], [0, 1], true),
-        (Some(2), [0, 0], [300, 1], true),
-        (Some(2), [300, 1], [1, 0], true),
+        (Some(2), [300, 1], [0, 1], pitch("300")),
+        (Some(2), [0, 0], [300, 1], Some(None)),
+        (Some(2), [300, 1], [1, 0], pitch("300")),
     ] {
         match read_file(&with_resolution(unit, across, down)) {
-            Ok(_) => assert!(is_read, "{unit:?} {across:?} {down:?}"),
-            Err(StackError::RectangularPixels { page: 0, .. }) => assert!(!is_read),
+            Ok(layer) => assert_eq!(Some(layer.pitch), found, "{unit:?} {across:?} {down:?}"),
+            Err(StackError::RectangularPixels { page: 0, .. }) => assert_eq!(found, None),
             Err(error) => panic!("{error}"),
         }
     }
-    let text = read_file(&with_resolution(None, [204, 1], [98, 1])).unwrap_err().to_string();
+    // Stored on its side: its columns are the rows that are seen.
+    let mut turned = with_resolution(None, [204, 1], [98, 1]);
+    let orientation = [274_u16.to_le_bytes(), [3, 0]].concat();
+    let at = turned.windows(4).position(|entry| entry == orientation).unwrap() + 8;
+    turned[at] = 6;
+    assert_eq!(Some(read_file(&turned).unwrap().pitch), pitch("98x204"));
+    let text = read_file(&with_resolution(Some(1), [204, 1], [98, 1])).unwrap_err().to_string();
     assert!(
         text.starts_with(
             "page 0: its pixels are not square (its resolution is 204 across and 98 down)"

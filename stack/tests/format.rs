@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::Command;
 
 use lamp_stack::{
-    Destination, Dpi, EncodedPage, FolderBeside, Format, GrayMask, Image, Layer, Mask, PageInfo,
-    PageReader, PageWriter, Pages, StackError, StackInfo, StripRecord, write_stack,
+    Destination, EncodedPage, FolderBeside, Format, GrayMask, Image, Layer, Mask, PageInfo,
+    PageReader, PageWriter, Pages, Pitch, StackError, StackInfo, StripRecord, write_stack,
 };
 use tiff::decoder::{Decoder, DecodingResult};
 
@@ -36,7 +36,7 @@ fn layers(count: u32) -> Vec<Layer> {
             stack: (index == 0).then(|| stack.clone()),
             ..PageInfo::default()
         },
-        dpi: Dpi::new(1500.0),
+        pitch: Pitch::of_dpi(1500.0),
         image: Image::Mask(mask(
             64,
             &[&[], &[3 + index, 40], &[0, 5, 60], &[2, 40 + index], &[63]],
@@ -50,7 +50,7 @@ fn gray_layer() -> Layer {
     let mut gray = GrayMask::new(300);
     gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).unwrap();
     gray.push_runs([]).unwrap();
-    Layer { info: PageInfo::default(), dpi: None, image: Image::Gray(gray).into() }
+    Layer { info: PageInfo::default(), pitch: None, image: Image::Gray(gray).into() }
 }
 
 fn write(layers: &[Layer], format: Format) -> Vec<u8> {

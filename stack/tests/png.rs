@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::Cursor;
 
-use lamp_stack::{Compression, Dpi, Image, Layer, MaskBuilder, PageInfo, Pages, StackError};
+use lamp_stack::{Compression, Image, Layer, MaskBuilder, PageInfo, Pages, Pitch, StackError};
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 
 /// Encodes rows of bytes as a PNG.
@@ -61,7 +61,7 @@ fn picture(image: &Image) -> Vec<String> {
 fn one_bit_pngs_are_masks() {
     let layer = read(bits()).unwrap();
     assert_eq!(picture(&layer.image), ["#..#.#...#", ".........."]);
-    assert_eq!((layer.info, layer.dpi), (PageInfo::default(), None));
+    assert_eq!((layer.info, layer.pitch), (PageInfo::default(), None));
 
     let palette = |colours: &'static [u8]| {
         read(png(10, PALETTE, &ROWS, 2, |encoder| encoder.set_palette(colours))).map(|l| l.image)
@@ -114,10 +114,10 @@ fn resolution_and_description_are_read() {
         read(file).unwrap()
     };
     let layer = described(59_055, Unit::Meter, r#"{"layer":7,"z_um":700}"#);
-    assert_eq!((layer.info, layer.dpi), (info, Dpi::new(1500.0)));
+    assert_eq!((layer.info, layer.pitch), (info, Pitch::of_dpi(1500.0)));
     let layer = described(59_060, Unit::Meter, "a scan");
-    assert_eq!((layer.info, layer.dpi), (PageInfo::default(), Dpi::new(59_060.0 * 0.0254)));
-    assert_eq!(described(59_055, Unit::Unspecified, "").dpi, None);
+    assert_eq!((layer.info, layer.pitch), (PageInfo::default(), Pitch::of_dpi(59_060.0 * 0.0254)));
+    assert_eq!(described(59_055, Unit::Unspecified, "").pitch, None);
 }
 
 #[test]
@@ -222,25 +222,28 @@ fn a_png_is_known_by_its_bytes() {
 }
 
 #[test]
-fn pixels_that_are_not_square_are_refused() {
-    for (sides, unit, is_read) in [
-        ([59_055, 59_055], Unit::Meter, true),
-        ([2834, 2835], Unit::Meter, true),
-        ([393, 394], Unit::Meter, true),
-        ([8031, 3858], Unit::Meter, false),
-        ([59_055, 59_155], Unit::Meter, false),
-        ([1, 1], Unit::Unspecified, true),
-        ([2, 1], Unit::Unspecified, false),
-        ([100, 101], Unit::Unspecified, false),
-        ([0, 2835], Unit::Meter, true),
+fn pixels_that_are_not_square_are_read_where_their_size_is_known() {
+    let dpi = |x: f64, y: f64| Some(Pitch::of_two_dpi([x, y]));
+    for (sides, unit, pitch) in [
+        ([59_055, 59_055], Unit::Meter, dpi(1500.0, 1500.0)),
+        // Rounding of other programs.
+        ([2834, 2835], Unit::Meter, dpi(2834.0 * 0.0254, 2834.0 * 0.0254)),
+        ([393, 394], Unit::Meter, dpi(393.0 * 0.0254, 393.0 * 0.0254)),
+        ([8031, 3858], Unit::Meter, dpi(204.0, 98.0)),
+        ([59_055, 59_155], Unit::Meter, dpi(1500.0, 59_155.0 * 0.0254)),
+        ([1, 1], Unit::Unspecified, Some(None)),
+        ([2, 1], Unit::Unspecified, None),
+        ([100, 101], Unit::Unspecified, None),
+        ([0, 2835], Unit::Meter, Some(None)),
+        ([1, 2835], Unit::Meter, None),
     ] {
         let [xppu, yppu] = sides;
         let file = png(10, BITS, &ROWS, 2, |encoder| {
             encoder.set_pixel_dims(Some(PixelDimensions { xppu, yppu, unit }));
         });
         match read(file) {
-            Ok(_) => assert!(is_read, "{sides:?}"),
-            Err(StackError::RectangularPixels { .. }) => assert!(!is_read, "{sides:?}"),
+            Ok(layer) => assert_eq!(Some(layer.pitch), pitch, "{sides:?}"),
+            Err(StackError::RectangularPixels { .. }) => assert_eq!(pitch, None, "{sides:?}"),
             Err(error) => panic!("{error}"),
         }
     }

@@ -4,14 +4,14 @@
 //! bodies off balance, on runs and in one pass.
 //!
 //! ```
-//! use lamp_stack::{Dpi, Layer, Mask, PageInfo};
+//! use lamp_stack::{Pitch, Layer, Mask, PageInfo};
 //! use lamp_supports::{CheckError, CheckOptions, Disagreements, IslandEnd, check};
 //!
 //! // A post, and a block beside it that begins in layer 1 and joins the post in layer 2.
 //! let layer = |transitions: &[u32]| {
 //!     let rows = vec![0, 0, transitions.len() as u32, 2 * transitions.len() as u32, 3 * transitions.len() as u32];
 //!     let mask = Mask::new(16, rows, transitions.repeat(3)).unwrap();
-//!     Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: mask.into() }
+//!     Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(254.0), image: mask.into() }
 //! };
 //! let layers = [layer(&[1, 5]), layer(&[1, 5, 9, 12]), layer(&[1, 12])];
 //! let layers = layers.into_iter().map(Ok::<_, CheckError>);

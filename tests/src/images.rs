@@ -58,7 +58,7 @@ pub fn at_least(gray: &GrayMask, level: u8) -> Mask {
 pub fn stripped(layers: &[Layer]) -> Vec<Layer> {
     let bare = |(index, layer): (u32, &Layer)| Layer {
         info: PageInfo { index, ..PageInfo::default() },
-        dpi: layer.dpi,
+        pitch: layer.pitch,
         image: layer.image.clone(),
     };
     (0..).zip(layers).map(bare).collect()

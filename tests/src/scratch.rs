@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 
 use lamp_fixtures::{Mesh, Sample, build};
 use lamp_stack::{
-    Destination, Dpi, Format, GrayMask, Image, Layer, Mask, PageInfo, Pages, StackError,
+    Destination, Format, GrayMask, Image, Layer, Mask, PageInfo, Pages, Pitch, StackError,
     write_stack,
 };
 use tempfile::TempDir;
@@ -299,7 +299,8 @@ pub fn write_gray_ramp(path: &Path, width: u32, height: u32) {
     for _ in 0..height {
         gray.push_runs((0..width).map(level)).expect("as many pixels as the width");
     }
-    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(100.0), image: gray.into() };
+    let layer =
+        Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(100.0), image: gray.into() };
     let to = Destination::File(path.to_owned());
     let layers = std::iter::once(Ok::<_, StackError>(layer));
     write_stack(layers, to, Format::Big).expect("the file can be written");

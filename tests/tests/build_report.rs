@@ -1,6 +1,6 @@
 //! Checks `tile --report` and `tile --time` against the pixels of the pages.
 
-use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+use lamp_stack::{Image, Layer, Mask, PageInfo, Pitch};
 use lamp_tests::{Scratch, write_gray_ramp};
 use serde_json::{Value, json};
 
@@ -85,7 +85,7 @@ fn cuboid(scratch: &Scratch, exposure_ms: Option<f64>) {
             exposure_ms,
             ..PageInfo::default()
         },
-        dpi: Dpi::new(25.4),
+        pitch: Pitch::of_dpi(25.4),
         image: Image::Mask(image.clone()).into(),
     };
     scratch.stack("box.tif", (0..50).map(layer));

@@ -3,7 +3,7 @@
 use lamp_fixtures::{
     Mesh, Sample, build, closed_void, cup, mug, needle, ring, serpentine, slanted_wall,
 };
-use lamp_stack::{Dpi, Layer, Mask, PageInfo};
+use lamp_stack::{Layer, Mask, PageInfo, Pitch};
 use lamp_tests::Scratch;
 use serde_json::Value;
 
@@ -103,7 +103,7 @@ fn squares(sides: &[[u32; 2]]) -> Vec<Layer> {
             origin_mm: Some([0.0, 10.0]),
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(25.4), image: mask.finish().into() }
+        Layer { info, pitch: Pitch::of_dpi(25.4), image: mask.finish().into() }
     };
     (0..).zip(sides).map(layer).collect()
 }

@@ -1,6 +1,6 @@
 //! Layers as large as a machine's whole build area are checked three at a time.
 
-use lamp_stack::{Dpi, Layer, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Layer, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_supports::{CheckError, CheckOptions, check};
 use peak_alloc::PeakAlloc;
 
@@ -29,7 +29,11 @@ fn bars(number: u32) -> Mask {
 fn three_layers_runs_and_labels_are_held_at_most() {
     let layer = |number| {
         let info = PageInfo { index: number, thickness_um: Some(100.0), ..PageInfo::default() };
-        Ok::<_, CheckError>(Layer { info, dpi: Dpi::new(1500.0), image: bars(number).into() })
+        Ok::<_, CheckError>(Layer {
+            info,
+            pitch: Pitch::of_dpi(1500.0),
+            image: bars(number).into(),
+        })
     };
     // A number for each transition and each row.
     let runs_bytes = 4 * (BARS + 1) * SIDE as usize;

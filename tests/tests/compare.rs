@@ -1,7 +1,7 @@
 //! Checks the reports of `lamp compare` on stacks, against their pixels.
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo, StackInfo};
+use lamp_stack::{GrayMask, Layer, Mask, PageInfo, Pitch, StackInfo};
 use lamp_tests::{Ran, Scratch};
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ fn stack(scratch: &Scratch, name: &str, layers: impl IntoIterator<Item = Mask>) 
             stack: (index == 0).then(StackInfo::default),
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(254.0), image: mask.into() }
+        Layer { info, pitch: Pitch::of_dpi(254.0), image: mask.into() }
     };
     scratch.stack(name, (0..).zip(layers).map(layer));
 }
@@ -170,7 +170,8 @@ fn images_lie_where_their_origins_say() {
             thickness_um: Some(100.0),
             ..PageInfo::default()
         };
-        scratch.stack(name, [Layer { info, dpi: Dpi::new(dpi), image: mask(&[block]).into() }]);
+        scratch
+            .stack(name, [Layer { info, pitch: Pitch::of_dpi(dpi), image: mask(&[block]).into() }]);
     };
     at("moved.tif", [-0.3, 4.5], 254.0, ([13, 33], [15, 35]));
     scratch.run("lamp compare a.tif moved.tif").succeeds_quietly();
@@ -201,7 +202,7 @@ fn gray_pages_are_compared_by_level() {
         for _ in 0..3 {
             gray.push_runs(levels.iter().map(|&level| (1, level))).unwrap();
         }
-        [Layer { info: PageInfo::default(), dpi: None, image: gray.into() }]
+        [Layer { info: PageInfo::default(), pitch: None, image: gray.into() }]
     };
     scratch.stack("a.tif", gray(&[0, 100, 255, 0]));
     scratch.stack("b.tif", gray(&[0, 101, 254, 0]));

@@ -1,7 +1,7 @@
 //! Checks that `lamp compensate` moves edges, keeps and reports walls, and corrects shrinkage.
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};
+use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, Pitch, StackInfo};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
@@ -15,7 +15,7 @@ fn layer(index: u32, image: Image) -> Layer {
         stack: (index == 0).then_some(stack),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(254.0), image: image.into() }
+    Layer { info, pitch: Pitch::of_dpi(254.0), image: image.into() }
 }
 
 /// Builds blocks from ranges of columns and rows, each with an exclusive end.
@@ -260,7 +260,7 @@ fn squares_cure_to_their_size_on_a_steep_material() {
             mask.push_row(if is_inside { &inside } else { &[] }).unwrap();
         }
         let mut square = layer(0, Image::Mask(mask.finish()));
-        square.dpi = Dpi::new(1500.0);
+        square.pitch = Pitch::of_dpi(1500.0);
         scratch.stack("in.tif", [square]);
         let line = "lamp compensate in.tif --material steep.toml --dose 500mJ/cm2 -o out.tif";
         scratch.run(line).succeeds_quietly();
@@ -390,7 +390,7 @@ fn what_cannot_be_done_is_said() {
     }
     assert_eq!(scratch.names(), ["dark.toml", "in.tif", "mine.toml"]);
     let mut bare = layer(0, Image::Mask(blocks(&[])));
-    bare.dpi = None;
+    bare.pitch = None;
     scratch.stack("bare.tif", [bare]);
     scratch
         .run("lamp compensate bare.tif --uniform 1mm -o out.tif")

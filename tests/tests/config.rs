@@ -23,7 +23,7 @@ fn with_settings(config: &str) -> Scratch {
 }
 
 fn dpi(scratch: &Scratch, stack: &str) -> f64 {
-    scratch.layers(stack)[0].dpi.expect("it is known").get()
+    scratch.layers(stack)[0].pitch.expect("it is known").x.get()
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_slicing::{Axis, Fill, Part, Placement, SectionOptions, Units, section};
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{Layer, Length, Pitch};
 use lamp_tests::Scratch;
 
 /// The distance of the referee's lines: whole ones to a pixel of 1500 dpi.
@@ -79,7 +79,7 @@ fn areas(
         placement: Placement::default().rotated(Axis::Y, 90.0).rotated(Axis::X, 90.0),
         fill: Fill::EvenOdd,
         z: Length::from_mm(y_mm),
-        dpi: Dpi::new(LINE_DPI).unwrap(),
+        pitch: Pitch::of_dpi(LINE_DPI).unwrap(),
         top_mm: right_mm,
         rows: lines,
     };
@@ -131,7 +131,7 @@ fn told(said: &str, panel: &str) -> ([f64; 4], u32) {
 
 /// Returns the height of y of a row's center, and the right edge of the images.
 fn place(layer: &Layer, row: u32) -> [f64; 2] {
-    let ([x, y], pitch) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap().pitch().mm());
+    let ([x, y], pitch) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().x.pitch().mm());
     [y - (f64::from(row) + 0.5) * pitch, x + f64::from(layer.image.width()) * pitch]
 }
 
@@ -229,7 +229,7 @@ fn pixels_leave_what_walls_cut_off() {
     let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds();
     let (found, _) = told(&String::from_utf8(ran.stdout).unwrap(), "pixels");
     let layer = &scratch.layers("white.tif")[0];
-    let (left, pitch) = (layer.info.origin_mm.unwrap()[0], layer.dpi.unwrap().pitch().mm());
+    let (left, pitch) = (layer.info.origin_mm.unwrap()[0], layer.pitch.unwrap().x.pitch().mm());
     let walls = [0.0, 3.013].map(|x| (x - left) / pitch);
     let [first, end] = walls.map(|wall| (wall - 0.5).ceil());
     let mm2 = |pixels: f64| pixels * pitch * 2.0;

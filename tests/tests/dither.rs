@@ -1,6 +1,6 @@
 //! Checks `dither` on stacks of gray layers.
 
-use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError, write_stack};
+use lamp_stack::{Destination, Format, GrayMask, Layer, PageInfo, Pitch, StackError, write_stack};
 use lamp_tests::{Scratch, masks, read_stack};
 
 const METHODS: [&str; 5] = ["blue-noise", "ordered", "floyd-steinberg", "sierra-lite", "threshold"];
@@ -16,7 +16,7 @@ fn with_gray_stack(dpi: f64) -> Scratch {
                 .unwrap();
         }
         let info = PageInfo { index, ..PageInfo::default() };
-        Ok::<_, StackError>(Layer { info, dpi: Dpi::new(dpi), image: gray.into() })
+        Ok::<_, StackError>(Layer { info, pitch: Pitch::of_dpi(dpi), image: gray.into() })
     };
     let scratch = Scratch::new();
     let to = Destination::File(scratch.path("gray.tif"));

@@ -51,7 +51,7 @@ fn check_sum(scratch: &Scratch, folder: &str, build: &[Layer], step: usize) {
             assert_eq!(info.other["field"]["columns"], listed["columns"]);
             assert_eq!(info.other["field"]["rows"], listed["rows"]);
             let [left, top] = [&listed["columns"], &listed["rows"]].map(|side| numbers(side)[0]);
-            let pitch = 25.4 / layer.dpi.unwrap().get();
+            let pitch = 25.4 / layer.pitch.unwrap().x.get();
             let mm = |pixels: u32| f64::from(pixels) * pitch;
             let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-6, "{a} {b}");
             near(listed["x_mm"].as_f64().unwrap(), mm(left));

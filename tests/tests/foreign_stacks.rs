@@ -6,7 +6,7 @@ use std::fs;
 use image::RgbImage;
 use lamp_fixtures::Sample;
 use lamp_stack::{
-    Destination, Dpi, Format, GrayMask, Image, Layer, MaskBuilder, PageInfo, StackError,
+    Destination, Format, GrayMask, Image, Layer, MaskBuilder, PageInfo, Pitch, StackError,
     write_stack,
 };
 use lamp_tests::{Packed, Scratch, ask, ask_python, packed};
@@ -73,7 +73,7 @@ fn stack(scratch: &Scratch, name: &str, image: fn(u32, &mut Dice) -> Image) -> V
         .zip(WIDTHS)
         .map(|(index, width)| Layer {
             info: PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() },
-            dpi: Dpi::new(300.0),
+            pitch: Pitch::of_dpi(300.0),
             image: image(width, &mut dice).into(),
         })
         .collect();
@@ -330,7 +330,7 @@ for k, (mask, gray) in enumerate(zip(pages("masks.tif"), pages("grays.tif"))):
 "#;
     python_writes(&scratch, script);
     if scratch.names().iter().any(|name| name == "mask_0.png") {
-        assert_eq!(scratch.layers("mask_0.png")[0].dpi, Dpi::new(1500.0));
+        assert_eq!(scratch.layers("mask_0.png")[0].pitch, Pitch::of_dpi(1500.0));
     }
 }
 

@@ -116,7 +116,7 @@ fn a_stack_without_heights_is_in_pixels_and_says_so() {
     let scratch = Scratch::new();
     let layer = |index| Layer {
         info: PageInfo { index, ..PageInfo::default() },
-        dpi: None,
+        pitch: None,
         image: rows(4, &[&[1, 3], &[1, 3]]).into(),
     };
     scratch.stack("plain.tif", (0..3).map(layer));
@@ -131,7 +131,8 @@ fn what_cannot_be_written_leaves_no_file() {
     let scratch = Scratch::with_tower_and_torus();
     let whole = scratch.bytes("tower.tif");
     scratch.write("cut.tif", &whole[..whole.len() / 2]);
-    let black = Layer { info: PageInfo::default(), dpi: None, image: rows(4, &[&[], &[]]).into() };
+    let black =
+        Layer { info: PageInfo::default(), pitch: None, image: rows(4, &[&[], &[]]).into() };
     scratch.stack("black.tif", [black]);
     let before = scratch.names();
     let refused = |line: &str, words: &[&str]| scratch.run(line).is_refused_with(words);

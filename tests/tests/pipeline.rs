@@ -39,7 +39,7 @@ fn four_processes_make_a_build_of_the_right_size() {
         assert_eq!((layer.image.width(), layer.image.height()), (400, 400));
         let PageInfo { index, z_um, thickness_um, .. } = layer.info;
         assert_eq!((index, z_um, thickness_um), (k, Some(f64::from(k) * 1e3), Some(1e3)));
-        assert_eq!(layer.dpi.map(lamp_stack::Dpi::get), Some(100.0));
+        assert_eq!(layer.pitch, lamp_stack::Pitch::of_dpi(100.0));
     }
     assert_eq!(stack_info(&layers).part, "tower");
     // Nine copies of a foot of 12.7 mm, of which a circle takes 50² π pixels.

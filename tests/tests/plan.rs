@@ -264,7 +264,7 @@ fn what_cannot_be_planned_is_refused() {
     spoilt("thin.tif", &|layer| layer.info.thickness_um = None);
     spoilt("flat.tif", &|layer| layer.info.thickness_um = Some(0.0));
     spoilt("dark.tif", &|layer| layer.info.exposure_ms = Some(-1.0));
-    spoilt("coarse.tif", &|layer| layer.dpi = None);
+    spoilt("coarse.tif", &|layer| layer.pitch = None);
     spoilt("narrow.tif", &|layer| layer.image = lamp_stack::Mask::black(49, 30).into());
     let shown = scratch.run("lamp material show pegda-sudan").succeeds().stdout;
     let material = String::from_utf8(shown).unwrap();
@@ -329,7 +329,7 @@ fn wrong_options_are_status_2() {
 fn doses_of_first(layers: &[Layer], light: Light) -> Vec<f64> {
     let first = &layers[0];
     let [columns, rows] = [0..first.image.width(), 0..first.image.height()];
-    let mut doses = RegionDoses::new(light, first.dpi.unwrap(), columns, rows);
+    let mut doses = RegionDoses::new(light, first.pitch.unwrap().x, columns, rows);
     for layer in layers {
         let exposed = LayerTime {
             thickness: Length::from_um(layer.info.thickness_um.unwrap()),

@@ -101,7 +101,7 @@ fn bitmaps_that_kinetics_cannot_take_are_refused() {
     let scratch = with_lens();
     let page = |image: Image| Layer {
         info: PageInfo { exposure_ms: Some(900.0), ..PageInfo::default() },
-        dpi: None,
+        pitch: None,
         image: image.into(),
     };
     let square = Mask::new(8, vec![0, 0, 2, 4, 4], vec![2, 6, 2, 6]).unwrap();

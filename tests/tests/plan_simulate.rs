@@ -100,7 +100,7 @@ fn a_plan_cures_what_its_report_says() {
 /// A stack of one page.
 fn page(scratch: &Scratch, name: &str, image: Mask, exposure_ms: Option<f64>) {
     let info = PageInfo { exposure_ms, ..PageInfo::default() };
-    scratch.stack(name, [Layer { info, dpi: None, image: Image::Mask(image).into() }]);
+    scratch.stack(name, [Layer { info, pitch: None, image: Image::Mask(image).into() }]);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn what_cannot_be_planned_is_refused_with_a_sentence() {
     layers[7].info.thickness_um = None;
     scratch.stack("thin.tif", layers.clone());
     layers.truncate(7);
-    layers[3].dpi = None;
+    layers[3].pitch = None;
     scratch.stack("pitch.tif", layers);
     let refused = |line: &str, text: &str| {
         let line = format!("lamp plan speed {line} -o out.tif");

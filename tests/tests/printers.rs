@@ -1,6 +1,6 @@
 //! Slices for printers with a panel, and reads their files by every command and by other programs.
 
-use lamp_stack::{Dpi, GrayMask, Layer, Mask, white_in_both};
+use lamp_stack::{GrayMask, Layer, Mask, Pitch, white_in_both};
 use lamp_tests::{Scratch, ask_python, masks};
 
 /// A printer of which every format can state all but moves. Its panel is wider than the tower and
@@ -100,7 +100,7 @@ fn every_format_comes_back_with_its_images_and_times() {
         assert_eq!(times[..4], [30_000.0, 21_000.0, 12_000.0, 3000.0].map(Some), "{ending}");
         assert!(times[4..].iter().all(|time| *time == Some(3000.0)));
         assert_eq!(read[9].info.z_um, Some(18_000.0));
-        assert_eq!(read[0].dpi.map(Dpi::get), Some(127.0));
+        assert_eq!(read[0].pitch, Pitch::of_dpi(127.0));
         // A stack that came from a file makes the same file.
         scratch.run(&format!("lamp convert back.tif -q -o again.{ending}")).succeeds_quietly();
         let [file, again] =
@@ -224,7 +224,7 @@ fn other_programs_see_the_same_layers() {
 fn what_does_not_fit_a_printer_is_refused() {
     let scratch = with_printer();
     let slice = |more: &str| scratch.run(&format!("slice tower.stl {more} -q -o plate.goo"));
-    slice("--machine saturn4ultra16k").is_wrong_usage(&["14 x 19 um", "square"]);
+    slice("--machine saturn4ultra16k --dpi 300").is_wrong_usage(&["300 dpi", "14 x 19 um"]);
     slice("--machine mine.toml --dpi 300").is_wrong_usage(&["300 dpi", "mine", "127 dpi"]);
     slice("--machine mine.toml --scale 1.3").is_refused_with(&["99.1mm", "90mm"]);
     slice("--machine mine.toml --scale 4").is_refused_with(&["the part takes"]);

@@ -1,7 +1,7 @@
 //! Checks that `lamp split` and `lamp join` reproduce the whole stack, byte for byte.
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Destination, Dpi, Format, GrayMask, Layer, PageInfo, StackError};
+use lamp_stack::{Destination, Format, GrayMask, Layer, PageInfo, Pitch, StackError};
 use lamp_tests::Scratch;
 
 const COARSE: &str = "--dpi 100 --thickness 1mm -q";
@@ -101,7 +101,7 @@ fn write_plain_stack(scratch: &Scratch, name: &str, indexes: &[u32]) {
         let mut gray = GrayMask::new(64);
         gray.push_runs([(index, 0), (1, index as u8), (20, 200)]).unwrap();
         let info = PageInfo { index, ..PageInfo::default() };
-        Ok::<_, StackError>(Layer { info, dpi: Dpi::new(300.0), image: gray.into() })
+        Ok::<_, StackError>(Layer { info, pitch: Pitch::of_dpi(300.0), image: gray.into() })
     });
     lamp_stack::write_stack(layers, Destination::File(scratch.path(name)), Format::Big).unwrap();
 }

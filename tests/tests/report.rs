@@ -1,7 +1,7 @@
 //! Compares the pages of `lamp report` with the output of `lamp info` and `lamp check`.
 
 use lamp_fixtures::mug;
-use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo, StackInfo};
+use lamp_stack::{GrayMask, Layer, Mask, PageInfo, Pitch, StackInfo};
 use lamp_tests::Scratch;
 use serde_json::{Value, json};
 
@@ -141,7 +141,7 @@ fn layer(index: u32, exposure_ms: Option<f64>, part: &str) -> Layer {
         stack: (index == 0).then_some(stack),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(254.0), image: mask.into() }
+    Layer { info, pitch: Pitch::of_dpi(254.0), image: mask.into() }
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn odd_stacks_have_pages_too() {
     };
     let of = |index, image: lamp_stack::LayerImage| Layer {
         info: PageInfo { index, ..PageInfo::default() },
-        dpi: None,
+        pitch: None,
         image,
     };
     scratch.stack("pixel.tif", [of(0, gray().into())]);

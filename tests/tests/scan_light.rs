@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use lamp_fixtures::SplitMix;
-use lamp_stack::{Dpi, Image, Layer, Mask, MaskBuilder, PageInfo, StackInfo};
+use lamp_stack::{Image, Layer, Mask, MaskBuilder, PageInfo, Pitch, StackInfo};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
@@ -197,7 +197,7 @@ fn a_compensated_block_prints_at_its_size_in_both_directions() {
     let image = block([256, 240], [50, 200], [40, 190]);
     let layer = Layer {
         info: PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() },
-        dpi: Dpi::new(1500.0),
+        pitch: Pitch::of_dpi(1500.0),
         image: Image::Mask(image).into(),
     };
     scratch.stack("block.tif", [layer]);

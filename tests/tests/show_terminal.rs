@@ -1,10 +1,10 @@
 //! Reads back what `lamp show --ascii` and `--sixel` print.
 
-use lamp_stack::{Dpi, GrayMask, Layer, Mask, PageInfo};
+use lamp_stack::{GrayMask, Layer, Mask, PageInfo, Pitch};
 use lamp_tests::{Scratch, ask};
 
 fn layer(image: impl Into<lamp_stack::LayerImage>) -> [Layer; 1] {
-    [Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() }]
+    [Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(254.0), image: image.into() }]
 }
 
 /// A ring of a width and a height of 120 pixels.

@@ -3,7 +3,7 @@
 use std::fs;
 
 use lamp_fixtures::Sample;
-use lamp_stack::{Dpi, GrayMask, Image, Layer, PageInfo, StackInfo, gray_runs};
+use lamp_stack::{GrayMask, Image, Layer, PageInfo, Pitch, StackInfo, gray_runs};
 use lamp_tests::Scratch;
 use serde_json::{Value, json};
 
@@ -59,8 +59,8 @@ fn check_sum(scratch: &Scratch, folder: &str, build: &str) -> Vec<Vec<Layer>> {
             assert_eq!(facts(page), facts(&layer.info));
             assert_eq!(page.other["strip"]["columns"], listed["columns"]);
             let start = listed["columns"][0].as_u64().unwrap() as usize;
-            let x0 =
-                layer.info.origin_mm.unwrap()[0] + start as f64 * 25.4 / layer.dpi.unwrap().get();
+            let x0 = layer.info.origin_mm.unwrap()[0]
+                + start as f64 * 25.4 / layer.pitch.unwrap().x.get();
             assert!((page.origin_mm.unwrap()[0] - x0).abs() < 1e-9);
             for (sum, row) in sum.iter_mut().zip(levels(&strip[k].image)) {
                 for (column, level) in (start..).zip(row).filter(|(_, level)| *level > 0) {
@@ -162,7 +162,7 @@ fn gray_layers_and_ranges_come_back() {
             stack,
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(ramp).into() }
+        Layer { info, pitch: Pitch::of_dpi(25.4), image: Image::Gray(ramp).into() }
     };
     scratch.stack("gray.tif", (0..9).map(layer));
     let tile = "tile gray.tif --area 100x80mm";
@@ -198,7 +198,7 @@ fn dithered_strips_give_seams_their_full_dose() {
     let info = PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() };
     scratch.stack(
         "white.tif",
-        [Layer { info, dpi: Dpi::new(25.4), image: Image::Gray(white).into() }],
+        [Layer { info, pitch: Pitch::of_dpi(25.4), image: Image::Gray(white).into() }],
     );
     scratch
         .run("tile white.tif --area 320x320mm --mesh none --strips s --mirrors 192 --overlap 64 --seam gray")
@@ -314,7 +314,7 @@ fn stages_take_a_folder_of_strips_for_its_build() {
         (0..30).for_each(|_| ramp.push_runs((0..90).map(|l| (1, (l * 2 + index) as u8))).unwrap());
         let stack = (index == 0).then(StackInfo::default);
         let info = PageInfo { index, stack, ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(1500.0), image: Image::Gray(ramp).into() }
+        Layer { info, pitch: Pitch::of_dpi(1500.0), image: Image::Gray(ramp).into() }
     };
     scratch.stack("gray.tif", (0..3).map(layer));
     let tile = "tile gray.tif --area 1.6x0.6mm --mesh none -o build.tif --mirrors 40 --overlap 11";

@@ -23,7 +23,7 @@ fn every_square_of_every_size_gets_its_dose() {
             assert_eq!(image.white_pixels(), (10 - j) * u64::from(size * size), "{name}: {j}");
             assert_eq!(page.info.other["feature_px"], json!(size));
             assert_eq!(page.info.other["dose_mj_per_cm2"], json!(60.0 * (j + 1) as f64));
-            assert_eq!(page.dpi.unwrap().get(), 1500.0);
+            assert_eq!(page.pitch.unwrap().x.get(), 1500.0);
         }
         for tile in 0..10 {
             let middle = |of: u32| 59 + of * (size + 59) + size / 2;

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use lamp_stack::{Dpi, Frame, GrayMask, Image, Layer, Mask, Op, Orientation, PageInfo, StackInfo};
+use lamp_stack::{
+    Frame, GrayMask, Image, Layer, Mask, Op, Orientation, PageInfo, Pitch, StackInfo,
+};
 use lamp_tests::{Scratch, mask};
 use serde_json::Value;
 
@@ -165,7 +167,7 @@ fn a_layout_says_how_copies_lie() {
     let scratch = Scratch::new();
     let image = Image::Mask(Mask::new(8, vec![0, 2, 4, 4], vec![1, 3, 1, 7]).unwrap());
     let info = PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() };
-    scratch.stack("l.tif", [Layer { info, dpi: Dpi::new(25.4), image: image.into() }]);
+    scratch.stack("l.tif", [Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() }]);
     let layout = |copies: &[&str]| {
         let copies: Vec<_> =
             copies.iter().map(|copy| format!(r#"{{"part": "l.tif", {copy}}}"#)).collect();
@@ -249,7 +251,7 @@ fn stray_rows_are_told_once_however_many_copies() {
         };
         let image =
             Image::Mask(Mask::new(4, vec![0, 2, 3, 4, 5, 7], vec![1, 3, 1, 1, 1, 1, 3]).unwrap());
-        Layer { info, dpi: Dpi::new(25.4), image: image.into() }
+        Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() }
     };
     scratch.stack("p.tif", [stray(0, &[]), stray(1, &[1, 2, 3])]);
     let said = |options: &str| {
@@ -274,7 +276,7 @@ fn gray_layers_make_a_gray_build() {
     (0..16).for_each(|row| ramp.push_runs((row..64).map(|level| (1, level as u8 * 3))).unwrap());
     let info = PageInfo { stack: Some(StackInfo::default()), ..PageInfo::default() };
     let image = Image::Gray(ramp.clone());
-    scratch.stack("gray.tif", [Layer { info, dpi: Dpi::new(25.4), image: image.into() }]);
+    scratch.stack("gray.tif", [Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() }]);
     let layout = r#"{"copies": [{"part": "gray.tif", "x_mm": 1, "y_mm": 1, "turn": 270}, {"part": "gray.tif", "x_mm": 20, "y_mm": 1}]}"#;
     scratch.write("layout.json", layout.as_bytes());
     scratch.run("tile gray.tif --layout layout.json --mesh none -o build.tif").succeeds_quietly();

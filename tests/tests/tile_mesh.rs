@@ -142,8 +142,11 @@ fn an_image_is_repeated_as_the_mesh() {
     };
     let mut template = lamp_stack::MaskBuilder::new(7);
     text.iter().for_each(|line| template.push_row(&row(line)).unwrap());
-    let layer =
-        Layer { info: lamp_stack::PageInfo::default(), dpi: None, image: template.finish().into() };
+    let layer = Layer {
+        info: lamp_stack::PageInfo::default(),
+        pitch: None,
+        image: template.finish().into(),
+    };
     scratch.stack("walls.tif", [layer]);
     scratch.run("tile torus.tif --mesh walls.tif --copies 1 -o build.tif").succeeds_quietly();
     let build = scratch.layers("build.tif");

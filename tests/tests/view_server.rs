@@ -501,7 +501,7 @@ fn damaged_and_tiny_stacks_are_shown_as_far_as_they_go() {
 
     let mut pixel = MaskBuilder::new(1);
     pixel.push_row(&[0]).unwrap();
-    let layer = Layer { info: PageInfo::default(), dpi: None, image: pixel.finish().into() };
+    let layer = Layer { info: PageInfo::default(), pitch: None, image: pixel.finish().into() };
     scratch.stack("pixel.tif", [layer]);
     let viewing = Viewing::start(&scratch, "pixel.tif");
     for reduction in [0, 1, 31] {
@@ -529,7 +529,7 @@ fn memory_stays_within_its_limit() {
             mask.push_row(&stripes).unwrap();
         }
         let info = PageInfo { index, ..PageInfo::default() };
-        Layer { info, dpi: None, image: mask.finish().into() }
+        Layer { info, pitch: None, image: mask.finish().into() }
     };
     scratch.stack("dense.tif", (0..LAYERS).map(layer));
     let viewing = Viewing::start(&scratch, "dense.tif --threads 2 --memory 128MB");

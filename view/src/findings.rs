@@ -131,9 +131,9 @@ fn of_plan(plan: &Value, headers: &[PageHeader]) -> Option<Finding> {
     // A stack without an origin has no place for millimeters: the finding is only listed.
     let at = header.and_then(|header| {
         let at = plan["at_mm"].as_array()?;
-        let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
+        let ([left, top], [pitch_x, pitch_y]) = (header.info.origin_mm?, header.pitch?.mm());
         let [x, y] = [at.first()?.as_f64()?, at.get(1)?.as_f64()?];
-        Some([(x - left) / pitch, (top - y) / pitch])
+        Some([(x - left) / pitch_x, (top - y) / pitch_y])
     });
     let bounds = at.zip(header).map(|(at, header)| {
         let pixel = at.map(|at| at.max(0.0) as u32);
@@ -231,7 +231,7 @@ mod tests {
     fn headers(layers: u32) -> Vec<PageHeader> {
         let header = |index| PageHeader {
             info: PageInfo { index, origin_mm: Some([0.0, 1.0]), ..PageInfo::default() },
-            dpi: lamp_stack::Dpi::new(254.0),
+            pitch: lamp_stack::Pitch::of_dpi(254.0),
             size: [60, 40],
             gray: false,
             compression: Compression::G4,

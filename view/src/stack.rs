@@ -1,6 +1,6 @@
 //! A stack that is viewed.
 
-use lamp_stack::{Dpi, Image, IndexedStack, Page, PageHeader, StackError};
+use lamp_stack::{Image, IndexedStack, NotSquare, Page, PageHeader, StackError};
 use serde_json::{Value, json};
 
 use crate::copies::Copies;
@@ -17,10 +17,16 @@ pub struct ViewedStack {
 
 impl ViewedStack {
     /// Takes a stack, and its name for people: the name of its file, without folders.
-    pub fn new(name: impl Into<String>, pages: IndexedStack) -> Self {
+    ///
+    /// # Errors
+    /// Returns an error if pixels are not square: the page draws and measures them as squares.
+    pub fn new(name: impl Into<String>, pages: IndexedStack) -> Result<Self, NotSquare> {
+        if let Some(pitch) = pages.headers().first().and_then(|first| first.pitch) {
+            pitch.square("the viewer needs")?;
+        }
         let copies =
             pages.headers().first().map_or_else(Copies::default, |first| Copies::of(&first.info));
-        Self { name: name.into(), pages, copies }
+        Ok(Self { name: name.into(), pages, copies })
     }
 
     /// Returns the headers of the pages, bottom first.
@@ -72,7 +78,7 @@ impl ViewedStack {
             "layers": headers.len(),
             "width": largest(0),
             "height": largest(1),
-            "dpi": headers.first().and_then(|first| first.dpi).map(Dpi::get),
+            "dpi": headers.first().and_then(|first| first.pitch),
             "gray": headers.iter().any(|header| header.gray),
             "digest": info.and_then(|info| stated(&info.digest)),
             "commands": info.map_or(&[][..], |info| &info.commands),
@@ -115,7 +121,7 @@ impl ViewedStack {
             "height": header.size[1],
             "gray": header.gray,
             "origin_mm": info.origin_mm,
-            "dpi": header.dpi.map(Dpi::get),
+            "dpi": header.pitch,
             "exposed_px": header.exposed_px,
             "stray_rows": pairs(bands(&info.stray_rows)),
             "fixed": pairs(fixed_bands(info)),
@@ -125,6 +131,6 @@ impl ViewedStack {
 
 /// Returns the place of a pixel's center in part coordinates, in millimeters, if it is known.
 pub(crate) fn place_mm(header: &PageHeader, x: u32, y: u32) -> Option<[f64; 2]> {
-    let ([left, top], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
-    Some([left + (f64::from(x) + 0.5) * pitch, top - (f64::from(y) + 0.5) * pitch])
+    let ([left, top], [pitch_x, pitch_y]) = (header.info.origin_mm?, header.pitch?.mm());
+    Some([left + (f64::from(x) + 0.5) * pitch_x, top - (f64::from(y) + 0.5) * pitch_y])
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use lamp_stack::{
-    Destination, Dpi, Format, GrayMask, Image, IndexedStack, Layer, LevelChange, Mask, MaskBuilder,
-    PageInfo, StackError, write_stack,
+    Destination, Format, GrayMask, Image, IndexedStack, Layer, LevelChange, Mask, MaskBuilder,
+    PageInfo, Pitch, StackError, write_stack,
 };
 use lamp_supports::FoundPixels;
 use serde_json::{Value, json};
@@ -19,13 +19,13 @@ fn stack(name: &str, layers: Vec<(PageInfo, Image)>) -> ViewedStack {
     let path = folder.path().join(name);
     let layer = |(index, (info, image)): (u32, (PageInfo, Image))| Layer {
         info: PageInfo { index, origin_mm: Some([1.0, 5.0]), ..info },
-        dpi: Dpi::new(254.0),
+        pitch: Pitch::of_dpi(254.0),
         image: image.into(),
     };
     let layers = (0..).zip(layers).map(layer).map(Ok::<_, StackError>);
     write_stack(layers, Destination::File(path.clone()), Format::Big).unwrap();
     // The file stays open.
-    ViewedStack::new(name, IndexedStack::open(&path).unwrap())
+    ViewedStack::new(name, IndexedStack::open(&path).unwrap()).unwrap()
 }
 
 fn mask(rows: [&[u32]; 3]) -> Mask {

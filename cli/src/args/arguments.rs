@@ -253,9 +253,9 @@ pub(crate) fn settings_of_machine(file: &Path) -> Result<Vec<Setting>, Exit> {
         return Err(Exit::usage("standard input is for the part: name the machine's file"));
     }
     let machine: Machine = document(file)?;
-    let Defaults { dpi, thickness, margin } = machine.slicing_defaults();
+    let Defaults { pitch, thickness, margin } = machine.slicing_defaults();
     let settings = [
-        ("dpi", dpi.map(|dpi| dpi.to_string())),
+        ("dpi", pitch.map(|pitch| pitch.to_string())),
         ("thickness", thickness.map(|thickness| thickness.to_string())),
         ("margin", margin.map(|margin| margin.to_string())),
     ];

@@ -11,7 +11,7 @@ use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::words::differing;
 use lamp_pipeline::{GrayRule, SliceFrame, SliceSettings, Thickness};
 use lamp_slicing::{PLANE_TOLERANCE, PlaneRule};
-use lamp_stack::{Dpi, Length, Size};
+use lamp_stack::{Length, Pitch, Size};
 
 use super::exposure::{EXPOSURE, ExposureArgs};
 use super::heights::{HEIGHTS, HeightArgs};
@@ -22,9 +22,10 @@ use crate::exit::Exit;
 /// Options that decide the images.
 #[derive(Args, Clone)]
 pub(crate) struct SlicingArgs {
-    /// Resolution in dots per inch
-    #[arg(long, value_name = "DPI", default_value_t = SliceSettings::default().dpi)]
-    dpi: Dpi,
+    /// Resolution in dots per inch, or how far pixels are apart: 1500, 1814x1337, 14um or 14x19um
+    #[arg(long, visible_alias = "pitch", value_name = "DPI")]
+    #[arg(default_value_t = SliceSettings::default().pitch)]
+    dpi: Pitch,
 
     /// Layer thickness, for example 100um, 0.1mm, 4mil or 0.004in
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
@@ -157,7 +158,7 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
             return Err(Exit::usage(format!("--{option} needs --adaptive")));
         }
         Ok(Self {
-            dpi: args.dpi,
+            pitch: args.dpi,
             thickness: match args.adaptive {
                 true => Thickness::Adaptive { adaptive: true, heights },
                 false => Thickness::Uniform { thickness: args.thickness },

@@ -7,7 +7,7 @@ use clap::Args;
 use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
 use lamp_slicing::brep::{Body, BodyReport, Comparison, PreparationAttempt, Prepared};
 use lamp_slicing::{SliceError, body_name, read_step};
-use lamp_stack::{Dpi, one_line};
+use lamp_stack::{Pitch, one_line};
 use serde_json::{Map, Value, json};
 
 use crate::args::solid::StepArgs;
@@ -33,8 +33,8 @@ pub(crate) struct BrepArgs {
     part: PathBuf,
 
     /// Resolution to check for; the default tolerance is a quarter of a pixel
-    #[arg(long, value_name = "DPI", default_value = "1500")]
-    dpi: Dpi,
+    #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
+    dpi: Pitch,
 
     #[command(flatten)]
     brep: StepArgs,

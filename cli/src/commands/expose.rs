@@ -348,7 +348,7 @@ impl DoseMap {
         };
         let mut info = header.info.clone();
         info.stack = exposing.stack().filter(|_| is_first);
-        let bounds = ImageBounds::of(&info, header.dpi, exposing.pages.size());
+        let bounds = ImageBounds::of(&info, header.pitch, exposing.pages.size());
         frame_page(&mut info, frame, &bounds.framed(frame));
         info.exposure_ms = Some(layer.exposure_ms * 255.0 / LEVEL_OF_EXPOSURE);
         let mut image = GrayMask::new(frame.width);
@@ -356,7 +356,7 @@ impl DoseMap {
             let runs = row.chunk_by(|a, b| a == b).map(|run| (run.len() as u32, run[0]));
             image.push_runs(runs).expect("as long as the rows");
         }
-        Layer { info, dpi: header.dpi, image: Image::Gray(image).into() }
+        Layer { info, pitch: header.pitch, image: Image::Gray(image).into() }
     }
 }
 

@@ -165,7 +165,7 @@ fn range_of(band: &Band) -> String {
 #[cfg(test)]
 mod tests {
     use lamp_fix::BandKinds;
-    use lamp_stack::{Dpi, Layer, Mask};
+    use lamp_stack::{Layer, Mask, Pitch};
 
     use super::*;
 
@@ -183,7 +183,8 @@ mod tests {
     }
 
     fn described(bands: &[Band], info: PageInfo) -> Vec<String> {
-        let layer = Layer { info, dpi: Dpi::new(254.0), image: Mask::black(500, 2000).into() };
+        let layer =
+            Layer { info, pitch: Pitch::of_dpi(254.0), image: Mask::black(500, 2000).into() };
         let fixed = Fixed { before: &layer, after: &layer, bands };
         describe(&fixed, &FixOptions::default())
     }
@@ -207,7 +208,8 @@ mod tests {
         let origin_mm = Some([20.0, 120.0]);
         let info = PageInfo { index: 812, z_um: Some(81_200.0), origin_mm, ..PageInfo::default() };
         let bands = [band(1034, 38, BandOutcome::TooWide), band(1080, 1, BandOutcome::Doubtful)];
-        let layer = Layer { info, dpi: Dpi::new(254.0), image: Mask::black(500, 2000).into() };
+        let layer =
+            Layer { info, pitch: Pitch::of_dpi(254.0), image: Mask::black(500, 2000).into() };
         let fixed = Fixed { before: &layer, after: &layer, bands: &bands };
         assert_eq!(
             describe(&fixed, &FixOptions { max_width: Some(15), ..FixOptions::default() }),

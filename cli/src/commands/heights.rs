@@ -15,7 +15,7 @@ use lamp_pipeline::heights::{HeightSettings, bound, doubts, measured, significan
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::solid::{Reading, at_part, name_of_all};
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 use serde::Serialize;
 use serde_json::json;
 
@@ -68,8 +68,8 @@ pub(crate) struct HeightsArgs {
     json: bool,
 
     /// Resolution of the images, which sets the distance between the rows that are measured
-    #[arg(long, value_name = "DPI", default_value = "1500")]
-    dpi: Dpi,
+    #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
+    dpi: Pitch,
 
     #[command(flatten)]
     solid: SolidArgs,
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     settings.check(exposure)?;
     let progress = Progress::new("heights", common, true);
     let reading =
-        Reading { dpi: args.dpi, may_be_open: false, keep_marks: false, watcher: &progress };
+        Reading { pitch: args.dpi, may_be_open: false, keep_marks: false, watcher: &progress };
     let model = solid.open(&args.parts, &reading)?;
     let body = solid.body(model.clone());
     let (files, _) = solid.files(&args.parts);

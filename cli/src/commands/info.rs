@@ -206,9 +206,9 @@ fn stack_lines(stack: &StackInfo) -> Vec<(&'static str, String)> {
 }
 
 fn resolution_text(page: &PageHeader) -> String {
-    let Some(dpi) = page.dpi else { return "not stated".to_owned() };
-    let [width, height] = page.size.map(|pixels| f64::from(pixels) * dpi.pitch().mm());
-    format!("{dpi} dpi ({width:.3} x {height:.3} mm)")
+    let Some(pitch) = page.pitch else { return "not stated".to_owned() };
+    let [[columns, rows], [x, y]] = [page.size.map(f64::from), pitch.mm()];
+    format!("{pitch:#} ({:.3} x {:.3} mm)", columns * x, rows * y)
 }
 
 fn range_text(NumberRange { least, greatest, .. }: NumberRange, unit: &str) -> String {

@@ -154,7 +154,7 @@ fn fields(machine: &Machine) -> Value {
             "swath_step_s": times.swath_step_s,
         })),
         "defaults": {
-            "dpi": defaults.dpi,
+            "dpi": defaults.pitch,
             "thickness_um": defaults.thickness.map(Length::um),
             "margin": defaults.margin,
         },
@@ -243,7 +243,7 @@ fn machine_table() -> String {
         let area = area.value.to_string();
         let height = height.map_or("unknown".to_owned(), |height| height.value.to_string());
         let any = || match &panel {
-            Some(panel) => panel.dpi().map_or("none".to_owned(), |dpi| dpi.to_string()),
+            Some(panel) => panel.pitch().map_or("none".to_owned(), |pitch| pitch.to_string()),
             None => "any".to_owned(),
         };
         let dpi = dpi.map_or_else(any, |dpi| format!("{}-{}", dpi.least, dpi.most));

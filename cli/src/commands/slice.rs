@@ -102,11 +102,12 @@ impl SliceArgs {
     ) -> Result<(), Exit> {
         let Some(path) = &self.report else { return Ok(()) };
         let trace = slicing.with_slices(|slices| slices.trace(bands))?;
-        let PixelGrid { origin_mm, dpi, .. } = slicing.with_slices(|slices| Ok(*slices.grid()))?;
+        let PixelGrid { origin_mm, pitch, .. } =
+            slicing.with_slices(|slices| Ok(*slices.grid()))?;
         let SliceStage { parts, settings, .. } = stage;
         let files = parts.iter().map(PartFile::file).collect();
         let fill = settings.solid.fill.name();
         let subject = MeshReport { files, fill, counts: slicing.counts() };
-        subject.write(&trace, RowPositions { top_mm: origin_mm[1], dpi }, path)
+        subject.write(&trace, RowPositions { top_mm: origin_mm[1], pitch }, path)
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lamp_pipeline::slice::Counts;
 use lamp_slicing::{EdgeFacet, Facet, FaultyEdge, OpenEnd, Trace, TracedBand};
-use lamp_stack::Dpi;
+use lamp_stack::Pitch;
 use lamp_stack::to_nm;
 use serde::Serialize;
 
@@ -57,7 +57,7 @@ struct EndLine {
 pub(crate) struct RowPositions {
     /// The top of the first row.
     pub(crate) top_mm: f64,
-    pub(crate) dpi: Dpi,
+    pub(crate) pitch: Pitch,
 }
 
 impl MeshReport<'_> {
@@ -86,7 +86,7 @@ fn edge_line((edge, FaultyEdge { ends, facets }): (usize, &FaultyEdge)) -> EdgeL
 }
 
 fn band_line(TracedBand { band, plane, ends }: &TracedBand, rows: RowPositions) -> BandLine {
-    let y_mm = |row: u32| to_nm(rows.top_mm - f64::from(row) * rows.dpi.pitch().mm());
+    let y_mm = |row: u32| to_nm(rows.top_mm - f64::from(row) * rows.pitch.y.pitch().mm());
     let end = |OpenEnd { at_mm, edges }: &OpenEnd| EndLine {
         at_mm: at_mm.map(to_nm),
         edges: edges.clone(),

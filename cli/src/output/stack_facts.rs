@@ -1,6 +1,6 @@
 //! The facts of a stack as `info` and `verify` give them to scripts.
 
-use lamp_stack::{Compression, Dpi, NumberRange, StackInfo, StackTotals};
+use lamp_stack::{Compression, NumberRange, Pitch, StackInfo, StackTotals};
 use serde::Serialize;
 
 use lamp_stack::to_nm;
@@ -18,7 +18,7 @@ pub(crate) struct StackFacts<'a> {
     width_px: u32,
     height_px: u32,
     one_size: bool,
-    dpi: Option<f64>,
+    dpi: Option<Pitch>,
     bottom_mm: Option<f64>,
     top_mm: Option<f64>,
     thickness_um: Option<[f64; 2]>,
@@ -50,7 +50,7 @@ impl<'a> StackFacts<'a> {
             width_px: first.size[0],
             height_px: first.size[1],
             one_size: totals.one_size,
-            dpi: first.dpi.map(Dpi::get),
+            dpi: first.pitch,
             // To the nanometer: the digits beyond are rounding of sums.
             bottom_mm: first.info.z().map(|z| to_nm(z.mm())),
             top_mm: totals.top_mm().map(to_nm),

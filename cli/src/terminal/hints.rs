@@ -200,6 +200,9 @@ fn tile(error: &TileError) -> Option<String> {
         TileError::WideMoat { .. } => "give a smaller --clearance, or --mesh none",
         TileError::TooManyRuns { .. } => "place fewer copies",
         TileError::Resolutions { .. } => "slice the parts at one resolution",
+        TileError::NotSquare { .. } => {
+            "give --mesh none, and no --turns quarters or turn of 90 degrees"
+        }
         TileError::Changed { .. } => "run tile again",
         TileError::Overlap { .. } => {
             "move one of them, or give --fit if only their black margins do"

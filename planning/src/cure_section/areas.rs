@@ -133,7 +133,7 @@ fn clip(solid: &[[f64; 2]], heights_um: &Range<f64>) -> SolidHeights {
 #[cfg(test)]
 mod tests {
     use lamp_grayscale::material::Material;
-    use lamp_stack::{Catalogued, Dpi, Layer, Mask, PageInfo};
+    use lamp_stack::{Catalogued, Layer, Mask, PageInfo, Pitch};
 
     use super::*;
     use crate::cure_section::SectionPlane;
@@ -149,7 +149,7 @@ mod tests {
                 exposure_ms: Some(ms),
                 ..PageInfo::default()
             };
-            Layer { info, dpi: Dpi::new(254.0), image: Mask::black(4, 4).inverted().into() }
+            Layer { info, pitch: Pitch::of_dpi(254.0), image: Mask::black(4, 4).inverted().into() }
         })
     }
 

@@ -64,7 +64,8 @@ impl SectionLine {
     /// misses its image.
     pub fn new(plane: SectionPlane, layer: &Layer) -> Result<Self, CureSectionError> {
         let corner_mm = layer.info.origin_mm.ok_or(CureSectionError::NoPosition)?;
-        let dpi = layer.dpi.ok_or(CureSectionError::NoResolution)?;
+        let pitch = layer.pitch.ok_or(CureSectionError::NoResolution)?;
+        let dpi = pitch.square("cured sections need")?;
         let [x0, y1] = corner_mm;
         let pitch = dpi.pitch().mm();
         let image = &layer.image;
@@ -136,7 +137,7 @@ impl SectionLine {
                 placement,
                 fill: options.fill,
                 z,
-                dpi: self.dpi,
+                pitch: self.dpi.into(),
                 top_mm,
                 rows: self.pixels,
             },

@@ -1,7 +1,7 @@
 //! Gathers the data of a stack's pages that planners of times need.
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_stack::{Change, Dpi, Image, Layer, Length, RunImage};
+use lamp_stack::{Change, Dpi, Image, Layer, Length, NotSquare, RunImage};
 use thiserror::Error;
 
 use crate::light::{LayerLight, LayerTime, Light, LightError};
@@ -38,6 +38,9 @@ pub enum PartError {
     /// A page does not state its resolution.
     #[error("{0} does not state its resolution")]
     NoResolution(String),
+    /// The pixels of a page are not square.
+    #[error("{0}: {1}")]
+    NotSquare(String, NotSquare),
     /// A page does not state its height and thickness.
     #[error("{0} does not state its height and thickness")]
     NoThickness(String),
@@ -74,7 +77,8 @@ impl PartPages {
     /// number is not above zero, or if its image differs from the first in size or resolution.
     pub fn push(&mut self, layer: Layer) -> Result<(), PartError> {
         let name = || layer.info.name();
-        let dpi = layer.dpi.ok_or_else(|| PartError::NoResolution(name()))?;
+        let pitch = layer.pitch.ok_or_else(|| PartError::NoResolution(name()))?;
+        let dpi = pitch.square("plans need").map_err(|why| PartError::NotSquare(name(), why))?;
         let heights = layer.info.z_um.zip(layer.info.thickness_um);
         let (z_um, thickness_um) = heights.ok_or_else(|| PartError::NoThickness(name()))?;
         let positive = |number: f64| number > 0.0 && number.is_finite();

@@ -3,7 +3,9 @@
 use std::io;
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_stack::{Dpi, GrayMask, Image, Layer, Length, Mask, PageInfo, white_runs};
+use lamp_stack::{
+    Dpi, GrayMask, Image, Layer, Length, Mask, NotSquare, PageInfo, Pitch, white_runs,
+};
 use thiserror::Error;
 
 use crate::blur::Blur;
@@ -39,6 +41,14 @@ pub enum VoxelPlanError {
         layer: String,
         /// The number that it lacks.
         what: &'static str,
+    },
+    /// The pixels of a page are not square.
+    #[error("{layer}: {why}")]
+    NotSquare {
+        /// The layer's name.
+        layer: String,
+        /// Its pitch.
+        why: NotSquare,
     },
     /// A page states a number that is not above zero.
     #[error("{layer} states {what} that is not above zero")]
@@ -121,7 +131,10 @@ impl PageStatements {
         let name = || layer.info.name();
         let size = [layer.image.width(), layer.image.height()];
         let silent = |what| VoxelPlanError::Silent { layer: name(), what };
-        let dpi = layer.dpi.ok_or_else(|| silent("resolution"))?;
+        let pitch = layer.pitch.ok_or_else(|| silent("resolution"))?;
+        let dpi = pitch
+            .square("plans need")
+            .map_err(|why| VoxelPlanError::NotSquare { layer: name(), why })?;
         if *self.size.get_or_insert(size) != size || *self.dpi.get_or_insert(dpi) != dpi {
             return Err(VoxelPlanError::Unlike { layer: name() });
         }
@@ -262,7 +275,8 @@ impl VoxelPlan {
         self.ascent.add(setting, layer, &prices, &wanted);
         let page = self.pages.infos.len() - 1 - layer;
         let image = self.image(layer)?;
-        Ok(Layer { info: self.pages.infos[page].clone(), dpi: self.pages.dpi, image: image.into() })
+        let (info, pitch) = (self.pages.infos[page].clone(), self.pages.dpi.map(Pitch::from));
+        Ok(Layer { info, pitch, image: image.into() })
     }
 
     fn image(&mut self, layer: usize) -> io::Result<Image> {

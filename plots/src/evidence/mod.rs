@@ -7,7 +7,7 @@ mod side_view;
 use std::io::{self, Write};
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Mask, combine_rows, format_significant, white_runs};
+use lamp_stack::{Mask, Pitch, combine_rows, format_significant, white_runs};
 use lamp_supports::{
     Findings, FoundPixels, Region, Shown, ShownMoment, component_at, inner_components,
 };
@@ -138,7 +138,7 @@ impl<'a> EvidencePicture<'a> {
         let mut panels = self.panels.into_iter();
         let first: Vec<Panel> = panels.by_ref().take(2).collect();
         for panel in first.into_iter().chain([side_view]).chain(panels) {
-            drawn.push(panel.drawn(self.findings.dpi)?);
+            drawn.push(panel.drawn(self.findings.pitch)?);
         }
         // The place at the left, the whole layer and the side view next to it, others where there is room.
         let (mut column_of, mut bottoms) = (Vec::new(), [0; 2]);
@@ -262,9 +262,9 @@ impl Panel {
         Self { title: "the whole layer".to_owned(), raster, scale: picture.scale() }
     }
 
-    fn drawn(self, dpi: Option<Dpi>) -> io::Result<Raster> {
+    fn drawn(self, pitch: Option<Pitch>) -> io::Result<Raster> {
         let title = text(&self.title)?;
-        let (length, words) = scale_bar(dpi, self.scale, f64::from(self.raster.width));
+        let (length, words) = scale_bar(pitch, self.scale, f64::from(self.raster.width));
         let words = text(&words)?;
         let width = self.raster.width.max(title.width).max(length + 8 + words.width);
         let below = CAPTION_HEIGHT + self.raster.height;
@@ -294,9 +294,9 @@ fn paint_found(
 
 /// Returns the length and the words of a scale of one, two or five of a unit, about a third of a
 /// picture's width, given the pixels of the picture for one of a layer.
-fn scale_bar(dpi: Option<Dpi>, scale: f64, width: f64) -> (u32, String) {
-    let (unit, name) = match dpi {
-        Some(dpi) => (scale / dpi.pitch().mm(), "mm"),
+fn scale_bar(pitch: Option<Pitch>, scale: f64, width: f64) -> (u32, String) {
+    let (unit, name) = match pitch {
+        Some(pitch) => (scale / pitch.x.pitch().mm(), "mm"),
         None => (scale, "pixels"),
     };
     let most = (width / 3.0).max(1.0) / unit;

@@ -40,7 +40,7 @@ impl SideView {
             true => (around(&whole.columns, width), shown.at[1]),
             false => (around(&whole.rows, height), shown.at[0]),
         };
-        let pitch_um = findings.dpi.map(|dpi| dpi.pitch().um());
+        let pitch_um = findings.pitch.map(|pitch| pitch.x.pitch().um());
         let mut top = 0.0;
         let all: Vec<[f64; 2]> = findings
             .layers

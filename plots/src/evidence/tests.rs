@@ -13,7 +13,7 @@ fn layers(rectangles: &[&[[u32; 4]]]) -> Vec<Layer> {
             mask.push_row(&ends).unwrap();
         }
         let info = PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(254.0), image: mask.finish().into() }
+        Layer { info, pitch: Pitch::of_dpi(254.0), image: mask.finish().into() }
     };
     (0..).zip(rectangles).map(layer).collect()
 }
@@ -72,7 +72,7 @@ fn a_cantilever_shows_from_the_side() {
 
 #[test]
 fn a_scale_is_one_two_or_five_of_its_unit() {
-    let dpi = Dpi::new(254.0);
+    let dpi = Pitch::of_dpi(254.0);
     assert_eq!(scale_bar(dpi, 1.0, 480.0), (100, "10 mm".to_owned()));
     assert_eq!(scale_bar(dpi, 8.0, 480.0), (160, "2 mm".to_owned()));
     assert_eq!(scale_bar(dpi, 0.1, 300.0), (100, "100 mm".to_owned()));

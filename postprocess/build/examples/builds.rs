@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use lamp_build::{FreeTurns, Layout, Pack, PackBy, PartStack, TileError, TurnedPlan, Turns};
 use lamp_fixtures::Plate;
-use lamp_stack::{Dpi, Image, Layer, Length, PageInfo};
+use lamp_stack::{Image, Layer, Length, PageInfo, Pitch};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut words = std::env::args().skip(1);
@@ -47,7 +47,7 @@ fn tell(plate: Plate, turns: &str, layout: &Layout, start: Instant) {
 fn part(plate: Plate, dpi: f64) -> Result<PartStack, TileError> {
     let image = Image::Mask(plate.mask(25.4 / dpi));
     let info = PageInfo { origin_mm: Some([0.0; 2]), ..PageInfo::default() };
-    let layer = Layer { info, dpi: Dpi::new(dpi), image: image.into() };
+    let layer = Layer { info, pitch: Pitch::of_dpi(dpi), image: image.into() };
     let outline = PartStack::of_outline(plate.name(), std::iter::once(Ok::<_, TileError>(layer)))?;
     Ok(outline.expect("a layer"))
 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use lamp_build::{Layout, Pack, PackBy, PartStack, TileError, Turns};
 use lamp_fixtures::Plate;
-use lamp_stack::{Dpi, Image, Layer, Length, PageInfo};
+use lamp_stack::{Image, Layer, Length, PageInfo, Pitch};
 
 /// A plate, its scale and the number of its copies.
 type Share = (Plate, f64, u32);
@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Returns a plate as one layer.
 fn part((plate, scale, _): &Share, dpi: f64) -> Result<PartStack, TileError> {
     let image = Image::Mask(plate.mask(25.4 / dpi / scale));
-    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(dpi), image: image.into() };
+    let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(dpi), image: image.into() };
     let outline = PartStack::of_outline(plate.name(), std::iter::once(Ok::<_, TileError>(layer)))?;
     Ok(outline.expect("a layer"))
 }

@@ -1,6 +1,6 @@
 //! How many pixels the parts and the mesh of each layer of a build have.
 
-use lamp_stack::{Dpi, Image, Layer};
+use lamp_stack::{Image, Layer, Pitch};
 
 use super::part_stack::white_of;
 
@@ -80,13 +80,13 @@ impl CuredPixels {
     }
 
     /// Returns their area in square millimeters, added up over all layers.
-    pub fn area_mm2(&self, dpi: Dpi) -> f64 {
-        self.pixels as f64 * dpi.pitch().mm().powi(2)
+    pub fn area_mm2(&self, pitch: Pitch) -> f64 {
+        self.pixels as f64 * pitch.pixel_mm2()
     }
 
     /// Returns their volume in cubic millimeters, if all thicknesses are known.
-    pub fn volume_mm3(&self, dpi: Dpi) -> Option<f64> {
+    pub fn volume_mm3(&self, pitch: Pitch) -> Option<f64> {
         // Thicknesses are in micrometers, areas in square millimeters.
-        Some(self.pixel_um? * dpi.pitch().mm().powi(2) / 1000.0)
+        Some(self.pixel_um? * pitch.pixel_mm2() / 1000.0)
     }
 }

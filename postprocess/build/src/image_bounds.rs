@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Frame, Length, Orientation, PageInfo};
+use lamp_stack::{Frame, Orientation, PageInfo, Pitch};
 
 /// The rectangle that a stack's images cover in the part's coordinates.
 ///
@@ -12,7 +12,7 @@ pub struct ImageBounds {
     /// The top left corner, in millimeters.
     pub origin_mm: [f64; 2],
     /// The resolution, if it is known.
-    pub dpi: Option<Dpi>,
+    pub pitch: Option<Pitch>,
     /// The number of columns.
     pub width: u32,
     /// The number of rows.
@@ -22,10 +22,10 @@ pub struct ImageBounds {
 impl ImageBounds {
     /// Returns the bounds of an image of that many columns and rows. If its page does not state
     /// them, the lower left corner is 0, 0.
-    pub fn of(info: &PageInfo, dpi: Option<Dpi>, [width, height]: [u32; 2]) -> Self {
-        let height_mm = dpi.map_or(0.0, |dpi| f64::from(height) * dpi.pitch().mm());
+    pub fn of(info: &PageInfo, pitch: Option<Pitch>, [width, height]: [u32; 2]) -> Self {
+        let height_mm = f64::from(height) * pitch.map_or(0.0, |pitch| pitch.y.pitch().mm());
         let origin_mm = info.origin_mm.unwrap_or([0.0, height_mm]);
-        Self { origin_mm, dpi, width, height }
+        Self { origin_mm, pitch, width, height }
     }
 
     /// Makes a page say that its image lies here, if it says where it lies.
@@ -42,10 +42,10 @@ impl ImageBounds {
 
     /// Returns the bounds of a frame of the image.
     pub fn framed(&self, frame: Frame) -> Self {
-        let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
+        let [pitch_x, pitch_y] = self.pitch_mm();
         let [x0, y1] = self.origin_mm;
         Self {
-            origin_mm: [x0 + frame.left as f64 * pitch, y1 - frame.top as f64 * pitch],
+            origin_mm: [x0 + frame.left as f64 * pitch_x, y1 - frame.top as f64 * pitch_y],
             width: frame.width,
             height: frame.height,
             ..*self
@@ -54,9 +54,9 @@ impl ImageBounds {
 
     /// Returns the bounds after the part is turned about x = y = 0.
     pub fn turned(&self, turn: Orientation) -> Self {
-        let pitch = self.dpi.map_or(0.0, |dpi| dpi.pitch().mm());
         let [mut x0, mut y1] = self.origin_mm;
-        let [mut width, mut height] = [self.width, self.height].map(|side| f64::from(side) * pitch);
+        let [mut width, mut height] = self.size_mm();
+        let mut pitch = self.pitch;
         if turn.is_mirrored() {
             // In the mirror x = 0 the right edge becomes the left one.
             x0 = -(x0 + width);
@@ -66,18 +66,27 @@ impl ImageBounds {
             // and the right edge the top.
             (x0, y1) = (-y1, x0 + width);
             (width, height) = (height, width);
+            pitch = pitch.map(Pitch::turned);
         }
         let (width, height) = turn.size(self.width, self.height);
-        Self { origin_mm: [x0, y1], width, height, ..*self }
+        Self { origin_mm: [x0, y1], pitch, width, height }
+    }
+
+    fn pitch_mm(&self) -> [f64; 2] {
+        self.pitch.map_or([0.0; 2], Pitch::mm)
+    }
+
+    fn size_mm(&self) -> [f64; 2] {
+        let [x, y] = self.pitch_mm();
+        [f64::from(self.width) * x, f64::from(self.height) * y]
     }
 }
 
 impl fmt::Display for ImageBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let pitch = self.dpi.map_or(Length::default(), Dpi::pitch).mm();
         let [x, y] = self.origin_mm;
-        let (right, bottom) =
-            (x + f64::from(self.width) * pitch, y - f64::from(self.height) * pitch);
+        let [width, height] = self.size_mm();
+        let (right, bottom) = (x + width, y - height);
         write!(f, "x {x:.3} to {right:.3} and y {bottom:.3} to {y:.3} mm")
     }
 }
@@ -87,7 +96,7 @@ mod tests {
     use super::*;
 
     fn place(origin_mm: [f64; 2], width: u32, height: u32) -> ImageBounds {
-        ImageBounds { origin_mm, dpi: Dpi::new(25.4), width, height }
+        ImageBounds { origin_mm, pitch: Pitch::of_dpi(25.4), width, height }
     }
 
     #[test]

@@ -318,7 +318,7 @@ mod tests {
                 ..PageInfo::default()
             };
             z += thickness;
-            Ok(Layer { info, dpi: None, image: Mask::black(1, 1).into() })
+            Ok(Layer { info, pitch: None, image: Mask::black(1, 1).into() })
         };
         (0..).zip(thicknesses).map(layer).collect()
     }

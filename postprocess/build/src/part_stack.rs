@@ -28,11 +28,15 @@ impl PartStack {
     /// layout files use its `name`.
     ///
     /// # Errors
-    /// Returns an error if the layer has no resolution.
+    /// Returns an error if the layer has no resolution, or pixels that are not square.
     pub fn of_image(name: &str, first: &Layer) -> Result<Self, TileError> {
         let name = name.to_owned();
-        let Some(dpi) = first.dpi else {
+        let Some(pitch) = first.pitch else {
             return Err(TileError::NoResolution { name, layer: first.info.name() });
+        };
+        let dpi = match pitch.square("builds need") {
+            Ok(dpi) => dpi,
+            Err(why) => return Err(TileError::NotSquare { name, why }),
         };
         let image = PixelSize::of(&first.image);
         let frame = Frame { left: 0, top: 0, width: image.width, height: image.height };
@@ -169,7 +173,7 @@ impl PartStack {
             let layer = layer.info.name();
             return Err(TileError::OtherSize { name, layer, found, expected: self.image });
         }
-        if layer.dpi != Some(self.dpi) {
+        if layer.pitch != Some(self.dpi.into()) {
             return Err(TileError::OtherResolution { name, layer: layer.info.name() });
         }
         Ok(())

@@ -93,7 +93,7 @@ impl Layout {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::{Dpi, Image, Layer, PageInfo};
+    use lamp_stack::{Image, Layer, PageInfo, Pitch};
 
     use super::super::testing::mask_of;
     use super::*;
@@ -102,7 +102,8 @@ mod tests {
     fn part(outline: bool) -> PartStack {
         let image =
             Image::Mask(mask_of(&["........", ".##.....", ".##.....", ".####...", "........"]));
-        let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image: image.into() };
+        let layer =
+            Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(25.4), image: image.into() };
         if outline {
             PartStack::of_outline("l.tif", std::iter::once(Ok::<_, TileError>(layer)))
                 .unwrap()

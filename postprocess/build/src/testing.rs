@@ -1,6 +1,6 @@
 //! Images as text, for the tests of tiling.
 
-use lamp_stack::{Dpi, Image, Layer, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Image, Layer, Mask, MaskBuilder, PageInfo, Pitch};
 
 /// An image of rows of `#` and `.`.
 pub(super) fn mask_of(rows: &[&str]) -> Mask {
@@ -21,5 +21,5 @@ pub(super) fn layer(index: u32, image: Image) -> Layer {
         thickness_um: Some(100.0),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(25.4), image: image.into() }
+    Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() }
 }

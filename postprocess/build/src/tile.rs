@@ -47,10 +47,10 @@ impl Default for TileOptions {
 ///
 /// ```
 /// use lamp_build::{TileError, TileOptions, tile};
-/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+/// use lamp_stack::{Pitch, Image, Layer, Mask, PageInfo};
 ///
 /// let image = Image::Mask(Mask::black(30, 20).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(254.0), image: image.into() };
 /// let layers = std::iter::once(Ok::<_, TileError>(layer));
 ///
 /// // At 254 dpi, 10 pixels are a millimetre: three columns and four rows of copies.
@@ -259,7 +259,7 @@ impl Layout {
     pub(crate) fn layer(&self, step: &MeshedStep, image: bool) -> Result<Layer, TileError> {
         let info = self.page(&step.set, step.is_first)?;
         let image = if image { self.image(step)? } else { Image::Mask(Mask::black(0, 0)) };
-        Ok(Layer { info, dpi: Some(self.dpi), image: image.into() })
+        Ok(Layer { info, pitch: Some(self.dpi.into()), image: image.into() })
     }
 
     /// Adds the mesh to the parts' layers at a height.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Length, Size};
+use lamp_stack::{Dpi, Length, NotSquare, Size};
 use thiserror::Error;
 
 use super::PixelSize;
@@ -117,6 +117,14 @@ pub enum TileError {
         name: String,
         /// The layer.
         layer: String,
+    },
+    /// The pixels of a part are not square.
+    #[error("{name}: {why}")]
+    NotSquare {
+        /// The part.
+        name: String,
+        /// Its pitch.
+        why: NotSquare,
     },
     /// A layer's size differs from the first layer's.
     #[error(

@@ -1,5 +1,5 @@
 use lamp_stack::{
-    Dpi, Frame, GrayMask, Image, Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Size,
+    Frame, GrayMask, Image, Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Pitch, Size,
     StackInfo,
 };
 use proptest::prelude::*;
@@ -54,7 +54,7 @@ fn what_does_not_fit_is_said() {
     assert!(error("31x100mm", None).contains("32 x 20 pixels"));
     assert!(error("100x50mm", Some(7)).contains("only 6 fit"));
     assert!(error("1e7x1e7in", None).contains("2^26 pixels"));
-    let foreign = Layer { dpi: None, ..black(1, 1) };
+    let foreign = Layer { pitch: None, ..black(1, 1) };
     let refused = tiled(foreign, &options("9x9mm", None, 1.0));
     assert!(matches!(refused, Err(TileError::NoResolution { .. })));
 }
@@ -68,7 +68,7 @@ fn layers_unlike_the_first_are_refused() {
         build.next().unwrap().unwrap_err()
     };
     assert!(matches!(second(black(32, 21)), TileError::OtherSize { .. }));
-    let other = Layer { dpi: Dpi::new(50.8), ..black(32, 20) };
+    let other = Layer { pitch: Pitch::of_dpi(50.8), ..black(32, 20) };
     assert!(matches!(second(other), TileError::OtherResolution { .. }));
 }
 

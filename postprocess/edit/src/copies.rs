@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     const PLACE: ImageBounds =
-        ImageBounds { origin_mm: [0.0, 9.0], dpi: None, width: 40, height: 30 };
+        ImageBounds { origin_mm: [0.0, 9.0], pitch: None, width: 40, height: 30 };
 
     fn info(tile: Value) -> PageInfo {
         let mut stack = StackInfo { part: "blade".to_owned(), ..StackInfo::default() };

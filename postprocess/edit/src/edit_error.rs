@@ -1,7 +1,7 @@
 //! Errors of reading a list of edits and of making them.
 
 use lamp_build::ImageBounds;
-use lamp_stack::{Dpi, OrientationError, StackError};
+use lamp_stack::{NotSquare, OrientationError, Pitch, StackError};
 use thiserror::Error;
 
 use super::serials::ListProblem;
@@ -42,6 +42,9 @@ pub enum EditError {
     /// The pages do not say how large pixels are, so lengths mean nothing.
     #[error("the stack has no resolution, so lengths have no meaning in it")]
     NoResolution,
+    /// Its pixels are not square.
+    #[error("the stack cannot be edited: {0}")]
+    NotSquare(#[from] NotSquare),
     /// A layer's size, place or resolution differs from the first layer's.
     #[error("{layer} differs in size, place or resolution from the first layer: a stack has one")]
     Unlike {
@@ -192,9 +195,9 @@ pub enum EditProblem {
         /// The other stack.
         stack: String,
         /// Its resolution.
-        found: Option<Dpi>,
+        found: Option<Pitch>,
         /// The edited stack's resolution.
-        edited: Option<Dpi>,
+        edited: Option<Pitch>,
     },
     /// Only one of the two stacks says where its images lie.
     #[error("{stack} and the stack that is edited do not both say where they lie")]
@@ -305,6 +308,6 @@ impl LayerProblem {
     }
 }
 
-fn resolution(dpi: Option<Dpi>) -> String {
-    dpi.map_or("no resolution".to_owned(), |dpi| format!("{dpi} dpi"))
+fn resolution(pitch: Option<Pitch>) -> String {
+    pitch.map_or("no resolution".to_owned(), |pitch| format!("{pitch:#}"))
 }

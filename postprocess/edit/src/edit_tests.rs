@@ -1,6 +1,6 @@
 //! Whole lists of edits against a referee that looks at each pixel.
 
-use lamp_stack::{Dpi, GrayMask, Image, Layer, Mask, MaskBuilder, Op, PageInfo, StackInfo};
+use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, Op, PageInfo, Pitch, StackInfo};
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -20,7 +20,7 @@ fn layer(index: u32, image: Image) -> Layer {
         stack: (index == 0).then_some(stack),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(25.4), image: image.into() }
+    Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() }
 }
 
 /// The middle of a pixel and its layer, in millimeters.
@@ -570,7 +570,7 @@ fn what_would_be_lost_or_cannot_be_is_refused() {
         );
     }
     let mut coarse = bars(1);
-    coarse[0].dpi = Dpi::new(50.8);
+    coarse[0].pitch = Pitch::of_dpi(50.8);
     assert!(error(bars(1), union, vec![coarse.clone()]).contains("50.8 dpi"));
     coarse.splice(0..0, bars(1));
     coarse[1].info.index = 1;

@@ -34,9 +34,10 @@ pub(super) fn frame_of(
     name: &str,
 ) -> Result<Frame, EditProblem> {
     let stack = name.to_owned();
-    let from = ImageBounds::of(&other.info, other.dpi, [other.image.width(), other.image.height()]);
-    if from.dpi != place.dpi {
-        let (found, edited) = (from.dpi, place.dpi);
+    let from =
+        ImageBounds::of(&other.info, other.pitch, [other.image.width(), other.image.height()]);
+    if from.pitch != place.pitch {
+        let (found, edited) = (from.pitch, place.pitch);
         return Err(EditProblem::OtherResolution { stack, found, edited });
     }
     if other.info.origin_mm.is_some() != info.origin_mm.is_some() {

@@ -50,11 +50,11 @@ use plan::EditPlan;
 ///
 /// ```
 /// use lamp_edit::{EditError, Edits, edit};
-/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+/// use lamp_stack::{Pitch, Image, Layer, Mask, PageInfo};
 ///
 /// // At 25.4 dpi a pixel is a millimetre, and the lower left corner is 0, 0.
 /// let image = Image::Mask(Mask::black(8, 4).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(25.4), image: image.into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(25.4), image: image.into() };
 /// let list = r#"
 ///     [[edit]]
 ///     op = "subtract"

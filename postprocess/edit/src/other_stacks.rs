@@ -51,7 +51,7 @@ impl<E: From<EditError>> AlignedStack<E> {
         self.current = self.layers.next().transpose()?.map(Arc::new);
         let Some(layer) = &self.current else { return Ok(()) };
         let place =
-            ImageBounds::of(&layer.info, layer.dpi, [layer.image.width(), layer.image.height()]);
+            ImageBounds::of(&layer.info, layer.pitch, [layer.image.width(), layer.image.height()]);
         // The plan has one frame for all layers, from the first.
         if *self.place.get_or_insert(place) != place {
             let layer = format!("{}: {}", self.name, layer.info.name());

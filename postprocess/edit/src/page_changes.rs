@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     const PLACE: ImageBounds =
-        ImageBounds { origin_mm: [7.0, 8.0], dpi: None, width: 5, height: 6 };
+        ImageBounds { origin_mm: [7.0, 8.0], pitch: None, width: 5, height: 6 };
 
     fn info() -> PageInfo {
         let mut stack = StackInfo::default();

@@ -1,6 +1,6 @@
 //! Patterns against the same shapes written one by one, and against turned images.
 
-use lamp_stack::{Dpi, Image, Layer, Mask, MaskBuilder, Op, Orientation, PageInfo};
+use lamp_stack::{Image, Layer, Mask, MaskBuilder, Op, Orientation, PageInfo, Pitch};
 use proptest::prelude::*;
 
 use super::*;
@@ -16,7 +16,7 @@ fn layer(index: u32, mask: Mask) -> Layer {
         origin_mm: Some([-20.0, 20.0]),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(25.4), image: Image::Mask(mask).into() }
+    Layer { info, pitch: Pitch::of_dpi(25.4), image: Image::Mask(mask).into() }
 }
 
 fn mask(layer: &Layer) -> &Mask {
@@ -263,7 +263,7 @@ fn ten_thousand_holes_are_as_many_as_one_a_hundred_times_a_hundred() {
         ..PageInfo::default()
     };
     let white = Mask::black(1000, 1000).inverted();
-    let layer = Layer { info, dpi: Dpi::new(25.4), image: Image::Mask(white).into() };
+    let layer = Layer { info, pitch: Pitch::of_dpi(25.4), image: Image::Mask(white).into() };
     let left = |repeat: &str| {
         let list = format!(
             "[[edit]]\nop = \"subtract\"\nstrut = {{ from = [\"4.3mm\", \"4.2mm\", \"-3mm\"], \

@@ -16,9 +16,9 @@ impl PixelMap {
     /// Returns the map from points of the part to an image's pixels.
     ///
     /// # Errors
-    /// Returns an error if the resolution is not known.
+    /// Returns an error if the resolution is not known, or pixels are not square.
     pub(super) fn of(image: &ImageBounds) -> Result<Self, EditError> {
-        let dpi = image.dpi.ok_or(EditError::NoResolution)?;
+        let dpi = image.pitch.ok_or(EditError::NoResolution)?.square("edits need")?;
         Ok(Self { origin_mm: image.origin_mm, dpi })
     }
 
@@ -26,9 +26,8 @@ impl PixelMap {
     /// from the first coordinate on have their centers at or right of the point, rows from
     /// the second on at or below it.
     pub(super) fn to_pixels(self, [x_mm, y_mm]: [f64; 2]) -> [f64; 2] {
-        // dpi / 25.4 pixels a millimeter, as dpi 5 / 127: 25.4 is not exact in binary, 5 and 127
-        // are. So a point on a pixel's center gives a whole number.
-        let pixels = |mm: f64| mm * (self.dpi.get() * 5.0) / 127.0 - 0.5;
+        let [pixels, of_mm] = self.dpi.pixels_in_mm();
+        let pixels = |mm: f64| mm * pixels / of_mm - 0.5;
         let [x0, y1] = self.origin_mm;
         [pixels(x_mm - x0), pixels(y1 - y_mm)]
     }

@@ -92,8 +92,11 @@ impl EditPlan {
         others: &mut [AlignedStack<E>],
         pictures: &mut [OtherPicture<E>],
     ) -> Result<Self, E> {
+        if let Some(pitch) = first.pitch() {
+            pitch.square("edits need").map_err(EditError::from)?;
+        }
         let mut plan = Self {
-            place: ImageBounds::of(first.info(), first.dpi(), first.size()),
+            place: ImageBounds::of(first.info(), first.pitch(), first.size()),
             steps: Vec::new(),
             command: String::new(),
         };
@@ -150,7 +153,7 @@ impl EditPlan {
         others: &[Option<Arc<Layer>>],
     ) -> Result<(PassingLayer, Vec<usize>), EditError> {
         // The planned pixels are right in this rectangle only.
-        if ImageBounds::of(layer.info(), layer.dpi(), layer.size()) != self.place {
+        if ImageBounds::of(layer.info(), layer.pitch(), layer.size()) != self.place {
             return Err(EditError::Unlike { layer: layer.info().name() });
         }
         let (mut others, mut done) = (others.iter(), Vec::new());
@@ -162,11 +165,11 @@ impl EditPlan {
             let other = other.and_then(Option::as_deref);
             if step.is_for(layer.info())? {
                 if !step.keeps_images_of(layer.size()) {
-                    let Layer { info, dpi, image } = layer.decode()?;
+                    let Layer { info, pitch, image } = layer.decode()?;
                     let image = step.of_image(&image, &info, other)?;
                     let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
                     let image = image.ok_or_else(too_many)?.into();
-                    layer = Layer { info, dpi, image }.into();
+                    layer = Layer { info, pitch, image }.into();
                 }
                 step.follow(layer.info_mut())?;
                 done.push(k);

@@ -83,17 +83,17 @@ impl Solid {
         runs: &mut RunSet,
     ) {
         let columns = |start: u32, end: u32| [start, end].map(f64::from);
-        let dpi = part.dpi.expect("shapes are drawn in known resolutions");
+        let pitch = part.pitch.expect("shapes are drawn in known resolutions");
         let size = [part.width, part.height];
         match self {
             Self::Lying(cylinder) => {
                 runs.add_polygons(&[rectangle(section(*cylinder, height), grid, &Motion::NONE)]);
             }
             Self::Strut(strut) => strut
-                .section(height, part.origin_mm, dpi, size)
+                .section(height, part.origin_mm, pitch, size)
                 .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Cone(cone) => cone
-                .section(height, part.origin_mm, dpi, size)
+                .section(height, part.origin_mm, pitch, size)
                 .for_each(|(row, start, end)| runs.add(row, columns(start, end))),
             Self::Sphere(Sphere { at: [x, y, z], diameter }) => {
                 let [radius, off] = [diameter.um() / 2.0, height.um() - z.um()];

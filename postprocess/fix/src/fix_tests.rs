@@ -61,7 +61,7 @@ fn whole(shape: ShapeCrossings) -> Mask {
 
 fn layer(index: u32, mask: Mask) -> Layer {
     let info = PageInfo { index, ..PageInfo::default() };
-    Layer { info, dpi: None, image: mask.into() }
+    Layer { info, pitch: None, image: mask.into() }
 }
 
 fn fixed(layers: Vec<impl Into<PassingLayer>>, options: FixOptions) -> (Vec<Layer>, Vec<Band>) {
@@ -445,7 +445,7 @@ fn gray_rows_take_the_levels_of_the_good_rows_along_new_edges() {
         let rows = 140..146;
         let stray = gray_bars(|row| if rows.contains(&row) { missed } else { &[] });
         let image = Image::Gray(stray);
-        let stray = Layer { info: PageInfo::default(), dpi: None, image: image.into() };
+        let stray = Layer { info: PageInfo::default(), pitch: None, image: image.into() };
         let (layers, bands) = fixed(vec![stray], FixOptions::default());
         assert_eq!((bands.len(), bands[0].outcome), (1, BandOutcome::Corrected));
         let Image::Gray(mended) = &*layers[0].image else { panic!("gray stays gray") };

@@ -129,7 +129,7 @@ pub struct Fixed<'a> {
 ///
 /// // Row 1 missed its second crossing and is white up to the image's edge.
 /// let stray = Mask::new(8, vec![0, 2, 3, 5], vec![2, 5, 2, 2, 5])?;
-/// let layer = Layer { info: PageInfo::default(), dpi: None, image: stray.into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: None, image: stray.into() };
 /// let layers = std::iter::once(Ok::<_, StackError>(layer));
 ///
 /// let mut fixed = fix(layers, FixOptions::default(), |fixed| {
@@ -208,7 +208,7 @@ fn fix_layer(
     let mut info = layer.info.clone();
     info.stray_rows.retain(|&row| corrected_row(&corrected, row).is_none());
     info.set_record(&record_of(&bands, options.method));
-    (Some(Layer { info, dpi: layer.dpi, image: image.into() }), bands)
+    (Some(Layer { info, pitch: layer.pitch, image: image.into() }), bands)
 }
 
 /// Returns what a corrected layer's page says under `fix`.

@@ -89,7 +89,7 @@ fn show_same_place<'a>(
         layer.info().index.abs_diff(other.info().index) == away
             && layer.size() == other.size()
             && layer.info().origin_mm == other.info().origin_mm
-            && layer.dpi() == other.dpi()
+            && layer.pitch() == other.pitch()
     };
     (1..).zip(others).take_while(is_beside).map(|(_, other)| other.clone()).collect()
 }

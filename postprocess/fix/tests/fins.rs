@@ -14,7 +14,7 @@ use std::ops::Range;
 use lamp_fix::{FixOptions, fix};
 use lamp_fixtures::{Facet, Mesh, SplitMix};
 use lamp_slicing::{GridRule, Part, Shading, SliceOptions, Slices};
-use lamp_stack::{DepthLevels, Dpi, Layer, Length, Mask, Op, StackError, white_in_row};
+use lamp_stack::{DepthLevels, Layer, Length, Mask, Op, Pitch, StackError, white_in_row};
 
 /// A pixel at 300 dpi, in mm.
 const PIXEL_MM: f64 = 25.4 / 300.0;
@@ -327,7 +327,7 @@ fn is_straight(truth: &Mask, had: &Mask, row: u32, which: usize) -> bool {
 
 fn options() -> SliceOptions {
     SliceOptions {
-        dpi: Dpi::new(300.0).unwrap(),
+        pitch: Pitch::of_dpi(300.0).unwrap(),
         thickness: Length::from_um(50.0),
         ..SliceOptions::default()
     }

@@ -4,8 +4,8 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use lamp_stack::{Builtin, Catalogued, Dpi, Length, Size, nonempty_text};
-use serde::de::{self, Deserialize, Deserializer};
+use lamp_stack::{Builtin, Catalogued, Length, Pitch, Size, nonempty_text};
+use serde::{Deserialize, Deserializer, de};
 use thiserror::Error;
 
 use super::{Machine, MachineLimit, ScanError};
@@ -20,9 +20,6 @@ pub enum MachineError {
     /// A height that holds nothing.
     #[error("height: it must be above zero")]
     Height,
-    /// A default that is no resolution.
-    #[error("defaults: dpi: it must be between 1 and 100000")]
-    NoResolution,
     /// A default that is no thickness.
     #[error("defaults: thickness: it must be above zero")]
     NoThickness,
@@ -109,8 +106,8 @@ impl Catalogued for Machine {
 
     fn check(&self) -> Result<(), MachineError> {
         if let Some(dpi) = &self.dpi
-            && !(Dpi::new(dpi.least).is_some()
-                && Dpi::new(dpi.most).is_some()
+            && !(Pitch::of_dpi(dpi.least).is_some()
+                && Pitch::of_dpi(dpi.most).is_some()
                 && dpi.least <= dpi.most)
         {
             return Err(MachineError::Range("dpi"));
@@ -174,10 +171,9 @@ impl Catalogued for Machine {
 
 impl Machine {
     fn check_defaults(&self) -> Result<(), MachineError> {
-        if let Some(dpi) = self.defaults.dpi {
-            let dpi = Dpi::new(dpi).ok_or(MachineError::NoResolution)?;
+        if let Some(pitch) = self.defaults.pitch {
             // A default outside the machine's own range would fail every command that uses it.
-            self.check_dpi(dpi, "a stack")?;
+            self.check_pitch(pitch, "a stack")?;
         }
         if let Some(thickness) = self.defaults.thickness {
             if thickness.um() <= 0.0 {
@@ -199,6 +195,21 @@ pub(super) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<Length, D::Er
 
 pub(super) fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Length>, D::Error> {
     length(from).map(Some)
+}
+
+/// Reads a number of dots per inch, or the text of a pitch.
+pub(super) fn some_pitch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Pitch>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Stated {
+        Dpi(f64),
+        Text(String),
+    }
+    let text = match Stated::deserialize(from)? {
+        Stated::Dpi(dpi) => dpi.to_string(),
+        Stated::Text(text) => text,
+    };
+    text.parse().map(Some).map_err(de::Error::custom)
 }
 
 pub(super) fn nonempty_path<'de, D: Deserializer<'de>>(from: D) -> Result<PathBuf, D::Error> {
@@ -295,7 +306,9 @@ thickness = "50um"
             ("\"0.1mm\"", "\"0.1\"", &["line 26", "recoating.gap", "unit"]),
             ("\"mine\"", "\"My own\"", &["name", "`My own` is not a name"]),
             ("dpi = 600", "dpi = 900", &["defaults: a stack has 900 dpi", "600 to 600"]),
-            ("dpi = 600", "dpi = 0", &["defaults: dpi", "between 1 and"]),
+            ("dpi = 600", "dpi = 0", &["line 35", "defaults.dpi", "between 1 and"]),
+            ("dpi = 600", "pitch = \"14x25um\"", &["defaults: a stack has 14 x 25 um", "600 to"]),
+            ("dpi = 600", "pitch = \"25\"\ndpi = 25", &["defaults: duplicate key `dpi`"]),
             ("\"50um\"", "\"1mm\"", &["defaults: a layer is 1mm thick", "20um to 200um"]),
             ("\"50um\"", "\"0um\"", &["defaults: thickness", "above zero"]),
             ("\"50um\"", "\"50\"", &["line 36", "defaults.thickness", "unit"]),

@@ -20,7 +20,7 @@ mod panel;
 mod scan;
 mod times;
 
-use lamp_stack::{Length, Size, nonempty_text};
+use lamp_stack::{Length, Pitch, Size, nonempty_text};
 use serde::Deserialize;
 
 pub use display::{Display, DisplayError};
@@ -134,8 +134,9 @@ pub struct ThicknessRange {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Defaults {
-    /// The resolution.
-    pub dpi: Option<f64>,
+    /// The resolution, under the key `dpi` or `pitch`: as `600` or `"14x19um"`.
+    #[serde(rename = "dpi", alias = "pitch", deserialize_with = "file::some_pitch")]
+    pub pitch: Option<Pitch>,
     /// The thickness of layers.
     #[serde(deserialize_with = "file::some_length")]
     pub thickness: Option<Length>,

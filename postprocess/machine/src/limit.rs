@@ -1,6 +1,6 @@
 //! Checks of what a machine builds.
 
-use lamp_stack::{Dpi, Layer, Length, Size};
+use lamp_stack::{Layer, Length, Pitch, Size};
 use thiserror::Error;
 
 use super::{BuildHeight, DpiRange, Machine, ThicknessRange};
@@ -44,12 +44,12 @@ pub enum MachineLimit {
         most: Length,
     },
     /// Another resolution.
-    #[error("{what} has {dpi} dpi, and the machine {machine} builds in {least} to {most} dpi")]
+    #[error("{what} has {pitch:#}, and the machine {machine} builds in {least} to {most} dpi")]
     Dpi {
         /// The object with the resolution.
         what: String,
         /// The resolution.
-        dpi: f64,
+        pitch: Pitch,
         /// The machine's name.
         machine: String,
         /// The coarsest that it builds in.
@@ -73,26 +73,15 @@ pub enum MachineLimit {
         /// The thickest that it builds in.
         most: Length,
     },
-    /// A panel whose pixels are not square.
-    #[error(
-        "the panel of the machine {machine} has pixels of {} x {} um, and the pixels of a stack \
-         are square: it cannot be sliced for yet", pitch_um[0], pitch_um[1]
-    )]
-    RectangularPixels {
+    /// Other pixels than the panel's.
+    #[error("the stack has {pitch:#}, and the panel of the machine {machine} has {panel:#}")]
+    PanelPitch {
+        /// The pitch of its pixels.
+        pitch: Pitch,
         /// The machine's name.
         machine: String,
-        /// The width and height of its pixels in micrometers.
-        pitch_um: [f64; 2],
-    },
-    /// Another resolution than the panel's.
-    #[error("the stack has {dpi} dpi, and the panel of the machine {machine} has {panel} dpi")]
-    PanelDpi {
-        /// The resolution.
-        dpi: f64,
-        /// The machine's name.
-        machine: String,
-        /// The resolution of its panel.
-        panel: f64,
+        /// The pitch of the panel's pixels.
+        panel: Pitch,
     },
     /// A part that is larger than the panel.
     #[error(
@@ -124,8 +113,8 @@ impl Machine {
     /// # Errors
     /// Returns an error if it does not.
     pub fn check(&self, layer: &Layer) -> Result<(), MachineLimit> {
-        if let Some(dpi) = layer.dpi {
-            self.check_dpi(dpi, &layer.info.name())?;
+        if let Some(pitch) = layer.pitch {
+            self.check_pitch(pitch, &layer.info.name())?;
         }
         match layer.info.thickness_um {
             Some(um) => self.check_thickness(Length::from_um(um), &layer.info.name()),
@@ -133,16 +122,18 @@ impl Machine {
         }
     }
 
-    /// Checks that the machine builds in a resolution. `what` names the object that has it: `layer
-    /// 12`.
+    /// Checks that the machine builds in a resolution, along both axes. `what` names the object that
+    /// has it: `layer 12`.
     ///
     /// # Errors
     /// Returns an error if it does not.
-    pub fn check_dpi(&self, dpi: Dpi, what: &str) -> Result<(), MachineLimit> {
+    pub fn check_pitch(&self, pitch: Pitch, what: &str) -> Result<(), MachineLimit> {
         match self.dpi {
-            Some(DpiRange { least, most, .. }) if !(least..=most).contains(&dpi.get()) => {
+            Some(DpiRange { least, most, .. })
+                if !pitch.dpi().iter().all(|dpi| (least..=most).contains(dpi)) =>
+            {
                 let (what, machine) = (what.to_owned(), self.name.clone());
-                Err(MachineLimit::Dpi { what, dpi: dpi.get(), machine, least, most })
+                Err(MachineLimit::Dpi { what, pitch, machine, least, most })
             }
             _ => Ok(()),
         }
@@ -219,7 +210,7 @@ mod tests {
 
     fn layer(dpi: f64, thickness_um: f64) -> Layer {
         let info = PageInfo { thickness_um: Some(thickness_um), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(dpi), image: Mask::black(1, 1).into() }
+        Layer { info, pitch: Pitch::of_dpi(dpi), image: Mask::black(1, 1).into() }
     }
 
     fn size(text: &str) -> Size {

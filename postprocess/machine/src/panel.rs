@@ -1,6 +1,6 @@
 //! Panels that show a layer at once: screens and projectors of printers.
 
-use lamp_stack::{Dpi, PrintRecord, PrintStep, Size, nonempty_text};
+use lamp_stack::{Dpi, Length, Pitch, PrintRecord, PrintStep, Size, nonempty_text};
 use serde::Deserialize;
 
 use super::{Defaults, Machine, MachineError, MachineLimit};
@@ -79,15 +79,18 @@ impl Panel {
         if !self.pitch_um.iter().all(|pitch| (1.0..=1000.0).contains(pitch)) {
             return Err(MachineError::Panel("pitch_um: each must be between 1 and 1000"));
         }
+        if self.pitch().is_none() {
+            return Err(MachineError::Panel("pitch_um: each has at most four decimals"));
+        }
         self.first.check()?;
         self.normal.check()
     }
 
-    /// Returns the resolution of a panel with square pixels, as a TIFF can state it.
-    pub fn dpi(&self) -> Option<Dpi> {
-        let [across, down] = self.pitch_um;
-        let dpi = (25_400.0 / across * 1e4).round() / 1e4;
-        if across == down { Dpi::new(dpi) } else { None }
+    /// Returns the pitch of its pixels; `None` if [`pitch_um`](Self::pitch_um) has more decimals than
+    /// a machine's file may give it.
+    pub fn pitch(&self) -> Option<Pitch> {
+        let [x, y] = self.pitch_um.map(|um| Dpi::of_pitch(Length::from_um(um)));
+        Some(Pitch { x: x?, y: y? })
     }
 
     /// Returns the width and height in millimeters, without the noise of the product.
@@ -139,9 +142,9 @@ impl Machine {
     /// Returns the options of slicing for the machine, unless others are given: a panel's
     /// resolution where its file states none.
     pub fn slicing_defaults(&self) -> Defaults {
-        let of_panel = || self.panel.as_ref().and_then(Panel::dpi).map(Dpi::get);
-        let dpi = self.defaults.dpi.or_else(of_panel);
-        Defaults { dpi, ..self.defaults.clone() }
+        let of_panel = || self.panel.as_ref().and_then(Panel::pitch);
+        let pitch = self.defaults.pitch.or_else(of_panel);
+        Defaults { pitch, ..self.defaults.clone() }
     }
 
     /// Returns how a printer with a panel exposes, as stacks and printers' files state it.
@@ -161,21 +164,18 @@ impl Machine {
         })
     }
 
-    /// Checks that a stack has the resolution of the machine's panel, if it has one.
+    /// Checks that the pixels of a stack are those of the machine's panel, if it has one.
     ///
     /// # Errors
-    /// Returns an error if it has another, or if the panel's pixels are not square.
-    pub fn check_panel_dpi(&self, dpi: Dpi) -> Result<(), MachineLimit> {
-        let Some(panel) = &self.panel else { return Ok(()) };
-        let machine = self.name.clone();
-        match panel.dpi() {
-            None => Err(MachineLimit::RectangularPixels { machine, pitch_um: panel.pitch_um }),
-            // A resolution with a few decimals is meant as the panel's.
-            Some(of_panel) if (of_panel.get() - dpi.get()).abs() > 0.01 => {
-                Err(MachineLimit::PanelDpi { dpi: dpi.get(), machine, panel: of_panel.get() })
-            }
-            Some(_) => Ok(()),
+    /// Returns an error if they are not.
+    pub fn check_panel_pitch(&self, pitch: Pitch) -> Result<(), MachineLimit> {
+        let Some(of_panel) = self.panel.as_ref().and_then(Panel::pitch) else { return Ok(()) };
+        let pairs = of_panel.dpi().into_iter().zip(pitch.dpi());
+        // A resolution with a few decimals is meant as the panel's.
+        if pairs.into_iter().all(|(panel, stack)| (panel - stack).abs() <= 0.01) {
+            return Ok(());
         }
+        Err(MachineLimit::PanelPitch { pitch, machine: self.name.clone(), panel: of_panel })
     }
 
     /// Checks that a part is no larger than the machine's panel, if it has one.
@@ -201,7 +201,7 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::Catalogued;
+    use lamp_stack::{Catalogued, Pitch};
 
     use crate::Machine;
 
@@ -228,19 +228,21 @@ mod tests {
         assert_eq!((record.normal.light, record.first.light), (200, 255));
         let exposures = [0, 2, 3].map(|layer| record.step(layer).exposure_s);
         assert_eq!(exposures, [30.0, 30.0, 2.5]);
-        assert_eq!(machine.slicing_defaults().dpi, Some(508.0));
+        assert_eq!(machine.slicing_defaults().pitch, Pitch::of_dpi(508.0));
     }
 
     #[test]
     fn a_stack_must_fit_the_panel() {
         let square = machine("", "").unwrap();
-        assert!(square.check_panel_dpi("508".parse().unwrap()).is_ok());
-        let other = square.check_panel_dpi("600".parse().unwrap()).unwrap_err().to_string();
+        assert!(square.check_panel_pitch("508".parse().unwrap()).is_ok());
+        let other = square.check_panel_pitch("600".parse().unwrap()).unwrap_err().to_string();
         assert_eq!(other, "the stack has 600 dpi, and the panel of the machine mine has 508 dpi");
         let wide = machine("[50, 50]", "[50, 60]").unwrap();
-        let error = wide.check_panel_dpi("508".parse().unwrap()).unwrap_err().to_string();
-        assert!(error.contains("mine has pixels of 50 x 60 um"), "{error}");
-        assert_eq!(wide.slicing_defaults().dpi, None);
+        let error = wide.check_panel_pitch("508".parse().unwrap()).unwrap_err().to_string();
+        assert!(error.contains("the panel of the machine mine has 50 x 60 um"), "{error}");
+        let pitch = "50x60um".parse().unwrap();
+        assert!(wide.check_panel_pitch(pitch).is_ok());
+        assert_eq!(wide.slicing_defaults().pitch, Some(pitch));
         assert!(square.check_on_panel("100x40mm".parse().unwrap()).is_ok());
         let error = square.check_on_panel("40x100mm".parse().unwrap()).unwrap_err().to_string();
         assert!(error.contains("the part takes 40x100mm, and the panel"), "{error}");
@@ -253,6 +255,7 @@ mod tests {
             ("[2000, 800]", "[65536, 800]", "panel: pixels: each must be"),
             ("[50, 50]", "[50, nan]", "panel: pitch_um: each must be"),
             ("[50, 50]", "[0.5, 50]", "panel: pitch_um: each must be"),
+            ("[50, 50]", "[50.00001, 50]", "panel: pitch_um: each has at most"),
             ("exposure_s = 30", "exposure_s = 0", "panel: exposure_s: it must be"),
             ("exposure_s = 2.5\n", "", "exposure_s"),
             ("light = 200", "light = 256", "panel: light: it must be"),

@@ -1,7 +1,8 @@
 //! Compensation as a stage: layers enlarged for firing, then their edges moved.
 
 use lamp_stack::{
-    CompensateRecord, Dpi, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, StackInfo, map_in_order,
+    CompensateRecord, GrayMask, Image, Layer, Length, MAX_SIDE, Mask, NotSquare, Pitch, StackInfo,
+    map_in_order,
 };
 use thiserror::Error;
 
@@ -63,6 +64,9 @@ pub enum CompensateProblem {
     /// The resolution is unknown, so lengths have no meaning in pixels.
     #[error("has no resolution, so a length has no size in pixels")]
     NoResolution,
+    /// Its pixels are not square.
+    #[error("cannot be compensated so: {0}")]
+    NotSquare(NotSquare),
     /// The layer is gray and should grow.
     #[error("is gray, and only 1-bit layers can grow")]
     GrayGrows,
@@ -126,17 +130,17 @@ const WIDTH_UNIT: u64 = 32;
 ///
 /// ```
 /// use lamp_offset::{CompensateError, CompensateOptions, Widths, compensate};
-/// use lamp_stack::{Dpi, Image, Layer, Mask, PageInfo};
+/// use lamp_stack::{Image, Layer, Mask, PageInfo, Pitch};
 ///
 /// // A square of 20 pixels at 25.4 um, whose edges move by a pixel.
 /// let rows = (0..22).map(|row| if row == 0 || row == 21 { vec![] } else { vec![1, 21] });
 /// let mut square = lamp_stack::MaskBuilder::new(22);
 /// rows.for_each(|row| square.push_row(&row).unwrap());
 /// let image = square.finish().into();
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(1000.0), image };
+/// let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(1000.0), image };
 ///
 /// let layers = std::iter::once(Ok::<_, CompensateError>(layer));
-/// let widths = |_: &Layer, _: Dpi| Ok(Widths::uniform(1.0));
+/// let widths = |_: &Layer, _: Pitch| Ok(Widths::uniform(1.0));
 /// let mut narrower = compensate(layers, CompensateOptions::default(), widths, |_| {});
 /// let Image::Mask(mask) = narrower.next().unwrap()?.image.into_image() else { unreachable!() };
 /// assert_eq!((mask.row(1), mask.row(2)), (&[][..], &[2, 20][..]));
@@ -149,21 +153,21 @@ const WIDTH_UNIT: u64 = 32;
 pub fn compensate<E: From<CompensateError> + Send>(
     layers: impl Iterator<Item = Result<Layer, E>>,
     options: CompensateOptions,
-    widths: impl Fn(&Layer, Dpi) -> Result<Widths, E> + Sync,
+    widths: impl Fn(&Layer, Pitch) -> Result<Widths, E> + Sync,
     mut report: impl FnMut(&Compensated<'_>),
 ) -> impl Iterator<Item = Result<Layer, E>> {
     let done = map_in_order(layers, move |mut layer: Layer| {
         let name = layer.info.name();
         let failed = |problem| CompensateError { layer: name.clone(), problem };
-        let dpi = layer.dpi.ok_or_else(|| failed(CompensateProblem::NoResolution))?;
-        let widths = widths(&layer, dpi)?;
+        let pitch = layer.pitch.ok_or_else(|| failed(CompensateProblem::NoResolution))?;
+        let widths = widths(&layer, pitch)?;
         let is_enlarged = enlarge(&mut layer, options.shrinkage).map_err(failed)?;
-        let moved = move_edges(&mut layer, &widths, &options, dpi).map_err(failed)?;
+        let moved = move_edges(&mut layer, &widths, &options, pitch).map_err(failed)?;
         if !is_enlarged && moved.is_none() {
             return Ok((layer, None));
         }
         let moved = moved.unwrap_or_default();
-        layer.info.renew_record(|before| record_of(before, &widths, &options, dpi, &moved));
+        layer.info.renew_record(|before| record_of(before, &widths, &options, pitch, &moved));
         Ok((layer, Some(moved)))
     });
     done.map(move |done| {
@@ -180,14 +184,14 @@ fn record_of(
     before: Option<CompensateRecord>,
     widths: &Widths,
     options: &CompensateOptions,
-    dpi: Dpi,
+    pitch: Pitch,
     moved: &MovedEdges,
 ) -> CompensateRecord {
     let nm = |um: f64| (um * 1e3).round() / 1e3 + 0.0;
     let mut page = before.unwrap_or_default();
     // A later pass for the shrinkage alone keeps the distance of the first.
     if !widths.are_zero() || page.inwards_um.is_none() {
-        page.inwards_um = Some(widths.range().map(|by| nm(by * dpi.pitch().um())));
+        page.inwards_um = Some(inwards_um(widths, pitch).map(nm));
     }
     for (of_page, count) in
         [(&mut page.thin_walls, moved.walls.len()), (&mut page.losses, moved.losses.len())]
@@ -201,6 +205,16 @@ fn record_of(
         page.shrinkage = Some([x, y]);
     }
     page
+}
+
+/// Returns the least and the greatest distance by which edges move.
+fn inwards_um(widths: &Widths, pitch: Pitch) -> [f64; 2] {
+    let [x_um, y_um] = pitch.um();
+    let [least, most] = widths.range();
+    match widths.ellipse() {
+        Some([x, y]) => [(x * x_um).min(y * y_um), (x * x_um).max(y * y_um)],
+        None => [least * x_um.min(y_um), most * x_um.max(y_um)],
+    }
 }
 
 /// Enlarges a layer. Returns false if firing takes nothing away.
@@ -243,7 +257,7 @@ fn move_edges(
     layer: &mut Layer,
     widths: &Widths,
     options: &CompensateOptions,
-    dpi: Dpi,
+    pitch: Pitch,
 ) -> Result<Option<MovedEdges>, CompensateProblem> {
     if widths.are_zero() || layer.image.change_count() == 0 {
         return Ok(None);
@@ -253,7 +267,10 @@ fn move_edges(
     if furthest > MAX_MOVE {
         return Err(CompensateProblem::TooFar { pixels: furthest, max: MAX_MOVE });
     }
-    let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(dpi));
+    if most > 0.0 && options.min_feature.is_none_or(|length| length.um() > 0.0) {
+        pitch.square("keeping walls needs").map_err(CompensateProblem::NotSquare)?;
+    }
+    let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(pitch.x));
     // A wall that is left so wide had its middle this deep before.
     let depth = most + min_feature / 2.0;
     if let Some(unequal) = widths.ellipse().filter(|_| most > 0.0 && min_feature > 0.0) {
@@ -263,7 +280,7 @@ fn move_edges(
         // Edges are to blame only if they would still move too far with walls of two pixels.
         let max_moved = MAX_DEPTH - min_feature.min(2.0) / 2.0;
         if most > max_moved {
-            let max = Length::from_um((max_moved * dpi.pitch().um()).floor());
+            let max = Length::from_um((max_moved * pitch.x.pitch().um()).floor());
             return Err(CompensateProblem::TooFarForWalls { pixels: most, max });
         }
         return Err(CompensateProblem::TooDeep { pixels: depth, max: MAX_DEPTH });

@@ -80,7 +80,7 @@ impl RimSearch<'_> {
         let grid = self.cutter.grid;
         let [z_mm, x_mm, _] = extremum.at_mm;
         let [column, _] = grid.to_pixels(x_mm, 0.0);
-        let reach = extremum.reach_mm / grid.dpi.pitch().mm() + 1.0;
+        let reach = extremum.reach_mm / grid.pitch.x.pitch().mm() + 1.0;
         let clamped = |column: f64| column.ceil().clamp(0.0, f64::from(grid.width)) as u32;
         let width_mm = 2.0 * extremum.width_mm();
         for column in clamped(column - reach)..clamped(column + reach) {

@@ -88,7 +88,7 @@ pub(crate) fn settle(
             row.lists.exact.push(crossing);
         }
     }
-    let max_columns = (MAX_FOLD_MM / cutter.grid.dpi.pitch().mm()) as u32;
+    let max_columns = (MAX_FOLD_MM / cutter.grid.pitch.x.pitch().mm()) as u32;
     for row in rows.values_mut() {
         row.unfold(tally, max_columns);
         row.switch(tally);
@@ -216,7 +216,10 @@ impl Near {
     ) -> Self {
         let grid = cutter.grid;
         let [column, row] = grid.to_pixels(at[0], at[1]);
-        let [reach, width] = reach_mm.map(|mm| mm / grid.dpi.pitch().mm() + 1.0);
+        // Along y, and along x.
+        let [reach_mm, width_mm] = reach_mm;
+        let [x_mm, y_mm] = grid.pitch.mm();
+        let [reach, width] = [reach_mm / y_mm + 1.0, width_mm / x_mm + 1.0];
         let clamped = |row: f64| row.ceil().clamp(0.0, f64::from(grid.height)) as u32;
         let columns = (column - width).floor() as i64..=(column + width).ceil() as i64;
         let body = cutter.rule.name_of(body);

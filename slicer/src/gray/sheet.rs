@@ -43,13 +43,15 @@ impl Sheet {
             return None;
         }
         // |dz/dx| + |dz/dy|, by the components of the normal.
-        let um_per_pixel = (cross(1, 2).abs() + cross(2, 0).abs()) / area.abs();
+        let slopes = [cross(1, 2).abs(), cross(2, 0).abs()];
+        let um_per_pixel = (slopes[0] + slopes[1]) / area.abs();
+        let [x_um, y_um] = cutter.grid.pitch.um();
         let (low_um, high_um) = facet_heights(facet);
         Some(Self {
             facet: RowFacet::new(corners, cutter.grid.height)?,
             low_um,
             high_um,
-            steepness: 1.0 + um_per_pixel / cutter.grid.dpi.pitch().um(),
+            steepness: 1.0 + (slopes[0] / x_um + slopes[1] / y_um) / area.abs(),
             // At most a micrometer, or steep facets would touch all around them.
             tie_um: TOUCHING_UM + ASIDE_PIXELS * um_per_pixel.min(1e6),
             // Rows count downward: facets that face down turn clockwise in y.

@@ -3,7 +3,7 @@
 use std::io::{Cursor, Write};
 
 use lamp_fixtures::{Mesh, three_mf, three_mf_model, zip_package};
-use lamp_stack::{Dpi, Image, Layer, Length};
+use lamp_stack::{Image, Layer, Length, Pitch};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -463,7 +463,7 @@ fn with_slices(stacks: &str, attributes: &str, is_required: bool) -> String {
 /// The white pixels of each layer of 0.1 mm, at 0.1 mm per pixel.
 fn white(part: Part) -> Vec<u64> {
     let options = SliceOptions {
-        dpi: Dpi::new(254.0).unwrap(),
+        pitch: Pitch::of_dpi(254.0).unwrap(),
         thickness: Length::from_um(100.0),
         plane: PlaneRule::Middle,
         ..SliceOptions::default()

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 
 use crate::bodies::BodyRole;
 use crate::error::SliceError;
@@ -64,7 +64,7 @@ impl ShellOverlap {
         // A flat box must not divide by zero.
         let [x, y, z] = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(1e-6));
         let options = SliceOptions {
-            dpi: Dpi::new(25.4 * ROWS / x.max(y)).unwrap_or(SliceOptions::default().dpi),
+            pitch: Pitch::of_dpi(25.4 * ROWS / x.max(y)).unwrap_or(SliceOptions::default().pitch),
             thickness: Length::from_mm(z / LAYERS),
             ..SliceOptions::default()
         };

@@ -3,7 +3,7 @@
 
 use lamp_fixtures::{StepSample, StepUnit, step};
 use lamp_slicing::{Axis, KernelName, OpenOptions, Part, Placement, Shading, SliceOptions, Slices};
-use lamp_stack::{DepthLevels, Dpi, Image, Length};
+use lamp_stack::{DepthLevels, Image, Length, Pitch};
 
 pub(crate) fn model(part: StepSample, chord_mm: f64) -> Part {
     model_by(KernelName::default(), part, chord_mm)
@@ -52,7 +52,7 @@ pub(crate) fn wrong_pixels(
 
 pub(crate) fn options(dpi: f64, thickness_mm: f64, placement: Placement) -> SliceOptions {
     SliceOptions {
-        dpi: Dpi::new(dpi).unwrap(),
+        pitch: Pitch::of_dpi(dpi).unwrap(),
         thickness: Length::from_mm(thickness_mm),
         placement,
         ..SliceOptions::default()

@@ -2,12 +2,12 @@
 
 use lamp_fixtures::Mesh;
 use lamp_slicing::{Part, SliceError, SliceOptions, Slices};
-use lamp_stack::{Dpi, Image, Layer, Length, Mask};
+use lamp_stack::{Image, Layer, Length, Mask, Pitch};
 use proptest::test_runner::Config;
 
 pub(crate) fn options(dpi: f64, thickness_um: f64) -> SliceOptions {
     SliceOptions {
-        dpi: Dpi::new(dpi).unwrap(),
+        pitch: Pitch::of_dpi(dpi).unwrap(),
         thickness: Length::from_um(thickness_um),
         ..SliceOptions::default()
     }

@@ -253,7 +253,7 @@ fn rows_are_even_in_millions_of_facets() {
 /// The rows that a facet crosses, layer by layer.
 fn rows_of(facet: &Facet, grid: &PixelGrid, planes_mm: &[f64]) -> Vec<Vec<u32>> {
     let corners = facet.map(|corner| corner.map(f64::from));
-    let row_at = |y: f64| (grid.origin_mm[1] - y) * grid.dpi.get() / 25.4 - 0.5;
+    let row_at = |y: f64| (grid.origin_mm[1] - y) * grid.pitch.x.get() / 25.4 - 0.5;
     let rows = |&plane: &f64| {
         let ends = (0..3).map(|k| (corners[k], corners[(k + 1) % 3])).filter_map(|(a, b)| {
             let met = (a[2] < plane) != (b[2] < plane);

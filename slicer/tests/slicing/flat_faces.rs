@@ -12,7 +12,7 @@ use lamp_slicing::topology::{CornerTable, StepSolids};
 use lamp_slicing::{
     Axis, LayerHeights, OpenOptions, Part, Placement, PlaneRule, SliceOptions, Slices, Units,
 };
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{Layer, Length, Pitch};
 use proptest::prelude::*;
 
 use super::common::{cases, mask};
@@ -123,7 +123,7 @@ impl Numbers {
     fn options(&self, plane: PlaneRule) -> SliceOptions {
         let pitch_mm = self.step[0] as f64 * self.units.mm() / 1000.0 / BOX_PIXELS as f64;
         SliceOptions {
-            dpi: Dpi::new(25.4 / pitch_mm).unwrap(),
+            pitch: Pitch::of_dpi(25.4 / pitch_mm).unwrap(),
             thickness: self.thickness(),
             plane,
             units: self.units,

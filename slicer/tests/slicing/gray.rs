@@ -148,7 +148,7 @@ fn referee(
     let gray_options = gray(overcure, options);
     let grid = *Slices::new(model(mesh), options).unwrap().grid();
     let layers = slice(mesh, &gray_options);
-    let pixel_mm = options.dpi.pitch().mm();
+    let pixel_mm = options.pitch.x.pitch().mm();
     let check = |layer: &Layer| -> Result<(usize, usize, usize), String> {
         let index = layer.info.index as usize;
         let [bottom, top] = match &options.heights {

@@ -22,7 +22,7 @@ fn layers_say_where_they_are() {
         assert_eq!(layer.info.index, index);
         assert_eq!(layer.info.thickness_um, Some(250.0));
         assert_eq!(layer.info.origin_mm, Some([-1.1, 3.1]));
-        assert_eq!(layer.dpi, Some(options.dpi));
+        assert_eq!(layer.pitch, Some(options.pitch));
         assert_eq!(layer.info.exposure_ms, None);
         assert!(layer.info.other.is_empty());
     }

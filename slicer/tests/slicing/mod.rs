@@ -11,6 +11,7 @@ mod flat_faces;
 mod formats;
 mod gray;
 mod layers;
+mod pitch;
 mod placement;
 mod referee;
 mod same_bytes;

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use lamp_fixtures::{Mesh, cone, cube_with_hole, sphere, torus, tower};
 use lamp_slicing::{Fill, GridRule, PixelGrid, PlaneRule, SliceOptions, Slices, Units};
-use lamp_stack::{Layer, Length};
+use lamp_stack::{Layer, Length, Pitch};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -88,11 +88,11 @@ fn compare(
     facets: &[[Point; 3]],
     fill: Fill,
 ) -> Result<u64, String> {
-    let (mask, pitch) = (mask(layer), 25.4 / grid.dpi.get());
+    let (mask, [pitch_x, pitch_y]) = (mask(layer), grid.pitch.dpi().map(|dpi| 25.4 / dpi));
     let mut open = 0;
     for (row, column) in (0..grid.height).flat_map(|r| (0..grid.width).map(move |c| (r, c))) {
-        let x = grid.origin_mm[0] + (f64::from(column) + 0.5) * pitch;
-        let y = grid.origin_mm[1] - (f64::from(row) + 0.5) * pitch;
+        let x = grid.origin_mm[0] + (f64::from(column) + 0.5) * pitch_x;
+        let y = grid.origin_mm[1] - (f64::from(row) + 0.5) * pitch_y;
         if mask.is_white(column, row) != inside(facets, [x, y, z], fill) {
             if !near_surface(facets, [x, y, z], fill) {
                 return Err(format!("layer {}, column {column}, row {row}", layer.info.index));
@@ -193,12 +193,15 @@ fn part() -> impl Strategy<Value = Mesh> {
 fn any_options() -> impl Strategy<Value = SliceOptions> {
     let plane = prop::sample::select(vec![PlaneRule::Top, PlaneRule::Middle, PlaneRule::Bottom]);
     let fill = prop::sample::select(vec![Fill::EvenOdd, Fill::Solid]);
-    (120.0..400.0, 100.0..900.0, plane, fill, 0u32..4).prop_map(
+    let dpi =
+        prop_oneof![(120.0..400.0).prop_map(|dpi| [dpi; 2]), prop::array::uniform2(120.0..400.0),];
+    (dpi, 100.0..900.0, plane, fill, 0u32..4).prop_map(
         |(dpi, thickness_um, plane, fill, margin)| SliceOptions {
+            pitch: Pitch::of_two_dpi(dpi).unwrap(),
             plane,
             fill,
             grid: GridRule::Around { margin },
-            ..options(dpi, thickness_um)
+            ..options(120.0, thickness_um)
         },
     )
 }

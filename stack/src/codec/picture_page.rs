@@ -33,7 +33,7 @@ pub(crate) fn header(
     {
         return Err(PictureFault::Rectangular(resolutions));
     }
-    Ok(Header { width, height, gray: true, dpi: None, line: None })
+    Ok(Header { width, height, gray: true, pitch: None, line: None })
 }
 
 /// Decodes a picture: to a mask if its file has one bit a pixel, black or white, otherwise to a

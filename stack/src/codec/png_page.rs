@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use png::{BitDepth, ColorType, Decoder, Info, Reader, Unit};
+use png::{BitDepth, ColorType, Decoder, Info, PixelDimensions, Reader, Unit};
 
 use crate::codec::bits::{bit_transitions, byte_runs};
 use crate::codec::picture_fault::{PictureFault, check_runs, gray_level};
@@ -11,9 +11,9 @@ use crate::image::Image;
 use crate::image::gray::GrayMask;
 use crate::image::mask::Mask;
 use crate::layer::check::PageLine;
-use crate::layer::page_info::PageInfo;
 use crate::length::{Dpi, has_square_pixels};
 use crate::limits::Limits;
+use crate::pitch::Pitch;
 
 /// The first bytes of every PNG.
 pub(crate) const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -29,7 +29,7 @@ pub(crate) struct Header {
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) gray: bool,
-    pub(crate) dpi: Option<Dpi>,
+    pub(crate) pitch: Option<Pitch>,
     pub(crate) line: Option<PageLine>,
 }
 
@@ -46,20 +46,12 @@ type PngRows<'a> = Reader<Cursor<&'a [u8]>>;
 pub(crate) fn header(file: &[u8], limits: &Limits) -> Result<Header, PictureFault> {
     let (reader, samples) = open(file, limits)?;
     let info = reader.info();
-    if let Some(dims) = info.pixel_dims {
-        // Whole pixels a meter are rounded; a ratio is not.
-        let rounding = if dims.unit == Unit::Meter { 1.0 } else { 0.0 };
-        let sides = [dims.xppu, dims.yppu].map(f64::from);
-        if !has_square_pixels(sides, rounding) {
-            return Err(PictureFault::Rectangular(sides));
-        }
-    }
     let mut line = description(info).and_then(|text| PageLine::parse(text.as_bytes()));
     Ok(Header {
         width: info.width,
         height: info.height,
         gray: !samples.are_bits(),
-        dpi: dpi(info, line.as_mut().map(|line| &mut line.info)),
+        pitch: pitch(info, line.as_mut())?,
         line,
     })
 }
@@ -199,16 +191,27 @@ impl Samples {
 
 /// Returns the resolution: from the JSON line's key if it rounds to the same whole pixels
 /// per meter (the key is then removed from the line), otherwise from these.
-fn dpi(info: &Info<'_>, line: Option<&mut PageInfo>) -> Option<Dpi> {
-    // Other units give only the ratio of the sides.
-    let pixels = info.pixel_dims.filter(|dims| dims.unit == Unit::Meter)?.xppu;
-    let whole = Dpi::from_per_metre(pixels);
+fn pitch(info: &Info<'_>, line: Option<&mut PageLine>) -> Result<Option<Pitch>, PictureFault> {
+    let Some(PixelDimensions { xppu, yppu, unit }) = info.pixel_dims else { return Ok(None) };
+    let sides = [xppu, yppu].map(f64::from);
+    // Whole pixels a meter are rounded; a ratio is not.
+    let is_square = has_square_pixels(sides, if unit == Unit::Meter { 1.0 } else { 0.0 });
+    // Other programs round by more than we do.
+    let is_ours = line.as_ref().is_some_and(|line| line.check.is_some());
+    let pixels = [xppu, if is_square && !is_ours { xppu } else { yppu }];
+    let whole = match (unit, pixels.map(Dpi::from_per_metre)) {
+        (Unit::Meter, [Some(x), Some(y)]) => Some(Pitch { x, y }),
+        _ if !is_square => return Err(PictureFault::Rectangular(sides)),
+        // Other units give only the ratio of the sides.
+        _ => None,
+    };
     let stated = line.and_then(|line| {
-        let dpi = Dpi::new(line.other.get(EXACT_DPI)?.as_f64()?)?;
-        let belongs = dpi.per_metre() == pixels && Some(dpi) != whole;
-        belongs.then(|| line.other.shift_remove(EXACT_DPI)).map(|_| dpi)
+        let other = &mut line.info.other;
+        let pitch: Pitch = serde_json::from_value(other.get(EXACT_DPI)?.clone()).ok()?;
+        let belongs = pitch.per_metre() == pixels && whole.is_some_and(|whole| whole != pitch);
+        belongs.then(|| other.shift_remove(EXACT_DPI)).map(|_| pitch)
     });
-    stated.or(whole)
+    Ok(stated.or(whole))
 }
 
 /// Returns the description, if it comes before the image data.

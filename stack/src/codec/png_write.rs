@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, PixelDimensions, Unit,
 };
+use serde_json::json;
 
 use crate::codec::bits::bits;
 use crate::codec::png_page::{DESCRIPTION, EXACT_DPI};
@@ -17,6 +18,7 @@ use crate::layer::Layer;
 use crate::layer::check::{CheckChain, OpenLine};
 use crate::length::Dpi;
 use crate::ordered::map_in_order;
+use crate::pitch::Pitch;
 
 /// Writes layers as a folder of PNGs named like `layer_00812.png`, encoded on all threads.
 /// The folder gets its name when it is complete.
@@ -41,7 +43,7 @@ where
 /// the keyword `Description` holds the page's JSON line.
 ///
 /// The `pHYs` chunk has whole pixels per meter. If these cannot express the resolution, the
-/// JSON line ends with it, as `"dpi":72.25`.
+/// JSON line ends with it, as `"dpi":72.25`, or as `"dpi":[72.25,72]` along x and y.
 ///
 /// # Errors
 /// Returns an error if the image has no pixels.
@@ -63,7 +65,7 @@ impl PngPage {
     fn new(layer: &Layer) -> Result<Self, StackError> {
         Ok(Self {
             index: layer.info.index,
-            png: png_of_image(&layer.image, layer.dpi)?,
+            png: png_of_image(&layer.image, layer.pitch)?,
             line: line(layer),
         })
     }
@@ -87,7 +89,7 @@ impl PageFile for PngPage {
     }
 }
 
-fn png_of_image(image: &Image, dpi: Option<Dpi>) -> io::Result<Vec<u8>> {
+fn png_of_image(image: &Image, pitch: Option<Pitch>) -> io::Result<Vec<u8>> {
     let mut png = Vec::new();
     let mut encoder = Encoder::new(&mut png, image.width(), image.height());
     // Most rows equal the row above. Better compression saves a third of the bytes but takes
@@ -95,7 +97,7 @@ fn png_of_image(image: &Image, dpi: Option<Dpi>) -> io::Result<Vec<u8>> {
     encoder.set_compression(Compression::Fast);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_filter(Filter::Up);
-    encoder.set_pixel_dims(dpi.map(pixel_dims));
+    encoder.set_pixel_dims(pitch.map(pixel_dims));
     match image {
         Image::Mask(mask) => {
             encoder.set_depth(BitDepth::One);
@@ -207,18 +209,19 @@ fn write_rows(
     writer.finish()
 }
 
-fn pixel_dims(dpi: Dpi) -> PixelDimensions {
-    let per_metre = dpi.per_metre();
-    PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
+fn pixel_dims(pitch: Pitch) -> PixelDimensions {
+    let [xppu, yppu] = pitch.per_metre();
+    PixelDimensions { xppu, yppu, unit: Unit::Meter }
 }
 
 /// Returns the page's JSON line in ASCII, because readers of `tEXt` disagree on other bytes.
 fn line(layer: &Layer) -> OpenLine {
     let mut info = layer.info.clone();
-    if let Some(dpi) = layer.dpi.filter(|&dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi)) {
-        info.other.insert(EXACT_DPI.to_owned(), dpi.get().into());
+    let is_lost = |dpi: Dpi| Dpi::from_per_metre(dpi.per_metre()) != Some(dpi);
+    if let Some(pitch) = layer.pitch.filter(|pitch| is_lost(pitch.x) || is_lost(pitch.y)) {
+        info.other.insert(EXACT_DPI.to_owned(), json!(pitch));
     }
-    OpenLine::new(&info, layer.dpi, layer.image.check(), None).into_ascii()
+    OpenLine::new(&info, layer.pitch, layer.image.check(), None).into_ascii()
 }
 
 /// A writer that keeps the I/O error, which the encoder's own errors do not contain.
@@ -247,7 +250,7 @@ mod tests {
     fn layer(dpi: f64, part: &str) -> Layer {
         let stack = StackInfo { part: part.to_owned(), ..StackInfo::default() };
         let info = PageInfo { index: 3, stack: Some(stack), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(dpi), image: Mask::black(8, 1).into() }
+        Layer { info, pitch: Pitch::of_dpi(dpi), image: Mask::black(8, 1).into() }
     }
 
     #[test]
@@ -279,7 +282,7 @@ mod tests {
                 layer.info.other.extend(own.map(|dpi| ("dpi".to_owned(), dpi.into())));
                 let header =
                     png_page::header(&png_of_layer(&layer).unwrap(), &Limits::default()).unwrap();
-                assert_eq!(header.dpi, layer.dpi);
+                assert_eq!(header.pitch, layer.pitch);
                 // A page that needs the key overwrites it.
                 if own.is_none() || dpi.fract() == 0.0 || dpi == 203.2 {
                     assert_eq!(header.line.unwrap().info, layer.info, "{dpi} {own:?}");

@@ -10,7 +10,7 @@ use crate::image::Image;
 use crate::image::outline::Outline;
 use crate::layer::Layer;
 use crate::layer::page_info::StackInfo;
-use crate::length::Dpi;
+use crate::pitch::Pitch;
 use crate::ordered::map_in_order;
 
 /// A format of contour files. All are text, in millimeters.
@@ -105,7 +105,7 @@ struct Contours {
     index: u32,
     outlines: Vec<Outline>,
     size: [u32; 2],
-    dpi: Dpi,
+    pitch: Pitch,
     /// x and y of the image's top left corner, if known.
     origin_mm: Option<[f64; 2]>,
     top_mm: f64,
@@ -117,16 +117,16 @@ impl Contours {
         let Image::Mask(mask) = &*layer.image else {
             return Err(ContourError::Gray { layer: index }.into());
         };
-        let dpi = layer.dpi.ok_or(ContourError::NoResolution { layer: index })?;
+        let pitch = layer.pitch.ok_or(ContourError::NoResolution { layer: index })?;
         let top_um = layer.info.z_um.unwrap_or(0.0) + layer.info.thickness_um.unwrap_or(0.0);
         let size = [mask.width(), mask.height()];
         let origin_mm = layer.info.origin_mm;
-        Ok(Self { index, outlines: mask.outlines(), size, dpi, origin_mm, top_mm: top_um / 1000.0 })
+        Ok(Self { index, outlines: mask.outlines(), size, pitch, origin_mm, top_mm: top_um / 1000.0 })
     }
 
     /// Returns the text before the first layer.
     fn head(&self, format: ContourFormat, first: &Layer) -> String {
-        let [width, height] = self.size.map(|px| Mm(self.mm(px)));
+        let [width, height] = self.mm(self.size).map(Mm);
         match format {
             ContourFormat::Svg => format!(
                 "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -161,7 +161,7 @@ impl Contours {
                         if is_hole(outline) { ("hole", "black") } else { ("contour", "white") };
                     let _ = write!(text, "    <polygon slic3r:type=\"{kind}\" points=\"");
                     for (k, corner) in outline.iter().enumerate() {
-                        let [x, y] = corner.map(|px| Mm(self.mm(px)));
+                        let [x, y] = self.mm(*corner).map(Mm);
                         let gap = if k > 0 { " " } else { "" };
                         let _ = write!(text, "{gap}{x},{y}");
                     }
@@ -201,14 +201,17 @@ impl Contours {
         text
     }
 
-    fn mm(&self, pixels: u32) -> f64 {
-        f64::from(pixels) * 25.4 / self.dpi.get()
+    /// Returns numbers of columns and rows in millimeters.
+    fn mm(&self, pixels: [u32; 2]) -> [f64; 2] {
+        let [x, y] = self.pitch.dpi();
+        [f64::from(pixels[0]) * 25.4 / x, f64::from(pixels[1]) * 25.4 / y]
     }
 
     /// Returns a corner in millimeters, with y up.
-    fn place(&self, [column, row]: [u32; 2]) -> [f64; 2] {
-        let [left, top] = self.origin_mm.unwrap_or([0.0, self.mm(self.size[1])]);
-        [left + self.mm(column), top - self.mm(row)]
+    fn place(&self, corner: [u32; 2]) -> [f64; 2] {
+        let [left, top] = self.origin_mm.unwrap_or([0.0, self.mm(self.size)[1]]);
+        let [right, down] = self.mm(corner);
+        [left + right, top - down]
     }
 }
 
@@ -253,7 +256,7 @@ mod tests {
                 origin_mm: Some([-1.0, 2.0]),
                 ..PageInfo::default()
             },
-            dpi: Dpi::new(254.0),
+            pitch: Pitch::of_dpi(254.0),
             image: Image::from(mask).into(),
         };
         vec![Ok(layer(0, Mask::black(8, 3))), Ok(layer(1, ring))]
@@ -306,7 +309,7 @@ mod tests {
             });
             write_contours(layers, &path, ContourFormat::Svg).unwrap_err().to_string()
         };
-        assert!(refused(|layer| layer.dpi = None).contains("layer 0 states no resolution"));
+        assert!(refused(|layer| layer.pitch = None).contains("layer 0 states no resolution"));
         let gray = |layer: &mut Layer| {
             let change = LevelChange { column: 1, level: 7 };
             let gray = GrayMask::from_changes(8, vec![0, 1], vec![change]).unwrap();

@@ -22,7 +22,7 @@ use crate::note::StackNote;
 /// # let path = folder.path().join("two.tif");
 /// let layers = (0..2).map(|index| Layer {
 ///     info: PageInfo { index, ..PageInfo::default() },
-///     dpi: None,
+///     pitch: None,
 ///     image: Mask::black(4, index + 1).into(),
 /// });
 /// write_stack(layers.map(Ok::<_, lamp_stack::StackError>), Destination::File(path.clone()), Format::Big)?;
@@ -217,7 +217,7 @@ mod tests {
     fn layers() -> Vec<Layer> {
         let layer = |index| Layer {
             info: PageInfo { index, ..PageInfo::default() },
-            dpi: None,
+            pitch: None,
             image: mask_of(90, [&[index, 40][..], &[3, 50 + index]]).into(),
         };
         (0..5).map(layer).collect()

@@ -146,12 +146,12 @@ fn difference(first: &Layer, other: &Layer) -> Option<String> {
 /// Returns the properties that all stacks must share. Text from files is quoted, so that it
 /// cannot control the terminal.
 fn facts(layer: &Layer) -> [(&'static str, String); 5] {
-    let Layer { info, dpi, image } = layer;
+    let Layer { info, pitch, image } = layer;
     let or_unknown = |fact: Option<String>| fact.unwrap_or_else(|| "unknown".to_owned());
     let of_stack = |fact: &dyn Fn(&StackInfo) -> String| or_unknown(info.stack.as_ref().map(fact));
     [
         ("part", of_stack(&|stack| format!("{:?}", stack.part))),
-        ("resolution", or_unknown(dpi.map(|dpi| format!("{dpi} dpi")))),
+        ("resolution", or_unknown(pitch.map(|pitch| format!("{pitch:#}")))),
         ("size", format!("{} x {} pixels", image.width(), image.height())),
         ("command line", of_stack(&|stack| format!("{:?}", stack.commands.join(" | ")))),
         ("input", of_stack(&|stack| format!("{:?}", stack.digest))),

@@ -6,7 +6,7 @@ use crate::codec::tiff::{Page, PageHeader};
 use crate::error::StackError;
 use crate::layer::page_info::PageInfo;
 use crate::layer::totals::StackTotals;
-use crate::length::{Dpi, Length};
+use crate::length::Length;
 use crate::ordered::map_in_order;
 
 /// A reason why a stack is not complete and undamaged.
@@ -130,7 +130,7 @@ fn check(before: Option<&StackTotals>, page: &PageHeader) -> Result<(), LayerFau
     if page.size != before.first.size {
         return Err(LayerFault::Size { found: page.size, first: before.first.size });
     }
-    if page.dpi.map(Dpi::get) != before.first.dpi.map(Dpi::get) {
+    if page.pitch != before.first.pitch {
         return Err(LayerFault::Resolution);
     }
     check_height(&before.last, info)

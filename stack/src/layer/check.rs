@@ -13,13 +13,13 @@
 //! stack.
 
 use crc32fast::Hasher;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use thiserror::Error;
 
 use crate::image::Image;
 use crate::image::runs::{Change, RunImage};
 use crate::layer::page_info::{PageInfo, short_number};
-use crate::length::Dpi;
+use crate::pitch::Pitch;
 
 /// A page line's checks of its image and of the stack up to the page.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,8 +30,13 @@ pub(crate) struct PageCheck {
     #[serde(flatten)]
     pub(crate) code: Option<CodeCheck>,
     /// The resolution in dpi, if the page states one.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "short_number")]
-    pub(crate) dpi: Option<f64>,
+    #[serde(
+        rename = "dpi",
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "short_dpi"
+    )]
+    pub(crate) pitch: Option<Pitch>,
     /// On the last page: the check of all pages.
     #[serde(flatten)]
     pub(crate) end: Option<EndCheck>,
@@ -121,12 +126,12 @@ pub enum CheckFault {
         written: u32,
     },
     /// The page's resolution differs from the resolution in its check.
-    #[error("its resolution is {}, but it was written with {}", dpi_text(*found), dpi_text(*written))]
+    #[error("its resolution is {}, but it was written with {}", pitch_text(*found), pitch_text(*written))]
     Resolution {
-        /// The resolution that the page states, in dpi.
-        found: Option<f64>,
-        /// The resolution in its check, in dpi.
-        written: Option<f64>,
+        /// The resolution that the page states.
+        found: Option<Pitch>,
+        /// The resolution in its check.
+        written: Option<Pitch>,
     },
     /// A page without a check follows pages that have checks.
     #[error("it has no check, but the pages before it have checks")]
@@ -151,8 +156,17 @@ fn chain_text(gap: Option<[u32; 2]>, found: u32, written: u32) -> String {
     }
 }
 
-fn dpi_text(dpi: Option<f64>) -> String {
-    dpi.map_or_else(|| "none".to_owned(), |dpi| format!("{dpi} dpi"))
+fn pitch_text(pitch: Option<Pitch>) -> String {
+    pitch.map_or_else(|| "none".to_owned(), |pitch| format!("{pitch:#}"))
+}
+
+/// Writes a number for square pixels, and else one along x and one along y.
+#[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
+fn short_dpi<S: Serializer>(pitch: &Option<Pitch>, to: S) -> Result<S::Ok, S::Error> {
+    match pitch.filter(|pitch| !pitch.is_square()) {
+        None => short_number(&pitch.map(|pitch| pitch.x.get()), to),
+        pitch => pitch.serialize(to),
+    }
 }
 
 impl ImageCheck {
@@ -253,12 +267,12 @@ pub(crate) struct OpenLine(String);
 impl OpenLine {
     pub(crate) fn new(
         info: &PageInfo,
-        dpi: Option<Dpi>,
+        pitch: Option<Pitch>,
         image: ImageCheck,
         code: Option<CodeCheck>,
     ) -> Self {
         let mut line = info.to_line();
-        let check = PageCheck { image, code, dpi: dpi.map(Dpi::get), end: None };
+        let check = PageCheck { image, code, pitch, end: None };
         let check = serde_json::to_string(&check).expect("a check is numbers and texts");
         // Both objects stay open: without their last braces.
         line.pop();
@@ -395,7 +409,7 @@ impl ChainReader {
     pub(crate) fn follow(
         &mut self,
         check: Option<&LineCheck>,
-        dpi: Option<Dpi>,
+        pitch: Option<Pitch>,
         layer: u32,
         before: Option<u32>,
     ) -> Result<(), CheckFault> {
@@ -411,9 +425,8 @@ impl ChainReader {
             (Some(_), ChainState::Checked { ended: true }) => return Err(CheckFault::AfterLast),
             (Some(check), _) => check.intact().ok_or(CheckFault::Text)?,
         };
-        let found = dpi.map(Dpi::get);
-        if !is_same_dpi(found, page.dpi) {
-            return Err(CheckFault::Resolution { found, written: page.dpi });
+        if !is_same_pitch(pitch, page.pitch) {
+            return Err(CheckFault::Resolution { found: pitch, written: page.pitch });
         }
         self.state = ChainState::Checked { ended: page.end.is_some() };
         // Taken before this page is added: a text cannot hold a check of itself.
@@ -435,9 +448,12 @@ impl ChainReader {
 }
 
 /// Returns whether two resolutions are equal except for the rounding of other programs.
-fn is_same_dpi(found: Option<f64>, written: Option<f64>) -> bool {
+fn is_same_pitch(found: Option<Pitch>, written: Option<Pitch>) -> bool {
     match (found, written) {
-        (Some(found), Some(written)) => (found - written).abs() <= 1e-6 * written.abs(),
+        (Some(found), Some(written)) => {
+            let mut axes = found.dpi().into_iter().zip(written.dpi());
+            axes.all(|(found, written)| (found - written).abs() <= 1e-6 * written)
+        }
         (None, None) => true,
         _ => false,
     }

@@ -11,8 +11,8 @@ use crate::codec::packbits;
 use crate::image::Image;
 use crate::layer::check::ImageCheck;
 use crate::layer::page_info::PageInfo;
-use crate::length::Dpi;
 use crate::ordered::MemorySize;
+use crate::pitch::Pitch;
 
 /// The exposure at one height: an image and its metadata.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Layer {
     /// The content of the page's JSON line.
     pub info: PageInfo,
     /// The image's resolution, if the page states one in inches or centimeters.
-    pub dpi: Option<Dpi>,
+    pub pitch: Option<Pitch>,
     /// The image.
     pub image: LayerImage,
 }
@@ -41,7 +41,7 @@ impl MemorySize for Layer {
 /// use lamp_stack::{Image, Layer, Mask, PageInfo};
 ///
 /// let image = Mask::black(8, 2).into();
-/// let mut layer = Layer { info: PageInfo::default(), dpi: None, image };
+/// let mut layer = Layer { info: PageInfo::default(), pitch: None, image };
 /// if let Image::Mask(mask) = &*layer.image {
 ///     layer.image = mask.inverted().into();
 /// }

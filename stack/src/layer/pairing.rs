@@ -5,7 +5,7 @@ use std::ops::Range;
 use thiserror::Error;
 
 use crate::codec::tiff::PageHeader;
-use crate::length::Dpi;
+use crate::pitch::Pitch;
 
 /// Heights this near to each other in micrometers are the same: pages state whole nanometers.
 const SAME_HEIGHT_UM: f64 = 0.002;
@@ -23,7 +23,7 @@ const SAME_PIXEL: f64 = 0.01;
 /// #     let path = folder.path().join(name);
 /// #     let layer = |index: u32| Layer {
 /// #         info: PageInfo { index, z_um: Some(f64::from(index) * thickness), thickness_um: Some(thickness), ..PageInfo::default() },
-/// #         dpi: None,
+/// #         pitch: None,
 /// #         image: Mask::black(4, 4).into(),
 /// #     };
 /// #     write_stack((0..layers).map(layer).map(Ok::<_, StackError>), Destination::File(path.clone()), Format::Big)?;
@@ -60,14 +60,14 @@ pub struct Section {
 #[non_exhaustive]
 pub enum PairingError {
     /// The resolutions differ.
-    #[error("{layer} has {a} dpi, and the other stack has {b} dpi there")]
+    #[error("{layer} has {a:#}, and the other stack has {b:#} there")]
     Resolutions {
         /// The first stack's layer.
         layer: String,
         /// Its resolution.
-        a: Dpi,
+        a: Pitch,
         /// The resolution of the other stack's layer.
-        b: Dpi,
+        b: Pitch,
     },
     /// The images lie parts of pixels apart.
     #[error(
@@ -137,15 +137,16 @@ impl Pairing {
 /// do not meet.
 pub fn shift_between(a: &PageHeader, b: &PageHeader) -> Result<[i64; 2], PairingError> {
     let layer = || a.info.name();
-    let Some((dpi, other)) = a.dpi.zip(b.dpi) else { return Ok([0, 0]) };
-    if dpi.get() != other.get() {
-        return Err(PairingError::Resolutions { layer: layer(), a: dpi, b: other });
+    let Some((pitch, other)) = a.pitch.zip(b.pitch) else { return Ok([0, 0]) };
+    if pitch != other {
+        return Err(PairingError::Resolutions { layer: layer(), a: pitch, b: other });
     }
     let Some(([ax, ay], [bx, by])) = a.info.origin_mm.zip(b.info.origin_mm) else {
         return Ok([0, 0]);
     };
     // Rows count down and y goes up, so the difference along y turns its sign.
-    let shift = [bx - ax, ay - by].map(|mm| mm / dpi.pitch().mm());
+    let [pitch_x, pitch_y] = pitch.mm();
+    let shift = [(bx - ax) / pitch_x, (ay - by) / pitch_y];
     let sides = |side: usize| [-f64::from(b.size[side]), f64::from(a.size[side])];
     let meets = |side: usize| {
         let [least, most] = sides(side);
@@ -236,7 +237,7 @@ mod tests {
     fn page(info: PageInfo, dpi: Option<f64>) -> PageHeader {
         PageHeader {
             info,
-            dpi: dpi.and_then(Dpi::new),
+            pitch: dpi.and_then(Pitch::of_dpi),
             size: [100, 50],
             gray: false,
             compression: Compression::G4,

@@ -6,8 +6,8 @@ use crate::image::Image;
 use crate::layer::Layer;
 use crate::layer::check::rows_that_end_white;
 use crate::layer::page_info::PageInfo;
-use crate::length::Dpi;
 use crate::ordered::MemorySize;
+use crate::pitch::Pitch;
 
 /// A layer on its way to another stack: decoded, or as its page has it. Stages take either, so that
 /// a caller with whole layers hands them over as they are.
@@ -22,7 +22,7 @@ use crate::ordered::MemorySize;
 /// # fn main() -> Result<(), StackError> {
 /// # let folder = tempfile::tempdir()?;
 /// # let [from, to] = ["a.tif", "b.tif"].map(|name| folder.path().join(name));
-/// let layer = Layer { info: PageInfo::default(), dpi: None, image: Mask::black(8, 2).into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: None, image: Mask::black(8, 2).into() };
 /// let layers = std::iter::once(Ok::<_, StackError>(layer));
 /// write_stack(layers, Destination::File(from.clone()), Format::Big)?;
 ///
@@ -72,10 +72,10 @@ impl PassingLayer {
     }
 
     /// Returns the resolution, if the page states one in inches or centimeters.
-    pub fn dpi(&self) -> Option<Dpi> {
+    pub fn pitch(&self) -> Option<Pitch> {
         match &self.0 {
-            PassingState::Decoded(layer) => layer.dpi,
-            PassingState::Coded(page, ..) => page.dpi(),
+            PassingState::Decoded(layer) => layer.pitch,
+            PassingState::Coded(page, ..) => page.pitch(),
         }
     }
 

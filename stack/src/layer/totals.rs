@@ -111,6 +111,6 @@ impl StackTotals {
 }
 
 fn volume_mm3(page: &PageHeader) -> Option<f64> {
-    let pitch = page.dpi?.pitch().mm();
-    Some(page.exposed_px? as f64 * pitch * pitch * page.info.thickness_um? / 1000.0)
+    let [x, y] = page.pitch?.mm();
+    Some(page.exposed_px? as f64 * x * y * page.info.thickness_um? / 1000.0)
 }

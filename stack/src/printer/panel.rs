@@ -1,23 +1,26 @@
 //! From a panel's pixels and the numbers of its files to resolutions and lengths.
 
 use crate::image::orientation::Orientation;
-use crate::length::{Dpi, has_square_pixels};
+use crate::length::{Dpi, Length, has_square_pixels};
+use crate::pitch::Pitch;
 use crate::record::PrintRecord;
 
-/// Returns the resolution of a panel, if its pixels are square: a stack has one resolution.
-pub(crate) fn resolution(record: &PrintRecord) -> Option<Dpi> {
-    let per_inch = |side: usize| 25.4 * f64::from(record.panel_px[side]) / record.panel_mm[side];
-    let [across, down] = [per_inch(0), per_inch(1)];
-    let are_finite = across.is_finite() && down.is_finite();
-    if !(are_finite && has_square_pixels([across, down], 0.0)) {
-        return None;
-    }
-    // Sides in hundredths of a millimeter round the pitch; the longer one rounds it less.
-    let dpi = if record.panel_px[0] >= record.panel_px[1] { across } else { down };
-    // A whole number of nanometers, as panels have them, and then what TIFF states exactly.
-    let of_whole_nm = 25.4e6 / (25.4e6 / dpi).round();
-    let meant = if ((of_whole_nm - dpi) / dpi).abs() < 1e-4 { of_whole_nm } else { dpi };
-    Dpi::new((meant * 1e4).round() / 1e4)
+/// Returns the pitch of a panel's pixels, if its sizes make one.
+pub(crate) fn pitch(record: &PrintRecord) -> Option<Pitch> {
+    let axis = |side: usize| {
+        let um = 1000.0 * record.panel_mm[side] / f64::from(record.panel_px[side]);
+        // Sides in hundredths of a millimeter round it; panels have whole nanometers.
+        let whole = (um * 1000.0).round() / 1000.0;
+        let meant = if ((whole - um) / um).abs() < 1e-4 { whole } else { um };
+        Dpi::of_pitch(Length::from_um(meant)).or_else(|| Dpi::new(25_400.0 / um))
+    };
+    let (x, y) = (axis(0)?, axis(1)?);
+    // Rounded sides make no rectangles; the longer one rounds the pitch less.
+    Some(match has_square_pixels([x.get(), y.get()], 0.0) {
+        true if record.panel_px[0] >= record.panel_px[1] => x.into(),
+        true => y.into(),
+        false => Pitch { x, y },
+    })
 }
 
 /// Returns the orientation that turns an image of the panel's files upright, and an upright image
@@ -51,13 +54,13 @@ mod tests {
     }
 
     #[test]
-    fn square_pixels_have_a_resolution() {
-        let dpi = |px, mm| resolution(&panel(px, mm)).map(Dpi::get);
-        assert_eq!(dpi([4098, 2560], [143.43, 89.6]), Some(725.7143));
-        assert_eq!(dpi([7680, 4320], [330.24, 185.76]), Some(590.6977));
-        assert_eq!(dpi([15120, 6230], [211.68, 118.37]), None);
+    fn panels_have_a_pitch() {
+        let um = |px, mm| pitch(&panel(px, mm)).map(Pitch::um);
+        assert_eq!(um([4098, 2560], [143.43, 89.6]), Some([35.0; 2]));
+        assert_eq!(um([7680, 4320], [330.24, 185.76]), Some([43.0; 2]));
+        assert_eq!(um([15120, 6230], [211.68, 118.37]), Some([14.0, 19.0]));
         for mm in [[0.0, 1.0], [-1.0, 1.0], [f64::NAN, 1.0]] {
-            assert_eq!(dpi([10, 10], mm), None, "{mm:?}");
+            assert_eq!(um([10, 10], mm), None, "{mm:?}");
         }
     }
 

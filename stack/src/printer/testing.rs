@@ -4,7 +4,7 @@ use crate::image::Image;
 use crate::image::gray::GrayMask;
 use crate::layer::Layer;
 use crate::layer::page_info::{PageInfo, StackInfo};
-use crate::printer::panel::{resolution, thousandths};
+use crate::printer::panel::{pitch, thousandths};
 use crate::record::{PrintRecord, PrintStep};
 use crate::testing::mask_of;
 
@@ -68,7 +68,7 @@ pub(crate) fn layers(record: &PrintRecord) -> Vec<Layer> {
             info.exposure_ms = Some(1234.5);
             info.set_record(&PrintStep { exposure_s: 1.2345, light: 7, ..record.normal });
         }
-        Layer { info, dpi: resolution(record), image: image.into() }
+        Layer { info, pitch: pitch(record), image: image.into() }
     };
     (0..5).map(layer).collect()
 }

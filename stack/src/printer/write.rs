@@ -146,7 +146,7 @@ impl CodedLayer {
             .then(|| image.oriented(orientation(mirrored)).expect("a mirrored image has its runs"));
         let code = match format {
             PrinterFormat::Goo => super::goo::rle::encode(turned.as_ref().unwrap_or(image)),
-            _ => super::archive::png::encode(turned.as_ref().unwrap_or(image), layer.dpi),
+            _ => super::archive::png::encode(turned.as_ref().unwrap_or(image), layer.pitch),
         };
         Self {
             info: layer.info.clone(),

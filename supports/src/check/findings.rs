@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, PageInfo};
+use lamp_stack::{PageInfo, Pitch};
 use serde::{Deserialize, Serialize};
 
 /// A rectangle of pixels.
@@ -286,7 +286,7 @@ pub struct Findings {
     /// The layers, from the first.
     pub layers: Vec<LayerFacts>,
     /// The resolution, if the pages state one.
-    pub dpi: Option<Dpi>,
+    pub pitch: Option<Pitch>,
     /// The top left corner of the images in part coordinates, in millimeters, if stated.
     pub origin_mm: Option<[f64; 2]>,
     /// The images' width and height in pixels.

@@ -24,7 +24,9 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, Op, take_batch, white_runs};
+use lamp_stack::{
+    Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, NotSquare, Op, Pitch, take_batch, white_runs,
+};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -109,6 +111,9 @@ pub enum CheckError {
     /// There are no layers.
     #[error("there are no layers to check")]
     NoLayers,
+    /// Pixels are not square.
+    #[error(transparent)]
+    NotSquare(#[from] NotSquare),
     /// The layers cannot be compared pixel by pixel.
     #[error(
         "{layer} is {} x {} pixels, and the first layer {} x {}: layers are compared pixel by pixel",
@@ -330,19 +335,19 @@ struct LabeledLayer {
     facts: LayerFacts,
     /// The layer's name in messages.
     name: String,
-    dpi: Option<Dpi>,
+    pitch: Option<Pitch>,
     origin_mm: Option<[f64; 2]>,
     labelled: Labelled,
 }
 
 impl LabeledLayer {
     fn new(layer: Layer, options: &CheckOptions) -> Self {
-        let Layer { info, dpi, image } = layer;
+        let Layer { info, pitch, image } = layer;
         let labelled = Labelled::new(image.into_image().into_mask(options.threshold));
         let mut facts = LayerFacts::new(&info);
         facts.has_white = labelled.of_colour(true).next().is_some();
         facts.white_at_border = labelled.of_colour(true).any(|white| labelled.reaches_frame(white));
-        Self { facts, name: info.name(), dpi, origin_mm: info.origin_mm, labelled }
+        Self { facts, name: info.name(), pitch, origin_mm: info.origin_mm, labelled }
     }
 
     fn size(&self) -> [u32; 2] {
@@ -367,22 +372,25 @@ struct Checker {
 impl Checker {
     fn new(first: &LabeledLayer, options: &CheckOptions) -> Result<Self, CheckError> {
         let rounding = options.rounding.get();
+        let dpi = first.pitch.map(|pitch| pitch.square("checks need")).transpose()?;
         let drain = options.drain.filter(|_| !options.islands_only).map(|drain| {
-            let dpi = first.dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
-            Ok((Drain::new(drain.um(), dpi.pitch().um(), rounding), Hollows::new(rounding)))
+            let dpi = dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
+            Ok::<_, CheckError>((
+                Drain::new(drain.um(), dpi.pitch().um(), rounding),
+                Hollows::new(rounding),
+            ))
         });
-        let speck =
-            Speck { side: options.speck_pixels(first.dpi), layers: options.speck_layers.get() };
+        let speck = Speck { side: options.speck_pixels(dpi), layers: options.speck_layers.get() };
         Ok(Self {
             options: options.clone(),
             layers: Vec::new(),
-            dpi: first.dpi,
+            dpi,
             origin_mm: first.origin_mm,
             size: first.size(),
             growth: Growth::new(speck),
             liquid: Liquid::new(rounding),
             drain: drain.transpose()?,
-            overhangs: Overhangs::new(options.least_overhang(first.dpi)),
+            overhangs: Overhangs::new(options.least_overhang(dpi)),
             weak_joints: Listed::default(),
         })
     }
@@ -471,7 +479,7 @@ impl Checker {
         pockets.left_out += narrow.left_out;
         let mut findings = Findings {
             layers: self.layers,
-            dpi: self.dpi,
+            pitch: self.dpi.map(Pitch::from),
             origin_mm: self.origin_mm,
             size: self.size,
             islands: self.growth.islands,

@@ -95,7 +95,7 @@ impl Findings {
 /// How pixels and layers lie in the part's coordinates.
 struct Grid {
     origin_mm: [f64; 2],
-    pitch_mm: f64,
+    pitch_mm: [f64; 2],
     size: [u32; 2],
     /// The heights at which the layers are cut.
     cuts_mm: Vec<f64>,
@@ -109,7 +109,7 @@ impl Grid {
         let heights: Vec<[f64; 2]> = heights.collect::<Option<_>>()?;
         Some(Self {
             origin_mm: findings.origin_mm?,
-            pitch_mm: findings.dpi?.pitch().mm(),
+            pitch_mm: findings.pitch?.mm(),
             size: findings.size,
             cuts_mm: heights.iter().map(|[z, thickness]| (z + cut * thickness) / 1000.0).collect(),
             thickness_mm: heights.iter().map(|[_, thickness]| thickness / 1000.0).collect(),
@@ -123,11 +123,11 @@ impl Grid {
     }
 
     fn column(&self, x_mm: f64) -> f64 {
-        (x_mm - self.origin_mm[0]) / self.pitch_mm
+        (x_mm - self.origin_mm[0]) / self.pitch_mm[0]
     }
 
     fn row(&self, y_mm: f64) -> f64 {
-        (self.origin_mm[1] - y_mm) / self.pitch_mm
+        (self.origin_mm[1] - y_mm) / self.pitch_mm[1]
     }
 
     /// Returns where a minimum shows; none if it stands on the platform or above the layers.
@@ -147,7 +147,7 @@ impl Grid {
             // Files round heights, so a depth of one layer may pass it by a hair.
             is_deep: minimum.depth_mm > thickness_mm + PLANE_TOLERANCE.mm(),
             sides,
-            drift: 2.0 * thickness_mm / self.pitch_mm,
+            drift: 2.0 * thickness_mm / self.pitch_mm[0].min(self.pitch_mm[1]),
         })
     }
 }

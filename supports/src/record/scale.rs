@@ -2,7 +2,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use lamp_stack::to_nm;
+use lamp_stack::{Pitch, to_nm};
 
 use super::places::{AreaRecord, BoxRecord, LayerPlace, LayerSpan, PointRecord};
 use crate::check::{Findings, Island, Region};
@@ -11,13 +11,13 @@ use crate::check::{Findings, Island, Region};
 /// six digits after the point.
 pub struct Scale<'a> {
     findings: &'a Findings,
-    pitch_mm: Option<f64>,
+    pitch_mm: Option<[f64; 2]>,
 }
 
 impl<'a> Scale<'a> {
     /// Returns the scale of a stack in which these findings are.
     pub fn new(findings: &'a Findings) -> Self {
-        Self { findings, pitch_mm: findings.dpi.map(|dpi| dpi.pitch().mm()) }
+        Self { findings, pitch_mm: findings.pitch.map(Pitch::mm) }
     }
 
     /// Returns a column and a row, also as x and y.
@@ -27,7 +27,9 @@ impl<'a> Scale<'a> {
             .origin_mm
             .zip(self.pitch_mm)
             // Rows count down, and y goes up.
-            .map(|([x, y], pitch)| [to_nm(x + at_px[0] * pitch), to_nm(y - at_px[1] * pitch)]);
+            .map(|([x, y], [pitch_x, pitch_y])| {
+                [to_nm(x + at_px[0] * pitch_x), to_nm(y - at_px[1] * pitch_y)]
+            });
         PointRecord { at_mm, at_px }
     }
 
@@ -51,7 +53,7 @@ impl<'a> Scale<'a> {
     }
 
     pub(super) fn length_mm(&self, pixels: f64) -> Option<f64> {
-        Some(to_nm(pixels * self.pitch_mm?))
+        Some(to_nm(pixels * self.pitch_mm?[0]))
     }
 
     /// Returns an area in pixels, also in square millimeters.
@@ -60,15 +62,16 @@ impl<'a> Scale<'a> {
     }
 
     pub(super) fn area_mm2(&self, pixels: u64) -> Option<f64> {
-        Some(to_nm(pixels as f64 * self.pitch_mm?.powi(2)))
+        let [x, y] = self.pitch_mm?;
+        Some(to_nm(pixels as f64 * (x * y)))
     }
 
     /// Returns the volume of pixels times thicknesses, if all layers have one.
     pub(super) fn volume_mm3(&self, pixels_um: f64) -> Option<f64> {
         // Layers without a thickness were weighed as 1 um, which makes no volume.
         let known = self.findings.layers.iter().all(|layer| layer.thickness_um.is_some());
-        let pitch = self.pitch_mm.filter(|_| known)?;
-        Some(to_nm(pixels_um / 1000.0 * pitch.powi(2)))
+        let [x, y] = self.pitch_mm.filter(|_| known)?;
+        Some(to_nm(pixels_um / 1000.0 * (x * y)))
     }
 
     /// Returns a layer by its place among the layers that were checked, from 0.

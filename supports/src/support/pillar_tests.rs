@@ -1,7 +1,7 @@
 //! Supports to the platform, against brute force over the pixels of random parts.
 
 use lamp_slicing::{FacetIndex, Part, Placement, Units};
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Image, Layer, Length, Mask, MaskBuilder, PageInfo, Pitch};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -29,7 +29,7 @@ fn layers(voxels: &Voxels) -> Vec<Layer> {
             origin_mm: Some([0.0, rows.len() as f64 / 10.0]),
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(DPI), image: mask.finish().into() }
+        Layer { info, pitch: Pitch::of_dpi(DPI), image: mask.finish().into() }
     };
     voxels.iter().enumerate().map(layer).collect()
 }

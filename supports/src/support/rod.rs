@@ -51,8 +51,12 @@ impl Rod {
         let Raster { origin_mm, dpi, size } = *raster;
         let run = |(row, start, end)| (row, start..end);
         match (self.strut(), self.cone()) {
-            (Some(strut), _) => strut.section(height, origin_mm, dpi, size).map(run).collect(),
-            (None, Some(cone)) => cone.section(height, origin_mm, dpi, size).map(run).collect(),
+            (Some(strut), _) => {
+                strut.section(height, origin_mm, dpi.into(), size).map(run).collect()
+            }
+            (None, Some(cone)) => {
+                cone.section(height, origin_mm, dpi.into(), size).map(run).collect()
+            }
             (None, None) => Vec::new(),
         }
     }

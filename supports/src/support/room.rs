@@ -15,9 +15,9 @@ pub fn padded(mut layer: Layer, pixels: u32) -> Layer {
     let side = |size: u32| size.saturating_add(pixels.saturating_mul(2));
     let (width, height) = (side(layer.image.width()), side(layer.image.height()));
     let frame = Frame { left: -by, top: -by, width, height };
-    if let (Some([x, y]), Some(dpi)) = (&mut layer.info.origin_mm, layer.dpi) {
-        let more = f64::from(pixels) * dpi.pitch().mm();
-        (*x, *y) = (*x - more, *y + more);
+    if let (Some([x, y]), Some(pitch)) = (&mut layer.info.origin_mm, layer.pitch) {
+        let [more_x, more_y] = pitch.mm().map(|mm| f64::from(pixels) * mm);
+        (*x, *y) = (*x - more_x, *y + more_y);
     }
     Layer { image: layer.image.into_image().framed(frame).into(), ..layer }
 }

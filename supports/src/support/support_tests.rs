@@ -2,7 +2,7 @@
 
 use lamp_fixtures::{Mesh, cavity_core, mug, needle, ring};
 use lamp_slicing::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, Op};
+use lamp_stack::{Image, Layer, Length, Mask, MaskBuilder, Op, Pitch};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -23,7 +23,7 @@ fn found_in(layers: &[Layer]) -> Findings {
 
 fn checked(mesh: Mesh, dpi: f64) -> Checked {
     let part = Part::from_facets("part", mesh.facets);
-    let options = SliceOptions { dpi: Dpi::new(dpi).unwrap(), ..SliceOptions::default() };
+    let options = SliceOptions { pitch: Pitch::of_dpi(dpi).unwrap(), ..SliceOptions::default() };
     let layers: Result<Vec<Layer>, _> = Slices::new(part.clone(), &options).unwrap().collect();
     let facets = FacetIndex::new(part, &Placement::default(), Units::Millimetres).unwrap();
     let (surface, layers) = (Surface::new(facets), layers.unwrap());
@@ -67,7 +67,7 @@ fn middle(layer: &Layer) -> Length {
 
 fn section(rod: &Rod, layer: &Layer) -> Mask {
     let size = [layer.image.width(), layer.image.height()];
-    let (origin, dpi) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap());
+    let (origin, dpi) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().x);
     let raster = super::window::Raster { origin_mm: origin, dpi, size };
     let runs = rod.section(middle(layer), &raster);
     let mut mask = MaskBuilder::new(size[0]);
@@ -227,7 +227,7 @@ fn what_the_pages_lack_and_too_many_places_are_errors() {
     assert_eq!(error(&part), SupportError::MissingLayers);
     part.found.layers[7].z_um = None;
     assert_eq!(error(&part), SupportError::NoHeight { index: 7 });
-    part.found.dpi = None;
+    part.found.pitch = None;
     assert_eq!(error(&part), SupportError::NoResolution);
     part.found.origin_mm = None;
     assert_eq!(error(&part), SupportError::NoOrigin);
@@ -302,7 +302,7 @@ fn pixels_before(support: &Support, layers: &[Layer]) -> Vec<([f64; 3], bool)> {
         if z > origin[2] || z < contact[2] {
             continue;
         }
-        let ([x0, y1], pitch) = (layer.info.origin_mm.unwrap(), layer.dpi.unwrap().pitch().mm());
+        let ([x0, y1], pitch) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().mm()[0]);
         for row in 0..layer.image.height() {
             for column in 0..layer.image.width() {
                 let [x, y] = [column, row].map(|place| (f64::from(place) + 0.5) * pitch);

@@ -1,6 +1,6 @@
 //! Holes drawn into parts, and checked again.
 
-use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, Op, PageInfo};
+use lamp_stack::{Layer, Length, Mask, MaskBuilder, Op, PageInfo, Pitch};
 use proptest::prelude::*;
 use std::num::NonZeroU8;
 
@@ -35,7 +35,7 @@ fn layers(count: u32, is_white: impl Fn(u32, u32, u32) -> bool) -> Vec<Layer> {
             origin_mm: Some([0.0, 0.0]),
             ..PageInfo::default()
         };
-        Layer { info, dpi: Dpi::new(DPI), image: image.into() }
+        Layer { info, pitch: Pitch::of_dpi(DPI), image: image.into() }
     };
     (0..count).map(layer).collect()
 }

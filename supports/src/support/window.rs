@@ -21,7 +21,7 @@ impl Raster {
     pub(super) fn of(found: &Findings) -> Result<Self, SupportError> {
         Ok(Self {
             origin_mm: found.origin_mm.ok_or(SupportError::NoOrigin)?,
-            dpi: found.dpi.ok_or(SupportError::NoResolution)?,
+            dpi: found.pitch.ok_or(SupportError::NoResolution)?.square("supports need")?,
             size: found.size,
         })
     }

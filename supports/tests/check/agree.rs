@@ -2,7 +2,7 @@
 
 use std::num::{NonZeroU8, NonZeroU32};
 
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Image, Layer, Length, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_supports::{
     CheckError, CheckOptions, Findings, Island, IslandEnd, PocketKind, Region,
     check as check_layers,
@@ -43,7 +43,7 @@ pub(crate) fn agree_as(layers: Vec<Layer>, block: &Block, limits: &Limits) {
 
 /// Checks layers.
 pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
-    let pitch_um = layers[0].dpi.unwrap().pitch().um();
+    let pitch_um = layers[0].pitch.unwrap().x.pitch().um();
     let options = CheckOptions {
         threshold: THRESHOLD,
         // Half a pixel less, so that no length is rounded up to one pixel more.
@@ -74,8 +74,8 @@ pub(crate) fn layers(block: &Block, image: &dyn Fn(usize) -> Image) -> Vec<Layer
             ..PageInfo::default()
         };
         z_um += thickness_um;
-        let dpi = Dpi::new(25_400.0 / block.pitch_um);
-        Layer { info, dpi, image: image(layer).into() }
+        let pitch = Pitch::of_dpi(25_400.0 / block.pitch_um);
+        Layer { info, pitch, image: image(layer).into() }
     };
     (0..block.size[2]).map(layer).collect()
 }

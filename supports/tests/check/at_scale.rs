@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use lamp_slicing::{Axis, OpenOptions, Part, Placement, SliceOptions, Slices};
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{Dpi, Layer, Length, Pitch};
 use lamp_supports::{
     CheckError, CheckOptions, Disagreements, Feature, FindingRecord, Findings, Island, Pocket,
     PocketKind, Severity, check, features, records,
@@ -314,7 +314,7 @@ fn real_parts_hide_no_island_cup_or_trap() {
             Placement::default().rotated(Axis::Y, 90.0),
         ] {
             let coarse = SliceOptions {
-                dpi: Dpi::new(5.0).unwrap(),
+                pitch: Pitch::of_dpi(5.0).unwrap(),
                 thickness: Length::from_um(5_000.0),
                 placement,
                 ..SliceOptions::default()
@@ -323,7 +323,7 @@ fn real_parts_hide_no_island_cup_or_trap() {
             let [low, high] = slices.box_mm();
             let pitch_mm = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max) / LONGEST;
             let options = SliceOptions {
-                dpi: Dpi::new(25.4 / pitch_mm).unwrap(),
+                pitch: Pitch::of_dpi(25.4 / pitch_mm).unwrap(),
                 thickness: Length::from_um(1000.0 * pitch_mm),
                 ..coarse
             };

@@ -5,7 +5,7 @@ use lamp_fixtures::{
     slanted_wall, twin_islands,
 };
 use lamp_slicing::{Axis, Part, Placement, SliceOptions, Slices};
-use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
+use lamp_stack::{Image, Layer, Length, Mask, PageInfo, Pitch};
 use lamp_supports::{Findings, HeldAt, IslandEnd, PocketKind};
 
 use super::agree::{agree_as, check};
@@ -24,7 +24,7 @@ const FINE_DPI: f64 = 254.0;
 
 fn slice(mesh: Mesh, dpi: f64, thickness_um: f64, placement: Placement) -> Vec<Layer> {
     let options = SliceOptions {
-        dpi: Dpi::new(dpi).unwrap(),
+        pitch: Pitch::of_dpi(dpi).unwrap(),
         thickness: Length::from_um(thickness_um),
         placement,
         ..SliceOptions::default()
@@ -38,7 +38,7 @@ pub(crate) fn block(layers: &[Layer]) -> Block {
     let mut block = Block {
         size: [0, 0, layers.len()],
         white: Vec::new(),
-        pitch_um: layers[0].dpi.unwrap().pitch().um(),
+        pitch_um: layers[0].pitch.unwrap().x.pitch().um(),
         thickness_um: layers.iter().map(|layer| layer.info.thickness_um.unwrap()).collect(),
     };
     for layer in layers {
@@ -260,7 +260,7 @@ fn the_widest_images_are_checked() {
         let rows = (0..=3).map(|row| row * transitions.len() as u32).collect();
         let image = Mask::new(u32::MAX, rows, transitions.repeat(3)).unwrap().into();
         let info = PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() };
-        Layer { info, dpi: Dpi::new(1500.0), image }
+        Layer { info, pitch: Pitch::of_dpi(1500.0), image }
     };
     let layers = vec![layer(0, &[0, 9]), layer(1, &[0, 9, u32::MAX - 3]), layer(2, &[0])];
     let found = check(layers, &LIMITS);

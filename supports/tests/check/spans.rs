@@ -1,6 +1,6 @@
 //! Spans of overhangs whose shapes have closed forms, and of parts at random by steps over voxels.
 
-use lamp_stack::{Dpi, Layer, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Layer, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_supports::{CheckError, CheckOptions, HeldAt, Overhang, check};
 
 use super::agree::{layers, mask};
@@ -21,7 +21,7 @@ fn overhang(below: impl Fn([f64; 2]) -> bool, layer: impl Fn([f64; 2]) -> bool) 
     };
     let page = |index, image: Mask| {
         let info = PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() };
-        Ok::<_, CheckError>(Layer { info, dpi: Dpi::new(254.0), image: image.into() })
+        Ok::<_, CheckError>(Layer { info, pitch: Pitch::of_dpi(254.0), image: image.into() })
     };
     let layers = [page(0, image(&below)), page(1, image(&|at| below(at) || layer(at)))];
     let found = check(layers.into_iter(), Ok, &CheckOptions::default()).unwrap();

@@ -1,6 +1,6 @@
 //! Checks of arbitrary stacks.
 
-use lamp_stack::{Dpi, Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Pages};
+use lamp_stack::{Layer, Length, Mask, MaskBuilder, Orientation, PageInfo, Pages, Pitch};
 use lamp_supports::{CheckError, CheckOptions, Findings, IslandEnd};
 
 use super::{MAX_ROWS, decoded, file_of, one_line};
@@ -37,7 +37,7 @@ fn block([columns, rows]: [u32; 2], pixels: &[u8]) -> Vec<Layer> {
         let thickness_um = Some(63.5);
         let info = PageInfo { index, thickness_um, ..PageInfo::default() };
         let image = mask(columns, bits).into();
-        Layer { info, dpi: Dpi::new(400.0), image }
+        Layer { info, pitch: Pitch::of_dpi(400.0), image }
     };
     layers.map(layer).collect()
 }
@@ -69,7 +69,7 @@ fn find(layers: &[Layer], options: &CheckOptions) {
             let image = layer.image.oriented(orientation)?;
             // Another frame would be at another place.
             let info = PageInfo { origin_mm: None, ..layer.info.clone() };
-            Some(Layer { info, image: image.into(), dpi: layer.dpi })
+            Some(Layer { info, image: image.into(), pitch: layer.pitch })
         });
         // Images with too many runs cannot be turned.
         if let Some(turned) = turned.collect::<Option<Vec<_>>>() {

@@ -19,8 +19,8 @@ use lamp_slicing::{
     Fill, OpenOptions, Part, Placement, SliceError, SliceOptions, Slices, SurfaceName, Units,
 };
 use lamp_stack::{
-    Dpi, EncodedPage, Format, Image, IndexedStack, Layer, Length, Mask, MaskBuilder, PageWriter,
-    Pages, PrinterFault, StackError, g4 as codec,
+    EncodedPage, Format, Image, IndexedStack, Layer, Length, Mask, MaskBuilder, PageWriter, Pages,
+    Pitch, PrinterFault, StackError, g4 as codec,
 };
 use tempfile::NamedTempFile;
 
@@ -141,7 +141,7 @@ fn mesh(part: &Part) {
 
 fn sliced(path: &Path, fill: Fill, memory: u64) -> Result<Vec<Layer>, SliceError> {
     let options = SliceOptions {
-        dpi: Dpi::new(25.4).expect("a resolution"),
+        pitch: Pitch::of_dpi(25.4).expect("a resolution"),
         thickness: Length::from_mm(1.0),
         layers: Some(0..6),
         fill,
@@ -167,7 +167,7 @@ pub fn step(bytes: &[u8]) {
     surfaces(&model);
     for polish in [false, true] {
         let options = SliceOptions {
-            dpi: Dpi::new(25.4).expect("a resolution"),
+            pitch: Pitch::of_dpi(25.4).expect("a resolution"),
             thickness: Length::from_mm(1.0),
             layers: Some(0..6),
             polish,
@@ -309,9 +309,11 @@ fn check_stack(layers: &[Layer]) {
         assert_eq!(again.len(), layers.len());
         for (again, layer) in again.into_iter().zip(layers) {
             // Resolutions are written with four decimals.
-            let [new, old] = [again.dpi, layer.dpi].map(|dpi| dpi.map_or(0.0, Dpi::get));
-            assert!((new - old).abs() < 1e-4, "{old} dpi became {new}");
-            assert_eq!(Layer { dpi: layer.dpi, ..again }, *layer);
+            let [new, old] =
+                [again.pitch, layer.pitch].map(|pitch| pitch.map_or([0.0; 2], Pitch::dpi));
+            let is_near = |axis: usize| (new[axis] - old[axis]).abs() < 1e-4;
+            assert!(is_near(0) && is_near(1), "{old:?} dpi became {new:?}");
+            assert_eq!(Layer { pitch: layer.pitch, ..again }, *layer);
         }
     }
 }

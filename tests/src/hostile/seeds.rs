@@ -13,9 +13,9 @@ use lamp_gantry::{FrameHeader, FrameWriter, Frames, MirrorArray, SwathImage};
 use lamp_machine::ScanDirection;
 use lamp_slicing::{Part, SliceOptions, Slices};
 use lamp_stack::{
-    Destination, Dpi, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder,
-    PackLevel, PageInfo, PageWriter, PrintRecord, PrintStep, PrinterFormat, StackError, StackInfo,
-    g4, png_of_layer, write_packed, write_printer_file,
+    Destination, EncodedPage, Format, GrayMask, Image, Layer, Length, Mask, MaskBuilder, PackLevel,
+    PageInfo, PageWriter, Pitch, PrintRecord, PrintStep, PrinterFormat, StackError, StackInfo, g4,
+    png_of_layer, write_packed, write_printer_file,
 };
 use tempfile::NamedTempFile;
 
@@ -265,7 +265,7 @@ fn layers(dpi: f64) -> Vec<Layer> {
     let mut ball = sphere(3.0, 100);
     inject(&mut ball, Defect::Drop, 6, 3);
     let options = SliceOptions {
-        dpi: Dpi::new(dpi).expect("a resolution"),
+        pitch: Pitch::of_dpi(dpi).expect("a resolution"),
         thickness: Length::from_mm(2.0),
         ..SliceOptions::default()
     };
@@ -282,7 +282,7 @@ fn gray_layer() -> Layer {
     gray.push_runs([(10, 0), (200, 255), (1, 128), (1, 127)]).expect("inside the width");
     gray.push_runs([]).expect("inside the width");
     gray.push_runs((0..=255).map(|level| (1, level))).expect("inside the width");
-    Layer { info: PageInfo::default(), dpi: None, image: gray.into() }
+    Layer { info: PageInfo::default(), pitch: None, image: gray.into() }
 }
 
 fn stack(layers: &[Layer], format: Format) -> Vec<u8> {
@@ -345,7 +345,7 @@ fn packed_stacks() -> Named {
         let mut mask = MaskBuilder::new(200);
         rows.for_each(|row| mask.push_row(&row).expect("inside the width"));
         let info = PageInfo { index, ..PageInfo::default() };
-        Layer { info, dpi: None, image: mask.finish().into() }
+        Layer { info, pitch: None, image: mask.finish().into() }
     };
     let gray = |index| {
         let layer = gray_layer();

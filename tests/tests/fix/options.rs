@@ -98,7 +98,7 @@ fn neighbours_show_what_a_wide_band_hides() {
     let scratch = Scratch::new();
     let layer = |index: u32, is_missed| {
         let info = PageInfo { index, ..PageInfo::default() };
-        Layer { info, dpi: None, image: notched(is_missed).into() }
+        Layer { info, pitch: None, image: notched(is_missed).into() }
     };
     scratch.stack("whole.tif", (0..3).map(|index| layer(index, false)));
     scratch.stack("stray.tif", (0..3).map(|index| layer(index, index == 1)));

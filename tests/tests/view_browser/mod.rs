@@ -3,7 +3,7 @@
 
 mod browser;
 
-use lamp_stack::{Dpi, Image, Layer, Mask, MaskBuilder, PageInfo};
+use lamp_stack::{Image, Layer, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_tests::{Scratch, Viewing, mask};
 use serde_json::{Value, json};
 
@@ -213,7 +213,7 @@ fn an_island_is_coloured_and_all_is_reached_by_keys() {
             origin_mm: Some([0.0, 0.0]),
             ..PageInfo::default()
         },
-        dpi: Dpi::new(300.0),
+        pitch: Pitch::of_dpi(300.0),
         image: Image::Mask(block_and_island(index == 1)).into(),
     };
     scratch.stack("island.tif", (0..3).map(layer));

@@ -79,7 +79,7 @@ impl CellGrid {
         let scale = StackScale::of(pages, size[1])?;
         let [bottom, _] = scale.heights[0];
         let [_, top] = scale.heights[pages.len() - 1];
-        let height = (top - bottom) / scale.pitch;
+        let height = (top - bottom) / scale.short_side();
         let longest = size.map(f64::from).into_iter().fold(height, f64::max);
         let cells = options.cells.get().min(MAX_CELLS);
         let side = (longest / f64::from(cells)).round().max(1.0) as u32;
@@ -99,9 +99,9 @@ impl CellGrid {
         Ok(grid)
     }
 
-    /// Returns the side of a cell, if the stack states its resolution.
+    /// Returns the shortest side of a cell, if the stack states its resolution.
     pub fn cell(&self) -> Option<Length> {
-        let side = Length::from_mm(self.scale.pitch * f64::from(self.side.get()));
+        let side = Length::from_mm(self.scale.short_side() * f64::from(self.side.get()));
         (self.scale.unit == SurfaceUnit::Millimetres).then_some(side)
     }
 
@@ -112,7 +112,7 @@ impl CellGrid {
 
     /// Computes the share of each layer in the planes of cells.
     fn share_out(&mut self, pages: &[PageHeader], at_most: Option<NonZeroU32>) {
-        let cell = self.scale.pitch * f64::from(self.side.get());
+        let cell = self.scale.short_side() * f64::from(self.side.get());
         let heights = &self.scale.heights;
         let start = heights[0][0];
         // Layers and planes both go up, so one pass over the layers finds all pairs.
@@ -180,10 +180,12 @@ impl CellGrid {
     /// Returns part coordinates of a place given in cells from the top left corner of the first
     /// layer.
     fn place(&self, [x, y, z]: [f64; 3]) -> [f32; 3] {
-        let cell = self.scale.pitch * f64::from(self.side.get());
+        let [pitch_x, pitch_y] = self.scale.pitch;
+        let [width, depth, height] = [pitch_x, pitch_y, self.scale.short_side()]
+            .map(|pitch| pitch * f64::from(self.side.get()));
         let [left, back] = self.scale.corner;
         let [bottom, _] = self.scale.heights[0];
-        [left + x * cell, back - y * cell, bottom + z * cell].map(|place| place as f32)
+        [left + x * width, back - y * depth, bottom + z * height].map(|place| place as f32)
     }
 }
 

@@ -11,8 +11,8 @@ const MAX_UM: f64 = 1e9;
 #[derive(Debug)]
 pub(super) struct StackScale {
     pub(super) unit: SurfaceUnit,
-    /// How wide a pixel is.
-    pub(super) pitch: f64,
+    /// How wide and how high a pixel is.
+    pub(super) pitch: [f64; 2],
     /// The left and upper sides of the images.
     pub(super) corner: [f64; 2],
     /// The bottom and top of each layer. No layer reaches into the next.
@@ -20,6 +20,11 @@ pub(super) struct StackScale {
 }
 
 impl StackScale {
+    /// Returns the shorter side of a pixel, in which cells are as high as wide.
+    pub(super) fn short_side(&self) -> f64 {
+        self.pitch[0].min(self.pitch[1])
+    }
+
     /// Returns where the pixels of pages lie whose highest has this many rows.
     pub(super) fn of(pages: &[PageHeader], rows: u32) -> Result<Self, SurfaceError> {
         let corner = [0.0, f64::from(rows)];
@@ -27,7 +32,7 @@ impl StackScale {
             Some(scale) => Ok(scale),
             None => Ok(Self {
                 unit: SurfaceUnit::Pixels,
-                pitch: 1.0,
+                pitch: [1.0; 2],
                 corner,
                 heights: (0..pages.len()).map(|k| [k as f64, k as f64 + 1.0]).collect(),
             }),
@@ -37,19 +42,19 @@ impl StackScale {
 
 /// Returns the scale in millimeters, if the pages state their resolution and heights.
 fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<StackScale>, SurfaceError> {
-    let Some(dpi) = pages[0].dpi else { return Ok(None) };
+    let Some(pitch) = pages[0].pitch else { return Ok(None) };
     let Some(heights) = heights_um(pages) else { return Ok(None) };
-    let pitch = dpi.pitch().mm();
+    let pitch_mm = pitch.mm();
     let origin = pages[0].info.origin_mm;
     for page in pages {
         let moved = match (page.info.origin_mm, origin) {
             (Some(here), Some(first)) => {
                 // A NaN is not near either.
-                !(0..2).all(|axis| (here[axis] - first[axis]).abs() <= pitch / 2.0)
+                !(0..2).all(|axis| (here[axis] - first[axis]).abs() <= pitch_mm[axis] / 2.0)
             }
             (here, first) => here.is_some() != first.is_some(),
         };
-        if moved || page.dpi != Some(dpi) {
+        if moved || page.pitch != Some(pitch) {
             return Err(SurfaceError::Unlike { layer: page.info.index });
         }
     }
@@ -58,8 +63,8 @@ fn in_millimetres(pages: &[PageHeader], rows: u32) -> Result<Option<StackScale>,
     let heights = heights.iter().zip(tops);
     Ok(Some(StackScale {
         unit: SurfaceUnit::Millimetres,
-        pitch,
-        corner: origin.unwrap_or([0.0, f64::from(rows) * pitch]),
+        pitch: pitch_mm,
+        corner: origin.unwrap_or([0.0, f64::from(rows) * pitch_mm[1]]),
         // A thickness that reaches into the next layer, by rounding or by error, would count twice.
         heights: heights.map(|([z, top], next)| [z / 1e3, top.min(next) / 1e3]).collect(),
     }))

@@ -1,7 +1,7 @@
 use std::collections::{HashMap, HashSet};
 use std::num::NonZeroU32;
 
-use lamp_stack::{Compression, Dpi, GrayMask, Image, Layer, PageHeader, PageInfo};
+use lamp_stack::{Compression, GrayMask, Image, Layer, PageHeader, PageInfo, Pitch};
 use proptest::prelude::*;
 
 use super::*;
@@ -31,7 +31,7 @@ fn layer(
         origin_mm: Some([0.0, f64::from(height) * 0.1]),
         ..PageInfo::default()
     };
-    Layer { info, dpi: Dpi::new(DPI), image: Image::Gray(gray).into() }
+    Layer { info, pitch: Pitch::of_dpi(DPI), image: Image::Gray(gray).into() }
 }
 
 /// Layers of a tenth of a millimeter.
@@ -43,7 +43,7 @@ fn stack(layers: u32, size: [u32; 2], level: impl Fn([f64; 3]) -> u8) -> Vec<Lay
 fn header(layer: &Layer) -> PageHeader {
     PageHeader {
         info: layer.info.clone(),
-        dpi: layer.dpi,
+        pitch: layer.pitch,
         size: [layer.image.width(), layer.image.height()],
         gray: true,
         compression: Compression::PackBits,
@@ -215,7 +215,7 @@ fn a_gap_between_layers_is_black() {
 fn a_stack_without_scale_counts_pixels() {
     let mut layers = stack(10, [10, 10], |_| 255);
     for layer in &mut layers {
-        (layer.dpi, layer.info.z_um) = (None, None);
+        (layer.pitch, layer.info.z_um) = (None, None);
     }
     let found = surface(&layers, &options(10)).unwrap();
     assert_eq!(found.unit, SurfaceUnit::Pixels);
@@ -245,7 +245,7 @@ fn what_has_no_surface_says_why() {
         let refused = with(&|layer| layer.info.origin_mm = Some(origin));
         assert!(matches!(refused, Err(SurfaceError::Unlike { layer: 2 })), "{origin:?}");
     }
-    let refused = with(&|layer| layer.dpi = None);
+    let refused = with(&|layer| layer.pitch = None);
     assert!(matches!(refused, Err(SurfaceError::Unlike { layer: 2 })));
 }
 

@@ -27,7 +27,7 @@ pub(super) fn write_report(
             "layers": findings.layers.len(),
             "width_px": findings.size[0],
             "height_px": findings.size[1],
-            "dpi": findings.dpi.map(lamp_stack::Dpi::get),
+            "dpi": findings.pitch,
             "findings": checked.found.count(),
             "specks": findings.specks.count(),
             "accepted": checked.found.accepted,

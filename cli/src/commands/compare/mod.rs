@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use lamp_stack::{Dpi, IndexedStack, Length, Pairing};
+use lamp_stack::{IndexedStack, Length, Pairing, Pitch};
 
 use crate::args::options::{Common, parse_distance};
 use crate::exit::Exit;
@@ -70,11 +70,18 @@ pub(crate) enum Tolerance {
 }
 
 impl Tolerance {
-    /// Returns it in pixels of a resolution, if that is needed and known.
-    fn pixels(self, dpi: Option<Dpi>) -> Option<f64> {
-        match self {
-            Self::Pixels(pixels) => Some(pixels),
-            Self::Length(length) => Some(length.pixels(dpi?)),
+    /// Returns it in pixels.
+    ///
+    /// # Errors
+    /// Returns an error if it is a length, and pixels have no known size or are not square.
+    fn pixels(self, pitch: Option<Pitch>) -> Result<f64, String> {
+        match (self, pitch) {
+            (Self::Pixels(pixels), _) => Ok(pixels),
+            (Self::Length(_), None) => Err("it states no resolution".to_owned()),
+            (Self::Length(length), Some(pitch)) => match pitch.square("a length needs") {
+                Ok(dpi) => Ok(length.pixels(dpi)),
+                Err(why) => Err(why.to_string()),
+            },
         }
     }
 }
@@ -117,11 +124,11 @@ fn compare(args: &CompareArgs, common: &Common) -> Result<(), Exit> {
     }
     let [a, b] = [opened(&args.a)?, opened(&args.b)?];
     // Pages of two resolutions are refused when they are compared.
-    let dpi = a.headers()[0].dpi;
-    let tolerance = args.tolerance.unwrap_or(Tolerance::Pixels(0.0)).pixels(dpi);
-    let tolerance = tolerance.ok_or_else(|| {
+    let pitch = a.headers()[0].pitch;
+    let tolerance = args.tolerance.unwrap_or(Tolerance::Pixels(0.0)).pixels(pitch);
+    let tolerance = tolerance.map_err(|why| {
         let name = input_name(&args.a);
-        Exit::usage(format!("{name} states no resolution: give --tolerance in pixels, such as 1px"))
+        Exit::usage(format!("{name}: {why}: give --tolerance in pixels, such as 1px"))
     })?;
     let pairing = Pairing::of(a.headers(), b.headers());
     let names = paths.map(|path| input_name(path));
@@ -169,9 +176,13 @@ mod tests {
     fn tolerances_are_pixels_or_lengths() {
         assert_eq!("1.5px".parse(), Ok(Tolerance::Pixels(1.5)));
         assert_eq!("20um".parse(), Ok(Tolerance::Length(Length::from_um(20.0))));
-        let dpi = Dpi::new(254.0);
-        assert_eq!(Tolerance::Length(Length::from_um(150.0)).pixels(dpi), Some(1.5));
-        assert_eq!(Tolerance::Length(Length::from_um(150.0)).pixels(None), None);
+        let dpi = Pitch::of_dpi(254.0);
+        assert_eq!(Tolerance::Length(Length::from_um(150.0)).pixels(dpi), Ok(1.5));
+        let refused =
+            |pitch: Option<Pitch>| Tolerance::Length(Length::from_um(150.0)).pixels(pitch);
+        assert!(refused(None).unwrap_err().contains("no resolution"));
+        let why = refused(Some("14x19um".parse().unwrap())).unwrap_err();
+        assert_eq!(why, "its pixels are 14 x 19 um, and a length needs square pixels");
         for wrong in ["", "px", "-1px", "nanpx", "1e9px", "-3um"] {
             assert!(wrong.parse::<Tolerance>().is_err(), "{wrong}");
         }

@@ -154,9 +154,9 @@ fn box_mm(
     each: &DifferenceBox,
 ) -> Option<[f64; 4]> {
     let header = comparison.header(found);
-    let ([x, y], pitch) = (header.info.origin_mm?, header.dpi?.pitch().mm());
-    let [x0, x1] = each.columns.map(|column| to_nm(x + column as f64 * pitch));
-    let [y1, y0] = each.rows.map(|row| to_nm(y - row as f64 * pitch));
+    let ([x, y], [pitch_x, pitch_y]) = (header.info.origin_mm?, header.pitch?.mm());
+    let [x0, x1] = each.columns.map(|column| to_nm(x + column as f64 * pitch_x));
+    let [y1, y0] = each.rows.map(|row| to_nm(y - row as f64 * pitch_y));
     Some([x0, x1, y0, y1])
 }
 

@@ -18,7 +18,7 @@ impl OrientArgs {
         pose: &Pose,
     ) -> Result<u64, Exit> {
         let options = SliceOptions {
-            dpi: self.dpi,
+            pitch: self.dpi.into(),
             thickness: self.thickness,
             units: solid.units,
             placement: solid.placement().then(&pose.placement()),

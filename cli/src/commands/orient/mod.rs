@@ -107,8 +107,12 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
         check_beside(plot, Path::new("-"), paths(&args.parts).chain(solid.cutters()))?;
     }
     let progress = Progress::new("orient", common, true);
-    let reading =
-        Reading { dpi: args.dpi, may_be_open: false, keep_marks: false, watcher: &progress };
+    let reading = Reading {
+        pitch: args.dpi.into(),
+        may_be_open: false,
+        keep_marks: false,
+        watcher: &progress,
+    };
     let part = solid.open(&args.parts, &reading)?;
     let limits =
         PoseLimits { thickness_mm: args.thickness.mm(), max_overhang_deg: args.max_overhang_angle };

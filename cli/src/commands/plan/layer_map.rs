@@ -71,8 +71,10 @@ impl<'a> LayerMap<'a> {
     }
 
     fn begin(&self, layer: &Layer) -> Result<Option<Begun>, Exit> {
-        // Plans refuse pages without a resolution themselves.
-        let Some(dpi) = layer.dpi else { return Ok(None) };
+        // Plans refuse other pages themselves.
+        let Some(dpi) = layer.pitch.and_then(|pitch| pitch.square("plans need").ok()) else {
+            return Ok(None);
+        };
         self.light.check_spread(dpi)?;
         let (image, name) = (&layer.image, layer.info.name());
         let all = PictureRegion::of(image);

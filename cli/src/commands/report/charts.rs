@@ -1,7 +1,5 @@
 //! The curves of a report, over the height.
 
-use lamp_stack::Dpi;
-
 use super::gather::StackReport;
 use super::measure::LayerNumbers;
 use lamp_plots::{Series, by_layer, curve, inline_svg};
@@ -12,7 +10,7 @@ const MOST_POINTS: usize = 1200;
 /// Returns the stack's curves as SVG.
 pub(super) fn charts(report: &StackReport) -> Vec<String> {
     let layers = &report.layers;
-    let pitch_mm = report.totals.first.dpi.map(|dpi: Dpi| dpi.pitch().mm());
+    let pitch = report.totals.first.pitch;
     // One axis cannot have heights of some layers and numbers of others.
     let has_heights = layers.iter().all(|layer| layer.z_um.is_some());
     let place = |(number, layer): (usize, &LayerNumbers)| match layer.z_um {
@@ -34,8 +32,10 @@ pub(super) fn charts(report: &StackReport) -> Vec<String> {
             inline_svg(&plot)
         })
     };
-    let (area, area_unit) = pitch_mm.map_or((1.0, "pixels"), |pitch| (pitch * pitch, "mm²"));
-    let (length, length_unit) = pitch_mm.map_or((1.0, "pixels"), |pitch| (pitch, "mm"));
+    let (area, area_unit) = pitch.map_or((1.0, "pixels"), |pitch| (pitch.pixel_mm2(), "mm²"));
+    // Sides of pixels are counted together, so they need one length.
+    let side = pitch.filter(|pitch| pitch.is_square()).map(|pitch| pitch.x.pitch().mm());
+    let (length, length_unit) = side.map_or((1.0, "pixels"), |side| (side, "mm"));
     let islands = report.islands_by_layer();
     let has = |of: fn(&LayerNumbers) -> u64| layers.iter().any(|layer| of(layer) > 0);
     let mut charts = vec![

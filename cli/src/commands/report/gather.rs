@@ -57,7 +57,7 @@ impl StackReport {
         let mut layers = measured(stack, &numbers, &sheet, progress).inspect(|layer| {
             if let Ok(layer) = layer {
                 let size = [layer.image.width(), layer.image.height()];
-                clock.borrow_mut().add(&layer.info, layer.dpi, size, &layer.image);
+                clock.borrow_mut().add(&layer.info, layer.pitch, size, &layer.image);
             }
         });
         let build = BuildCopies::of(&headers[0].info, headers[0].size);
@@ -102,7 +102,7 @@ impl StackReport {
         if !totals.has_checks() {
             warnings.push("Its pages carry no checks: a changed image would not show.".to_owned());
         }
-        if totals.first.dpi.is_none() {
+        if totals.first.pitch.is_none() {
             warnings.push("It states no resolution: lengths are in pixels.".to_owned());
         }
         if let Some(why) = &self.time.unscanned {

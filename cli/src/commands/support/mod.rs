@@ -146,7 +146,7 @@ impl SupportArgs {
         let surface = self.surface(&first.info, &name, progress)?;
         // Room for pillars that lean outwards.
         let options = self.settings.options();
-        let reach = first.dpi.map_or(0.0, |dpi| options.reach_outside().pixels(dpi).ceil());
+        let reach = first.pitch.map_or(0.0, |pitch| options.reach_outside().pixels(pitch.x).ceil());
         let room = reach.min(MOST_ROOM) as u32;
         let found = self.check(stack, room, progress)?;
         let of_stack = |error: Exit| match error.cause::<SupportError>() {

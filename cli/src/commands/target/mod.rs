@@ -70,7 +70,7 @@ fn pages(
             info.other.insert("feature_px".to_owned(), feature.into());
         }
         info.other.insert("dose_mj_per_cm2".to_owned(), dose.into());
-        Ok(Layer { info, dpi: Some(dpi), image: exposure.image.into() })
+        Ok(Layer { info, pitch: Some(dpi.into()), image: exposure.image.into() })
     })
 }
 

@@ -64,7 +64,7 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
         stack: Some(stack),
         ..PageInfo::default()
     };
-    let layer = Layer { info, dpi: Some(args.dpi), image: image.into() };
+    let layer = Layer { info, pitch: Some(args.dpi.into()), image: image.into() };
     let progress = progress("target", common, &args.output);
     write_layers(std::iter::once(Ok(layer)), &args.output, &progress)
 }

@@ -3,7 +3,7 @@
 use lamp_build::{CopyEntry, CuredPixels, LayerAreas, Layout};
 use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
-use lamp_stack::{Dpi, Layer, to_nm};
+use lamp_stack::{Layer, Pitch, to_nm};
 use serde_json::{Value, json};
 
 use super::TileArgs;
@@ -47,7 +47,7 @@ impl BuildTotals {
 
     /// Adds the time of the next layer, whose build is so large in pixels.
     pub(super) fn time(&mut self, layer: &Layer, size: [u32; 2]) {
-        self.clock.add(&layer.info, layer.dpi, size, &layer.image);
+        self.clock.add(&layer.info, layer.pitch, size, &layer.image);
     }
 
     /// Adds the next layer.
@@ -67,12 +67,13 @@ impl BuildTotals {
 
     fn report(&self, layout: &Layout, machine: Option<&Machine>, time: &BuildTime) -> JsonReport {
         let dpi = layout.dpi();
+        let pitch = Pitch::from(dpi);
         let file = layout.to_file();
         let cured = |pixels: &CuredPixels| {
             json!({
                 "exposed_px": pixels.pixels,
-                "area_mm2": to_nm(pixels.area_mm2(dpi)),
-                "volume_mm3": pixels.volume_mm3(dpi).map(to_nm),
+                "area_mm2": to_nm(pixels.area_mm2(pitch)),
+                "volume_mm3": pixels.volume_mm3(pitch).map(to_nm),
             })
         };
         let head = json!({
@@ -114,14 +115,14 @@ impl BuildTotals {
         JsonReport::new(&head)
             .list("parts", (0..self.parts.len()).map(part))
             .list("copies", copies)
-            .list("by_layer", self.layers.iter().map(|layer| layer.json(dpi)))
+            .list("by_layer", self.layers.iter().map(|layer| layer.json(pitch)))
     }
 }
 
 impl LayerTotals {
-    fn json(&self, dpi: Dpi) -> Value {
+    fn json(&self, pitch: Pitch) -> Value {
         let Self { areas, exposed_px } = self;
-        let mm2 = |pixels: u64| to_nm(pixels as f64 * dpi.pitch().mm().powi(2));
+        let mm2 = |pixels: u64| to_nm(pixels as f64 * pitch.pixel_mm2());
         let share = (*exposed_px > 0).then(|| areas.mesh_px as f64 / *exposed_px as f64);
         json!({
             "layer": areas.index,

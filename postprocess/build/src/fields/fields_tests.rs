@@ -1,6 +1,6 @@
 //! Swaths and fields cut and put back together.
 
-use lamp_stack::{Dpi, GrayMask, Mask, PageInfo};
+use lamp_stack::{GrayMask, Mask, PageInfo, Pitch};
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -86,7 +86,7 @@ fn a_column_is_in_one_swath_or_two() {
 fn a_page_says_where_its_swath_lies() {
     let info = PageInfo { origin_mm: Some([1.0, 5.0]), stray_rows: vec![0], ..PageInfo::default() };
     let image = Image::Mask(Mask::black(22, 1));
-    let layer = Layer { info, dpi: Dpi::new(25.4), image: image.into() };
+    let layer = Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() };
     let form = FieldForm { width: 10, height: None, overlap: 4, seam: Seam::Comb };
     let fields = form.fields([22, 1]).unwrap();
     let swath = fields.cut_layer(&layer, 2..3).next().unwrap();
@@ -107,7 +107,7 @@ fn a_page_says_where_its_field_lies() {
         ..PageInfo::default()
     };
     let image = Image::Mask(Mask::black(22, 14));
-    let layer = Layer { info, dpi: Dpi::new(25.4), image: image.into() };
+    let layer = Layer { info, pitch: Pitch::of_dpi(25.4), image: image.into() };
     let form = FieldForm { width: 10, height: Some(8), overlap: 2, seam: Seam::Comb };
     let fields = form.fields([22, 14]).unwrap();
     assert_eq!((fields.grid(), fields.count()), ([3, 2], 6));

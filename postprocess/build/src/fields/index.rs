@@ -5,7 +5,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use lamp_stack::{Dpi, StackError, one_line, to_nm};
+use lamp_stack::{Dpi, Pitch, StackError, one_line, to_nm};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -38,7 +38,7 @@ pub(super) struct FieldIndex {
     pub(super) name: String,
     pub(super) layers: u32,
     /// The build's resolution, if fields have places in millimeters.
-    pub(super) dpi: Option<Dpi>,
+    pub(super) pitch: Option<Pitch>,
     pub(super) fields: Fields,
 }
 
@@ -74,7 +74,7 @@ struct FieldsFile {
     /// The build's width and height.
     pixels: [u32; 2],
     layers: u32,
-    dpi: Option<f64>,
+    dpi: Option<Pitch>,
     /// A field's width and height.
     field: [u32; 2],
     overlap: u32,
@@ -110,13 +110,16 @@ impl FieldLine {
     fn of(index: &FieldIndex, field: u32) -> Self {
         let FieldPlace { row, column } = index.fields.place(field);
         let (columns, rows) = (index.fields.columns(field), index.fields.rows(field));
-        let mm = |pixels: u32| index.dpi.map(|dpi| to_nm(f64::from(pixels) * dpi.pitch().mm()));
+        let mm = |axis: fn(&Pitch) -> Dpi, pixels: u32| {
+            let pitch = index.pitch.as_ref().map(axis)?.pitch();
+            Some(to_nm(f64::from(pixels) * pitch.mm()))
+        };
         Self {
             row,
             column,
             file: index.file_name(field),
-            x_mm: mm(columns.start),
-            y_mm: mm(rows.start),
+            x_mm: mm(|pitch| pitch.x, columns.start),
+            y_mm: mm(|pitch| pitch.y, rows.start),
             columns: [columns.start, columns.end],
             rows: [rows.start, rows.end],
         }
@@ -138,8 +141,7 @@ impl FieldIndex {
         let FieldForm { width: field_width, height: field_height, overlap, seam } = fields.form();
         let [width, height] = fields.layer_size();
         let name = serde_json::to_string(name).expect("a text is JSON");
-        let dpi = self.dpi.map(Dpi::get);
-        let dpi = serde_json::to_string(&dpi).expect("a number is JSON");
+        let dpi = serde_json::to_string(&self.pitch).expect("a number is JSON");
         let (size, kind, lines) = match field_height {
             None => {
                 (format!("\"mirrors\": {field_width}"), "strips", json(self.lines(StripLine::of)))
@@ -194,17 +196,16 @@ impl FieldIndex {
                 let StripsFile { name, pixels, layers, mirrors, overlap, seam, strips } =
                     from_json(text, kind)?;
                 let form = FieldForm { width: mirrors, height: None, overlap, seam };
-                let index = Self { name, layers, dpi: None, fields: form.fields(pixels)? };
+                let index = Self { name, layers, pitch: None, fields: form.fields(pixels)? };
                 let is_alike = index.lines(StripLine::of).eq(strips);
                 (index, is_alike)
             }
             FieldKind::Field => {
                 let FieldsFile { name, pixels, layers, dpi, field, overlap, seam, fields } =
                     from_json(text, kind)?;
-                let dpi = dpi.map(|dpi| Dpi::new(dpi).ok_or_else(malformed)).transpose()?;
                 let [width, height] = field;
                 let form = FieldForm { width, height: Some(height), overlap, seam };
-                let index = Self { name, layers, dpi, fields: form.fields(pixels)? };
+                let index = Self { name, layers, pitch: dpi, fields: form.fields(pixels)? };
                 let is_alike = index.lines(FieldLine::of).eq(fields);
                 (index, is_alike)
             }
@@ -235,7 +236,7 @@ mod tests {
     fn an_index_reads_back_and_what_is_none_is_refused() {
         let form = FieldForm { width: 10, height: None, overlap: 4, seam: Seam::Comb };
         let fields = form.fields([22, 7]).unwrap();
-        let index = FieldIndex { name: "a \"b\"".to_owned(), layers: 3, dpi: None, fields };
+        let index = FieldIndex { name: "a \"b\"".to_owned(), layers: 3, pitch: None, fields };
         let text = index.to_json();
         let parse = |text: &str| FieldIndex::parse(text, FieldKind::Strip);
         assert_eq!(parse(&text).unwrap(), index);
@@ -264,14 +265,15 @@ mod tests {
     fn an_index_of_fields_has_rows_columns_and_places() {
         let form = FieldForm { width: 10, height: Some(8), overlap: 2, seam: Seam::Comb };
         let fields = form.fields([22, 13]).unwrap();
-        let index = FieldIndex { name: "a".to_owned(), layers: 3, dpi: Dpi::new(1500.0), fields };
+        let index =
+            FieldIndex { name: "a".to_owned(), layers: 3, pitch: Pitch::of_dpi(1500.0), fields };
         let text = index.to_json();
         let parse = |text: &str| FieldIndex::parse(text, FieldKind::Field);
         assert_eq!(parse(&text).unwrap(), index);
         // 8 pixels of 25.4 mm / 1500.
         let line = r#"{"row":0,"column":1,"file":"field_000_001.tif","columns":[8,18],"rows":[0,8],"x_mm":0.135467,"y_mm":0.0}"#;
         assert!(text.contains(line), "{text}");
-        let without = FieldIndex { dpi: None, ..index.clone() };
+        let without = FieldIndex { pitch: None, ..index.clone() };
         assert!(without.to_json().contains("\"x_mm\":null"));
         assert_eq!(parse(&without.to_json()).unwrap(), without);
         for (from, to) in [

@@ -169,8 +169,11 @@ impl Fields {
                 cut.into_iter().map(LayerImage::from).collect()
             }
         };
-        let page =
-            move |(image, field)| Layer { info: this.page(layer, field), dpi: layer.dpi, image };
+        let page = move |(image, field)| Layer {
+            info: this.page(layer, field),
+            pitch: layer.pitch,
+            image,
+        };
         images.into_iter().zip(fields).map(page)
     }
 
@@ -183,7 +186,7 @@ impl Fields {
         if field > 0 || height < layer_size[1] {
             let (left, top) = (columns.start.into(), rows.start.into());
             let frame = Frame { left, top, width, height };
-            let bounds = ImageBounds::of(&info, layer.dpi, layer_size);
+            let bounds = ImageBounds::of(&info, layer.pitch, layer_size);
             frame_page(&mut info, frame, &bounds.framed(frame));
         }
         let bits = if matches!(*layer.image, Image::Mask(_)) { 1 } else { 8 };

@@ -178,14 +178,14 @@ impl LayerPages {
         let decoded = self.pages.into_iter().zip(0..).map(|(page, field)| {
             let file = || form.file_name(fields.place(field));
             let layer = page.decode().map_err(|source| FieldsError::In { file: file(), source })?;
-            Ok(((layer.info, layer.dpi), layer.image.into_image()))
+            Ok(((layer.info, layer.pitch), layer.image.into_image()))
         });
         let decoded: Vec<_> = decoded.collect::<Result<_, FieldsError>>()?;
         let (mut pages, images): (Vec<_>, Vec<Image>) = decoded.into_iter().unzip();
         let stray_rows = rows_of_build(&fields, &pages, |info| &info.stray_rows);
         let open_rows = rows_of_build(&fields, &pages, |info| &info.open_rows);
         // The first field's page keeps the origin of the build.
-        let (mut info, dpi) = pages.swap_remove(0);
+        let (mut info, pitch) = pages.swap_remove(0);
         (info.stray_rows, info.open_rows) = (stray_rows, open_rows);
         let unlike = |source| FieldsError::Join { layer: info.name(), source };
         let gray = fields.join(&images).map_err(unlike)?;
@@ -208,7 +208,7 @@ impl LayerPages {
             // The build's page lacked this command: without it the build comes back byte for byte.
             stack.commands.retain(|command| !command.starts_with(&of_field));
         }
-        Ok(Layer { info, dpi, image: image.into() })
+        Ok(Layer { info, pitch, image: image.into() })
     }
 }
 

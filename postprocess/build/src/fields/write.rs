@@ -96,9 +96,9 @@ impl FieldWriter {
         };
         let name = first.info.stack.as_ref().map(|stack| stack.part.clone()).unwrap_or_default();
         // Only fields have places in millimeters.
-        let dpi = first.dpi.filter(|_| self.form.kind() == FieldKind::Field);
+        let pitch = first.pitch.filter(|_| self.form.kind() == FieldKind::Field);
         Ok(OpenFields {
-            index: FieldIndex { name, layers: 0, dpi, fields },
+            index: FieldIndex { name, layers: 0, pitch, fields },
             files: (0..fields.count()).map(file).collect::<Result<_, _>>()?,
         })
     }

@@ -33,7 +33,7 @@ pub(crate) fn on_base<E>(
             });
             let areas = Areas { part_px: vec![0; areas.part_px.len()], mesh_px: *mesh_px };
             let image = Image::Mask(image.clone());
-            let layer = Layer { info, dpi: first.dpi, image: image.into() };
+            let layer = Layer { info, pitch: first.pitch, image: image.into() };
             next += 1;
             return Some(Ok((layer, (Vec::new(), areas))));
         }

@@ -305,7 +305,7 @@ impl Canvas {
                 let whole = || mesh.map_or_else(|| Mask::black(0, 0), BuildMesh::whole);
                 // The base is one image: the first thread that needs it draws it for all.
                 let image = self.whole.get_or_init(whole).clone();
-                Ok(Layer { info: *info, dpi: Some(self.layout.dpi), image: image.into() })
+                Ok(Layer { info: *info, pitch: Some(self.layout.dpi.into()), image: image.into() })
             }
             LayerDrawing::Parts(step) => {
                 let mut layer = self.layout.layer(&step, true)?;

@@ -39,7 +39,7 @@ const SCHEMA: &str = "lamp-recipe-1";
 ///     RecipePart, TileError,
 /// };
 /// use lamp_stack::{
-///     Destination, Dpi, Format, IndexedStack, Layer, Mask, PageInfo, StackError, digest_of,
+///     Destination, Pitch, Format, IndexedStack, Layer, Mask, PageInfo, StackError, digest_of,
 ///     write_stack,
 /// };
 ///
@@ -48,7 +48,7 @@ const SCHEMA: &str = "lamp-recipe-1";
 /// // A part of twenty layers, at 10 pixels a millimetre.
 /// let layer = |index| Layer {
 ///     info: PageInfo { index, ..PageInfo::default() },
-///     dpi: Dpi::new(254.0),
+///     pitch: Pitch::of_dpi(254.0),
 ///     image: Mask::black(30, 20).inverted().into(),
 /// };
 /// let file = folder.join("blade.tif");

@@ -106,7 +106,7 @@ impl PartStackFile {
     pub(super) fn headers(&self) -> impl Iterator<Item = Result<Layer, TileError>> + use<> {
         let layer = |header: &PageHeader| Layer {
             info: PageInfo { stack: None, ..header.info.clone() },
-            dpi: header.dpi,
+            pitch: header.pitch,
             // Heights alone decide which pages go together, so nothing is decoded.
             image: LayerImage::from(Mask::black(0, 0)),
         };

@@ -1,5 +1,5 @@
 use lamp_fixtures::{Plate, Quad};
-use lamp_stack::{Dpi, Frame, Image, Layer, Mask, MaskBuilder, Op, PageInfo};
+use lamp_stack::{Dpi, Frame, Image, Layer, Mask, MaskBuilder, Op, PageInfo, Pitch};
 
 use super::super::testing::mask_of;
 use super::super::{PackBy, Turns};
@@ -48,7 +48,7 @@ fn sampled(name: &str, quads: &[Quad], origin_mm: [f64; 2], pixels: [u32; 2]) ->
     }
     let info = PageInfo { origin_mm: Some(origin_mm), ..PageInfo::default() };
     let image = Image::Mask(mask.finish()).into();
-    let layer = Layer { info, dpi: Dpi::new(DPI), image };
+    let layer = Layer { info, pitch: Pitch::of_dpi(DPI), image };
     PartStack::of_outline(name, std::iter::once(Ok::<_, TileError>(layer))).unwrap().unwrap()
 }
 
@@ -169,7 +169,7 @@ fn what_fits_as_it_is_takes_no_other_stacks() {
 #[test]
 fn parts_without_a_place_or_an_outline_are_not_turned() {
     let image = Image::Mask(mask_of(&["##", "#."])).into();
-    let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(DPI), image };
+    let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(DPI), image };
     let box_alone = PartStack::of_image("p.tif", &layer).unwrap();
     assert!(matches!(box_alone.turned([0.0; 2], 15.0), Err(TileError::NoOutline { .. })));
     let layers = std::iter::once(Ok::<_, TileError>(layer));

@@ -62,7 +62,7 @@ pub(super) struct CodedLayer {
 
 impl CodedLayer {
     pub(super) fn new(pair: &Pair) -> Self {
-        let Layer { info, dpi, image } = &*pair.layer;
+        let Layer { info, pitch, image } = &*pair.layer;
         let below = pair.below.as_ref().map(|below| &*below.image);
         let CodedImage { mode, streams } = encode(image, below);
         let shape = ImageFacts {
@@ -71,7 +71,7 @@ impl CodedLayer {
             size: [image.width(), image.height()],
             changes: image.change_count() as u32,
         };
-        let line = OpenLine::new(info, *dpi, image.check(), None);
+        let line = OpenLine::new(info, *pitch, image.check(), None);
         Self { is_key: pair.below.is_none(), shape, line, streams }
     }
 }

@@ -86,7 +86,7 @@ pub fn copy_packed(
 /// Returns a page's line with other metadata.
 fn line_of(page: &Page, info: &PageInfo) -> Result<OpenLine, StackError> {
     let check = page.image_check().ok_or(StackError::Changed)?;
-    Ok(OpenLine::new(info, page.header().dpi, check, None))
+    Ok(OpenLine::new(info, page.header().pitch, check, None))
 }
 
 /// The frames of a packed file, as they are.

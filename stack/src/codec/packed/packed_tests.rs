@@ -13,7 +13,7 @@ use crate::layer::page_info::PageInfo;
 use crate::layer::{Layer, LayerImage, Strip};
 use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 use crate::{
-    Compression, Dpi, Format, IndexedStack, JoinError, Pages, StackError, g4, write_stack,
+    Compression, Format, IndexedStack, JoinError, Pages, Pitch, StackError, g4, write_stack,
 };
 
 /// The bytes that are written to a stream.
@@ -57,7 +57,7 @@ fn read(bytes: Vec<u8>) -> Result<Vec<Layer>, StackError> {
 fn layers_of(first: u32, images: Vec<Image>) -> Vec<Layer> {
     let of = |(index, image): (u32, Image)| Layer {
         info: PageInfo { index, z_um: Some(f64::from(index)), ..PageInfo::default() },
-        dpi: Dpi::new(1500.0),
+        pitch: Pitch::of_dpi(1500.0),
         image: image.into(),
     };
     (first..).zip(images).map(of).collect()
@@ -180,7 +180,7 @@ fn codes_of_other_programs_are_kept() {
     let info = PageInfo { index: 3, ..PageInfo::default() };
     let strip = Strip { compression: Compression::G4, bytes: foreign.into() };
     let image = LayerImage::of_page(mask.into(), Some(strip.clone()), None);
-    let layers = [Layer { info, dpi: None, image }];
+    let layers = [Layer { info, pitch: None, image }];
     let back = read(packed(&layers)).unwrap();
     assert_eq!(back[0].image.strip(), Some(&strip));
     assert!(tiff(back.into_iter().map(Ok)) == tiff(layers.into_iter().map(Ok)));

@@ -57,7 +57,7 @@ impl PackLevel {
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("one.lamp");
 /// let mask = Mask::new(4, vec![0, 2, 2], vec![1, 3]).unwrap();
-/// let layer = Layer { info: PageInfo::default(), dpi: None, image: mask.into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: None, image: mask.into() };
 ///
 /// let layers = std::iter::once(Ok::<_, StackError>(layer.clone()));
 /// let to = Destination::File(path.clone());

@@ -18,8 +18,9 @@ use crate::codec::compression::Compression;
 use crate::error::{PageFault, StackError, UnsupportedFeature, malformed};
 use crate::image::orientation::Orientation;
 use crate::layer::check::{CheckFault, PageLine};
-use crate::length::{Dpi, has_square_pixels};
+use crate::length::has_square_pixels;
 use crate::limits::Limits;
+use crate::pitch::Pitch;
 
 /// The tags whose values are read.
 pub(super) const KNOWN: [u16; 24] = [
@@ -89,42 +90,49 @@ impl Fields {
         }
     }
 
-    fn dpi(&self) -> Option<Dpi> {
-        let value = self.resolution(X_RESOLUTION)?;
+    /// Returns the pitch of the pixels as they are stored, if it is stated with a unit.
+    ///
+    /// Refuses pixels whose width differs from their height where their size is not known: the
+    /// numbers alone still give the ratio of width to height.
+    fn pitch(&self, is_ours: bool) -> Result<Option<Pitch>, StackError> {
+        let Some(across) = self.resolution(X_RESOLUTION) else { return Ok(None) };
+        let down = self.resolution(Y_RESOLUTION).unwrap_or(across);
+        let numbers = [across, down].map(|[num, den]| num / den);
+        let is_square = has_square_pixels(numbers, 0.0);
+        // Other programs round.
+        let down = if is_square && !is_ours { across } else { down };
         // Inches are the default (TIFF 6.0, section 8, ResolutionUnit).
-        match self.number_or(RESOLUTION_UNIT, PER_INCH).ok()? {
-            PER_INCH => Dpi::new(value),
-            PER_CENTIMETRE => Dpi::new(value * 2.54),
+        let scale = match self.number_or(RESOLUTION_UNIT, PER_INCH) {
+            Ok(PER_INCH) => Some([1.0, 1.0]),
+            Ok(PER_CENTIMETRE) => Some([254.0, 100.0]),
             _ => None,
+        };
+        let pitch = scale.and_then(|[by, of]| {
+            // Products of whole numbers are exact, so the pitch is exact, too.
+            Pitch::of_two_dpi([across, down].map(|[num, den]| num * by / (den * of)))
+        });
+        match numbers {
+            [across, down] if pitch.is_none() && !is_square => {
+                Err(StackError::RectangularPixels { page: self.page, across, down })
+            }
+            _ => Ok(pitch),
         }
     }
 
-    /// Returns a resolution, in any of the types that libtiff reads.
-    fn resolution(&self, tag: u16) -> Option<f64> {
+    /// Returns a resolution as a fraction, in any of the types that libtiff reads.
+    fn resolution(&self, tag: u16) -> Option<[f64; 2]> {
         let (kind, bytes) = self.values.get(&tag)?;
         let size = type_size(*kind) as usize;
         let long = |bytes: &[u8]| number(bytes, self.little_endian) as u32;
         let first = bytes.get(..size).filter(|_| size > 0)?;
         Some(match *kind {
             // 0/0 makes NaN, which is no resolution.
-            RATIONAL => f64::from(long(&first[..4])) / f64::from(long(&first[4..])),
-            SRATIONAL => f64::from(long(&first[..4]) as i32) / f64::from(long(&first[4..]) as i32),
-            FLOAT => f32::from_bits(long(first)).into(),
-            DOUBLE => f64::from_bits(number(first, self.little_endian)),
-            _ => self.number(tag).ok()? as f64,
+            RATIONAL => [&first[..4], &first[4..]].map(|part| long(part).into()),
+            SRATIONAL => [&first[..4], &first[4..]].map(|part| (long(part) as i32).into()),
+            FLOAT => [f32::from_bits(long(first)).into(), 1.0],
+            DOUBLE => [f64::from_bits(number(first, self.little_endian)), 1.0],
+            _ => [self.number(tag).ok()? as f64, 1.0],
         })
-    }
-
-    /// Refuses pixels whose width differs from their height. The unit does not matter: without one,
-    /// the numbers still give the ratio of width to height.
-    fn check_pixels(&self) -> Result<(), StackError> {
-        let sides = self.resolution(X_RESOLUTION).zip(self.resolution(Y_RESOLUTION));
-        match sides.filter(|&(across, down)| !has_square_pixels([across, down], 0.0)) {
-            Some((across, down)) => {
-                Err(StackError::RectangularPixels { page: self.page, across, down })
-            }
-            None => Ok(()),
-        }
     }
 
     /// Returns the text of the page's description, if it has one.
@@ -165,13 +173,13 @@ impl Fields {
             let (layer, fault) = (info.index, CheckFault::Directory);
             return Err(StackError::Check { layer, fault });
         }
-        self.check_pixels()?;
+        let pitch = self.pitch(check.is_some())?;
         Ok(Page {
             number: self.page,
             limits: self.limits,
             info,
             check,
-            dpi: self.dpi(),
+            pitch: pitch.map(|pitch| if orientation.is_across() { pitch.turned() } else { pitch }),
             width,
             gray,
             white_is_zero,
@@ -187,8 +195,9 @@ impl Fields {
 
     /// Returns whether fields that other programs need, but we do not, are as we write them.
     fn is_as_we_write(&self) -> bool {
-        let resolution = |tag| self.values.get(&tag);
-        resolution(X_RESOLUTION) == resolution(Y_RESOLUTION)
+        // The page's check has the values of both.
+        let is_stated = |tag| self.values.contains_key(&tag);
+        is_stated(X_RESOLUTION) == is_stated(Y_RESOLUTION)
             && matches!(self.number_or(PLANAR_CONFIGURATION, 1), Ok(1))
             && matches!(self.number_or(T6_OPTIONS, 0), Ok(0))
     }

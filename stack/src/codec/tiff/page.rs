@@ -22,9 +22,9 @@ use crate::layer::check::{
 };
 use crate::layer::page_info::PageInfo;
 use crate::layer::{Layer, LayerImage, Strip};
-use crate::length::Dpi;
 use crate::limits::Limits;
 use crate::ordered::MemorySize;
+use crate::pitch::Pitch;
 use crate::printer::{archive, goo};
 
 /// A page that is not decoded yet.
@@ -34,7 +34,7 @@ pub struct Page {
     pub(super) limits: Limits,
     pub(super) info: PageInfo,
     pub(super) check: Option<LineCheck>,
-    pub(super) dpi: Option<Dpi>,
+    pub(super) pitch: Option<Pitch>,
     pub(super) width: u32,
     pub(super) gray: bool,
     pub(super) white_is_zero: bool,
@@ -72,7 +72,7 @@ pub(crate) struct PackedShape {
 pub(crate) struct PanelPage {
     pub(crate) number: u32,
     pub(crate) info: PageInfo,
-    pub(crate) dpi: Option<Dpi>,
+    pub(crate) pitch: Option<Pitch>,
     /// The columns and rows of the panel.
     pub(crate) size: [u32; 2],
     pub(crate) gray: bool,
@@ -87,7 +87,7 @@ pub struct PageHeader {
     /// The content of the page's JSON line, or only the page's number if it has none.
     pub info: PageInfo,
     /// The resolution, if the page states one in inches or centimeters.
-    pub dpi: Option<Dpi>,
+    pub pitch: Option<Pitch>,
     /// The width and height in pixels of the upright image.
     pub size: [u32; 2],
     /// Whether the image is gray, not a mask.
@@ -134,14 +134,14 @@ impl Page {
         header: Header,
         file: Vec<u8>,
     ) -> Self {
-        let Header { width, height, gray, dpi, line } = header;
+        let Header { width, height, gray, pitch, line } = header;
         let PageLine { info, check } = line.unwrap_or_else(|| PageLine::without(number));
         Self {
             number,
             limits,
             info,
             check,
-            dpi,
+            pitch,
             width,
             gray,
             white_is_zero: false,
@@ -167,13 +167,13 @@ impl Page {
     ) -> Self {
         let [width, height] = shape.size;
         let PageLine { info, check } = line;
-        let dpi = check.as_ref().and_then(|check| check.page.as_ref()?.dpi).and_then(Dpi::new);
+        let pitch = check.as_ref().and_then(|check| check.page.as_ref()?.pitch);
         Self {
             number,
             limits,
             info,
             check,
-            dpi,
+            pitch,
             width,
             gray: shape.gray,
             white_is_zero: false,
@@ -190,14 +190,14 @@ impl Page {
     /// Creates a page of a printer's file from the data of its image, which is kept only to be
     /// decoded.
     pub(crate) fn of_panel(page: PanelPage, limits: Limits, data: Vec<u8>, is_kept: bool) -> Self {
-        let PanelPage { number, info, dpi, size, gray, orientation, compression } = page;
+        let PanelPage { number, info, pitch, size, gray, orientation, compression } = page;
         let [width, height] = size;
         Self {
             number,
             limits,
             info,
             check: None,
-            dpi,
+            pitch,
             width,
             gray,
             white_is_zero: false,
@@ -221,8 +221,8 @@ impl Page {
     }
 
     /// Returns the resolution, if the page states one in inches or centimeters.
-    pub(crate) fn dpi(&self) -> Option<Dpi> {
-        self.dpi
+    pub(crate) fn pitch(&self) -> Option<Pitch> {
+        self.pitch
     }
 
     /// Returns the width and height in pixels of the upright image.
@@ -273,7 +273,7 @@ impl Page {
         chain: &mut ChainReader,
         before: Option<u32>,
     ) -> Result<(), CheckFault> {
-        chain.follow(self.check.as_ref(), self.dpi, self.info.index, before)
+        chain.follow(self.check.as_ref(), self.pitch, self.info.index, before)
     }
 
     /// Returns the page's statements, without its image.
@@ -281,7 +281,7 @@ impl Page {
         let check = self.check.as_ref().and_then(|check| check.page.as_ref());
         PageHeader {
             info: self.info.clone(),
-            dpi: self.dpi,
+            pitch: self.pitch,
             size: self.size(),
             gray: self.gray,
             compression: self.compression,
@@ -363,7 +363,7 @@ impl Page {
         let strip = strip
             .and_then(|compression| Some(Strip { compression, bytes: self.pieces.pop()?.into() }));
         let image = LayerImage::of_page(image, strip, check);
-        Ok(Layer { info: self.info, dpi: self.dpi, image })
+        Ok(Layer { info: self.info, pitch: self.pitch, image })
     }
 
     fn decode_mask(&self) -> Result<Mask, StackError> {

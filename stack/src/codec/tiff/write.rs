@@ -21,6 +21,7 @@ use crate::files::page_folder::PageFile;
 use crate::image::Image;
 use crate::layer::Layer;
 use crate::layer::check::{CheckChain, CodeCheck, OpenLine};
+use crate::pitch::Pitch;
 
 /// The variant of TIFF to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,7 +66,7 @@ pub struct EncodedPage {
     width: u32,
     height: u32,
     compression: Compression,
-    resolution: (u32, u32),
+    pitch: Option<Pitch>,
     line: OpenLine,
     strip: Vec<u8>,
 }
@@ -85,8 +86,8 @@ impl EncodedPage {
             width: layer.image.width(),
             height: layer.image.height(),
             compression,
-            resolution: layer.dpi.map_or((0, 1), crate::Dpi::to_rational),
-            line: OpenLine::new(&layer.info, layer.dpi, layer.image.check(), Some(code)),
+            pitch: layer.pitch,
+            line: OpenLine::new(&layer.info, layer.pitch, layer.image.check(), Some(code)),
             strip,
         }
     }
@@ -103,8 +104,8 @@ impl EncodedPage {
             width,
             height,
             compression,
-            resolution: page.dpi.map_or((0, 1), crate::Dpi::to_rational),
-            line: OpenLine::new(&page.info, page.dpi, image, Some(code)),
+            pitch: page.pitch,
+            line: OpenLine::new(&page.info, page.pitch, image, Some(code)),
             strip: page.pieces.pop().expect("pages that pass have a strip"),
         }
     }
@@ -131,8 +132,7 @@ impl EncodedPage {
             Format::Big => (tag, LONG8, 1, value.to_le_bytes().to_vec()),
             Format::Classic => long(tag, value as u32),
         };
-        let resolution = |tag| {
-            let (num, den) = self.resolution;
+        let rational = |tag, (num, den): (u32, u32)| {
             (tag, RATIONAL, 1, [num.to_le_bytes(), den.to_le_bytes()].concat())
         };
         let (is_gray, compression) = match self.compression {
@@ -157,8 +157,9 @@ impl EncodedPage {
             word(STRIP_BYTE_COUNTS, self.strip.len() as u64),
             short(PLANAR_CONFIGURATION, 1),
         ];
-        if self.resolution.0 > 0 {
-            fields.extend([resolution(X_RESOLUTION), resolution(Y_RESOLUTION)]);
+        if let Some(Pitch { x, y }) = self.pitch {
+            fields.push(rational(X_RESOLUTION, x.to_rational()));
+            fields.push(rational(Y_RESOLUTION, y.to_rational()));
             fields.push(short(RESOLUTION_UNIT, PER_INCH));
         }
         if !is_gray {

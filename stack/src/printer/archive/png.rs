@@ -10,22 +10,22 @@ use crate::error::PageFault;
 use crate::image::Image;
 use crate::image::frame::Frame;
 use crate::image::gray::GrayMask;
-use crate::length::Dpi;
 use crate::limits::Limits;
+use crate::pitch::Pitch;
 
 /// Encodes an image as an 8-bit gray PNG, whatever it is: printers know no other.
 ///
 /// The cost grows with the image's runs: a row's filter byte is a black pixel before it.
-pub(crate) fn encode(image: &Image, dpi: Option<Dpi>) -> Vec<u8> {
+pub(crate) fn encode(image: &Image, pitch: Option<Pitch>) -> Vec<u8> {
     let [width, height] = [image.width(), image.height()];
     let framed = Frame { left: -1, top: 0, width: width + 1, height };
     let data = deflate::encode(&image.to_gray().framed(framed));
     let mut file = png_page::SIGNATURE.to_vec();
     let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[8, 0, 0, 0, 0]].concat();
     put_chunk(&mut file, b"IHDR", &header);
-    if let Some(dpi) = dpi {
-        let per_metre = dpi.per_metre().to_be_bytes();
-        put_chunk(&mut file, b"pHYs", &[&per_metre[..], &per_metre, &[1]].concat());
+    if let Some(pitch) = pitch {
+        let [x, y] = pitch.per_metre().map(u32::to_be_bytes);
+        put_chunk(&mut file, b"pHYs", &[&x[..], &y, &[1]].concat());
     }
     put_chunk(&mut file, b"IDAT", &data);
     put_chunk(&mut file, b"IEND", &[]);

@@ -14,7 +14,7 @@ use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::Limits;
 use crate::printer::archive::{Plate, nanodlp, png, sl1, uvj};
 use crate::printer::fault::PrinterFault;
-use crate::printer::panel::resolution;
+use crate::printer::panel::pitch;
 use crate::printer::total::ReadHeight;
 
 /// The most bytes of a text: layers take a few hundred each.
@@ -146,7 +146,7 @@ impl ArchiveReader {
         let page = PanelPage {
             number,
             info,
-            dpi: resolution(record),
+            pitch: pitch(record),
             size: record.panel_px,
             // Only its pixels say whether it is gray; a mask is decoded as one.
             gray: true,

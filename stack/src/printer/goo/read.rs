@@ -10,7 +10,7 @@ use crate::printer::goo::header::{
     GooHeader, GooLayer, LAYER_BYTES, NUMBER_BYTES, NUMBERS_AT, TEXT_BYTES, TEXTS_AT,
 };
 use crate::printer::goo::{MAGIC, VERSION, rle};
-use crate::printer::panel::{orientation, resolution};
+use crate::printer::panel::{orientation, pitch};
 use crate::printer::total::ReadHeight;
 
 /// The key of a layer before which the printer waits for a person.
@@ -172,7 +172,7 @@ fn read_layer(
     let page = PanelPage {
         number: at.number,
         info,
-        dpi: resolution(record),
+        pitch: pitch(record),
         size,
         gray: rle::is_gray(&data).map_err(fault)?,
         orientation: orientation(record.mirrored),

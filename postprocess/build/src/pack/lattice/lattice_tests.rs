@@ -1,5 +1,5 @@
 use lamp_fixtures::Plate;
-use lamp_stack::{Dpi, Image, Layer, Mask, Orientation, PageInfo};
+use lamp_stack::{Image, Layer, Mask, Orientation, PageInfo, Pitch};
 use proptest::prelude::*;
 
 use super::super::super::testing::mask_of;
@@ -17,8 +17,8 @@ fn ways(turns: Turns) -> Vec<Way> {
 
 /// An area for a part of 25.4 dpi times `scale`, so that a pixel is a millimeter or less.
 fn layout_of(mask: Mask, scale: f64, area: &str) -> Layout {
-    let dpi = Dpi::new(25.4 * scale);
-    let layer = Layer { info: PageInfo::default(), dpi, image: Image::Mask(mask).into() };
+    let pitch = Pitch::of_dpi(25.4 * scale);
+    let layer = Layer { info: PageInfo::default(), pitch, image: Image::Mask(mask).into() };
     let part = PartStack::of_outline("p.tif", std::iter::once(Ok::<_, TileError>(layer)));
     let part = part.unwrap().unwrap();
     let gap = lamp_stack::Length::from_mm(0.0);
