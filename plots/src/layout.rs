@@ -27,7 +27,8 @@ pub fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, PlotError
 struct LayoutPicture<'a> {
     layout: &'a Layout,
     /// Pixels of the picture for one of the build.
-    scale: f64,
+    /// Pixels of the picture for a column and for a row of the build.
+    scale: [f64; 2],
     /// Of parts whose outlines are known, what they look like.
     outlines: HashMap<(usize, Orientation), Mask>,
 }
@@ -35,7 +36,10 @@ struct LayoutPicture<'a> {
 impl<'a> LayoutPicture<'a> {
     fn new(layout: &'a Layout) -> Self {
         let PixelSize { width, height } = layout.pixels();
-        let scale = f64::from(SIDE) / f64::from(width.max(height).max(1));
+        let [pitch_x, pitch_y] = layout.pitch().mm();
+        let rows_as_columns = pitch_y / pitch_x;
+        let side = f64::from(width).max(f64::from(height) * rows_as_columns).max(1.0);
+        let scale = [f64::from(SIDE) / side, f64::from(SIDE) / side * rows_as_columns];
         let mut outlines = layout.silhouettes();
         // A part without an outline fills its box, which needs no mask.
         outlines.retain(|&(part, _), _| layout.parts()[part].outline().is_some());
@@ -44,17 +48,18 @@ impl<'a> LayoutPicture<'a> {
 
     fn size(&self) -> (u32, u32) {
         let PixelSize { width, height } = self.layout.pixels();
-        let [width, height] = [width, height].map(|side| self.scaled(side) as u32);
+        let [width, height] = self.scaled([width, height]).map(|side| side as u32);
         (width + 2 * MARGIN as u32, height + (2 * MARGIN + LEGEND) as u32)
     }
 
-    fn scaled(&self, pixels: u32) -> i32 {
-        (f64::from(pixels) * self.scale).round() as i32
+    fn scaled(&self, pixels: [u32; 2]) -> [i32; 2] {
+        [0, 1].map(|axis| (f64::from(pixels[axis]) * self.scale[axis]).round() as i32)
     }
 
     /// Where a pixel of the build is in the picture.
     fn at(&self, column: u32, row: u32) -> (i32, i32) {
-        (MARGIN + self.scaled(column), MARGIN + self.scaled(row))
+        let [x, y] = self.scaled([column, row]);
+        (MARGIN + x, MARGIN + y)
     }
 
     fn draw_copy<B: DrawingBackend>(
@@ -72,7 +77,9 @@ impl<'a> LayoutPicture<'a> {
             None => area.draw(&Rectangle::new(corners, fill))?,
         }
         area.draw(&Rectangle::new(corners, ink.mix(0.7).stroke_width(1)))?;
-        let size = (self.scale * f64::from(width.min(height)) / 2.5).clamp(9.0, 44.0);
+        let [scale_x, scale_y] = self.scale;
+        let least = (scale_x * f64::from(width)).min(scale_y * f64::from(height));
+        let size = (least / 2.5).clamp(9.0, 44.0);
         let middle = ((corners[0].0 + corners[1].0) / 2, (corners[0].1 + corners[1].1) / 2);
         let style = (FAMILY, size).into_text_style(area).color(&BLACK);
         area.draw(&Text::new(
@@ -94,7 +101,7 @@ impl<'a> LayoutPicture<'a> {
         let (_, bottom) = self.at(0, at.top + outline.height());
         let mut strips = OutlinePolygons::default();
         for y in top..bottom {
-            let row = (f64::from(y - MARGIN) + 0.5) / self.scale - f64::from(at.top);
+            let row = (f64::from(y - MARGIN) + 0.5) / self.scale[1] - f64::from(at.top);
             let row = outline.row((row.max(0.0) as u32).min(outline.height() - 1));
             let runs = white_runs(row, outline.width());
             let x_of = |column| self.at(at.left + column, 0).0;
@@ -117,7 +124,7 @@ impl<'a> LayoutPicture<'a> {
         let y = y + 36;
         let parts = self.layout.parts().iter().enumerate();
         let entries = parts.map(|(part, about)| (self.entry(part, about), colors[part]));
-        let build = format!("{} at {} dpi", self.layout.area(), self.layout.dpi());
+        let build = format!("{} at {:#}", self.layout.area(), self.layout.pitch());
         for (text, ink) in std::iter::once((build, GRAY_INK)).chain(entries) {
             let style = (FAMILY, 28).into_text_style(area).color(&ink);
             let (width, _) = area.estimate_text_size(&text, &style)?;

@@ -70,5 +70,5 @@ fn length_mm(layout: &Layout) -> f64 {
         .map(bottom)
         .max()
         .zip(layout.placements().iter().map(|at| at.top).min());
-    ends.map_or(0.0, |(bottom, top)| f64::from(bottom - top) * layout.dpi().pitch().mm())
+    ends.map_or(0.0, |(bottom, top)| f64::from(bottom - top) * layout.pitch().mm()[1])
 }

@@ -164,10 +164,10 @@ impl Layout {
         let copies = || self.placements.iter().filter(|at| at.part == part);
         let PartStack { origin_mm, .. } = self.parts[part];
         let frame = self.parts[part].frame();
-        let pitch = self.dpi.pitch().mm();
+        let [pitch_x, pitch_y] = self.pitch.mm();
         let corner = origin_mm.map(|[x, y]| match (frame.left, frame.top) {
             (0, 0) => [x, y],
-            (left, top) => [x + left as f64 * pitch, y - top as f64 * pitch],
+            (left, top) => [x + left as f64 * pitch_x, y - top as f64 * pitch_y],
         });
         let is_turned = copies().any(|at| at.turn != Orientation::default());
         let turns = copies().filter(|_| is_turned).map(|at| at.turn.to_string());

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lamp_stack::{Dpi, Length, MAX_SIDE, Mask, Orientation, Size, quoted};
+use lamp_stack::{Dpi, Length, MAX_SIDE, Mask, Orientation, Pitch, Size, quoted};
 
 use super::mesh::BuildMesh;
 use super::{CopyName, PartStack, PixelSize, TileError};
@@ -11,11 +11,11 @@ use super::{CopyName, PartStack, PixelSize, TileError};
 ///
 /// ```
 /// use lamp_build::{Layout, Pack, PartStack};
-/// use lamp_stack::{Dpi, Image, Layer, Length, Mask, PageInfo};
+/// use lamp_stack::{Pitch, Image, Layer, Length, Mask, PageInfo};
 ///
 /// // At 254 dpi, 10 pixels are a millimetre.
 /// let image = Image::Mask(Mask::black(30, 20).inverted());
-/// let layer = Layer { info: PageInfo::default(), dpi: Dpi::new(254.0), image: image.into() };
+/// let layer = Layer { info: PageInfo::default(), pitch: Pitch::of_dpi(254.0), image: image.into() };
 /// let part = PartStack::of_image("blade.tif", &layer)?;
 ///
 /// // As many copies as fit, 1 mm apart: two, in the middle of the area.
@@ -31,7 +31,7 @@ pub struct Layout {
     pub(super) placements: Vec<CopyPlacement>,
     /// The serial number of each copy, as far as a layout file gives it.
     pub(super) serials: Vec<Option<String>>,
-    pub(super) dpi: Dpi,
+    pub(super) pitch: Pitch,
     pub(super) area: Size,
     pub(super) pixels: PixelSize,
     /// The command that made it, for the build's first page.
@@ -61,18 +61,18 @@ impl Layout {
     /// Returns a layout without copies.
     pub(super) fn empty(parts: Vec<PartStack>, area: Size) -> Result<Self, TileError> {
         let first = parts.first().expect("a build has a part");
-        let dpi = first.dpi();
-        if let Some(other) = parts.iter().find(|part| part.dpi() != dpi) {
+        let pitch = first.pitch();
+        if let Some(other) = parts.iter().find(|part| part.pitch() != pitch) {
             return Err(TileError::Resolutions {
                 first: first.name().to_owned(),
-                first_dpi: dpi,
+                first_pitch: pitch,
                 name: other.name().to_owned(),
-                dpi: other.dpi(),
+                pitch: other.pitch(),
             });
         }
         let pixels = PixelSize {
-            width: whole_pixels(area.width, dpi),
-            height: whole_pixels(area.height, dpi),
+            width: whole_pixels(area.width, pitch.x),
+            height: whole_pixels(area.height, pitch.y),
         };
         if pixels.width.max(pixels.height) > MAX_SIDE {
             return Err(TileError::AreaTooLarge { area_mm: area });
@@ -81,7 +81,7 @@ impl Layout {
             parts,
             placements: Vec::new(),
             serials: Vec::new(),
-            dpi,
+            pitch,
             area,
             pixels,
             command: String::new(),
@@ -114,8 +114,8 @@ impl Layout {
     }
 
     /// Returns the resolution of all parts.
-    pub fn dpi(&self) -> Dpi {
-        self.dpi
+    pub fn pitch(&self) -> Pitch {
+        self.pitch
     }
 
     /// Returns the build area.
@@ -128,10 +128,30 @@ impl Layout {
         self.pixels
     }
 
-    /// Returns a distance in pixels, rounded up. One that no two places of the area are apart leaves
+    /// Returns the resolution of square pixels, which `work` needs.
+    pub(super) fn square(&self, work: &'static str) -> Result<Dpi, TileError> {
+        let name = || self.parts[0].name().to_owned();
+        self.pitch.square(work).map_err(|why| TileError::NotSquare { name: name(), why })
+    }
+
+    /// Checks that parts may be turned so: a quarter turn of pixels that are not square would
+    /// stretch the part.
+    pub(super) fn check_turns(
+        &self,
+        mut turns: impl Iterator<Item = Orientation>,
+    ) -> Result<(), TileError> {
+        match turns.any(|turn| turn.quarters() % 2 == 1) {
+            true => self.square("quarter turns need").map(drop),
+            false => Ok(()),
+        }
+    }
+
+    /// Returns a distance along either axis in pixels, rounded up: the distance is at least kept
+    /// along the longer side of pixels. One that no two places of the area are apart leaves
     /// room for one copy, and so does a wider one.
     pub(super) fn pixels_across(&self, gap: Length) -> u32 {
-        let pixels = (gap.pixels(self.dpi).max(0.0) - 1e-6).ceil().max(0.0) as u32;
+        let [x, y] = self.pitch.pixels(gap);
+        let pixels = (x.max(y).max(0.0) - 1e-6).ceil().max(0.0) as u32;
         // Nothing on the area is farther apart.
         let PixelSize { width, height } = self.pixels;
         pixels.min(width.saturating_add(height)).min(MAX_SIDE)

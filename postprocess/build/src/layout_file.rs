@@ -239,14 +239,14 @@ impl Layout {
         // Whole nanometers hide the rounding of pitches. Zero is added to turn -0.0 into 0.0.
         let nm = |mm: f64| (mm * 1e6).round() / 1e6 + 0.0;
         let Size { width, height } = self.area;
-        let pitch = self.dpi.pitch().mm();
+        let [pitch_x, pitch_y] = self.pitch.mm();
         let line = |(copy, at): (usize, &CopyPlacement)| {
             let part = &self.parts[at.part];
             let image = image_of(part, at);
             CopyEntry {
                 part: label(&self.parts, at.part).to_owned(),
-                x_mm: nm(image.left as f64 * pitch),
-                y_mm: nm(height.mm() - (image.top + i64::from(image.height)) as f64 * pitch),
+                x_mm: nm(image.left as f64 * pitch_x),
+                y_mm: nm(height.mm() - (image.top + i64::from(image.height)) as f64 * pitch_y),
                 turn: at.turn.quarters() * 90,
                 mirror: at.turn.is_mirrored(),
                 serial: self.serials.get(copy).cloned().flatten(),
@@ -262,15 +262,15 @@ impl Layout {
 impl CopyEntry {
     fn request(&self, index: usize, part: &PartStack, area: Size) -> RequestedPlacement {
         let turn = Orientation::new(self.turn / 90, self.mirror);
-        let pitch = part.dpi().pitch().mm();
+        let [pitch_x, pitch_y] = part.pitch().mm();
         let (margin_left, margin_top) = margins(part, turn);
         let image = part.image();
         let (_, height) = turn.size(image.width, image.height);
         // `from_json` limits lengths to 1e10 mm, so they are far below 2^63 pixels at any
         // resolution.
-        let left = (self.x_mm / pitch).round() as i64;
+        let left = (self.x_mm / pitch_x).round() as i64;
         // Files count from the lower edge, images from the upper one.
-        let bottom = ((area.height.mm() - self.y_mm) / pitch).round() as i64;
+        let bottom = ((area.height.mm() - self.y_mm) / pitch_y).round() as i64;
         let top = bottom - i64::from(height);
         RequestedPlacement { part: index, turn, left: left + margin_left, top: top + margin_top }
     }

@@ -5,15 +5,17 @@ use std::collections::HashMap;
 use lamp_stack::{Frame, Length, Mask, white_runs};
 
 use super::{CopyName, CopyPlacement, Layout};
-use lamp_offset::offset_one_bit;
+use lamp_offset::{offset_by_ellipse, offset_one_bit};
 
 impl Layout {
     /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.
     pub fn nearer_than(&self, gap: Length) -> Vec<[CopyName; 2]> {
         let silhouettes = self.silhouettes();
         let margin = self.pixels_across(gap);
-        let grown: HashMap<_, Mask> =
-            silhouettes.iter().map(|(key, mask)| (*key, grown_by(mask, margin))).collect();
+        let grown: HashMap<_, Mask> = silhouettes
+            .iter()
+            .map(|(key, mask)| (*key, self.grown_by(mask, margin, gap)))
+            .collect();
         let numbers: Vec<u32> = self.numbers().collect();
         let name = |k: usize| self.copy_name(self.placements[k].part, numbers[k]);
         let mut near = Vec::new();
@@ -29,14 +31,21 @@ impl Layout {
         }
         near
     }
-}
 
-/// Returns an outline grown by a margin, which begins as much above and to the left.
-fn grown_by(outline: &Mask, margin: u32) -> Mask {
-    let by = -i64::from(margin);
-    let [width, height] = [outline.width(), outline.height()].map(|side| side + 2 * margin);
-    let wide = outline.framed(Frame { left: by, top: by, width, height });
-    if margin == 0 { wide } else { offset_one_bit(&wide, by as f64) }
+    /// Returns an outline grown by a gap, which begins `margin` pixels above and to the left.
+    fn grown_by(&self, outline: &Mask, margin: u32, gap: Length) -> Mask {
+        let by = -i64::from(margin);
+        let [width, height] = [outline.width(), outline.height()].map(|side| side + 2 * margin);
+        let wide = outline.framed(Frame { left: by, top: by, width, height });
+        match margin {
+            0 => wide,
+            _ if self.pitch.is_square() => offset_one_bit(&wide, by as f64),
+            _ => {
+                let whole = self.pitch.pixels(gap).map(|by| -(by - 1e-6).ceil());
+                offset_by_ellipse(&wide, whole).at_least(128)
+            }
+        }
+    }
 }
 
 /// Returns the column and row of a pixel of the build that is white in two placed masks.

@@ -1,7 +1,7 @@
 //! The stack of a part before it is placed: its size, and its outline if that is known.
 
 use lamp_stack::{
-    Change, Dpi, Frame, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, RunImage,
+    Change, Frame, Image, Layer, LevelChange, Mask, MaskBuilder, Op, Orientation, Pitch, RunImage,
     StackInfo,
 };
 
@@ -11,7 +11,7 @@ use super::{PixelSize, TileError};
 #[derive(Clone, Debug)]
 pub struct PartStack {
     name: String,
-    dpi: Dpi,
+    pitch: Pitch,
     image: PixelSize,
     /// The part of the image that is placed.
     frame: Frame,
@@ -28,20 +28,16 @@ impl PartStack {
     /// layout files use its `name`.
     ///
     /// # Errors
-    /// Returns an error if the layer has no resolution, or pixels that are not square.
+    /// Returns an error if the layer has no resolution.
     pub fn of_image(name: &str, first: &Layer) -> Result<Self, TileError> {
         let name = name.to_owned();
         let Some(pitch) = first.pitch else {
             return Err(TileError::NoResolution { name, layer: first.info.name() });
         };
-        let dpi = match pitch.square("builds need") {
-            Ok(dpi) => dpi,
-            Err(why) => return Err(TileError::NotSquare { name, why }),
-        };
         let image = PixelSize::of(&first.image);
         let frame = Frame { left: 0, top: 0, width: image.width, height: image.height };
         let (origin_mm, stack) = (first.info.origin_mm, first.info.stack.clone());
-        Ok(Self { name, dpi, image, frame, is_fit: false, outline: None, origin_mm, stack })
+        Ok(Self { name, pitch, image, frame, is_fit: false, outline: None, origin_mm, stack })
     }
 
     /// Creates a part whose extents are placed: the least frame that holds the white pixels of all
@@ -97,7 +93,7 @@ impl PartStack {
         let frame = extents(outline).expect("an outline has a pixel");
         Self {
             name,
-            dpi: self.dpi,
+            pitch: self.pitch,
             image,
             frame,
             is_fit: true,
@@ -127,8 +123,8 @@ impl PartStack {
     }
 
     /// Returns the resolution.
-    pub fn dpi(&self) -> Dpi {
-        self.dpi
+    pub fn pitch(&self) -> Pitch {
+        self.pitch
     }
 
     /// Returns what the first page says of the stack.
@@ -173,7 +169,7 @@ impl PartStack {
             let layer = layer.info.name();
             return Err(TileError::OtherSize { name, layer, found, expected: self.image });
         }
-        if layer.pitch != Some(self.dpi.into()) {
+        if layer.pitch != Some(self.pitch) {
             return Err(TileError::OtherResolution { name, layer: layer.info.name() });
         }
         Ok(())

@@ -25,17 +25,16 @@ impl Layout {
         area: Size,
     ) -> Result<Self, TileError> {
         let mut layout = Self::empty(parts, area)?;
+        layout.check_turns(requested.iter().map(|request| request.turn))?;
         for (index, request) in requested.iter().enumerate() {
             let RequestedPlacement { part, turn, left, top } = *request;
             let size = layout.parts[part].size(turn);
-            let beyond = layout.beyond(request, size);
-            if beyond > 0 {
+            let beyond_um = layout.beyond_um(request, size);
+            if beyond_um > 0.0 {
                 let number = requested[..=index].iter().filter(|other| other.part == part).count();
                 return Err(TileError::OutOfArea {
                     copy: layout.copy_name(part, number as u32),
-                    beyond: Length::from_um(
-                        (beyond as f64 * layout.dpi.pitch().um() * 10.0).round() / 10.0,
-                    ),
+                    beyond: Length::from_um((beyond_um * 10.0).round() / 10.0),
                     area_mm: area,
                 });
             }
@@ -51,12 +50,13 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Returns the number of pixels by which a copy reaches beyond the area; negative
-    /// within it.
-    fn beyond(&self, request: &RequestedPlacement, size: PixelSize) -> i64 {
+    /// Returns how far a copy reaches beyond the area, in micrometers; negative within it.
+    fn beyond_um(&self, request: &RequestedPlacement, size: PixelSize) -> f64 {
         let right = request.left + i64::from(size.width) - i64::from(self.pixels.width);
         let bottom = request.top + i64::from(size.height) - i64::from(self.pixels.height);
-        right.max(bottom).max(-request.left).max(-request.top)
+        let [x_um, y_um] = self.pitch.um();
+        let across = right.max(-request.left) as f64 * x_um;
+        across.max(bottom.max(-request.top) as f64 * y_um)
     }
 
     /// Checks that no two copies overlap, sweeping from the top to the bottom.
@@ -85,9 +85,9 @@ impl Layout {
     fn overlap(&self, copies: [usize; 2], (column, row): (u32, u32)) -> TileError {
         let numbers: Vec<u32> = self.numbers().collect();
         let [one, other] = copies.map(|k| self.copy_name(self.placements[k].part, numbers[k]));
-        let pitch = self.dpi.pitch().mm();
-        let y_mm = self.area.height.mm() - f64::from(row) * pitch;
-        TileError::Overlap { one, other, at_mm: [f64::from(column) * pitch, y_mm] }
+        let [pitch_x, pitch_y] = self.pitch.mm();
+        let y_mm = self.area.height.mm() - f64::from(row) * pitch_y;
+        TileError::Overlap { one, other, at_mm: [f64::from(column) * pitch_x, y_mm] }
     }
 }
 

@@ -259,7 +259,7 @@ impl Layout {
     pub(crate) fn layer(&self, step: &MeshedStep, image: bool) -> Result<Layer, TileError> {
         let info = self.page(&step.set, step.is_first)?;
         let image = if image { self.image(step)? } else { Image::Mask(Mask::black(0, 0)) };
-        Ok(Layer { info, pitch: Some(self.dpi.into()), image: image.into() })
+        Ok(Layer { info, pitch: Some(self.pitch), image: image.into() })
     }
 
     /// Adds the mesh to the parts' layers at a height.

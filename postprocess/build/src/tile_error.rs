@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lamp_stack::{Dpi, Length, NotSquare, Size};
+use lamp_stack::{Length, NotSquare, Pitch, Size};
 use thiserror::Error;
 
 use super::PixelSize;
@@ -141,16 +141,16 @@ pub enum TileError {
         expected: PixelSize,
     },
     /// Two parts have different resolutions.
-    #[error("{name} has {dpi} dpi and {first} has {first_dpi} dpi: a build has one resolution")]
+    #[error("{name} has {pitch:#} and {first} has {first_pitch:#}: a build has one resolution")]
     Resolutions {
         /// The first part.
         first: String,
         /// Its resolution.
-        first_dpi: Dpi,
+        first_pitch: Pitch,
         /// The part that differs.
         name: String,
         /// Its resolution.
-        dpi: Dpi,
+        pitch: Pitch,
     },
     /// A part is black in all layers.
     #[error("{name}: all its layers are black, so there is no part to place")]

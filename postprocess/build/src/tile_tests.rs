@@ -134,6 +134,48 @@ fn a_copy_lies_as_the_layout_says() {
 }
 
 #[test]
+fn pixels_that_are_not_square_keep_every_millimeter() {
+    let pitch: Pitch = "14x19mm".parse().unwrap();
+    let white = Image::Mask(Mask::black(2, 3).inverted());
+    let part = || {
+        let first = Layer { pitch: Some(pitch), ..layer(0, white.clone()) };
+        PartStack::of_image("p", &first).unwrap()
+    };
+    let area: Size = "300x400mm".parse().unwrap();
+    let packed = |turns| {
+        let pack = Pack { turns, ..Pack::default() };
+        Layout::packed(vec![part()], &[None], area, Length::from_mm(20.0), pack)
+    };
+    let layout = packed(Turns::Half).unwrap();
+    // 21 columns and 21 rows; two of either are the gap.
+    assert_eq!((layout.pixels().width, layout.pixels().height), (21, 21));
+    assert_eq!(layout.placements().len(), 5 * 4);
+    let file = layout.to_file();
+    let corners: Vec<[f64; 2]> = file.copies().iter().map(|copy| [copy.x_mm, copy.y_mm]).collect();
+    for (k, [x, y]) in corners.iter().enumerate() {
+        assert!(*x >= 0.0 && x + 28.0 <= 300.0 && *y >= 0.0 && y + 57.0 <= 400.0);
+        let is_apart = |[a, b]: &[f64; 2]| (x - a).abs() >= 48.0 || (y - b).abs() >= 77.0;
+        assert!(corners[..k].iter().all(is_apart));
+    }
+    assert_eq!(file.place(vec![part()], area).unwrap().placements(), layout.placements());
+    assert!(layout.nearer_than(Length::from_mm(28.0)).is_empty());
+    assert!(!layout.nearer_than(Length::from_mm(28.1)).is_empty());
+    let placed = |turn: u32| {
+        let text =
+            format!(r#"{{"copies": [{{"part": "p", "x_mm": 28, "y_mm": 38, "turn": {turn}}}]}}"#);
+        LayoutFile::from_json(&text).unwrap().place(vec![part()], area)
+    };
+    let at = placed(180).unwrap().placements()[0];
+    // 400 mm are 21.05 rows; 38 mm are 2 of them, below 3 of the part.
+    assert_eq!((at.left, at.top), (2, 16));
+    let refused = "p: its pixels are 14000 x 19000 um, and quarter turns need square pixels";
+    assert_eq!(packed(Turns::Quarters).unwrap_err().to_string(), refused);
+    assert_eq!(placed(90).unwrap_err().to_string(), refused);
+    let mesh = layout.with_mesh(&MeshOptions::default()).unwrap_err().to_string();
+    assert_eq!(mesh, "p: its pixels are 14000 x 19000 um, and meshes need square pixels");
+}
+
+#[test]
 fn layouts_that_are_none_are_refused() {
     let place = |text: &str| {
         let parts = vec![PartStack::of_image("a/p.tif", &black(4, 2)).unwrap()];

@@ -66,8 +66,7 @@ impl BuildTotals {
     }
 
     fn report(&self, layout: &Layout, machine: Option<&Machine>, time: &BuildTime) -> JsonReport {
-        let dpi = layout.dpi();
-        let pitch = Pitch::from(dpi);
+        let pitch = layout.pitch();
         let file = layout.to_file();
         let cured = |pixels: &CuredPixels| {
             json!({
@@ -82,7 +81,7 @@ impl BuildTotals {
             "area_mm": file.area().map(|area| [to_nm(area.width.mm()), to_nm(area.height.mm())]),
             "width_px": layout.pixels().width,
             "height_px": layout.pixels().height,
-            "dpi": dpi.get(),
+            "dpi": pitch,
             "layers": self.layers.len(),
             "all": cured(&self.all),
             "mesh": cured(&self.mesh),

@@ -10,23 +10,24 @@ impl Layout {
     /// Surrounds the copies with a mesh.
     ///
     /// # Errors
-    /// Returns an error if the mesh would have no holes, no room next to the moats or more runs
-    /// than an image can hold, or if moats are to follow outlines and a part was read without its
-    /// outline.
+    /// Returns an error if pixels are not square, if the mesh would have no holes, no room next to
+    /// the moats or more runs than an image can hold, or if moats are to follow outlines and a part
+    /// was read without its outline.
     pub fn with_mesh(mut self, options: &MeshOptions) -> Result<Self, TileError> {
-        let pixels = |length: Length| length.pixels(self.dpi).max(0.0);
+        let dpi = self.square("meshes need")?;
+        let pixels = |length: Length| length.pixels(dpi).max(0.0);
         let clearance = pixels(options.clearance);
         let longest = self.pixels.width.max(self.pixels.height);
         // A wider moat leaves no mesh. The limit also keeps pixels within u32 below.
         if clearance > f64::from(longest) {
             return Err(TileError::WideMoat { clearance: options.clearance, area_mm: self.area });
         }
-        let least_piece = options.least_piece_mm2 / self.dpi.pitch().mm().powi(2);
+        let least_piece = options.least_piece_mm2 / dpi.pitch().mm().powi(2);
         if least_piece > f64::from(self.pixels.width) * f64::from(self.pixels.height) {
             let least_mm2 = options.least_piece_mm2;
             return Err(TileError::LargePiece { least_mm2, area_mm: self.area });
         }
-        let lattice = options.lattice(self.dpi, self.pixels)?;
+        let lattice = options.lattice(dpi, self.pixels)?;
         let whole = |length| (pixels(length).round().min(f64::from(longest))) as u32;
         let breaks = match whole(options.break_width) {
             0 => BreakLines::default(),

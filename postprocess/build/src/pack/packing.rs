@@ -26,6 +26,7 @@ impl Layout {
     ) -> Result<Self, TileError> {
         assert_eq!(parts.len(), counts.len(), "a count for each part");
         let mut layout = Self::empty(parts, area)?;
+        layout.check_turns(pack.turns.orientations().into_iter())?;
         let gap_pixels = layout.pixels_across(gap);
         layout.placements = self::pack(&layout, counts, gap_pixels, pack)?;
         layout.command = layout.packing_command(gap, pack);

@@ -305,7 +305,7 @@ impl Canvas {
                 let whole = || mesh.map_or_else(|| Mask::black(0, 0), BuildMesh::whole);
                 // The base is one image: the first thread that needs it draws it for all.
                 let image = self.whole.get_or_init(whole).clone();
-                Ok(Layer { info: *info, pitch: Some(self.layout.dpi.into()), image: image.into() })
+                Ok(Layer { info: *info, pitch: Some(self.layout.pitch), image: image.into() })
             }
             LayerDrawing::Parts(step) => {
                 let mut layer = self.layout.layer(&step, true)?;
@@ -321,6 +321,7 @@ impl Layout {
     /// Places the copies of a recipe, without their mesh.
     fn by_recipe(parts: Vec<PartStack>, recipe: &Recipe) -> Result<Self, RecipeError> {
         let mut layout = Self::empty(parts, recipe.form.area)?;
+        layout.check_turns(recipe.copies.iter().map(|at| at.turn))?;
         for (index, at) in recipe.copies.iter().enumerate() {
             let size = layout.parts[at.part].size(at.turn);
             let is_within = |start: u32, length: u32, side: u32| {

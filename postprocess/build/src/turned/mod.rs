@@ -165,7 +165,7 @@ impl PartStack {
         let name = || self.name().to_owned();
         let outline = self.outline().ok_or_else(|| TileError::NoOutline { name: name() })?;
         let origin_mm = self.origin_mm.ok_or_else(|| TileError::NoPlace { name: name() })?;
-        let pitch = self.dpi().pitch().mm();
+        let pitch = self.pitch().x.pitch().mm();
         let centre = [(centre_mm[0] - origin_mm[0]) / pitch, (origin_mm[1] - centre_mm[1]) / pitch];
         let turn = ImageTurn::about(centre, degrees);
         let image = self.image();
