@@ -1,7 +1,7 @@
 //! Errors of reading a list of edits and of making them.
 
 use lamp_build::ImageBounds;
-use lamp_stack::{NotSquare, OrientationError, Pitch, StackError};
+use lamp_stack::{OrientationError, Pitch, StackError};
 use thiserror::Error;
 
 use super::serials::ListProblem;
@@ -42,9 +42,6 @@ pub enum EditError {
     /// The pages do not say how large pixels are, so lengths mean nothing.
     #[error("the stack has no resolution, so lengths have no meaning in it")]
     NoResolution,
-    /// Its pixels are not square.
-    #[error("the stack cannot be edited: {0}")]
-    NotSquare(#[from] NotSquare),
     /// A layer's size, place or resolution differs from the first layer's.
     #[error("{layer} differs in size, place or resolution from the first layer: a stack has one")]
     Unlike {

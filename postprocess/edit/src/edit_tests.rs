@@ -412,6 +412,44 @@ fn later_edits_see_the_part_turned() {
     assert_eq!(mask(&after[0]).white_pixels(), 5);
 }
 
+/// Pixels of 1 x 2 mm, x -40 to 40 and y -40 to 40, against closed forms in millimeters.
+#[test]
+fn pixels_that_are_not_square_keep_every_millimeter() {
+    let pitch: Pitch = "1x2mm".parse().unwrap();
+    let page = || {
+        let image = Image::Mask(Mask::black(80, 40));
+        let Layer { mut info, .. } = layer(0, image.clone());
+        info.origin_mm = Some([-40.0, 40.0]);
+        Layer { info, pitch: Some(pitch), image: image.into() }
+    };
+    let center = |layer: &Layer, column: u32, row: u32| {
+        let [x0, y1] = layer.info.origin_mm.unwrap();
+        let [x_mm, y_mm] = layer.pitch.unwrap().mm();
+        [x0 + (f64::from(column) + 0.5) * x_mm, y1 - (f64::from(row) + 0.5) * y_mm]
+    };
+    let check = |list: &str, is_white: &dyn Fn([f64; 2]) -> bool| {
+        let edited = edited(vec![page()], list, vec![]).unwrap().remove(0);
+        let mask = mask(&edited);
+        assert!(mask.white_pixels() > 50);
+        for (row, column) in (0..mask.height()).flat_map(|r| (0..mask.width()).map(move |c| (r, c)))
+        {
+            let at = center(&edited, column, row);
+            assert_eq!(mask.is_white(column, row), is_white(at), "{list} {at:?}");
+        }
+        edited
+    };
+    let disc = "[[edit]]\ncylinder = { at = [\"3.1mm\", \"-2.2mm\"], diameter = \"31mm\" }\n";
+    let in_disc = |[x, y]: [f64; 2]| (x - 3.1).hypot(y + 2.2) < 15.5;
+    check(disc, &in_disc);
+    let turned = check(&format!("{disc}[[edit]]\nrotate = 90\n"), &|[x, y]| in_disc([y, -x]));
+    assert_eq!(turned.pitch, Some(pitch.turned()));
+    let padded = format!("{disc}[[edit]]\npad = {{ left = \"3mm\", top = \"4mm\" }}\n");
+    let padded = check(&padded, &in_disc);
+    assert_eq!((padded.image.width(), padded.image.height()), (83, 42));
+    let crop = "[[edit]]\ncrop = { x = [\"-9mm\", \"30mm\"], y = [\"-30mm\", \"9.5mm\"] }\n";
+    check(&format!("{disc}{crop}"), &in_disc);
+}
+
 #[test]
 fn gray_layers_are_edited_too() {
     let mut gray = GrayMask::new(WIDTH);

@@ -70,10 +70,12 @@ impl RunSet {
     }
 
     /// Adds the pixels nearer to a point than `radius`.
-    pub(super) fn add_disc(&mut self, [x, y]: PixelPoint, radius: f64) {
-        let end = (y + radius).floor() + 1.0;
-        for row in (y - radius).ceil() as u32..(end as u32).min(self.height) {
-            let square = radius * radius - (f64::from(row) - y).powi(2);
+    pub(super) fn add_disc(&mut self, [x, y]: PixelPoint, [across, down]: [f64; 2]) {
+        let end = (y + down).floor() + 1.0;
+        for row in (y - down).ceil() as u32..(end as u32).min(self.height) {
+            // One in square pixels.
+            let columns_per_row = across / down;
+            let square = across * across - ((f64::from(row) - y) * columns_per_row).powi(2);
             if square > 0.0 {
                 self.add(row, [x - square.sqrt(), x + square.sqrt()]);
             }
@@ -149,7 +151,7 @@ mod tests {
 
     fn disc(centre: PixelPoint, radius: f64, width: u32, height: u32) -> Mask {
         let mut runs = RunSet::new(width, height);
-        runs.add_disc(centre, radius);
+        runs.add_disc(centre, [radius; 2]);
         runs.into_mask().unwrap()
     }
 

@@ -10,8 +10,8 @@ use super::schema::{OtherStack, Pad, Rectangle};
 /// Returns a frame with black around the image, in whole pixels.
 pub(super) fn padded(pad: Pad, place: &ImageBounds) -> Result<Frame, EditError> {
     let grid = PixelMap::of(place)?;
-    let [left, right, top, bottom] =
-        [pad.left, pad.right, pad.top, pad.bottom].map(|length| grid.length(length).round() as i64);
+    let [left, right] = [pad.left, pad.right].map(|length| grid.length(length)[0].round() as i64);
+    let [top, bottom] = [pad.top, pad.bottom].map(|length| grid.length(length)[1].round() as i64);
     // Lengths are at most 10 m, which 32 bits hold at any resolution.
     let side = |size: u32, more: i64| (i64::from(size) + more) as u32;
     Ok(Frame {

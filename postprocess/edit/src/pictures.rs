@@ -57,9 +57,11 @@ pub(super) fn stamped(
     grid: PixelMap,
     motions: &[Motion],
 ) -> Result<Mask, EditProblem> {
-    // The side of the picture's pixels.
-    let side = keys.width.map_or(1.0, |width| grid.length(width) / f64::from(picture.width()));
-    let [width, height] = [picture.width(), picture.height()].map(|n| f64::from(n) * side);
+    // The sides of the picture's pixels along x and y.
+    let [side_x, side_y] = keys.width.map_or([1.0; 2], |width| {
+        grid.length(width).map(|width| width / f64::from(picture.width()))
+    });
+    let [width, height] = [picture.width(), picture.height()].map(f64::from);
     let start = match keys.align {
         Align::Left => 0.0,
         Align::Center => -width / 2.0,
@@ -78,8 +80,8 @@ pub(super) fn stamped(
         };
         let [a, b] = [[start, 0.0], [start + width, height]].map(|corner| turned(corner, turn));
         let [x, y] = grid.to_pixels(motion.of_level(*at).map(Length::mm));
-        let columns = PixelEdges { start: x + a[0].min(b[0]), side };
-        let rows = PixelEdges { start: y - a[1].max(b[1]), side };
+        let columns = PixelEdges { start: x + side_x * a[0].min(b[0]), side: side_x };
+        let rows = PixelEdges { start: y - side_y * a[1].max(b[1]), side: side_y };
         let [left, right] = [0, picture.width()].map(|k| columns.at(k));
         let [top, bottom] = [0, picture.height()].map(|k| rows.at(k));
         if left == right || top == bottom {

@@ -92,9 +92,6 @@ impl EditPlan {
         others: &mut [AlignedStack<E>],
         pictures: &mut [OtherPicture<E>],
     ) -> Result<Self, E> {
-        if let Some(pitch) = first.pitch() {
-            pitch.square("edits need").map_err(EditError::from)?;
-        }
         let mut plan = Self {
             place: ImageBounds::of(first.info(), first.pitch(), first.size()),
             steps: Vec::new(),
@@ -169,6 +166,10 @@ impl EditPlan {
                     let image = step.of_image(&image, &info, other)?;
                     let too_many = || LayerProblem::TooManyRuns { edit: k + 1 }.of_layer(&info);
                     let image = image.ok_or_else(too_many)?.into();
+                    let pitch = match step {
+                        PlannedEdit::Turn { place, .. } => place.pitch,
+                        _ => pitch,
+                    };
                     layer = Layer { info, pitch, image }.into();
                 }
                 step.follow(layer.info_mut())?;

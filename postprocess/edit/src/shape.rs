@@ -131,7 +131,7 @@ fn height(info: &PageInfo) -> Result<Length, EditError> {
 fn draw(edit: &Edit, motion: &Motion, grid: PixelMap, runs: &mut RunSet) {
     let corner = |point: [Length; 2]| grid.to_pixels(motion.of_level(point).map(Length::mm));
     if let Some(Cylinder { at, diameter, .. }) = edit.cylinder {
-        runs.add_disc(corner(at), grid.length(diameter) / 2.0);
+        runs.add_disc(corner(at), grid.length(diameter).map(|side| side / 2.0));
     } else if let Some(polygon) = &edit.polygon {
         runs.add_polygons(&[polygon.points.iter().copied().map(corner).collect()]);
     } else if let Some(LineShape { from, to, width }) = edit.line {
@@ -189,7 +189,7 @@ fn letters<'a>(
     runs: &mut RunSet,
 ) -> Result<(), EditProblem> {
     let grid = PixelMap::of(part).expect("shapes are drawn in known resolutions");
-    let size = grid.length(label.height);
+    let [width, height] = grid.length(label.height);
     let places: Vec<_> =
         motions.iter().flat_map(|motion| label.at.iter().map(move |at| (motion, *at))).collect();
     // Numbers go on from copy to copy, with one for each place.
@@ -198,13 +198,13 @@ fn letters<'a>(
         let n = i64::from(label.start) + k * i64::from(label.step);
         let text = numbered(&label.text, n, serial(place))?;
         // The unit of outlines is a capital's height, so the tolerance is in it, too.
-        let mut lines = outlines(&text, label.align, label.turn, TOLERANCE / size)
+        let mut lines = outlines(&text, label.align, label.turn, TOLERANCE / width.max(height))
             .map_err(EditProblem::Letter)?;
         let [x, y] = grid.to_pixels(motion.of_level(*at).map(Length::mm));
         for point in lines.iter_mut().flatten() {
             let [right, up] = motion.turned(*point);
             // Outlines count up, and rows down.
-            *point = [x + size * right, y - size * up];
+            *point = [x + width * right, y - height * up];
         }
         // A serial number that is cut off would read as another one.
         if !lines.iter().flatten().all(|&point| part.holds(point)) {
