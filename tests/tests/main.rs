@@ -50,6 +50,7 @@ mod orient;
 mod other_readers;
 mod pack;
 mod pipeline;
+mod pitch;
 
 mod placement;
 mod plain_words;
