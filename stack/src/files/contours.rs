@@ -10,8 +10,8 @@ use crate::image::Image;
 use crate::image::outline::Outline;
 use crate::layer::Layer;
 use crate::layer::page_info::StackInfo;
-use crate::pitch::Pitch;
 use crate::ordered::map_in_order;
+use crate::pitch::Pitch;
 
 /// A format of contour files. All are text, in millimeters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +121,14 @@ impl Contours {
         let top_um = layer.info.z_um.unwrap_or(0.0) + layer.info.thickness_um.unwrap_or(0.0);
         let size = [mask.width(), mask.height()];
         let origin_mm = layer.info.origin_mm;
-        Ok(Self { index, outlines: mask.outlines(), size, pitch, origin_mm, top_mm: top_um / 1000.0 })
+        Ok(Self {
+            index,
+            outlines: mask.outlines(),
+            size,
+            pitch,
+            origin_mm,
+            top_mm: top_um / 1000.0,
+        })
     }
 
     /// Returns the text before the first layer.

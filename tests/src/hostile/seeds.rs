@@ -138,7 +138,7 @@ fn prints() -> Named {
             gray.push_runs([(row, 0), (4 + index, level), (1, 255)]).expect("it is 40 wide");
         }
         let image = gray.to_mask().map_or(Image::Gray(gray), Image::Mask);
-        Layer { info, dpi: None, image: image.into() }
+        Layer { info, pitch: None, image: image.into() }
     };
     let file = |format| {
         let file = NamedTempFile::new().expect("there is room");
