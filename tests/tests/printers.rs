@@ -220,6 +220,26 @@ fn other_programs_see_the_same_layers() {
     }
 }
 
+/// A built-in printer with pixels of 14 x 19 um: every millimeter is right, in its file and back.
+#[test]
+fn rectangular_pixels_keep_millimeters() {
+    let scratch = Scratch::with_tower_and_torus();
+    let part = "slice torus.stl tower.stl@26,0 --thickness 10mm -q";
+    scratch.run(&format!("{part} --machine saturn4ultra16k -o plate.goo")).succeeds_quietly();
+    scratch.run("lamp convert plate.goo -q -o plate.tif").succeeds_quietly();
+    scratch.run(&format!("{part} --dpi 1500 -o square.tif")).succeeds_quietly();
+    let [placed, square] = ["plate.tif", "square.tif"].map(|name| scratch.layers(name));
+    assert_eq!(placed.len(), square.len());
+    let pitch = placed[0].pitch.unwrap();
+    assert_eq!(pitch.um(), [14.0, 19.0]);
+    for (layer, square) in masks(&placed).into_iter().zip(masks(&square)) {
+        assert_eq!((layer.width(), layer.height()), (15_120, 6230));
+        let [mm2, expected] = [(layer, pitch.pixel_mm2()), (square, (25.4_f64 / 1500.0).powi(2))]
+            .map(|(mask, pixel)| mask.white_pixels() as f64 * pixel);
+        assert!((mm2 - expected).abs() < 2e-4 * expected, "{mm2} mm2, not {expected}");
+    }
+}
+
 #[test]
 fn what_does_not_fit_a_printer_is_refused() {
     let scratch = with_printer();
