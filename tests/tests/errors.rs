@@ -117,7 +117,10 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("lamp convert cube.tif --png --classic -o x/", &["--classic"]),
         ("lamp convert cube.tif --classic -o x.png", &["--classic is for TIFFs"]),
         ("fix cube.tif -o x.png", &["x.png: a stack is a TIFF", "lamp convert"]),
-        ("lamp convert cube.tif --layers 3 -o x.jpg", &["a stack is a TIFF: end its name in .tif"]),
+        (
+            "lamp convert cube.tif --layers 3 -o x.jpg",
+            &["a stack is a TIFF, or a printer's file: end its name in .tif"],
+        ),
         ("lamp show cube.tif --layer 3 -o x.jpg", &["a PNG: end its name in .png"]),
         (
             "lamp show cube.tif --layer five -o x.png",

@@ -121,7 +121,7 @@ fn edges_move_by_the_same_distance_along_both_axes() {
         assert!((area(after) / left - 1.0).abs() < 0.01, "{} of {left}", area(after));
     }
     scratch.run("lamp compensate ball.tif --uniform 60um").is_refused_with(&[
-        "cannot be compensated so: its pixels are 14 x 19 um, and keeping walls needs square pixels",
+        "cannot be compensated so: its pixels are 14 x 19 um, and keeping walls (--min-feature above 0um) needs square pixels",
     ]);
 }
 

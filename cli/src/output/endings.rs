@@ -17,8 +17,10 @@ pub(crate) struct Writes {
 }
 
 /// A stack, as a TIFF or packed.
-pub(crate) const STACK: Writes =
-    Writes { sentence: "a stack is a TIFF: end its name in .tif", endings: &STACK_ENDINGS };
+pub(crate) const STACK: Writes = Writes {
+    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .nanodlp, .sl1 or .uvj",
+    endings: &STACK_ENDINGS,
+};
 
 /// A packed stack.
 pub(crate) const PACKED_STACK: Writes =

@@ -115,9 +115,16 @@ impl PanelStep {
         if self.light > 255 {
             return Err(MachineError::Panel("light: it must be between 0 and 255"));
         }
-        match times.iter().chain(moves.as_flattened()).all(possible) {
+        if !times.iter().chain(moves.as_flattened()).all(possible) {
+            return Err(MachineError::Panel("each wait and move must be between 0 and 10000"));
+        }
+        let record = self.record();
+        // A printer without moves of its own, as Prusa's, has none here.
+        match record.lift_mm == [0.0; 2] || record.moves() {
             true => Ok(()),
-            false => Err(MachineError::Panel("each wait and move must be between 0 and 10000")),
+            false => Err(MachineError::Panel(
+                "each lift and retraction needs its speed, lift_mm_per_min and retract_mm_per_min",
+            )),
         }
     }
 
@@ -261,6 +268,8 @@ mod tests {
             ("light = 200", "light = 256", "panel: light: it must be"),
             ("[3, 4]", "[3, -4]", "panel: each wait and move"),
             ("[3, 4]", "[3, inf]", "panel: each wait and move"),
+            ("[60, 120]", "[60, 0]", "needs its speed"),
+            ("[200, 0]", "[0, 0]", "needs its speed"),
             ("first_layers = 3", "first_layers = -3", "first_layers"),
             ("first_layers = 3", "first_layer = 3", "first_layer"),
             ("[panel.normal]", "[panel.usual]", "usual"),

@@ -268,7 +268,9 @@ fn move_edges(
         return Err(CompensateProblem::TooFar { pixels: furthest, max: MAX_MOVE });
     }
     if most > 0.0 && options.min_feature.is_none_or(|length| length.um() > 0.0) {
-        pitch.square("keeping walls needs").map_err(CompensateProblem::NotSquare)?;
+        pitch
+            .square("keeping walls (--min-feature above 0um) needs")
+            .map_err(CompensateProblem::NotSquare)?;
     }
     let min_feature = options.min_feature.map_or(2.0, |length| length.pixels(pitch.x));
     // A wall that is left so wide had its middle this deep before.

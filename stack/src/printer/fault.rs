@@ -128,6 +128,27 @@ pub enum PrinterFault {
         /// The printer's property.
         what: &'static str,
     },
+    /// The printer of the stack does not say how the platform moves, and the format makes it move.
+    #[error(
+        "the stack does not say how far and how fast {printer} lifts and retracts, and {format} moves \
+         it so: slice for a machine whose [panel] has lift_mm, lift_mm_per_min and retract_mm_per_min"
+    )]
+    NoMoves {
+        /// The format's name.
+        format: &'static str,
+        /// The printer's name.
+        printer: String,
+    },
+    /// An archive has more images than it states layers.
+    #[error(
+        "it states {stated} layers, but has an image of layer {layer}: its texts are not its own"
+    )]
+    MoreImages {
+        /// The number of layers.
+        stated: u32,
+        /// The layer of the image.
+        layer: u32,
+    },
     /// A file cannot be written to a pipe.
     #[error("{0} cannot be written to a pipe or a folder: name a file with -o")]
     NotAFile(&'static str),

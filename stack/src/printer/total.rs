@@ -97,7 +97,8 @@ impl ReadHeight {
             exposure_ms: Some(thousandths(step.exposure_s)),
             ..PageInfo::default()
         };
-        if !info.exposure_ms.is_some_and(f64::is_finite) {
+        // NaN lies in no range.
+        if !info.exposure_ms.is_some_and(|ms| (0.0..f64::INFINITY).contains(&ms)) {
             return Err(PrinterFault::Damaged("exposure of a layer"));
         }
         self.um = top_um;
@@ -154,6 +155,7 @@ mod tests {
             "layer 3 ends 0.21 mm above the platform, but it builds 0.2 mm high"
         );
         assert!(read.info(&record, 3, 0.2, record.normal).is_err());
+        assert!(read.info(&record, 3, 0.3, step(-1.0)).is_err());
         assert!(read.info(&record, 3, f64::NAN, record.normal).is_err());
         let other = PrintStep { wait_lifted_s: 9.0, ..record.normal };
         let info = read.info(&record, 3, 0.3, other).unwrap();

@@ -60,11 +60,6 @@ impl PrinterFormat {
         }
     }
 
-    /// Returns whether images are mirrored as the panel shows them.
-    fn mirrored(self, record: &PrintRecord) -> [bool; 2] {
-        if self == Self::Uvj { [false; 2] } else { record.mirrored }
-    }
-
     /// Checks that a file can state the layer, which was added to `totals`.
     fn check(
         self,
@@ -205,7 +200,7 @@ where
         _ => Box::new(ArchiveWriter::new(out, format, &part)),
     };
     let (mut totals, mut view) = (PrintTotals::default(), TopView::new());
-    let mirrored = format.mirrored(&record);
+    let mirrored = record.mirrored;
     for layer in map_in_order(layers, |layer: Layer| Ok(CodedLayer::new(&layer, format, mirrored)))
     {
         let layer = layer?;
@@ -227,6 +222,11 @@ fn record_of(first: &Layer, format: PrinterFormat) -> Result<PrintRecord, StackE
     let most = format.most_side();
     if record.panel_px.iter().any(|side| *side > most) {
         return Err(PrinterFault::Side { format: format.name(), most }.into());
+    }
+    // The printer moves as the file says, even if that is not at all.
+    if format == PrinterFormat::Goo && !(record.first.moves() && record.normal.moves()) {
+        let (format, printer) = (format.name(), record.printer);
+        return Err(PrinterFault::NoMoves { format, printer }.into());
     }
     Ok(record)
 }

@@ -66,6 +66,16 @@ impl PageRecord for PrintStep {
 }
 
 impl PrintStep {
+    /// Returns whether the platform lifts and comes back, each stage at a speed.
+    pub fn moves(&self) -> bool {
+        let moves = |mm: [f64; 2], speed: [f64; 2]| {
+            let stages = mm.into_iter().zip(speed);
+            mm.iter().sum::<f64>() > 0.0
+                && stages.into_iter().all(|(mm, speed)| mm == 0.0 || speed > 0.0)
+        };
+        moves(self.lift_mm, self.lift_mm_per_min) && moves(self.retract_mm, self.retract_mm_per_min)
+    }
+
     /// Returns the time from the start of the layer to the start of the next, in seconds.
     pub fn time_s(&self) -> f64 {
         let of_moves = |mm: [f64; 2], speed: [f64; 2]| -> f64 {
@@ -137,6 +147,8 @@ mod tests {
         // 3 s and 1 s up, 2 s down.
         assert_eq!(step.time_s(), 2.5 + 1.75 + 6.0);
         assert_eq!(PrintStep { light_off_s: 20.0, ..step }.time_s(), 22.5);
+        assert!(step.moves() && !PrintStep::default().moves());
+        assert!(!PrintStep { lift_mm_per_min: [60.0, 0.0], ..step }.moves());
     }
 
     #[test]

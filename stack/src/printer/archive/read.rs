@@ -179,7 +179,11 @@ pub(crate) fn images(
     // An archive has at least its images, so a false count takes no memory.
     let mut found = vec![None; archive.files.len().min(layers as usize)];
     for (number, file) in archive.names().enumerate() {
-        if let Some(layer) = index(&file).and_then(|layer| found.get_mut(layer as usize)) {
+        let Some(layer) = index(&file) else { continue };
+        if layer >= layers {
+            return Err(PrinterFault::MoreImages { stated: layers, layer });
+        }
+        if let Some(layer) = found.get_mut(layer as usize) {
             *layer = Some(number);
         }
     }

@@ -1,13 +1,13 @@
 //! UVJ, UVtools' own format, which is for any printer: `config.json`, images `slice/00000000.png`
-//! and up, and two pictures in `preview/`. Images are as seen from above.
+//! and up, and two pictures in `preview/`. Images are as the panel shows them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::StackError;
-use crate::image::orientation::Orientation;
 use crate::printer::archive::read::{Archive, images};
 use crate::printer::archive::{Plate, PlateLayer, json};
 use crate::printer::fault::PrinterFault;
+use crate::printer::panel::orientation;
 use crate::printer::total::PrintLayer;
 use crate::printer::write::Print;
 use crate::record::{PrintRecord, PrintStep};
@@ -176,7 +176,8 @@ pub(crate) fn read(archive: &mut Archive) -> Result<Plate, StackError> {
         },
     };
     let layers = (0..).zip(files).map(layer).collect();
-    Ok(Plate { part: String::new(), orientation: Orientation::default(), layers, record })
+    let orientation = orientation(record.mirrored);
+    Ok(Plate { part: String::new(), orientation, layers, record })
 }
 
 /// Returns the name of a layer's image.

@@ -7,7 +7,7 @@ use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::Limits;
 use crate::printer::fault::PrinterFault;
 use crate::printer::goo::header::{
-    GooHeader, GooLayer, LAYER_BYTES, NUMBER_BYTES, NUMBERS_AT, TEXT_BYTES, TEXTS_AT,
+    GooHeader, GooLayer, LAYER_BYTES, NUMBER_BYTES, NUMBERS_AT, TEXT_BYTES, TEXTS_AT, footer,
 };
 use crate::printer::goo::{MAGIC, VERSION, rle};
 use crate::printer::panel::{orientation, pitch};
@@ -56,7 +56,10 @@ impl GooReader {
     ) -> Result<Option<Page>, StackError> {
         let header = self.header(source)?;
         if self.next.number == header.layers {
-            return Ok(None);
+            let last = header.layers.checked_sub(1);
+            let wanted = footer();
+            let end = read(source, self.next.offset, wanted.len() as u64, last)?;
+            return if end == wanted { Ok(None) } else { Err(PrinterFault::Damaged("end").into()) };
         }
         let (page, next) = read_layer(&header, self.next, source, limits, images)?;
         self.next = next;
