@@ -129,7 +129,6 @@ fn edges_move_by_the_same_distance_along_both_axes() {
 fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
     let scratch = with_ball();
     for line in [
-        "lamp check ball.tif",
         "lamp view ball.tif",
         "lamp cure ball.tif --section x=0mm --material pegda-sudan -o cure.png",
         "tile ball.tif --area 20x20mm -o build.tif",
@@ -142,9 +141,6 @@ fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
         .run("lamp compare ball.tif ball.tif --tolerance 20um")
         .is_wrong_usage(&["14 x 19 um", "a length needs square pixels"]);
     scratch.run("lamp compare ball.tif ball.tif").succeeds();
-    scratch.run("lamp report ball.tif -o report.html -q").succeeds();
-    let report = String::from_utf8(scratch.bytes("report.html")).unwrap();
-    assert!(report.contains("its pixels are 14 x 19 um, and checks need square pixels"));
 }
 
 /// Pillow reads both resolutions, and the rectangle of white pixels in millimeters.

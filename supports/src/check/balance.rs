@@ -2,6 +2,7 @@
 
 use super::contact::Labelled;
 use super::findings::{OffBalance, Region};
+use super::metric::Metric;
 
 /// A body that stands on the platform.
 pub(super) struct Base {
@@ -84,11 +85,12 @@ impl Base {
         components: &[u32],
         number: u32,
         thickness_um: f64,
+        metric: Metric,
     ) {
         self.weight.grow(layer, components, thickness_um);
         let Weight { mass, moments } = self.weight;
         let centre = moments.map(|moment| moment / mass);
-        let off_pixels = distance(&self.hull, centre);
+        let off_pixels = distance(&self.hull, centre, metric);
         if off_pixels == 0.0 || mass == 0.0 {
             return;
         }
@@ -136,9 +138,10 @@ fn half_hull(points: impl Iterator<Item = [i64; 2]>) -> Vec<[i64; 2]> {
     half
 }
 
-/// Returns the distance of a point from a convex hull: zero inside.
-fn distance(hull: &[[i64; 2]], point: [f64; 2]) -> f64 {
-    let corners = hull.iter().map(|corner| corner.map(|place| place as f64));
+/// Returns the distance of a point from a convex hull, in widths of a pixel: zero inside.
+fn distance(hull: &[[i64; 2]], point: [f64; 2], metric: Metric) -> f64 {
+    let corners = hull.iter().map(|corner| metric.place(corner.map(|place| place as f64)));
+    let point = metric.place(point);
     let sides: Vec<_> = corners.clone().zip(corners.cycle().skip(1)).collect();
     // Inside is left of all sides, as the corners go counter-clockwise.
     let is_left = |[a, b]: [[f64; 2]; 2]| {

@@ -138,14 +138,15 @@ impl Components {
         })
     }
 
-    /// Returns whether a component holds a full square of pixels.
-    pub(super) fn holds_square(&self, mask: &Mask, component: u32, side: u32) -> bool {
+    /// Returns whether a component holds a full rectangle of pixels, given its columns and rows.
+    pub(super) fn holds_rectangle(&self, mask: &Mask, component: u32, sides: [u32; 2]) -> bool {
         let Component { area, rows, columns, .. } = &self.all[component as usize];
+        let [wide, high] = sides;
         // Box and area refuse most components before their runs are read.
-        let room = rows.len().min(columns.len()) as u64;
-        room >= u64::from(side)
-            && *area >= u64::from(side).pow(2)
-            && holds_square(self.runs(mask, component), side)
+        columns.len() >= wide as usize
+            && rows.len() >= high as usize
+            && *area >= u64::from(wide) * u64::from(high)
+            && holds_rectangle(self.runs(mask, component), sides)
     }
 
     /// Returns the component that holds a pixel.
@@ -154,33 +155,37 @@ impl Components {
     }
 }
 
-/// Returns whether runs, by row and column, hold a full square of pixels.
-pub(super) fn holds_square(runs: impl Iterator<Item = (u32, Range<u32>)>, side: u32) -> bool {
+/// Returns whether runs, by row and column, hold a full rectangle of pixels, given its columns and
+/// rows.
+pub(super) fn holds_rectangle(
+    runs: impl Iterator<Item = (u32, Range<u32>)>,
+    [wide, high]: [u32; 2],
+) -> bool {
     // Ranges common to the last rows: to one row, to two rows and so on.
-    let mut common: Vec<Vec<Range<u32>>> = vec![Vec::new(); side as usize];
+    let mut common: Vec<Vec<Range<u32>>> = vec![Vec::new(); high as usize];
     let mut of_row: Vec<Range<u32>> = Vec::new();
     let mut last_row = None;
     let mut runs = runs.peekable();
     while let Some((row, columns)) = runs.next() {
-        // A shorter run is in no square.
-        if columns.end - columns.start >= side {
+        // A shorter run is in no rectangle.
+        if columns.end - columns.start >= wide {
             of_row.push(columns);
         }
         if runs.peek().is_some_and(|(next, _)| *next == row) {
             continue;
         }
-        // A row without runs ends all squares.
+        // A row without runs ends all rectangles.
         if last_row.is_none_or(|last| last + 1 != row) {
             common.iter_mut().for_each(Vec::clear);
         }
         // From the most rows down, so that each list is read before it changes.
-        for rows in (1..side as usize).rev() {
+        for rows in (1..high as usize).rev() {
             let [upper, here] = common.get_disjoint_mut([rows - 1, rows]).expect("they differ");
-            intersect(upper, &of_row, side, here);
+            intersect(upper, &of_row, wide, here);
         }
         std::mem::swap(&mut common[0], &mut of_row);
         of_row.clear();
-        if !common[side as usize - 1].is_empty() {
+        if !common[high as usize - 1].is_empty() {
             return true;
         }
         last_row = Some(row);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use lamp_stack::Mask;
 
 use super::components::{Component, Components, for_each_overlap, in_step};
-use super::overhang::{OverhangPatch, Unheld, patches};
+use super::overhang::{OverhangLimit, OverhangPatch, Unheld, patches};
 
 /// A layer's image and its components.
 #[derive(Debug)]
@@ -26,9 +26,15 @@ impl Labelled {
 
     /// Returns whether one of the components holds a full square of pixels.
     pub(super) fn hold_square(&self, components: &[u32], side: u32) -> bool {
+        self.hold_rectangle(components, [side; 2])
+    }
+
+    /// Returns whether one of the components holds a full rectangle of pixels, given its columns and
+    /// rows.
+    pub(super) fn hold_rectangle(&self, components: &[u32], sides: [u32; 2]) -> bool {
         components
             .iter()
-            .any(|&component| self.components.holds_square(&self.mask, component, side))
+            .any(|&component| self.components.holds_rectangle(&self.mask, component, sides))
     }
 
     /// Returns whether a component has pixels at the image's border.
@@ -62,13 +68,18 @@ pub(super) struct LayerContact {
 }
 
 impl LayerContact {
-    /// Compares a layer with the one below. Overhangs reach farther than `limit` pixels.
-    pub(super) fn new(below: &Labelled, layer: &Labelled, limit: Option<f64>, speck: u32) -> Self {
+    /// Compares a layer with the one below. Overhangs reach farther than `limit`.
+    pub(super) fn new(
+        below: &Labelled,
+        layer: &Labelled,
+        limit: Option<OverhangLimit>,
+        speck: u32,
+    ) -> Self {
         let mut joints = Joints::new(layer.components.all.len());
         let mut unheld = Vec::new();
         let width = layer.mask.width();
         // 1e9 is beyond any image, and keeps the cast exact.
-        let reach = limit.map(f64::floor).map_or(u32::MAX, |limit| limit.min(1e9) as u32);
+        let reach = limit.map_or(u32::MAX, |limit| limit.widths.floor().min(1e9) as u32);
         for row in 0..layer.mask.height() {
             let [under, over] = [below, layer].map(|layer| layer.mask.row(row));
             let [labels_under, labels] = [below, layer].map(|layer| layer.components.of_row(row));

@@ -9,19 +9,20 @@ use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{Mask, MaskBuilder};
+use lamp_stack::{Mask, MaskBuilder, Pitch};
 use rayon::prelude::*;
 
 use super::LabeledLayer;
 use super::contact::{Labelled, LayerContact};
 use super::findings::{Listed, Pocket, PocketKind};
+use super::metric::Metric;
 use super::overhang::without;
 use super::pockets::Hollows;
 
 /// Where balls may be, layer by layer.
 pub(super) struct Drain {
     radius_um: f64,
-    pitch_um: f64,
+    pitch: Pitch,
     /// The layers within reach of unfinished layers.
     window: VecDeque<NearLayer>,
     /// How many layers of the window are done, and the number of the next.
@@ -46,10 +47,10 @@ struct NearLayer {
 }
 
 impl Drain {
-    pub(super) fn new(diameter_um: f64, pitch_um: f64, rounding: u32) -> Self {
+    pub(super) fn new(diameter_um: f64, pitch: Pitch, rounding: u32) -> Self {
         Self {
             radius_um: diameter_um / 2.0,
-            pitch_um,
+            pitch,
             window: VecDeque::new(),
             done: 0,
             next: 0,
@@ -150,7 +151,7 @@ impl Drain {
         let mut reaches: Vec<(f64, SidewaysReach<'_>)> = Vec::new();
         for near in &self.window {
             let off_um = (near.middle_um - middle_um).abs();
-            let aside = asides(self.radius_um, off_um, self.pitch_um);
+            let aside = asides(self.radius_um, off_um, self.pitch);
             if !aside.is_empty() {
                 reaches.push((off_um, SidewaysReach { mask: &near.layer.labelled.mask, aside }));
             }
@@ -169,19 +170,20 @@ struct SidewaysReach<'a> {
 
 /// Returns the greatest number of columns at which a pixel is nearer than `radius`, for each
 /// distance in rows, given the distance of the layers.
-fn asides(radius_um: f64, off_um: f64, pitch_um: f64) -> Vec<u32> {
+fn asides(radius_um: f64, off_um: f64, pitch: Pitch) -> Vec<u32> {
+    let (metric, width_um) = (Metric::of(Some(pitch)), pitch.um()[0]);
     // The margin takes up the rounding of a radius of whole pixels.
-    let limit = (radius_um * radius_um * (1.0 - 1e-9) - off_um * off_um) / (pitch_um * pitch_um);
-    let is_near = |columns: u64, rows: u64| ((columns * columns + rows * rows) as f64) < limit;
-    let aside = |rows: u64| {
-        let mut columns = (limit - (rows * rows) as f64).sqrt() as u64;
+    let limit = (radius_um * radius_um * (1.0 - 1e-9) - off_um * off_um) / (width_um * width_um);
+    let is_near = |columns: u32, rows: u32| metric.squared(columns, rows) < limit;
+    let aside = |rows: u32| {
+        let mut columns = (limit - metric.squared(0, rows)).sqrt() as u32;
         // Rounding may have made the root one too large.
         while columns > 0 && !is_near(columns, rows) {
             columns -= 1;
         }
-        columns as u32
+        columns
     };
-    (0u64..).take_while(|&rows| is_near(0, rows)).map(aside).collect()
+    (0u32..).take_while(|&rows| is_near(0, rows)).map(aside).collect()
 }
 
 /// Takes from the runs of row `y` what white of the rows around it reaches.

@@ -23,12 +23,12 @@ impl Region {
         self.rows = both(&self.rows, &other.rows);
     }
 
-    /// Returns whether the region, grown by `by` pixels on each side, meets another one.
-    pub(crate) fn is_near(&self, other: &Self, by: u32) -> bool {
-        let near = |a: &Range<u32>, b: &Range<u32>| {
+    /// Returns whether the region, grown on each side by so many columns and rows, meets another one.
+    pub(crate) fn is_near(&self, other: &Self, [columns, rows]: [u32; 2]) -> bool {
+        let near = |a: &Range<u32>, b: &Range<u32>, by: u32| {
             a.start < b.end.saturating_add(by) && b.start < a.end.saturating_add(by)
         };
-        near(&self.columns, &other.columns) && near(&self.rows, &other.rows)
+        near(&self.columns, &other.columns, columns) && near(&self.rows, &other.rows, rows)
     }
 }
 
@@ -109,14 +109,14 @@ pub struct Overhang {
     pub layers: [u32; 2],
     /// The pixels that lie too far from white below.
     pub area: u64,
-    /// The largest distance to white below, squared, in pixels.
-    pub reach_squared: u64,
+    /// The largest distance to white below, squared, in widths of a pixel.
+    pub reach_squared: f64,
     /// The first layer that reaches so far.
     pub reach_layer: u32,
     /// The pixel of that layer that does, as column and row.
     pub farthest: [u32; 2],
-    /// The span there in pixels, if that pixel is held at both sides: the shortest way in a line through
-    /// it, from white on white to white on white.
+    /// The span there in widths of a pixel, if that pixel is held at both sides: the shortest way in a
+    /// line through it, from white on white to white on white.
     pub span_pixels: Option<f64>,
     /// The rectangle around all.
     pub region: Region,
@@ -141,9 +141,9 @@ impl Overhang {
         if self.span_pixels.is_some() { HeldAt::BothSides } else { HeldAt::OneSide }
     }
 
-    /// Returns the largest distance to white below, in pixels.
+    /// Returns the largest distance to white below, in widths of a pixel.
     pub fn reach_pixels(&self) -> f64 {
-        (self.reach_squared as f64).sqrt()
+        self.reach_squared.sqrt()
     }
 }
 
@@ -213,7 +213,7 @@ pub struct OffBalance {
     /// The layer after which it is farthest off.
     pub worst_layer: u32,
     /// The distance of the center of gravity from the convex hull of the body's first layer, in
-    /// pixels, after that layer.
+    /// widths of a pixel, after that layer.
     pub off_pixels: f64,
     /// The center of gravity then, as column and row.
     pub centre: [f64; 2],
@@ -343,9 +343,9 @@ impl Findings {
         self.weak_joints
             .list
             .sort_by(|a, b| share(a).total_cmp(&share(b)).then(a.layer.cmp(&b.layer)));
-        self.overhangs
-            .list
-            .sort_by_key(|overhang| (Reverse(overhang.reach_squared), overhang.layers));
+        self.overhangs.list.sort_by(|a, b| {
+            b.reach_squared.total_cmp(&a.reach_squared).then(a.layers.cmp(&b.layers))
+        });
         self.pockets
             .list
             .sort_by_key(|pocket| (pocket.kind, Reverse(pocket.pixels), pocket.born()));

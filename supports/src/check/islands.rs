@@ -5,26 +5,28 @@ use super::components::Component;
 use super::contact::{Labelled, LayerContact};
 use super::findings::{Island, IslandEnd, Listed, OffBalance, Region};
 use super::live::{Group, Live, Next};
+use super::metric::Metric;
 
 /// The white bodies of the layers so far.
 pub(super) struct Growth {
     live: Live<ImageBody>,
     begun: u64,
     speck: Speck,
+    metric: Metric,
     pub(super) islands: Listed<Island>,
     pub(super) specks: Listed<Island>,
     pub(super) off_balance: Listed<OffBalance>,
 }
 
-/// The area in a layer that makes a long, thin island more than a speck, in squares of its side. By
-/// default it is a square millimeter.
+/// The area in a layer that makes a long, thin island more than a speck, in squares of a speck's side.
+/// By default it is a square millimeter.
 const SPECK_SQUARES: u64 = 16;
 
 /// The size up to which an island is a speck.
 #[derive(Clone, Copy)]
 pub(super) struct Speck {
-    /// The side in pixels of the square that it may not hold in a layer.
-    pub(super) side: u32,
+    /// The columns and rows of the square that it may not hold in a layer.
+    pub(super) sides: [u32; 2],
     /// The layers that it may not float for.
     pub(super) layers: u32,
 }
@@ -47,11 +49,12 @@ struct Floating {
 }
 
 impl Growth {
-    pub(super) fn new(speck: Speck) -> Self {
+    pub(super) fn new(speck: Speck, metric: Metric) -> Self {
         Self {
             live: Live::new(true),
             begun: 0,
             speck,
+            metric,
             islands: Listed::default(),
             specks: Listed::default(),
             off_balance: Listed::default(),
@@ -80,7 +83,9 @@ impl Growth {
                 (false, _) => self.unite(bodies, number),
             };
             match &mut body {
-                ImageBody::Standing(base) => base.grow(layer, &components, number, thickness_um),
+                ImageBody::Standing(base) => {
+                    base.grow(layer, &components, number, thickness_um, self.metric);
+                }
                 ImageBody::Floating(island) => {
                     island.grow(layer, &components, number, thickness_um, self.speck);
                 }
@@ -195,8 +200,8 @@ impl Floating {
         // One square is enough, and the search reads all runs.
         self.counts = self.counts
             || self.layers >= speck.layers
-            || area >= SPECK_SQUARES * u64::from(speck.side).pow(2)
-            || layer.hold_square(components, speck.side);
+            || area >= SPECK_SQUARES * speck.sides.map(u64::from).iter().product::<u64>()
+            || layer.hold_rectangle(components, speck.sides);
     }
 }
 

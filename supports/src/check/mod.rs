@@ -13,6 +13,7 @@ mod findings;
 mod islands;
 mod liquid;
 mod live;
+mod metric;
 mod overhang;
 mod overhangs;
 mod pairs;
@@ -24,9 +25,7 @@ use std::num::{NonZeroU8, NonZeroU32};
 use std::ops::Range;
 use std::sync::Arc;
 
-use lamp_stack::{
-    Dpi, Layer, Length, Mask, MaskBuilder, MemorySize, NotSquare, Op, Pitch, take_batch, white_runs,
-};
+use lamp_stack::{Layer, Length, Mask, MaskBuilder, MemorySize, Op, Pitch, take_batch, white_runs};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -40,6 +39,8 @@ pub use findings::{
 };
 use islands::{Growth, Speck};
 use liquid::Liquid;
+pub(crate) use metric::Metric;
+use overhang::OverhangLimit;
 pub(crate) use overhang::without;
 use overhangs::Overhangs;
 pub use pairs::{Disagreements, IslandMinimum, LoneMinimum};
@@ -87,19 +88,20 @@ impl Default for CheckOptions {
 }
 
 impl CheckOptions {
-    /// Returns the side of the square that an island must hold, in pixels.
-    fn speck_pixels(&self, dpi: Option<Dpi>) -> u32 {
+    /// Returns the columns and rows of the square that an island must hold.
+    fn speck_pixels(&self, pitch: Option<Pitch>) -> [u32; 2] {
         // Where slopes begin, rounding makes islands of a pixel at any resolution.
         let least = if self.speck == Length::default() { 1.0 } else { 2.0 };
         // A hair less: a length of whole pixels may be rounded up.
-        let pixels = |dpi| (self.speck.pixels(dpi) - 1e-6).ceil().clamp(least, 1e9) as u32;
-        dpi.map_or(self.rounding.get(), pixels)
+        let whole = |pixels: f64| (pixels - 1e-6).ceil().clamp(least, 1e9) as u32;
+        pitch.map_or([self.rounding.get(); 2], |pitch| pitch.pixels(self.speck).map(whole))
     }
 
-    /// Returns the reach in pixels and the number of layers of which an overhang must have one. A
-    /// given limit is taken as it is.
-    fn least_overhang(&self, dpi: Option<Dpi>) -> (f64, u32) {
-        let reach = dpi.filter(|_| self.max_overhang.is_none()).map(|dpi| self.speck.pixels(dpi));
+    /// Returns the reach in widths of a pixel and the number of layers of which an overhang must have
+    /// one. A given limit is taken as it is.
+    fn least_overhang(&self, pitch: Option<Pitch>) -> (f64, u32) {
+        let pitch = pitch.filter(|_| self.max_overhang.is_none());
+        let reach = pitch.map(|pitch| self.speck.pixels(pitch.x));
         (reach.unwrap_or(0.0), self.speck_layers.get())
     }
 }
@@ -111,9 +113,6 @@ pub enum CheckError {
     /// There are no layers.
     #[error("there are no layers to check")]
     NoLayers,
-    /// Pixels are not square.
-    #[error(transparent)]
-    NotSquare(#[from] NotSquare),
     /// The layers cannot be compared pixel by pixel.
     #[error(
         "{layer} is {} x {} pixels, and the first layer {} x {}: layers are compared pixel by pixel",
@@ -359,7 +358,7 @@ impl LabeledLayer {
 struct Checker {
     options: CheckOptions,
     layers: Vec<LayerFacts>,
-    dpi: Option<Dpi>,
+    pitch: Option<Pitch>,
     origin_mm: Option<[f64; 2]>,
     size: [u32; 2],
     growth: Growth,
@@ -372,25 +371,23 @@ struct Checker {
 impl Checker {
     fn new(first: &LabeledLayer, options: &CheckOptions) -> Result<Self, CheckError> {
         let rounding = options.rounding.get();
-        let dpi = first.pitch.map(|pitch| pitch.square("checks need")).transpose()?;
+        let pitch = first.pitch;
         let drain = options.drain.filter(|_| !options.islands_only).map(|drain| {
-            let dpi = dpi.ok_or(CheckError::NoScale("large a pixel is"))?;
-            Ok::<_, CheckError>((
-                Drain::new(drain.um(), dpi.pitch().um(), rounding),
-                Hollows::new(rounding),
-            ))
+            let pitch = pitch.ok_or(CheckError::NoScale("large a pixel is"))?;
+            Ok::<_, CheckError>((Drain::new(drain.um(), pitch, rounding), Hollows::new(rounding)))
         });
-        let speck = Speck { side: options.speck_pixels(dpi), layers: options.speck_layers.get() };
+        let speck =
+            Speck { sides: options.speck_pixels(pitch), layers: options.speck_layers.get() };
         Ok(Self {
             options: options.clone(),
             layers: Vec::new(),
-            dpi,
+            pitch,
             origin_mm: first.origin_mm,
             size: first.size(),
-            growth: Growth::new(speck),
+            growth: Growth::new(speck, Metric::of(pitch)),
             liquid: Liquid::new(rounding),
             drain: drain.transpose()?,
-            overhangs: Overhangs::new(options.least_overhang(dpi)),
+            overhangs: Overhangs::new(options.least_overhang(pitch)),
             weak_joints: Listed::default(),
         })
     }
@@ -409,13 +406,14 @@ impl Checker {
         }
     }
 
-    /// Returns how far white may reach beyond the white below, in pixels.
-    fn limit(&self, layer: &LayerFacts) -> Option<f64> {
+    /// Returns how far white may reach beyond the white below.
+    fn limit(&self, layer: &LayerFacts) -> Option<OverhangLimit> {
         if self.options.islands_only {
             return None;
         }
         let of_layer = || layer.thickness_um.map(Length::from_um);
-        Some(self.options.max_overhang.or_else(of_layer)?.pixels(self.dpi?))
+        let widths = self.options.max_overhang.or_else(of_layer)?.pixels(self.pitch?.x);
+        Some(OverhangLimit { widths, metric: Metric::of(self.pitch) })
     }
 
     fn add(
@@ -435,7 +433,9 @@ impl Checker {
         if let Some(contact) = contact {
             self.add_weak_joints(&layer.labelled, contact, number);
             // On a slope, patches of neighboring layers may be a limit and a pixel apart.
-            let near = self.limit(&layer.facts).map_or(0, |limit| limit.ceil().min(1e9) as u32 + 1);
+            let near = self.limit(&layer.facts).map_or([0; 2], |limit| {
+                limit.metric.pixels(limit.widths).map(|side| side.ceil().min(1e9) as u32 + 1)
+            });
             self.overhangs.add(&contact.patches, number, near);
         }
         if let Some((drain, hollows)) = &mut self.drain {
@@ -479,7 +479,7 @@ impl Checker {
         pockets.left_out += narrow.left_out;
         let mut findings = Findings {
             layers: self.layers,
-            pitch: self.dpi.map(Pitch::from),
+            pitch: self.pitch,
             origin_mm: self.origin_mm,
             size: self.size,
             islands: self.growth.islands,

@@ -5,7 +5,8 @@ use std::ops::Range;
 use lamp_stack::sets::{root, unite};
 use lamp_stack::{Mask, white_runs};
 
-use super::components::holds_square;
+use super::components::holds_rectangle;
+use super::metric::Metric;
 use super::span::span;
 
 /// White pixels of a row that may lie too far from the white below.
@@ -22,27 +23,37 @@ pub(super) struct OverhangPatch {
     pub(super) columns: Range<u32>,
     pub(super) rows: Range<u32>,
     pub(super) area: u64,
-    /// The largest distance to white below, squared, in pixels.
-    pub(super) reach_squared: u64,
+    /// The largest distance to white below, squared, in widths of a pixel.
+    pub(super) reach_squared: f64,
     /// The pixel that is so far: column and row.
     pub(super) farthest: [u32; 2],
-    /// The span there in pixels, if it is held at both sides.
+    /// The span there in widths of a pixel, if it is held at both sides.
     pub(super) span: Option<f64>,
 }
 
-/// Whether a distance, squared and in pixels, is within a limit. The margin takes up the rounding
-/// of a limit of whole pixels.
-fn is_within(squared: u64, limit: f64) -> bool {
-    squared as f64 <= limit * limit * (1.0 + 1e-9)
+/// How far white may reach beyond the white below.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OverhangLimit {
+    /// The distance in widths of a pixel.
+    pub(super) widths: f64,
+    pub(super) metric: Metric,
 }
 
-/// Returns the patches of a layer that are farther than `limit` pixels from the white of `below`, by rows.
+impl OverhangLimit {
+    /// Whether a distance, squared and in widths, is within the limit. The margin takes up the
+    /// rounding of a limit of whole pixels.
+    fn has(self, squared: f64) -> bool {
+        squared <= self.widths * self.widths * (1.0 + 1e-9)
+    }
+}
+
+/// Returns the patches of a layer that are farther than `limit` from the white of `below`, by rows.
 /// Patches without a square of `speck` pixels are left out. The runs are sorted by row and column,
 /// and exclude pixels that white of their own row reaches.
 pub(super) fn patches(
     [layer, below]: [&Mask; 2],
     runs: &[Unheld],
-    limit: f64,
+    limit: OverhangLimit,
     speck: u32,
 ) -> Vec<OverhangPatch> {
     let mut far: Vec<(u32, Range<u32>)> = Vec::new();
@@ -63,21 +74,22 @@ pub(super) fn patches(
         far.extend(left.drain(..).map(|columns| (*row, columns)));
     }
     let mut groups = touching(&far);
-    groups.retain(|runs| holds_square(runs.iter().cloned(), speck));
-    groups.iter().map(|runs| patch([layer, below], runs)).collect()
+    groups.retain(|runs| holds_rectangle(runs.iter().cloned(), [speck; 2]));
+    groups.iter().map(|runs| patch([layer, below], runs, limit.metric)).collect()
 }
 
 /// Returns how far white of a row reaches sideways, for each distance in rows.
-fn reaches(limit: f64) -> impl Iterator<Item = (u32, u32)> {
+fn reaches(limit: OverhangLimit) -> impl Iterator<Item = (u32, u32)> {
+    let OverhangLimit { widths, metric } = limit;
     (0u32..).map_while(move |rows| {
-        let squared = u64::from(rows).pow(2);
-        is_within(squared, limit).then(|| {
-            let mut reach = (limit * limit - squared as f64).max(0.0).sqrt() as u64;
+        let squared = metric.squared(0, rows);
+        limit.has(squared).then(|| {
+            let mut reach = (widths * widths - squared).max(0.0).sqrt() as u32;
             // The root may be rounded down; the exact test decides.
-            while is_within(squared + (reach + 1).pow(2), limit) {
+            while reach < u32::MAX && limit.has(metric.squared(reach + 1, rows)) {
                 reach += 1;
             }
-            (rows, reach.min(u64::from(u32::MAX)) as u32)
+            (rows, reach)
         })
     })
 }
@@ -141,11 +153,11 @@ fn touching(runs: &[(u32, Range<u32>)]) -> Vec<Vec<(u32, Range<u32>)>> {
 }
 
 /// Measures a patch.
-fn patch([layer, below]: [&Mask; 2], runs: &[(u32, Range<u32>)]) -> OverhangPatch {
+fn patch([layer, below]: [&Mask; 2], runs: &[(u32, Range<u32>)], metric: Metric) -> OverhangPatch {
     let columns = runs.iter().map(|(_, columns)| columns);
     let start = columns.clone().map(|columns| columns.start).min().unwrap_or_default();
     let end = columns.clone().map(|columns| columns.end).max().unwrap_or_default();
-    let mut farthest = Farthest { below, squared: 0, at: [runs[0].1.start, runs[0].0] };
+    let mut farthest = Farthest { below, metric, squared: 0.0, at: [runs[0].1.start, runs[0].0] };
     farthest.search(runs);
     OverhangPatch {
         columns: start..end,
@@ -153,20 +165,21 @@ fn patch([layer, below]: [&Mask; 2], runs: &[(u32, Range<u32>)]) -> OverhangPatc
         area: columns.map(|columns| u64::from(columns.end - columns.start)).sum(),
         reach_squared: farthest.squared,
         farthest: farthest.at,
-        span: span([layer, below], farthest.at, (farthest.squared as f64).sqrt()),
+        span: span([layer, below], farthest.at, farthest.squared.sqrt(), metric),
     }
 }
 
 /// The pixel, of those searched, that is farthest from white.
 struct Farthest<'a> {
     below: &'a Mask,
-    squared: u64,
+    metric: Metric,
+    squared: f64,
     at: [u32; 2],
 }
 
 impl Farthest<'_> {
-    /// Searches runs, sorted by row. One step to the next pixel changes the distance by at most one
-    /// pixel, so a pixel in their middle bounds the largest distance.
+    /// Searches runs, sorted by row. The distances of two pixels differ by at most their own, so a
+    /// pixel in their middle bounds the largest distance.
     fn search(&mut self, runs: &[(u32, Range<u32>)]) {
         let (row, columns) = match runs {
             [] => return,
@@ -175,26 +188,26 @@ impl Farthest<'_> {
         };
         let column = columns.start + (columns.end - columns.start) / 2;
         let aside = runs.iter().map(|(_, c)| column.abs_diff(c.start).max(column.abs_diff(c.end)));
-        let aside = f64::from(aside.max().unwrap_or_default());
-        let along = f64::from((row - runs[0].0).max(runs[runs.len() - 1].0 - row));
-        // Only a larger whole square matters; the margin takes up the rounding of roots.
-        let least = ((self.squared + 1) as f64).sqrt() - aside.hypot(along) - 1e-6;
-        let squared = self.measure(column, *row, least.max(0.0).powi(2) as u64);
-        if (squared as f64).sqrt() >= least {
+        let aside = aside.max().unwrap_or_default();
+        let along = (row - runs[0].0).max(runs[runs.len() - 1].0 - row);
+        // Only a larger square matters; the margin takes up the rounding of roots.
+        let least = self.squared.sqrt() - self.metric.squared(aside, along).sqrt() - 1e-6;
+        let squared = self.measure(column, *row, least.max(0.0).powi(2));
+        if squared.sqrt() >= least {
             let (upper, lower) = runs.split_at(runs.len() / 2);
             self.search(upper);
             self.search(lower);
         }
     }
 
-    /// Searches columns of a row. One step to the next pixel changes the distance by at most one
-    /// pixel, so the middle of the columns bounds the largest distance.
+    /// Searches columns of a row. One step to the next pixel changes the distance by at most a width,
+    /// so the middle of the columns bounds the largest distance.
     fn within(&mut self, row: u32, columns: Range<u32>) {
         let middle = columns.start + (columns.end - columns.start) / 2;
         let half = middle - columns.start;
-        let least = ((self.squared + 1) as f64).sqrt() - f64::from(half) - 1e-6;
-        let squared = self.measure(middle, row, least.max(0.0).powi(2) as u64);
-        if half > 0 && (squared as f64).sqrt() >= least {
+        let least = self.squared.sqrt() - f64::from(half) - 1e-6;
+        let squared = self.measure(middle, row, least.max(0.0).powi(2));
+        if half > 0 && squared.sqrt() >= least {
             self.within(row, columns.start..middle);
             if middle + 1 < columns.end {
                 self.within(row, middle + 1..columns.end);
@@ -204,8 +217,8 @@ impl Farthest<'_> {
 
     /// Returns the squared distance of a pixel to the nearest white, or an upper bound of it below
     /// `enough`. Remembers the first pixel of the largest distance.
-    fn measure(&mut self, column: u32, row: u32, enough: u64) -> u64 {
-        let squared = nearest(self.below, column, row, enough);
+    fn measure(&mut self, column: u32, row: u32, enough: f64) -> f64 {
+        let squared = nearest(self.below, [column, row], self.metric, enough);
         if squared > self.squared {
             (self.squared, self.at) = (squared, [column, row]);
         }
@@ -213,20 +226,19 @@ impl Farthest<'_> {
     }
 }
 
-/// Returns the squared distance in pixels from a pixel's center to the nearest white one's, or to
+/// Returns the squared distance in widths from a pixel's center to the nearest white one's, or to
 /// one that is nearer than `enough`, squared.
-fn nearest(mask: &Mask, column: u32, row: u32, enough: u64) -> u64 {
-    let mut nearest = u64::MAX;
+fn nearest(mask: &Mask, [column, row]: [u32; 2], metric: Metric, enough: f64) -> f64 {
+    let mut nearest = f64::INFINITY;
     for distance in 0..mask.height() {
-        let squared = u64::from(distance).pow(2);
         // Rows at this distance hold nothing nearer.
-        if squared >= nearest || nearest < enough {
+        if metric.squared(0, distance) >= nearest || nearest < enough {
             break;
         }
         for near in [row.checked_sub(distance), row.checked_add(distance)] {
             let near = near.filter(|near| *near < mask.height());
             if let Some(aside) = near.and_then(|near| aside(mask, column, near)) {
-                nearest = nearest.min(squared.saturating_add(u64::from(aside).pow(2)));
+                nearest = nearest.min(metric.squared(aside, distance));
             }
         }
     }

@@ -8,7 +8,7 @@ use super::overhang::OverhangPatch;
 /// The overhangs of the layers so far.
 #[derive(Default)]
 pub(super) struct Overhangs {
-    /// The reach in pixels and the number of layers of which an overhang must have one.
+    /// The reach in widths of a pixel and the number of layers of which an overhang must have one.
     least: (f64, u32),
     /// The last layer's patches, and which of `open` each belongs to.
     last: Vec<(Region, usize)>,
@@ -21,9 +21,9 @@ impl Overhangs {
         Self { least, ..Self::default() }
     }
 
-    /// Adds a layer's patches. A patch whose box is within `near` pixels of a patch of the last
-    /// layer continues it.
-    pub(super) fn add(&mut self, patches: &[OverhangPatch], number: u32, near: u32) {
+    /// Adds a layer's patches. A patch whose box is within `near` columns and rows of a patch of the
+    /// last layer continues it.
+    pub(super) fn add(&mut self, patches: &[OverhangPatch], number: u32, near: [u32; 2]) {
         let before = self.open.len();
         let mut all = std::mem::take(&mut self.open);
         let mut of_patch = Vec::new();
@@ -95,10 +95,9 @@ impl Overhang {
         self.layers = [self.layers[0].min(other.layers[0]), self.layers[1].max(other.layers[1])];
         self.area += other.area;
         self.region.unite(&other.region);
-        let reach = |overhang: &Self| {
-            (std::cmp::Reverse(overhang.reach_squared), overhang.reach_layer, overhang.farthest)
-        };
-        if reach(other) < reach(self) {
+        let first = |overhang: &Self| (overhang.reach_layer, overhang.farthest);
+        let farther = other.reach_squared.total_cmp(&self.reach_squared);
+        if farther.then(first(self).cmp(&first(other))).is_gt() {
             self.reach_squared = other.reach_squared;
             (self.reach_layer, self.farthest) = (other.reach_layer, other.farthest);
             self.span_pixels = other.span_pixels;

@@ -11,8 +11,8 @@ use super::{
     PocketRecord, Shown, ShownMoment, StrayRowsRecord,
 };
 use crate::check::{
-    Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, OffBalance, Overhang,
-    Pocket, PocketKind, Region, WeakJoint,
+    Disagreements, Findings, Island, IslandEnd, LayerFacts, LoneMinimum, Metric, OffBalance,
+    Overhang, Pocket, PocketKind, Region, WeakJoint,
 };
 
 /// Returns the records of all findings, the worst first, given the shear stress of the recoating
@@ -38,7 +38,8 @@ pub fn records(
     let overhang = |overhang: &Overhang| Record::Overhang(of_overhang(overhang, scale));
     records.extend(findings.overhangs.list.iter().map(overhang));
     // Less is rounding to pixels.
-    let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= 1.0);
+    let least = Metric::of(findings.pitch).longer_side();
+    let off = findings.off_balance.list.iter().filter(|off| off.off_pixels >= least);
     records.extend(off.map(|off| Record::OffBalance(of_balance(off, scale))));
     records.extend(at_border(findings, scale));
     records.extend(empty(findings, scale));

@@ -52,8 +52,9 @@ impl<'a> Scale<'a> {
         }
     }
 
-    pub(super) fn length_mm(&self, pixels: f64) -> Option<f64> {
-        Some(to_nm(pixels * self.pitch_mm?[0]))
+    /// Returns a length, given in widths of a pixel.
+    pub(super) fn length_mm(&self, widths: f64) -> Option<f64> {
+        Some(to_nm(widths * self.pitch_mm?[0]))
     }
 
     /// Returns an area in pixels, also in square millimeters.

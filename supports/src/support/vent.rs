@@ -47,7 +47,7 @@ impl VentPlan {
             matches!(other.kind, PocketKind::Trap | PocketKind::Cup)
                 && other.layers[0] <= last
                 && first <= other.layers[1]
-                && pocket.region.is_near(&other.region, 0)
+                && pocket.region.is_near(&other.region, [0; 2])
         };
         let volumes = found.pockets.list.iter().filter(meets).map(|other| other.pixels_um);
         // A sum of nothing is -0.

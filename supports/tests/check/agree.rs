@@ -43,13 +43,13 @@ pub(crate) fn agree_as(layers: Vec<Layer>, block: &Block, limits: &Limits) {
 
 /// Checks layers.
 pub(crate) fn check(layers: Vec<Layer>, limits: &Limits) -> Findings {
-    let pitch_um = layers[0].pitch.unwrap().x.pitch().um();
+    let width_um = layers[0].pitch.unwrap().x.pitch().um();
     let options = CheckOptions {
         threshold: THRESHOLD,
         // Half a pixel less, so that no length is rounded up to one pixel more.
         speck: match limits.speck.0 {
             1 => Length::default(),
-            side => Length::from_um((side as f64 - 0.5) * pitch_um),
+            side => Length::from_um((side as f64 - 0.5) * width_um),
         },
         speck_layers: NonZeroU32::new(limits.speck.1 as u32).unwrap(),
         rounding: NonZeroU32::new(limits.rounding as u32).unwrap(),
@@ -74,7 +74,7 @@ pub(crate) fn layers(block: &Block, image: &dyn Fn(usize) -> Image) -> Vec<Layer
             ..PageInfo::default()
         };
         z_um += thickness_um;
-        let pitch = Pitch::of_dpi(25_400.0 / block.pitch_um);
+        let pitch = Pitch::of_two_dpi(block.pitch_um.map(|um| 25_400.0 / um));
         Layer { info, pitch, image: image(layer).into() }
     };
     (0..block.size[2]).map(layer).collect()
@@ -139,23 +139,25 @@ fn joints_agree(block: &Block, limits: &Limits, found: &Findings) {
 }
 
 fn overhangs_agree(block: &Block, limits: &Limits, found: &Findings) {
+    // Squares of square pixels are whole; others are rounded to a millionth.
+    let reach = |widths: f64| (widths.powi(2) * 1e6).round() as u64;
     let ours = found.overhangs.list.iter().map(|ours| {
         let layers = ours.layers[0] as usize..ours.layers[1] as usize + 1;
-        let reach = (ours.reach_squared, ours.reach_layer as usize);
+        let reach = (reach(ours.reach_pixels()), ours.reach_layer as usize);
         (layers, ours.area as usize, reach, frame(&ours.region))
     });
     // By the default limit, small ones of few layers are left out.
     let is_small = |overhang: &referee::Overhang| {
         let (side, layers) = limits.speck;
-        let least_um = if side == 1 { 0.0 } else { (side as f64 - 0.5) * block.pitch_um };
+        let least_um = if side == 1 { 0.0 } else { block.just_below(side) };
         limits.max_overhang_um.is_none()
             && overhang.reach_um < least_um
             && overhang.layers.len() < layers
     };
     let expected = referee::overhangs(block, limits).into_iter().filter(|it| !is_small(it));
     let expected = expected.map(|overhang| {
-        let reach = (overhang.reach_um / block.pitch_um).powi(2).round() as u64;
-        (overhang.layers, overhang.area, (reach, overhang.reach_layer), overhang.frame)
+        let reach = (reach(overhang.reach_um / block.pitch_um[0]), overhang.reach_layer);
+        (overhang.layers, overhang.area, reach, overhang.frame)
     });
     assert_eq!(sorted(ours), sorted(expected));
 }
@@ -193,7 +195,7 @@ fn balance_agrees(block: &Block, found: &Findings) {
     let mut ours: Vec<_> = ours.collect();
     let mut expected: Vec<_> = referee::tilts(block)
         .into_iter()
-        .map(|tilt| (tilt.base, tilt.layer, tilt.farthest_um / block.pitch_um))
+        .map(|tilt| (tilt.base, tilt.layer, tilt.farthest_um / block.pitch_um[0]))
         .collect();
     assert_eq!(ours.len(), expected.len(), "{ours:?} {expected:?}");
     let key = |(frame, layer, _): &(Frame, usize, f64)| {
@@ -227,6 +229,6 @@ fn near(a: [f64; 2], b: [f64; 2]) {
 }
 
 fn near_mm3(block: &Block, pixels_um: f64, mm3: f64) {
-    let ours = pixels_um * block.pitch_um.powi(2) * 1e-9;
+    let ours = pixels_um * block.pitch_um[0] * block.pitch_um[1] * 1e-9;
     assert!((ours - mm3).abs() <= 1e-12 * mm3, "{ours} {mm3}");
 }

@@ -149,7 +149,7 @@ fn islands_are_all_there(
     let all: Vec<&Island> = islands.iter().chain(&found.specks.list).collect();
     let floating: u64 = all.iter().map(|island| island.floating_pixels).sum();
     assert_eq!(floating as usize, simulated.floats.iter().filter(|&&floats| floats).count());
-    let least = options.speck.pixels(Dpi::new(25_400.0 / block.pitch_um).unwrap());
+    let least = options.speck.pixels(Dpi::new(25_400.0 / block.pitch_um[0]).unwrap());
     let side = if least == 0.0 { 1 } else { (least - 1e-6).ceil().max(2.0) as usize };
     for layer in 0..block.size[2] {
         for body in bodies(block, layer, |voxel| simulated.floats[voxel]) {

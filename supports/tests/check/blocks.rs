@@ -9,37 +9,42 @@ use super::agree::{THRESHOLD, agree, agree_as, check, layers, mask};
 use super::referee::{Block, Limits, holes};
 
 /// Returns blocks of a size: boxes painted over each other, the first one white and from the
-/// platform up, then single voxels turned over.
+/// platform up, then single voxels turned over. Some have pixels that are higher or lower than wide.
 fn blocks(size: [usize; 3], noise: usize) -> impl Strategy<Value = Block> {
+    const PITCHES: [[f64; 2]; 4] = [[63.5, 63.5], [63.5, 86.1], [63.5, 47.0], [30.0, 97.0]];
+    let pitch_um = proptest::sample::select(&PITCHES[..]);
     let span = |length: usize| (0..length, 1..=length / 2 + 1);
     let boxes = (span(size[0]), span(size[1]), span(size[2]), any::<bool>());
     let boxes = proptest::collection::vec(boxes, 1..12);
     let voxels = size.iter().product::<usize>();
     let turned = proptest::collection::vec(0..voxels, 0..=noise);
     let thickness_um = proptest::collection::vec(25..200u32, size[2]);
-    (boxes, turned, thickness_um).prop_map(move |(boxes, turned, thickness_um)| {
-        let thickness_um = thickness_um.into_iter().map(f64::from).collect();
-        let white = vec![false; size.iter().product()];
-        let mut block = Block { size, white, pitch_um: 63.5, thickness_um };
-        for (k, (columns, rows, layers, is_white)) in boxes.into_iter().enumerate() {
-            let first_layer = if k == 0 { 0 } else { layers.0 };
-            for voxel in 0..block.white.len() {
-                let [column, row, layer] = block.place(voxel);
-                let inside =
-                    |at: usize, (from, length): (usize, usize)| (from..from + length).contains(&at);
-                if inside(column, columns)
-                    && inside(row, rows)
-                    && inside(layer, (first_layer, layers.1))
-                {
-                    block.white[voxel] = is_white || k == 0;
+    (boxes, turned, thickness_um, pitch_um).prop_map(
+        move |(boxes, turned, thickness_um, pitch_um)| {
+            let thickness_um = thickness_um.into_iter().map(f64::from).collect();
+            let white = vec![false; size.iter().product()];
+            let mut block = Block { size, white, pitch_um, thickness_um };
+            for (k, (columns, rows, layers, is_white)) in boxes.into_iter().enumerate() {
+                let first_layer = if k == 0 { 0 } else { layers.0 };
+                for voxel in 0..block.white.len() {
+                    let [column, row, layer] = block.place(voxel);
+                    let inside = |at: usize, (from, length): (usize, usize)| {
+                        (from..from + length).contains(&at)
+                    };
+                    if inside(column, columns)
+                        && inside(row, rows)
+                        && inside(layer, (first_layer, layers.1))
+                    {
+                        block.white[voxel] = is_white || k == 0;
+                    }
                 }
             }
-        }
-        for voxel in turned {
-            block.white[voxel] = !block.white[voxel];
-        }
-        block
-    })
+            for voxel in turned {
+                block.white[voxel] = !block.white[voxel];
+            }
+            block
+        },
+    )
 }
 
 fn limits() -> impl Strategy<Value = Limits> {

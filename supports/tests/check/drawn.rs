@@ -11,7 +11,7 @@ pub(crate) fn block(layers: &[&str]) -> Block {
     Block {
         size: [rows[0][0].len(), rows[0].len(), layers.len()],
         white: white.map(|c| c == '#').collect(),
-        pitch_um: 100.0,
+        pitch_um: [100.0; 2],
         thickness_um: vec![50.0; layers.len()],
     }
 }

@@ -38,7 +38,7 @@ pub(crate) fn block(layers: &[Layer]) -> Block {
     let mut block = Block {
         size: [0, 0, layers.len()],
         white: Vec::new(),
-        pitch_um: layers[0].pitch.unwrap().x.pitch().um(),
+        pitch_um: layers[0].pitch.unwrap().um(),
         thickness_um: layers.iter().map(|layer| layer.info.thickness_um.unwrap()).collect(),
     };
     for layer in layers {

@@ -28,7 +28,7 @@ pub(crate) fn random_part(seed: u64) -> Block {
     let mut dice = Dice(seed);
     let mut white = vec![false; SIZE.iter().product()];
     let thickness_um = vec![100.0; SIZE[2]];
-    let mut block = Block { size: SIZE, white: Vec::new(), pitch_um: 125.0, thickness_um };
+    let mut block = Block { size: SIZE, white: Vec::new(), pitch_um: [125.0; 2], thickness_um };
     let mut paint = |shape: [[usize; 2]; 3], color: bool| {
         for (voxel, white) in white.iter_mut().enumerate() {
             let place = block.place(voxel);

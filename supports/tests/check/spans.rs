@@ -9,19 +9,32 @@ use super::referee::Block;
 
 /// Returns the overhang of a layer above another, given which pixels are white by their centers.
 fn overhang(below: impl Fn([f64; 2]) -> bool, layer: impl Fn([f64; 2]) -> bool) -> Overhang {
+    overhang_of(1.0, below, layer)
+}
+
+/// Returns the overhang of a layer above another, given the height of pixels in widths, and which are
+/// white by their centers in widths.
+fn overhang_of(
+    height: f64,
+    below: impl Fn([f64; 2]) -> bool,
+    layer: impl Fn([f64; 2]) -> bool,
+) -> Overhang {
     const SIDE: u32 = 240;
+    let rows = (f64::from(SIDE) / height).ceil();
     let image = |is_white: &dyn Fn([f64; 2]) -> bool| -> Mask {
         let mut mask = MaskBuilder::new(SIDE);
-        for row in 0..SIDE {
-            let white = |column: u32| is_white([column, row].map(|at| f64::from(at) - 119.5));
+        for row in 0..rows as u32 {
+            let y = (f64::from(row) + 0.5 - rows / 2.0) * height;
+            let white = |column: u32| is_white([f64::from(column) - 119.5, y]);
             let ends = (1..SIDE).filter(|&column| white(column) != white(column - 1));
             mask.push_row(&ends.collect::<Vec<_>>()).unwrap();
         }
         mask.finish()
     };
+    let pitch = Pitch::of_two_dpi([254.0, 254.0 / height]);
     let page = |index, image: Mask| {
         let info = PageInfo { index, thickness_um: Some(100.0), ..PageInfo::default() };
-        Ok::<_, CheckError>(Layer { info, pitch: Pitch::of_dpi(254.0), image: image.into() })
+        Ok::<_, CheckError>(Layer { info, pitch, image: image.into() })
     };
     let layers = [page(0, image(&below)), page(1, image(&|at| below(at) || layer(at)))];
     let found = check(layers.into_iter(), Ok, &CheckOptions::default()).unwrap();
@@ -48,6 +61,25 @@ fn a_bridge_spans_its_gap_at_any_angle() {
         let span = found.span_pixels.unwrap();
         assert!((span - 40.0).abs() < 2.0, "{degrees} {span}");
         assert!((found.reach_pixels() - 20.0).abs() < 2.0);
+    }
+}
+
+#[test]
+fn a_bridge_of_pixels_that_are_not_square_spans_its_gap_at_any_angle() {
+    let degrees = [0.0, 10.0, 30.0, 45.0, 71.0, 90.0, 137.0];
+    for (height, degrees) in [19.0 / 14.0, 0.6].iter().flat_map(|h| degrees.map(|d| (*h, d))) {
+        let turned = turned(degrees);
+        // The gap is widest along the middle of the deck, so the farthest pixel is there.
+        let piers = |at| {
+            let [x, y] = turned(at);
+            (20.0 - y.abs() / 10.0..60.0).contains(&x.abs()) && y.abs() < 50.0
+        };
+        let deck = |at| turned(at)[0].abs() < 60.0 && turned(at)[1].abs() < 15.0;
+        let found = overhang_of(height, piers, deck);
+        let span = found.span_pixels.unwrap();
+        let two_pixels = 2.0 * height.max(1.0);
+        assert!((span - 40.0).abs() < two_pixels, "{height} {degrees} {span}");
+        assert!((found.reach_pixels() - 20.0).abs() < two_pixels, "{height} {degrees}");
     }
 }
 
@@ -82,7 +114,7 @@ fn ceilings_are_bridges_and_ledges_around_are_not() {
     assert_eq!(slot.span_pixels, Some(24.0));
 }
 
-/// Returns the least span through a voxel along lines 7.5 degrees apart, in pixels.
+/// Returns the least span through a voxel along lines 7.5 degrees apart, in widths of a pixel.
 fn span(block: &Block, [column, row, layer]: [usize; 3]) -> Option<f64> {
     let white = |x: f64, y: f64, layer: usize| {
         let [x, y] = [x.round(), y.round()];
@@ -92,6 +124,7 @@ fn span(block: &Block, [column, row, layer]: [usize; 3]) -> Option<f64> {
     };
     let along = |angle: f64| {
         let (sine, cosine) = angle.to_radians().sin_cos();
+        let sine = sine * block.pitch_um[0] / block.pitch_um[1];
         let scale = sine.abs().max(cosine.abs());
         let mut step = 0.0;
         loop {
@@ -117,8 +150,10 @@ fn span(block: &Block, [column, row, layer]: [usize; 3]) -> Option<f64> {
 #[test]
 fn spans_of_parts_at_random_are_those_of_voxels() {
     let (mut bridges, mut cantilevers) = (0, 0);
-    for seed in 0..150 {
-        let part = random_part(seed);
+    for seed in 0..200 {
+        let mut part = random_part(seed);
+        // A third has pixels that are higher than wide, and a third lower.
+        part.pitch_um[1] *= [1.0, 1.36, 0.7][seed as usize % 3];
         let layers = layers(&part, &|layer| mask(&part, layer).into());
         let layers = layers.into_iter().map(Ok::<_, CheckError>);
         let found = check(layers, Ok, &CheckOptions::default()).unwrap();

@@ -133,7 +133,7 @@ fn counts(found: &Findings) -> String {
         .overhangs
         .list
         .iter()
-        .map(|over| (over.layers, over.area, over.reach_squared, over.reach_layer))
+        .map(|over| (over.layers, over.area, over.reach_squared as u64, over.reach_layer))
         .collect();
     overhangs.sort_unstable();
     let mut pockets: Vec<_> = found

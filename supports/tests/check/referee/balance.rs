@@ -31,7 +31,7 @@ pub(crate) fn tilts(block: &Block) -> Vec<Tilt> {
         }
         for (body, lean) in leans.iter_mut().enumerate() {
             if growth.stands(body) && growth.is_eldest(body) {
-                let off_um = off_base(&growth, &weights, body) * block.pitch_um;
+                let off_um = off_base(&growth, &weights, body);
                 // Less is what rounding leaves of zero.
                 if off_um > 1e-6 {
                     let (first, farthest_um) = lean.unwrap_or((layer, 0.0));
@@ -71,7 +71,7 @@ impl Weight {
     }
 }
 
-/// Returns the distance of a body's center of gravity from its base, in pixels; zero within it.
+/// Returns the distance of a body's center of gravity from its base, in µm; zero within it.
 /// Weights are the weights that births had while they were the eldest of their bodies.
 fn off_base(growth: &Growth, weights: &[Weight], body: usize) -> f64 {
     let block = growth.block;
@@ -79,13 +79,14 @@ fn off_base(growth: &Growth, weights: &[Weight], body: usize) -> f64 {
     let Weight([mass, x, y]) =
         its.map(|birth| weights[birth]).fold(Weight::default(), Weight::with);
     let base = block.layer(0).filter(|&voxel| growth.names[voxel] == Some(body));
+    let [wide, high] = block.pitch_um;
     let corners: Vec<[f64; 2]> = base
         .flat_map(|voxel| {
             let [column, row, _] = block.place(voxel);
-            (0..4).map(move |i| [(column + i % 2) as f64, (row + i / 2) as f64])
+            (0..4).map(move |i| [(column + i % 2) as f64 * wide, (row + i / 2) as f64 * high])
         })
         .collect();
-    outside(&hull(&corners), [x / mass, y / mass])
+    outside(&hull(&corners), [x / mass * wide, y / mass * high])
 }
 
 /// Returns the corners of the convex hull, by wrapping: each is followed by the one that has

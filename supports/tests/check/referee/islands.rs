@@ -194,8 +194,9 @@ fn float(growth: &Growth, layer: usize, limits: &Limits, found: &mut [Option<Isl
         if its.len() > island.largest_area {
             (island.largest_area, island.largest_layer) = (its.len(), layer);
         }
-        island.is_speck &= !block.hold_square(&its, limits.speck.0);
-        island.is_speck &= its.len() < 16 * limits.speck.0.pow(2);
+        let sides = block.speck_sides(limits);
+        island.is_speck &= !block.hold_rectangle(&its, sides);
+        island.is_speck &= its.len() < 16 * sides[0] * sides[1];
         island.is_speck &= island.floating_layers < limits.speck.1;
     }
 }

@@ -24,8 +24,8 @@ pub(crate) struct Block {
     pub(crate) size: [usize; 3],
     /// True where cured.
     pub(crate) white: Vec<bool>,
-    /// The side of a pixel in µm.
-    pub(crate) pitch_um: f64,
+    /// The width and the height of a pixel in µm.
+    pub(crate) pitch_um: [f64; 2],
     /// The thickness of each layer in µm.
     pub(crate) thickness_um: Vec<f64>,
 }
@@ -42,14 +42,14 @@ impl fmt::Debug for Block {
             };
             writeln!(f, "{}", (0..layers).map(line).collect::<Vec<_>>().join(" "))?;
         }
-        write!(f, "{:?} um thick, {} um wide", self.thickness_um, self.pitch_um)
+        write!(f, "{:?} um thick, {:?} um wide and high", self.thickness_um, self.pitch_um)
     }
 }
 
 /// Limits of the findings.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
-    /// The side in pixels of the square that more than a speck holds, and the number of layers that
+    /// The side in columns of the square that more than a speck holds, and the number of layers that
     /// it floats for.
     pub(crate) speck: (usize, usize),
     /// The side in pixels of the square that any other finding holds.
@@ -155,8 +155,29 @@ impl Block {
         self.bodies(self.layer(layer), |voxel| self.white[voxel])
     }
 
+    /// Returns the length in µm of a number of columns, half a column less.
+    pub(crate) fn just_below(&self, columns: usize) -> f64 {
+        (columns as f64 - 0.5) * self.pitch_um[0]
+    }
+
+    /// Returns the columns and rows of a speck's square: the least number that is as wide and high.
+    fn speck_sides(&self, limits: &Limits) -> [usize; 2] {
+        let side = limits.speck.0;
+        // Of no length, a pixel is as wide and high; of others, two are.
+        let least = side.min(2);
+        let length_um = if side == 1 { 0.0 } else { self.just_below(side) };
+        self.pitch_um.map(|pitch_um| {
+            (least..).find(|&pixels| pixels as f64 * pitch_um >= length_um * (1.0 - 1e-9)).unwrap()
+        })
+    }
+
     /// Returns true if some voxels, sorted, hold a full square of a layer's pixels.
     fn hold_square(&self, voxels: &[usize], side: usize) -> bool {
+        self.hold_rectangle(voxels, [side; 2])
+    }
+
+    /// Returns true if some voxels, sorted, hold a full rectangle of columns and rows of a layer.
+    fn hold_rectangle(&self, voxels: &[usize], [wide, high]: [usize; 2]) -> bool {
         let holds = |place: [usize; 3]| {
             place[0] < self.size[0]
                 && place[1] < self.size[1]
@@ -164,8 +185,8 @@ impl Block {
         };
         voxels.iter().any(|&voxel| {
             let [column, row, layer] = self.place(voxel);
-            let mut square = (0..side * side).map(|i| [column + i % side, row + i / side, layer]);
-            square.all(holds)
+            let mut pixels = (0..wide * high).map(|i| [column + i % wide, row + i / wide, layer]);
+            pixels.all(holds)
         })
     }
 
@@ -179,7 +200,7 @@ impl Block {
 
     /// Returns the volume in mm³ of some pixels of a layer.
     fn mm3(&self, layer: usize, pixels: usize) -> f64 {
-        pixels as f64 * self.pitch_um.powi(2) * self.thickness_um[layer] * 1e-9
+        pixels as f64 * self.pitch_um[0] * self.pitch_um[1] * self.thickness_um[layer] * 1e-9
     }
 }
 

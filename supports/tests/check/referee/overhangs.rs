@@ -64,20 +64,21 @@ fn most_um(block: &Block, limits: &Limits, layer: usize) -> f64 {
 /// below, which must have one.
 fn distance_um(block: &Block, voxel: usize) -> f64 {
     let [column, row, layer] = block.place(voxel).map(|at| at as isize);
-    let mut least = isize::MAX;
-    let mut ring = 0;
-    // Pixels of a ring are at least as far as its number.
-    while ring * ring < least {
+    let [wide, high] = block.pitch_um;
+    let mut least = f64::INFINITY;
+    let mut ring = 0_isize;
+    // Pixels of a ring are at least as far as its number of shorter sides.
+    while ring as f64 * wide.min(high) < least {
         for (across, down) in (-ring..=ring).flat_map(|a| (-ring..=ring).map(move |d| (a, d))) {
             if across.abs().max(down.abs()) == ring
                 && is_white(block, [column + across, row + down, layer - 1])
             {
-                least = least.min(across * across + down * down);
+                least = least.min((across as f64 * wide).hypot(down as f64 * high));
             }
         }
         ring += 1;
     }
-    (least as f64).sqrt() * block.pitch_um
+    least
 }
 
 fn is_white(block: &Block, place: [isize; 3]) -> bool {
@@ -117,10 +118,13 @@ fn continues(block: &Block, limits: &Limits, lower: &Patch, upper: &Patch) -> bo
         return false;
     }
     let most = most_um(block, limits, upper.layer);
-    let grown = (most / block.pitch_um).ceil() as usize + 1;
-    let meets =
-        |a: &Range<usize>, b: &Range<usize>| a.start < b.end + grown && b.start < a.end + grown;
-    meets(&lower.frame.columns, &upper.frame.columns) && meets(&lower.frame.rows, &upper.frame.rows)
+    let meets = |a: &Range<usize>, b: &Range<usize>, side_um: f64| {
+        let grown = (most / side_um).ceil() as usize + 1;
+        a.start < b.end + grown && b.start < a.end + grown
+    };
+    let [wide, high] = block.pitch_um;
+    meets(&lower.frame.columns, &upper.frame.columns, wide)
+        && meets(&lower.frame.rows, &upper.frame.rows, high)
 }
 
 fn joined(patches: &[&Patch]) -> Option<Overhang> {

@@ -160,7 +160,7 @@ fn distance_um(block: &Block, voxel: usize) -> f64 {
         let [column, row, layer] = block.place(voxel);
         let below: f64 = block.thickness_um[..layer].iter().sum();
         let z = below + block.thickness_um[layer] / 2.0;
-        [column as f64 * block.pitch_um, row as f64 * block.pitch_um, z]
+        [column as f64 * block.pitch_um[0], row as f64 * block.pitch_um[1], z]
     };
     let from = centre(voxel);
     let white = (0..block.white.len()).filter(|&other| block.white[other]).map(centre);

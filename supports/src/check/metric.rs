@@ -1,0 +1,44 @@
+//! Lengths within layers whose pixels may be higher or lower than wide.
+
+use lamp_stack::Pitch;
+
+/// The shape of pixels, by which lengths within a layer are measured in widths of a pixel. Of square
+/// pixels these are pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Metric {
+    /// The height of a pixel in widths.
+    height: f64,
+}
+
+impl Metric {
+    /// Returns the metric of a pitch; pixels without one count as square.
+    pub(crate) fn of(pitch: Option<Pitch>) -> Self {
+        let height = pitch.filter(|pitch| !pitch.is_square()).map(|pitch| {
+            let [x, y] = pitch.um();
+            y / x
+        });
+        Self { height: height.unwrap_or(1.0) }
+    }
+
+    /// Returns the square of the distance of two pixels, given their columns and rows between.
+    #[inline]
+    pub(super) fn squared(self, columns: u32, rows: u32) -> f64 {
+        self.place([columns, rows].map(f64::from)).map(|side| side * side).iter().sum()
+    }
+
+    /// Returns a column and a row in widths.
+    #[inline]
+    pub(super) fn place(self, [column, row]: [f64; 2]) -> [f64; 2] {
+        [column, row * self.height]
+    }
+
+    /// Returns a length in columns and in rows.
+    pub(super) fn pixels(self, length: f64) -> [f64; 2] {
+        [length, length / self.height]
+    }
+
+    /// Returns the longer side of a pixel.
+    pub(crate) fn longer_side(self) -> f64 {
+        self.height.max(1.0)
+    }
+}
