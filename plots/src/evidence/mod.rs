@@ -126,6 +126,7 @@ impl<'a> EvidencePicture<'a> {
     /// # Errors
     /// Returns the errors of `out`, or an error if texts cannot be drawn.
     pub fn write_png(self, out: impl Write) -> io::Result<()> {
+        let (pitch, side_pitch) = (self.findings.pitch, self.side_view.pitch);
         let side_view = Panel {
             title: match (self.side_view.along_row, self.side_view.at) {
                 (true, row) => format!("side view along row {row}"),
@@ -134,12 +135,11 @@ impl<'a> EvidencePicture<'a> {
             raster: self.side_view.draw(self.shown),
             scale: self.side_view.scale(),
         };
-        let mut drawn = Vec::new();
         let mut panels = self.panels.into_iter();
         let first: Vec<Panel> = panels.by_ref().take(2).collect();
-        for panel in first.into_iter().chain([side_view]).chain(panels) {
-            drawn.push(panel.drawn(self.findings.pitch)?);
-        }
+        let layers = first.into_iter().chain(panels).map(|panel| panel.drawn(pitch));
+        let mut drawn = layers.collect::<io::Result<Vec<Raster>>>()?;
+        drawn.insert(drawn.len().min(2), side_view.drawn(side_pitch)?);
         // The place at the left, the whole layer and the side view next to it, others where there is room.
         let (mut column_of, mut bottoms) = (Vec::new(), [0; 2]);
         for (number, panel) in drawn.iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use lamp_stack::{Mask, white_runs};
+use lamp_stack::{Mask, Pitch, white_runs};
 use lamp_supports::{Findings, FoundPixels, Shown};
 
 use super::raster::Raster;
@@ -22,10 +22,12 @@ pub(super) struct SideView {
     pub(super) along_row: bool,
     /// The row or column.
     pub(super) at: u32,
+    /// The pitch of what it shows, x across the picture.
+    pub(super) pitch: Option<Pitch>,
     /// Columns or rows that it shows.
     window: Range<u32>,
-    /// Bottom and top of each layer that it shows, in pixels above the first of all.
-    heights: BTreeMap<u32, [f64; 2]>,
+    /// Bottom and top of each layer that it shows, in pixels across above the first of all.
+    pub(super) heights: BTreeMap<u32, [f64; 2]>,
     /// The white of each layer within the window.
     white: BTreeMap<u32, Vec<Range<u32>>>,
 }
@@ -40,14 +42,15 @@ impl SideView {
             true => (around(&whole.columns, width), shown.at[1]),
             false => (around(&whole.rows, height), shown.at[0]),
         };
-        let pitch_um = findings.pitch.map(|pitch| pitch.x.pitch().um());
+        let pitch = findings.pitch.map(|pitch| if along_row { pitch } else { pitch.turned() });
+        let across_um = pitch.map(|pitch| pitch.x.pitch().um());
         let mut top = 0.0;
         let all: Vec<[f64; 2]> = findings
             .layers
             .iter()
             .map(|layer| {
                 // Without both, a layer is as high as a pixel is wide.
-                let high = layer.thickness_um.zip(pitch_um).map_or(1.0, |(um, pitch)| um / pitch);
+                let high = layer.thickness_um.zip(across_um).map_or(1.0, |(um, pixel)| um / pixel);
                 top += high;
                 [top - high, top]
             })
@@ -58,7 +61,7 @@ impl SideView {
         let more = ((window.len() as f64 - (high - low)) / 2.0).max((high - low) / 4.0);
         let is_shown = |[bottom, top]: &[f64; 2]| *top > low - more && *bottom < high + more;
         let heights = (0..).zip(all).filter(|(_, ends)| is_shown(ends)).collect();
-        Self { along_row, at, window, heights, white: BTreeMap::new() }
+        Self { along_row, at, pitch, window, heights, white: BTreeMap::new() }
     }
 
     pub(super) fn needs(&self, position: u32) -> bool {

@@ -1,5 +1,5 @@
 use lamp_stack::{Layer, MaskBuilder, PageInfo};
-use lamp_supports::{CheckError, CheckOptions, Disagreements, check, records};
+use lamp_supports::{CheckError, CheckOptions, Disagreements, FindingRecord, check, records};
 
 use super::*;
 
@@ -16,6 +16,24 @@ fn layers(rectangles: &[&[[u32; 4]]]) -> Vec<Layer> {
         Layer { info, pitch: Pitch::of_dpi(254.0), image: mask.finish().into() }
     };
     (0..).zip(rectangles).map(layer).collect()
+}
+
+/// The pitch of the axis across the picture gives the height of a layer.
+#[test]
+fn side_views_of_pixels_that_are_not_square_have_the_height_of_layers() {
+    let pitch = Pitch::of_two_dpi([254.0, 127.0]);
+    let heights = |arm: [u32; 4]| {
+        let mut layers = layers(&[&[POST], &[POST], &[arm]]);
+        layers.iter_mut().for_each(|layer| layer.pitch = pitch);
+        let layers = layers.into_iter().map(Ok::<_, CheckError>);
+        let found = check(layers, Ok, &CheckOptions::default()).unwrap();
+        let records = records(&found, &Disagreements::default(), None);
+        let overhang = records.iter().find(|it| matches!(it, FindingRecord::Overhang(_))).unwrap();
+        let side_view = SideView::new(overhang.shown().unwrap(), &found);
+        (side_view.along_row, side_view.heights[&1])
+    };
+    assert_eq!(heights([2, 14, 10, 30]), (true, [1.0, 2.0]));
+    assert_eq!(heights([2, 30, 10, 18]), (false, [0.5, 1.0]));
 }
 
 /// Draws the first finding of layers.
