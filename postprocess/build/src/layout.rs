@@ -65,9 +65,9 @@ impl Layout {
         if let Some(other) = parts.iter().find(|part| part.pitch() != pitch) {
             return Err(TileError::Resolutions {
                 first: first.name().to_owned(),
-                first_pitch: pitch,
+                first_pitch: pitch.into(),
                 name: other.name().to_owned(),
-                pitch: other.pitch(),
+                pitch: other.pitch().into(),
             });
         }
         let pixels = PixelSize {

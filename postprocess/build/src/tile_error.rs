@@ -146,11 +146,11 @@ pub enum TileError {
         /// The first part.
         first: String,
         /// Its resolution.
-        first_pitch: Pitch,
+        first_pitch: Box<Pitch>,
         /// The part that differs.
         name: String,
         /// Its resolution.
-        pitch: Pitch,
+        pitch: Box<Pitch>,
     },
     /// A part is black in all layers.
     #[error("{name}: all its layers are black, so there is no part to place")]
