@@ -22,7 +22,9 @@ use crate::exit::Exit;
 /// Options that decide the images.
 #[derive(Args, Clone)]
 pub(crate) struct SlicingArgs {
-    /// Resolution in dots per inch, or how far pixels are apart: 1500, 1814x1337, 14um or 14x19um
+    /// Dots per inch, or pitch of pixels: 1500, 14um or 14x19um
+    ///
+    /// Two numbers are along x and along y: 1814x1337
     #[arg(long, visible_alias = "pitch", value_name = "DPI")]
     #[arg(default_value_t = SliceSettings::default().pitch)]
     dpi: Pitch,
@@ -77,7 +79,7 @@ pub(crate) struct SlicingArgs {
     #[command(flatten)]
     exposure: ExposureArgs,
 
-    /// Write gray layers, which cure down to where the part ends
+    /// Write gray layers, cured to where the part ends
     ///
     /// Each pixel is just bright enough to cure down to where the part ends below it. It is white
     /// if the part goes deeper than white cures
@@ -119,7 +121,7 @@ pub(crate) struct SliceStageArgs {
     #[command(flatten)]
     options: SlicingArgs,
 
-    /// Machine to build on: alpha, beta, another built-in one or a file (see lamp machine)
+    /// Machine, by its name or a file (see lamp machine)
     ///
     /// A part, a resolution or a layer thickness beyond the machine's limits is refused at the
     /// start. The machine's defaults apply to resolution, thickness and margin unless you give

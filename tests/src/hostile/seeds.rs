@@ -112,7 +112,15 @@ fn colored(mut stl: Vec<u8>, header: &[u8]) -> Vec<u8> {
 
 /// Files of every format of printers, of masks and of a gray layer.
 fn prints() -> Named {
-    let step = PrintStep { exposure_s: 2.0, light: 255, ..PrintStep::default() };
+    let step = PrintStep {
+        exposure_s: 2.0,
+        light: 255,
+        lift_mm: [5.0, 0.0],
+        lift_mm_per_min: [60.0, 0.0],
+        retract_mm: [5.0, 0.0],
+        retract_mm_per_min: [120.0, 0.0],
+        ..PrintStep::default()
+    };
     let print = PrintRecord {
         printer: "mine".to_owned(),
         panel_px: [40, 6],
