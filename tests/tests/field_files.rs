@@ -217,7 +217,7 @@ fn an_ending_of_another_format_is_refused() {
     let before = scratch.names();
     let others = ["photon", "cbddlp", "ctb", "zip", "pdf", "obj", "gcode", "mp4", "STEPX", "3MF"];
     for (line, writes, own) in [
-        ("slice box.stl -o {}", "a stack is a TIFF", "svg"),
+        ("slice box.stl -o {}", "a stack is a TIFF", "svgz"),
         ("fix box.tif -o {}", "a stack is a TIFF", "png"),
         ("dither box.tif -o {}", "a stack is a TIFF", "stl"),
         ("tile box.tif -o {}", "a stack is a TIFF", "json"),
