@@ -177,6 +177,8 @@ pub(crate) fn is_step_name(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::PrinterFormat;
+
     use super::*;
 
     #[test]
@@ -190,6 +192,9 @@ mod tests {
         let known = |writes: &Writes| writes.endings.iter().all(|end| all.contains(end));
         let kinds = [&STACK, &PACKED_STACK, &PNG, &STL, &SAMPLE, &JSON, &TABLE, &TOML, &HTML];
         assert!(kinds.into_iter().all(known));
+        // Stacks are read and written as the files of every printer.
+        let of_printers = PrinterFormat::ALL.iter().flat_map(|(_, endings)| *endings);
+        assert!(of_printers.into_iter().all(|ending| STACK.endings.contains(ending)));
     }
 
     #[test]

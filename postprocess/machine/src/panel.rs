@@ -171,7 +171,7 @@ impl Machine {
         })
     }
 
-    /// Checks that the pixels of a stack are those of the machine's panel, if it has one.
+    /// Checks that a stack has the pixels of the machine's panel, if it has one.
     ///
     /// # Errors
     /// Returns an error if they are not.

@@ -2,8 +2,8 @@
 //!
 //! By Green's theorem, the area within a contour is the sum of the trapezoids to the right of its
 //! edges, with signs. An edge therefore adds to the pixels that it passes and, by its height, to
-//! all pixels to the right of them. Between edges a row's level does not change, so the cost is
-//! that of the edges.
+//! all pixels to the right of them. Between edges a row's level does not change, so the cost
+//! grows with edges, not with area.
 //!
 //! A sum of windings is an area only where no winding exceeds one. Edges of a row that share pixels
 //! form a cluster. If they do not all cross it one way, as at overlaps of bodies or the ends of
@@ -172,8 +172,8 @@ struct Cell {
     cover: i32,
 }
 
-/// Returns a layer whose levels are those of `image`, which has the pixels whose centers are within the
-/// section, times the shares of pixels within the section. Rows whose edges do not add up, because
+/// Returns a layer whose levels are the levels of `image`, which has the pixels whose centers are within
+/// the section, times the shares of pixels within the section. Rows whose edges do not add up, because
 /// facets are missing, are rows of `image`.
 pub(crate) fn covered<'a, I: Iterator<Item = &'a Edge>>(
     edges: impl Fn() -> I,
@@ -410,7 +410,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Multiplies the shares of a row by levels. A pixel whose center is outside gets the level of a
-    /// pixel beside it, above it or below it.
+    /// pixel to its left, to its right, above or below.
     fn dim(&mut self, levels: &GrayMask, row: u32) {
         let shares = std::mem::take(&mut self.changes);
         let mut next = shares.iter().skip(1).map(|change| change.column);

@@ -8,7 +8,7 @@ use crate::image::mask::Mask;
 /// passes a point twice, but two may touch at a corner.
 pub type Outline = Vec<[u32; 2]>;
 
-/// A vertical side between white and black pixels, as long as it is straight.
+/// A straight vertical side between white and black pixels.
 struct Side {
     column: u32,
     /// The lines of its upper and lower end.
