@@ -58,6 +58,8 @@ pub use commands::{
     Call, Commands, JOIN_CODE, LayersOf, PACK_CODE, StageError, Stages, WriteLayers,
 };
 pub use deliver::{Delivered, Deliverer, check_delivered};
+#[cfg(windows)]
+pub use engine::end_with_this_process;
 pub use engine::{
     Attempt, Engine, EngineError, Launcher, Local, SchedulerError, Work, end_children, status,
 };

@@ -87,6 +87,7 @@ fn limit_of_group(line: &str, root: &Path) -> Option<u64> {
 }
 
 /// Returns the bytes of an entry such as `VmSize:     1234 kB`.
+#[cfg(any(test, not(any(windows, target_os = "macos"))))]
 fn bytes_of(text: &str, key: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(key))?;
     rest.trim().strip_suffix(" kB")?.parse::<u64>().ok().map(|kib| kib * 1024)

@@ -1,5 +1,11 @@
 //! Checks that pipelines of real processes give the same layers by pipe, file and folder.
 
+use std::io::Read;
+use std::process::Stdio;
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+
 use lamp_fixtures::Sample;
 use lamp_stack::{Layer, PageInfo, StackInfo};
 use lamp_tests::{Scratch, masks, read_stack};
@@ -235,4 +241,25 @@ fn the_demo_is_what_the_four_binaries_make() {
     assert!(scratch.bytes("shown/job/job.json") == scratch.bytes("shown/again/job.json"));
     let in_mesh = read_stack(in_mesh);
     assert_eq!((in_mesh.len(), in_mesh[0].info.index), (20, 444));
+}
+
+#[test]
+fn a_stage_that_is_killed_leaves_no_process_at_work() {
+    let scratch = Scratch::new();
+    let mut fix = scratch.command("fix");
+    fix.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut fix = fix.spawn().expect("fix starts");
+    // It waits for its input, which stays open.
+    let input = fix.stdin.take();
+    let mut errors = fix.stderr.take().expect("a pipe");
+    thread::sleep(Duration::from_secs(2));
+    assert!(fix.try_wait().expect("a child can be waited for").is_none(), "it does not wait");
+    fix.kill().expect("it can be ended");
+    // The pipe ends with the last process that could still write into it.
+    let (sender, ended) = mpsc::channel();
+    thread::spawn(move || sender.send(errors.read_to_end(&mut Vec::new())));
+    let ended = ended.recv_timeout(Duration::from_secs(20));
+    assert!(matches!(ended, Ok(Ok(_))), "a process goes on");
+    drop(input);
+    fix.wait().expect("a child can be waited for");
 }

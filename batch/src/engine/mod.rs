@@ -20,6 +20,8 @@ use crate::store::{Store, StoreError};
 use crate::task::Graph;
 
 pub use local::Local;
+#[cfg(windows)]
+pub use process::end_with_this_process;
 pub use process::{Launcher, end_children};
 pub use rounds::SchedulerError;
 

@@ -71,6 +71,43 @@ fn ask_to_end() {
 #[cfg(not(unix))]
 fn ask_to_end() {}
 
+/// Lets the system end a child, and its own children, when this process ends for whatever reason. Where
+/// the system refuses, the child ends by itself.
+#[cfg(windows)]
+#[expect(unsafe_code, reason = "job objects have C functions alone")]
+pub fn end_with_this_process(child: &Child) {
+    use std::os::windows::io::AsRawHandle;
+    use std::ptr::{from_ref, null};
+    use std::sync::LazyLock;
+
+    use windows_sys::Win32::System::JobObjects::{
+        AssignProcessToJobObject, CreateJobObjectW, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE,
+        JOBOBJECT_EXTENDED_LIMIT_INFORMATION, JobObjectExtendedLimitInformation,
+        SetInformationJobObject,
+    };
+
+    /// The job's handle, which stays open until this process ends.
+    static JOB: LazyLock<usize> = LazyLock::new(|| {
+        let mut limits = JOBOBJECT_EXTENDED_LIMIT_INFORMATION::default();
+        limits.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE;
+        let size = size_of_val(&limits) as u32;
+        // SAFETY: both pointers may be null: nobody else inherits or names the job.
+        let job = unsafe { CreateJobObjectW(null(), null()) };
+        // SAFETY: the struct is the one that this class of information has, with its size.
+        unsafe {
+            SetInformationJobObject(
+                job,
+                JobObjectExtendedLimitInformation,
+                from_ref(&limits).cast(),
+                size,
+            );
+        }
+        job as usize
+    });
+    // SAFETY: both handles are open; a job that could not be made is null, which is refused.
+    unsafe { AssignProcessToJobObject(*JOB as _, child.as_raw_handle().cast()) };
+}
+
 /// Starts a process and sends its end, with its last words.
 pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) -> io::Result<()> {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
@@ -80,6 +117,8 @@ pub(super) fn start(mut command: Command, key: Key, ends: Sender<(Key, End)>) ->
         return Err(io::Error::new(io::ErrorKind::Interrupted, "a signal ends the night"));
     }
     let child = command.spawn()?;
+    #[cfg(windows)]
+    end_with_this_process(&child);
     now.children.insert(child.id());
     drop(now);
     let wait = move || {

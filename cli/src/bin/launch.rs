@@ -41,7 +41,13 @@ fn become_it(lamp: &mut Command, name: OsString) -> io::Error {
 /// Waits for `lamp` and ends with its status, where no process can turn into another.
 #[cfg(not(unix))]
 fn become_it(lamp: &mut Command, _: OsString) -> io::Error {
-    match lamp.status() {
+    let status = lamp.spawn().and_then(|mut child| {
+        // Who ends this process means `lamp`.
+        #[cfg(windows)]
+        lamp_batch::end_with_this_process(&child);
+        child.wait()
+    });
+    match status {
         Ok(status) => std::process::exit(status.code().unwrap_or(1)),
         Err(error) => error,
     }

@@ -42,7 +42,21 @@ fn end_with(parent: i32) {
     }
 }
 
-#[cfg(not(target_os = "linux"))]
+/// Asks each second, where no signal comes.
+#[cfg(all(unix, not(target_os = "linux")))]
+fn end_with(parent: i32) {
+    use rustix::process::{Pid, Signal, getpid, getppid, kill_process};
+    std::thread::spawn(move || {
+        while getppid() == Pid::from_raw(parent) {
+            std::thread::sleep(std::time::Duration::from_secs(1));
+        }
+        // As a signal, so that temporary files are removed.
+        let _ = kill_process(getpid(), Signal::TERM);
+    });
+}
+
+/// On Windows the parent arranges it ([`lamp_batch::end_with_this_process`]).
+#[cfg(not(unix))]
 fn end_with(_: i32) {}
 
 /// Returns the status by which engines decide what to do.
