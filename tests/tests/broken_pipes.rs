@@ -248,6 +248,8 @@ fn a_full_disk_is_no_success() {
         "lamp info cube.tif",
         "lamp sample cube",
         "lamp show cube.tif --layer 3",
+        "lamp --version",
+        "slice -h",
     ] {
         let file = std::fs::OpenOptions::new().write(true).open(full).unwrap();
         let out = scratch.command(line).stdout(file).output().unwrap();

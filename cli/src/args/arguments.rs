@@ -184,13 +184,13 @@ impl Arguments {
 
     /// Ends the process as clap does, and names the files that had a say.
     fn end(&self, error: &clap::Error) -> ! {
-        show(error);
+        let status = show(error);
         if error.use_stderr() && !self.from.is_empty() {
             say("");
             let files: Vec<_> = self.from.iter().map(|(file, _)| file.as_str()).collect();
             say(&format!("With the options of {}.", files.join(" and ")));
         }
-        exit(error.exit_code())
+        exit(status)
     }
 
     /// Returns the command that runs, as words, and its matches.

@@ -1,21 +1,22 @@
 //! Shows errors of usage, in words that people know.
 
 use std::error::Error as _;
+use std::io;
 use std::num::{IntErrorKind, ParseIntError};
 
 use clap::error::{ContextKind, ErrorKind};
 
+use crate::exit::Exit;
 use crate::started;
 use crate::terminal::progress::{printable, say};
 
 /// Shows an error of usage, or the help that was asked for, and ends the process.
 pub(crate) fn refuse(error: &clap::Error) -> ! {
-    show(error);
-    std::process::exit(error.exit_code())
+    std::process::exit(show(error))
 }
 
-/// Shows an error of usage, or the help that was asked for.
-pub(crate) fn show(error: &clap::Error) {
+/// Shows an error of usage, or the help that was asked for, and returns the status.
+pub(crate) fn show(error: &clap::Error) -> i32 {
     let known = with_known_words(error);
     let error = known.as_ref().unwrap_or(error);
     let steers_terminal = |arg: std::ffi::OsString| {
@@ -25,10 +26,15 @@ pub(crate) fn show(error: &clap::Error) {
     if error.use_stderr() && started::words().into_iter().any(steers_terminal) {
         // One line, since a line break may be the argument's.
         say(error.render().to_string().trim_end().trim_end_matches(MORE).trim_end());
-    } else {
-        // No one is left to report to if it cannot be printed.
-        let _ = error.print();
+    } else if let Err(failed) = error.print()
+        && !error.use_stderr()
+        && failed.kind() != io::ErrorKind::BrokenPipe
+    {
+        let failed = Exit::output(failed, "standard output");
+        say(&format!("lamp: {failed}"));
+        return failed.status().into();
     }
+    error.exit_code()
 }
 
 /// Returns an error of usage as one sentence.
