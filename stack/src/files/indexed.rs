@@ -11,6 +11,7 @@ use crate::error::StackError;
 use crate::files::input::{PagePlace, Pages, only_page};
 use crate::layer::Layer;
 use crate::note::StackNote;
+use crate::printer::write::PrinterFormat;
 
 /// A stack whose pages can be read in any order, from several threads.
 ///
@@ -79,7 +80,7 @@ impl IndexedStack {
                 Ok(IndexedSource::Folder(stamped.collect::<Result<_, StackError>>()?))
             });
         }
-        Self::from_file(File::open(path)?)
+        Self::from_file(File::open(path)?).map_err(|error| PrinterFormat::explain(path, error))
     }
 
     /// Reads an open file from its start, as [`Self::open`] does.

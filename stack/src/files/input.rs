@@ -13,6 +13,7 @@ use crate::layer::check::ChainReader;
 use crate::limits::Limits;
 use crate::note::{ImagesBeside, StackNote};
 use crate::ordered::map_in_order;
+use crate::printer::write::PrinterFormat;
 use crate::record::{FieldRecord, StripRecord};
 
 /// An iterator over the pages of a stack, bottom first.
@@ -64,7 +65,8 @@ impl Pages {
     /// holds pages of several formats, or two with one number.
     pub fn open(path: &Path) -> Result<Self, StackError> {
         if !path.is_dir() {
-            return Self::from_file(File::open(path)?);
+            return Self::from_file(File::open(path)?)
+                .map_err(|error| PrinterFormat::explain(path, error));
         }
         let PageFiles { mut files, doubts, left_out } = PageFiles::of(path)?;
         if files.is_empty() {

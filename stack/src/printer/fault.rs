@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::printer::write::PrinterFormat;
+
 /// A reason why a printer's file cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -18,8 +20,11 @@ pub enum PrinterFault {
     #[error("its {0} is damaged")]
     Damaged(&'static str),
     /// The file's ZIP archive cannot be read.
-    #[error("its ZIP archive cannot be read: {0}")]
+    #[error("its ZIP archive is damaged ({0}): copy it again, or make it again")]
     Archive(String),
+    /// A file does not begin, or end, as its name has it.
+    #[error("this is not {0}, or it was cut off or damaged: copy it again, or make it again")]
+    NotAsNamed(PrinterFormat),
     /// An archive on a pipe.
     #[error("a ZIP archive cannot be read from a pipe: give the file's name instead")]
     Piped,

@@ -52,6 +52,14 @@ impl PrinterFormat {
         found.map(|(format, _)| *format)
     }
 
+    /// Explains why a file cannot be opened, if its name promises a printer's file.
+    pub(crate) fn explain(path: &Path, error: StackError) -> StackError {
+        match (error, Self::of_name(path)) {
+            (StackError::NotTiff { .. }, Some(format)) => PrinterFault::NotAsNamed(format).into(),
+            (error, _) => error,
+        }
+    }
+
     /// Returns the most columns and rows that a file can state.
     fn most_side(self) -> u32 {
         match self {

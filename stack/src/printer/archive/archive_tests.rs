@@ -262,7 +262,7 @@ fn archives_with_faults_are_refused_in_a_sentence() {
         (NanoDlp, "3.png", "lacks 3.png"),
         (NanoDlp, "profile.json", "lacks profile.json"),
         (Sl1, "blade00002.png", "lacks blade00002.png"),
-        (Sl1, "config.ini", "neither a TIFF stack nor"),
+        (Sl1, "config.ini", "this is not an SL1 file"),
     ] {
         let good = written(plates(format), format).unwrap();
         let bad = changed(&good.path, |it, bytes| (it != name).then_some(bytes));
