@@ -45,8 +45,34 @@ export function listenToKeys(app) {
     act();
   });
   picture.canvas.addEventListener("keydown", (event) => event.key === "Enter" && pixelAtCentre());
+  giveFocusBack(picture.canvas);
   byId("keys").addEventListener("click", () => byId("help").showModal());
   byId("help-keys").replaceChildren(...table.flatMap(([keys, what]) => row(keys[0], what)));
+}
+
+/**
+ * Gives the focus back to the picture once a field or a list has what it was asked for: it would take all
+ * further keys. Who chooses from a list by keys goes on in it.
+ * @param {HTMLElement} canvas
+ */
+function giveFocusBack(canvas) {
+  let byPointer = false;
+  document.addEventListener("pointerdown", () => (byPointer = true), true);
+  document.addEventListener("keydown", ({ key, target }) => {
+    byPointer = false;
+    if (!takesKeys(target)) return;
+    // The form reads its field first, and a field that loses the focus reports its change.
+    if (key === "Enter" || key === "Escape") setTimeout(() => canvas.focus());
+  }, true);
+  document.addEventListener("change", ({ target }) => {
+    if (target instanceof HTMLSelectElement && byPointer) canvas.focus();
+  });
+}
+
+/** Whether an element takes all keys while it has the focus. */
+function takesKeys(target) {
+  return target instanceof HTMLSelectElement ||
+    (target instanceof HTMLInputElement && !["checkbox", "range"].includes(target.type));
 }
 
 /** Whether a key is for what has the focus: a field, a list, or the dialog. */
@@ -56,8 +82,7 @@ function isElsewhere(event) {
   if (target.id === "slider") return false;
   const moves = event.key.startsWith("Arrow") || ["Home", "End", "PageUp", "PageDown"].includes(event.key);
   if (target instanceof HTMLInputElement && target.type === "range") return moves;
-  return target instanceof HTMLSelectElement ||
-    (target instanceof HTMLInputElement && target.type !== "checkbox" && event.key !== "Escape");
+  return takesKeys(target) && event.key !== "Escape";
 }
 
 function nameOf({ key, shiftKey }) {

@@ -141,8 +141,13 @@ impl Browser {
     /// Presses a key where the focus is.
     #[track_caller]
     pub(crate) fn press(&self, key: char) {
-        let pressed =
-            async { self.client().active_element().await?.send_keys(&key.to_string()).await };
+        self.type_where_the_focus_is(&key.to_string());
+    }
+
+    /// Presses keys where the focus is.
+    #[track_caller]
+    pub(crate) fn type_where_the_focus_is(&self, keys: &str) {
+        let pressed = async { self.client().active_element().await?.send_keys(keys).await };
         self.runtime.block_on(pressed).unwrap();
     }
 

@@ -195,6 +195,64 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
     browser.was_quiet();
 }
 
+/// After each control, each kind of key does what it says.
+#[test]
+fn keys_work_after_every_control() {
+    let scratch = Scratch::with_tower_and_torus();
+    let viewing = Viewing::unopened(&scratch, "tower.tif torus.tif", &[]);
+    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    browser.shows(&["0/0/layer"]);
+    let by_field = |browser: &Browser| {
+        browser.press('g');
+        browser.type_where_the_focus_is("7\u{e007}");
+    };
+    let given_up = |browser: &Browser| {
+        browser.press('g');
+        browser.type_where_the_focus_is("999\u{e00c}");
+    };
+    type Control<'a> = (&'a str, &'a dyn Fn(&Browser));
+    let controls: [Control; 9] = [
+        ("the field and Enter", &by_field),
+        ("the field and Escape", &given_up),
+        ("a choice from the list", &|browser| browser.click("#stack option:last-child")),
+        ("the other choice", &|browser| browser.click("#stack option:first-child")),
+        ("an overlay", &|browser| browser.click("#overlay-below")),
+        ("the overlay's shade", &|browser| browser.click("#overlays input[type=range]")),
+        ("a button", &|browser| browser.click("#zoom-in")),
+        ("the slider", &|browser| browser.click("#slider")),
+        ("the picture", &|browser| browser.click("#sheets")),
+    ];
+    let number = |key: &str| browser.place()[key].as_str().unwrap().parse::<f64>().unwrap();
+    for (name, control) in controls {
+        browser.go("#stack=0&layer=3&at=20.5,20.5&zoom=4");
+        control(&browser);
+        browser.settle();
+        if name == "the field and Enter" {
+            assert_eq!(number("layer"), 7.0);
+        }
+        let before = [number("layer"), number("zoom")];
+        browser.press('+');
+        browser.settle();
+        assert!(number("zoom") > before[1], "+ after {name}");
+        browser.press('-');
+        browser.settle();
+        assert!((number("zoom") / before[1] - 1.0).abs() < 1e-6, "- after {name}");
+        // Arrows move what has the focus where that has a range.
+        if name != "the overlay's shade" {
+            browser.press(UP);
+            browser.settle();
+            assert_eq!(number("layer"), before[0] + 1.0, "an arrow after {name}");
+        }
+        for open in [true, false] {
+            browser.press('m');
+            let pressed =
+                browser.run("return document.querySelector('#measure').ariaPressed", vec![]);
+            assert_eq!(pressed, json!(open.to_string()), "m after {name}");
+        }
+    }
+    browser.was_quiet();
+}
+
 fn bands(json: &Value) -> Vec<std::ops::Range<u32>> {
     let number = |value: &Value| value.as_u64().unwrap() as u32;
     let bands = json.as_array().into_iter().flatten();
