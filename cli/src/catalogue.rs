@@ -6,7 +6,7 @@ use lamp_pipeline::documents::{self, Document, document_and_text, own_names};
 
 use crate::exit::{Exit, boxed};
 use crate::streams::print;
-use crate::terminal::progress::say;
+use crate::terminal::progress::Severity;
 
 /// Prints a document's file as it was written, once it is checked.
 pub(crate) fn show<T: Document>(path: &Path) -> Result<(), Exit> {
@@ -18,7 +18,7 @@ pub(crate) fn show<T: Document>(path: &Path) -> Result<(), Exit> {
 pub(crate) fn named<T: Document>() -> Vec<T> {
     let own = own_names::<T>().into_iter().filter_map(|name| {
         let read = documents::document(Path::new(&name));
-        read.inspect_err(|error| say(&format!("warning: {error}"))).ok()
+        read.inspect_err(|error| Severity::Warning.say(&error.to_string())).ok()
     });
     T::builtins().chain(own).collect()
 }

@@ -71,11 +71,14 @@ pub(crate) fn write_stack_or_fields(
     let fields = FieldWriter::new(folder, form, format(output.classic));
     let mut fields = fields.map_err(|error| failed(to, error))?;
     for layer in layers {
-        fields.push(&layer?).map_err(|error| failed(to, error))?;
-        progress.layer_done();
+        let layer = layer?;
+        fields.push(&layer).map_err(|error| failed(to, error))?;
+        progress.layer_written(&layer);
     }
     progress.done();
-    fields.finish().map_err(|error| failed(to, error))
+    fields.finish().map_err(|error| failed(to, error))?;
+    progress.wrote_layers(to);
+    Ok(())
 }
 
 fn failed(folder: &Path, error: FieldsError) -> Exit {

@@ -27,7 +27,7 @@ use streams::{give_up, print, settle_output};
 use terminal::allocator::keep_freed_memory;
 use terminal::help::{LONG_VERSION, formed, version};
 use terminal::out_of_memory::note_command;
-use terminal::progress::say;
+use terminal::progress::Severity;
 use terminal::signals::{clean_up_on_signals, wait_if_ending};
 use terminal::stack_notes::print_notes_of;
 use terminal::usage::refuse;
@@ -69,7 +69,7 @@ pub fn run_lamp() -> u8 {
         Err(error) => return finish("lamp", Err(error)),
     };
     let parsed = Lamp::from_arg_matches(&matches);
-    let Lamp { command, licenses, common } = parsed.unwrap_or_else(|error| refuse(&error));
+    let Lamp { command, licenses, common } = parsed.unwrap_or_else(|error| refuse(error));
     if licenses {
         return finish("lamp", print_licences());
     }
@@ -91,8 +91,8 @@ pub fn run_stage(name: &str) -> u8 {
         Ok(matches) => matches,
         Err(error) => return finish(name, Err(error)),
     };
-    let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| refuse(&error));
-    let command = Command::of_stage(name, &matches).unwrap_or_else(|error| refuse(&error));
+    let common = Common::from_arg_matches(&matches).unwrap_or_else(|error| refuse(error));
+    let command = Command::of_stage(name, &matches).unwrap_or_else(|error| refuse(error));
     finish(name, run(name, &command, &common))
 }
 
@@ -148,7 +148,7 @@ fn finish(name: &str, result: Result<u8, Exit>) -> u8 {
         // The differences are on standard output.
         Err(error @ Exit::Different) => error.status(),
         Err(error) if !error.is_reader_gone() => {
-            say(&format!("{name}: {error}"));
+            Severity::Error.say(&format!("{name}: {error}"));
             give_up(&error);
             error.status()
         }

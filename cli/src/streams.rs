@@ -20,7 +20,7 @@ use lamp_stack::{
 use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
 use crate::output::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
-use crate::terminal::progress::Progress;
+use crate::terminal::progress::{Counted, Progress};
 use crate::terminal::stack_notes::{noting, print_note};
 
 /// Layers on their way to a writer.
@@ -148,6 +148,14 @@ fn stdout_handle() -> Option<(File, fs::Metadata)> {
 /// Returns the file that standard output goes to, if it is one, so that no stage follows.
 fn stdout_file() -> Option<File> {
     stdout_handle().filter(|(_, metadata)| metadata.is_file()).map(|(file, _)| file)
+}
+
+/// Returns the name and the bytes of the file behind standard output, if it is a file.
+pub(crate) fn redirected_to() -> Option<(String, u64)> {
+    let bytes = stdout_file()?.metadata().ok()?.len();
+    let path = fs::read_link("/proc/self/fd/1").ok();
+    let name = path.as_deref().and_then(Path::file_name);
+    Some((name.map_or_else(|| "standard output".into(), |name| name.display().to_string()), bytes))
 }
 
 /// Reads the wanted layers of a stack, decoded, in order.
@@ -302,10 +310,10 @@ pub(crate) fn write_layers(
     let to = destination(output)?;
     if let (Some(format), Destination::File(path)) = (ContourFormat::of_name(&output.output), &to) {
         refuse_tiff_options(output)?;
-        let counted = map_in_order(layers, decode).inspect(|_| progress.layer_done());
+        let counted = map_in_order(layers, decode).inspect(counting(progress));
         return written_to(&output.output, write_contours(counted, path, format), progress);
     }
-    let (counted, format) = (layers.inspect(|_| progress.layer_done()), format(output.classic));
+    let (counted, format) = (layers.inspect(counting(progress)), format(output.classic));
     let written = if output.packbits {
         let coded = map_in_order(counted, |layer| {
             let layer: Layer = decode(layer)?;
@@ -329,7 +337,7 @@ pub(crate) fn write_packed_layers(
         return Err(for_tiffs("--packbits"));
     }
     let to = packed_destination(output)?;
-    let counted = layers.inspect(|_| progress.layer_done());
+    let counted = layers.inspect(counting(progress));
     let written = write_packed(counted, to, format(output.classic), level);
     written_to(&output.output, written, progress)
 }
@@ -343,7 +351,7 @@ fn write_print(
 ) -> Result<(), Exit> {
     refuse_tiff_options(output)?;
     let to = destination(output)?;
-    let counted = layers.inspect(|_| progress.layer_done());
+    let counted = layers.inspect(counting(progress));
     written_to(&output.output, write_printer_file(counted, to, format), progress)
 }
 
@@ -383,13 +391,26 @@ pub(crate) fn format(classic: bool) -> Format {
     if classic { Format::Classic } else { Format::Big }
 }
 
-/// Removes the bar, and adds the output's name to a failure to write it.
+/// Returns what counts layers that are written.
+pub(crate) fn counting<L: Counted>(progress: &Progress) -> impl FnMut(&Result<L, Exit>) {
+    move |layer| {
+        if let Ok(layer) = layer {
+            progress.layer_written(layer);
+        }
+    }
+}
+
+/// Removes the bar, and prints the line of what was written, or adds the output's name to a failure to
+/// write it.
 pub(crate) fn written_to(
     output: &Path,
     written: Result<(), Exit>,
     progress: &Progress,
 ) -> Result<(), Exit> {
     progress.done();
+    if written.is_ok() {
+        progress.wrote_layers(output);
+    }
     written.map_err(|error| match error {
         Exit::Output(_) if is_stream(output) => error.at("standard output"),
         Exit::Output(_) => error.at(output.display().to_string()),
@@ -468,6 +489,9 @@ pub(crate) fn check_beside<'a>(
     stack: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<(), Exit> {
+    if is_stream(beside) {
+        return Ok(());
+    }
     let folder = match beside.parent() {
         // A bare name has the empty parent, which is no folder.
         Some(folder) if folder != Path::new("") => folder,

@@ -2,7 +2,7 @@
 //! settings: `alpha`, `mine.toml`, `mine`, or `mine.toml@blake3:0123456789abcdef` as stacks record
 //! them.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, IsTerminal, Read};
 use std::path::{Component, Path, PathBuf};
@@ -66,7 +66,7 @@ pub fn document<T: Document>(path: &Path) -> Result<T, Error> {
 /// and the digest of its text. The word is accepted wherever the document's name is.
 pub fn document_and_word<T: Document>(path: &Path) -> Result<(T, String), Error> {
     let (document, text) = document_and_text(path)?;
-    Ok((document, word_of_text(path, &text)))
+    Ok((document, word_of_text(&in_own_case::<T>(path), &text)))
 }
 
 /// The separator between a name and the digest of the file.
@@ -117,7 +117,7 @@ pub fn check_word(path: &Path, found: &str) -> Result<(), Error> {
 /// # Errors
 /// Returns an error if there is no such document, or it is wrong.
 pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error> {
-    let (path, _) = without_digest(word);
+    let (path, _) = without_digest(&in_own_case::<T>(word));
     // Built-in names win over files of the same name, so that a record means the same in every
     // folder.
     let (document, text) = if let Some(builtin) = builtin::<T>(&path) {
@@ -137,14 +137,51 @@ pub fn document_and_text<T: Document>(word: &Path) -> Result<(T, String), Error>
         (document, text)
     } else {
         let builtins = T::BUILTINS.iter().map(|builtin| builtin.name.into());
-        let names: Vec<OsString> = builtins.chain(own_names::<T>()).collect();
-        let names = names.join(", ".as_ref()).to_string_lossy().into_owned();
-        let (path, kind) = (path.display(), T::KIND);
-        let text = format!("{path}: there is no such file, nor a {kind} of that name: {names}");
+        let names = builtins.chain(own_names::<T>());
+        let names: Vec<String> = names.map(|name| name.display().to_string()).collect();
+        let (path, kind) = (path.display().to_string(), T::KIND);
+        let meant = match nearest(&path, names.iter().map(String::as_str)) {
+            Some(name) => format!("did you mean {name}?"),
+            None => names.join(", "),
+        };
+        let text = format!("{path}: there is no such file, nor a {kind} of that name: {meant}");
         return Err(Error::work(text));
     };
     check_word(word, &word_of_text(&path, &text))?;
     Ok((document, text))
+}
+
+/// Returns a word with the letters of the name that it means: people write `Mars3` for `mars3`. A file
+/// of the word's own letters comes first.
+fn in_own_case<T: Document>(word: &Path) -> PathBuf {
+    let (path, digest) = without_digest(word);
+    let own = own_names::<T>();
+    let mut names = T::BUILTINS.iter().map(|builtin| OsStr::new(builtin.name));
+    let mut all = names.by_ref().chain(own.iter().map(OsString::as_os_str));
+    match all.find(|name| name.eq_ignore_ascii_case(path.as_os_str())) {
+        Some(name) if name != path.as_os_str() && !path.exists() => {
+            let digest = digest.map(|digest| format!("{DIGEST}{digest}")).unwrap_or_default();
+            format!("{}{digest}", name.display()).into()
+        }
+        _ => word.to_owned(),
+    }
+}
+
+/// Returns the nearest of some words, if somebody who mistyped may have meant it: one letter differs, or a
+/// quarter of them, or one is the beginning of the other.
+pub fn nearest<'a>(word: &str, words: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let word = word.to_lowercase();
+    let begins = |other: &str| {
+        word.len().min(other.len()) > 3 && (word.starts_with(other) || other.starts_with(&word))
+    };
+    let near = words.into_iter().filter_map(|other| {
+        let lower = other.to_lowercase();
+        let differs = strsim::damerau_levenshtein(&word, &lower);
+        let most = 1.max(word.len().max(lower.len()) / 4);
+        let is_near = word.len() > 2 && differs <= most || begins(&lower);
+        is_near.then_some((differs, other))
+    });
+    near.min_by_key(|&(differs, _)| differs).map(|(_, other)| other)
 }
 
 fn builtin<T: Document>(path: &Path) -> Option<&'static Builtin> {

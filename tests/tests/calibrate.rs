@@ -306,7 +306,10 @@ fn bad_measurements_get_a_sentence_and_leave_no_file() {
     ] {
         scratch.write("a.csv", csv.as_bytes());
         let ran = scratch.run(line).is_refused_with(words);
-        assert!(ran.stderr.starts_with("calibrate: a.csv: ") && ran.stdout.is_empty(), "{ran:?}");
+        assert!(
+            ran.stderr.starts_with("error: calibrate: a.csv: ") && ran.stdout.is_empty(),
+            "{ran:?}"
+        );
     }
     let beyond = b"dose_mj_per_cm2,depth_um\n320,190\n1e308,900\n640,300\n1000,400\n";
     scratch.write("a.csv", beyond);

@@ -41,7 +41,10 @@ fn is_refused(scratch: &Scratch, words: &str, change: impl FnOnce(&Path)) {
     let (status, said) = sliced_while(scratch, change);
     assert_eq!(status, Some(1), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
-    assert!(said.starts_with("slice: part.stl: the file changed while it was read"), "{said}");
+    assert!(
+        said.starts_with("error: slice: part.stl: the file changed while it was read"),
+        "{said}"
+    );
     assert!(said.contains(words) && said.contains("slice it again"), "{said}");
 }
 

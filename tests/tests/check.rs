@@ -58,7 +58,7 @@ fn findings_end_a_strict_check_with_status_3() {
     let strict = format!("slice ring.stl {SLICE} | fix | lamp check --strict");
     let ran = scratch.run(&strict);
     assert_eq!(ran.statuses, [Some(0), Some(0), Some(3)], "{ran:?}");
-    assert!(ran.stderr.starts_with("lamp check: ") || ran.stderr.starts_with("check: "), "{ran:?}");
+    assert!(ran.stderr.starts_with("error: check: "), "{ran:?}");
     let ran = scratch.run(&format!("lamp check ring.stl {SLICE} --strict --only pockets,balance"));
     ran.succeeds_quietly();
 }

@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use lamp_fixtures::Sample;
 use lamp_tests::Scratch;
 
 const PROGRAMS: [&str; 5] = ["lamp", "slice", "fix", "dither", "tile"];
@@ -106,4 +107,44 @@ fn short_help_has_what_people_use_and_long_help_all() {
             assert!(text.find("\nExamples:\n").unwrap() < text.find("\nArguments:\n").unwrap());
         }
     }
+}
+
+/// Reads a line that says what was written: the name, the facts, the size in words and the seconds.
+fn facts_of(line: &str) -> (String, Vec<String>) {
+    let (name, facts) = line.split_once(": ").expect("a name");
+    (name.to_owned(), facts.split(", ").map(str::to_owned).collect())
+}
+
+#[test]
+fn each_command_that_writes_prints_one_line_of_it() {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 5_000);
+    let slice = "slice tower.stl --dpi 100 --thickness 1mm";
+    for (line, name, facts) in [
+        (format!("{slice} -o part.tif"), "part.tif", &["76 layers", "128 x 102"][..]),
+        (
+            format!("{slice} | fix | tile --area 14x4in --mesh none > build.tif"),
+            "build.tif",
+            &["76 layers", "1,400 x 400", "39 copies"],
+        ),
+        ("lamp convert part.tif -o pages/".to_owned(), "pages/", &["76 layers", "128 x 102"]),
+        ("lamp pack part.tif -o part.lamp".to_owned(), "part.lamp", &["76 layers", "128 x 102"]),
+        ("lamp show part.tif --layer 3 -o part.png".to_owned(), "part.png", &[]),
+        ("lamp report part.tif -o part.html".to_owned(), "part.html", &["76 layers"]),
+        ("lamp sample torus --facets 2000 -o torus.stl".to_owned(), "torus.stl", &["2,000 facets"]),
+    ] {
+        let ran = scratch.run(&line).succeeds();
+        let [written] = &ran.written[..] else { panic!("one line: {ran:?}") };
+        let (said, mut found) = facts_of(written);
+        assert_eq!(said, name, "{line}");
+        let time = found.pop().expect("the time");
+        assert!(time.ends_with(" s") || time.ends_with(" min"), "{written}");
+        let size = found.pop().expect("the size");
+        assert!(["bytes", "kB", "MB"].iter().any(|unit| size.ends_with(unit)), "{written}");
+        assert_eq!(found, facts, "{line}");
+    }
+    // A pipe, or a device, is no file that somebody looks for.
+    let ran = scratch.run("lamp convert part.tif -o pages/ -q --force").succeeds();
+    assert!(ran.written.is_empty(), "{ran:?}");
+    assert!(scratch.run(slice).succeeds().written.is_empty());
 }

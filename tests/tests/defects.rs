@@ -27,7 +27,8 @@ fn slice_lists_the_rows_that_do_not_balance() {
         let rows = stray_rows(&layers);
         let of = layers.iter().filter(|layer| !layer.info.stray_rows.is_empty()).count();
         assert!(rows > 0);
-        let says = format!("slice: {rows} rows in {of} layers do not balance: the mesh has gaps");
+        let says =
+            format!("note: slice: {rows} rows in {of} layers do not balance: the mesh has gaps");
         assert!(ran.stderr.starts_with(&says), "{}", ran.stderr);
         for layer in &layers {
             let image = mask(layer);

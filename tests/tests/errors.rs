@@ -65,7 +65,7 @@ fn is_wrong_usage(scratch: &Scratch, line: &str, words: &[&str]) {
 fn is_bad_input(scratch: &Scratch, line: &str, words: &[&str]) {
     let ran = fails(scratch, line).is_refused_with(words);
     let name = line.trim_start_matches("lamp ").split(' ').next().unwrap();
-    assert!(ran.stderr.starts_with(&format!("{name}: ")), "{ran:?}");
+    assert!(ran.stderr.starts_with(&format!("error: {name}: ")), "{ran:?}");
 }
 
 #[test]

@@ -233,7 +233,7 @@ fn an_ending_of_another_format_is_refused() {
         ("lamp report box.tif -o {}", "a report is a web page", "png"),
         ("slice box.stl -o x.tif --report {}", "written as JSON", "csv"),
         ("slice box.stl -o y.tif --report {}", "no stack is written there", "tif"),
-        ("lamp heights box.stl --report {}", "a table is CSV", "json"),
+        ("lamp heights box.stl --csv {}", "a table is CSV", "json"),
         ("lamp heights box.stl --plot {}", "a plot is an SVG or a PNG", "html"),
         ("lamp compare box.tif box.tif --picture {}", "the picture is a PNG", "svg"),
     ] {

@@ -38,9 +38,8 @@ fn a_stack_has_the_layers_of_the_report() {
     scratch
         .run(&format!("slice tower.stl --dpi 200 --adaptive {options} -o tower.tif"))
         .succeeds_quietly();
-    let line = format!(
-        "lamp heights tower.stl --dpi 200 {options} --report heights.csv --plot heights.svg"
-    );
+    let line =
+        format!("lamp heights tower.stl --dpi 200 {options} --csv heights.csv --plot heights.svg");
     let said = String::from_utf8(scratch.run(&line).succeeds().stdout).unwrap();
     let layers = scratch.layers("tower.tif");
     let rows = report(&scratch, "heights.csv");
@@ -195,7 +194,7 @@ fn what_cannot_be_is_said() {
     usage("lamp heights tower.stl --criterion cusp", "needs a bound, such as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
     usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
-    usage("lamp heights tower.stl --plot x.svg --report x.svg", "a table is CSV");
+    usage("lamp heights tower.stl --plot x.svg --csv x.svg", "a table is CSV");
     usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
     usage(
         "slice tower.stl --adaptive --gray --material lamp-suspension --exposure-table times.csv",

@@ -104,7 +104,7 @@ fn heights() {
     scratch.part("tower.stl", Sample::Tower, 2_000);
     scratch.write("times.csv", b"thickness_um,exposure_ms\n1000,200\n2000,800\n");
     let line = "lamp heights tower.stl --min 1mm --max 2mm --step 0.5mm --exposure-table times.csv \
-                --layer-overhead 10s --uniform 2mm --report heights.csv --json";
+                --layer-overhead 10s --uniform 2mm --csv heights.csv --json";
     let answer = answer(&scratch, line);
     assert_eq!(keys(&answer), ["schema", "part", "criterion", "bound", "choices", "layers"]);
     assert_eq!(answer["schema"], "lamp-heights-1");
@@ -183,4 +183,36 @@ fn bodies() {
     scratch.write("healed.step", broken_step(StepDefect::Apart { gap_nm: 1000 }).as_bytes());
     let healed = answer(&scratch, "lamp brep healed.step --json");
     assert_eq!(keys(&healed["tries"][0]), ["chordal_deviation_mm", "heal_mm", "why"]);
+}
+
+#[test]
+fn a_report_in_a_file_is_what_json_prints() {
+    let scratch = Scratch::new();
+    scratch.part("tower.stl", Sample::Tower, 5_000);
+    let slice = "slice tower.stl --dpi 100 --thickness 1mm";
+    scratch.run(&format!("{slice} -o tower.tif")).succeeds();
+    for line in [
+        &format!("{slice} -o again.tif"),
+        "fix tower.tif -o fixed.tif",
+        "lamp compensate tower.tif --uniform 10um --min-feature 0um -o offset.tif",
+        "lamp support tower.tif --to platform -o held.tif",
+        "tile tower.tif --area 4x4in --mesh none -o build.tif",
+        "tile tower.tif --area 4x4in --mesh none --time",
+        "lamp check tower.tif",
+        "lamp orient tower.stl --directions 20 --best 0",
+        "lamp heights tower.stl --dpi 100",
+    ] {
+        let printed = scratch.run(&format!("{line} --json")).succeeds();
+        scratch.run(&format!("{line} --report report.json")).succeeds();
+        assert!(printed.stdout == scratch.bytes("report.json"), "{line}");
+        assert!(scratch.run(&format!("{line} --report -")).succeeds().stdout == printed.stdout);
+        let answer: Value = serde_json::from_slice(&printed.stdout).unwrap();
+        assert!(answer["schema"].as_str().unwrap().starts_with("lamp-"), "{line}");
+        scratch.run(&format!("{line} --json --report report.json")).is_wrong_usage(&["--report"]);
+    }
+    // Standard output is for one thing.
+    for line in [slice, "fix tower.tif", "tile tower.tif --area 4x4in -o -"] {
+        scratch.run(&format!("{line} --json")).is_wrong_usage(&["name a file with -o"]);
+    }
+    assert!(!scratch.names().contains(&"-".to_owned()));
 }

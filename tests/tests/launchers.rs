@@ -31,7 +31,7 @@ fn without_lamp_a_stage_says_so() {
         assert_eq!((ran.status.code(), &ran.stdout[..]), (Some(1), &b""[..]), "{stage}");
         assert_eq!(
             String::from_utf8_lossy(&ran.stderr),
-            format!("{stage}: the program lamp is neither next to it nor in PATH\n")
+            format!("error: {stage}: the program lamp is neither next to it nor in PATH\n")
         );
     }
 }
@@ -50,7 +50,7 @@ fn stages_have_their_own_names_and_status() {
         let help = String::from_utf8(help).expect("text");
         assert!(help.contains(&format!("Usage: {stage} ")), "{help}");
         let usage = scratch.run(&format!("{stage} --no-such-option"));
-        usage.is_wrong_usage(&[&format!("Usage: {stage} ")]);
+        usage.is_wrong_usage(&["unexpected argument '--no-such-option'"]);
         scratch.run(&format!("{stage} missing.file")).is_refused_with(&[&format!("{stage}: ")]);
     }
 }

@@ -45,6 +45,7 @@ mod memory_copies;
 mod mesh;
 mod mesh_out;
 mod mesh_report;
+mod mistakes;
 mod options_file;
 mod orient;
 mod other_readers;

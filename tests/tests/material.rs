@@ -205,7 +205,7 @@ fn bad_files_are_refused_and_say_what_to_do() {
     ] {
         spoilt(from, to);
         let ran = scratch.run("lamp material check mine.toml").is_refused_with(words);
-        assert!(ran.stderr.starts_with("material: mine.toml: "), "{ran:?}");
+        assert!(ran.stderr.starts_with("error: material: mine.toml: "), "{ran:?}");
         assert!(ran.stdout.is_empty());
     }
     scratch.write("image.tif", b"II\x2b\0\x08\0\xff\xfe");

@@ -70,7 +70,7 @@ fn strict_ends_with_status_3_and_still_answers() {
     scratch.mesh("hole.stl", &spoiled(&sphere(10.0, 2_000), Defect::Drop, 2));
     let ran = scratch.run("lamp mesh check hole.stl --strict");
     assert_eq!(ran.statuses, [Some(3)]);
-    assert_eq!(ran.stderr, "mesh: hole.stl: its mesh has faults\n");
+    assert_eq!(ran.stderr, "error: mesh: hole.stl: its mesh has faults\n");
     for words in
         ["2 loops of boundary edges; the longest has 3 edges, ", "  volume:   not closed: 6 sides"]
     {

@@ -20,7 +20,7 @@ fn report(scratch: &Scratch, parts: &str, options: &str) -> Value {
     } else {
         let layers = &report["stray_layers"];
         let says = format!(
-            "slice: {rows} rows in {layers} layers do not balance: the mesh has gaps; \
+            "note: slice: {rows} rows in {layers} layers do not balance: the mesh has gaps; \
              fix corrects them, and gaps.json lists the facets\n"
         );
         assert_eq!(ran.stderr, says);

@@ -15,7 +15,7 @@ fn shell(scratch: &Scratch, line: &str) -> Ran {
     shell.args(["-c", line]).current_dir(scratch).env("PATH", format!("{folder}:{path}"));
     let ran = shell.output().unwrap();
     let stderr = String::from_utf8_lossy(&ran.stderr).into_owned();
-    Ran { line: line.to_owned(), statuses: vec![ran.status.code()], stdout: ran.stdout, stderr }
+    Ran::new(line, vec![ran.status.code()], ran.stdout, &stderr)
 }
 
 fn commands(scratch: &Scratch, stack: &str) -> Vec<String> {

@@ -258,7 +258,7 @@ fn stray_rows_are_told_once_however_many_copies() {
         let line = format!("tile p.tif:200 --area 100x100mm --mesh none {options} -o build.tif");
         scratch.run(&line).succeeds().stderr
     };
-    let all = "tile: p.tif: 3 stray rows in 1 layer, the first in layer 1 (z 0.10 mm): run fix \
+    let all = "warning: tile: p.tif: 3 stray rows in 1 layer, the first in layer 1 (z 0.10 mm): run fix \
                before tile, and repair the CAD model where fix cannot\n";
     assert_eq!(said("-q"), all);
     let listed = "tile: p.tif: layer 1 (z 0.10 mm) has 3 stray rows: 1-3\n";

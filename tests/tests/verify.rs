@@ -103,10 +103,10 @@ fn a_stage_that_never_starts_tells_the_next_one_why() {
     let mut lines: Vec<&str> = ran.stderr.lines().collect();
     lines.sort_unstable();
     let [of_fix, of_slice, of_tile] = lines[..] else { panic!("{}", ran.stderr) };
-    let reason = of_slice.strip_prefix("slice: ").unwrap();
+    let reason = of_slice.strip_prefix("error: slice: ").unwrap();
     assert!(reason.starts_with("absent.stl: No such file"), "{reason}");
     let told = format!("standard input: the stage before gave up: {reason}");
-    assert_eq!([of_fix, of_tile], [format!("fix: {told}"), format!("tile: {told}")]);
+    assert_eq!([of_fix, of_tile], [format!("error: fix: {told}"), format!("error: tile: {told}")]);
     assert_eq!(scratch.names(), ["cube.stl", "cube.tif"]);
 }
 

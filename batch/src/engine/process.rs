@@ -157,7 +157,10 @@ fn wait_for(mut child: Child) -> End {
 /// Returns the last words of a process: its last line, or the signal that ended it.
 fn why(status: ExitStatus, words: &str) -> String {
     let last = words.lines().last().unwrap_or_default();
-    let last = last.trim_start_matches("lamp: ").trim_start_matches("batch: ").to_owned();
+    let last = ["error: ", "lamp: ", "batch: "]
+        .iter()
+        .fold(last, |last, label| last.strip_prefix(label).unwrap_or(last));
+    let last = last.to_owned();
     match signal(status) {
         Some(signal) if last.is_empty() => {
             format!("its process was ended by signal {signal}{}", guess(signal))

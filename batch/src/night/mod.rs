@@ -8,6 +8,7 @@ mod walk;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use lamp_pipeline::documents::nearest;
 use thiserror::Error;
 
 use walk::Walk;
@@ -136,11 +137,7 @@ impl Night {
 
 /// Returns `: did you mean X?` for the nearest of some words, if one is near.
 fn did_you_mean<'a>(word: &str, words: impl IntoIterator<Item = &'a str>) -> String {
-    let near = words.into_iter().map(|other| (strsim::jaro_winkler(word, other), other));
-    match near.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((likeness, other)) if likeness > 0.75 => format!(": did you mean {other}?"),
-        _ => String::new(),
-    }
+    nearest(word, words).map(|other| format!(": did you mean {other}?")).unwrap_or_default()
 }
 
 /// Returns the first name that occurs twice.

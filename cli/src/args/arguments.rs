@@ -174,18 +174,19 @@ impl Arguments {
                 }
                 _ => Err(error),
             })
-            .unwrap_or_else(|error| self.end(&error))
+            .unwrap_or_else(|error| self.end(error))
     }
 
     fn parsed(self) -> ArgMatches {
         let parsed = self.program.clone().try_get_matches_from(&self.words);
-        parsed.unwrap_or_else(|error| self.end(&error))
+        parsed.unwrap_or_else(|error| self.end(error))
     }
 
     /// Ends the process as clap does, and names the files that had a say.
-    fn end(&self, error: &clap::Error) -> ! {
+    fn end(&self, error: clap::Error) -> ! {
+        let is_wrong = error.use_stderr();
         let status = show(error);
-        if error.use_stderr() && !self.from.is_empty() {
+        if is_wrong && !self.from.is_empty() {
             say("");
             let files: Vec<_> = self.from.iter().map(|(file, _)| file.as_str()).collect();
             say(&format!("With the options of {}.", files.join(" and ")));

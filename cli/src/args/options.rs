@@ -30,8 +30,8 @@ pub(crate) struct Common {
     pub(crate) verbose: bool,
 
     /// Use N threads [default: one per processor]
-    #[arg(long, value_name = "N", global = true, help_heading = GENERAL, hide_short_help = true)]
-    #[arg(value_parser = clap::value_parser!(u16).range(1..=512))]
+    #[arg(long, short_alias = 'j', value_name = "N", global = true)]
+    #[arg(help_heading = GENERAL, hide_short_help = true, value_parser = clap::value_parser!(u16).range(1..=512))]
     threads: Option<u16>,
 
     /// Do not wait until outputs are on the disk
@@ -122,7 +122,7 @@ pub(crate) struct InputArgs {
     #[arg(value_name = "STACK", default_value = "-")]
     pub(crate) stack: PathBuf,
 
-    /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended
+    /// Use only these layers: A..B is A to B - 1, A-B is A to B; A.. and ..B are open-ended
     #[arg(long, value_name = "A..B", value_parser = parse_layers)]
     pub(crate) layers: Option<Range<u32>>,
 }
@@ -146,7 +146,7 @@ pub(crate) struct Output {
     pub(crate) packbits: bool,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     pub(crate) force: bool,
 }
 
@@ -173,10 +173,18 @@ pub(crate) fn parse_layers(text: &str) -> Result<Range<u32>, String> {
     parse_range(text, "layer")
 }
 
-/// Parses a range of things that are counted from 0, such as `12..40`, or one of them.
+/// Parses a range of things that are counted from 0, such as `12..40`, which lacks 40, `12-39`, which
+/// has 39, or one of them.
 pub(crate) fn parse_range(text: &str, thing: &str) -> Result<Range<u32>, String> {
-    let wrong = |_| format!("`{text}` is not a range of {thing}s: write A..B, A.. or ..B");
-    let (start, end) = match text.split_once("..") {
+    let wrong = |_| format!("`{text}` is not a range of {thing}s: write A..B, A.., ..B or A-B");
+    // People also write what a range ends with.
+    let with_end = text.split_once('-').filter(|(start, _)| !start.is_empty());
+    let (start, end) = match text.split_once("..").or(with_end) {
+        Some((start, end)) if with_end.is_some() => {
+            let [start, last]: [u32; 2] =
+                [start.parse().map_err(wrong)?, end.parse().map_err(wrong)?];
+            (start, last.saturating_add(1))
+        }
         Some((start, end)) => {
             let start = if start.is_empty() { 0 } else { start.parse().map_err(wrong)? };
             let end = if end.is_empty() { u32::MAX } else { end.parse().map_err(wrong)? };

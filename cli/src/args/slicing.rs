@@ -25,12 +25,12 @@ pub(crate) struct SlicingArgs {
     /// Dots per inch, or pitch of pixels: 1500, 14um or 14x19um
     ///
     /// Two numbers are along x and along y: 1814x1337
-    #[arg(long, visible_alias = "pitch", value_name = "DPI")]
+    #[arg(long, visible_alias = "pitch", alias = "resolution", value_name = "DPI")]
     #[arg(default_value_t = SliceSettings::default().pitch)]
     dpi: Pitch,
 
     /// Layer thickness, for example 100um, 0.1mm, 4mil or 0.004in
-    #[arg(long, value_name = "LENGTH", value_parser = parse_thickness)]
+    #[arg(long, alias = "layer-height", value_name = "LENGTH", value_parser = parse_thickness)]
     #[arg(default_value = "100um")]
     #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
     thickness: Length,

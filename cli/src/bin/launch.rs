@@ -20,7 +20,7 @@ pub(crate) fn launch(stage: &str) -> ExitCode {
         _ => format!("the program lamp does not start: {error}"),
     };
     // There is nobody left to read it if it cannot be printed.
-    let _ = writeln!(io::stderr(), "{stage}: {why}");
+    let _ = writeln!(io::stderr(), "error: {stage}: {why}");
     ExitCode::FAILURE
 }
 

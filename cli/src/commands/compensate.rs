@@ -1,7 +1,5 @@
 //! `lamp compensate`: moves edges by the cure width, and enlarges images for shrinkage.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use lamp_offset::CompensateError;
 use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
@@ -9,8 +7,7 @@ use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::CompensateStageArgs;
 use crate::exit::Exit;
-use crate::output::endings::parse_report;
-use crate::output::json_report::JsonReport;
+use crate::output::json_report::{JsonReport, ReportTo};
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };
@@ -36,9 +33,8 @@ pub(crate) struct CompensateArgs {
     #[command(flatten)]
     settings: CompensateStageArgs,
 
-    /// Write lost pieces, and walls narrowed less than requested, as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     #[command(flatten)]
     output: Output,
@@ -48,7 +44,8 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let CompensateArgs { input, settings, report, output } = args;
     let settings = CompensateSettings::from(settings);
     let compensating = Compensating::new(&settings)?;
-    if let Some(beside) = report {
+    report.check_output(&output.output)?;
+    if let Some(beside) = report.path() {
         check_beside(beside, &output.output, settings.inputs().chain([&input.stack]))?;
     }
     check_not_input(&output.output, settings.inputs())?;
@@ -62,7 +59,7 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     write_layers(layers, output, &progress)
         .map_err(|error| if is_of_stage(&error) { error.at(name.clone()) } else { error })?;
     compensating.lines(&name).iter().for_each(|line| progress.say(line));
-    let Some(path) = report else { return Ok(()) };
+    let Some(path) = report.path() else { return Ok(()) };
     let (walls, layers) = compensating.report();
     JsonReport::new(&walls.head(layers)).list("walls", walls.listed()).write(path)
 }

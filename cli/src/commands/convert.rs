@@ -17,11 +17,13 @@ use crate::args::options::{Common, InputArgs, Output, one_of};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
 use crate::output::endings::is_step_name;
+use crate::output::numbers::number_of;
 use crate::streams::{
-    check_beside, check_stack_name, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
-    new_folder, open_pages, progress, unless_found, write_file, write_layers, written_to,
+    check_beside, check_stack_name, counting, for_tiffs, input_name, is_folder, is_stream,
+    layers_of_input, new_folder, open_pages, progress, unless_found, write_file, write_layers,
+    written_to,
 };
-use crate::terminal::progress::say;
+use crate::terminal::progress::{Progress, Severity};
 use crate::terminal::stack_notes::doubts;
 
 /// Convert a stack to pages, PNGs or contours, a STEP part to STL, or a mesh to STEP
@@ -115,13 +117,15 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     match shape {
         OutputKind::Tiff => write_layers(layers, &to, &progress),
         OutputKind::Pngs => {
-            let counted = layers.inspect(|_| progress.layer_done());
+            let counted = layers.inspect(counting(&progress));
             let folder = new_folder(output, args.output.force)?;
             written_to(output, write_png_folder(counted, folder), &progress)
         }
         OutputKind::Png => {
             let png = png_of_layer(&only_layer(layers, &input_name(&args.input.stack))?)?;
-            write_file(output, |out| out.write_all(&png))
+            write_file(output, |out| out.write_all(&png))?;
+            progress.wrote(output, &[]);
+            Ok(())
         }
     }
 }
@@ -173,16 +177,17 @@ impl ConvertArgs {
         let facets = table.facet_count();
         let solids = StepSolids::new(table).map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
-            part_notes(&part).iter().for_each(|note| say(&format!("convert: {note}")));
-            say(&format!(
-                "convert: {}: {} facets as {} faces; solids: {}",
-                step.display(),
-                facets,
-                solids.faces(),
-                solids.solids()
-            ));
+            part_notes(&part)
+                .iter()
+                .for_each(|note| Severity::Note.say(&format!("convert: {note}")));
         }
-        write_file(step, |out| solids.write(part.name(), out))
+        let progress = Progress::new("convert", common, true);
+        write_file(step, |out| solids.write(part.name(), out))?;
+        let [solids, faces, facets] =
+            [(solids.solids(), "solid"), (solids.faces(), "face"), (facets, "facet")]
+                .map(|(count, one)| number_of(count as u64, one));
+        progress.wrote(step, &[solids, format!("{faces} of {facets}")]);
+        Ok(())
     }
 
     /// Writes a STEP part as facets.
@@ -194,9 +199,14 @@ impl ConvertArgs {
         let model = bytes_of(path).and_then(|bytes| Part::from_step(&name, bytes, &options));
         let model = model.map_err(|error| Exit::from(error).at(name))?;
         if !common.quiet {
-            part_notes(&model).iter().for_each(|note| say(&format!("convert: {note}")));
+            part_notes(&model)
+                .iter()
+                .for_each(|note| Severity::Note.say(&format!("convert: {note}")));
         }
-        write_file(stl, |out| model.write_stl(out))
+        let progress = Progress::new("convert", common, true);
+        write_file(stl, |out| model.write_stl(out))?;
+        progress.wrote(stl, &[number_of(model.facet_count() as u64, "facet")]);
+        Ok(())
     }
 
     fn shape(&self) -> Result<OutputKind, Exit> {

@@ -84,7 +84,7 @@ pub(crate) struct ExposeArgs {
     output: Option<PathBuf>,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long, requires = "output")]
+    #[arg(long, alias = "overwrite", requires = "output")]
     force: bool,
 
     /// Print JSON, as docs/json.md describes it

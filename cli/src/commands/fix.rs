@@ -13,8 +13,7 @@ use crate::args::stages::FixStageArgs;
 use crate::exit::Exit;
 use crate::field_folder::{read_stack_or_fields, write_stack_or_fields};
 use crate::output::band_pictures::BandPictures;
-use crate::output::endings::parse_report;
-use crate::output::json_report::JsonReport;
+use crate::output::json_report::{JsonReport, ReportTo};
 use crate::streams::{check_beside, progress, unless_found};
 use crate::terminal::stack_notes::doubts;
 
@@ -44,9 +43,8 @@ pub(crate) struct FixArgs {
     #[command(flatten)]
     settings: FixStageArgs,
 
-    /// Write all bands and their corrections as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Write a picture of each band to a new folder: before, after and the difference (new white in
     /// blue, new black in red), or just the band if it was not corrected
@@ -63,7 +61,8 @@ pub(crate) struct FixArgs {
 }
 
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
-    for beside in [&args.report, &args.evidence].into_iter().flatten() {
+    args.report.check_output(&args.output.output)?;
+    for beside in args.report.path().into_iter().chain(&args.evidence) {
         check_beside(beside, &args.output.output, [&args.input.stack])?;
     }
     let progress = progress("fix", common, &args.output);
@@ -97,7 +96,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     if let Some(evidence) = evidence {
         evidence.finish()?;
     }
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.path() {
         let report = JsonReport::new(&findings.head(layer_count));
         report.list("bands", findings.bands()).write(path)?;
     }

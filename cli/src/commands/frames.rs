@@ -17,7 +17,9 @@ use crate::args::options::{Common, parse_range};
 use crate::commands::job::ScanArgs;
 use crate::exit::Exit;
 use crate::output::endings::{FRAMES, check_ending};
+use crate::output::numbers::number_of;
 use crate::streams::{extension, input_name, is_stream, write_file};
+use crate::terminal::progress::Progress;
 
 /// Write the frames of a swath: a picture of the mirrors for each row of the scan
 ///
@@ -66,7 +68,8 @@ const PICTURES_PER_SECOND: u16 = 12;
 /// The most frames of an animation.
 const MAX_PICTURES: u64 = 2000;
 
-pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
+pub(crate) fn run(args: &FramesArgs, common: &Common) -> Result<(), Exit> {
+    let progress = Progress::new("frames", common, true);
     if !is_stream(&args.output) {
         check_ending(&args.output, &FRAMES)?;
     }
@@ -109,7 +112,9 @@ pub(crate) fn run(args: &FramesArgs, _: &Common) -> Result<(), Exit> {
         writer.finish().map(drop)
     };
     if !is_stream(&args.output) {
-        return write_file(&args.output, write);
+        write_file(&args.output, write)?;
+        progress.wrote(&args.output, &[number_of(header.frames.into(), "frame")]);
+        return Ok(());
     }
     let mut write = write;
     let mut out = BufWriter::with_capacity(1 << 20, io::stdout().lock());

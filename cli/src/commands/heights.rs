@@ -25,9 +25,9 @@ use crate::args::options::{Common, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
-use crate::output::endings::parse_table;
-use crate::output::json_report::print_answer;
-use crate::streams::{check_beside, print, write_file};
+use crate::output::endings::{parse_report, parse_table};
+use crate::output::json_report::{ReportTo, write_answer};
+use crate::streams::{check_beside, extension, print, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::{self as plots, Plot, PlotAxis, Series, drawn};
 
@@ -37,11 +37,12 @@ use lamp_plots::{self as plots, Plot, PlotAxis, Series, drawn};
 /// --adaptive` with the same options. The layers are compared with uniform layers; no images are
 /// written.
 #[derive(Args)]
+#[command(mut_arg("report", |report| report.value_parser(parse_report_or_table)))]
 #[command(after_help = "\
 Examples:
   lamp heights blade.stl
   lamp heights tower.stl --min 0.001in --max 0.1in --step 0.001in --plot heights.svg
-  lamp heights blade.stl --cusp 10um --report heights.csv
+  lamp heights blade.stl --cusp 10um --csv heights.csv
   lamp heights blade.stl --time-budget 10h --layer-overhead 20s --material lamp-suspension")]
 pub(crate) struct HeightsArgs {
     /// The part: files, or - for standard input, as for `slice`
@@ -51,7 +52,10 @@ pub(crate) struct HeightsArgs {
     /// Write a table of the layers: height, thickness, volume lost and gained, and the error under
     /// each criterion
     #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
-    report: Option<PathBuf>,
+    csv: Option<PathBuf>,
+
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Plot thickness, deviation, and the volume lost and gained over z: a file that ends in .svg or
     /// .png
@@ -62,10 +66,6 @@ pub(crate) struct HeightsArgs {
     /// layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
     uniform: Vec<Length>,
-
-    /// Print JSON, as docs/json.md describes it
-    #[arg(long)]
-    json: bool,
 
     /// Resolution of the images, which sets the distance between the rows that are measured
     #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
@@ -106,7 +106,10 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     let found = found.map_err(|error| at_part(error, &files))?;
     let uniform = args.uniform(settings.max(), &part).map_err(|error| at_part(error, &files))?;
     doubts(&found, exposure).iter().for_each(|doubt| progress.say(doubt));
-    if let Some(path) = &args.report {
+    if args.table_in_report().is_some() {
+        progress.warn("a table is written by --csv FILE.csv: --report writes JSON");
+    }
+    if let Some(path) = args.table() {
         write_file(path, |out| write_table(&found.heights, exposure, out))?;
     }
     let all: Vec<_> =
@@ -120,9 +123,12 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
         .iter()
         .map(|(name, heights)| Choice::new(name, heights, &found, exposure, settings.overhead()))
         .collect();
-    if !args.json {
-        return print(&summary(&choices, found.measure));
+    if !args.report.is_printed() {
+        print(&summary(&choices, found.measure))?;
     }
+    let Some(path) = args.report.path().filter(|_| args.table_in_report().is_none()) else {
+        return Ok(());
+    };
     let layers = found.heights.layers.iter().map(|layer| LayerRow::new(layer, exposure));
     let answer = json!({
         "part": name_of_all(&args.parts),
@@ -131,7 +137,14 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
         "choices": choices,
         "layers": layers.collect::<Vec<_>>(),
     });
-    print_answer("lamp-heights-1", &answer)
+    write_answer("lamp-heights-1", &answer, path)
+}
+
+fn parse_report_or_table(text: &str) -> Result<PathBuf, String> {
+    match extension(Path::new(text)).as_str() {
+        "csv" => parse_table(text),
+        _ => parse_report(text),
+    }
 }
 
 impl HeightsArgs {
@@ -141,13 +154,25 @@ impl HeightsArgs {
             plots::check_name(plot)?;
         }
         let inputs = || paths(&self.parts).chain(files.iter().copied());
-        for file in self.report.iter().chain(&self.plot) {
+        let files = self.csv.iter().chain(self.report.path()).chain(&self.plot);
+        let files: Vec<_> = files.collect();
+        for (number, file) in files.iter().enumerate() {
             check_beside(file, Path::new("-"), inputs())?;
-        }
-        if self.report.is_some() && self.report == self.plot {
-            return Err(Exit::usage("--report and --plot name the same file"));
+            if files[..number].contains(file) {
+                return Err(Exit::usage(format!("{}: named twice", file.display())));
+            }
         }
         Ok(())
+    }
+
+    /// Returns where the table of layers goes.
+    fn table(&self) -> Option<&PathBuf> {
+        self.csv.as_ref().or_else(|| self.table_in_report())
+    }
+
+    /// Returns the table that `--report` names, as it did when it wrote tables.
+    fn table_in_report(&self) -> Option<&PathBuf> {
+        self.report.path().filter(|path| extension(path) == "csv")
     }
 
     /// The uniform layers to compare with, by what they are called.

@@ -1,9 +1,12 @@
-//! `lamp info`: describes a stack.
+//! `lamp info`: describes stacks.
+
+use std::path::PathBuf;
 
 use clap::Args;
 use lamp_build::is_fields;
 use lamp_stack::{
-    NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals, map_in_order,
+    Compression, NumberRange, Page, PageHeader, PageInfo, Pages, StackInfo, StackTotals,
+    map_in_order,
 };
 use serde::Serialize;
 
@@ -11,6 +14,7 @@ use super::info_fields::print_fields;
 use crate::args::options::InputArgs;
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
+use crate::output::numbers::{grouped, volume_in_words};
 use crate::output::stack_facts::{StackFacts, compression_name};
 use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 
@@ -23,41 +27,53 @@ use crate::streams::{failed_at, in_range, input_name, open_pages, print};
 #[command(after_help = "\
 Examples:
   lamp info build.tif
+  lamp info *.tif
   lamp info build.tif --json | jq .exposure_s
   slice blade.stl | lamp info --runs")]
 pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: InputArgs,
 
+    /// More stacks
+    #[arg(value_name = "STACK", hide = true)]
+    more: Vec<PathBuf>,
+
     /// Also decode the images, and count their transitions
     #[arg(long)]
     runs: bool,
 
-    /// Print a JSON object (docs/json.md)
+    /// Print a JSON object for each stack, on a line (docs/json.md)
     #[arg(long)]
     json: bool,
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
-    if is_fields(&args.input.stack) {
-        if args.runs || args.input.layers.is_some() {
+    describe(&args.input, args)?;
+    for stack in &args.more {
+        if !args.json {
+            print("\n")?;
+        }
+        describe(&InputArgs { stack: stack.clone(), ..args.input.clone() }, args)?;
+    }
+    Ok(())
+}
+
+fn describe(input: &InputArgs, args: &InfoArgs) -> Result<(), Exit> {
+    if is_fields(&input.stack) {
+        if args.runs || input.layers.is_some() {
             return Err(Exit::usage(
                 "--runs and --layers are for one stack: name the file of a strip or field, or make \
                  one stack of all with lamp join",
             ));
         }
-        return print_fields(&args.input.stack, args.json);
+        return print_fields(&input.stack, args.json);
     }
-    let pages = open_pages(&args.input.stack)?;
+    let pages = open_pages(&input.stack)?;
     let facts = if args.runs {
-        runs_of(pages, &args.input)?
+        runs_of(pages, input)?
     } else {
-        let headers = in_range(
-            pages.headers(),
-            header_info,
-            args.input.stack.clone(),
-            args.input.layers.clone(),
-        );
+        let headers =
+            in_range(pages.headers(), header_info, input.stack.clone(), input.layers.clone());
         Facts::sum(headers.map(|page| Ok((with_stack(page?), None))))?
     };
     let Some(facts) = facts else { return Ok(()) };
@@ -65,7 +81,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Exit> {
         return print_answer("lamp-info-1", &facts.json());
     }
     // The first page has named the part of standard input.
-    print(&facts.text(&input_name(&args.input.stack)))
+    print(&facts.text(&input_name(&input.stack)))
 }
 
 fn header_info(header: &PageHeader) -> &PageInfo {
@@ -146,7 +162,10 @@ pub(super) fn lines(
     lines.push(("layers", layers_text(totals)));
     let [width, height] = totals.first.size;
     let others = if totals.one_size { "" } else { " on the first page; others differ" };
-    lines.push(("size", format!("{width} x {height} pixels{others}")));
+    lines.push((
+        "size",
+        format!("{} x {} pixels{others}", grouped(width.into()), grouped(height.into())),
+    ));
     lines.push(("resolution", resolution_text(&totals.first)));
     if let (Some(bottom), Some(top)) = (info.z(), totals.top_mm()) {
         lines.push(("z", format!("{:.3} to {top:.3} mm", bottom.mm())));
@@ -157,12 +176,12 @@ pub(super) fn lines(
         lines.push(("exposure", format!("{text}, {seconds:.1} s in all")));
     }
     lines.extend(area_text(totals).map(|text| ("exposed", text)));
-    lines.extend(runs.map(|runs| ("runs", format!("{runs} transitions"))));
+    lines.extend(runs.map(|runs| ("runs", format!("{} transitions", grouped(runs)))));
     let names: Vec<_> = totals.compressions.iter().map(|each| compression_name(*each)).collect();
-    lines.push(("data", format!("{} bytes, {}", totals.data_bytes, names.join(" and "))));
+    lines.push(("data", format!("{} bytes, {}", grouped(totals.data_bytes), names.join(" and "))));
     let stray = match totals.stray_rows {
         0 => "none known".to_owned(),
-        rows => format!("{rows} in {} layers", totals.stray_layers),
+        rows => format!("{} in {} layers", grouped(rows), grouped(totals.stray_layers)),
     };
     lines.push(("stray rows", stray));
     lines.push(("checks", checks_text(totals, runs).to_owned()));
@@ -174,16 +193,20 @@ pub(super) fn lines(
 fn layers_text(totals: &StackTotals) -> String {
     let gray = match totals.gray_pages {
         0 => String::new(),
-        pages => format!(", {pages} of them gray"),
+        // Only their images say which of them are.
+        _ if totals.compressions.contains(&Compression::PrinterPng) => String::new(),
+        pages => format!(", {} of them gray", grouped(pages)),
     };
     let (first, last) = (totals.first.info.index, totals.last.index);
-    format!("{} ({first} to {last}){gray}", totals.pages)
+    format!("{} ({first} to {last}){gray}", grouped(totals.pages))
 }
 
-/// `1.2 megapixels in all, 340.512 mm3`.
+/// `1,200 pixels in all layers, 340.512 mm3`.
 fn area_text(totals: &StackTotals) -> Option<String> {
-    let pixels = totals.exposed_px?;
-    let volume = totals.volume_mm3.map(|volume| format!(", {volume:.3} mm3"));
+    let pixels = grouped(totals.exposed_px?);
+    // Pages state the number of gray pixels, not their levels.
+    let most = if totals.gray_pages == 0 { "" } else { "at most " };
+    let volume = totals.volume_mm3.map(|volume| format!(", {most}{}", volume_in_words(volume)));
     Some(format!("{pixels} pixels in all layers{}", volume.unwrap_or_default()))
 }
 

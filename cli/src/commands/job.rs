@@ -52,7 +52,7 @@ pub(crate) struct JobArgs {
     output: PathBuf,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 
     /// Print the job's totals as JSON, as docs/json.md describes it

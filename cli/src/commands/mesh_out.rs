@@ -11,6 +11,7 @@ use lamp_view::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions,
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::output::endings::{STL, check_ending};
+use crate::output::numbers::number_of;
 use crate::streams::{check_not_input, failed_at, input_name, open_indexed, write_mesh};
 use crate::terminal::progress::Progress;
 
@@ -63,7 +64,9 @@ pub(crate) fn run(args: &MeshOutArgs, common: &Common) -> Result<(), Exit> {
              layer is as thick as a pixel is wide",
         );
     }
-    write_mesh(&args.output, |out| write_stl(surface.facets(), out))
+    write_mesh(&args.output, |out| write_stl(surface.facets(), out))?;
+    progress.wrote(&args.output, &[number_of(surface.facets().len() as u64, "facet")]);
+    Ok(())
 }
 
 /// Opens a stack that is whole.

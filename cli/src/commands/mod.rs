@@ -123,7 +123,7 @@ impl Command {
             Self::Compare(args) => compare::run(args, common),
             Self::Check(args) => check::run(args, common),
             Self::Support(args) => support::run(args, common),
-            Self::Show(args) => show::run(args),
+            Self::Show(args) => show::run(args, common),
             Self::Report(args) => report::run(args, common),
             Self::View(args) => view::run(args, common),
             Self::Convert(args) => convert::run(args, common),

@@ -8,8 +8,8 @@ use lamp_stack::{Format, PackLevel};
 use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
 use crate::output::endings::{PACKED_STACK, check_ending};
+use crate::output::numbers::size_in_words;
 use crate::streams::{is_stream, layers_of_input, open_pages, progress, write_packed_layers};
-use crate::terminal::progress::say;
 
 /// Pack a stack: store each layer as its difference from the layer below
 ///
@@ -47,9 +47,9 @@ pub(crate) fn run(args: &PackArgs, common: &Common) -> Result<(), Exit> {
     to.classic |= pages.format() == Format::Classic;
     let layers = layers_of_input(pages, &args.input, &progress);
     write_packed_layers(layers, &to, args.level.unwrap_or_default(), &progress)?;
-    if let Some((from, to)) = size_of(path).zip(size_of(output)).filter(|_| !common.quiet) {
-        let share = 100.0 * to as f64 / from as f64;
-        say(&format!("pack: {}: {to} bytes of {from} ({share:.1} %)", output.display()));
+    if let Some((from, to)) = size_of(path).zip(size_of(output)) {
+        let (share, from) = (100.0 * to as f64 / from as f64, size_in_words(from));
+        progress.say(&format!("{share:.1} % of the {from} of {}", path.display()));
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ use lamp_stack::Length;
 use crate::args::options::{Common, parse_count};
 use crate::exit::Exit;
 use crate::output::endings::{SAMPLE, check_ending, is_step_name};
+use crate::output::numbers::number_of;
 use crate::streams::{is_stream, write_file};
 use crate::terminal::progress::Progress;
 
@@ -119,5 +120,5 @@ impl SampleArgs {
 
 fn say_size(args: &SampleArgs, common: &Common, mesh: &Mesh) {
     let progress = Progress::new("sample", common, true);
-    progress.say(&format!("{}: {} facets", args.output.display(), mesh.facets.len()));
+    progress.wrote(&args.output, &[number_of(mesh.facets.len() as u64, "facet")]);
 }

@@ -8,10 +8,12 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order};
 
+use crate::args::options::Common;
 use crate::args::options::EveryNth;
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
 use crate::streams::{failed_at, input_name, is_stream, learning_part, open_pages, write_file};
+use crate::terminal::progress::Progress;
 use crate::terminal::terminal_picture::TerminalForm;
 use lamp_plots::{Picture, PictureRegion, PictureScale};
 use lamp_plots::{Thumbnail, contact_sheet, write_animation};
@@ -95,7 +97,7 @@ impl ShowArgs {
     }
 }
 
-pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
+pub(crate) fn run(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
     if args.terminal_form().is_none() {
         if is_stream(&args.output) && io::stdout().is_terminal() {
             return Err(Exit::usage(
@@ -105,12 +107,12 @@ pub(crate) fn run(args: &ShowArgs) -> Result<(), Exit> {
         check_ending(&args.output, &PNG)?;
     }
     match &args.shown.layers {
-        Some(layers) => show_many(args, layers),
-        None => show_one(args),
+        Some(layers) => show_many(args, layers, common),
+        None => show_one(args, common),
     }
 }
 
-fn show_one(args: &ShowArgs) -> Result<(), Exit> {
+fn show_one(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
     let Layer { image, .. } = match (args.shown.layer, args.shown.z) {
         (Some(index), _) => layer_numbered(&args.stack, index)?,
         (None, z) => layer_at(&args.stack, z.expect("one of the options is required"))?,
@@ -122,13 +124,13 @@ fn show_one(args: &ShowArgs) -> Result<(), Exit> {
     let scale = args.scale.unwrap_or_else(fitting);
     check_size(scale.size(&region))?;
     let picture = Picture::new(&image, region, scale);
-    write(args, |out| match form {
+    write(args, common, |out| match form {
         Some(form) => form.write(picture, out),
         None => picture.write_png(out),
     })
 }
 
-fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
+fn show_many(args: &ShowArgs, layers: &EveryNth, common: &Common) -> Result<(), Exit> {
     let failed = |error| failed_at(input_name(&args.stack), error);
     let mut pages = learning_part(open_pages(&args.stack)?, &args.stack);
     let mut next = 0;
@@ -164,12 +166,12 @@ fn show_many(args: &ShowArgs, layers: &EveryNth) -> Result<(), Exit> {
         return Err(Exit::Failed(anyhow!("{name}: no layer is in that range")));
     }
     if args.animate {
-        return write(args, |out| write_animation(&thumbnails, args.fps, out));
+        return write(args, common, |out| write_animation(&thumbnails, args.fps, out));
     }
     let sheet = contact_sheet(thumbnails);
     // The sheet may be too large though each picture is small.
     check_size([sheet.width, sheet.height].map(u64::from))?;
-    write(args, |out| sheet.write_png(out))
+    write(args, common, |out| sheet.write_png(out))
 }
 
 /// The longer side of a layer's picture among others, in pixels.
@@ -201,13 +203,17 @@ fn region_on(args: &ShowArgs, image: &Image) -> Result<PictureRegion, Exit> {
 
 fn write(
     args: &ShowArgs,
+    common: &Common,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Exit> {
+    let progress = Progress::new("show", common, true);
     if is_stream(&args.output) {
         let written = write(&mut BufWriter::new(io::stdout().lock()));
         written.map_err(|error| Exit::output(error, "standard output"))
     } else {
-        write_file(&args.output, write)
+        write_file(&args.output, write)?;
+        progress.wrote(&args.output, &[]);
+        Ok(())
     }
 }
 

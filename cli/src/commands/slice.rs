@@ -12,7 +12,7 @@ use lamp_slicing::{Bodies, PixelGrid, StrayBand};
 use crate::args::options::{Common, Output};
 use crate::args::slicing::SliceStageArgs;
 use crate::exit::Exit;
-use crate::output::endings::parse_report;
+use crate::output::json_report::ReportTo;
 use crate::output::mesh_report::{MeshReport, RowPositions};
 use crate::streams::{check_beside, check_not_input, progress, unless_found, write_layers};
 
@@ -36,10 +36,8 @@ pub(crate) struct SliceArgs {
     #[command(flatten)]
     settings: SliceStageArgs,
 
-    /// Write the mesh's faults as JSON: for each band of unbalanced rows, the edges that are open
-    /// or shared by too many facets, with those facets' numbers and corners in the part's file
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Stop with status 3 for likely mistakes: a part smaller than a few pixels or layers, or
     /// larger than any machine, parts that overlap, or a stack without a white pixel
@@ -52,7 +50,8 @@ pub(crate) struct SliceArgs {
 
 pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let stage = SliceStage::try_from(&args.settings)?;
-    if let Some(report) = &args.report {
+    args.report.check_output(&args.output.output)?;
+    if let Some(report) = args.report.path() {
         check_beside(report, &args.output.output, stage.inputs())?;
     }
     check_not_input(&args.output.output, stage.inputs())?;
@@ -67,7 +66,7 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     progress.expect(slicing.layer_count().into());
     let mut bands = Vec::new();
     let layers = slicing.layers(0..u32::MAX, |info| {
-        if args.report.is_some() {
+        if args.report.path().is_some() {
             bands.extend(StrayBand::of(info));
         }
     });
@@ -82,7 +81,10 @@ pub(crate) fn run(args: &SliceArgs, common: &Common) -> Result<(), Exit> {
     let layers = layers.map(|layer| Ok(layer?));
     write_layers(unless_found(layers, finding), &args.output, &progress)?;
     args.write_report(&stage, &slicing, &bands)?;
-    slicing.summary(args.report.as_deref()).into_iter().for_each(|line| progress.remark(line));
+    slicing
+        .summary(args.report.path().filter(|_| !args.report.is_printed()).map(PathBuf::as_path))
+        .into_iter()
+        .for_each(|line| progress.remark(line));
     if slicing.is_blank() {
         progress.warn(BLANK);
     }
@@ -100,7 +102,7 @@ impl SliceArgs {
         slicing: &Slicing<'_>,
         bands: &[StrayBand],
     ) -> Result<(), Exit> {
-        let Some(path) = &self.report else { return Ok(()) };
+        let Some(path) = self.report.path() else { return Ok(()) };
         let trace = slicing.with_slices(|slices| slices.trace(bands))?;
         let PixelGrid { origin_mm, pitch, .. } =
             slicing.with_slices(|slices| Ok(*slices.grid()))?;

@@ -8,7 +8,7 @@ use lamp_stack::{SplitError, SplitPoints, write_split};
 
 use crate::args::options::{Common, InputArgs};
 use crate::exit::Exit;
-use crate::streams::{format, input_name, new_folder, read_layers, written_to};
+use crate::streams::{counting, format, input_name, new_folder, read_layers, written_to};
 use crate::terminal::progress::Progress;
 
 /// Split a stack into files, each with a range of layers
@@ -44,7 +44,7 @@ pub(crate) struct SplitArgs {
     classic: bool,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &SplitArgs, common: &Common) -> Result<(), Exit> {
     };
     let folder = new_folder(&args.output, args.force)?;
     let progress = Progress::new("split", common, true);
-    let layers = read_layers(&args.input, &progress)?.inspect(|_| progress.layer_done());
+    let layers = read_layers(&args.input, &progress)?.inspect(counting(&progress));
     let written = write_split(layers, &cuts, folder, format(args.classic));
     written_to(&args.output, written, &progress).map_err(|error| match error {
         Exit::Failed(error) if error.is::<SplitError>() => {

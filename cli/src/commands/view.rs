@@ -19,7 +19,7 @@ use crate::args::slicing::SlicingArgs;
 use crate::exit::Exit;
 use crate::streams::{failed_at, input_name, is_stream, open_indexed, print};
 use crate::terminal::allocator::give_freed_memory_back;
-use crate::terminal::progress::Progress;
+use crate::terminal::progress::{Progress, Severity};
 
 /// Look at layers in a browser
 ///
@@ -35,7 +35,7 @@ Examples:
   lamp view build.tif --check
   lamp view fixed.tif sliced.tif --open
   lamp view blade.stl --dpi 600 --open
-  lamp view build.tif --report check.json --port 8700")]
+  lamp view build.tif --findings check.json --port 8700")]
 pub(crate) struct ViewArgs {
     /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts. The second
     /// is compared with the first
@@ -48,11 +48,15 @@ pub(crate) struct ViewArgs {
     open: bool,
 
     /// Run `lamp check` on the first stack, in the background
-    #[arg(long, conflicts_with = "report")]
+    #[arg(long, conflicts_with_all = ["findings", "report"])]
     check: bool,
 
-    /// Show a report of `lamp check` or `lamp support` on the first stack
+    /// Show the findings of a report of `lamp check` or `lamp support` on the first stack
     #[arg(long, value_name = "FILE.json")]
+    findings: Vec<PathBuf>,
+
+    /// An earlier name of `--findings`: elsewhere, `--report` is written.
+    #[arg(long, value_name = "FILE.json", hide = true)]
     report: Vec<PathBuf>,
 
     /// Port of the loopback address [default: any free port]
@@ -97,9 +101,12 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     ));
     if args.check {
         viewer.find(|stack, progress| find(stack, progress).map_err(|error| error.to_string()));
-    } else if !args.report.is_empty() {
+    } else if !(args.findings.is_empty() && args.report.is_empty()) {
+        if !args.report.is_empty() {
+            Severity::Warning.say("view: findings to show are named by --findings");
+        }
         let headers = viewer.stacks()[0].headers();
-        let findings = args.report.iter().map(|path| {
+        let findings = args.findings.iter().chain(&args.report).map(|path| {
             let report = read_json(path)?;
             of_report(&report, headers)
                 .map_err(|why| Exit::Failed(anyhow!("{}: {why}", path.display())))

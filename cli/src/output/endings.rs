@@ -133,8 +133,13 @@ pub(crate) fn check_no_stack(path: &Path) -> Result<(), Exit> {
     Err(Exit::usage(format!("{path}: no stack is written there: leave out .{ending}")))
 }
 
-/// Parses the name of a JSON file. Standard output is for the stack.
+/// Parses the name of a JSON file, or `-` for standard output.
 pub(crate) fn parse_report(text: &str) -> Result<PathBuf, String> {
+    if text == "-" { Ok(text.into()) } else { parse_json(text) }
+}
+
+/// Parses the name of a JSON file. Standard output is for the stack.
+pub(crate) fn parse_json(text: &str) -> Result<PathBuf, String> {
     match text {
         "-" => Err("standard output is for the stack: name a file, such as report.json".to_owned()),
         "" => Err("name a file, such as report.json".to_owned()),

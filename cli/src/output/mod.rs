@@ -4,5 +4,6 @@ pub(crate) mod band_pictures;
 pub(crate) mod endings;
 pub(crate) mod json_report;
 pub(crate) mod mesh_report;
+pub(crate) mod numbers;
 pub(crate) mod plan_folder;
 pub(crate) mod stack_facts;

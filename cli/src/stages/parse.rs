@@ -35,12 +35,13 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 21] = [
+const REFUSED: [(&str, &str); 22] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
     ("force", "leave out --force: no existing file is replaced"),
     ("report", "leave out --report: findings are with the results"),
+    ("json", "leave out --json: findings are with the results"),
     ("evidence", "leave out --evidence: run this stage by hand for pictures of its findings"),
     ("strict", "leave out --strict: findings are reported, and decide the status at the end"),
     ("layers", "leave out --layers: a part is cut into ranges of layers by itself"),
@@ -124,7 +125,7 @@ impl<'a> StageReader<'a> {
         let matches = |words: &[OsString]| {
             // Help and version come as errors, too.
             command.clone().try_get_matches_from(words).map_err(|error| match error.use_stderr() {
-                true => sentence(&error),
+                true => sentence(error),
                 false => "help and version are for the command line".to_owned(),
             })
         };

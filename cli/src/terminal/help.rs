@@ -37,8 +37,11 @@ const FORM: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\
 /// The examples that `-h` shows.
 const FEW: usize = 3;
 
+/// Options that few people need, of any command.
+const RARE: [&str; 3] = ["classic", "packbits", "force"];
+
 /// The options that `-h` shows, of the commands that have many.
-const USUAL: [(&str, &[&str]); 5] = [
+const USUAL: [(&str, &[&str]); 14] = [
     (
         "slice",
         &[
@@ -89,7 +92,77 @@ const USUAL: [(&str, &[&str]); 5] = [
             "output",
         ],
     ),
-    ("heights", &["report", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
+    ("view", &["check", "findings", "open", "port", "dpi", "thickness", "units", "rotate"]),
+    (
+        "orient",
+        &["directions", "cone", "max_overhang_angle", "thickness", "best", "plot", "json", "units"],
+    ),
+    (
+        "learn",
+        &[
+            "start", "material", "measured", "print", "law", "gain", "step", "report", "plot",
+            "output",
+        ],
+    ),
+    (
+        "compensate",
+        &[
+            "uniform",
+            "material",
+            "dose",
+            "min_feature",
+            "one_bit",
+            "shrinkage",
+            "report",
+            "layers",
+            "output",
+        ],
+    ),
+    ("fix", &["method", "max_width", "evidence", "report", "strict", "layers", "output"]),
+    ("expose", &["layers", "tolerance", "strict", "picture", "json", "output"]),
+    (
+        "plan voxels",
+        &[
+            "material",
+            "wanted",
+            "objective",
+            "exposure",
+            "report",
+            "plot",
+            "map",
+            "layers",
+            "output",
+        ],
+    ),
+    (
+        "plan speed",
+        &[
+            "material",
+            "wanted",
+            "speed",
+            "max_change",
+            "profile",
+            "report",
+            "plot",
+            "layers",
+            "output",
+        ],
+    ),
+    (
+        "plan column-cure",
+        &[
+            "projector",
+            "material",
+            "pixel",
+            "full",
+            "bitmaps",
+            "gray",
+            "optimize",
+            "robust",
+            "output",
+        ],
+    ),
+    ("heights", &["csv", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
 ];
 
 /// The headings of options of `slice` that have none of their own.
@@ -98,7 +171,7 @@ const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
     ("Part", &["units", "fill", "trust_extent"]),
     (
         "Output and memory",
-        &["memory", "report", "strict", "output", "force", "classic", "packbits"],
+        &["memory", "report", "json", "strict", "output", "force", "classic", "packbits"],
     ),
 ];
 
@@ -113,21 +186,24 @@ pub(crate) fn formed(lamp: Command) -> Command {
         .help_heading(GENERAL);
     // The manual page still has the examples.
     let lamp = few_examples(lamp).override_help(LAMP);
-    lamp.disable_help_flag(true).arg(help).mut_subcommands(of_command)
+    lamp.disable_help_flag(true).arg(help).mut_subcommands(|command| of_command(command, ""))
 }
 
-fn of_command(command: Command) -> Command {
-    let name = command.get_name().to_owned();
+/// Forms a command below the commands of `path`, such as `plan `.
+fn of_command(command: Command, path: &str) -> Command {
+    let name = format!("{path}{}", command.get_name());
     let usual = USUAL.iter().find(|(of, _)| *of == name).map(|(_, usual)| *usual);
     let headings = if name == "slice" { &SLICE_HEADINGS[..] } else { &[] };
     let command = command.help_template(FORM).mut_args(|option| {
         let is_in = |ids: &[&str]| ids.contains(&option.get_id().as_str());
-        let is_hidden = !option.is_positional() && usual.is_some_and(|usual| !is_in(usual));
+        let is_unusual = !option.is_positional() && usual.is_some_and(|usual| !is_in(usual));
+        let is_hidden = is_unusual || is_in(&RARE);
         let heading = headings.iter().find(|(_, ids)| is_in(ids)).map(|(heading, _)| *heading);
         let option = if is_hidden { option.hide_short_help(true) } else { option };
         if heading.is_some() { option.help_heading(heading) } else { option }
     });
-    few_examples(command).mut_subcommands(of_command)
+    let path = format!("{name} ");
+    few_examples(command).mut_subcommands(|command| of_command(command, &path))
 }
 
 /// Leaves all examples to the long help.
@@ -176,11 +252,31 @@ mod tests {
     }
 
     #[test]
+    fn the_short_help_of_every_command_lists_twelve_options_at_most() {
+        fn check(command: &Command, path: &str) {
+            let path = format!("{path} {}", command.get_name());
+            let shown = command.get_arguments().filter(|arg| {
+                let is_general = arg.get_help_heading() == Some(GENERAL);
+                !arg.is_positional()
+                    && !is_general
+                    && !arg.is_hide_set()
+                    && !arg.is_hide_short_help_set()
+            });
+            let shown: Vec<_> = shown.map(|arg| arg.get_id().as_str()).collect();
+            assert!(shown.len() <= 12, "{path}: {shown:?}");
+            command.get_subcommands().for_each(|command| check(command, &path));
+        }
+        check(&formed(Lamp::command()), "");
+    }
+
+    #[test]
     fn every_option_that_is_named_is_there() {
         let lamp = Lamp::command();
         let listed = SLICE_HEADINGS.iter().map(|(_, ids)| ("slice", *ids));
         for (command, ids) in listed.chain(USUAL) {
-            let command = lamp.find_subcommand(command).expect("it is a command");
+            let find = |command: &Command, word| command.find_subcommand(word).cloned();
+            let command = command.split(' ').try_fold(lamp.clone(), |lamp, word| find(&lamp, word));
+            let command = command.expect("it is a command");
             for id in ids {
                 assert!(command.get_arguments().any(|option| option.get_id() == *id), "{id}");
             }

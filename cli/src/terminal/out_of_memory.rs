@@ -125,7 +125,7 @@ fn tell(bytes: usize) {
     let command = COMMAND.get().map_or("lamp", String::as_str);
     let written = writeln!(
         cursor,
-        "{command}: out of memory ({bytes} bytes more were asked for): {RAISE}end other programs, \
+        "error: {command}: out of memory ({bytes} bytes more were asked for): {RAISE}end other programs, \
          or give fewer --threads"
     );
     let end = cursor.position() as usize;

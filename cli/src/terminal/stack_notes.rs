@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use lamp_stack::{Pages, StackNote};
 
 use crate::streams::input_name;
-use crate::terminal::progress::say;
+use crate::terminal::progress::Severity;
 
 /// The notes that were printed.
 #[derive(Default)]
@@ -44,8 +44,9 @@ pub(crate) fn print_note(path: &Path, note: &StackNote) {
     let line = format!("{}: {}: {note}", printed.command, input_name(path));
     // For --strict, which asks only at the end.
     printed.is_doubtful |= note.is_doubt();
+    let severity = if note.is_doubt() { Severity::Warning } else { Severity::Note };
     if (note.is_doubt() || !printed.quiet) && printed.lines.insert(line.clone()) {
-        say(&line);
+        severity.say(&line);
     }
 }
 

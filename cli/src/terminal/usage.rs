@@ -3,22 +3,23 @@
 use std::error::Error as _;
 use std::io;
 use std::num::{IntErrorKind, ParseIntError};
+use std::path::Path;
 
-use clap::error::{ContextKind, ErrorKind};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use lamp_pipeline::documents::nearest;
 
 use crate::exit::Exit;
 use crate::started;
-use crate::terminal::progress::{printable, say};
+use crate::terminal::progress::{Severity, printable, say};
 
 /// Shows an error of usage, or the help that was asked for, and ends the process.
-pub(crate) fn refuse(error: &clap::Error) -> ! {
+pub(crate) fn refuse(error: clap::Error) -> ! {
     std::process::exit(show(error))
 }
 
 /// Shows an error of usage, or the help that was asked for, and returns the status.
-pub(crate) fn show(error: &clap::Error) -> i32 {
-    let known = with_known_words(error);
-    let error = known.as_ref().unwrap_or(error);
+pub(crate) fn show(error: clap::Error) -> i32 {
+    let error = improved(error);
     let steers_terminal = |arg: std::ffi::OsString| {
         let arg = arg.to_string_lossy();
         printable(&arg) != arg
@@ -31,16 +32,15 @@ pub(crate) fn show(error: &clap::Error) -> i32 {
         && failed.kind() != io::ErrorKind::BrokenPipe
     {
         let failed = Exit::output(failed, "standard output");
-        say(&format!("lamp: {failed}"));
+        Severity::Error.say(&format!("lamp: {failed}"));
         return failed.status().into();
     }
     error.exit_code()
 }
 
 /// Returns an error of usage as one sentence.
-pub(crate) fn sentence(error: &clap::Error) -> String {
-    let known = with_known_words(error);
-    let text = known.as_ref().unwrap_or(error).render().to_string();
+pub(crate) fn sentence(error: clap::Error) -> String {
+    let text = improved(error).render().to_string();
     let lines = text.lines().take_while(|line| !line.starts_with("Usage:") && *line != MORE);
     let trimmed = lines.map(|line| line.trim().trim_start_matches("error: "));
     let words: Vec<&str> = trimmed.filter(|line| !line.is_empty()).collect();
@@ -48,6 +48,38 @@ pub(crate) fn sentence(error: &clap::Error) -> String {
 }
 
 const MORE: &str = "For more information, try '--help'.";
+
+/// Returns the error in words that people know, without tips that would lead astray: names unlike the
+/// given one, and how to pass a file whose name begins with a dash, unless there is one.
+fn improved(mut error: clap::Error) -> clap::Error {
+    if let Some(known) = with_known_words(&error) {
+        return known;
+    }
+    for (given, tip) in [
+        (ContextKind::InvalidArg, ContextKind::SuggestedArg),
+        (ContextKind::InvalidSubcommand, ContextKind::SuggestedSubcommand),
+        (ContextKind::InvalidValue, ContextKind::SuggestedValue),
+    ] {
+        let words = |kind| match error.get(kind)? {
+            ContextValue::String(word) => Some(vec![word.trim_start_matches('-').to_owned()]),
+            ContextValue::Strings(words) => {
+                Some(words.iter().map(|word| word.trim_start_matches('-').to_owned()).collect())
+            }
+            _ => None,
+        };
+        let Some((given, tips)) = words(given).zip(words(tip)) else { continue };
+        if nearest(&given[0], tips.iter().map(String::as_str)).is_none() {
+            error.remove(tip);
+            // It would show the option of the tip.
+            error.remove(ContextKind::Usage);
+        }
+    }
+    let is_file = |word: &ContextValue| Path::new(&word.to_string()).exists();
+    if !error.get(ContextKind::InvalidArg).is_some_and(is_file) {
+        error.remove(ContextKind::Suggested);
+    }
+    error
+}
 
 /// Says what to write instead of something that is not a whole number.
 fn with_known_words(error: &clap::Error) -> Option<clap::Error> {
@@ -83,12 +115,15 @@ mod tests {
         let command = Command::new("fix")
             .arg(Arg::new("method").long("method").value_parser(["nearest", "spline"]));
         let said = |words: &[&str]| {
-            sentence(&command.clone().no_binary_name(true).try_get_matches_from(words).unwrap_err())
+            sentence(command.clone().no_binary_name(true).try_get_matches_from(words).unwrap_err())
         };
         assert_eq!(
             said(&["--metod", "spline"]),
             "unexpected argument '--metod' found; a similar argument exists: '--method'"
         );
+        // Sounds alike, and means something else.
+        assert_eq!(said(&["--met"]), "unexpected argument '--met' found");
+        assert_eq!(said(&["-j"]), "unexpected argument '-j' found");
         let text = said(&["--method", "best"]);
         assert!(text.starts_with("invalid value 'best' for '--method <method>'"), "{text}");
         assert!(text.ends_with("[possible values: nearest, spline]"), "{text}");

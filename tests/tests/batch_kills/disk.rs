@@ -51,8 +51,7 @@ fn check(night: &Night, wanted: &Outcome, ended: &Ended) {
     assert_eq!(first.matches(needed).count(), 2, "by plan, and by the night: {ended:?}");
     let (before, after) = first.split_once(": no more tasks are started\n").expect("it is told");
     assert!(before.lines().last().is_some_and(|line| line.contains("No space left")), "{ended:?}");
-    let last =
-        "batch: the store's disk is full: make room, and run the same command again to go on\n";
+    let last = "error: batch: the store's disk is full: make room, and run the same command again to go on\n";
     assert_eq!(after, last, "{ended:?}");
     // Finished tasks are not done again.
     let done = |text: &str| text.lines().filter(|line| line.ends_with(" is done")).count();

@@ -46,7 +46,7 @@ const WRITERS: &[&str] = &[
     "lamp compose build.json -o out.tif",
     "lamp cure good.tif --material lamp-suspension --section y=0mm -o out.png",
     "lamp plan voxels good.tif --material pegda-sudan -o out.tif",
-    "lamp heights ball.stl --report out.csv",
+    "lamp heights ball.stl --csv out.csv",
     "lamp orient ball.stl --directions 20 --plot out.svg",
     "lamp learn job --measured a.csv --law single -o out.csv",
     "lamp job good.tif --machine scan.toml -o out/",

@@ -17,6 +17,7 @@ use lamp_batch::Key;
 
 use crate::args::options::{Common, one_of_described, parse_memory};
 use crate::exit::Exit;
+use crate::output::json_report::ReportTo;
 
 /// Make many parts and builds overnight, even if tasks crash
 ///
@@ -116,6 +117,9 @@ struct NightArgs {
     /// The night file
     #[arg(value_name = "NIGHT.toml")]
     night: PathBuf,
+
+    #[command(flatten)]
+    report: ReportTo,
 }
 
 #[derive(Args)]
@@ -161,8 +165,8 @@ struct TaskArgs {
 pub(crate) fn run(args: &BatchArgs, common: &Common) -> Result<(), Exit> {
     match &args.command {
         None => run::run(&args.run, common),
-        Some(BatchCommand::Plan(args)) => plan_text::run(&args.night, common),
-        Some(BatchCommand::Status(args)) => status::run(&args.night, common),
+        Some(BatchCommand::Plan(args)) => plan_text::run(args, common),
+        Some(BatchCommand::Status(args)) => status::run(args, common),
         Some(BatchCommand::Verify(args)) => keep::verify(args, common),
         Some(BatchCommand::Gc(args)) => keep::collect(args, common),
         Some(BatchCommand::Task(args)) => task::run(args),

@@ -4,15 +4,19 @@ use std::collections::BTreeMap;
 
 use lamp_batch::{Deliverer, Key, Ledger, SubjectState, SubjectSummary, Summary, events};
 
+use serde_json::json;
+
+use super::NightArgs;
 use super::night_file::NightFile;
 use super::run::counts;
 use crate::args::options::Common;
 use crate::exit::Exit;
+use crate::output::json_report::write_answer;
 use crate::streams::print;
 use crate::terminal::progress::printable;
 
-pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> {
-    let file = NightFile::open(night)?;
+pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
+    let file = NightFile::open(&args.night)?;
     let store = file.store()?;
     let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
@@ -45,7 +49,13 @@ pub(super) fn run(night: &std::path::Path, common: &Common) -> Result<(), Exit> 
     let all = summary.lines().count();
     let counts = counts(&summary);
     text += &format!("{done} of {all} are done ({counts}), {} tasks are to do\n", to_do.len());
-    print(&text)
+    if !args.report.is_printed() {
+        print(&text)?;
+    }
+    let Some(path) = args.report.path() else { return Ok(()) };
+    let answer =
+        json!({ "tasks_to_do": to_do.len(), "parts": summary.parts, "builds": summary.builds });
+    write_answer("lamp-batch-status-1", &answer, path)
 }
 
 fn told(line: &SubjectSummary) -> String {

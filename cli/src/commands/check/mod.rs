@@ -24,7 +24,7 @@ use crate::args::slicing::SlicingArgs;
 use crate::args::stages::CheckStageArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::output::endings::parse_report;
+use crate::output::json_report::ReportTo;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
@@ -62,9 +62,8 @@ pub(crate) struct CheckArgs {
     #[command(flatten)]
     pub(crate) settings: Parsed<CheckStageArgs, CheckSettings>,
 
-    /// Write all findings as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Write pictures of the worst findings to a new folder, with the whole layer and a side view:
     /// findings in red, other white that rests on nothing white in yellow, the layer below in gray
@@ -77,7 +76,7 @@ pub(crate) struct CheckArgs {
     accept: Option<PathBuf>,
 
     /// Replace a folder of pictures that an earlier run wrote
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 
     /// End with status 3 if there are findings, or if pages of a folder may be missing
@@ -98,7 +97,7 @@ pub(crate) struct CheckArgs {
 }
 
 pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
-    for beside in [&args.report, &args.evidence].into_iter().flatten() {
+    for beside in args.report.path().into_iter().chain(&args.evidence) {
         check_beside(beside, Path::new("-"), &args.inputs)?;
     }
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
@@ -115,11 +114,13 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
         if let Some(accepted) = &accepted {
             checked.found.accept(accepted);
         }
-        print(&printed(&checked.name, &checked.found, common.verbose))?;
+        if !args.report.is_printed() {
+            print(&printed(&checked.name, &checked.found, common.verbose))?;
+        }
         Ok(checked)
     });
     let mut checked = checked.collect::<Result<Vec<_>, Exit>>()?;
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.path() {
         write_report(&checked, machine.recoating.as_ref(), path)?;
     }
     if let Some(folder) = evidence {

@@ -20,7 +20,8 @@ use crate::args::planning_options::{SAMPLE_HEIGHTS, parse_margin};
 use crate::args::platform_options::{DEFAULT_SPEEDS, parse_change, parse_speeds};
 use crate::catalogue::read_text;
 use crate::exit::Exit;
-use crate::output::endings::{parse_report, parse_table};
+use crate::output::endings::parse_table;
+use crate::output::json_report::ReportTo;
 use crate::streams::{check_beside, input_name, is_stream, print, read_beside, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots as plots;
@@ -78,9 +79,8 @@ pub(crate) struct LearnArgs {
     #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
     output: Option<PathBuf>,
 
-    /// Write the errors of all prints and the numbers for the next print as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report, requires = "measured")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Plot the errors and the times of all prints: a file that ends in .svg or .png
     #[arg(long, value_name = "FILE", requires = "measured")]
@@ -157,6 +157,9 @@ impl LearnArgs {
 
 pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("learn", common, true);
+    if args.report.path().is_some() && args.measured.is_none() {
+        return Err(Exit::usage("--report and --json are of a print that was --measured"));
+    }
     if let Some(stack) = &args.start {
         let Some(material) = &args.kept.material else {
             return Err(Exit::usage("--start needs the resin: give --material NAME|FILE"));
@@ -202,14 +205,17 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     write_file(output, |out| out.write_all(job.profile(&learned.times).as_bytes()))?;
     // Read again, so that report and plot show the job as it is on the disk.
     let job = open(&args.job, &progress)?;
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.path() {
         write_report(&job, print_number, &learned, path)?;
     }
     if let Some(path) = &args.plot {
         let bytes = plots::drawn(&plot::plots_of(&job), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
-    print(&lines_of(&job, print_number, &learned))
+    match args.report.is_printed() {
+        true => Ok(()),
+        false => print(&lines_of(&job, print_number, &learned)),
+    }
 }
 
 /// Opens a job.
@@ -233,8 +239,8 @@ impl LearnArgs {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
-        let files = [&self.output, &self.report, &self.plot];
-        let files: Vec<_> = files.into_iter().flatten().collect();
+        let files: Vec<_> =
+            self.output.iter().chain(self.report.path()).chain(&self.plot).collect();
         let measured = measured.to_owned();
         for (number, path) in files.iter().enumerate() {
             let others = std::iter::once(&measured).chain(files[..number].iter().copied());

@@ -20,7 +20,7 @@ use crate::args::options::{Common, one_of, parse_memory};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream};
-use crate::terminal::progress::say;
+use crate::terminal::progress::Severity;
 
 /// Check or repair the mesh of a part
 #[derive(Args)]
@@ -110,7 +110,9 @@ impl MeshPart {
             .at(self.name()));
         }
         if !common.quiet {
-            part_notes(&part).iter().for_each(|note| say(&format!("{command}: {note}")));
+            part_notes(&part)
+                .iter()
+                .for_each(|note| Severity::Note.say(&format!("{command}: {note}")));
         }
         Ok((part, bytes))
     }

@@ -17,8 +17,8 @@ use crate::commands::mesh::MeshPart;
 use crate::commands::mesh::answer::{counts, deeds};
 use crate::commands::mesh::text::faults;
 use crate::exit::Exit;
-use crate::output::endings::{STL, check_ending, parse_report};
-use crate::output::json_report::JsonReport;
+use crate::output::endings::{STL, check_ending};
+use crate::output::json_report::{JsonReport, ReportTo};
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
 use crate::terminal::progress::{Progress, say};
 
@@ -51,9 +51,8 @@ pub(super) struct RepairArgs {
     #[arg(long, value_name = "LENGTH", default_value = "1mm", value_parser = parse_distance)]
     close: Length,
 
-    /// Write a list of all facets touched, as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Exit with status 3 if faults are left; the mesh is still written
     #[arg(long)]
@@ -67,7 +66,8 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let (name, input) = (args.part.name(), &args.part.part);
     check_not_input(&args.output, [input])?;
     check_ending(&args.output, &STL)?;
-    if let Some(report) = &args.report {
+    args.report.check_output(&args.output)?;
+    if let Some(report) = args.report.path() {
         check_beside(report, &args.output, [input])?;
     }
     let failed = |error: SliceError| Exit::from(error).at(name.clone());
@@ -114,7 +114,7 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     if !common.quiet {
         tell(&repaired, &left, weld * unit);
     }
-    if let Some(report) = &args.report {
+    if let Some(report) = args.report.path() {
         write_report(report, &name, &repaired)?;
     }
     match args.strict && !repaired.left.is_clean() {

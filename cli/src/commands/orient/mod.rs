@@ -16,6 +16,7 @@ use crate::args::options::{Common, parse_angle, parse_thickness};
 use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
+use crate::output::json_report::ReportTo;
 use crate::streams::{check_beside, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::{self as plots, sphere_picture};
@@ -66,9 +67,8 @@ pub(crate) struct OrientArgs {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// Print JSON, as docs/json.md describes it
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: ReportTo,
 
     #[command(flatten)]
     solid: SolidArgs,
@@ -102,9 +102,9 @@ impl ComparedPoses {
 
 pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     let solid = SolidSettings::from(&args.solid);
-    if let Some(plot) = &args.plot {
-        plots::check_name(plot)?;
-        check_beside(plot, Path::new("-"), paths(&args.parts).chain(solid.cutters()))?;
+    args.plot.as_deref().map_or(Ok(()), plots::check_name)?;
+    for beside in args.plot.iter().chain(args.report.path()) {
+        check_beside(beside, Path::new("-"), paths(&args.parts).chain(solid.cutters()))?;
     }
     let progress = Progress::new("orient", common, true);
     let reading = Reading {
@@ -136,5 +136,5 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
         let bytes = sphere_picture(&title, &compared.poses, compared.best(), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
     }
-    args.report(&compared)
+    args.write_report(&compared)
 }

@@ -9,18 +9,19 @@ use serde_json::json;
 
 use super::{ComparedPoses, OrientArgs};
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::write_answer;
 use crate::streams::print;
 
 /// The most poses that the table shows.
 const MOST_ROWS: usize = 20;
 
 impl OrientArgs {
-    pub(super) fn report(&self, compared: &ComparedPoses) -> Result<(), Exit> {
+    pub(super) fn write_report(&self, compared: &ComparedPoses) -> Result<(), Exit> {
         let part = name_of_all(&self.parts);
-        if !self.json {
-            return print(&table(&part, compared));
+        if !self.report.is_printed() {
+            print(&table(&part, compared))?;
         }
+        let Some(path) = self.report.path() else { return Ok(()) };
         let rank = |pose: usize| compared.pareto.iter().position(|&other| other == pose);
         let row = |(number, facts): (usize, &PoseFacts)| PoseRow {
             rotate: &compared.rotations[number],
@@ -41,7 +42,7 @@ impl OrientArgs {
             "best": compared.rotations[compared.best()],
             "orientations": compared.poses.iter().enumerate().map(row).collect::<Vec<_>>(),
         });
-        print_answer("lamp-orient-2", &answer)
+        write_answer("lamp-orient-2", &answer, path)
     }
 }
 

@@ -101,7 +101,7 @@ pub(super) struct ColumnCureArgs {
     output: PathBuf,
 
     /// Replace a folder that an earlier run wrote
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 

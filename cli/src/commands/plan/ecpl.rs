@@ -59,7 +59,7 @@ pub(super) struct EcplArgs {
     output: PathBuf,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 

@@ -17,7 +17,8 @@ use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::args::platform_options::PlatformOptions;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::output::endings::{parse_report, parse_table};
+use crate::output::endings::parse_table;
+use crate::output::json_report::ReportTo;
 use crate::streams::{
     check_beside, check_not_input, input_name, layers_of, layers_of_input, progress, write_file,
     write_layers,
@@ -50,9 +51,8 @@ pub(super) struct SpeedArgs {
     #[arg(long, value_name = "FILE.csv", value_parser = parse_table)]
     profile: Option<PathBuf>,
 
-    /// Write the plan's results, layer by layer, as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Plot wrong voxels and times by layer, doses, counts at 5% less and more light, and the
     /// course of the search: a file that ends in .svg or .png
@@ -96,7 +96,7 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     if let Some(path) = &args.profile {
         write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
     }
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.path() {
         write_report(&planned, args.planning.margin, path)?;
     }
     if let Some(path) = &args.plot {
@@ -111,8 +111,9 @@ impl SpeedArgs {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
         }
-        let beside = [&self.profile, &self.report, &self.plot];
-        let beside: Vec<_> = beside.into_iter().flatten().collect();
+        self.report.check_output(&self.output.output)?;
+        let beside: Vec<_> =
+            self.profile.iter().chain(self.report.path()).chain(&self.plot).collect();
         for (number, path) in beside.iter().enumerate() {
             let inputs = [&self.input.stack, &self.planning.material].into_iter();
             let others = inputs.chain(beside[..number].iter().copied());

@@ -17,7 +17,7 @@ use super::voxels_report::{PlannedVoxels, lines_of, write_report};
 use crate::args::options::{Common, InputArgs, Output, one_of_described, parse_memory};
 use crate::args::planning_options::{PlannedResin, PlanningOptions};
 use crate::exit::Exit;
-use crate::output::endings::parse_report;
+use crate::output::json_report::ReportTo;
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, unless_found, write_file,
     write_layers,
@@ -75,9 +75,8 @@ pub(super) struct VoxelsArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
     exposure: Option<ExposureTime>,
 
-    /// Write the plan's results, layer by layer, as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Plot wrong voxels by layer, doses, counts at 5% less and more light, and the course of the
     /// search: a file that ends in .svg or .png
@@ -181,7 +180,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     for line in lines_of(&planned).into_iter().chain(doubts) {
         progress.say(&line);
     }
-    if let Some(path) = &args.report {
+    if let Some(path) = args.report.path() {
         write_report(&planned, path)?;
     }
     if let Some(path) = &args.plot {
@@ -211,7 +210,8 @@ impl VoxelsArgs {
         for picture in self.plot.iter().chain(&self.map.map) {
             plots::check_name(picture)?;
         }
-        let beside = || self.report.iter().chain(&self.plot).chain(&self.map.map);
+        self.report.check_output(&self.output.output)?;
+        let beside = || self.report.path().into_iter().chain(&self.plot).chain(&self.map.map);
         for (number, path) in beside().enumerate() {
             let inputs = [&self.input.stack, &self.planning.material];
             check_beside(path, &self.output.output, inputs)?;

@@ -21,6 +21,7 @@ use crate::commands::job::build_clock;
 use crate::exit::Exit;
 use crate::output::endings::{HTML, check_ending};
 use crate::output::json_report::print_answer;
+use crate::output::numbers::number_of;
 use crate::streams::{
     check_beside, failed_at, input_name, is_folder, is_stream, new_folder, open_indexed, print,
     write_file,
@@ -40,7 +41,7 @@ pub(super) use pictures::{InlinePicture, of_layer};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  lamp report build.tif -o report.html
+  lamp report build.tif
   lamp report night/ -o reports/
   lamp report build.tif --json | jq .stacks[0].findings
   slice blade.stl | fix | lamp report --machine alpha -o report.html
@@ -52,7 +53,8 @@ pub(crate) struct ReportArgs {
     stack: PathBuf,
 
     /// Where to write: an HTML file, or a folder of HTML files with an index, such as reports/
-    #[arg(short, long, value_name = "OUT", required_unless_present = "json")]
+    /// [default: the stack's name with .html]
+    #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
     /// Machine that builds the stack: alpha, beta or a file (see lamp machine). Its recoating
@@ -61,7 +63,7 @@ pub(crate) struct ReportArgs {
     machine: Option<PathBuf>,
 
     /// Replace a folder of reports that an earlier run wrote
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 
     /// Print the numbers as a JSON object (docs/json.md)
@@ -81,9 +83,20 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     }
     let work =
         ReportWork { machine: machine.as_ref(), machine_path: args.machine.as_deref(), common };
-    match &args.output {
-        Some(folder) if is_folder(folder) || stacks.len() > 1 => {
-            work.write_folder(&stacks, folder, args)
+    let beside = || match &stacks[..] {
+        [stack] if !is_stream(stack) => Ok(stack.with_extension("html")),
+        [_] => Err(Exit::usage("name the page: -o report.html")),
+        _ => {
+            Err(Exit::usage("there are several stacks: name a folder for their pages: -o reports/"))
+        }
+    };
+    let output = match &args.output {
+        None if !args.json => Some(beside()?),
+        output => output.clone(),
+    };
+    match output {
+        Some(folder) if is_folder(&folder) || stacks.len() > 1 => {
+            work.write_folder(&stacks, &folder, args)
         }
         output => work.write_page(&stacks, output.as_deref(), args),
     }
@@ -127,6 +140,7 @@ impl ReportWork<'_> {
             check_beside(output, Path::new("-"), [&args.stack])?;
             check_ending(output, &HTML)?;
         }
+        let progress = Progress::new("report", self.common, true);
         let mut answers = Vec::new();
         for path in stacks {
             let report = self.report(path)?;
@@ -134,6 +148,7 @@ impl ReportWork<'_> {
                 Some(output) if is_stream(output) => print(&page::html(&report, None))?,
                 Some(output) => {
                     write_file(output, |out| out.write_all(page::html(&report, None).as_bytes()))?;
+                    progress.wrote(output, &[number_of(report.layers.len() as u64, "layer")]);
                 }
                 None => {}
             }
@@ -159,6 +174,7 @@ impl ReportWork<'_> {
             )));
         }
         let folder = new_folder(output, args.force)?;
+        let progress = Progress::new("report", self.common, true);
         let mut entries = Vec::new();
         let mut answers = Vec::new();
         for (number, path) in (1..).zip(stacks) {
@@ -187,6 +203,7 @@ impl ReportWork<'_> {
         written.map_err(|error| Exit::Output(error.into()).at("index.html"))?;
         // Before the JSON, whose reader may look for the pages.
         folder.persist().map_err(|error| Exit::Failed(error.into()))?;
+        progress.wrote(output, &[number_of(stacks.len() as u64, "stack")]);
         if args.json {
             print_stacks(&answers)?;
         }

@@ -31,7 +31,8 @@ use crate::args::solid::part_file;
 use crate::args::stages::SupportStageArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
-use crate::output::endings::{parse_report, parse_toml};
+use crate::output::endings::parse_toml;
+use crate::output::json_report::ReportTo;
 use crate::streams::Layers;
 use crate::streams::{
     check_beside, check_not_input, failed_at, input_name, is_stream, layers_of, progress,
@@ -85,7 +86,7 @@ pub(crate) struct SupportArgs {
         long,
         value_name = "DIAMETER",
         requires = "plan",
-        conflicts_with_all = ["part", "stl", "report", "output", "avoid"],
+        conflicts_with_all = ["part", "stl", "report", "json", "output", "avoid"],
         value_parser = parse_thickness,
         hide_short_help = true
     )]
@@ -99,9 +100,8 @@ pub(crate) struct SupportArgs {
     #[arg(long, value_name = "FILE.stl", value_parser = solid::parse_stl)]
     stl: Option<PathBuf>,
 
-    /// Write islands and supports as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Stop with status 3 if islands are left or rest on too little, if there are stray rows, or if
     /// pages of a folder may be missing: no stack is written, and the next stage of a pipe fails, too
@@ -166,7 +166,7 @@ impl SupportArgs {
         let least_support = self.settings.least_support;
         let recoating = machine.recoating.as_ref();
         let report = SupportReport::new(&supports, &found, recoating, least_support, &hints);
-        if let Some(path) = &self.report {
+        if let Some(path) = self.report.path() {
             report.write(&part, path)?;
         }
         report.tell(progress);
@@ -232,7 +232,10 @@ impl SupportArgs {
             )));
         }
         check_not_input(&self.output.output, paths(&self.part))?;
-        for beside in [&self.plan, &self.stl, &self.report].into_iter().flatten() {
+        if self.vent.is_none() {
+            self.report.check_output(&self.output.output)?;
+        }
+        for beside in self.plan.iter().chain(&self.stl).chain(self.report.path()) {
             check_beside(beside, &self.output.output, inputs())?;
         }
         Ok(())

@@ -64,7 +64,7 @@ pub(super) struct ScanArgs {
     output: PathBuf,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 

@@ -58,7 +58,7 @@ pub(super) struct SquaresArgs {
     output: PathBuf,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 

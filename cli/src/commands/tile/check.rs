@@ -27,7 +27,10 @@ impl TileArgs {
         }
         self.check_plan()?;
         self.settings.mesh.check()?;
-        self.cut.check(self.output.as_ref(), self.time || self.recipe.is_some())?;
+        self.cut.check(
+            self.output.as_ref(),
+            self.time || self.report.is_printed() || self.recipe.is_some(),
+        )?;
         let inputs = || {
             self.stacks
                 .iter()
@@ -39,8 +42,9 @@ impl TileArgs {
         let output = self.output().map(|output| output.output);
         let main = output.as_ref().or(self.cut_folder()).or(self.recipe.as_ref());
         let main = main.map_or(Path::new("-"), PathBuf::as_path);
+        output.as_deref().map_or(Ok(()), |output| self.report.check_output(output))?;
         self.check_by_products()?;
-        for beside in [&self.layout_out, &self.layout_picture, &self.report].into_iter().flatten() {
+        for beside in self.layout_out.iter().chain(&self.layout_picture).chain(self.report.path()) {
             check_beside(beside, main, inputs())?;
         }
         if let (Some(output), Some(folder)) = (&output, self.cut_folder()) {
@@ -59,8 +63,8 @@ impl TileArgs {
 
     /// Checks that what is written beside the build goes to several files.
     fn check_by_products(&self) -> Result<(), Exit> {
-        let files = [&self.layout_out, &self.layout_picture, &self.report, &self.recipe];
-        let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
+        let files = self.layout_out.iter().chain(&self.layout_picture);
+        let files: Vec<&PathBuf> = files.chain(self.report.path()).chain(&self.recipe).collect();
         for (k, file) in files.iter().enumerate() {
             check_beside(file, Path::new("-"), files[..k].iter().copied())?;
         }

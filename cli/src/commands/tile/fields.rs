@@ -9,7 +9,7 @@ use lamp_stack::{Layer, is_stack_name};
 
 use crate::args::options::{Output, one_of_described};
 use crate::exit::Exit;
-use crate::streams::{format, is_stream, new_folder, write_layers};
+use crate::streams::{counting, format, is_stream, new_folder, write_layers};
 use crate::terminal::progress::Progress;
 
 const HEADING: &str = "Strips of a projector that scans, fields of one that steps";
@@ -204,12 +204,11 @@ pub(super) fn write(
         Some(output) => write_layers(layers, output, progress)?,
         None => drain(layers, progress)?,
     }
-    match cut {
-        Some(CutOutput { folder, writer }) => {
-            writer.finish().map_err(|error| failed(&folder, error))
-        }
-        None => Ok(()),
+    if let Some(CutOutput { folder, writer }) = cut {
+        writer.finish().map_err(|error| failed(&folder, error))?;
+        progress.wrote_layers(&folder);
     }
+    Ok(())
 }
 
 /// Takes all layers, counting them in `report`.
@@ -217,7 +216,7 @@ fn drain(
     layers: impl Iterator<Item = Result<Layer, Exit>>,
     progress: &Progress,
 ) -> Result<(), Exit> {
-    let mut layers = layers.inspect(|_| progress.layer_done());
+    let mut layers = layers.inspect(counting(progress));
     let done = layers.try_for_each(|layer| layer.map(drop));
     progress.done();
     done

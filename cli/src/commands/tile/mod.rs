@@ -27,7 +27,8 @@ use crate::args::parsed::Parsed;
 use crate::args::tile::TileStageArgs;
 use crate::commands::job::build_clock;
 use crate::exit::Exit;
-use crate::output::endings::parse_report;
+use crate::output::endings::parse_json;
+use crate::output::json_report::ReportTo;
 use crate::streams::Layers;
 use crate::streams::{progress, unless_found, write_file};
 use crate::terminal::progress::Progress;
@@ -79,7 +80,7 @@ pub(crate) struct TileArgs {
     pub(crate) settings: Parsed<TileStageArgs, TileSettings>,
 
     /// Write the copies' positions, for --layout
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[arg(long, value_name = "FILE.json", value_parser = parse_json)]
     layout_out: Option<PathBuf>,
 
     /// Draw the numbered copies on the build area, as SVG or PNG
@@ -88,12 +89,11 @@ pub(crate) struct TileArgs {
 
     /// Write the recipe for the build's pages, without its parts' stacks; lamp compose makes any
     /// page from it. Without -o, the build itself is not written
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
+    #[arg(long, value_name = "FILE.json", value_parser = parse_json)]
     recipe: Option<PathBuf>,
 
-    /// Write areas and volumes of each copy and layer, and the build time, as JSON
-    #[arg(long, value_name = "FILE.json", value_parser = parse_report)]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportTo,
 
     /// Print how long the build takes, from [times] and [recoating] in the machine's file. Without
     /// -o, the build itself is not written
@@ -110,7 +110,7 @@ pub(crate) struct TileArgs {
 
     /// Where to write the build: a file, a folder of pages (a name that ends in /, or an empty
     /// folder), or - for standard output. With --fields, the folder of the fields [default: -, or
-    /// nowhere with --strips, --recipe or --time]
+    /// nowhere with --strips, --recipe, --time or --json]
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
@@ -124,7 +124,7 @@ pub(crate) struct TileArgs {
     packbits: bool,
 
     /// Replace folders that an earlier run wrote, once the new ones are complete
-    #[arg(long)]
+    #[arg(long, alias = "overwrite")]
     force: bool,
 }
 
@@ -238,7 +238,7 @@ impl TileArgs {
         let bare = Rc::clone(&no_mesh);
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
         let told = recipe.clone();
-        let is_timed = self.time || self.report.is_some();
+        let is_timed = self.time || self.report.path().is_some();
         let clock =
             build_clock(self.settings.machine.as_deref().filter(|_| is_timed), machine.as_ref())?;
         let clock = match fields::of_steps(self.cut.form(machine.as_ref())?) {
@@ -248,7 +248,7 @@ impl TileArgs {
         let needs_images = self.needs_images() || clock.needs_images();
         let totals = Rc::new(RefCell::new(BuildTotals::new(&layout, clock)));
         let added = Rc::clone(&totals);
-        let wanted = BuildWanted { images: needs_images, areas: self.report.is_some() };
+        let wanted = BuildWanted { images: needs_images, areas: self.report.path().is_some() };
         let build = layout.build_telling(layers, heights, wanted, move |finding| match finding {
             BuildFinding::Stray(stray) => {
                 found.borrow_mut().add(&stray);
@@ -286,7 +286,8 @@ impl TileArgs {
         if self.cut.makes_fields() {
             return None;
         }
-        let is_alone = self.cut_folder().is_none() && self.recipe.is_none() && !self.time;
+        let answers = self.time || self.report.is_printed();
+        let is_alone = self.cut_folder().is_none() && self.recipe.is_none() && !answers;
         let output = self.output.clone().or_else(|| is_alone.then(|| PathBuf::from("-")))?;
         Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
     }

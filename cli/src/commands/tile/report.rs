@@ -155,10 +155,10 @@ impl TileArgs {
         output: Option<&Output>,
     ) -> Result<(), Exit> {
         let time = totals.clock.time();
-        if let Some(path) = &self.report {
+        if let Some(path) = self.report.path() {
             totals.report(layout, machine, &time).write(path)?;
         }
-        if self.time {
+        if self.time && !self.report.is_printed() {
             let text = time::text(&time, machine);
             if output.is_some_and(|output| is_stream(&output.output)) {
                 text.lines().for_each(crate::terminal::progress::say);

@@ -74,7 +74,7 @@ pub(super) struct SimulateArgs {
     output: Option<PathBuf>,
 
     /// Replace a folder that an earlier run wrote, once the new one is complete
-    #[arg(long, requires = "output")]
+    #[arg(long, alias = "overwrite", requires = "output")]
     force: bool,
 }
 
