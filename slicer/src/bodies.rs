@@ -52,6 +52,8 @@ pub(crate) struct BodyRule {
     pub(crate) object: usize,
     pub(crate) role: BodyRole,
     pub(crate) join: Join,
+    /// Whether its format fills it by even-odd.
+    pub(crate) is_even_odd: bool,
 }
 
 impl BodyRule {
@@ -118,7 +120,7 @@ impl FillRule {
         if let [rule] = &rules[..]
             && !rule.is_cutter()
         {
-            return fill.into();
+            return if rule.is_even_odd { Fill::EvenOdd } else { fill }.into();
         }
         // Most parts only unite. Then any body decides, without a look at the others.
         let is_union = fill == Fill::Solid && !rules.iter().any(BodyRule::is_cutter);
@@ -142,6 +144,12 @@ impl FillRule {
     /// Returns the rule of each body by itself.
     pub fn fill(&self) -> Fill {
         self.fill
+    }
+
+    /// Returns true if the format of a body fills it by even-odd.
+    #[inline]
+    fn is_even_odd(&self, body: u32) -> bool {
+        self.rules.get(body as usize).is_some_and(|rule| rule.is_even_odd)
     }
 
     /// Returns true if crossings must record their bodies.
@@ -254,7 +262,9 @@ impl<'a> Position<'a> {
         if self.winding != 0 {
             self.unsigned.push(0);
         }
-        self.unsigned.extend(self.windings.iter().map(|&(body, _)| body));
+        let rule = self.rule;
+        let bodies = self.windings.iter().map(|&(body, _)| body);
+        self.unsigned.extend(bodies.filter(|&body| !rule.is_even_odd(body)));
         self.winding = 0;
         self.windings.clear();
     }
@@ -297,7 +307,8 @@ impl<'a> Position<'a> {
     #[inline]
     fn holds(&self, body: u32, winding: i32) -> bool {
         let is_unsigned = !self.unsigned.is_empty() && self.unsigned.contains(&body);
-        if is_unsigned { Fill::EvenOdd } else { self.rule.fill }.is_inside(winding)
+        let is_even_odd = is_unsigned || self.rule.is_even_odd(body);
+        if is_even_odd { Fill::EvenOdd } else { self.rule.fill }.is_inside(winding)
     }
 
     /// Returns the bodies that hold the point, with the winding numbers about them.
@@ -329,9 +340,10 @@ impl<'a> Position<'a> {
         self.windings.iter().find(|&&(other, _)| other == body).map_or(0, |&(_, winding)| winding)
     }
 
-    /// Returns true if a body is cut out of others, however its facets face.
-    pub(crate) fn is_cut_out(&self, body: u32) -> bool {
-        self.rule.is_cutter(body)
+    /// Returns true if the direction of a body's facets counts: it is not cut out of others, and
+    /// neither its format nor this row fills it by even-odd.
+    pub(crate) fn has_signs(&self, body: u32) -> bool {
+        !self.rule.is_cutter(body) && !self.rule.is_even_odd(body) && !self.unsigned.contains(&body)
     }
 
     /// Returns the bodies whose winding numbers are not zero.

@@ -53,13 +53,19 @@ impl DecimalMesh {
             low = std::array::from_fn(|axis| low[axis].min(vertex[axis]));
             high = std::array::from_fn(|axis| high[axis].max(vertex[axis]));
         }
-        let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-        std::array::from_fn(|axis| {
-            // Below zero if the mesh surrounds the origin.
-            let nearest = low[axis].max(-high[axis]);
-            if nearest.is_finite() && nearest > FAR * size { low[axis] } else { 0.0 }
-        })
+        offset_of(low, high)
     }
+}
+
+/// Returns the least coordinates of a box along axes where it is far away, and zero along the
+/// others.
+pub(crate) fn offset_of(low: [f64; 3], high: [f64; 3]) -> [f64; 3] {
+    let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    std::array::from_fn(|axis| {
+        // Below zero if the box surrounds the origin.
+        let nearest = low[axis].max(-high[axis]);
+        if nearest.is_finite() && nearest > FAR * size { low[axis] } else { 0.0 }
+    })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use lamp_brep::{BodyFault, BrepError, BrepFinding, KernelDifference};
 use lamp_stack::{FileFormat, Length, one_line};
 use thiserror::Error;
 
+use crate::contours::ContourFault;
 use crate::three_mf::ThreeMfError;
 
 /// The reason why a part cannot be sliced.
@@ -36,7 +37,7 @@ pub enum SliceError {
         size: u64,
     },
     /// The file has another format.
-    #[error("this is {0}, not an STL, STEP, 3MF or OBJ file")]
+    #[error("this is {0}, neither an STL, STEP, 3MF or OBJ file nor contours")]
     OtherFormat(FileFormat),
     /// The file is a ZIP archive but not a 3MF package.
     #[error(
@@ -90,6 +91,16 @@ pub enum SliceError {
         line: u64,
         /// The fault there.
         fault: ObjFault,
+    },
+    /// A contour file or a layout cannot be read.
+    #[error("{place} of {format} {fault}")]
+    Contours {
+        /// The format, with an article.
+        format: FileFormat,
+        /// The place in the file.
+        place: String,
+        /// The fault there.
+        fault: ContourFault,
     },
     /// A 3MF file cannot be read.
     #[error(transparent)]

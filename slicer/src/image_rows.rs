@@ -224,8 +224,7 @@ pub(crate) fn by_body(
         shared.add(position, here - column);
         for &(body, winding) in position.windings() {
             // Cutters may face either way.
-            let is_doubtful = winding != outward && !position.is_cut_out(body);
-            if is_doubtful && !position.unsigned().contains(&body) {
+            if winding != outward && position.has_signs(body) {
                 let doubts = doubts.of_bodies.entry(body).or_default();
                 doubts.add(outward * winding, here - column);
             }

@@ -222,7 +222,7 @@ impl<'a> PieceMarks<'a> {
     fn of(piece: &'a Piece) -> io::Result<Self> {
         let painted = piece.marks.as_ref().map_or(&[][..], |marks| &marks.painted);
         let (colors, faces) = match &piece.facets {
-            Facets::Memory(_) => {
+            Facets::Memory(_) | Facets::Prisms(_) => {
                 let marks = piece.marks.as_ref();
                 (marks.map(|marks| marks.colors.clone()).unwrap_or_default(), Vec::new())
             }

@@ -14,6 +14,7 @@ use lamp_stack::{FORMAT_BYTES, FileFormat, Length, PartFormat, digest_of, one_li
 
 use crate::archive::not_three_mf;
 use crate::ascii;
+use crate::contours::{self, Opened};
 use crate::error::SliceError;
 use crate::obj;
 use crate::obj_colors::ObjColors;
@@ -67,10 +68,12 @@ pub struct OpenOptions {
     /// Whether colors and painted regions of 3MF and OBJ files are kept, so that
     /// [`Part::surface`] knows them. Other formats have them at hand.
     pub keep_marks: bool,
+    /// The thickness of each mask of a layout, which states none.
+    pub mask_thickness: Length,
 }
 
 impl Default for OpenOptions {
-    /// LAMP's own kernel, 5 um and 300 s; bodies must be closed.
+    /// LAMP's own kernel, 5 um and 300 s; bodies must be closed. Masks are 100 um thick.
     fn default() -> Self {
         Self {
             kernel: KernelName::Lamp,
@@ -79,13 +82,14 @@ impl Default for OpenOptions {
             allow_gaps: false,
             trust_extent: false,
             keep_marks: false,
+            mask_thickness: Length::from_um(100.0),
         }
     }
 }
 
 impl Part {
-    /// Opens an STL, STEP, 3MF or OBJ file, or one of these compressed with gzip. The content
-    /// determines the format. A pipe is read to its end.
+    /// Opens an STL, STEP, 3MF or OBJ file, contours (CLI, SVG, DXF) or a layout (GDSII, SVG, DXF),
+    /// or one of these compressed with gzip. The content determines the format. A pipe is read to its end.
     ///
     /// A binary STL must not change while the part is in use; [`check_unchanged`] checks this.
     ///
@@ -138,7 +142,7 @@ impl Part {
             },
         };
         let part = Self::new(name, contents.pieces, digest);
-        let part = part.with(contents.notes, options.trust_extent);
+        let part = part.with(contents.notes, options.trust_extent).with_layers(contents.layers_mm);
         if part.facet_count() == 0 { Err(SliceError::NoFacets) } else { Ok(part) }
     }
 
@@ -179,7 +183,7 @@ fn unpacked(
     start: &[u8],
     options: &OpenOptions,
 ) -> Result<Contents, SliceError> {
-    let of_one = |piece, notes| Contents { pieces: vec![piece], notes };
+    let of_one = |piece, notes| Contents { pieces: vec![piece], notes, layers_mm: None };
     let format = FileFormat::of_start(start, Some(file.size()));
     // A binary STL may hold any bytes, even the bytes of a package.
     let is_counted = format == Some(FileFormat::Part(PartFormat::BinaryStl));
@@ -192,7 +196,7 @@ fn unpacked(
             let mut bytes = Vec::new();
             file.reader().read_to_end(&mut bytes)?;
             let prepared = read_good(&bytes.into(), options)?;
-            Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new() })
+            Ok(Contents { pieces: Piece::of_bodies(prepared), notes: Vec::new(), layers_mm: None })
         }
         Some(FileFormat::Part(PartFormat::Obj)) => {
             let colors = || options.keep_marks.then(|| ObjColors::new(file.folder()));
@@ -208,6 +212,16 @@ fn unpacked(
             let (facets, notes) = stl::open(file, start)?;
             Ok(of_facets(facets, notes))
         }
+        Some(FileFormat::Part(
+            kind @ (PartFormat::Cli | PartFormat::Svg | PartFormat::Dxf | PartFormat::Gdsii),
+        )) => match contours::read(file, kind, options.mask_thickness)? {
+            Ok(Opened { pieces, layers_mm, notes }) => {
+                Ok(Contents { pieces, notes, layers_mm: Some(layers_mm) })
+            }
+            Err((place, fault)) => {
+                Err(SliceError::Contours { format: FileFormat::Part(kind), place, fault })
+            }
+        },
         Some(FileFormat::Part(PartFormat::Gzip)) => {
             Err(SliceError::OtherFormat(FileFormat::Archive("a doubly packed file")))
         }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lamp_brep::Prepared;
-use lamp_stack::{digest_of, digest_of_digests};
+use lamp_stack::{Length, digest_of, digest_of_digests};
 
 use crate::bodies::{Bodies, FillRule, Join};
 use crate::error::SliceError;
@@ -13,6 +13,7 @@ use crate::facet::Facet;
 use crate::fill::Fill;
 use crate::piece::{Facets, Piece};
 use crate::placement::Placement;
+use crate::planes::LayerHeights;
 use crate::read_note::ReadNote;
 
 /// A part: its name and its facets, from one or several files with one or many bodies. A binary STL
@@ -28,6 +29,8 @@ pub struct Part {
     bodies: Bodies,
     notes: Vec<ReadNote>,
     trusts_extent: bool,
+    /// The boundaries of the layers that its files state, in millimeters.
+    layers_mm: Option<Vec<f64>>,
 }
 
 impl Part {
@@ -41,7 +44,26 @@ impl Part {
         let block_ends = pieces.iter().map(end).collect();
         let name = name.to_owned();
         let (bodies, notes) = (Bodies::default(), Vec::new());
-        Self { name, pieces, block_ends, digest, bodies, notes, trusts_extent: false }
+        let (trusts_extent, layers_mm) = (false, None);
+        Self { name, pieces, block_ends, digest, bodies, notes, trusts_extent, layers_mm }
+    }
+
+    /// Adds the boundaries of the layers that its file states, in millimeters.
+    pub(crate) fn with_layers(self, layers_mm: Option<Vec<f64>>) -> Self {
+        Self { layers_mm, ..self }
+    }
+
+    /// Returns the layers that its files state, if it has a placement: the layers of contours, and
+    /// the masks of layouts. Files with different layers state none together, nor does a part that
+    /// is tilted or turned over.
+    ///
+    /// # Errors
+    /// Returns an error if there are more layers than any machine builds.
+    pub fn stated_layers(&self, placement: &Placement) -> Result<Option<LayerHeights>, SliceError> {
+        let Some(layers_mm) = &self.layers_mm else { return Ok(None) };
+        let Some(layers_mm) = placement.heights_mm(layers_mm) else { return Ok(None) };
+        let um = layers_mm.into_iter().map(|mm| Length::from_mm(mm).um());
+        LayerHeights::new(um.collect()).map(Some)
     }
 
     /// Adds notes on skipped contents of the file, and whether its extent is trusted.
@@ -115,6 +137,10 @@ impl Part {
         let notes = models.iter().flat_map(|model| model.notes.clone()).collect();
         let trusts_extent = models.iter().any(|model| model.trusts_extent);
         let bodies = models.first().map_or_else(Bodies::default, |model| model.bodies);
+        let layers_mm = models.first().and_then(|model| model.layers_mm.clone());
+        let layers_mm = layers_mm.filter(|first| {
+            models.iter().all(|model| is_cutter(model) || model.layers_mm.as_ref() == Some(first))
+        });
         let mut pieces = Vec::new();
         for model in models {
             // Files are numbered from 0 in each part.
@@ -122,7 +148,8 @@ impl Part {
             let of_model = model.pieces.into_iter();
             pieces.extend(of_model.map(|piece| Piece { file: files + piece.file, ..piece }));
         }
-        Self::new(&name, pieces, digest).with(notes, trusts_extent).with_bodies(bodies)
+        let part = Self::new(&name, pieces, digest).with(notes, trusts_extent);
+        part.with_bodies(bodies).with_layers(layers_mm)
     }
 
     /// Places the part among others, after its file's units were applied. Slicing scales, turns and
@@ -132,6 +159,7 @@ impl Part {
         for piece in &mut self.pieces {
             piece.placement = piece.placement.then(placement);
         }
+        self.layers_mm = self.layers_mm.and_then(|layers| placement.heights_mm(&layers));
         self
     }
 

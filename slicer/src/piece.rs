@@ -10,9 +10,11 @@ use crate::binary_stl::{FACET_BYTES, HEADER_BYTES, parse};
 use crate::bodies::{BodyRole, BodyRule, Join};
 use crate::facet::{Facet, Units, rounded};
 use crate::file_blocks::{BLOCK_FACETS, FileBlock};
+use crate::fill::Fill;
 use crate::marks::FacetMarks;
 use crate::part_file::OpenPartFile;
 use crate::placement::Placement;
+use crate::prisms::Prisms;
 
 /// Facets of surfaces are fewer and cost more, and every thread should have some.
 const BLOCK_SURFACE_FACETS: usize = 128;
@@ -38,6 +40,8 @@ pub(crate) struct Piece {
     pub(crate) role: BodyRole,
     /// How its file joins the other files.
     pub(crate) join: Join,
+    /// The rule of its format, which counts in place of [`Fill::Solid`].
+    pub(crate) fill: Option<Fill>,
     /// The marks of its facets, if they were read.
     pub(crate) marks: Option<Arc<FacetMarks>>,
 }
@@ -55,14 +59,15 @@ impl Piece {
             object: 0,
             role: BodyRole::default(),
             join: Join::default(),
+            fill: None,
             marks: None,
         }
     }
 
     /// Returns the rule by which it counts.
     pub(crate) fn rule(&self) -> BodyRule {
-        let Self { file, object, role, join, .. } = *self;
-        BodyRule { file, object, role, join }
+        let Self { file, object, role, join, fill, .. } = *self;
+        BodyRule { file, object, role, join, is_even_odd: fill == Some(Fill::EvenOdd) }
     }
 
     /// Returns true if the facets are read from their file again at each use.
@@ -116,6 +121,8 @@ pub(crate) enum Facets {
         count: usize,
     },
     Memory(Arc<Vec<Facet>>),
+    /// The facets of polygons between heights.
+    Prisms(Arc<Prisms>),
     /// The facets of a body.
     Surfaces {
         prepared: Arc<Prepared>,
@@ -128,6 +135,7 @@ impl Facets {
         match self {
             Self::Binary { count, .. } => *count,
             Self::Memory(facets) => facets.len(),
+            Self::Prisms(prisms) => prisms.count(),
             Self::Surfaces { facets, .. } => facets.len(),
         }
     }
@@ -159,6 +167,7 @@ impl Facets {
     ) -> io::Result<()> {
         match self {
             Self::Memory(facets) => facets[range].iter().for_each(each),
+            Self::Prisms(prisms) => prisms.for_each(range, each),
             Self::Surfaces { prepared, facets } => {
                 let mesh = &prepared.mesh;
                 let facets = &mesh.facets[facets.clone()][range];

@@ -117,6 +117,13 @@ impl Placement {
         a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1) < 0.0
     }
 
+    /// Returns placed heights, in millimeters. `None` if they depend on x or y, or fall.
+    pub(crate) fn heights_mm(&self, heights_mm: &[f64]) -> Option<Vec<f64>> {
+        let [x, y, z, shift] = self.rows[2];
+        let is_upright = x == 0.0 && y == 0.0 && z > 0.0;
+        is_upright.then(|| heights_mm.iter().map(|height| z * height + shift).collect())
+    }
+
     /// Returns a placed point, in millimeters.
     pub fn at(&self, point_mm: [f64; 3]) -> [f64; 3] {
         self.rows.map(|row| affine(&row, point_mm))

@@ -431,7 +431,7 @@ impl Planes {
 
 /// Returns the heights that divide vertices above planes from vertices below, at most a tolerance
 /// away from the planes. No vertex is on two planes, and no plane touches both a part's bottom and
-/// top.
+/// top. A part that begins within a given layer, but as near its plane as rounding, begins there.
 fn sides(
     z_um: &[f64],
     boundaries_um: &[f64],
@@ -439,9 +439,14 @@ fn sides(
     rule: PlaneRule,
     tolerance: Length,
 ) -> Vec<f64> {
+    let is_near = |distance_um: f64| distance_um <= tolerance.um();
     let side = |(&z, layer): (&f64, &[f64])| {
+        let begins_there = bottom_um > layer[0] && is_near(z - bottom_um) && !is_near(top_um - z);
+        let ends_there = top_um < layer[1] && is_near(top_um - z) && !is_near(z - bottom_um);
         let room_um = match rule {
+            PlaneRule::Top | PlaneRule::Middle if begins_there => z - layer[0],
             PlaneRule::Top | PlaneRule::Middle => z - layer[0].max(bottom_um),
+            PlaneRule::Bottom if ends_there => layer[1] - z,
             PlaneRule::Bottom => layer[1].min(top_um) - z,
         };
         let tolerance_um = tolerance.um().min(0.5 * room_um.max(0.0));

@@ -85,6 +85,28 @@ pub enum ReadNote {
         /// The number of faces.
         faces: u64,
     },
+    /// Contents of a contour file or a layout that have no area, or are not read.
+    LeftOut {
+        /// Their name, of one and of several.
+        what: [&'static str; 2],
+        /// Their number.
+        count: u64,
+    },
+    /// The masks of a layout, which are pages.
+    Masks {
+        /// Their names, from page 0.
+        names: Vec<String>,
+    },
+    /// Cells of a GDSII library that no other cell places.
+    TopCells {
+        /// The number of cells.
+        cells: usize,
+    },
+    /// A drawing that states no unit.
+    NoUnit {
+        /// The unit that is taken.
+        taken: &'static str,
+    },
     /// A file of an OBJ's materials that cannot be read, so that their colors are unknown.
     NoMaterials {
         /// Its name in the OBJ.
@@ -96,8 +118,17 @@ pub enum ReadNote {
 const MAX_WORDS: usize = 8;
 /// The greatest number of characters of a word that a note quotes.
 const MAX_CHARACTERS: usize = 40;
+/// The number of masks that a note names.
+const MAX_MASKS: usize = 32;
 
 impl ReadNote {
+    /// Adds a note on contents that are left out, if there are any.
+    pub(crate) fn leave_out(notes: &mut Vec<Self>, what: [&'static str; 2], count: u64) {
+        if count > 0 {
+            notes.push(Self::LeftOut { what, count });
+        }
+    }
+
     /// Counts a statement that is skipped.
     pub(crate) fn count_statement(notes: &mut Vec<Self>, statement: &[u8]) {
         let quoted = String::from_utf8_lossy(statement);
@@ -211,6 +242,29 @@ impl fmt::Display for ReadNote {
             }
             Self::FewCorners { faces } => {
                 write!(f, "{faces} faces with fewer than three corners are left out")
+            }
+            Self::LeftOut { what: [what, _], count: 1 } => write!(f, "1 {what} is left out"),
+            Self::LeftOut { what: [_, what], count } => {
+                write!(f, "{count} {what} are left out")
+            }
+            Self::Masks { names } => {
+                let shown = names.iter().take(MAX_MASKS).enumerate();
+                let name = |name: &String| -> String {
+                    one_line(name).chars().take(MAX_CHARACTERS).collect()
+                };
+                let shown: Vec<_> =
+                    shown.map(|(page, of)| format!("mask {page} is {}", name(of))).collect();
+                write!(f, "{}", shown.join(", "))?;
+                match names.len().saturating_sub(MAX_MASKS) {
+                    0 => Ok(()),
+                    more => write!(f, ", and {more} more in ascending order"),
+                }
+            }
+            Self::TopCells { cells } => {
+                write!(f, "no cell places {cells} cells: they are built together, as they lie")
+            }
+            Self::NoUnit { taken } => {
+                write!(f, "the drawing states no unit: its numbers are read as {taken}")
             }
             Self::NoMaterials { file } => {
                 let file: String = one_line(file).chars().take(MAX_CHARACTERS).collect();

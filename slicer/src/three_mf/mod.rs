@@ -13,7 +13,7 @@ mod project;
 mod slices;
 #[cfg(test)]
 mod tests;
-mod xml;
+pub(crate) mod xml;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
@@ -27,7 +27,7 @@ use error::MAX_VISITS;
 use model::{Object, ObjectReference, ObjectShape, PackageModel};
 use package::{Package, without_root};
 use project::{PROJECT_FILES, Project, UNREAD_FILES, VolumeKind};
-use slices::Prisms;
+use slices::SliceSolid;
 use xml::BoundedText;
 
 pub use error::{ModelFault, ThreeMfError};
@@ -44,6 +44,8 @@ const SAME_VOLUME: f64 = 0.05;
 pub(crate) struct Contents {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) notes: Vec<ReadNote>,
+    /// The boundaries of the layers that the file states, in millimeters.
+    pub(crate) layers_mm: Option<Vec<f64>>,
 }
 
 /// Reads a file's items, and the marks of their facets if they are kept.
@@ -84,7 +86,7 @@ pub(crate) fn read(file: &OpenPartFile, keep_marks: bool) -> Result<Contents, Th
     if models.project.plates > 1 {
         notes.push(ReadNote::Plates { plates: models.project.plates });
     }
-    Ok(Contents { pieces: found.pieces, notes })
+    Ok(Contents { pieces: found.pieces, notes, layers_mm: None })
 }
 
 /// The pieces of the items read so far.
@@ -312,14 +314,14 @@ impl Models<'_> {
             None if is_stand_in => return Err(failed("a coarse mesh and no slices instead of it")),
             None => None,
             Some(stack) => {
-                let prisms = self.prisms(path, stack)?.map_err(failed)?;
-                let is_mesh = !is_stand_in && self.has_volume(path, id, prisms.volume)?;
+                let solid = self.slice_solid(path, stack)?.map_err(failed)?;
+                let is_mesh = !is_stand_in && self.has_volume(path, id, solid.volume)?;
                 let of_kind = if is_mesh { &mut left_out.slices } else { &mut left_out.stand_ins };
                 of_kind.insert(key.clone());
                 (!is_mesh).then(|| Piece {
                     first_facet: self.facets,
                     units: Some(self.models[path].units),
-                    ..prisms.mesh.into_piece()
+                    ..solid.drawing.into_pieces().swap_remove(0)
                 })
             }
         };
@@ -329,16 +331,16 @@ impl Models<'_> {
     }
 
     /// Returns the slices of a stack and of the stacks that it refers to, or their fault.
-    fn prisms(
+    fn slice_solid(
         &mut self,
         path: &str,
         stack: u32,
-    ) -> Result<Result<Prisms, &'static str>, ThreeMfError> {
+    ) -> Result<Result<SliceSolid, &'static str>, ThreeMfError> {
         const LOST: &str = "slices that are not there";
         let most = self.package.most;
-        let mut prisms = Prisms::default();
+        let mut solid = SliceSolid::new();
         let Some(stack) = self.get(path)?.slice_stacks.get(&stack) else { return Ok(Err(LOST)) };
-        if let Err(fault) = prisms.add(stack, most) {
+        if let Err(fault) = solid.add(stack, most) {
             return Ok(Err(fault));
         }
         for (target, number) in stack.references.clone() {
@@ -346,11 +348,11 @@ impl Models<'_> {
             let Some(stack) = self.get(&path)?.slice_stacks.get(&number) else {
                 return Ok(Err(LOST));
             };
-            if let Err(fault) = prisms.add(stack, most) {
+            if let Err(fault) = solid.add(stack, most) {
                 return Ok(Err(fault));
             }
         }
-        Ok(if prisms.volume > 0.0 { Ok(prisms) } else { Err("slices without area") })
+        Ok(if solid.volume > 0.0 { Ok(solid) } else { Err("slices without area") })
     }
 
     /// Returns true if an object has about this volume, in units of its file, or consists of other

@@ -7,7 +7,8 @@ use quick_xml::events::BytesStart;
 
 use super::error::ModelFault;
 use super::xml::{attribute, number, numbers};
-use crate::decimal_mesh::DecimalMesh;
+use crate::fill::Fill;
+use crate::prisms::Drawing;
 
 /// Slices, from below.
 #[derive(Debug, Default)]
@@ -102,15 +103,19 @@ impl Slice {
 }
 
 /// Slices converted to a solid: a prism for each polygon.
-#[derive(Debug, Default)]
-pub(super) struct Prisms {
-    pub(super) mesh: DecimalMesh,
+#[derive(Debug)]
+pub(super) struct SliceSolid {
+    pub(super) drawing: Drawing,
     pub(super) volume: f64,
-    facets: u64,
+    corners: u64,
     top: Option<f64>,
 }
 
-impl Prisms {
+impl SliceSolid {
+    pub(super) fn new() -> Self {
+        Self { drawing: Drawing::new(Fill::Solid), volume: 0.0, corners: 0, top: None }
+    }
+
     /// Adds the slices of a stack. Returns the reason if this is not possible.
     pub(super) fn add(&mut self, stack: &SliceStack, most_facets: u64) -> Result<(), &'static str> {
         let mut bottom = stack.bottom;
@@ -124,41 +129,20 @@ impl Prisms {
                 return Err("slices of lines that are not closed");
             }
             self.volume += slice.area() * (slice.top - bottom);
+            let slab = self.drawing.add_slab([bottom, slice.top]);
             for polygon in &slice.polygons {
-                // A prism of n sides has 2 n facets around it and n - 2 at each end.
-                self.facets += 4 * polygon.len() as u64;
-                if self.facets > most_facets.min(u64::from(u32::MAX)) {
+                // A polygon has four facets at each corner.
+                self.corners += polygon.len() as u64;
+                let ring = polygon.iter().map(|&vertex| slice.vertices[vertex as usize]);
+                if 4 * self.corners > most_facets {
                     return Err("more slices than a package of its size can hold");
                 }
-                self.add_prism(slice, &polygon[1..], [bottom, slice.top]);
+                let added = self.drawing.add(slab, ring);
+                added.map_err(|_| "slices with coordinates that are not finite, or too many")?;
             }
             bottom = slice.top;
             self.top = Some(slice.top);
         }
         Ok(())
-    }
-
-    /// Adds a polygon between two heights. Its ends are fans of facets, which may overlap and still
-    /// have an odd number above each inner point.
-    fn add_prism(&mut self, slice: &Slice, polygon: &[u32], heights: [f64; 2]) {
-        if polygon.len() < 3 {
-            return;
-        }
-        let base = self.mesh.vertex_count() as u32;
-        for &vertex in polygon {
-            let [x, y] = slice.vertices[vertex as usize];
-            heights.iter().for_each(|&z| self.mesh.add_vertex([x, y, z]));
-        }
-        let count = polygon.len() as u32;
-        let [low, high] = [0, 1].map(|end| move |corner: u32| base + 2 * (corner % count) + end);
-        for corner in 0..count {
-            let next = corner + 1;
-            self.mesh.add_facet([low(corner), low(next), high(next)]);
-            self.mesh.add_facet([low(corner), high(next), high(corner)]);
-            if 0 < corner && next < count {
-                self.mesh.add_facet([low(0), low(next), low(corner)]);
-                self.mesh.add_facet([high(0), high(corner), high(next)]);
-            }
-        }
     }
 }

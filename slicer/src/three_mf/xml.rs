@@ -9,15 +9,15 @@ use quick_xml::{Reader, XmlVersion};
 
 use super::error::ModelFault;
 
-/// The longest tag, comment or text in XML.
+/// The longest tag, comment or text in the XML of a package.
 const MAX_XML_BYTES: usize = 4 << 20;
 
 /// A fault and its approximate byte.
-pub(super) type Located = (u64, ModelFault);
+pub(crate) type Located = (u64, ModelFault);
 
 /// A piece of XML. Elements come with their namespace; without a declaration, the prefix of their
 /// names replaces it.
-pub(super) enum Xml<'a> {
+pub(crate) enum Xml<'a> {
     Start(&'a str, &'a BytesStart<'a>),
     Text(&'a str),
     /// The end of an element of this name, without a prefix.
@@ -25,7 +25,7 @@ pub(super) enum Xml<'a> {
 }
 
 /// Calls `each` at the start and the end of every element, and with the text between.
-pub(super) fn for_each_piece(
+pub(crate) fn for_each_piece(
     text: &mut BoundedText<impl BufRead>,
     mut each: impl FnMut(Xml<'_>) -> Result<(), ModelFault>,
 ) -> Result<(), Located> {
@@ -90,12 +90,12 @@ fn name_of<'a>(namespace: &'a ResolveResult<'_>) -> &'a str {
 }
 
 /// Returns an attribute without a prefix.
-pub(super) fn attribute(tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ModelFault> {
+pub(crate) fn attribute(tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ModelFault> {
     find_attribute(tag, |key| key.as_ref() == name)
 }
 
 /// Returns an attribute of an extension, with any prefix.
-pub(super) fn prefixed_attribute(
+pub(crate) fn prefixed_attribute(
     tag: &BytesStart<'_>,
     name: &str,
 ) -> Result<Option<String>, ModelFault> {
@@ -118,7 +118,7 @@ fn find_attribute(
 }
 
 /// Returns an attribute as a number.
-pub(super) fn number<T: FromStr + Copy>(
+pub(crate) fn number<T: FromStr + Copy>(
     tag: &BytesStart<'_>,
     name: &'static str,
 ) -> Result<T, ModelFault> {
@@ -126,7 +126,7 @@ pub(super) fn number<T: FromStr + Copy>(
 }
 
 /// Returns attributes as numbers.
-pub(super) fn numbers<T: FromStr + Copy, const N: usize>(
+pub(crate) fn numbers<T: FromStr + Copy, const N: usize>(
     tag: &BytesStart<'_>,
     names: [&'static str; N],
 ) -> Result<[T; N], ModelFault> {
@@ -145,22 +145,28 @@ pub(super) fn numbers<T: FromStr + Copy, const N: usize>(
     }
 }
 
-pub(super) fn missing(tag: &BytesStart<'_>, attribute: &'static str) -> ModelFault {
+pub(crate) fn missing(tag: &BytesStart<'_>, attribute: &'static str) -> ModelFault {
     let element = tag.name().as_ref().chars().take(40).collect();
     ModelFault::Attribute { element, attribute }
 }
 
 /// A text reader that limits the memory for each tag, comment or text between tags.
-pub(super) struct BoundedText<R> {
+pub(crate) struct BoundedText<R> {
     text: R,
     /// The number of bytes read in all, and since the last event.
-    pub(super) read: u64,
+    pub(crate) read: u64,
     of_event: usize,
+    most: usize,
 }
 
 impl<R: BufRead> BoundedText<R> {
-    pub(super) fn new(text: R) -> Self {
-        Self { text, read: 0, of_event: 0 }
+    pub(crate) fn new(text: R) -> Self {
+        Self::limited(text, MAX_XML_BYTES)
+    }
+
+    /// Limits each tag, comment or text to a number of bytes.
+    pub(crate) fn limited(text: R, most: usize) -> Self {
+        Self { text, read: 0, of_event: 0, most }
     }
 
     fn begin_event(&mut self) {
@@ -178,8 +184,9 @@ impl<R: BufRead> Read for BoundedText<R> {
 
 impl<R: BufRead> BufRead for BoundedText<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.of_event > MAX_XML_BYTES {
-            return Err(io::Error::other("a tag or text is longer than four megabytes"));
+        if self.of_event > self.most {
+            let most = self.most >> 20;
+            return Err(io::Error::other(format!("a tag or text is longer than {most} megabytes")));
         }
         self.text.fill_buf()
     }

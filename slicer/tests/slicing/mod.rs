@@ -4,6 +4,7 @@
 mod closed;
 mod closed_forms;
 mod common;
+mod contours;
 mod coverage;
 mod even_rows;
 mod fill;

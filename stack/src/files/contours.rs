@@ -148,7 +148,7 @@ impl Contours {
                 )
             }
             ContourFormat::Dxf => {
-                "999\nmillimeters\n0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n0\nENDSEC\n\
+                "999\nmillimeters\n0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n\
                  0\nSECTION\n2\nENTITIES\n"
                     .to_owned()
             }

@@ -46,6 +46,14 @@ pub enum PartFormat {
     Obj,
     /// Solids in exact surfaces.
     Step,
+    /// Contours of layers in the Common Layer Interface.
+    Cli,
+    /// Contours of layers, or a flat drawing, in XML.
+    Svg,
+    /// Contours of layers, or a flat drawing, of AutoCAD as text.
+    Dxf,
+    /// A layout of masks.
+    Gdsii,
     /// A ZIP package, which may be a 3MF.
     Zip,
     /// A part in one of these formats, packed by gzip.
@@ -58,6 +66,10 @@ impl fmt::Display for FileFormat {
             Self::Part(PartFormat::BinaryStl | PartFormat::AsciiStl) => "an STL file",
             Self::Part(PartFormat::Obj) => "an OBJ file",
             Self::Part(PartFormat::Step) => "a STEP file",
+            Self::Part(PartFormat::Cli) => "a CLI file",
+            Self::Part(PartFormat::Svg) => "an SVG file",
+            Self::Part(PartFormat::Dxf) => "a DXF file",
+            Self::Part(PartFormat::Gdsii) => "a GDSII file",
             Self::Part(PartFormat::Zip) => "a ZIP archive",
             Self::Part(PartFormat::Gzip) => "a file packed with gzip",
             Self::Layers(name)
@@ -78,6 +90,8 @@ use FileFormat::{Archive, Document, Layers, Model, Pointer, PrintJob, WebPage};
 const SIGNATURES: &[(&[u8], FileFormat)] = &[
     (b"\x1F\x8B", FileFormat::Part(PartFormat::Gzip)),
     (b"PK\x03\x04", FileFormat::Part(PartFormat::Zip)),
+    (b"$$HEADERSTART", FileFormat::Part(PartFormat::Cli)),
+    (b"\0\x06\0\x02", FileFormat::Part(PartFormat::Gdsii)),
     (b"PK\x05\x06", Archive("an empty ZIP archive")),
     (b"II*\0", Layers("a TIFF file")),
     (b"II+\0", Layers("a TIFF file")),
@@ -111,7 +125,7 @@ const SIGNATURES: &[(&[u8], FileFormat)] = &[
     (b"; FBX", Model("an FBX file")),
     (b"BLENDER", Model("a Blender file")),
     (b"AC10", Model("a DWG file")),
-    (b"AutoCAD Binary DXF", Model("a DXF file")),
+    (b"AutoCAD Binary DXF", Model("a binary DXF file")),
     (b"V5_CFV2", Model("a CATIA file")),
     (b"CATIA", Model("a CATIA file")),
     (b"#UGC:2", Model("a Creo file")),
@@ -168,7 +182,7 @@ const XML_ROOTS: &[(&str, FileFormat)] = &[
     ("x3d", Model("an X3D file")),
     ("collada", Model("a COLLADA file")),
     ("model", Model("the model of a 3MF file without its package")),
-    ("svg", Document("an SVG file")),
+    ("svg", FileFormat::Part(PartFormat::Svg)),
     ("xmc", Model("an XML file of Parasolid")),
     ("document", Model("an XML file of a CAD program")),
 ];
@@ -363,8 +377,10 @@ fn of_columns(text: &[u8]) -> Option<FileFormat> {
     }
     let mut first = words(text);
     match [first.next()?, first.next().unwrap_or_default()] {
-        [b"0" | b"999", b"section"] => return Some(Model("a DXF file")),
-        [b"999", _] if has_words(text, b"section") => return Some(Model("a DXF file")),
+        [b"0" | b"999", b"section"] => return Some(FileFormat::Part(PartFormat::Dxf)),
+        [b"999", _] if has_words(text, b"section") => {
+            return Some(FileFormat::Part(PartFormat::Dxf));
+        }
         _ => {}
     }
     // Four numbers, and a line whose texts have their lengths before them.

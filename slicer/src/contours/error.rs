@@ -1,0 +1,45 @@
+//! Defines the faults of contour files and layouts.
+
+use thiserror::Error;
+
+/// A fault in a contour file or a layout.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ContourFault {
+    /// The file ends too early.
+    #[error("is the last one: the file was cut off")]
+    CutOff,
+    /// Something else stands where a word or number should be.
+    #[error("is not {0}")]
+    Malformed(&'static str),
+    /// A coordinate is infinite, not a number or beyond 32 bits.
+    #[error("has a coordinate that is not a finite number, or too large for 32 bits")]
+    NotFinite,
+    /// A polygon is not closed.
+    #[error("has a polygon whose last corner is not its first: export closed polygons")]
+    Open,
+    /// Lines do not close.
+    #[error("has {0} lines that form no closed polygon: export closed polylines")]
+    OpenLines(usize),
+    /// A polygon comes before the first layer.
+    #[error("has a polygon before the first layer")]
+    NoLayer,
+    /// Layers do not rise.
+    #[error("has a layer that is not above the layer before it")]
+    Falling,
+    /// There are too many corners.
+    #[error("makes more than {0} corners: arrays or curves are too large")]
+    TooManyCorners(usize),
+    /// Too many polygons cross themselves.
+    #[error("is one of more than {0} polygons that cross themselves: clean them first")]
+    Crossed(usize),
+    /// References nest without end, or too deep.
+    #[error("refers to {0}, which contains itself or nests too deep")]
+    Endless(String),
+    /// A reference to something that is not there.
+    #[error("refers to {0}, which is not in the file")]
+    Missing(String),
+    /// Contents that would change the picture, and are not read.
+    #[error("has {0}, which is not read")]
+    Unread(&'static str),
+}
