@@ -38,8 +38,8 @@ impl<'a> RecordedSlicing<'a> {
         keep_marks: bool,
         watcher: &dyn Watcher,
     ) -> Result<Part, Error> {
-        let reading =
-            Reading { pitch: self.settings.pitch, may_be_open: false, keep_marks, watcher };
+        let (pitch, mask) = (self.settings.pitch, self.settings.uniform_thickness());
+        let reading = Reading { pitch, may_be_open: false, keep_marks, mask, watcher };
         let model = self.settings.solid.open(parts, &reading)?;
         if model.digest() != self.digest {
             let part = name_of_all(parts);

@@ -132,7 +132,8 @@ impl SliceSettings {
         exposure: Option<RecordedExposure>,
         watcher: &dyn Watcher,
     ) -> Result<(Slices, PageWords), Error> {
-        let mut settings = self.clone();
+        let of_part = self.of_part(&model)?;
+        let mut settings = of_part.clone();
         // Records name files without folders, and the kernel that made the images: bytes must not
         // depend on where files lie.
         settings.exposure.name(exposure.as_ref());
@@ -140,14 +141,17 @@ impl SliceSettings {
         settings.solid.step.reader.kernel = settings.solid.step.reader.kernel.of_images();
         let record = SlicingRecord { parts, name: None, settings, fallback: None, machine: None };
         let exposure = exposure.map(|recorded| recorded.exposure);
-        let heights = self.layer_heights(&model, exposure.as_ref(), watcher)?;
-        let uniform = self.uniform_thickness();
-        let shading = self.shading(heights.as_ref(), exposure.as_ref())?;
+        let heights = of_part.layer_heights(&model, exposure.as_ref(), watcher)?;
+        let uniform = of_part.uniform_thickness();
+        let shading = of_part.shading(heights.as_ref(), exposure.as_ref())?;
         let memory = table_memory(memory);
         let options = SliceOptions { layers, heights, shading, memory, ..self.for_slicing() };
-        if let (Some(exposure), Some(thickness)) = (&exposure, uniform) {
-            exposure.check(thickness)?;
-            let doubts = exposure.doubts(iter::once(thickness));
+        let stated = options.heights.iter().filter(|_| of_part.thickness == (Thickness::OfPart {}));
+        let stated = stated.flat_map(LayerHeights::thicknesses_um).map(Length::from_um);
+        if let Some(exposure) = &exposure {
+            let thicknesses: Vec<_> = uniform.into_iter().chain(stated).collect();
+            thicknesses.iter().try_for_each(|thickness| exposure.check(*thickness))?;
+            let doubts = exposure.doubts(thicknesses.into_iter());
             doubts.into_iter().for_each(|doubt| watcher.remark(Remark::note(doubt)));
         }
         let slices = Slices::new(model, &options)?;
@@ -187,15 +191,23 @@ impl SliceSettings {
         })
     }
 
-    /// Finds adaptive layer heights, if requested, with notes on them.
+    /// Finds adaptive layer heights, if requested, with notes on them, or returns the layers that
+    /// the part's files state.
     fn layer_heights(
         &self,
         model: &Part,
         exposure: Option<&Exposure>,
         watcher: &dyn Watcher,
     ) -> Result<Option<LayerHeights>, Error> {
-        let Thickness::Adaptive { heights: settings, .. } = &self.thickness else {
-            return Ok(None);
+        let settings = match &self.thickness {
+            Thickness::Adaptive { heights, .. } => heights,
+            Thickness::Uniform { thickness } => {
+                // Black layers below the part and above it count.
+                let stated = model.stated_layers(&self.solid.placement())?;
+                let nm = thickness.to_whole_nm().um();
+                return Ok(stated.filter(|layers| layers.thicknesses_um().all(|um| um == nm)));
+            }
+            Thickness::OfPart {} => return Ok(model.stated_layers(&self.solid.placement())?),
         };
         let body = self.solid.body(model.clone())?;
         let part = settings.part(body, self.pitch, self.solid.fill)?;
@@ -271,9 +283,16 @@ impl SliceStage {
             pitch: settings.pitch,
             may_be_open: self.fallback.is_some(),
             keep_marks: false,
+            mask: settings.uniform_thickness(),
             watcher,
         };
         let part = settings.solid.open(parts, &reading)?;
+        let settings = &settings.of_part(&part).map_err(|error| error.at(name_of_all(parts)))?;
+        if let (Some(machine), Thickness::Uniform { .. }) = (&machine, &settings.thickness) {
+            settings
+                .check_machine(machine)
+                .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
+        }
         if self.fallback.is_some() && part.prepared().next().is_none() {
             return Err(Error::settings("--fallback needs a STEP part"));
         }
@@ -317,7 +336,7 @@ impl Slicing<'_> {
         let slices = &self.bridged.borrow().slices;
         let size = settings.solid.size(&self.part, slices.box_mm());
         let doubts = [
-            size.doubt(settings.pitch, settings.uniform_thickness()),
+            size.doubt(settings.pitch, self.pages.record.settings.uniform_thickness()),
             settings.solid.overlap_doubt(parts, slices.overlap()),
         ];
         doubts.into_iter().flatten().collect()

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use lamp_build::TurnedSlicing;
 use lamp_machine::{Defaults, Machine, MachineLimit};
-use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, PlaneRule, SliceOptions};
+use lamp_slicing::{Axis, GridRule, PLANE_TOLERANCE, Part, PlaneRule, SliceOptions};
 use lamp_stack::{Length, Pitch, Size, StackInfo, quoted};
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,12 @@ pub enum Thickness {
         #[serde(with = "text")]
         thickness: Length,
     },
+    /// As the part's file states them, as contours and layouts do, or else 100 um.
+    OfPart {},
 }
+
+/// The thickness of layers if neither a setting nor the part's file states one.
+pub(crate) const USUAL_THICKNESS: Length = Length::from_um(100.0);
 
 /// Whether layers are gray, and how their doses count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -146,7 +151,7 @@ impl Default for SliceSettings {
     fn default() -> Self {
         Self {
             pitch: Pitch::of_dpi(1500.0).expect("it is a resolution"),
-            thickness: Thickness::Uniform { thickness: Length::from_um(100.0) },
+            thickness: Thickness::OfPart {},
             plane: PlaneRule::default(),
             plane_tolerance: PLANE_TOLERANCE,
             solid: SolidSettings::default(),
@@ -248,6 +253,8 @@ impl SliceSettings {
                 machine.check_thickness(heights.max(), "the thickest layer")
             }
             Thickness::Uniform { thickness } => machine.check_thickness(*thickness, "a layer"),
+            // Known once the part is open.
+            Thickness::OfPart {} => Ok(()),
         }
     }
 
@@ -264,8 +271,24 @@ impl SliceSettings {
     pub fn uniform_thickness(&self) -> Option<Length> {
         match self.thickness {
             Thickness::Uniform { thickness } => Some(thickness),
-            Thickness::Adaptive { .. } => None,
+            Thickness::Adaptive { .. } | Thickness::OfPart {} => None,
         }
+    }
+
+    /// Returns the settings for an open part: with the usual thickness, if neither they nor the
+    /// part's files state one.
+    ///
+    /// # Errors
+    /// Returns an error if the files state too many layers.
+    #[must_use = "the settings themselves stay"]
+    pub fn of_part(&self, part: &Part) -> Result<Self, Error> {
+        let mut settings = self.clone();
+        if self.thickness == (Thickness::OfPart {})
+            && part.stated_layers(&self.solid.placement())?.is_none()
+        {
+            settings.thickness = Thickness::Uniform { thickness: USUAL_THICKNESS };
+        }
+        Ok(settings)
     }
 
     /// Returns the files that the settings name.
@@ -286,7 +309,7 @@ impl SliceSettings {
         let is_gray = self.gray != GrayRule::None;
         let heights = match &self.thickness {
             Thickness::Adaptive { heights, .. } => Some(heights),
-            Thickness::Uniform { .. } => None,
+            Thickness::Uniform { .. } | Thickness::OfPart {} => None,
         };
         let needs_top = [(is_gray, "--gray"), (heights.is_some(), "--adaptive")];
         if let Some((_, option)) = needs_top.iter().find(|(given, _)| *given)

@@ -69,8 +69,8 @@ impl SlicedPart {
         if !is_part {
             return Ok(None);
         }
-        let reading =
-            Reading { pitch: slicing.pitch, may_be_open: false, keep_marks: false, watcher };
+        let (pitch, mask) = (slicing.pitch, slicing.uniform_thickness());
+        let reading = Reading { pitch, may_be_open: false, keep_marks: false, mask, watcher };
         let file = PartFile { path: path.to_owned(), placement: None };
         let model = slicing.solid.open(std::slice::from_ref(&file), &reading)?;
         Ok(Some(Self { file, model, settings: slicing.clone() }))

@@ -8,7 +8,7 @@ use lamp_slicing::{
     Bodies, FacetIndex, Fill, Join, OpenOptions, Part, Placement, SliceError, SurfaceError,
     SurfaceName, Units,
 };
-use lamp_stack::Pitch;
+use lamp_stack::{Length, Pitch};
 use serde::{Deserialize, Serialize};
 
 use crate::documents::is_stream;
@@ -16,6 +16,7 @@ use crate::error::{Error, ErrorKind};
 use crate::part_file::{PartFile, PartPlacement, paths};
 use crate::placement::PlacementSettings;
 use crate::size::PartSize;
+use crate::slice_settings::USUAL_THICKNESS;
 use crate::step::{StepSettings, notes};
 use crate::watcher::{Remark, Watcher};
 use crate::words::{parts, text};
@@ -155,6 +156,7 @@ impl SolidSettings {
             allow_gaps: reading.may_be_open,
             trust_extent: self.trust_extent,
             keep_marks: reading.keep_marks,
+            mask_thickness: reading.mask.unwrap_or(USUAL_THICKNESS),
             ..self.step.reader.for_opening(tolerance)?
         };
         let model = match is_stream(path) {
@@ -163,7 +165,7 @@ impl SolidSettings {
         };
         // After opening: only the content shows whether a file states its unit.
         if self.units != Units::default() && model.states_unit() {
-            let why = "a STEP or 3MF file states its own unit: leave out --units";
+            let why = "the file states its own unit: leave out --units";
             return Err(Error::settings(why));
         }
         // Crossings move onto the surfaces, but where faces meet, facets decide.
@@ -192,6 +194,8 @@ pub struct Reading<'a> {
     pub may_be_open: bool,
     /// Whether colors and painted regions of facets are kept.
     pub keep_marks: bool,
+    /// The thickness of each mask of a layout; `None` is the usual.
+    pub mask: Option<Length>,
     /// Takes notes about the files.
     pub watcher: &'a dyn Watcher,
 }

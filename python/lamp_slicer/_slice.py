@@ -75,15 +75,16 @@ def slice(
 ) -> Layers:
     """Slices a part into layers. A pixel is white exactly if its center is inside the section.
 
-    `part` is the path of an STL, STEP, 3MF or OBJ file, a list of paths that share one coordinate
-    system, `(vertices, faces)`, or an object that has both, such as a mesh of trimesh. Coordinates
-    of a mesh are in `units` and are rounded to 32 bits, as in an STL.
+    `part` is the path of an STL, STEP, 3MF, OBJ, CLI, SVG, DXF or GDSII file, a list of paths that
+    share one coordinate system, `(vertices, faces)`, or an object that has both, such as a mesh of
+    trimesh. Coordinates of a mesh are in `units` and are rounded to 32 bits, as in an STL.
 
     The keywords are the options of `lamp slice`, which `lamp slice --help` describes:
 
     dpi: resolution in dots per inch, or how far pixels are apart, "14x19um"; 1500, or the
         machine's.
-    thickness: thickness of the layers; "100um", or the machine's.
+    thickness: thickness of the layers; the machine's, or the file's for contours and masks, or
+        else "100um".
     name: the part's name in its stack; its file's name.
     machine: "alpha", "beta" or a file: its limits and defaults hold.
     layers: only these layers, such as range(100, 200).

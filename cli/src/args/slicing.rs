@@ -29,11 +29,12 @@ pub(crate) struct SlicingArgs {
     #[arg(default_value_t = SliceSettings::default().pitch)]
     dpi: Pitch,
 
-    /// Layer thickness, for example 100um, 0.1mm, 4mil or 0.004in
+    /// Layer thickness: 100um, 0.1mm or 4mil [default: as in the file, or 100um]
+    ///
+    /// Contours and masks of layouts have their own layers. Other files state none
     #[arg(long, alias = "layer-height", value_name = "LENGTH", value_parser = parse_thickness)]
-    #[arg(default_value = "100um")]
     #[arg(allow_hyphen_values = true, conflicts_with = "adaptive")]
-    thickness: Length,
+    thickness: Option<Length>,
 
     /// Height in each layer at which the part is cut
     #[arg(long, value_parser = one_of::<PlaneRule>(), default_value_t)]
@@ -107,7 +108,7 @@ pub(crate) struct SlicingArgs {
 /// The part to slice, and the options of slicing.
 #[derive(Args, Clone)]
 pub(crate) struct SliceStageArgs {
-    /// The part: STL, STEP, 3MF or OBJ files, plain or gzipped, or - for standard input
+    /// The part: STL, STEP, 3MF, OBJ, CLI, SVG, DXF or GDSII files, or - for standard input
     ///
     /// Several files share one coordinate system; FILE@X,Y,Z,DEGREES turns a file about z and then
     /// moves it. Overlapping files are united; --subtract and --intersect cut them
@@ -161,9 +162,10 @@ impl TryFrom<&SlicingArgs> for SliceSettings {
         }
         Ok(Self {
             pitch: args.dpi,
-            thickness: match args.adaptive {
-                true => Thickness::Adaptive { adaptive: true, heights },
-                false => Thickness::Uniform { thickness: args.thickness },
+            thickness: match (args.adaptive, args.thickness) {
+                (true, _) => Thickness::Adaptive { adaptive: true, heights },
+                (false, Some(thickness)) => Thickness::Uniform { thickness },
+                (false, None) => Thickness::OfPart {},
             },
             plane: args.plane,
             plane_tolerance: args.plane_tolerance,

@@ -91,8 +91,13 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
     exposure.map_or(Ok(()), Exposure::check_light)?;
     settings.check(exposure)?;
     let progress = Progress::new("heights", common, true);
-    let reading =
-        Reading { pitch: args.dpi, may_be_open: false, keep_marks: false, watcher: &progress };
+    let reading = Reading {
+        pitch: args.dpi,
+        may_be_open: false,
+        keep_marks: false,
+        mask: None,
+        watcher: &progress,
+    };
     let model = solid.open(&args.parts, &reading)?;
     let body = solid.body(model.clone());
     let (files, _) = solid.files(&args.parts);

@@ -104,7 +104,7 @@ fn slicing(error: &SliceError) -> Option<String> {
             ThreeMfError::NothingToBuild { .. } => "give items to build the type part",
             _ => "export the part again",
         },
-        SliceError::Obj { .. } => "export the part again",
+        SliceError::Obj { .. } | SliceError::Contours { .. } => "export the part again",
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::NothingLeft { .. } => "export the part again",
         SliceError::TooManyFacets { .. } => "export it with fewer facets",

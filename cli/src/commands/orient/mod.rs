@@ -111,6 +111,7 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
         pitch: args.dpi.into(),
         may_be_open: false,
         keep_marks: false,
+        mask: None,
         watcher: &progress,
     };
     let part = solid.open(&args.parts, &reading)?;
