@@ -225,7 +225,7 @@ impl<R: BufRead> DxfReader<R> {
         self.layers.len() - 1
     }
 
-    fn into_block(&mut self) -> &mut Block {
+    fn current_block(&mut self) -> &mut Block {
         self.blocks.entry(self.block.clone()).or_default()
     }
 
@@ -235,7 +235,7 @@ impl<R: BufRead> DxfReader<R> {
         match entity.name.as_str() {
             "BLOCK" => {
                 self.block = entity.text(2).unwrap_or_default().to_ascii_uppercase();
-                self.into_block().base = entity.point(10)?;
+                self.current_block().base = entity.point(10)?;
                 return Ok(());
             }
             "ENDBLK" => {
@@ -244,7 +244,7 @@ impl<R: BufRead> DxfReader<R> {
             }
             "SEQEND" => {
                 if let Some(line) = self.polyline.take() {
-                    self.into_block().lines.push(line);
+                    self.current_block().lines.push(line);
                 }
                 return Ok(());
             }
@@ -351,7 +351,7 @@ impl<R: BufRead> DxfReader<R> {
                     steps: [entity.number_or(44, 0.0)?, entity.number_or(45, 0.0)?],
                     is_mirrored: entity.is_mirrored()?,
                 };
-                self.into_block().inserts.push(insert);
+                self.current_block().inserts.push(insert);
                 return Ok(());
             }
             "SPLINE" => return Err(ContourFault::Unread("a spline: export it as a polyline")),
@@ -367,7 +367,7 @@ impl<R: BufRead> DxfReader<R> {
                 *corner = [-corner[0], corner[1], -corner[2]];
             }
         }
-        self.into_block().lines.push(line);
+        self.current_block().lines.push(line);
         Ok(())
     }
 
@@ -492,7 +492,7 @@ impl Flat<'_> {
             if ring.iter().flatten().any(|number| !number.is_finite()) {
                 return Err(ContourFault::NotFinite);
             }
-            // What is on layer 0 of a block is on the block's layer.
+            // Contents of a block on layer 0 are on the layer of the block.
             let layer = match place.layer {
                 Some(layer) if line.layer == 0 => layer,
                 _ => line.layer,

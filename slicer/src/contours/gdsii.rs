@@ -240,9 +240,9 @@ impl<R: BufRead> GdsReader<R> {
             _ => {
                 let Some(element) = element else { return Ok(true) };
                 match kind {
-                    record::LAYER => element.layer = short()? as u16 as u32,
+                    record::LAYER => element.layer = u32::from(short()? as u16),
                     record::DATATYPE | record::BOXTYPE => {
-                        element.datatype = short()? as u16 as u32;
+                        element.datatype = u32::from(short()? as u16);
                     }
                     record::WIDTH => {
                         element.width = integers::<4>(data).next().ok_or_else(wrong)? as f64;

@@ -29,7 +29,7 @@ const PIXEL_MM: f64 = 25.4 / 96.0;
 /// x and y of a point are sums of these coefficients times x, y and 1.
 type Matrix = [[f64; 3]; 2];
 
-/// What shapes inherit from their groups.
+/// The settings that shapes inherit from their groups.
 #[derive(Clone)]
 struct Group {
     to_mm: Matrix,
@@ -154,7 +154,7 @@ impl SvgReader {
         }
         let rings = self.rings(name, tag, &group.to_mm)?;
         if let Some(rings) = rings {
-            self.add(tag, &group, rings)?;
+            self.add(tag, &group, &rings)?;
         }
         // Shapes may contain titles and the like.
         self.groups.push(group);
@@ -203,7 +203,7 @@ impl SvgReader {
         &mut self,
         tag: &BytesStart<'_>,
         group: &Group,
-        rings: Vec<Ring>,
+        rings: &[Ring],
     ) -> Result<(), ContourFault> {
         if rings.iter().all(|ring| ring.len() < 3) {
             return Ok(());
@@ -227,7 +227,7 @@ impl SvgReader {
                 self.left_out[NO_FILL] += 1;
                 Ok(())
             }
-            _ => self.pages.drawing.add_shape(slab, &rings, group.rule),
+            _ => self.pages.drawing.add_shape(slab, rings, group.rule),
         }
     }
 
