@@ -288,9 +288,15 @@ impl SliceStage {
         };
         let part = settings.solid.open(parts, &reading)?;
         let settings = &settings.of_part(&part).map_err(|error| error.at(name_of_all(parts)))?;
-        if let (Some(machine), Thickness::Uniform { .. }) = (&machine, &settings.thickness) {
-            settings
-                .check_machine(machine)
+        if let Some(machine) = &machine {
+            let stated = part.stated_layers(&settings.solid.placement())?;
+            let stated = stated.iter().flat_map(LayerHeights::thicknesses_um).map(Length::from_um);
+            let uniform = settings.uniform_thickness();
+            let is_of_part = settings.thickness == Thickness::OfPart {};
+            // The settings alone were checked above.
+            let mut thicknesses = uniform.into_iter().chain(stated.filter(|_| is_of_part));
+            thicknesses
+                .try_for_each(|thickness| machine.check_thickness(thickness, "a layer"))
                 .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
         }
         if self.fallback.is_some() && part.prepared().next().is_none() {
