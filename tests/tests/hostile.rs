@@ -26,8 +26,9 @@ fn survives(target: &str, entry: fn(&[u8])) {
         let cuts = (0..bytes.len().min(160)).chain((160..bytes.len()).step_by(97));
         cuts.for_each(|end| entry(&bytes[..end]));
     }
-    // Preparing a part takes milliseconds.
-    let mutations = if target == "step" { mutations() / 10 } else { mutations() };
+    // Preparing a part takes milliseconds, and arrays of cells take seconds.
+    let mutations =
+        if matches!(target, "step" | "contours") { mutations() / 10 } else { mutations() };
     for number in 0..mutations {
         let mut numbers = SplitMix(number);
         let mut bytes = seeds[numbers.below(seeds.len())].bytes.clone();
@@ -50,6 +51,11 @@ fn no_stl_makes_the_slicer_panic_or_contradict_itself() {
 #[test]
 fn no_obj_makes_the_slicer_panic_or_contradict_itself() {
     survives("obj", hostile::obj);
+}
+
+#[test]
+fn no_contours_make_the_slicer_panic_or_contradict_itself() {
+    survives("contours", hostile::contours);
 }
 
 #[test]

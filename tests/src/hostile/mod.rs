@@ -56,6 +56,14 @@ pub fn obj(bytes: &[u8]) {
     part(bytes);
 }
 
+/// Reads bytes as contours or a layout, as `part` says.
+///
+/// # Panics
+/// If that does not hold.
+pub fn contours(bytes: &[u8]) {
+    part(bytes);
+}
+
 /// Reads bytes as a 3MF package, and as the model of one, as `part` says.
 ///
 /// # Panics

@@ -42,6 +42,7 @@ pub fn seeds() -> Vec<Seed> {
         .into_iter()
         .map(of("stl"))
         .chain(objs().into_iter().map(of("obj")))
+        .chain(contours().into_iter().map(of("contours")))
         .chain(three_mfs().into_iter().map(of("three_mf")))
         .chain(steps().into_iter().map(of("step")))
         .chain(tiff().into_iter().map(of("tiff")))
@@ -185,6 +186,76 @@ fn objs() -> Named {
         ("packed_stl.gz", gzip(&binary(&ball))),
         ("packed_twice.gz", gzip(&gzip(obj.as_bytes()))),
         ("blanks.gz", gzip(&vec![b' '; 1 << 20])),
+    ]
+}
+
+fn contours() -> Named {
+    let cli = "$$HEADERSTART\n$$ASCII\n$$UNITS/0.5\n$$LABEL/1,a\n$$HEADEREND\n$$GEOMETRYSTART\n\
+               $$LAYER/2\n$$POLYLINE/1,1,5,0,0,9,0,9,9,0,9,0,0\n$$POLYLINE/1,0,4,3,3,3,6,6,6,3,3\n\
+               $$LAYER/4\n// a // $$POLYLINE/1,2,2,0,0,1,1\n$$HATCHES/1,1,0,0,1,1\n$$GEOMETRYEND\n";
+    let mut binary = b"$$HEADERSTART\n$$BINARY\n$$UNITS/1\n$$USERDATA/a,2,xy\n$$HEADEREND".to_vec();
+    binary.extend([128, 0, 2, 0, 129, 0, 1, 0, 1, 0, 4, 0]);
+    binary.extend([0u16, 0, 9, 0, 9, 9, 0, 0].iter().flat_map(|number| number.to_le_bytes()));
+    binary.extend([127, 0, 0, 0, 0x80, 0x40, 130, 0, 1, 0, 0, 0, 1, 0, 0, 0, 4, 0, 0, 0]);
+    binary.extend([0f32, 0.0, 7.0, 0.0, 7.0, 7.0, 0.0, 0.0].iter().flat_map(|it| it.to_le_bytes()));
+    let svg = "<svg xmlns:slic3r=\"a\" width=\"9mm\" height=\"9mm\" viewBox=\"0 0 9 9\">\n\
+               <g slic3r:z=\"1\"><polygon slic3r:type=\"contour\" points=\"0,0 9,0 9,9\"/>\n\
+               <polygon slic3r:type=\"hole\" points=\"4,1 8,1 8,4\"/></g>\n\
+               <g slic3r:z=\"2.5\" slic3r:layer-height=\"1\"/></svg>\n";
+    let drawing = "<svg viewBox=\"0 0 20 20\" width=\"2cm\"><defs/><style/>\n\
+                   <g inkscape:groupmode=\"layer\" transform=\"rotate(9 1 2) scale(1,.5)\">\n\
+                   <path style=\"fill-rule:evenodd\" d=\"M1 1h8v8H1zm2 2l4,0-.5 4z\"/>\n\
+                   <path d=\"M9 9c1 0 2 1 2 3s-1 3-2 3q-3 0-3-3t3-3a2 3 9 0 1 1 1z\"/></g>\n\
+                   <rect x=\"1\" y=\"12\" width=\"5\" height=\"3\" rx=\"1\"/><circle r=\"3\"/></svg>\n";
+    let dxf = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n\
+               0\nBLOCK\n8\n0\n2\nA\n10\n1\n20\n1\n0\nCIRCLE\n8\n0\n10\n2\n20\n2\n40\n1\n0\nENDBLK\n\
+               0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nINSERT\n8\nb\n2\nA\n41\n2\n70\n2\n44\n9\n\
+               0\nLINE\n8\nc\n10\n0\n20\n0\n11\n4\n21\n0\n0\nARC\n8\nc\n10\n2\n20\n0\n40\n2\n50\n0\n51\n180\n\
+               0\nLWPOLYLINE\n8\nc\n70\n1\n10\n9\n20\n0\n42\n1\n10\n7\n20\n5\n10\n5\n20\n9\n\
+               0\nPOLYLINE\n8\nd\n70\n1\n0\nVERTEX\n10\n0\n20\n0\n0\nVERTEX\n10\n5\n20\n0\n0\nVERTEX\n\
+               10\n0\n20\n5\n0\nSEQEND\n0\nENDSEC\n0\nEOF\n";
+    let record = |kind: u8, of: u8, data: &[u8]| {
+        [&(data.len() as u16 + 4).to_be_bytes()[..], &[kind, of], data].concat()
+    };
+    let longs = |numbers: &[i32]| -> Vec<u8> {
+        numbers.iter().flat_map(|number| number.to_be_bytes()).collect()
+    };
+    // A thousandth of a unit, which is a millimeter: 1/16 to the power of 2 and so on.
+    let units = [[0x3E, 0x41, 0x89, 0x37, 0x4B, 0xC6, 0xA7, 0xF0]; 2].concat();
+    let gdsii = [
+        record(0x00, 2, &[2, 0x58]),
+        record(0x03, 5, &units),
+        record(0x05, 2, &[0; 24]),
+        record(0x06, 6, b"A\0"),
+        record(0x08, 0, &[]),
+        record(0x0D, 2, &[0, 1]),
+        record(0x10, 3, &longs(&[0, 0, 9, 0, 9, 9, 0, 0])),
+        record(0x11, 0, &[]),
+        record(0x09, 0, &[]),
+        record(0x21, 2, &[0, 1]),
+        record(0x0F, 3, &longs(&[2])),
+        record(0x10, 3, &longs(&[0, 0, 7, 0, 7, 8])),
+        record(0x11, 0, &[]),
+        record(0x07, 0, &[]),
+        record(0x05, 2, &[0; 24]),
+        record(0x06, 6, b"B\0"),
+        record(0x0B, 0, &[]),
+        record(0x12, 6, b"A\0"),
+        record(0x1A, 1, &[0x80, 0]),
+        record(0x13, 2, &[0, 2, 0, 3]),
+        record(0x10, 3, &longs(&[0, 0, 20, 0, 0, 30])),
+        record(0x11, 0, &[]),
+        record(0x07, 0, &[]),
+        record(0x04, 0, &[]),
+    ]
+    .concat();
+    vec![
+        ("layers.cli", cli.into()),
+        ("binary.cli", binary),
+        ("layers.svg", svg.into()),
+        ("drawing.svg", drawing.into()),
+        ("drawing.dxf", dxf.into()),
+        ("cells.gds", gdsii),
     ]
 }
 
