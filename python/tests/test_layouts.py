@@ -31,7 +31,8 @@ def layout(tmp_path_factory):
     top = library.new_cell("TOP")
     top.add(gdstk.Reference(leaf, (0, 0), columns=3, rows=2, spacing=(60, 90)))
     top.add(gdstk.Reference(leaf, (250, 40), math.radians(33), 1.7, True))
-    top.add(gdstk.Reference(leaf, (-100, 20), math.pi / 2, 0.5, columns=2, rows=3, spacing=(40, 50)))
+    grid = {"columns": 2, "rows": 3, "spacing": (40, 50)}
+    top.add(gdstk.Reference(leaf, (-100, 20), math.pi / 2, 0.5, **grid))
     path = tmp_path_factory.mktemp("layout") / "layout.gds"
     library.write_gds(path)
     return path
