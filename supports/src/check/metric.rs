@@ -22,23 +22,33 @@ impl Metric {
 
     /// Returns the square of the distance of two pixels, given their columns and rows between.
     #[inline]
-    pub(super) fn squared(self, columns: u32, rows: u32) -> f64 {
+    pub(crate) fn squared(self, columns: u32, rows: u32) -> f64 {
         self.place([columns, rows].map(f64::from)).map(|side| side * side).iter().sum()
     }
 
     /// Returns a column and a row in widths.
     #[inline]
-    pub(super) fn place(self, [column, row]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn place(self, [column, row]: [f64; 2]) -> [f64; 2] {
         [column, row * self.height]
     }
 
     /// Returns a length in columns and in rows.
-    pub(super) fn pixels(self, length: f64) -> [f64; 2] {
+    pub(crate) fn pixels(self, length: f64) -> [f64; 2] {
         [length, length / self.height]
     }
 
     /// Returns the longer side of a pixel.
     pub(crate) fn longer_side(self) -> f64 {
         self.height.max(1.0)
+    }
+
+    /// Returns the shorter side of a pixel.
+    pub(crate) fn shorter_side(self) -> f64 {
+        self.height.min(1.0)
+    }
+
+    /// Returns the area of a pixel.
+    pub(crate) fn pixel_area(self) -> f64 {
+        self.height
     }
 }

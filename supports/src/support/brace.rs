@@ -16,7 +16,7 @@ use super::pillar::{BASE_HEIGHT_MM, TIP_LENGTH_MM};
 use super::rod::Rod;
 use super::window::Raster;
 use super::{Support, SupportError, SupportOptions, SupportPlan};
-use crate::check::Findings;
+use crate::check::{Findings, Metric};
 
 /// The height of a column in diameters from which it needs braces (15 mm for 1 mm in
 /// `PrusaSlicer`, as `max_solo_pillar_height_mm`).
@@ -74,7 +74,8 @@ pub fn plan_braces<E: From<SupportError>>(
     let pillars = plan.supports().filter(|it| it.is_pillar());
     let columns: Vec<Column> = pillars.filter_map(column).collect();
     let mut braces = zigzags(&columns);
-    let clearance = options.pillar.clearance.pixels(raster.dpi).max(1.0);
+    let metric = raster.metric();
+    let clearance = raster.widths(options.pillar.clearance).max(metric.longer_side());
     let highest = braces.iter().map(|brace| brace.rod.heights()[1].mm()).fold(f64::MIN, f64::max);
     for (facts, layer) in found.layers.iter().zip(layers) {
         let [bottom, thickness] =
@@ -92,7 +93,7 @@ pub fn plan_braces<E: From<SupportError>>(
             // At 45 degrees a section moves aside by the layer's thickness, and is √2 diameters long:
             // half of it rests on the one below.
             let is_steady = thickness <= FRAC_1_SQRT_2 * brace.rod.diameters[0].mm();
-            is_steady && !meets(&brace.rod.section(middle, &raster), &mask, clearance)
+            is_steady && !meets(&brace.rod.section(middle, &raster), &mask, clearance, metric)
         });
     }
     let braced: BTreeSet<usize> = braces.iter().flat_map(|brace| brace.columns).collect();
@@ -102,9 +103,9 @@ pub fn plan_braces<E: From<SupportError>>(
     Ok(())
 }
 
-/// Returns whether white is within a distance in pixels of a section.
-fn meets(section: &WhiteRuns, mask: &Mask, distance: f64) -> bool {
-    section.iter().any(|(row, run)| is_white_near(mask, *row, run, distance))
+/// Returns whether white is within a distance of a section.
+fn meets(section: &WhiteRuns, mask: &Mask, distance: f64, metric: Metric) -> bool {
+    section.iter().any(|(row, run)| is_white_near(mask, *row, run, distance, metric))
 }
 
 /// Returns the column of a pillar, if it has one.

@@ -1,6 +1,5 @@
 //! Reasons that no supports can be planned.
 
-use lamp_stack::NotSquare;
 use thiserror::Error;
 
 use super::plan::MOST_SUPPORTS;
@@ -12,9 +11,6 @@ pub enum SupportError {
     /// The pages do not say how large pixels are.
     #[error("the stack has no resolution, so it cannot be compared with the part")]
     NoResolution,
-    /// Pixels are not square.
-    #[error(transparent)]
-    NotSquare(#[from] NotSquare),
     /// The pages do not say where the images lie in the part.
     #[error("the stack does not state where its images are in the part")]
     NoOrigin,

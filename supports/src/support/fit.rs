@@ -80,11 +80,11 @@ impl IslandSurroundings<'_> {
             Some(column) => section(&rods[leaning..], column),
             None => WhiteRuns::new(),
         };
-        let pitch = self.raster.dpi.pitch().mm();
+        let (width, metric) = (self.raster.width_mm(), self.raster.metric());
         for number in junction..self.layer {
             let section = section(&rods[..leaning], number);
             let depth = self.middle(self.layer).mm() - self.middle(number).mm();
-            let clear = (clearance_mm.min(depth) / pitch).max(1.0);
+            let clear = (clearance_mm.min(depth) / width).max(metric.longer_side());
             let is_beyond = depth > self.contact_depth_mm;
             if is_beyond
                 && section.iter().any(|(row, run)| self.is_white_near(number, *row, run, clear))
@@ -99,9 +99,10 @@ impl IslandSurroundings<'_> {
     }
 
     fn is_white_near(&self, number: u32, row: u32, run: &Range<u32>, distance: f64) -> bool {
-        let far = distance.floor() as u32;
+        let metric = self.raster.metric();
+        let [_, far] = metric.pixels(distance).map(|pixels| pixels.floor() as u32);
         (row.saturating_sub(far)..=row.saturating_add(far)).any(|near| {
-            let aside = (distance.powi(2) - f64::from(near.abs_diff(row)).powi(2)).max(0.0).sqrt();
+            let aside = (distance.powi(2) - metric.squared(0, near.abs_diff(row))).max(0.0).sqrt();
             let aside = aside as u32;
             let run = run.start.saturating_sub(aside)..run.end.saturating_add(aside);
             self.window.white_in(number, near, &run).next().is_some()
@@ -139,10 +140,10 @@ impl IslandSurroundings<'_> {
         radius_mm: f64,
     ) -> Result<(), Rejection> {
         let [_, thickness] = self.span_mm(number);
-        let pitch = self.raster.dpi.pitch().mm();
+        let pixel = self.raster.pitch.long_side().mm();
         // Images are off the surface by up to a pixel and a layer, and the surface off the
         // contact's plane.
-        let slack = radius_mm / 4.0 + pitch + thickness * contact.normal[2].abs();
+        let slack = radius_mm / 4.0 + pixel + thickness * contact.normal[2].abs();
         let outside = |column: u32, row: u32| {
             let [x, y] = self.raster.place_mm([column, row].map(|place| f64::from(place) + 0.5));
             dot(sub([x, y, middle.mm()], contact.at_mm), contact.normal)

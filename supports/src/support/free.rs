@@ -5,7 +5,7 @@ use std::ops::Range;
 use lamp_stack::{Mask, Op, white_runs};
 
 use super::divide::WhiteRuns;
-use crate::check::{Region, without};
+use crate::check::{Metric, Region, without};
 
 /// The white of the layers so far, seen from below.
 #[derive(Debug, Default)]
@@ -29,26 +29,36 @@ impl WhiteBelow {
         Some(())
     }
 
-    /// Returns the pixels of a region whose centers are not within a distance in pixels of the
-    /// center of a pixel that is white in some layer.
-    pub(super) fn free_columns(&self, region: &Region, distance: f64) -> FreeColumns {
+    /// Returns the pixels of a region whose centers are not within a distance of the center of a
+    /// pixel that is white in some layer.
+    pub(super) fn free_columns(
+        &self,
+        region: &Region,
+        distance: f64,
+        metric: Metric,
+    ) -> FreeColumns {
         let mut runs = WhiteRuns::new();
         let mut left = Vec::new();
         for row in region.rows.clone() {
             left.clear();
             left.push(region.columns.clone());
             if let Some(white) = &self.all {
-                remote(white, row, distance, &mut left);
+                remote(white, row, distance, metric, &mut left);
             }
             runs.extend(left.drain(..).map(|run| (row, run)));
         }
         FreeColumns { runs }
     }
 
-    /// Returns whether no white of the lowest layers is within a distance in pixels of a pixel.
-    pub(super) fn is_base_free(&self, [column, row]: [u32; 2], distance: f64) -> bool {
+    /// Returns whether no white of the lowest layers is within a distance of a pixel.
+    pub(super) fn is_base_free(
+        &self,
+        [column, row]: [u32; 2],
+        distance: f64,
+        metric: Metric,
+    ) -> bool {
         let run = column..column + 1;
-        self.low.as_ref().is_none_or(|white| !is_white_near(white, row, &run, distance))
+        self.low.as_ref().is_none_or(|white| !is_white_near(white, row, &run, distance, metric))
     }
 }
 
@@ -74,10 +84,16 @@ impl FreeColumns {
     }
 }
 
-/// Keeps what of runs of a row is not nearer to white than a distance in pixels.
-pub(super) fn remote(white: &Mask, row: u32, distance: f64, runs: &mut Vec<Range<u32>>) {
+/// Keeps what of runs of a row is not nearer to white than a distance.
+pub(super) fn remote(
+    white: &Mask,
+    row: u32,
+    distance: f64,
+    metric: Metric,
+    runs: &mut Vec<Range<u32>>,
+) {
     let mut next = Vec::new();
-    for (near, reach) in rows_within(white, row, distance) {
+    for (near, reach) in rows_within(white, row, distance, metric) {
         if runs.is_empty() {
             return;
         }
@@ -87,9 +103,15 @@ pub(super) fn remote(white: &Mask, row: u32, distance: f64, runs: &mut Vec<Range
     }
 }
 
-/// Returns whether white is nearer to a run of a row than a distance in pixels.
-pub(super) fn is_white_near(white: &Mask, row: u32, run: &Range<u32>, distance: f64) -> bool {
-    rows_within(white, row, distance).any(|(near, reach)| {
+/// Returns whether white is nearer to a run of a row than a distance.
+pub(super) fn is_white_near(
+    white: &Mask,
+    row: u32,
+    run: &Range<u32>,
+    distance: f64,
+    metric: Metric,
+) -> bool {
+    rows_within(white, row, distance, metric).any(|(near, reach)| {
         let run = run.start.saturating_sub(reach)..run.end.saturating_add(reach);
         let mut others = white_runs(white.row(near), white.width());
         others.any(|(start, end)| start < run.end && run.start < end)
@@ -97,13 +119,18 @@ pub(super) fn is_white_near(white: &Mask, row: u32, run: &Range<u32>, distance: 
 }
 
 /// Returns the rows that hold pixels nearer than a distance, and how many columns aside.
-fn rows_within(white: &Mask, row: u32, distance: f64) -> impl Iterator<Item = (u32, u32)> {
+fn rows_within(
+    white: &Mask,
+    row: u32,
+    distance: f64,
+    metric: Metric,
+) -> impl Iterator<Item = (u32, u32)> {
     // The margin takes up the rounding of a distance of whole pixels.
     let limit = distance * distance * (1.0 - 1e-9);
-    let most = distance.ceil() as u32;
+    let [_, most] = metric.pixels(distance).map(|pixels| pixels.ceil() as u32);
     let rows = row.saturating_sub(most)..row.saturating_add(most + 1).min(white.height());
     rows.filter_map(move |near| {
-        let square = limit - f64::from(near.abs_diff(row)).powi(2);
+        let square = limit - metric.squared(0, near.abs_diff(row));
         let reach = square.max(0.0).sqrt();
         // A pixel at just the distance is not nearer.
         let whole = if reach.fract() == 0.0 { reach - 1.0 } else { reach.floor() };
@@ -113,7 +140,7 @@ fn rows_within(white: &Mask, row: u32, distance: f64) -> impl Iterator<Item = (u
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::MaskBuilder;
+    use lamp_stack::{MaskBuilder, Pitch};
     use proptest::prelude::*;
 
     use super::*;
@@ -136,20 +163,24 @@ mod tests {
         fn columns_are_free_if_no_white_is_near(
             layers in prop::collection::vec(prop::collection::vec([0..SIZE, 0..SIZE], 0..4), 1..4),
             distance in 0.2f64..6.0,
+            pitch in prop::sample::select(vec!["14um", "14x19um", "19x14um"]),
         ) {
+            let pitch: Pitch = pitch.parse().unwrap();
+            let (metric, [x_um, y_um]) = (Metric::of(Some(pitch)), pitch.um());
             for distance in [distance, distance.ceil()] {
                 let mut below = WhiteBelow::default();
                 layers.iter().for_each(|pixels| below.add(&image(pixels), true).unwrap());
                 let region = Region { columns: 2..20, rows: 1..23 };
-                let free = below.free_columns(&region, distance);
+                let free = below.free_columns(&region, distance, metric);
                 for (row, column) in (1..23).flat_map(|row| (2..20).map(move |column| (row, column))) {
                     let far = |[x, y]: &[u32; 2]| {
-                        let square = x.abs_diff(column).pow(2) + y.abs_diff(row).pow(2);
-                        f64::from(square) >= distance * distance * (1.0 - 1e-9)
+                        let x_um = f64::from(x.abs_diff(column)) * x_um;
+                        let y_um = f64::from(y.abs_diff(row)) * y_um;
+                        x_um.hypot(y_um) >= distance * pitch.um()[0] * (1.0 - 1e-9)
                     };
                     let is_free = layers.iter().flatten().all(far);
                     prop_assert_eq!(free.holds([column, row]), is_free, "{} {}", column, row);
-                    prop_assert_eq!(below.is_base_free([column, row], distance), is_free);
+                    prop_assert_eq!(below.is_base_free([column, row], distance, metric), is_free);
                 }
             }
         }

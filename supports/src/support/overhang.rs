@@ -11,7 +11,7 @@ use super::free::{WhiteBelow, remote};
 use super::plan::{MOST_SUPPORTS, SupportPlanner};
 use super::window::SupportWindow;
 use super::{HeldPlace, SupportError};
-use crate::check::{Region, Standing};
+use crate::check::{Metric, Region, Standing};
 
 /// The fewest pixels of an overhang in a cell: fewer may come of rounding to pixels.
 const LEAST_AREA: u64 = 9;
@@ -38,11 +38,12 @@ impl SupportPlanner<'_> {
     ) -> Result<Vec<HeldPlace>, SupportError> {
         let Some(angle) = self.options.overhangs else { return Ok(Vec::new()) };
         let limit_mm = self.thickness_mm(layer) / angle.to_radians().tan();
-        let limit = limit_mm / self.raster.dpi.pitch().mm();
+        let limit = limit_mm / self.raster.width_mm();
         // Smaller cells than pieces need pixels would leave all without a support.
-        let cell = self.options.spacing.pixels(self.raster.dpi).max(3.0) as u32;
+        let cell =
+            self.raster.pitch.pixels(self.options.spacing).map(|pixels| pixels.max(3.0) as u32);
         let mut places = Vec::new();
-        for piece in pieces(standing.mask(), under, limit, cell) {
+        for piece in pieces(standing.mask(), under, limit, cell, self.raster.metric()) {
             let [column, row] = piece.middle.map(|place| place as u32);
             let component = standing.component_at([column, row]);
             let [x, y] = self.raster.place_mm(piece.middle);
@@ -75,9 +76,15 @@ impl SupportPlanner<'_> {
     }
 }
 
-/// Divides the white that is farther than `limit` pixels from the white of the image under it by
-/// cells of an even grid.
-fn pieces(mask: &Mask, under: &Mask, limit: f64, cell: u32) -> Vec<IslandPiece> {
+/// Divides the white that is farther than `limit` from the white of the image under it by cells of
+/// an even grid, of so many columns and rows.
+fn pieces(
+    mask: &Mask,
+    under: &Mask,
+    limit: f64,
+    [wide, high]: [u32; 2],
+    metric: Metric,
+) -> Vec<IslandPiece> {
     let mut cells: BTreeMap<[u32; 2], WhiteRuns> = BTreeMap::new();
     let mut far: Vec<Range<u32>> = Vec::new();
     // A pixel at just the limit is held.
@@ -85,15 +92,15 @@ fn pieces(mask: &Mask, under: &Mask, limit: f64, cell: u32) -> Vec<IslandPiece> 
     for row in 0..mask.height() {
         far.clear();
         far.extend(white_runs(mask.row(row), mask.width()).map(|(start, end)| start..end));
-        remote(under, row, limit, &mut far);
+        remote(under, row, limit, metric, &mut far);
         for run in &far {
-            for column in run.start / cell..=(run.end - 1) / cell {
-                let part = run.start.max(column * cell)..run.end.min((column + 1) * cell);
-                cells.entry([row / cell, column]).or_default().push((row, part));
+            for column in run.start / wide..=(run.end - 1) / wide {
+                let part = run.start.max(column * wide)..run.end.min((column + 1) * wide);
+                cells.entry([row / high, column]).or_default().push((row, part));
             }
         }
     }
-    let pieces = cells.into_values().map(piece);
+    let pieces = cells.into_values().map(|runs| piece(runs, metric));
     pieces.filter(|piece| piece.area >= LEAST_AREA).collect()
 }
 
@@ -109,7 +116,7 @@ fn region_of(runs: &WhiteRuns) -> Region {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::MaskBuilder;
+    use lamp_stack::{MaskBuilder, Pitch};
     use proptest::prelude::*;
 
     use super::*;
@@ -141,21 +148,25 @@ mod tests {
         fn pieces_hold_the_pixels_that_are_far_from_white(
             (above, below) in (boxes(), boxes()),
             limit in 0.5f64..6.0,
-            cell in 1u32..12,
+            cell in prop::array::uniform2(1u32..12),
+            pitch in prop::sample::select(vec!["14um", "14x19um", "19x14um"]),
         ) {
+            let pitch: Pitch = pitch.parse().unwrap();
+            let [x_um, y_um] = pitch.um();
             for limit in [limit, limit.floor()] {
                 let (mask, under) = (image(&above), image(&below));
                 let mut cells = std::collections::BTreeMap::new();
                 for (row, column) in (0..SIZE).flat_map(|row| (0..SIZE).map(move |column| (row, column))) {
                     let is_near = (0..SIZE).any(|y| (0..SIZE).any(|x| {
-                        let square = x.abs_diff(column).pow(2) + y.abs_diff(row).pow(2);
-                        under.is_white(x, y) && f64::from(square) <= limit * limit + 1e-9
+                        let away_um = (f64::from(x.abs_diff(column)) * x_um)
+                            .hypot(f64::from(y.abs_diff(row)) * y_um);
+                        under.is_white(x, y) && away_um <= limit * x_um + 1e-9
                     }));
                     if mask.is_white(column, row) && !is_near {
-                        *cells.entry([row / cell, column / cell]).or_insert(0) += 1;
+                        *cells.entry([row / cell[1], column / cell[0]]).or_insert(0) += 1;
                     }
                 }
-                let found = pieces(&mask, &under, limit, cell);
+                let found = pieces(&mask, &under, limit, cell, Metric::of(Some(pitch)));
                 let areas: Vec<u64> = cells.into_values().filter(|area| *area >= LEAST_AREA).collect();
                 prop_assert_eq!(found.iter().map(|piece| piece.area).collect::<Vec<_>>(), areas);
             }

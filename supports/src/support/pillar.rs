@@ -57,10 +57,10 @@ impl SupportPlanner<'_> {
         self.bottom_mm(layer) < self.bottom_mm(0) + BASE_HEIGHT_MM
     }
 
-    /// Returns the distance in pixels from a column's axis in which all must be black.
+    /// Returns the distance from a column's axis, in widths of a pixel, in which all must be black.
     pub(super) fn column_clearance(&self) -> f64 {
         let sizes = &self.options.pillar;
-        (sizes.diameter.mm() / 2.0 + sizes.clearance.mm()) / self.raster.dpi.pitch().mm()
+        (sizes.diameter.mm() / 2.0 + sizes.clearance.mm()) / self.raster.width_mm()
     }
 
     /// Returns where pillars of white in a region may stand, if they are asked for.
@@ -74,13 +74,13 @@ impl SupportPlanner<'_> {
         }
         let [aside, _] = self.reach_mm();
         let region = self.grown(region, aside);
-        let free = below.free_columns(&region, self.column_clearance());
+        let free = below.free_columns(&region, self.column_clearance(), self.raster.metric());
         Some(PillarGround { below, free, tip: self.options.pillar.tip, may_touch: false })
     }
 
     /// Returns the diameter of equal tips that cover a number of pixels.
     pub(super) fn tip_for(&self, pixels: f64, tips: usize) -> Length {
-        let area = pixels * self.raster.dpi.pitch().mm().powi(2) / tips as f64;
+        let area = pixels * self.raster.pitch.pixel_mm2() / tips as f64;
         // Some reach beyond an edge of the island.
         Length::from_mm(1.05 * (4.0 * area / PI).sqrt())
     }
@@ -122,7 +122,8 @@ impl SupportPlanner<'_> {
         });
         let off = |[column, row]: [u32; 2]| {
             let [x, y] = [column, row].map(|place| f64::from(place) + 0.5);
-            (x - piece.middle[0]).powi(2) + (y - piece.middle[1]).powi(2)
+            let [x, y] = self.raster.metric().place([x - piece.middle[0], y - piece.middle[1]]);
+            x.powi(2) + y.powi(2)
         };
         let mut free: Vec<[u32; 2]> = free.collect();
         free.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
@@ -172,8 +173,8 @@ impl SupportPlanner<'_> {
             Length::from_um(base + share * (column - base))
         };
         let has_room = |base: &Length| {
-            let distance = (base.mm() / 2.0 + sizes.clearance.mm()) / self.raster.dpi.pitch().mm();
-            ground.below.is_base_free(pixel, distance)
+            let distance = (base.mm() / 2.0 + sizes.clearance.mm()) / self.raster.width_mm();
+            ground.below.is_base_free(pixel, distance, self.raster.metric())
         };
         let base = (0..BASE_STEPS).map(width).find(has_room).unwrap_or(sizes.diameter);
         // Bases end at the bottom of a layer: sections between two rods are in just one of them.

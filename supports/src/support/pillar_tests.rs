@@ -8,13 +8,17 @@ use proptest::test_runner::RngSeed;
 use super::*;
 use crate::check::{CheckError, CheckOptions, Findings, Island, check};
 
-/// 254 dpi: a pixel is 0.1 mm, as thick as a layer.
-const DPI: f64 = 254.0;
+/// A pixel is 0.1 mm, as thick as a layer.
+const SQUARE: &str = "100um";
+
+fn pitch(text: &str) -> Pitch {
+    text.parse().unwrap()
+}
 
 /// Pixels by layer, row and column.
 type Voxels = Vec<Vec<Vec<bool>>>;
 
-fn layers(voxels: &Voxels) -> Vec<Layer> {
+fn layers(voxels: &Voxels, pitch: Pitch) -> Vec<Layer> {
     let layer = |(index, rows): (usize, &Vec<Vec<bool>>)| {
         let mut mask = MaskBuilder::new(rows[0].len() as u32);
         for row in rows {
@@ -26,10 +30,10 @@ fn layers(voxels: &Voxels) -> Vec<Layer> {
             index: index as u32,
             z_um: Some(100.0 * index as f64),
             thickness_um: Some(100.0),
-            origin_mm: Some([0.0, rows.len() as f64 / 10.0]),
+            origin_mm: Some([0.0, rows.len() as f64 * pitch.mm()[1]]),
             ..PageInfo::default()
         };
-        Layer { info, pitch: Pitch::of_dpi(DPI), image: mask.finish().into() }
+        Layer { info, pitch: Some(pitch), image: mask.finish().into() }
     };
     voxels.iter().enumerate().map(layer).collect()
 }
@@ -77,17 +81,19 @@ fn supported(part: &[Layer], options: &SupportOptions) -> (SupportPlan, Vec<Laye
     // Edits refuse a rod without a length.
     assert!(plan.rods().all(|rod| rod.ends[0] != rod.ends[1]));
     let mut voxels = voxels(part);
+    let pitch = part[0].pitch.unwrap();
+    let [wide, high] = pitch.mm();
     for (number, rows) in voxels.iter_mut().enumerate() {
         let z = 0.1 * number as f64 + 0.05;
         let height = rows.len();
         for rod in plan.rods() {
             for (row, column) in pixels(rows) {
-                let at = [0.1 * (column as f64 + 0.5), 0.1 * ((height - row) as f64 - 0.5), z];
+                let at = [wide * (column as f64 + 0.5), high * ((height - row) as f64 - 0.5), z];
                 rows[row][column] |= is_in(rod, at);
             }
         }
     }
-    let drawn = self::layers(&voxels);
+    let drawn = self::layers(&voxels, pitch);
     (plan, drawn)
 }
 
@@ -115,8 +121,8 @@ fn is_in(rod: &Rod, at: Vec3) -> bool {
     (0.0..1.0).contains(&share) && length(away) < a + share * (b - a)
 }
 
-/// Whether a pixel of an island has a column below it that is free of white.
-fn has_free_column(island: &Island, part: &Voxels, distance: f64) -> bool {
+/// Whether a pixel of an island has a column below it that is free of white within a distance.
+fn has_free_column(island: &Island, part: &Voxels, pitch: Pitch, distance_mm: f64) -> bool {
     let layer = island.layer as usize;
     let rows = &part[layer];
     let (mut left, mut seen) = (vec![island.first.map(|at| at as usize)], vec![]);
@@ -130,8 +136,9 @@ fn has_free_column(island: &Island, part: &Voxels, distance: f64) -> bool {
     let is_free = |[column, row]: &[usize; 2]| {
         part[..layer].iter().all(|rows| {
             pixels(rows).all(|(y, x)| {
-                let off = (x.abs_diff(*column).pow(2) + y.abs_diff(*row).pow(2)) as f64;
-                !rows[y][x] || off >= distance * distance
+                let [wide, high] = pitch.mm();
+                let off = (wide * x.abs_diff(*column) as f64).hypot(high * y.abs_diff(*row) as f64);
+                !rows[y][x] || off >= distance_mm - 1e-9
             })
         })
     };
@@ -161,13 +168,17 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 48, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
-    fn islands_with_a_free_column_are_held(part in blocks()) {
+    fn islands_with_a_free_column_are_held(
+        part in blocks(),
+        text in prop::sample::select(vec![SQUARE, "100x136um", "118x87um"]),
+    ) {
         let options = small();
-        let stack = layers(&part);
+        let pitch = pitch(text);
+        let stack = layers(&part, pitch);
         let (plan, drawn) = supported(&stack, &options);
         for plan in &plan.islands {
             // A radius and the clearance.
-            prop_assert!(plan.stands || !has_free_column(&plan.island, &part, 3.0), "{plan:?}");
+            prop_assert!(plan.stands || !has_free_column(&plan.island, &part, pitch, 0.3), "{plan:?}");
         }
         let after = found_in(&drawn);
         let left: Vec<u32> = plan.islands.iter().filter(|it| it.is_left()).map(|it| it.island.layer).collect();
@@ -188,7 +199,8 @@ proptest! {
         for (end, rods) in rods {
             for (number, rows) in part[..end].iter().enumerate() {
                 for (row, column) in pixels(rows) {
-                    let at = [column as f64 + 0.5, 59.5 - row as f64, number as f64 + 0.5].map(|at| 0.1 * at);
+                    let [wide, high] = pitch.mm();
+                    let at = [wide * (column as f64 + 0.5), high * (59.5 - row as f64), 0.1 * (number as f64 + 0.5)];
                     if rods.iter().any(|rod| is_in(rod, at)) {
                         prop_assert!(drawn[number][row][column]);
                         let near = [[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]].map(|[x, y]| {
@@ -216,7 +228,7 @@ fn an_island_above_a_plate_gets_a_pillar_from_beside_it() {
     fill(&mut part, [[20, 36], [20, 36], [0, 3]]);
     // 0.4 mm inside the plate's edge, 2 mm above it.
     fill(&mut part, [[26, 32], [26, 32], [25, 30]]);
-    let (plan, _) = supported(&layers(&part), &small());
+    let (plan, _) = supported(&layers(&part, pitch(SQUARE)), &small());
     let [plan] = &plan.islands[..] else { panic!("one island") };
     let support = plan.supports().next().expect("it is held");
     assert!(plan.stands && support.tilt > 10.0 && support.tilt <= 45.0, "{support:?}");
@@ -233,7 +245,7 @@ fn tips_widen_until_the_island_rests_on_enough() {
     fill(&mut part, [[2, 5], [2, 5], [0, 30]]);
     let tips = |least_support: f64| {
         let options = SupportOptions { least_support, ..small() };
-        let (plan, _) = supported(&layers(&part), &options);
+        let (plan, _) = supported(&layers(&part, pitch(SQUARE)), &options);
         let [plan] = &plan.islands[..] else { panic!("one island") };
         assert!(plan.stands && !plan.is_weak(least_support), "{plan:?}");
         plan.supports().map(|support| support.rods[0].diameters[0].um()).collect::<Vec<_>>()
@@ -251,7 +263,7 @@ fn tall_pillars_are_braced_unless_they_stand_alone() {
     for x in [20, 35, 170] {
         fill(&mut part, [[x, x + 6], [17, 23], [80, 84]]);
     }
-    let (plan, drawn) = supported(&layers(&part), &small());
+    let (plan, drawn) = supported(&layers(&part, pitch(SQUARE)), &small());
     assert_eq!(plan.islands.iter().map(|plan| plan.supports().count()).collect::<Vec<_>>(), [1; 3]);
     assert_eq!(plan.braces.alone, 1);
     // Each rises by the distance that it leads aside.
@@ -264,7 +276,7 @@ fn tall_pillars_are_braced_unless_they_stand_alone() {
     assert_eq!(found_in(&drawn).islands.list, []);
     // A wall between them leaves no way for braces.
     fill(&mut part, [[28, 33], [0, 40], [0, 70]]);
-    let (plan, _) = supported(&layers(&part), &small());
+    let (plan, _) = supported(&layers(&part, pitch(SQUARE)), &small());
     assert!(plan.islands.iter().all(|plan| plan.stands));
     assert_eq!((plan.braces.rods.len(), plan.braces.alone), (0, 3));
 }
@@ -275,7 +287,7 @@ fn undersides_flatter_than_the_angle_get_supports_on_an_even_grid() {
     let mut part = vec![vec![vec![false; 160]; 60]; 34];
     fill(&mut part, [[10, 14], [10, 50], [0, 24]]);
     fill(&mut part, [[10, 134], [10, 50], [20, 24]]);
-    let stack = layers(&part);
+    let stack = layers(&part, pitch(SQUARE));
     let options =
         SupportOptions { overhangs: Some(45.0), spacing: Length::from_mm(2.0), ..small() };
     let (plan, drawn) = supported(&stack, &options);
@@ -310,7 +322,7 @@ fn slopes_get_supports_only_if_they_are_flatter() {
     let count = |angle: f64| {
         let options =
             SupportOptions { overhangs: Some(angle), spacing: Length::from_mm(2.0), ..small() };
-        let (plan, drawn) = supported(&layers(&part), &options);
+        let (plan, drawn) = supported(&layers(&part, pitch(SQUARE)), &options);
         assert_eq!(found_in(&drawn).islands.list, []);
         (plan.overhangs.len(), plan.supports().count())
     };

@@ -191,11 +191,11 @@ impl<'a> SupportPlanner<'a> {
     /// Returns a region grown by a length, in the images.
     pub(super) fn grown(&self, Region { columns, rows }: &Region, by_mm: f64) -> Region {
         let by = self.raster.pixels(Length::from_mm(by_mm));
-        let grown = |range: &Range<u32>, size: u32| {
+        let grown = |range: &Range<u32>, axis: usize| {
+            let (by, size) = (by[axis], self.raster.size[axis]);
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(size)
         };
-        let [width, height] = self.raster.size;
-        Region { columns: grown(columns, width), rows: grown(rows, height) }
+        Region { columns: grown(columns, 0), rows: grown(rows, 1) }
     }
 
     /// Plans the supports of an island, given its pixels in its first layer and the images below.
@@ -218,16 +218,18 @@ impl<'a> SupportPlanner<'a> {
         let near = self.near(&island.region, island.layer);
         let mut ground = self.ground(&island.region, below);
         let [widest, radius] = [self.options.hold, Length::from_mm(self.least_radius_mm())]
-            .map(|length| length.pixels(self.raster.dpi));
+            .map(|length| self.raster.widths(length));
+        let metric = self.raster.metric();
         // Nearer to each other, struts touch.
-        let narrowest = 2.0 * radius + 1.0;
+        let narrowest = 2.0 * radius + metric.longer_side();
+        let section = PI * radius * radius / metric.pixel_area();
         let asked = self.options.least_support * island.area as f64;
         let before = self.built.len();
         let mut best: Option<(u64, Vec<HeldPlace>)> = None;
         let mut hold = widest;
         for _ in 0..MOST_DIVISIONS {
             // Pieces are connected: one smaller than the section of a strut needs none of its own.
-            let pieces = divided(runs, hold, PI * radius * radius, MOST_SUPPORTS - before);
+            let pieces = divided(runs, hold, section, MOST_SUPPORTS - before, metric);
             let Some(pieces) = pieces else { break };
             if let Some(ground) = &mut ground {
                 ground.tip = self.wider(ground.tip, self.tip_for(asked, pieces.len()));
@@ -253,16 +255,17 @@ impl<'a> SupportPlanner<'a> {
             }
             // As many more pieces as are missing, and some more at the edges.
             // The cells are as many as the extent has room for, so they are smaller than asked.
-            let cells = (extent(runs) / hold).ceil().max(1.0);
-            let cell = extent(runs) / cells;
+            let cells = (extent(runs, metric) / hold).ceil().max(1.0);
+            let cell = extent(runs, metric) / cells;
             let finer = 0.95 * cell * (covered as f64 / asked).sqrt();
-            hold = finer.min(extent(runs) / (cells + 0.5)).max(narrowest);
+            hold = finer.min(extent(runs, metric) / (cells + 0.5)).max(narrowest);
         }
         let (mut covered, mut places) = best.ok_or(SupportError::TooMany)?;
         // A pillar anywhere, even through others, is better than none.
         if let Some(ground) = ground.as_mut().filter(|_| covered == 0) {
             ground.may_touch = true;
-            let anywhere = self.places(&[piece(runs.clone())], &near, &surroundings, Some(ground));
+            let anywhere =
+                self.places(&[piece(runs.clone(), metric)], &near, &surroundings, Some(ground));
             self.built.truncate(before);
             covered = surroundings.covered(anywhere.iter().filter_map(|it| it.supports.first()));
             places = if covered > 0 { anywhere } else { places };
@@ -310,7 +313,7 @@ impl<'a> SupportPlanner<'a> {
     /// Returns whether an axis comes too near to a support.
     pub(super) fn is_beside_another(&self, axis: [Vec3; 2], radius_mm: f64) -> bool {
         // A pixel between them keeps them apart in the images, too.
-        let apart = radius_mm + self.raster.dpi.pitch().mm();
+        let apart = radius_mm + self.raster.pitch.long_side().mm();
         let mut built = self.built.iter();
         built.any(|(other, radius)| distance_mm(*other, axis) < apart + radius)
     }

@@ -48,15 +48,11 @@ impl Rod {
 
     /// Returns its section at a height as `lamp edit` draws it, a run a row.
     pub(super) fn section(&self, height: Length, raster: &Raster) -> Vec<(u32, Range<u32>)> {
-        let Raster { origin_mm, dpi, size } = *raster;
+        let Raster { origin_mm, pitch, size } = *raster;
         let run = |(row, start, end)| (row, start..end);
         match (self.strut(), self.cone()) {
-            (Some(strut), _) => {
-                strut.section(height, origin_mm, dpi.into(), size).map(run).collect()
-            }
-            (None, Some(cone)) => {
-                cone.section(height, origin_mm, dpi.into(), size).map(run).collect()
-            }
+            (Some(strut), _) => strut.section(height, origin_mm, pitch, size).map(run).collect(),
+            (None, Some(cone)) => cone.section(height, origin_mm, pitch, size).map(run).collect(),
             (None, None) => Vec::new(),
         }
     }

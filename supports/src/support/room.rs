@@ -32,8 +32,9 @@ pub fn room_for<'a>(
     found: &Findings,
     padding: u32,
 ) -> Result<[Length; 4], SupportError> {
-    let Raster { origin_mm: [x0, y1], dpi, size } = Raster::of(found)?;
-    let pitch = dpi.pitch().mm();
+    let Raster { origin_mm: [x0, y1], pitch, size } = Raster::of(found)?;
+    let [across, down] = pitch.mm();
+    let pitches = [across, across, down, down];
     let mut sides = [0f64; 4];
     for rod in rods {
         for (end, diameter) in rod.ends.iter().zip(rod.diameters) {
@@ -41,12 +42,14 @@ pub fn room_for<'a>(
             let radius = diameter.mm() / 2.0;
             let beyond = [
                 x0 - (x - radius),
-                x + radius - x0 - f64::from(size[0]) * pitch,
+                x + radius - x0 - f64::from(size[0]) * across,
                 y + radius - y1,
-                y1 - f64::from(size[1]) * pitch - (y - radius),
+                y1 - f64::from(size[1]) * down - (y - radius),
             ];
-            sides = std::array::from_fn(|k| sides[k].max(beyond[k] / pitch + f64::from(padding)));
+            sides =
+                std::array::from_fn(|k| sides[k].max(beyond[k] / pitches[k] + f64::from(padding)));
         }
     }
-    Ok(sides.map(|pixels| Length::from_mm(pixels.ceil() * pitch).to_whole_nm()))
+    let room = |k: usize| Length::from_mm(sides[k].ceil() * pitches[k]).to_whole_nm();
+    Ok([0, 1, 2, 3].map(room))
 }

@@ -2,7 +2,7 @@
 
 use lamp_fixtures::{Mesh, cavity_core, mug, needle, ring};
 use lamp_slicing::{FacetIndex, Part, Placement, SliceOptions, Slices, Units};
-use lamp_stack::{Image, Layer, Length, Mask, MaskBuilder, Op, Pitch};
+use lamp_stack::{Image, Layer, Length, Mask, MaskBuilder, Op};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -21,9 +21,9 @@ fn found_in(layers: &[Layer]) -> Findings {
     check(layers, Ok, &CheckOptions::default()).unwrap()
 }
 
-fn checked(mesh: Mesh, dpi: f64) -> Checked {
+fn checked(mesh: Mesh, pitch: &str) -> Checked {
     let part = Part::from_facets("part", mesh.facets);
-    let options = SliceOptions { pitch: Pitch::of_dpi(dpi).unwrap(), ..SliceOptions::default() };
+    let options = SliceOptions { pitch: pitch.parse().unwrap(), ..SliceOptions::default() };
     let layers: Result<Vec<Layer>, _> = Slices::new(part.clone(), &options).unwrap().collect();
     let facets = FacetIndex::new(part, &Placement::default(), Units::Millimetres).unwrap();
     let (surface, layers) = (Surface::new(facets), layers.unwrap());
@@ -67,8 +67,8 @@ fn middle(layer: &Layer) -> Length {
 
 fn section(rod: &Rod, layer: &Layer) -> Mask {
     let size = [layer.image.width(), layer.image.height()];
-    let (origin, dpi) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().x);
-    let raster = super::window::Raster { origin_mm: origin, dpi, size };
+    let (origin, pitch) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap());
+    let raster = super::window::Raster { origin_mm: origin, pitch, size };
     let runs = rod.section(middle(layer), &raster);
     let mut mask = MaskBuilder::new(size[0]);
     for row in 0..size[1] {
@@ -107,6 +107,9 @@ fn assert_held(part: &Checked, plans: &[IslandPlan], options: &SupportOptions) {
     assert_eq!(after.specks.count(), part.found.specks.count());
 }
 
+/// A tenth of a millimeter.
+const SQUARE: &str = "100um";
+
 /// Options that hold an island at one point.
 fn undivided() -> SupportOptions {
     SupportOptions { hold: Length::from_mm(50.0), least_support: 0.0, ..SupportOptions::default() }
@@ -114,7 +117,7 @@ fn undivided() -> SupportOptions {
 
 #[test]
 fn cores_in_a_cavity_are_held_by_the_nearest_walls() {
-    let part = checked(cavity_core(2_000), 254.0);
+    let part = checked(cavity_core(2_000), SQUARE);
     let options = SupportOptions { least_support: 0.0, ..SupportOptions::default() };
     let plans = part.plan(&options);
     assert_held(&part, &plans, &options);
@@ -143,8 +146,27 @@ fn cores_in_a_cavity_are_held_by_the_nearest_walls() {
 }
 
 #[test]
+fn struts_are_as_long_where_pixels_are_not_square() {
+    let options = SupportOptions { least_support: 0.0, ..SupportOptions::default() };
+    let of = |pitch: &str| {
+        let part = checked(cavity_core(2_000), pitch);
+        let plans = part.plan(&options);
+        assert_held(&part, &plans, &options);
+        plans.iter().map(|plan| lengths(plan).into_iter().flatten().collect::<Vec<_>>()).collect()
+    };
+    let [square, wide, high]: [Vec<Vec<f64>>; 3] = [SQUARE, "125x100um", "100x125um"].map(of);
+    for other in [wide, high] {
+        assert_eq!([0, 1].map(|k: usize| other[k].len()), [15, 6]);
+        for (a, b) in square.iter().flatten().zip(other.iter().flatten()) {
+            // Pieces end at pixels, so a piece's middle is off by up to half a pixel.
+            assert!((a - b).abs() < 0.15, "{square:?} {other:?}");
+        }
+    }
+}
+
+#[test]
 fn a_handle_is_held_from_the_side() {
-    let part = checked(mug(4_000), 254.0);
+    let part = checked(mug(4_000), SQUARE);
     let [plan] = &part.plan(&undivided())[..] else { panic!("one island") };
     let [place] = &plan.places[..] else { panic!("one place") };
     // The wall is round, 10 mm about (-4, 0): 6.5 mm from the grip's middle at (12.5, 0).
@@ -168,7 +190,7 @@ fn a_handle_is_held_from_the_side() {
 
 #[test]
 fn an_island_without_a_way_is_left() {
-    let part = checked(needle(2_000), 254.0);
+    let part = checked(needle(2_000), SQUARE);
     let plans = part.plan(&SupportOptions::default());
     assert_eq!(plans[0].places[0].rejected, [(Rejection::Far, 400)]);
     assert_held(&part, &plans, &SupportOptions::default());
@@ -182,7 +204,7 @@ fn an_island_without_a_way_is_left() {
 
 #[test]
 fn a_ring_is_held_where_it_is_white() {
-    let part = checked(ring(2_000), 254.0);
+    let part = checked(ring(2_000), SQUARE);
     let far = SupportOptions { max_length: Length::from_mm(20.0), max_tilt: 60.0, ..undivided() };
     let plans = part.plan(&far);
     let [x, y, z] = plans[0].places[0].origin_mm;
@@ -192,7 +214,7 @@ fn a_ring_is_held_where_it_is_white() {
 
 #[test]
 fn a_wide_island_is_held_by_as_much_as_is_asked() {
-    let part = checked(cavity_core(2_000), 254.0);
+    let part = checked(cavity_core(2_000), SQUARE);
     for least_support in [0.1, 0.25] {
         let options = SupportOptions { least_support, ..SupportOptions::default() };
         let plans = part.plan(&options);
@@ -215,7 +237,7 @@ fn lengths_of_one(plan: &IslandPlan) -> f64 {
 
 #[test]
 fn what_the_pages_lack_and_too_many_places_are_errors() {
-    let mut part = checked(ring(2_000), 254.0);
+    let mut part = checked(ring(2_000), SQUARE);
     let error_with = |part: &Checked, options: &SupportOptions| {
         let layers = part.layers.iter().cloned().map(Ok::<_, SupportError>);
         plan_supports(layers, &part.found, &part.surface, options).unwrap_err()
@@ -261,9 +283,10 @@ proptest! {
     fn supports_of_random_blocks_hold_them_and_run_through_black(
         mesh in blocks(),
         (tilt, hold, diameter) in (10f64..70.0, 1f64..9.0, 4f64..9.0),
+        pitch in prop::sample::select(vec!["200um", "140x190um", "190x140um"]),
     ) {
         let sides: Vec<[f32; 3]> = mesh.facets.iter().flatten().copied().collect();
-        let part = checked(mesh, 127.0);
+        let part = checked(mesh, pitch);
         let options = SupportOptions {
             candidates: NonZeroU32::new(100).unwrap(),
             max_tilt: tilt,
@@ -302,10 +325,11 @@ fn pixels_before(support: &Support, layers: &[Layer]) -> Vec<([f64; 3], bool)> {
         if z > origin[2] || z < contact[2] {
             continue;
         }
-        let ([x0, y1], pitch) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().mm()[0]);
+        let ([x0, y1], pitch) = (layer.info.origin_mm.unwrap(), layer.pitch.unwrap().mm());
         for row in 0..layer.image.height() {
             for column in 0..layer.image.width() {
-                let [x, y] = [column, row].map(|place| (f64::from(place) + 0.5) * pitch);
+                let [x, y] = [(column, pitch[0]), (row, pitch[1])]
+                    .map(|(place, side)| (f64::from(place) + 0.5) * side);
                 let centre = [x0 + x, y1 - y, z];
                 let from: [f64; 3] = std::array::from_fn(|k| centre[k] - origin[k]);
                 let place: f64 = (0..3).map(|k| from[k] * axis[k]).sum();

@@ -80,7 +80,8 @@ pub fn plan_vents<E: From<SupportError>>(
         .filter(is_full)
         .map(|pocket| {
             let sides = [&pocket.region.columns, &pocket.region.rows].map(ExactSizeIterator::len);
-            let is_too_wide = diameter.pixels(raster.dpi) > sides[0].min(sides[1]) as f64;
+            let wide = raster.pitch.pixels(diameter);
+            let is_too_wide = (0..2).any(|k| wide[k] > sides[k] as f64);
             VentPlan { pocket: pocket.clone(), vents: Vec::new(), is_too_wide }
         })
         .collect();
@@ -178,7 +179,8 @@ fn shortest<'a>(
     let middle = floor[floor.len() / 2].0;
     let mut floor: Vec<_> = floor.iter().collect();
     floor.sort_by_key(|(row, _)| row.abs_diff(middle));
-    let pitch = raster.dpi.pitch().mm();
+    let (metric, width) = (raster.metric(), raster.width_mm());
+    let [_, row_mm] = raster.pitch.mm();
     let mut best_mm = max_length.mm().next_up();
     let mut best = None;
     // Ways aside come first: of two equally long ways, people reach this one more easily.
@@ -189,12 +191,13 @@ fn shortest<'a>(
         }
         for (row, run) in &floor {
             // No row farther away than this is nearer than the best.
-            let reach = ((best_mm.powi(2) - down.powi(2)).max(0.0).sqrt() / pitch).ceil() as u32;
+            let reach = ((best_mm.powi(2) - down.powi(2)).max(0.0).sqrt() / row_mm).ceil() as u32;
             let rows = row.saturating_sub(reach)..=(row + reach).min(raster.size[1] - 1);
             for other in rows {
                 let Some([from, to]) = outside.nearest(other, run) else { continue };
                 let [aside, across] = [from.abs_diff(to), row.abs_diff(other)];
-                let length = (f64::from(aside).hypot(f64::from(across)) * pitch).hypot(down);
+                let [aside, across] = metric.place([aside, across].map(f64::from));
+                let length = (aside.hypot(across) * width).hypot(down);
                 if length < best_mm {
                     best_mm = length;
                     let pixels = [[from, *row], [to, other]];
@@ -214,27 +217,30 @@ fn vents(
     raster: &Raster,
     diameter: Length,
 ) -> Vec<Vent> {
-    let (pitch, radius) = (raster.dpi.pitch().mm(), diameter.mm() / 2.0);
+    let (metric, width, radius) = (raster.metric(), raster.width_mm(), diameter.mm() / 2.0);
     let [from, to] = way.pixels.map(|pixel| pixel.map(|at| f64::from(at) + 0.5));
     let [[high, above], [low, thickness]] = way.layers.map(|layer| {
         span_mm(&found.layers[layer as usize]).expect("heights were found for all layers")
     });
     let place = |[x, y]: [f64; 2], height: f64| [x, y, height];
     let rod = |ends: [[f64; 3]; 2]| Rod::new(ends, [diameter; 2]);
-    let aside_px = (to[0] - from[0]).hypot(to[1] - from[1]);
-    if aside_px == 0.0 {
+    let [across, down] = metric.place([to[0] - from[0], to[1] - from[1]]);
+    // In widths of a pixel.
+    let aside = across.hypot(down);
+    if aside == 0.0 {
         // Straight down, from the floor's layer to the black below.
         let ends = [place(raster.place_mm(from), high + above), place(raster.place_mm(to), low)];
         let wall = Length::from_mm((high - low - thickness).max(0.0));
         return vec![Vent { rod: rod(ends), wall }];
     }
-    let along = [0, 1].map(|k| (to[k] - from[k]) / aside_px);
+    let along = [0, 1].map(|k| (to[k] - from[k]) / aside);
     // Walls may be curved, so that the ends reach on by a radius, as far as black goes.
     let reach = |start: [f64; 2], sign: f64, is_black: &dyn Fn([i64; 2]) -> bool| {
-        let steps = (radius / pitch).ceil() as u32;
-        let at = |step: u32| [0, 1].map(|k| start[k] + sign * f64::from(step) * along[k]);
-        (1..=steps).take_while(|step| is_black(at(*step).map(|at| at.floor() as i64))).count()
-            as f64
+        let side = metric.shorter_side();
+        let steps = (radius / (width * side)).ceil() as u32;
+        let at = |step: u32| [0, 1].map(|k| start[k] + sign * f64::from(step) * side * along[k]);
+        let black = (1..=steps).take_while(|step| is_black(at(*step).map(|at| at.floor() as i64)));
+        black.count() as f64 * side
     };
     let is_floor = |[column, row]: [i64; 2]| {
         let holds = |(y, run): &(u32, Range<u32>)| {
@@ -242,19 +248,21 @@ fn vents(
         };
         floor.iter().any(holds)
     };
-    let inside_px = reach(from, -1.0, &is_floor);
-    let outside_px = reach(to, 1.0, &|at| way.outside.holds(at));
-    let slope = (low - high) / aside_px;
+    let inside = reach(from, -1.0, &is_floor);
+    let outside = reach(to, 1.0, &|at| way.outside.holds(at));
+    let slope = (low - high) / aside;
     // Resin runs off where the hole is as low as the floor. A hole that touches the floor's layer from
     // above does so by a narrow strip; if that is lost between pixels, it sinks by a third of its radius.
     let hole = |sunk: f64| {
-        let end = |at_px: f64| {
-            let at = [0, 1].map(|k| from[k] + at_px * along[k]);
-            place(raster.place_mm(at), high + radius * (1.0 - sunk) + slope * at_px)
+        let end = |at: f64| {
+            let pixel = [0, 1].map(|k| from[k] + at * along[k]);
+            place(raster.place_mm(pixel), high + radius * (1.0 - sunk) + slope * at)
         };
-        let ends = [end(-inside_px), end(aside_px + outside_px)];
-        // From center to center, less half a pixel at both ends.
-        let wall = ((aside_px - 1.0) * pitch).hypot(high - low);
+        let ends = [end(-inside), end(aside + outside)];
+        // From center to center, less half a pixel at both ends: of one that is higher than wide,
+        // more the more the way leads along y.
+        let pixel = 1.0 + (metric.pixel_area() - 1.0) * (down / aside).powi(2);
+        let wall = ((aside - pixel) * width).hypot(high - low);
         Vent { rod: rod(ends), wall: Length::from_mm(wall) }
     };
     vec![hole(0.0), hole(1.0 / 3.0)]

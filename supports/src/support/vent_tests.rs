@@ -9,7 +9,7 @@ use super::*;
 use crate::check::{CheckError, CheckOptions, Findings, check};
 
 /// A pixel is 0.1 mm, and so is a layer.
-const DPI: f64 = 254.0;
+const SQUARE: &str = "100um";
 const SIDE: u32 = 48;
 
 fn image(is_white: impl Fn(u32, u32) -> bool) -> Mask {
@@ -17,15 +17,20 @@ fn image(is_white: impl Fn(u32, u32) -> bool) -> Mask {
     for row in 0..SIDE {
         let changes = |&column: &u32| {
             let before = column > 0 && is_white(column - 1, row);
-            (column < SIDE && is_white(column, row)) != before
+            is_white(column, row) != before
         };
-        mask.push_row(&(0..=SIDE).filter(changes).collect::<Vec<_>>()).unwrap();
+        mask.push_row(&(0..SIDE).filter(changes).collect::<Vec<_>>()).unwrap();
     }
     mask.finish()
 }
 
 /// Returns layers of 0.1 mm, white where `is_white` holds for a column, a row and a layer.
 fn layers(count: u32, is_white: impl Fn(u32, u32, u32) -> bool) -> Vec<Layer> {
+    layers_of(SQUARE, count, is_white)
+}
+
+fn layers_of(pitch: &str, count: u32, is_white: impl Fn(u32, u32, u32) -> bool) -> Vec<Layer> {
+    let pitch: Pitch = pitch.parse().unwrap();
     let layer = |number: u32| {
         let image = image(|column, row| is_white(column, row, number));
         let info = PageInfo {
@@ -35,7 +40,7 @@ fn layers(count: u32, is_white: impl Fn(u32, u32, u32) -> bool) -> Vec<Layer> {
             origin_mm: Some([0.0, 0.0]),
             ..PageInfo::default()
         };
-        Layer { info, pitch: Pitch::of_dpi(DPI), image: image.into() }
+        Layer { info, pitch: Some(pitch), image: image.into() }
     };
     (0..count).map(layer).collect()
 }
@@ -148,6 +153,7 @@ proptest! {
         lid in 0_u32..4,
         legs in 0_u32..6,
         diameter in 0.6..1.5_f64,
+        pitch in prop::sample::select(vec![SQUARE, "100x136um", "118x87um"]),
     ) {
         let [left, right, top, bottom] = walls;
         let outer = 3..SIDE - 3;
@@ -164,15 +170,22 @@ proptest! {
             let is_hollow = hollow[0].contains(&column) && hollow[1].contains(&row);
             !(is_hollow && (floor_at..end).contains(&layer))
         };
-        let part = layers(end + lid, is_white);
+        let part = layers_of(pitch, end + lid, is_white);
         let plans = planned(&part, diameter);
         prop_assert_eq!(plans.len(), 1);
         let drained = drained(&part, &plans[0]);
         prop_assert!(drained.is_some(), "{:?}", plans[0]);
         let (_, vent) = drained.unwrap();
         // All walls are flat, so the nearest outside lies straight aside or straight down.
-        let down = if legs > 0 { floor } else { u32::MAX };
-        let least = walls.into_iter().chain([down]).min().unwrap();
-        prop_assert!((vent.wall.mm() - 0.1 * f64::from(least)).abs() < 1e-9, "{} for {least}", vent.wall);
+        let [wide, high] = pitch.parse::<Pitch>().unwrap().mm();
+        let down = if legs > 0 { 0.1 * f64::from(floor) } else { f64::INFINITY };
+        let aside = [(left, wide), (right, wide), (top, high), (bottom, high)];
+        let walls = aside.into_iter().map(|(pixels, side)| f64::from(pixels) * side);
+        // The shortest way is from pixel to pixel: a side of one longer than a wall aside, and a
+        // layer longer than a floor.
+        let ways = aside.into_iter().map(|(pixels, side)| f64::from(pixels + 1) * side);
+        let ways = ways.zip(walls).chain([(down + 0.1, down)]);
+        let (_, least) = ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        prop_assert!((vent.wall.mm() - least).abs() < 1e-9, "{} for {least}", vent.wall);
     }
 }

@@ -3,16 +3,16 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Frame, Length, Mask, white_runs};
+use lamp_stack::{Frame, Length, Mask, Pitch, white_runs};
 
 use super::SupportError;
-use crate::check::{Findings, Region};
+use crate::check::{Findings, Metric, Region};
 
 /// How the pixels of a stack lie in the part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Raster {
     pub(super) origin_mm: [f64; 2],
-    pub(super) dpi: Dpi,
+    pub(super) pitch: Pitch,
     pub(super) size: [u32; 2],
 }
 
@@ -21,30 +21,46 @@ impl Raster {
     pub(super) fn of(found: &Findings) -> Result<Self, SupportError> {
         Ok(Self {
             origin_mm: found.origin_mm.ok_or(SupportError::NoOrigin)?,
-            dpi: found.pitch.ok_or(SupportError::NoResolution)?.square("supports need")?,
+            pitch: found.pitch.ok_or(SupportError::NoResolution)?,
             size: found.size,
         })
     }
 
     /// Returns the x and y of a column and row; the first pixel's center is at (0.5, 0.5).
     pub(super) fn place_mm(&self, [column, row]: [f64; 2]) -> [f64; 2] {
-        let pitch = self.dpi.pitch().mm();
+        let [across, down] = self.pitch.mm();
         let [x0, y1] = self.origin_mm;
-        [x0 + column * pitch, y1 - row * pitch]
+        [x0 + column * across, y1 - row * down]
     }
 
     /// Returns the pixel at x and y, as column and row, if the images have one there.
     pub(super) fn pixel_at(&self, [x, y]: [f64; 2]) -> Option<[u32; 2]> {
-        let pitch = self.dpi.pitch().mm();
+        let [across, down] = self.pitch.mm();
         let [x0, y1] = self.origin_mm;
-        let at = [(x - x0) / pitch, (y1 - y) / pitch];
+        let at = [(x - x0) / across, (y1 - y) / down];
         let is_within = (0..2).all(|k| (0.0..f64::from(self.size[k])).contains(&at[k]));
         is_within.then_some(at.map(|place| place as u32))
     }
 
-    /// Returns a length in pixels, at least one.
-    pub(super) fn pixels(&self, length: Length) -> u32 {
-        length.pixels(self.dpi).ceil().max(1.0) as u32
+    /// Returns the shape of pixels. Lengths in images are in widths of a pixel.
+    pub(super) fn metric(&self) -> Metric {
+        Metric::of(Some(self.pitch))
+    }
+
+    /// Returns the width of a pixel.
+    pub(super) fn width_mm(&self) -> f64 {
+        let [width, _] = self.pitch.mm();
+        width
+    }
+
+    /// Returns a length in widths of a pixel, not rounded.
+    pub(super) fn widths(&self, length: Length) -> f64 {
+        length.pixels(self.pitch.x)
+    }
+
+    /// Returns a length in columns and in rows, at least one of each.
+    pub(super) fn pixels(&self, length: Length) -> [u32; 2] {
+        self.pitch.pixels(length).map(|pixels| pixels.ceil().max(1.0) as u32)
     }
 }
 

@@ -146,8 +146,8 @@ impl SupportArgs {
         let surface = self.surface(&first.info, &name, progress)?;
         // Room for pillars that lean outwards.
         let options = self.settings.options();
-        let reach = first.pitch.map_or(0.0, |pitch| options.reach_outside().pixels(pitch.x).ceil());
-        let room = reach.min(MOST_ROOM) as u32;
+        let reach = first.pitch.map_or([0.0; 2], |pitch| pitch.pixels(options.reach_outside()));
+        let room = reach[0].max(reach[1]).ceil().min(MOST_ROOM) as u32;
         let found = self.check(stack, room, progress)?;
         let of_stack = |error: Exit| match error.cause::<SupportError>() {
             Some(_) => error.at(name.clone()),
