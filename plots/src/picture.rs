@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use std::ops::Range;
 use std::str::FromStr;
 
-use lamp_stack::{Image, mean_levels, write_gray_png};
+use lamp_stack::{Image, mean_levels, mean_levels_of_bands, write_gray_png};
 
 /// A rectangle of an image, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,6 +40,12 @@ impl PictureRegion {
         Self { columns: join(self.columns, other.columns), rows: join(self.rows, other.rows) }
     }
 
+    /// Returns its width or height, whichever is greater, in widths of a pixel.
+    pub(crate) fn longer_side(&self, aspect: f64) -> u32 {
+        let high = (self.rows.len() as f64 * aspect).ceil();
+        (self.columns.len() as u32).max(high as u32)
+    }
+
     /// Returns the part of the region that lies on the image, if any.
     pub fn on(&self, image: &Image) -> Option<Self> {
         let columns = self.columns.start..self.columns.end.min(image.width());
@@ -67,12 +73,13 @@ impl FromStr for PictureRegion {
     }
 }
 
-/// How much larger or smaller a picture is than its region.
+/// How much larger or smaller a picture is than its region: in width. Rows follow by the aspect of
+/// pixels, their height in widths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureScale {
-    /// How many picture pixels an image pixel has on a side.
+    /// How many picture pixels an image pixel is wide.
     Up(u32),
-    /// How many image pixels a picture pixel has on a side.
+    /// How many image pixels a picture pixel is wide.
     Down(u32),
 }
 
@@ -81,17 +88,24 @@ const MAX_FACTOR: u32 = 1000;
 
 impl PictureScale {
     /// The width and height of a region's picture, in pixels.
-    pub fn size(self, region: &PictureRegion) -> [u64; 2] {
-        [region.columns.len() as u64, region.rows.len() as u64].map(|side| match self {
-            Self::Up(up) => side * u64::from(up),
-            Self::Down(down) => side.div_ceil(down.into()),
-        })
+    pub fn size(self, region: &PictureRegion, aspect: f64) -> [u64; 2] {
+        let [up, down] = self.factors().map(u64::from);
+        let width = (region.columns.len() as u64 * up).div_ceil(down);
+        [width, RowScale::new(region.rows.clone(), self, aspect).height()]
+    }
+
+    /// Returns by how much the picture is enlarged, and by how much reduced.
+    fn factors(self) -> [u32; 2] {
+        match self {
+            Self::Up(up) => [up, 1],
+            Self::Down(down) => [1, down],
+        }
     }
 
     /// Returns the scale, at most 1, at which a region's picture is at most `side` pixels wide
     /// and high, as far as scales go.
-    pub fn fitting(region: &PictureRegion, side: u32) -> Self {
-        let longer = region.columns.len().max(region.rows.len()) as u32;
+    pub fn fitting(region: &PictureRegion, side: u32, aspect: f64) -> Self {
+        let longer = region.longer_side(aspect);
         Self::Down(longer.div_ceil(side).clamp(1, MAX_FACTOR))
     }
 }
@@ -112,6 +126,63 @@ impl FromStr for PictureScale {
     }
 }
 
+/// How rows of an image become rows of a picture whose pixels are square.
+pub(crate) struct RowScale {
+    rows: Range<u32>,
+    up: f64,
+    down: f64,
+}
+
+impl RowScale {
+    pub(crate) fn new(rows: Range<u32>, scale: PictureScale, aspect: f64) -> Self {
+        let [up, down] = scale.factors().map(f64::from);
+        Self { rows, up: up * aspect, down }
+    }
+
+    /// Returns the place in the picture of an edge between rows, given the rows above it.
+    pub(crate) fn place(&self, rows: u32) -> u64 {
+        (f64::from(rows) * self.up / self.down).round() as u64
+    }
+
+    /// Returns the height of the picture.
+    pub(crate) fn height(&self) -> u64 {
+        let count = self.rows.len() as u32;
+        if self.up >= self.down {
+            return self.place(count);
+        }
+        // The last row of the picture has at least one of the image, whatever rounding makes of it.
+        let mut height = u64::from(count.min(self.place(count) as u32));
+        while height > 0 && self.first(height - 1) >= count {
+            height -= 1;
+        }
+        while self.first(height) < count {
+            height += 1;
+        }
+        height
+    }
+
+    /// Returns the first row of the image in a row of a reduced picture, counted from the top.
+    fn first(&self, row: u64) -> u32 {
+        (row as f64 * self.down / self.up).round() as u32
+    }
+
+    /// Returns the rows of the image that share rows of the picture, and how many they share.
+    pub(crate) fn bands(self) -> impl Iterator<Item = (Range<u32>, usize)> {
+        let (top, count) = (self.rows.start, self.rows.len() as u32);
+        let is_enlarged = self.up >= self.down;
+        let bands = if is_enlarged { u64::from(count) } else { self.height() };
+        (0..bands).map(move |band| {
+            if is_enlarged {
+                let row = band as u32;
+                let times = self.place(row + 1) - self.place(row);
+                return (top + row..top + row + 1, times as usize);
+            }
+            let end = self.first(band + 1).min(count);
+            (top + self.first(band)..top + end, 1)
+        })
+    }
+}
+
 /// A gray picture, made row by row.
 pub struct Picture<'a> {
     /// Its width in pixels.
@@ -122,23 +193,21 @@ pub struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// A picture of a region, which must lie on the image. It is made row by
-    /// row, so a large layer takes little memory.
-    pub fn new(image: &'a Image, region: PictureRegion, scale: PictureScale) -> Self {
-        let (up, down) = match scale {
-            PictureScale::Up(up) => (up, 1),
-            PictureScale::Down(down) => (1, down),
-        };
-        let width = region.columns.len().div_ceil(down as usize) as u32;
-        let height = region.rows.len().div_ceil(down as usize) as u32;
+    /// A picture of a region, which must lie on the image, whose pixels are `aspect` widths high.
+    /// It is made row by row, so a large layer takes little memory.
+    pub fn new(image: &'a Image, region: PictureRegion, scale: PictureScale, aspect: f64) -> Self {
+        let [width, height] = scale.size(&region, aspect).map(|side| side as u32);
+        let [up, down] = scale.factors();
         let side = NonZeroU32::new(down).expect("scales are not zero");
-        let mean_rows = mean_levels(image, region.columns, region.rows, side);
-        let rows = mean_rows.flat_map(move |row| {
+        let bands = || RowScale::new(region.rows.clone(), scale, aspect).bands();
+        let means = bands().map(|(band, _)| band);
+        let means = mean_levels_of_bands(image, region.columns.clone(), means, side);
+        let rows = means.zip(bands()).flat_map(move |(row, (_, times))| {
             let wide: Vec<u8> =
                 row.iter().flat_map(|&level| std::iter::repeat_n(level, up as usize)).collect();
-            std::iter::repeat_n(wide, up as usize)
+            std::iter::repeat_n(wide, times)
         });
-        Self { width: width * up, height: height * up, rows: Box::new(rows) }
+        Self { width, height, rows: Box::new(rows) }
     }
 
     /// A picture of rows of `width` levels.
@@ -201,7 +270,7 @@ mod tests {
     fn pixels_are_copied_enlarged_and_averaged() {
         let image = image();
         let all = PictureRegion::of(&image);
-        let picture = |scale| rows(Picture::new(&image, all.clone(), scale));
+        let picture = |scale| rows(Picture::new(&image, all.clone(), scale, 1.0));
         assert_eq!(picture(PictureScale::Up(1)), [[0, 255, 255, 0, 255], [255; 5]]);
         assert_eq!(picture(PictureScale::Up(2))[1], [0, 0, 255, 255, 255, 255, 0, 0, 255, 255]);
         assert_eq!(picture(PictureScale::Down(2)), [[191, 191, 255]]);
@@ -212,7 +281,7 @@ mod tests {
         let image = image();
         let region: PictureRegion = "3,1,99,99".parse().unwrap();
         let region = region.on(&image).unwrap();
-        assert_eq!(rows(Picture::new(&image, region, PictureScale::Up(1))), [[255, 255]]);
+        assert_eq!(rows(Picture::new(&image, region, PictureScale::Up(1), 1.0)), [[255, 255]]);
         assert_eq!("5,0,1,1".parse::<PictureRegion>().unwrap().on(&image), None);
         for wrong in ["", "1,2,3", "1,2,0,4", "a,b,c,d", "1,2,3,4,5"] {
             assert!(wrong.parse::<PictureRegion>().is_err(), "{wrong}");
@@ -227,6 +296,39 @@ mod tests {
         assert_eq!(PictureRegion::of_content(&Image::Mask(Mask::black(9, 9))), None);
     }
 
+    /// The mean level of each third of a picture's height tells where the image's rows went.
+    #[test]
+    fn rows_are_as_high_as_pixels() {
+        for (scale, aspect) in [
+            (PictureScale::Up(1), 19.0 / 14.0),
+            (PictureScale::Up(3), 19.0 / 14.0),
+            (PictureScale::Up(1), 14.0 / 19.0),
+            (PictureScale::Up(2), 14.0 / 19.0),
+            (PictureScale::Down(2), 19.0 / 14.0),
+            (PictureScale::Down(7), 14.0 / 19.0),
+            (PictureScale::Up(1), 0.001),
+        ] {
+            let count = 300;
+            let mut rows = vec![vec![]; 100];
+            rows.extend(vec![vec![0]; 100]);
+            rows.extend(vec![vec![]; 100]);
+            let mut mask = lamp_stack::MaskBuilder::new(90);
+            rows.iter().for_each(|row| mask.push_row(row).unwrap());
+            let image = Image::Mask(mask.finish());
+            let [up, down] = scale.factors().map(f64::from);
+            let high = f64::from(count) * aspect * up / down;
+            let drawn = self::rows(Picture::new(&image, PictureRegion::of(&image), scale, aspect));
+            assert!((drawn.len() as f64 - high).abs() <= 1.0, "{scale:?} {aspect}");
+            for (k, row) in drawn.iter().enumerate() {
+                // Within a row of the picture of the edges, either may be.
+                let place = (k as f64 + 0.5) / high * 3.0;
+                let is_near = (place - 1.0).abs().min((place - 2.0).abs()) < 3.0 / high;
+                let level = if (1.0..2.0).contains(&place) { 255 } else { 0 };
+                assert!(is_near || row[0] == level, "{scale:?} {aspect} {k}");
+            }
+        }
+    }
+
     #[test]
     fn scales_parse() {
         assert_eq!("4".parse(), Ok(PictureScale::Up(4)));
@@ -239,7 +341,8 @@ mod tests {
     #[test]
     fn a_picture_is_reduced_to_fit() {
         let fitting = |width: u32, height, side| {
-            PictureScale::fitting(&PictureRegion { columns: 5..5 + width, rows: 0..height }, side)
+            let region = PictureRegion { columns: 5..5 + width, rows: 0..height };
+            PictureScale::fitting(&region, side, 1.0)
         };
         assert_eq!(fitting(400, 10, 400), PictureScale::Down(1));
         assert_eq!(fitting(401, 10, 400), PictureScale::Down(2));
@@ -253,7 +356,7 @@ mod tests {
         gray.push_runs([(1, 0), (2, 100), (1, 255)]).unwrap();
         let image = Image::Gray(gray);
         let mut png = Vec::new();
-        Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1))
+        Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1), 1.0)
             .write_png(&mut png)
             .unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
@@ -265,7 +368,7 @@ mod tests {
     #[test]
     fn pictures_stand_side_by_side() {
         let image = image();
-        let one = || Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1));
+        let one = || Picture::new(&image, PictureRegion::of(&image), PictureScale::Up(1), 1.0);
         let both = rows(Picture::side_by_side(vec![one(), one()]));
         assert_eq!(both[0][..6], [0, 255, 255, 0, 255, 128]);
         assert_eq!(both[1].len(), 18);

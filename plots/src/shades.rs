@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use lamp_stack::write_rgb_png;
 
-use crate::picture::PictureRegion;
+use crate::picture::{PictureRegion, PictureScale, RowScale};
 
 /// The least that is shown around a region, in pixels, and the share of its size.
 const LEAST_AROUND: u32 = 16;
@@ -27,20 +27,23 @@ pub struct ShadedPicture {
     region: PictureRegion,
     down: u32,
     up: u32,
+    /// The height of a pixel of the image in widths.
+    aspect: f64,
 }
 
 impl ShadedPicture {
     /// A picture whose longer side has at most `side` pixels, of a region on an image of a width
-    /// and a height.
-    pub fn new(region: PictureRegion, [width, height]: [u32; 2], side: u32) -> Self {
+    /// and a height, whose pixels are `aspect` widths high.
+    pub fn new(region: PictureRegion, [width, height]: [u32; 2], side: u32, aspect: f64) -> Self {
         let grow = |range: Range<u32>, end: u32| {
             let by = LEAST_AROUND.max((range.end - range.start) / SHARE_AROUND);
             range.start.saturating_sub(by)..range.end.saturating_add(by).min(end)
         };
         let region =
             PictureRegion { columns: grow(region.columns, width), rows: grow(region.rows, height) };
-        let longer = (region.columns.len().max(region.rows.len()) as u32).max(1);
-        Self { region, down: longer.div_ceil(side), up: (side / longer).clamp(1, MOST_ENLARGED) }
+        let longer = region.longer_side(aspect).max(1);
+        let [down, up] = [longer.div_ceil(side), (side / longer).clamp(1, MOST_ENLARGED)];
+        Self { region, down, up, aspect }
     }
 
     /// Returns the part of the image that shows.
@@ -48,15 +51,25 @@ impl ShadedPicture {
         &self.region
     }
 
-    /// Returns how many pixels of the picture a pixel of the image has.
-    pub(crate) fn scale(&self) -> f64 {
-        f64::from(self.up) / f64::from(self.down)
+    /// Returns how many pixels of the picture a pixel of the image is wide and high.
+    pub(crate) fn scale(&self) -> [f64; 2] {
+        let across = f64::from(self.up) / f64::from(self.down);
+        [across, across * self.aspect]
+    }
+
+    /// Returns how the rows that show become rows of the picture.
+    fn row_scale(&self) -> RowScale {
+        let scale = match self.down {
+            1 => PictureScale::Up(self.up),
+            down => PictureScale::Down(down),
+        };
+        RowScale::new(self.region.rows.clone(), scale, self.aspect)
     }
 
     /// Returns the picture's width and height.
     pub(crate) fn size(&self) -> [u32; 2] {
-        let PictureRegion { columns, rows } = &self.region;
-        [columns, rows].map(|range| (range.len() as u32).div_ceil(self.down) * self.up)
+        let width = (self.region.columns.len() as u32).div_ceil(self.down) * self.up;
+        [width, self.row_scale().height() as u32]
     }
 
     /// Writes the picture as a PNG. `shade` is called with each row of the image that shows, from
@@ -75,10 +88,10 @@ impl ShadedPicture {
         &'a self,
         mut shade: impl FnMut(u32, &mut dyn FnMut(Range<u32>, S)) + 'a,
     ) -> impl Iterator<Item = Vec<u8>> + 'a {
-        let Self { region: PictureRegion { columns, rows }, down, up } = self;
-        rows.clone().step_by(*down as usize).flat_map(move |first| {
+        let Self { region: PictureRegion { columns, .. }, down, up, .. } = self;
+        self.row_scale().bands().flat_map(move |(band, times)| {
             let mut shades = vec![S::NONE; columns.len().div_ceil(*down as usize)];
-            for row in first..(first + down).min(rows.end) {
+            for row in band {
                 shade(row, &mut |run, shade| {
                     let run = run.start.max(columns.start)..run.end.min(columns.end);
                     if !run.is_empty() {
@@ -91,7 +104,7 @@ impl ShadedPicture {
                 });
             }
             let wide = shades.iter().flat_map(|shade| shade.color().repeat(*up as usize));
-            std::iter::repeat_n(wide.collect::<Vec<u8>>(), *up as usize)
+            std::iter::repeat_n(wide.collect::<Vec<u8>>(), times)
         })
     }
 }

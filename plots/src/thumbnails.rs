@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use lamp_stack::{Layer, write_gray_animation};
+use lamp_stack::{Layer, Pitch, write_gray_animation};
 
 use crate::PlotError;
 use crate::caption::{CAPTION_HEIGHT, caption};
@@ -32,7 +32,8 @@ impl Thumbnail {
         region: PictureRegion,
         scale: PictureScale,
     ) -> Result<Self, PlotError> {
-        let rows = Picture::new(&layer.image, region, scale).into_rows().collect();
+        let aspect = layer.pitch.map_or(1.0, Pitch::aspect);
+        let rows = Picture::new(&layer.image, region, scale, aspect).into_rows().collect();
         Ok(Self { rows, caption: caption(&layer.info.name(), BACKGROUND)? })
     }
 

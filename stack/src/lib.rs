@@ -82,7 +82,7 @@ pub use files::verify::{LayerFault, VerifyError, verify};
 pub use image::Image;
 pub use image::boxes::{WhiteBox, largest_boxes};
 pub use image::combine::{Combine, Op, combine_rows};
-pub use image::coverage::mean_levels;
+pub use image::coverage::{mean_levels, mean_levels_of_bands};
 pub use image::difference::{Difference, Overlaid};
 pub use image::frame::{Frame, place_row};
 pub use image::gray::{GrayMask, LevelChange, gray_runs};

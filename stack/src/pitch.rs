@@ -86,6 +86,12 @@ impl Pitch {
         Length::from_um(x.max(y))
     }
 
+    /// Returns the height of a pixel in widths of one: 1 if pixels are square.
+    pub fn aspect(self) -> f64 {
+        let [x, y] = self.um();
+        if self.is_square() { 1.0 } else { y / x }
+    }
+
     /// Returns a length along x and along y in pixels, not rounded.
     pub fn pixels(self, length: Length) -> [f64; 2] {
         [self.x, self.y].map(|axis| length.pixels(axis))

@@ -231,13 +231,13 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
     let shown = read(stack, &pictured(layers))?;
     for layer in &shown {
         let name = format!("layer_{:05}.png", layer.info.index);
-        let picture = Picture::new(&layer.image, PictureRegion::of(&layer.image), SCALE);
+        let picture = Picture::new(&layer.image, PictureRegion::of(&layer.image), SCALE, 1.0);
         write_picture(&sheet.with_file_name(name), picture)?;
     }
     let content = shown.iter().filter_map(|layer| PictureRegion::of_content(&layer.image));
     // One region for all, so that the pictures show the same place at the same scale.
     let content = content.reduce(PictureRegion::joined).context("the pictured layers are black")?;
-    let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE));
+    let parts = shown.iter().map(|layer| Picture::new(&layer.image, content.clone(), SCALE, 1.0));
     write_picture(sheet, Picture::side_by_side(parts.collect()))?;
     Ok(shown.iter().map(|layer| layer.info.index.to_string()).collect::<Vec<_>>().join(", "))
 }
@@ -246,7 +246,7 @@ fn draw(stack: &Path, sheet: &Path, layers: u32) -> Result<String, Exit> {
 fn draw_in_mesh(stack: &Path, picture: &Path, index: u32) -> Result<(), Exit> {
     let layers = read(stack, &[index])?;
     let Layer { image, .. } = layers.first().context("the pictured layer is not there")?;
-    write_picture(picture, Picture::new(image, PictureRegion::of(image), SCALE))
+    write_picture(picture, Picture::new(image, PictureRegion::of(image), SCALE, 1.0))
 }
 
 /// Some layers of a stack.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::anyhow;
 use clap::Args;
-use lamp_stack::{Image, Layer, Length, Page, PageInfo, StackError, map_in_order};
+use lamp_stack::{Image, Layer, Length, Page, PageInfo, Pitch, StackError, map_in_order};
 
 use crate::args::options::Common;
 use crate::args::options::EveryNth;
@@ -42,7 +42,8 @@ pub(crate) struct ShowArgs {
     #[arg(long, value_name = "X,Y,W,H")]
     region: Option<PictureRegion>,
 
-    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 shows the mean of 8 x 8 pixels
+    /// Scale of the picture: 4 shows each pixel as 4 x 4, 1/8 shows the mean of 8 x 8 pixels; where
+    /// pixels are not square, the scale is of their width, and the picture keeps the part's shape
     /// [default: 1; for several layers, at most 400 pixels wide and high each; in a terminal, its
     /// width]
     #[arg(long, value_name = "N|1/N")]
@@ -113,7 +114,7 @@ pub(crate) fn run(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
 }
 
 fn show_one(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
-    let Layer { image, .. } = match (args.shown.layer, args.shown.z) {
+    let Layer { image, pitch, .. } = match (args.shown.layer, args.shown.z) {
         (Some(index), _) => layer_numbered(&args.stack, index)?,
         (None, z) => layer_at(&args.stack, z.expect("one of the options is required"))?,
     };
@@ -122,8 +123,9 @@ fn show_one(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
     // A file takes pixels as they are; a terminal has only so many columns.
     let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region));
     let scale = args.scale.unwrap_or_else(fitting);
-    check_size(scale.size(&region))?;
-    let picture = Picture::new(&image, region, scale);
+    let aspect = pitch.map_or(1.0, Pitch::aspect);
+    check_size(scale.size(&region, aspect))?;
+    let picture = Picture::new(&image, region, scale, aspect);
     write(args, common, |out| match form {
         Some(form) => form.write(picture, out),
         None => picture.write_png(out),
@@ -149,8 +151,10 @@ fn show_many(args: &ShowArgs, layers: &EveryNth, common: &Common) -> Result<(), 
     let thumbnails = map_in_order(shown, |page: Page| {
         let layer = page.decode().map_err(failed)?;
         let region = region_on(args, &layer.image)?;
-        let scale = args.scale.unwrap_or_else(|| PictureScale::fitting(&region, THUMBNAIL_SIDE));
-        let [width, height] = scale.size(&region);
+        let aspect = layer.pitch.map_or(1.0, Pitch::aspect);
+        let fitting = || PictureScale::fitting(&region, THUMBNAIL_SIDE, aspect);
+        let scale = args.scale.unwrap_or_else(fitting);
+        let [width, height] = scale.size(&region, aspect);
         // Counted before the pictures take their memory, by all threads together.
         if pixels.fetch_add(width * height, Ordering::Relaxed) + width * height > MAX_PIXELS {
             return Err(Exit::usage(format!(

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use lamp_fix::{Band, BandOutcome, Fixed};
-use lamp_stack::{FolderBeside, Image, write_rgb_png};
+use lamp_stack::{FolderBeside, Image, Pitch, write_rgb_png};
 
 use crate::exit::Exit;
 use crate::streams::new_folder;
@@ -17,7 +17,7 @@ const COLUMNS_AROUND: u32 = 48;
 /// and this much shows how it was corrected.
 const MAX_COLUMNS: u32 = 400;
 const MAX_ROWS: u32 = 200;
-/// Picture pixels per image pixel, on a side.
+/// Picture pixels that an image pixel is wide.
 const SCALE: usize = 4;
 /// Color of the gap between two panels.
 const GUTTER: [u8; 3] = [128; 3];
@@ -64,7 +64,8 @@ impl BandPictures {
         } else {
             vec![plain(&before)]
         };
-        let rows = enlarged(&panels);
+        let aspect = fixed.before.pitch.map_or(1.0, Pitch::aspect);
+        let rows = enlarged(&panels, (SCALE as f64 * aspect).round().max(1.0) as usize);
         let name = format!(
             "layer_{:05}_rows_{:05}-{:05}{}.png",
             fixed.before.info.index,
@@ -108,15 +109,15 @@ fn difference(before: &[Vec<u8>], after: &[Vec<u8>]) -> Panel {
     before.iter().zip(after).map(|(a, b)| a.iter().zip(b).map(shade).collect()).collect()
 }
 
-/// The panels one below the other, each pixel as a square.
-fn enlarged(panels: &[Panel]) -> Vec<Vec<u8>> {
+/// The panels one below the other, each row so many pixels high.
+fn enlarged(panels: &[Panel], high: usize) -> Vec<Vec<u8>> {
     let wide =
         |row: &[[u8; 3]]| -> Vec<u8> { row.iter().flat_map(|pixel| pixel.repeat(SCALE)).collect() };
     let width = panels[0][0].len();
     let gutter = vec![wide(&vec![GUTTER; width]); SCALE];
     let panels: Vec<Vec<Vec<u8>>> = panels
         .iter()
-        .map(|panel| panel.iter().flat_map(|row| vec![wide(row); SCALE]).collect())
+        .map(|panel| panel.iter().flat_map(|row| vec![wide(row); high]).collect())
         .collect();
     panels.join(&gutter[..])
 }

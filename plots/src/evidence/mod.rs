@@ -67,7 +67,7 @@ pub struct EvidencePicture<'a> {
 struct Panel {
     title: String,
     raster: Raster,
-    /// Pixels of the picture for one of a layer.
+    /// Pixels of the picture for the width of one of a layer.
     scale: f64,
 }
 
@@ -97,16 +97,17 @@ impl<'a> EvidencePicture<'a> {
             facts.map_or(position, |facts| facts.index)
         };
         let Shown { region, pixel, pixels, whole, .. } = self.shown;
+        let aspect = self.findings.pitch.map_or(1.0, Pitch::aspect);
         if position == self.shown.layer {
             let found = pixel.map(|[column, row]| component_at(layer, column, row));
             let found = found.unwrap_or_else(|| unheld_in(region, below, layer));
-            let picture = picture(region, layer, PLACE_SIDE);
+            let picture = picture(region, layer, PLACE_SIDE, aspect);
             let title = format!("layer {}", index(position));
             let panel = Panel::of(title, &picture, [below, Some(layer)], &found);
             self.panels.insert(0, panel);
             let all = Region { columns: 0..layer.width(), rows: 0..layer.height() };
-            let whole =
-                Panel::whole(&self::picture(&all, layer, WHOLE_SIDE), layer, &found, region);
+            let whole = self::picture(&all, layer, WHOLE_SIDE, aspect);
+            let whole = Panel::whole(&whole, layer, &found, region);
             self.panels.insert(1, whole);
         }
         for (moment, _) in self.shown.also.iter().filter(|(_, layer)| *layer == position) {
@@ -116,7 +117,7 @@ impl<'a> EvidencePicture<'a> {
             };
             debug_assert!(*pixels == FoundPixels::White, "islands are white");
             let title = format!("layer {}: {words}", index(position));
-            let picture = picture(whole, layer, MOMENT_SIDE);
+            let picture = picture(whole, layer, MOMENT_SIDE, aspect);
             self.panels.push(Panel::of(title, &picture, [below, Some(layer)], &found));
         }
     }
@@ -170,12 +171,12 @@ impl<'a> EvidencePicture<'a> {
 /// Returns a range and what pictures show around it.
 fn around(range: &Range<u32>, end: u32) -> Range<u32> {
     let region = PictureRegion { columns: range.clone(), rows: 0..0 };
-    ShadedPicture::new(region, [end, 0], PLACE_SIDE).region().columns.clone()
+    ShadedPicture::new(region, [end, 0], PLACE_SIDE, 1.0).region().columns.clone()
 }
 
-fn picture(region: &Region, layer: &Mask, side: u32) -> ShadedPicture {
+fn picture(region: &Region, layer: &Mask, side: u32, aspect: f64) -> ShadedPicture {
     let region = PictureRegion { columns: region.columns.clone(), rows: region.rows.clone() };
-    ShadedPicture::new(region, [layer.width(), layer.height()], side)
+    ShadedPicture::new(region, [layer.width(), layer.height()], side, aspect)
 }
 
 fn runs(row: &[u32], width: u32) -> impl Iterator<Item = Range<u32>> {
@@ -240,7 +241,7 @@ impl Panel {
             paint_found(row, found, paint);
         });
         let raster = Raster::of_rows(picture.size(), rows);
-        Self { title, raster, scale: picture.scale() }
+        Self { title, raster, scale: picture.scale()[0] }
     }
 
     /// Draws a whole layer, and a frame around a region.
@@ -255,11 +256,15 @@ impl Panel {
             paint_found(row, found, paint);
         });
         let mut raster = Raster::of_rows(picture.size(), rows);
-        let place = |at: u32| (f64::from(at) * picture.scale()) as u32;
-        let [columns, rows] = [&region.columns, &region.rows]
-            .map(|range| place(range.start).saturating_sub(5)..place(range.end) + 6);
+        let [across, down] = picture.scale();
+        let [columns, rows] =
+            [(&region.columns, across), (&region.rows, down)].map(|(range, scale)| {
+                let [start, end] =
+                    [range.start, range.end].map(|at| (f64::from(at) * scale) as u32);
+                start.saturating_sub(5)..end + 6
+            });
         raster.frame(columns, rows, EvidenceShade::Place.color());
-        Self { title: "the whole layer".to_owned(), raster, scale: picture.scale() }
+        Self { title: "the whole layer".to_owned(), raster, scale: picture.scale()[0] }
     }
 
     fn drawn(self, pitch: Option<Pitch>) -> io::Result<Raster> {

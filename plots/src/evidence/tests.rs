@@ -70,9 +70,13 @@ fn an_island_shows_where_it_floats_and_joins() {
     let red = |shade: EvidenceShade| pixels.iter().filter(|at| **at == shade.color()).count();
     // 50 pixels of 8 x 8 in the place, 200 in the layer of the largest area; the whole layer and the
     // side view are enlarged 5 and 8 times.
-    let place =
-        ShadedPicture::new(PictureRegion { columns: 30..40, rows: 15..20 }, [60, 40], PLACE_SIDE);
-    assert_eq!(place.scale(), 8.0);
+    let place = ShadedPicture::new(
+        PictureRegion { columns: 30..40, rows: 15..20 },
+        [60, 40],
+        PLACE_SIDE,
+        1.0,
+    );
+    assert_eq!(place.scale(), [8.0; 2]);
     let largest = 200 * 6 * 6;
     let least = 50 * 64 + largest;
     assert!(red(EvidenceShade::Found) > least, "{} {least}", red(EvidenceShade::Found));

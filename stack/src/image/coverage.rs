@@ -32,12 +32,25 @@ pub fn mean_levels(
     rows: Range<u32>,
     side: NonZeroU32,
 ) -> impl Iterator<Item = Vec<u8>> + use<'_> {
-    assert!(columns.end <= image.width() && rows.end <= image.height(), "the region is outside");
+    assert!(rows.end <= image.height(), "the region is outside");
+    let bands = rows.clone().step_by(side.get() as usize);
+    let bands = bands.map(move |first| first..first.saturating_add(side.get()).min(rows.end));
+    mean_levels_of_bands(image, columns, bands, side)
+}
+
+/// Returns the mean levels of boxes `side` columns wide, as [`mean_levels`] does, in bands of rows.
+///
+/// # Panics
+/// Panics if the columns or a band reach beyond the image, or if a band is empty.
+pub fn mean_levels_of_bands<B: Iterator<Item = Range<u32>>>(
+    image: &Image,
+    columns: Range<u32>,
+    bands: B,
+    side: NonZeroU32,
+) -> impl Iterator<Item = Vec<u8>> + use<'_, B> {
+    assert!(columns.end <= image.width(), "the region is outside");
     let mut sums = BoxSums::new(columns, side);
-    let height = side.get() as usize;
-    let bands = rows.clone().step_by(height);
-    bands.map(move |first| {
-        let band = first..first.saturating_add(side.get()).min(rows.end);
+    bands.map(move |band| {
         for row in band.clone() {
             match image {
                 Image::Mask(mask) => sums.add(mask.row(row), |white| 255 * i64::from(white)),

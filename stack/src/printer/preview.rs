@@ -17,6 +17,8 @@ pub(crate) struct TopView {
     /// For each box, row by row: one more than the number of its highest layer, 0 without any.
     tops: Vec<u32>,
     layers: u32,
+    /// The height of the panel's pixels in widths.
+    aspect: f64,
 }
 
 /// The boxes that a layer covers by half, row by row.
@@ -35,8 +37,9 @@ impl Covered {
 }
 
 impl TopView {
-    pub(crate) fn new() -> Self {
-        Self { columns: 0, rows: 0, tops: Vec::new(), layers: 0 }
+    /// Begins the picture of a panel whose pixels are `aspect` widths high.
+    pub(crate) fn new(aspect: f64) -> Self {
+        Self { columns: 0, rows: 0, tops: Vec::new(), layers: 0, aspect }
     }
 
     /// Adds the next layer above the others. All layers have one size.
@@ -56,16 +59,17 @@ impl TopView {
     pub(crate) fn draw(&self, [width, height]: [u32; 2]) -> Vec<u8> {
         let mut levels = vec![0; width as usize * height as usize];
         let Some([left, top, right, bottom]) = self.extent() else { return levels };
-        // Boxes of a pixel of the picture: the same number across and down.
+        // Widths of boxes in a pixel of the picture: the same number across and down.
         let across = f64::from(right - left) / f64::from(width);
-        let step = across.max(f64::from(bottom - top) / f64::from(height)) * 1.1;
+        let step = across.max(f64::from(bottom - top) * self.aspect / f64::from(height)) * 1.1;
         let middle = [left + right, top + bottom].map(|sum| f64::from(sum) / 2.0);
-        let place = |pixel: u32, of: u32, middle: f64| {
-            (middle + (f64::from(pixel) + 0.5 - f64::from(of) / 2.0) * step).floor()
+        let place = |pixel: u32, of: u32, middle: f64, side: f64| {
+            (middle + (f64::from(pixel) + 0.5 - f64::from(of) / 2.0) * step / side).floor()
         };
         for (index, level) in levels.iter_mut().enumerate() {
             let (x, y) = (index as u32 % width, index as u32 / width);
-            let [x, y] = [place(x, width, middle[0]), place(y, height, middle[1])];
+            let [x, y] =
+                [place(x, width, middle[0], 1.0), place(y, height, middle[1], self.aspect)];
             let inside = x >= 0.0 && y >= 0.0 && x < self.columns.into() && y < self.rows.into();
             if inside {
                 let at = y as usize * self.columns as usize + x as usize;
@@ -100,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_higher_layer_is_lighter() {
-        let mut view = TopView::new();
+        let mut view = TopView::new(1.0);
         let wide: &[u32] = &[2, 8];
         let thin: &[u32] = &[4, 6];
         for layer in [[wide; 6], [thin; 6]] {
@@ -111,6 +115,12 @@ mod tests {
         assert_eq!(drawn[10 * 20 + 10], 255);
         assert_eq!(drawn[10 * 20 + 3], 162);
         assert_eq!(drawn[0], 0);
-        assert!(TopView::new().draw([4, 4]).iter().all(|level| *level == 0));
+        // A square of pixels twice as high as wide is half as wide as high.
+        view.aspect = 2.0;
+        let drawn = view.draw([20, 20]);
+        let white = |at: &dyn Fn(usize) -> usize| (0..20).filter(|k| drawn[at(*k)] > 0).count();
+        let [wide, high] = [white(&|k| 200 + k), white(&|k| 20 * k + 10)];
+        assert!(high == 18 && wide.abs_diff(9) <= 1, "{wide} x {high}");
+        assert!(TopView::new(1.0).draw([4, 4]).iter().all(|level| *level == 0));
     }
 }

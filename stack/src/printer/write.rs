@@ -14,6 +14,7 @@ use crate::layer::Layer;
 use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::MAX_SIDE;
 use crate::ordered::map_in_order;
+use crate::pitch::Pitch;
 use crate::printer::archive::write::ArchiveWriter;
 use crate::printer::fault::PrinterFault;
 use crate::printer::goo::write::GooWriter;
@@ -207,7 +208,8 @@ where
         PrinterFormat::Goo => Box::new(GooWriter::new(out)?),
         _ => Box::new(ArchiveWriter::new(out, format, &part)),
     };
-    let (mut totals, mut view) = (PrintTotals::default(), TopView::new());
+    let aspect = first.pitch.map_or(1.0, Pitch::aspect);
+    let (mut totals, mut view) = (PrintTotals::default(), TopView::new(aspect));
     let mirrored = record.mirrored;
     for layer in map_in_order(layers, |layer: Layer| Ok(CodedLayer::new(&layer, format, mirrored)))
     {

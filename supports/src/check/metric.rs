@@ -13,11 +13,7 @@ pub(crate) struct Metric {
 impl Metric {
     /// Returns the metric of a pitch; pixels without one count as square.
     pub(crate) fn of(pitch: Option<Pitch>) -> Self {
-        let height = pitch.filter(|pitch| !pitch.is_square()).map(|pitch| {
-            let [x, y] = pitch.um();
-            y / x
-        });
-        Self { height: height.unwrap_or(1.0) }
+        Self { height: pitch.map_or(1.0, Pitch::aspect) }
     }
 
     /// Returns the square of the distance of two pixels, given their columns and rows between.

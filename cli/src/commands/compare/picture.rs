@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lamp_stack::{Difference, Image, Section, white_runs};
+use lamp_stack::{Difference, Image, Pitch, Section, white_runs};
 
 use super::walk::{Compared, Images, NamedStack, shift_of};
 use crate::exit::Exit;
@@ -56,7 +56,9 @@ pub(super) fn write_picture(
     let Compared { overlaid, all, left } = found;
     let exposed = [overlaid.a.exposed(), overlaid.b.exposed()];
     let width = left.added.width();
-    let picture = ShadedPicture::new(region(left.clone()), [width, left.added.height()], SIDE);
+    let size = [width, left.added.height()];
+    let aspect = stacks[0].0.headers()[0].pitch.map_or(1.0, Pitch::aspect);
+    let picture = ShadedPicture::new(region(left.clone()), size, SIDE, aspect);
     write_file(path, |out| {
         picture.write_png(out, |row, paint| {
             let layers = [

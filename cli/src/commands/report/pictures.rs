@@ -1,6 +1,6 @@
 //! Pictures within a page.
 
-use lamp_stack::Layer;
+use lamp_stack::{Layer, Pitch};
 use serde::{Deserialize, Serialize};
 
 use lamp_plots::{EvidencePicture, PictureRegion, PictureScale};
@@ -20,8 +20,10 @@ pub(in crate::commands) fn of_layer(layer: &Layer) -> InlinePicture {
     let region = PictureRegion::of(&layer.image);
     let mut png = Vec::new();
     if !region.columns.is_empty() && !region.rows.is_empty() {
-        let scale = PictureScale::fitting(&region, SIDE);
-        let written = lamp_plots::Picture::new(&layer.image, region, scale).write_png(&mut png);
+        let aspect = layer.pitch.map_or(1.0, Pitch::aspect);
+        let scale = PictureScale::fitting(&region, SIDE, aspect);
+        let picture = lamp_plots::Picture::new(&layer.image, region, scale, aspect);
+        let written = picture.write_png(&mut png);
         written.expect("memory takes all");
     }
     InlinePicture { address: address(&png), caption: layer.info.name() }
