@@ -6,10 +6,26 @@ export const count = (value) => Math.round(value).toLocaleString("en").replaceAl
 /** Millimetres, to the micrometre. */
 export const mm = (value) => `${value.toFixed(3)} mm`;
 
-/** A length that is given in pixels, also in millimetres where the resolution is known. */
-export function length(pixels, dpi) {
+/** The width and height of a pixel in millimetres, by dots per inch as a stack has them: a number, or
+ * one along x and one along y; null if they are not known. */
+export const pitchOf = (dpi) =>
+  dpi == null ? null : (Array.isArray(dpi) ? dpi : [dpi, dpi]).map((axis) => 25.4 / axis);
+
+/** The height of a pixel in widths: 1 where pixels are square. */
+export function aspectOf(dpi) {
+  return Array.isArray(dpi) ? dpi[0] / dpi[1] : 1;
+}
+
+/** The resolution as people write it. */
+export function resolution(dpi) {
+  const um = (axis) => +(25400 / axis).toFixed(4);
+  return Array.isArray(dpi) ? `${um(dpi[0])} x ${um(dpi[1])} µm` : `${dpi} dpi`;
+}
+
+/** A length that is given in pixels, also in millimetres where a pixel's side is known. */
+export function length(pixels, side) {
   const text = `${+pixels.toFixed(1)} px`;
-  return dpi ? `${mm((pixels * 25.4) / dpi)} (${text})` : text;
+  return side ? `${mm(pixels * side)} (${text})` : text;
 }
 
 /**

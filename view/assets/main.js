@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import { Findings } from "./findings.js";
-import { byId, count, element, mm } from "./format.js";
+import { aspectOf, byId, count, element, mm, pitchOf, resolution } from "./format.js";
 import { Heights } from "./heights.js";
 import { listenToKeys } from "./keys.js";
 import { Marks } from "./marks.js";
@@ -45,6 +45,10 @@ async function start() {
     },
     /** The width and height of the present layer. */
     size: () => ["width", "height"].map((side) => app.columns[side][state.view.layer]),
+    /** The width and height of a pixel of the present stack in millimetres, if they are known. */
+    get pitch() {
+      return pitchOf(session.stacks[state.view.stack].dpi);
+    },
   };
   app.redraw = () => picture.refresh("findings");
   app.overlays = new Overlays(app, () => show(app));
@@ -106,19 +110,21 @@ function tellStack({ session, state }) {
   const stack = session.stacks[state.view.stack];
   document.title = `${stack.name} – LAMP`;
   byId("stack").value = state.view.stack;
-  const size = stack.dpi ? `, ${mm((stack.width * 25.4) / stack.dpi)} wide at ${stack.dpi} dpi` : "";
+  const [side] = pitchOf(stack.dpi) ?? [];
+  const size = side ? `, ${mm(stack.width * side)} wide at ${resolution(stack.dpi)}` : "";
   const part = stack.part ? `${stack.part}: ` : "";
   byId("facts").textContent =
     `${part}${count(stack.layers)} layers of ${count(stack.width)} x ${count(stack.height)} px${size}. ${stack.end ?? ""}`;
 }
 
 /** Shows the layer of the state with its overlays; the next one is expected in the same direction. */
-function show({ columns, overlays, picture, state }) {
+function show({ columns, overlays, picture, session, state }) {
   byId("message").hidden = true;
   const { stack, layer, threshold } = state.view;
   const sheets = (layer) => {
     const [width, height] = [columns.width[layer], columns.height[layer]];
-    const sheet = { stack, layer, width, height, threshold: null };
+    const aspect = aspectOf(session.stacks[stack].dpi);
+    const sheet = { stack, layer, width, height, aspect, threshold: null };
     const over = state.view.overlays.map((kind) => ({ ...sheet, kind }));
     return [{ ...sheet, kind: "layer", threshold: columns.gray[layer] ? threshold : null }, ...over];
   };

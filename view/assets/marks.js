@@ -57,16 +57,16 @@ export class Marks {
 
   /** Draws a bar of a round length of 60 to 150 screen pixels. */
   #scale() {
-    const { picture, session, state } = this.#app;
-    const { dpi } = session.stacks[state.view.stack];
-    const pitch = dpi ? 25.4 / dpi : 1;
+    const { picture } = this.#app;
+    const [side] = this.#app.pitch ?? [];
+    const pitch = side ?? 1;
     const most = (150 / picture.zoom) * pitch;
     const ten = 10 ** Math.floor(Math.log10(most));
     const round = [5, 2, 1].map((digit) => digit * ten).find((length) => length <= most);
     const bar = byId("scale");
     bar.style.width = `${(round / pitch) * picture.zoom}px`;
     const millimetres = round < 0.1 ? `${+(round * 1000).toPrecision(1)} µm` : `${+round.toPrecision(1)} mm`;
-    bar.firstElementChild.textContent = dpi ? millimetres : `${+round.toPrecision(1)} px`;
+    bar.firstElementChild.textContent = side ? millimetres : `${+round.toPrecision(1)} px`;
   }
 }
 

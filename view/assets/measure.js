@@ -1,7 +1,7 @@
 /** A measure between two points, which snap to edges. */
 
 import { get } from "./api.js";
-import { byId, length } from "./format.js";
+import { byId, length, mm } from "./format.js";
 
 /** Points snap to edges within so many screen pixels. */
 const SNAP = 12;
@@ -52,20 +52,22 @@ export class Measure {
 
   #draw() {
     const { marks, picture } = this.#app;
-    const arm = 7 / picture.zoom;
-    const cross = ([x, y]) => [[[x - arm, y], [x + arm, y]], [[x, y - arm], [x, y + arm]]];
+    const [arm, down] = [7 / picture.zoom, 7 / picture.zoom / picture.aspect];
+    const cross = ([x, y]) => [[[x - arm, y], [x + arm, y]], [[x, y - down], [x, y + down]]];
     const line = this.#points.length === 2 ? [this.#points] : [];
     marks.set("measure", [...this.#points.flatMap(cross), ...line]);
   }
 
   #show() {
     this.#draw();
-    const { session, state } = this.#app;
     const [a, b] = this.#points;
-    const { dpi } = session.stacks[state.view.stack];
+    const [wide, high] = this.#app.pitch ?? [];
+    const apart = (axis) => Math.abs(b[axis] - a[axis]);
+    // Of pixels that are not square, only millimetres add up.
+    const across = () =>
+      wide === high ? length(Math.hypot(apart(0), apart(1)), wide) : mm(Math.hypot(apart(0) * wide, apart(1) * high));
     byId("length-text").textContent = b
-      ? `${length(Math.hypot(b[0] - a[0], b[1] - a[1]), dpi)}: ` +
-        `${length(Math.abs(b[0] - a[0]), dpi)} along x, ${length(Math.abs(b[1] - a[1]), dpi)} along y`
+      ? `${across()}: ${length(apart(0), wide)} along x, ${length(apart(1), high)} along y`
       : `Click ${a ? "the second" : "the first"} point, or press Enter for the middle. Points snap to edges.`;
   }
 }

@@ -10,7 +10,7 @@ const MOST_GIVEN_UP = 3;
 /** What comes next is fetched ahead when nothing has come or moved for so long. */
 const STILL_MS = 80;
 
-/** The largest zoom, in screen pixels for a pixel. */
+/** The largest zoom, in screen pixels for the width of a pixel. */
 export const MAX_ZOOM = 40;
 
 /** Events: `view` when place or zoom change, `shown` when a scene has come, `failed`. */
@@ -18,6 +18,7 @@ export class Picture extends EventTarget {
   #viewer;
   #side;
   #unit;
+  #aspect = 1;
   /** @type {Map<string, any>} OpenSeadragon's images by the names of their sheets */
   #items = new Map();
   #wanted = null;
@@ -64,7 +65,7 @@ export class Picture extends EventTarget {
       item.setPreload(false);
       item.savedCutOffLevel = 0;
     });
-    // Pixels that are larger than the screen's stay squares. Told before it draws, not after.
+    // Pixels that are larger than the screen's stay sharp. Told before it draws, not after.
     this.#viewer.addHandler("viewport-change", () => {
       this.#viewer.drawer.setImageSmoothingEnabled(this.zoom < 1);
     });
@@ -93,7 +94,12 @@ export class Picture extends EventTarget {
     });
   }
 
-  /** Zoom: screen pixels for a pixel. */
+  /** The height of a pixel of what is wanted in widths. */
+  get aspect() {
+    return this.#aspect;
+  }
+
+  /** Zoom: screen pixels for the width of a pixel. */
   get zoom() {
     const { viewport } = this.#viewer;
     return (viewport.getContainerSize().x * viewport.getZoom(true)) / this.#unit;
@@ -102,20 +108,24 @@ export class Picture extends EventTarget {
   /** @returns {[number, number]} column and row in the middle */
   get centre() {
     const { x, y } = this.#viewer.viewport.getCenter(true);
-    return [x * this.#unit, y * this.#unit];
+    return [x * this.#unit, (y * this.#unit) / this.#aspect];
   }
 
   /** Returns the place on the screen of a place in the image. */
   toScreen([x, y]) {
-    const point = new OpenSeadragon.Point(x / this.#unit, y / this.#unit);
-    const place = this.#viewer.viewport.pixelFromPoint(point, true);
+    const place = this.#viewer.viewport.pixelFromPoint(this.#point([x, y]), true);
     return [place.x, place.y];
   }
 
   /** Returns the place in the image of a place on the screen. */
   fromScreen([x, y]) {
     const point = this.#viewer.viewport.pointFromPixel(new OpenSeadragon.Point(x, y), true);
-    return [point.x * this.#unit, point.y * this.#unit];
+    return [point.x * this.#unit, (point.y * this.#unit) / this.#aspect];
+  }
+
+  /** Returns a place of the image in the viewport. */
+  #point([x, y]) {
+    return new OpenSeadragon.Point(x / this.#unit, (y * this.#aspect) / this.#unit);
   }
 
   /** Brings a place of the image to the middle, with a zoom. */
@@ -123,7 +133,7 @@ export class Picture extends EventTarget {
     const { viewport } = this.#viewer;
     const target = (zoom * this.#unit) / viewport.getContainerSize().x;
     viewport.zoomTo(target, null, true);
-    viewport.panTo(new OpenSeadragon.Point(x / this.#unit, y / this.#unit), true);
+    viewport.panTo(this.#point([x, y]), true);
     viewport.applyConstraints(true);
   }
 
@@ -131,7 +141,7 @@ export class Picture extends EventTarget {
   fit([left, top, right, bottom]) {
     const [width, height] = [right - left, bottom - top];
     const screen = this.#viewer.viewport.getContainerSize();
-    const zoom = Math.min(screen.x / width, screen.y / height) / 3;
+    const zoom = Math.min(screen.x / width, screen.y / (height * this.#aspect)) / 3;
     this.lookAt([left + width / 2, top + height / 2], Math.min(zoom, MAX_ZOOM / 2));
   }
 
@@ -161,6 +171,7 @@ export class Picture extends EventTarget {
    */
   show(scene) {
     this.#wanted = scene;
+    this.#aspect = scene.sheets[0].aspect;
     if (!this.#loading) this.#loadWanted();
     else if (performance.now() - this.#since > PATIENCE_MS && this.#givenUp < MOST_GIVEN_UP) this.#loading.abort();
   }

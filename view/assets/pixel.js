@@ -44,21 +44,21 @@ export class Pixel {
 
   #show(x, y, pixel) {
     const { copy, component, level, white } = pixel;
-    const { dpi } = this.#app.session.stacks[this.#app.state.view.stack];
     const named = (id) => this.#app.findings?.text(id) ?? `${id}`;
     tell(byId("pixel"), [
       ["Column, row", `${x}, ${y}`],
       ["Place", pixel.x_mm == null ? null : `x ${mm(pixel.x_mm)}, y ${mm(pixel.y_mm)}`],
       ["Colour", `${white ? "white (cured)" : "black"}, level ${level}`],
       ["Copy", copy && `${copy.number} of ${copy.of} of ${copy.part}, pixel ${copy.x}, ${copy.y}`],
-      ["Component", component && `${count(component.area_px)} px, ${extent(component.box, dpi)}`],
+      ["Component", component && `${count(component.area_px)} px, ${extent(component.box, this.#app.pitch)}`],
       ["Findings", pixel.findings.map(named).join("; ")],
     ]);
   }
 }
 
-function extent([left, top, right, bottom], dpi) {
-  return `${length(right - left, dpi)} by ${length(bottom - top, dpi)}`;
+function extent([left, top, right, bottom], pitch) {
+  const [wide, high] = pitch ?? [];
+  return `${length(right - left, wide)} by ${length(bottom - top, high)}`;
 }
 
 /**

@@ -1,7 +1,7 @@
 /** The panel of the part in 3D: loads what it needs when it is opened. */
 
 import { ask, get, poll } from "./api.js";
-import { byId } from "./format.js";
+import { byId, pitchOf } from "./format.js";
 
 /** Shows the part of the first stack, its layer and findings. */
 export class SolidPanel {
@@ -93,11 +93,11 @@ function hasWebGl() {
 async function placesOf(columns) {
   const first = await get("/api/stacks/0/layers/0");
   const scaled = first.dpi != null && columns.z_um.every((z) => z != null);
-  const pitch = scaled ? 25.4 / first.dpi : 1;
+  const [wide, high] = scaled ? pitchOf(first.dpi) : [1, 1];
   const rows = columns.height.reduce((most, height) => Math.max(most, height), 0);
-  const [left, upper] = (scaled && first.origin_mm) || [0, rows * pitch];
+  const [left, upper] = (scaled && first.origin_mm) || [0, rows * high];
   const bottom = (layer) => (scaled ? columns.z_um[layer] / 1000 : layer);
   const thickness = (layer) => (scaled ? (columns.thickness_um[layer] ?? 0) / 1000 : 1);
   const top = (layer) => bottom(layer) + thickness(layer);
-  return { top, point: ([x, y], layer) => [left + x * pitch, upper - y * pitch, top(layer)] };
+  return { top, point: ([x, y], layer) => [left + x * wide, upper - y * high, top(layer)] };
 }

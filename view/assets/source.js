@@ -10,6 +10,7 @@ import { ask } from "./api.js";
  * @property {number | null} threshold
  * @property {number} width in pixels
  * @property {number} height in pixels
+ * @property {number} aspect the height of a pixel in widths
  */
 
 /**
@@ -28,16 +29,29 @@ export function nameOf({ stack, layer, kind, threshold }) {
  * @param {(error: Error) => void} fail is told why a tile does not come
  */
 export function tileSource(sheet, side, fail) {
-  const { stack, layer, kind, threshold, width, height } = sheet;
+  const { stack, layer, kind, threshold, width, height, aspect } = sheet;
   const maxLevel = Math.max(0, Math.ceil(Math.log2(Math.max(width, height) / side)));
   const source = new OpenSeadragon.TileSource({
     width,
-    height,
-    tileSize: side,
+    height: height * aspect,
+    tileWidth: side,
+    tileHeight: side * aspect,
     tileOverlap: 0,
     minLevel: 0,
     maxLevel,
   });
+  // Tiles have as many rows as columns, and are drawn higher or lower than wide.
+  const boundsOf = source.getTileBounds.bind(source);
+  source.getTileBounds = (level, x, y, isSource) => {
+    const bounds = boundsOf(level, x, y, isSource);
+    if (isSource) bounds.height /= aspect;
+    return bounds;
+  };
+  // By pixels, for a rounded height might have one row of tiles more.
+  source.getNumTiles = (level) => {
+    const tiles = (pixels) => Math.ceil((source.getLevelScale(level) * pixels) / side);
+    return new OpenSeadragon.Point(tiles(width), tiles(height));
+  };
   const query = threshold ? `?threshold=${threshold}` : "";
   const stop = new AbortController();
   source.getTileUrl = (level, x, y) =>

@@ -5,7 +5,7 @@
  * @property {number} stack
  * @property {number} layer position in the stack, from 0
  * @property {[number, number] | null} centre column and row in the middle; null: the whole layer
- * @property {number | null} zoom screen pixels for a pixel
+ * @property {number | null} zoom screen pixels for the width of a pixel
  * @property {string[]} overlays
  * @property {number | null} threshold gray levels from this one on are shown as cured
  */

@@ -2,14 +2,21 @@
 
 use lamp_stack::{Mask, Op};
 
-/// The largest distance of the search for an edge, in pixels.
+/// The largest distance of the search for an edge, in widths of a pixel.
 pub(crate) const MOST_RADIUS: f64 = 256.0;
 
-/// Returns the point nearest to `at` on the sides of pixels between black and white, at most
-/// `radius` pixels away. Corners of pixels are at whole numbers; outside the image all is black.
-pub(crate) fn nearest_edge(mask: &Mask, at: [f64; 2], radius: f64) -> Option<[f64; 2]> {
-    let mut nearest = Nearest { at, squared: radius.min(MOST_RADIUS).powi(2), point: None };
-    let reach = nearest.squared.sqrt();
+/// Returns the point nearest to `at` on the sides of pixels between black and white, at most `radius`
+/// widths of a pixel away. Pixels are `aspect` widths high. Corners of pixels are at whole numbers;
+/// outside the image all is black.
+pub(crate) fn nearest_edge(
+    mask: &Mask,
+    at: [f64; 2],
+    radius: f64,
+    aspect: f64,
+) -> Option<[f64; 2]> {
+    let squared = radius.min(MOST_RADIUS).powi(2);
+    let mut nearest = Nearest { at, aspect, squared, point: None };
+    let reach = squared.sqrt() / aspect;
     let row_of = |y: f64| y.floor().clamp(0.0, f64::from(mask.height())) as u32;
     let [first, last] = [row_of(at[1] - reach), row_of(at[1] + reach)];
     let row = |number: Option<u32>| {
@@ -27,6 +34,7 @@ pub(crate) fn nearest_edge(mask: &Mask, at: [f64; 2], radius: f64) -> Option<[f6
 
 struct Nearest {
     at: [f64; 2],
+    aspect: f64,
     /// The square of the distance that a nearer point must not exceed.
     squared: f64,
     point: Option<[f64; 2]>,
@@ -34,7 +42,8 @@ struct Nearest {
 
 impl Nearest {
     fn try_point(&mut self, point: [f64; 2]) {
-        let squared = (point[0] - self.at[0]).powi(2) + (point[1] - self.at[1]).powi(2);
+        let down = (point[1] - self.at[1]) * self.aspect;
+        let squared = (point[0] - self.at[0]).powi(2) + down.powi(2);
         // Of points at equal distances, the first counts.
         if squared < self.squared || (self.point.is_none() && squared == self.squared) {
             (self.squared, self.point) = (squared, Some(point));
@@ -83,7 +92,7 @@ mod tests {
     use super::*;
 
     /// The same, by all sides of all pixels.
-    fn slow(mask: &Mask, at: [f64; 2], radius: f64) -> Option<f64> {
+    fn slow(mask: &Mask, at: [f64; 2], radius: f64, aspect: f64) -> Option<f64> {
         let [width, height] = [mask.width(), mask.height()].map(i64::from);
         let white = |x: i64, y: i64| {
             (0..width).contains(&x) && (0..height).contains(&y) && mask.is_white(x as u32, y as u32)
@@ -91,7 +100,7 @@ mod tests {
         let distance = |[x0, x1]: [i64; 2], [y0, y1]: [i64; 2]| {
             let x = at[0].clamp(x0 as f64, x1 as f64) - at[0];
             let y = at[1].clamp(y0 as f64, y1 as f64) - at[1];
-            x.hypot(y)
+            x.hypot(y * aspect)
         };
         let mut least = f64::INFINITY;
         for y in 0..=height {
@@ -113,15 +122,16 @@ mod tests {
             rows in prop::collection::vec(prop::collection::btree_set(0u32..24, 0..7), 0..20),
             at in [-5.0..30.0f64, -5.0..25.0],
             radius in 0.0..12.0f64,
+            aspect in prop::sample::select(vec![1.0, 19.0 / 14.0, 14.0 / 19.0]),
         ) {
             let mut mask = MaskBuilder::new(24);
             for row in rows {
                 mask.push_row(&row.into_iter().collect::<Vec<_>>()).unwrap();
             }
             let mask = mask.finish();
-            let found = nearest_edge(&mask, at, radius);
-            let far = found.map(|[x, y]| (x - at[0]).hypot(y - at[1]));
-            match (far, slow(&mask, at, radius)) {
+            let found = nearest_edge(&mask, at, radius, aspect);
+            let far = found.map(|[x, y]| (x - at[0]).hypot((y - at[1]) * aspect));
+            match (far, slow(&mask, at, radius, aspect)) {
                 (Some(far), Some(least)) => prop_assert!((far - least).abs() < 1e-9),
                 (far, least) => prop_assert_eq!(far, least),
             }

@@ -1,6 +1,6 @@
 //! A stack that is viewed.
 
-use lamp_stack::{Image, IndexedStack, NotSquare, Page, PageHeader, StackError};
+use lamp_stack::{Image, IndexedStack, Page, PageHeader, StackError};
 use serde_json::{Value, json};
 
 use crate::copies::Copies;
@@ -17,16 +17,10 @@ pub struct ViewedStack {
 
 impl ViewedStack {
     /// Takes a stack, and its name for people: the name of its file, without folders.
-    ///
-    /// # Errors
-    /// Returns an error if pixels are not square: the page draws and measures them as squares.
-    pub fn new(name: impl Into<String>, pages: IndexedStack) -> Result<Self, NotSquare> {
-        if let Some(pitch) = pages.headers().first().and_then(|first| first.pitch) {
-            pitch.square("the viewer needs")?;
-        }
+    pub fn new(name: impl Into<String>, pages: IndexedStack) -> Self {
         let copies =
             pages.headers().first().map_or_else(Copies::default, |first| Copies::of(&first.info));
-        Ok(Self { name: name.into(), pages, copies })
+        Self { name: name.into(), pages, copies }
     }
 
     /// Returns the headers of the pages, bottom first.

@@ -4,7 +4,7 @@ use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use lamp_stack::{FixRecord, Frame, Image, Mask};
+use lamp_stack::{FixRecord, Frame, Image, Mask, Pitch};
 use serde_json::{Value, json};
 
 use crate::background::{Background, WorkProgress};
@@ -341,7 +341,9 @@ impl Viewer {
             return Err(ViewError::Malformed("x, y and radius must be numbers"));
         }
         let image = self.image(stack, layer, ImageKind::Layer, given_up)?;
-        let point = nearest_edge(&image.exposed(), at, radius);
+        let pitch = self.stacks[stack].header(layer)?.pitch;
+        let aspect = pitch.map_or(1.0, Pitch::aspect);
+        let point = nearest_edge(&image.exposed(), at, radius, aspect);
         Ok(json!({"x": point.map(|point| point[0]), "y": point.map(|point| point[1])}))
     }
 

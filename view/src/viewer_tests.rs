@@ -25,7 +25,7 @@ fn stack(name: &str, layers: Vec<(PageInfo, Image)>) -> ViewedStack {
     let layers = (0..).zip(layers).map(layer).map(Ok::<_, StackError>);
     write_stack(layers, Destination::File(path.clone()), Format::Big).unwrap();
     // The file stays open.
-    ViewedStack::new(name, IndexedStack::open(&path).unwrap()).unwrap()
+    ViewedStack::new(name, IndexedStack::open(&path).unwrap())
 }
 
 fn mask(rows: [&[u32]; 3]) -> Mask {

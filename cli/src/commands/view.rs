@@ -173,7 +173,7 @@ fn opened(path: &Path, slicing: &SliceSettings, common: &Common) -> Result<Viewe
         progress.warn(&format!("{name}: {end}; the layers before are shown"));
     }
     let shown = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
-    ViewedStack::new(shown, pages).with_context(|| name.clone()).map_err(Exit::Failed)
+    Ok(ViewedStack::new(shown, pages))
 }
 
 fn sliced(part: &SlicedPart, progress: &Progress) -> Result<File, Exit> {
