@@ -1,7 +1,7 @@
 //! The model of planners: the dose that a pixel of a layer adds to every voxel.
 
 use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
-use lamp_stack::{Dpi, Length};
+use lamp_stack::{Length, Pitch};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -122,25 +122,27 @@ impl Light {
     ///
     /// # Errors
     /// Returns an error if the spread is wider than 256 pixels.
-    pub fn check_spread(&self, dpi: Dpi) -> Result<(), LightError> {
-        let [across, along] = self.spread_pixels(dpi);
+    pub fn check_spread(&self, pitch: impl Into<Pitch>) -> Result<(), LightError> {
+        let [across, along] = self.spread_pixels(pitch);
         let pixels = across.max(along).ceil() as u64;
         if pixels > MOST_SPREAD { Err(LightError::TooWide { pixels }) } else { Ok(()) }
     }
 
     /// Returns σ in pixels, along the rows and along the columns of images.
-    pub fn spread_pixels(&self, dpi: Dpi) -> [f64; 2] {
-        self.spread.map(|sigma| sigma.um() / dpi.pitch().um())
+    pub fn spread_pixels(&self, pitch: impl Into<Pitch>) -> [f64; 2] {
+        let [x_um, y_um] = pitch.into().um();
+        [self.spread[0].um() / x_um, self.spread[1].um() / y_um]
     }
 
     /// Returns the light that reaches each layer. Layers count from the light: the last page comes
     /// first.
-    pub fn layers(&self, dpi: Dpi, layers: &[LayerTime]) -> Vec<LayerLight> {
+    pub fn layers(&self, pitch: impl Into<Pitch>, layers: &[LayerTime]) -> Vec<LayerLight> {
+        let pitch = pitch.into();
         // 001 gives the light at the center of one pixel's Gaussian; radiometers read a wide field,
         // where the Gaussians of all pixels add up.
         let weight = match self.intensity_of {
-            IntensityOf::Field => 1.0 / Blur::<f64>::of_scan(self.spread_pixels(dpi)).sum(),
-            IntensityOf::Pixel(size) => (dpi.pitch().um() / size.um()).powi(2),
+            IntensityOf::Field => 1.0 / Blur::<f64>::of_scan(self.spread_pixels(pitch)).sum(),
+            IntensityOf::Pixel(size) => pitch.um().map(|side| side / size.um()).iter().product(),
         };
         let fade = |um: f64| (-um / self.penetration_depth.um()).exp();
         let above_and_own = |above: Option<&LayerTime>, own: &LayerTime| {
@@ -174,6 +176,8 @@ impl Light {
 
 #[cfg(test)]
 mod tests {
+    use lamp_stack::Dpi;
+
     use super::*;
 
     fn light(at: SampleHeight) -> Light {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lamp_stack::{Dpi, Image};
+use lamp_stack::{Image, Pitch};
 
 use crate::blur::{Blur, LANES};
 use crate::light::{LayerTime, Light};
@@ -14,7 +14,7 @@ use crate::light::{LayerTime, Light};
 #[derive(Clone, Debug)]
 pub struct RegionDoses {
     light: Light,
-    dpi: Dpi,
+    pitch: Pitch,
     columns: Range<u32>,
     rows: Range<u32>,
     blur: Blur<f64>,
@@ -25,10 +25,16 @@ pub struct RegionDoses {
 
 impl RegionDoses {
     /// Creates a rectangle without any dose.
-    pub fn new(light: Light, dpi: Dpi, columns: Range<u32>, rows: Range<u32>) -> Self {
-        let blur = Blur::of_scan(light.spread_pixels(dpi));
+    pub fn new(
+        light: Light,
+        pitch: impl Into<Pitch>,
+        columns: Range<u32>,
+        rows: Range<u32>,
+    ) -> Self {
+        let pitch = pitch.into();
+        let blur = Blur::of_scan(light.spread_pixels(pitch));
         let doses = vec![0.0; columns.len() * rows.len()];
-        Self { light, dpi, columns, rows, blur, last: None, doses }
+        Self { light, pitch, columns, rows, blur, last: None, doses }
     }
 
     /// Exposes the layer itself, and then, from the bottom up, the layers above it. `light_of`
@@ -37,11 +43,11 @@ impl RegionDoses {
         let passed = match self.last {
             None => 1.0,
             Some((below, passed)) => {
-                passed * self.light.layers(self.dpi, &[exposed, below])[1].passed
+                passed * self.light.layers(self.pitch, &[exposed, below])[1].passed
             }
         };
         self.last = Some((exposed, passed));
-        let own = passed * self.light.layers(self.dpi, &[exposed])[0].own;
+        let own = passed * self.light.layers(self.pitch, &[exposed])[0].own;
         let (spread, width) = self.spread(image, light_of);
         let reach = self.blur.radius();
         let inside = spread.chunks_exact(width).skip(reach);
@@ -86,7 +92,7 @@ mod tests {
     use lamp_grayscale::PixelLine;
     use lamp_grayscale::material::Material;
     use lamp_grayscale::resin::ExposureTime;
-    use lamp_stack::{Catalogued, GrayMask, Length};
+    use lamp_stack::{Catalogued, Dpi, GrayMask, Length};
 
     use super::*;
     use crate::light::SampleHeight;

@@ -1,7 +1,7 @@
 //! The doses of all layers along one line of pixels: a vertical section.
 
 use lamp_grayscale::{PixelLine, SolidHeights, add_below};
-use lamp_stack::{Dpi, Image, Length};
+use lamp_stack::{Image, Length, Pitch};
 
 use crate::blur::Blur;
 use crate::light::{LayerTime, Light, SampleHeight};
@@ -34,7 +34,7 @@ use crate::light::{LayerTime, Light, SampleHeight};
 #[derive(Clone, Debug)]
 pub struct DoseSection {
     light: Light,
-    dpi: Dpi,
+    pitch: Pitch,
     line: PixelLine,
     blur: Blur<f64>,
     layers: Vec<ExposedLayer>,
@@ -51,9 +51,10 @@ struct ExposedLayer {
 
 impl DoseSection {
     /// Creates the section of a stack whose images have this resolution, along a line.
-    pub fn new(light: Light, line: PixelLine, dpi: Dpi) -> Self {
-        let blur = Blur::of_scan(light.spread_pixels(dpi));
-        Self { light, dpi, line, blur, layers: Vec::new() }
+    pub fn new(light: Light, line: PixelLine, pitch: impl Into<Pitch>) -> Self {
+        let pitch = pitch.into();
+        let blur = Blur::of_scan(light.spread_pixels(pitch));
+        Self { light, pitch, line, blur, layers: Vec::new() }
     }
 
     /// Exposes a layer on top of the layers before. `light_of` returns the light that a level that
@@ -138,7 +139,7 @@ impl DoseSection {
         let ends = self.layers.iter().filter_map(|layer| layer.spread.last());
         let pixels = ends.map(|&(end, _)| end).max().unwrap_or(0);
         let mut doses = vec![0.0; pixels as usize];
-        let lights = self.light.layers(self.dpi, &from_top);
+        let lights = self.light.layers(self.pitch, &from_top);
         for ((number, layer), light) in self.layers.iter().enumerate().rev().zip(lights) {
             // 001 eq. 5 from the light down: the light passed from all layers above fades together.
             doses.iter_mut().for_each(|dose| *dose *= light.passed);
@@ -207,7 +208,7 @@ fn stretches(numbers: &[f64]) -> Vec<(u32, f64)> {
 #[cfg(test)]
 mod tests {
     use lamp_grayscale::resin::{Dose, ExposureTime, Intensity};
-    use lamp_stack::{GrayMask, Mask};
+    use lamp_stack::{Dpi, GrayMask, Mask};
 
     use super::*;
     use crate::light::IntensityOf;

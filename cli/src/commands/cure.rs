@@ -85,7 +85,8 @@ pub(crate) struct CureArgs {
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
     at: Option<SampleHeight>,
 
-    /// Scale of the picture: 4 draws each pixel as 4 x 4, 1/8 draws every eighth pixel
+    /// Scale of the picture: 4 draws each pixel 4 wide, 1/8 draws every eighth pixel; heights have the
+    /// same scale
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     scale: PictureScale,
 
@@ -139,7 +140,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
             }
             let course = SectionLine::new(args.section, &layer).map_err(no_section)?;
             if let CureRule::Spread(light) | CureRule::Voxels(light) = rule {
-                light.check_spread(course.dpi)?;
+                light.check_spread(course.pitch)?;
             }
             section = Some(CureSection::new(&resin, rule, course));
             stack = layer.info.stack.clone();

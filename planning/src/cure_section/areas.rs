@@ -107,7 +107,7 @@ impl ShownSection {
     /// Returns an area in mm², from mean heights over every pixel.
     fn area_mm2(&self, height_at: impl Fn(usize) -> Length) -> f64 {
         let pixels = self.pixels.start as usize..self.pixels.end as usize;
-        pixels.map(|pixel| height_at(pixel).mm()).sum::<f64>() * self.course.dpi.pitch().mm()
+        pixels.map(|pixel| height_at(pixel).mm()).sum::<f64>() * self.course.pixel_mm()
     }
 
     /// Returns the heights of the part at each pixel's center: the heights cured if each pixel

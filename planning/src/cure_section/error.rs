@@ -1,7 +1,7 @@
 //! Why a stack has no section.
 
 use lamp_grayscale::resin::CureError;
-use lamp_stack::{LengthError, NotSquare};
+use lamp_stack::LengthError;
 use thiserror::Error;
 
 use super::line::SectionPlane;
@@ -28,9 +28,6 @@ pub enum CureSectionError {
     /// Pages do not state the size of pixels.
     #[error("its pages do not state their resolution")]
     NoResolution,
-    /// Pixels are not square.
-    #[error(transparent)]
-    NotSquare(#[from] NotSquare),
     /// The plane misses the images.
     #[error("{plane} is outside its images: {low_mm:.3} to {high_mm:.3} mm")]
     Outside {

@@ -76,7 +76,7 @@ impl<'a> CureSection<'a> {
                 CuredResin::Summed([line.clone(), line])
             }
             CureRule::Spread(light) | CureRule::Voxels(light) => {
-                let section = DoseSection::new(light, course.line, course.dpi);
+                let section = DoseSection::new(light, course.line, course.pitch);
                 CuredResin::Spread(Box::new((light, [section.clone(), section])))
             }
         };

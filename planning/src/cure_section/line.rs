@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use lamp_grayscale::{OutlinePiece, PixelLine};
 use lamp_slicing::{Axis, Part, SectionOptions, SliceError, SliceOptions, Trapezoid, section_area};
-use lamp_stack::{Dpi, Layer, Length};
+use lamp_stack::{Dpi, Layer, Length, Pitch};
 
 use super::error::{CureSectionError, UnknownPlane};
 
@@ -51,7 +51,7 @@ pub struct SectionLine {
     pub line: PixelLine,
     corner_mm: [f64; 2],
     /// The resolution of the images.
-    pub dpi: Dpi,
+    pub pitch: Pitch,
     /// The number of pixels along it.
     pub pixels: u32,
 }
@@ -65,43 +65,57 @@ impl SectionLine {
     pub fn new(plane: SectionPlane, layer: &Layer) -> Result<Self, CureSectionError> {
         let corner_mm = layer.info.origin_mm.ok_or(CureSectionError::NoPosition)?;
         let pitch = layer.pitch.ok_or(CureSectionError::NoResolution)?;
-        let dpi = pitch.square("cured sections need")?;
         let [x0, y1] = corner_mm;
-        let pitch = dpi.pitch().mm();
+        let [wide, high] = pitch.mm();
         let image = &layer.image;
         let [width, height] = [image.width(), image.height()];
-        let (number, count, low) = match plane {
-            SectionPlane::X(x) => ((x.mm() - x0) / pitch, width, x0),
-            SectionPlane::Y(y) => ((y1 - y.mm()) / pitch, height, y1 - f64::from(height) * pitch),
+        let (number, count, low, side) = match plane {
+            SectionPlane::X(x) => ((x.mm() - x0) / wide, width, x0, wide),
+            SectionPlane::Y(y) => {
+                ((y1 - y.mm()) / high, height, y1 - f64::from(height) * high, high)
+            }
         };
         if !(0.0..f64::from(count)).contains(&number) {
-            let high = low + f64::from(count) * pitch;
+            let high = low + f64::from(count) * side;
             return Err(CureSectionError::Outside { plane, low_mm: low, high_mm: high });
         }
         let (line, pixels) = match plane {
             SectionPlane::X(_) => (PixelLine::Column(number as u32), height),
             SectionPlane::Y(_) => (PixelLine::Row(number as u32), width),
         };
-        Ok(Self { line, corner_mm, dpi, pixels })
+        Ok(Self { line, corner_mm, pitch, pixels })
+    }
+
+    /// Returns the resolution along the line.
+    pub fn along(&self) -> Dpi {
+        match self.line {
+            PixelLine::Row(_) => self.pitch.x,
+            PixelLine::Column(_) => self.pitch.y,
+        }
+    }
+
+    /// Returns the length of a pixel along the line in millimeters.
+    pub(super) fn pixel_mm(&self) -> f64 {
+        self.along().pitch().mm()
     }
 
     /// Returns the plane through the centers of its pixels.
     pub fn plane(&self) -> SectionPlane {
-        let pitch = self.dpi.pitch().mm();
-        let inwards = |pixel: u32| (f64::from(pixel) + 0.5) * pitch;
+        let [wide, high] = self.pitch.mm();
+        let inwards = |pixel: u32, side: f64| (f64::from(pixel) + 0.5) * side;
         match self.line {
             PixelLine::Row(row) => {
-                SectionPlane::Y(Length::from_mm(self.corner_mm[1] - inwards(row)))
+                SectionPlane::Y(Length::from_mm(self.corner_mm[1] - inwards(row, high)))
             }
             PixelLine::Column(column) => {
-                SectionPlane::X(Length::from_mm(self.corner_mm[0] + inwards(column)))
+                SectionPlane::X(Length::from_mm(self.corner_mm[0] + inwards(column, wide)))
             }
         }
     }
 
     /// Returns the pixels whose centers lie in a stretch of the section.
     pub fn within(&self, along_mm: &Range<f64>) -> Range<u32> {
-        let pitch = self.dpi.pitch().mm();
+        let pitch = self.pixel_mm();
         let [from, to] = match self.line {
             PixelLine::Row(_) => [along_mm.start, along_mm.end].map(|x| x - self.corner_mm[0]),
             PixelLine::Column(_) => [along_mm.end, along_mm.start].map(|y| self.corner_mm[1] - y),
@@ -122,7 +136,7 @@ impl SectionLine {
         options: &SliceOptions,
     ) -> Result<Vec<Vec<OutlinePiece>>, SliceError> {
         let turned = options.placement.rotated(Axis::Y, 90.0);
-        let pitch = self.dpi.pitch().mm();
+        let pitch = self.pixel_mm();
         let (placement, z, top_mm) = match self.plane() {
             SectionPlane::X(x) => (turned, Length::from_um(-x.um()), self.corner_mm[1]),
             SectionPlane::Y(y) => {
@@ -137,7 +151,7 @@ impl SectionLine {
                 placement,
                 fill: options.fill,
                 z,
-                pitch: self.dpi.into(),
+                pitch: self.along().into(),
                 top_mm,
                 rows: self.pixels,
             },

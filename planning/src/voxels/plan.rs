@@ -3,9 +3,7 @@
 use std::io;
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_stack::{
-    Dpi, GrayMask, Image, Layer, Length, Mask, NotSquare, PageInfo, Pitch, white_runs,
-};
+use lamp_stack::{GrayMask, Image, Layer, Length, Mask, PageInfo, Pitch, white_runs};
 use thiserror::Error;
 
 use crate::blur::Blur;
@@ -41,14 +39,6 @@ pub enum VoxelPlanError {
         layer: String,
         /// The number that it lacks.
         what: &'static str,
-    },
-    /// The pixels of a page are not square.
-    #[error("{layer}: {why}")]
-    NotSquare {
-        /// The layer's name.
-        layer: String,
-        /// Its pitch.
-        why: NotSquare,
     },
     /// A page states a number that is not above zero.
     #[error("{layer} states {what} that is not above zero")]
@@ -107,8 +97,8 @@ pub fn plan<E: From<VoxelPlanError>>(
         let image = layer.image.into_image().into_mask(options.wanted);
         wanted.push(runs_of(&image)).map_err(VoxelPlanError::from)?;
     }
-    let dpi = pages.dpi.ok_or(VoxelPlanError::NoLayers)?;
-    light.check_spread(dpi).map_err(VoxelPlanError::from)?;
+    let pitch = pages.pitch.ok_or(VoxelPlanError::NoLayers)?;
+    light.check_spread(pitch).map_err(VoxelPlanError::from)?;
     let setting = setting(&pages, light, options).ok_or(VoxelPlanError::NoLayers)?;
     let done = descend(&setting, &mut wanted, settled).map_err(VoxelPlanError::from)?;
     let ascent = Ascent::new(&setting);
@@ -123,7 +113,7 @@ struct PageStatements {
     infos: Vec<PageInfo>,
     times: Vec<LayerTime>,
     size: Option<[u32; 2]>,
-    dpi: Option<Dpi>,
+    pitch: Option<Pitch>,
 }
 
 impl PageStatements {
@@ -132,10 +122,7 @@ impl PageStatements {
         let size = [layer.image.width(), layer.image.height()];
         let silent = |what| VoxelPlanError::Silent { layer: name(), what };
         let pitch = layer.pitch.ok_or_else(|| silent("resolution"))?;
-        let dpi = pitch
-            .square("plans need")
-            .map_err(|why| VoxelPlanError::NotSquare { layer: name(), why })?;
-        if *self.size.get_or_insert(size) != size || *self.dpi.get_or_insert(dpi) != dpi {
+        if *self.size.get_or_insert(size) != size || *self.pitch.get_or_insert(pitch) != pitch {
             return Err(VoxelPlanError::Unlike { layer: name() });
         }
         let above_zero = |number: f64, what| {
@@ -168,16 +155,16 @@ fn runs_of(wanted: &Mask) -> SpooledRuns {
 }
 
 fn setting(pages: &PageStatements, light: &Light, options: &Options) -> Option<VoxelSetting> {
-    let (size, dpi) = (pages.size?, pages.dpi?);
+    let (size, pitch) = (pages.size?, pages.pitch?);
     let image = size.map(|side| side as usize);
-    let sigmas = light.spread_pixels(dpi);
+    let sigmas = light.spread_pixels(pitch);
     let blur = Blur::of_scan(sigmas);
     let sigma = sigmas[0].max(sigmas[1]);
     let around = options.around.map_or(blur.radius(), |around| around as usize);
     let [width, height] = image.map(|side| side + 2 * around);
     // The last page was exposed last and lies nearest to the light.
     let from_light: Vec<LayerTime> = pages.times.iter().rev().copied().collect();
-    let lights = light.layers(dpi, &from_light);
+    let lights = light.layers(pitch, &from_light);
     let passed = lights.iter().skip(1).map(|layer| layer.passed).fold(0.0, f64::max);
     let window = options.window.unwrap_or_else(|| {
         // Light that has passed n layers is down to passed^n (001 eq. 2).
@@ -275,7 +262,7 @@ impl VoxelPlan {
         self.ascent.add(setting, layer, &prices, &wanted);
         let page = self.pages.infos.len() - 1 - layer;
         let image = self.image(layer)?;
-        let (info, pitch) = (self.pages.infos[page].clone(), self.pages.dpi.map(Pitch::from));
+        let (info, pitch) = (self.pages.infos[page].clone(), self.pages.pitch);
         Ok(Layer { info, pitch, image: image.into() })
     }
 

@@ -56,7 +56,7 @@ impl SectionPicture {
         SectionScene {
             pixels: shown.pixels.clone(),
             heights_um: shown.heights_um.clone(),
-            pitch_um: shown.course.dpi.pitch().um(),
+            pitch_um: shown.course.along().pitch().um(),
             cured: shown.cured.iter().map(|(_, cured)| &cured[..]).collect(),
             part: shown.part.as_deref(),
         }

@@ -72,10 +72,8 @@ impl<'a> LayerMap<'a> {
 
     fn begin(&self, layer: &Layer) -> Result<Option<Begun>, Exit> {
         // Plans refuse other pages themselves.
-        let Some(dpi) = layer.pitch.and_then(|pitch| pitch.square("plans need").ok()) else {
-            return Ok(None);
-        };
-        self.light.check_spread(dpi)?;
+        let Some(pitch) = layer.pitch else { return Ok(None) };
+        self.light.check_spread(pitch)?;
         let (image, name) = (&layer.image, layer.info.name());
         let all = PictureRegion::of(image);
         let region = self.options.map_region.as_ref().unwrap_or(&all).on(image);
@@ -96,7 +94,7 @@ impl<'a> LayerMap<'a> {
             columns.clone().map(is_wanted)
         });
         let wanted = wanted.collect();
-        let doses = || RegionDoses::new(self.light, dpi, columns.clone(), rows.clone());
+        let doses = || RegionDoses::new(self.light, pitch, columns.clone(), rows.clone());
         let title = format!("Doses of {name} in mJ/cm2");
         let (before, after) = (doses(), doses());
         Ok(Some(Begun { title, width: columns.len(), wanted, before, after }))
