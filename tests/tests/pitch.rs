@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use lamp_fixtures::Sample;
+use lamp_fixtures::{Facet, Mesh, Sample};
 use lamp_stack::{Length, Pitch};
 use lamp_tests::{Scratch, ask_python, mask, read_stack};
 use serde_json::{Value, json};
@@ -130,8 +130,6 @@ fn edges_move_by_the_same_distance_along_both_axes() {
 fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
     let scratch = with_ball();
     for line in [
-        "lamp view ball.tif",
-        "lamp cure ball.tif --section x=0mm --material pegda-sudan -o cure.png",
         "tile ball.tif --area 20x20mm -o build.tif",
         "tile ball.tif --area 20x20mm --mesh none --turns quarters -o build.tif",
     ] {
@@ -142,6 +140,148 @@ fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
         .run("lamp compare ball.tif ball.tif --tolerance 20um")
         .is_wrong_usage(&["14 x 19 um", "a length needs square pixels"]);
     scratch.run("lamp compare ball.tif ball.tif").succeeds();
+}
+
+/// A box, by columns, rows and tenths of a millimeter at 14 x 19 um.
+fn block(x: [u16; 2], y: [u16; 2], z: [u16; 2]) -> Vec<Facet> {
+    let sides = [(x, 0.014), (y, 0.019), (z, 0.1)];
+    let corner = |k: usize| {
+        [0, 1, 2].map(|axis| {
+            let (ends, side) = sides[axis];
+            (f64::from(ends[k >> axis & 1]) * side) as f32
+        })
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let halves = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    halves.map(|facet| facet.map(corner)).collect()
+}
+
+/// A plate with a post below two arms, and an island; edges are edges of pixels both of 14 x 19 um
+/// and of 1 um.
+fn with_blocks() -> Scratch {
+    let scratch = Scratch::new();
+    let blocks = [
+        block([0, 200], [0, 150], [0, 5]),
+        block([20, 60], [20, 50], [5, 20]),
+        block([20, 160], [20, 50], [20, 24]),
+        block([20, 60], [50, 130], [20, 24]),
+        block([120, 180], [90, 130], [15, 24]),
+    ];
+    scratch.mesh("blocks.stl", &Mesh { facets: blocks.concat() });
+    for pitch in ["14x19um", "1um"] {
+        let slice = format!("slice blocks.stl --pitch {pitch} --thickness 100um -q -o {pitch}.tif");
+        scratch.run(&slice).succeeds_quietly();
+    }
+    scratch
+}
+
+/// Checks that two reports state the same, but for pixels: numbers to a pixel, and areas to the
+/// pixels along an edge.
+fn assert_alike([a, b]: [&Value; 2], key: &str) {
+    let of_pixels = |key: &str| key.contains("px") || ["dpi", "input"].contains(&key);
+    match (a, b) {
+        (Value::Object(a), Value::Object(b)) => {
+            assert!(a.keys().eq(b.keys()), "{key}: {a:?} {b:?}");
+            for (key, value) in a.iter().filter(|(key, _)| !of_pixels(key)) {
+                assert_alike([value, &b[key]], key);
+            }
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            assert_eq!(a.len(), b.len(), "{key}: {a:?} {b:?}");
+            a.iter().zip(b).for_each(|(a, b)| assert_alike([a, b], key));
+        }
+        (Value::Number(x), Value::Number(y)) => {
+            let [x, y] = [x, y].map(|number| number.as_f64().unwrap());
+            assert!((x - y).abs() < 0.03_f64.max(0.01 * y.abs()), "{key}: {x} {y}");
+        }
+        _ => assert_eq!(a, b, "{key}"),
+    }
+}
+
+#[test]
+fn findings_have_the_same_millimeters() {
+    let scratch = with_blocks();
+    let report = |pitch: &str| -> Value {
+        scratch.run(&format!("lamp check {pitch}.tif --report {pitch}.json")).succeeds();
+        serde_json::from_slice(&scratch.bytes(&format!("{pitch}.json"))).unwrap()
+    };
+    let [found, fine] = ["14x19um", "1um"].map(report);
+    let kinds: Vec<_> =
+        found["findings"].as_array().unwrap().iter().map(|it| &it["kind"]).collect();
+    assert_eq!(kinds, ["island", "weak-joint", "overhang", "overhang"]);
+    assert_alike([&found, &fine], "");
+    let island = &found["findings"][0];
+    let area = 60.0 * 0.014 * 40.0 * 0.019;
+    assert!((island["area_mm2"].as_f64().unwrap() - area).abs() < 1e-6, "{island}");
+}
+
+#[test]
+fn supports_have_the_same_millimeters() {
+    let scratch = with_blocks();
+    let sizes = "--tip 0.2mm --pillar 0.3mm --base 0.5mm --clearance 0.1mm";
+    for to in [
+        "--radius 0.1mm".to_owned(),
+        format!("--to platform --overhangs 45 --spacing 0.6mm {sizes}"),
+    ] {
+        let report = |pitch: &str| -> Value {
+            let support = format!(
+                "lamp support {pitch}.tif --part blocks.stl {to} --report {pitch}.json -o held.tif"
+            );
+            scratch.run(&support).succeeds();
+            serde_json::from_slice(&scratch.bytes(&format!("{pitch}.json"))).unwrap()
+        };
+        let [held, fine] = ["14x19um", "1um"].map(report);
+        for count in
+            ["islands", "left", "weak", "supports", "pillars", "overhangs", "bare_overhangs"]
+        {
+            assert_eq!(held[count], fine[count], "{count}");
+        }
+        // Columns stand at the centers of pixels, and each widens its base as far as there is room.
+        let [volume, least] = [&held, &fine].map(|report| report["volume_mm3"].as_f64().unwrap());
+        assert!(volume > 0.1 && (volume / least - 1.0).abs() < 0.03, "{volume} {least}");
+        assert_eq!(held["left"], 0);
+    }
+}
+
+/// A picture has the shape of the part: both sides of the ball's layer are as long.
+#[test]
+fn pictures_are_not_stretched() {
+    let scratch = with_ball();
+    scratch.run("lamp show ball.tif --layer 15 --scale 2 -o ball.png").succeeds();
+    let sides = |scratch: &Scratch, name: &str| {
+        let mut reader =
+            png::Decoder::new(std::io::Cursor::new(scratch.bytes(name))).read_info().unwrap();
+        let mut levels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut levels).unwrap();
+        let width = info.width as usize;
+        let white = |at: &usize| levels[*at] > 127;
+        let of_row = |row: usize| (row * width..(row + 1) * width).filter(white).count();
+        let of_column = |column: usize| (column..levels.len()).step_by(width).filter(white).count();
+        let rows = levels.len() / width;
+        [(0..rows).map(of_row).max().unwrap(), (0..width).map(of_column).max().unwrap()]
+    };
+    let [across, down] = sides(&scratch, "ball.png");
+    // 3 mm in widths of 14 um, twice each.
+    assert!(across.abs_diff(428) < 5 && across.abs_diff(down) < 5, "{across} x {down}");
+}
+
+/// A section through the middle of the ball is a disc, along a row and along a column.
+#[test]
+fn cured_sections_have_the_part_in_millimeters() {
+    let scratch = with_ball();
+    for plane in ["x=0mm", "y=0mm"] {
+        let cure = format!(
+            "lamp cure ball.tif --section {plane} --part ball.stl --material pegda-sudan -o cure.png"
+        );
+        let text = String::from_utf8(scratch.run(&cure).succeeds().stdout).unwrap();
+        let line = text
+            .lines()
+            .find(|line| line.starts_with("pixels"))
+            .unwrap_or_else(|| panic!("{text}"));
+        let part: f64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!((part / (PI * 1.5 * 1.5) - 1.0).abs() < 0.01, "{plane}: {text}");
+    }
 }
 
 /// Pillow reads both resolutions, and the rectangle of white pixels in millimeters.
