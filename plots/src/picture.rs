@@ -166,7 +166,7 @@ impl RowScale {
         (row as f64 * self.down / self.up).round() as u32
     }
 
-    /// Returns the rows of the image that share rows of the picture, and how many they share.
+    /// Returns bands of the image's rows, and the number of rows of the picture for each.
     pub(crate) fn bands(self) -> impl Iterator<Item = (Range<u32>, usize)> {
         let (top, count) = (self.rows.start, self.rows.len() as u32);
         let is_enlarged = self.up >= self.down;
@@ -296,7 +296,7 @@ mod tests {
         assert_eq!(PictureRegion::of_content(&Image::Mask(Mask::black(9, 9))), None);
     }
 
-    /// The mean level of each third of a picture's height tells where the image's rows went.
+    /// The middle third of the image's rows is white, and so is that of the picture.
     #[test]
     fn rows_are_as_high_as_pixels() {
         for (scale, aspect) in [
