@@ -83,5 +83,6 @@ pub(crate) fn compression_name(compression: Compression) -> &'static str {
         Compression::Picture(format) => format.name(),
         Compression::Packed => "packed against the layer below",
         Compression::Goo => "run lengths of GOO",
+        Compression::Ctb => "run lengths of CTB",
     }
 }

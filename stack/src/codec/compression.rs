@@ -29,6 +29,8 @@ pub enum Compression {
     Packed,
     /// The run lengths of GOO files.
     Goo,
+    /// The run lengths of CTB files.
+    Ctb,
     /// The page is a PNG in a printer's file.
     PrinterPng,
 }

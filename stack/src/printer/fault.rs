@@ -25,9 +25,9 @@ pub enum PrinterFault {
     /// A file does not begin, or end, as its name has it.
     #[error("this is not {0}, or it was cut off or damaged: copy it again, or make it again")]
     NotAsNamed(PrinterFormat),
-    /// An archive on a pipe.
-    #[error("a ZIP archive cannot be read from a pipe: give the file's name instead")]
-    Piped,
+    /// A format whose parts are read in any order, on a pipe.
+    #[error("{0} cannot be read from a pipe: give the file's name instead")]
+    Piped(&'static str),
     /// A file of an archive is missing.
     #[error("its ZIP archive lacks {0}")]
     Missing(String),
@@ -103,6 +103,20 @@ pub enum PrinterFault {
         format: &'static str,
         /// The most columns or rows.
         most: u32,
+    },
+    /// The stack does not state its number of layers.
+    #[error(
+        "the stack does not state its number of layers, which {0} has before them: write it to a .tif \
+         file first, and convert that"
+    )]
+    NoCount(&'static str),
+    /// The stack states another number of layers than it has.
+    #[error("the stack states {stated} layers, and has {layers}: make it again")]
+    OtherCount {
+        /// The number that it states.
+        stated: u32,
+        /// The number that it has.
+        layers: u32,
     },
     /// A layer's thickness is not known.
     #[error("layer {layer} has no thickness: slice the part anew")]

@@ -4,10 +4,12 @@
 //! mirror them as the printer shows them, and add up what the files state of the whole print.
 
 pub(crate) mod archive;
+pub(crate) mod ctb;
 pub(crate) mod fault;
 pub(crate) mod goo;
 pub(crate) mod panel;
 pub(crate) mod preview;
+pub(crate) mod runs;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod total;

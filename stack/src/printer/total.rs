@@ -86,6 +86,9 @@ impl ReadHeight {
     ) -> Result<PageInfo, PrinterFault> {
         let top_um = thousandths(top_mm);
         let thickness_um = ((top_um - self.um) * 1e3).round() / 1e3;
+        if !step.is_finite() {
+            return Err(PrinterFault::Damaged("numbers of a layer"));
+        }
         // NaN is not above zero.
         if !(thickness_um > 0.0 && top_um.is_finite()) {
             return Err(PrinterFault::Damaged("height of a layer"));

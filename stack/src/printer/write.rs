@@ -16,6 +16,7 @@ use crate::limits::MAX_SIDE;
 use crate::ordered::map_in_order;
 use crate::pitch::Pitch;
 use crate::printer::archive::write::ArchiveWriter;
+use crate::printer::ctb::write::CtbWriter;
 use crate::printer::fault::PrinterFault;
 use crate::printer::goo::write::GooWriter;
 use crate::printer::panel::orientation;
@@ -35,15 +36,18 @@ pub enum PrinterFormat {
     Sl1,
     /// UVtools' own format, for any printer.
     Uvj,
+    /// CTB of printers with Chitu boards.
+    Ctb,
 }
 
 impl PrinterFormat {
     /// All formats, and the endings of the names of their files.
-    pub const ALL: [(Self, &'static [&'static str]); 4] = [
+    pub const ALL: [(Self, &'static [&'static str]); 5] = [
         (Self::Goo, &["goo"]),
         (Self::NanoDlp, &["nanodlp"]),
         (Self::Sl1, &["sl1", "sl1s"]),
         (Self::Uvj, &["uvj"]),
+        (Self::Ctb, &["ctb"]),
     ];
 
     /// Returns the format that a file's name ends in.
@@ -65,7 +69,7 @@ impl PrinterFormat {
     fn most_side(self) -> u32 {
         match self {
             Self::Goo => super::goo::header::MOST_SIDE,
-            Self::NanoDlp | Self::Sl1 | Self::Uvj => MAX_SIDE,
+            Self::NanoDlp | Self::Sl1 | Self::Uvj | Self::Ctb => MAX_SIDE,
         }
     }
 
@@ -81,6 +85,15 @@ impl PrinterFormat {
         if matches!(self, Self::Goo | Self::Uvj) {
             return Ok(());
         }
+        let unstated = |what| Err(PrinterFault::Unstated { format, what });
+        if self == Self::Ctb {
+            let [up, down] = [added.step.lift_mm, added.step.retract_mm].map(|mm| mm[0] + mm[1]);
+            return match (record.mirrored, (up - down).abs() < 1e-6) {
+                ([_, true], _) => unstated("a panel mirrored top to bottom"),
+                (_, false) => unstated("a way back that is not as long as the lift"),
+                _ => Ok(()),
+            };
+        }
         if !totals.is_even {
             return Err(PrinterFault::Uneven { format, layer });
         }
@@ -92,12 +105,8 @@ impl PrinterFormat {
             return Err(PrinterFault::OwnStep { format, layer });
         }
         match self {
-            Self::NanoDlp if record.mirrored[1] => {
-                Err(PrinterFault::Unstated { format, what: "a panel mirrored top to bottom" })
-            }
-            Self::Sl1 if record.first_layers > 1 => {
-                Err(PrinterFault::Unstated { format, what: "more than one first layer" })
-            }
+            Self::NanoDlp if record.mirrored[1] => unstated("a panel mirrored top to bottom"),
+            Self::Sl1 if record.first_layers > 1 => unstated("more than one first layer"),
             _ => Ok(()),
         }
     }
@@ -117,6 +126,7 @@ impl PrinterFormat {
             Self::NanoDlp => "a NanoDLP file",
             Self::Sl1 => "an SL1 file",
             Self::Uvj => "a UVJ file",
+            Self::Ctb => "a CTB file",
         }
     }
 }
@@ -150,6 +160,7 @@ impl CodedLayer {
             .then(|| image.oriented(orientation(mirrored)).expect("a mirrored image has its runs"));
         let code = match format {
             PrinterFormat::Goo => super::goo::rle::encode(turned.as_ref().unwrap_or(image)),
+            PrinterFormat::Ctb => super::ctb::rle::encode(turned.as_ref().unwrap_or(image)),
             _ => super::archive::png::encode(turned.as_ref().unwrap_or(image), layer.pitch),
         };
         Self {
@@ -201,11 +212,17 @@ where
     };
     let first = first.ok_or(StackError::NoLayers)?;
     let record = record_of(first, format)?;
-    let part = first.info.stack.as_ref().map(|stack| stack.part.clone()).unwrap_or_default();
+    let stack = first.info.stack.as_ref();
+    let part = stack.map(|stack| stack.part.clone()).unwrap_or_default();
+    let stack_layers = stack.and_then(|stack| stack.layers);
     let temporary = FileBeside::new(&path).map_err(StackError::from)?;
     let out = BufWriter::with_capacity(1 << 18, temporary.file());
     let mut file: Box<dyn PrinterWriter> = match format {
         PrinterFormat::Goo => Box::new(GooWriter::new(out)?),
+        PrinterFormat::Ctb => {
+            let layers = stack_layers.ok_or(PrinterFault::NoCount(format.name()));
+            Box::new(CtbWriter::new(out, layers.map_err(StackError::from)?, &record)?)
+        }
         _ => Box::new(ArchiveWriter::new(out, format, &part)),
     };
     let aspect = first.pitch.map_or(1.0, Pitch::aspect);
@@ -234,7 +251,8 @@ fn record_of(first: &Layer, format: PrinterFormat) -> Result<PrintRecord, StackE
         return Err(PrinterFault::Side { format: format.name(), most }.into());
     }
     // The printer moves as the file says, even if that is not at all.
-    if format == PrinterFormat::Goo && !(record.first.moves() && record.normal.moves()) {
+    let states_moves = matches!(format, PrinterFormat::Goo | PrinterFormat::Ctb);
+    if states_moves && !(record.first.moves() && record.normal.moves()) {
         let (format, printer) = (format.name(), record.printer);
         return Err(PrinterFault::NoMoves { format, printer }.into());
     }

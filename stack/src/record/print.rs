@@ -66,6 +66,19 @@ impl PageRecord for PrintStep {
 }
 
 impl PrintStep {
+    /// Returns whether all its numbers are finite, as those of damaged files need not be.
+    pub(crate) fn is_finite(&self) -> bool {
+        let times = [
+            self.exposure_s,
+            self.light_off_s,
+            self.wait_before_s,
+            self.wait_after_s,
+            self.wait_lifted_s,
+        ];
+        let moves = [self.lift_mm, self.lift_mm_per_min, self.retract_mm, self.retract_mm_per_min];
+        times.iter().chain(moves.as_flattened()).all(|number| number.is_finite())
+    }
+
     /// Returns whether the platform lifts and comes back, each stage at a speed.
     pub fn moves(&self) -> bool {
         let moves = |mm: [f64; 2], speed: [f64; 2]| {

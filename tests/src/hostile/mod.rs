@@ -210,7 +210,7 @@ pub fn tiff(bytes: &[u8]) {
     let file = file_of(bytes);
     let from_file = decoded(Pages::open(file.path()));
     match (decoded(Pages::from_stream(Cursor::new(bytes.to_vec()))), &from_file) {
-        (Err(StackError::NotForward { .. } | StackError::Printer(PrinterFault::Piped)), _) => {}
+        (Err(StackError::NotForward { .. } | StackError::Printer(PrinterFault::Piped(_))), _) => {}
         (Ok(streamed), Ok(from_file)) => assert_eq!(&streamed, from_file),
         (Err(streamed), Err(from_file)) => assert_eq!(one_line(&streamed), one_line(from_file)),
         (streamed, from_file) => panic!("a pipe gives {streamed:?}, a file {from_file:?}"),

@@ -25,7 +25,7 @@ use crate::layer::{Layer, LayerImage, Strip};
 use crate::limits::Limits;
 use crate::ordered::MemorySize;
 use crate::pitch::Pitch;
-use crate::printer::{archive, goo};
+use crate::printer::{archive, ctb, goo};
 
 /// A page that is not decoded yet.
 #[derive(Clone, Debug)]
@@ -340,6 +340,11 @@ impl Page {
                 let size = [self.width, self.layout.page_height];
                 archive::png::decode(&self.pieces[0], size, &self.limits)
                     .map_err(|fault| fault.on(self.number))?
+            }
+            Compression::Ctb => {
+                let size = [self.width, self.layout.page_height];
+                ctb::rle::decode(&self.pieces[0], size, self.gray, self.limits.runs)
+                    .map_err(|fault| malformed(self.number, fault))?
             }
             Compression::Goo => {
                 let size = [self.width, self.layout.page_height];

@@ -22,6 +22,7 @@ use crate::files::file_format::{FORMAT_BYTES, FileFormat};
 use crate::limits::Limits;
 use crate::note::ImagesBeside;
 use crate::printer::archive::read::ArchiveReader;
+use crate::printer::ctb::read::CtbReader;
 use crate::printer::fault::PrinterFault;
 use crate::printer::goo::read::GooReader;
 use crate::text::one_line;
@@ -95,9 +96,12 @@ impl PageReader {
                 FileKind::Packed(Box::new(Unpacker::new(*format)))
             }
             FileKind::Tiff if ArchiveReader::is_start(&start) => {
-                let file = source.file()?.ok_or(PrinterFault::Piped)?;
+                let file = source.file()?.ok_or(PrinterFault::Piped("a ZIP archive"))?;
                 let archive = ArchiveReader::new(file)?;
                 archive.map_or(FileKind::Tiff, |archive| FileKind::Archive(Box::new(archive)))
+            }
+            FileKind::Tiff if CtbReader::is_start(&start) => {
+                FileKind::Ctb(Box::new(CtbReader::new(&mut source, &start)?))
             }
             kind => kind,
         };
@@ -164,7 +168,9 @@ impl PageReader {
     /// directory, or in a packed stack or a printer's file its number.
     pub(crate) fn next_place(&self) -> u64 {
         match self.kind {
-            FileKind::Packed(_) | FileKind::Goo(_) | FileKind::Archive(_) => self.number.into(),
+            FileKind::Packed(_) | FileKind::Goo(_) | FileKind::Ctb(_) | FileKind::Archive(_) => {
+                self.number.into()
+            }
             _ => self.next,
         }
     }
@@ -176,6 +182,7 @@ impl PageReader {
                 return unpacker.page(place as u32, &mut self.source, &self.limits);
             }
             FileKind::Goo(goo) => return goo.page(place as u32, &mut self.source, &self.limits),
+            FileKind::Ctb(ctb) => return ctb.page(place as u32, &mut self.source, &self.limits),
             FileKind::Archive(archive) => return archive.page(place as u32, &self.limits, true),
             _ => {}
         }
@@ -228,6 +235,10 @@ impl PageReader {
                 }
             }
             FileKind::Goo(goo) => match goo.next(&mut self.source, &self.limits, self.images)? {
+                Some(page) => (page, self.next),
+                None => return Ok(None),
+            },
+            FileKind::Ctb(ctb) => match ctb.next(&mut self.source, &self.limits, self.images)? {
                 Some(page) => (page, self.next),
                 None => return Ok(None),
             },
@@ -505,6 +516,7 @@ enum FileKind {
     Png,
     Packed(Box<Unpacker>),
     Goo(Box<GooReader>),
+    Ctb(Box<CtbReader>),
     Archive(Box<ArchiveReader>),
     /// Another picture, with its first bytes, which a stream gives only once.
     Picture {

@@ -262,12 +262,24 @@ fn archives_with_faults_are_refused_in_a_sentence() {
         (NanoDlp, "3.png", "lacks 3.png"),
         (NanoDlp, "profile.json", "lacks profile.json"),
         (Sl1, "blade00002.png", "lacks blade00002.png"),
-        (Sl1, "config.ini", "this is not an SL1 file"),
+        (Sl1, "config.ini", "neither a TIFF stack nor"),
     ] {
         let good = written(plates(format), format).unwrap();
         let bad = changed(&good.path, |it, bytes| (it != name).then_some(bytes));
         let said = read(&bad.path).unwrap_err().to_string();
         assert!(said.contains(words), "{name}: {said}");
+    }
+}
+
+#[test]
+fn a_name_says_what_a_file_without_its_directory_was() {
+    for (format, ending) in FORMATS {
+        let good = written(plates(format), format).unwrap();
+        let bytes = fs::read(&good.path).unwrap();
+        let path = good.path.with_file_name(format!("cut.{ending}"));
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let said = Pages::open(&path).unwrap_err().to_string();
+        assert!(said.starts_with(&format!("this is not {format}, or it was cut off")), "{said}");
     }
 }
 

@@ -147,26 +147,15 @@ impl GooHeader {
         if u64::from(layers_at) < NUMBERS_AT + NUMBER_BYTES {
             return Err(PrinterFault::Damaged("header"));
         }
-        let numbers = panel_mm.into_iter().chain([height_mm]).chain(numbers_of(&first));
-        if panel_px.contains(&0) || !numbers.chain(numbers_of(&normal)).all(f64::is_finite) {
+        let mut numbers = panel_mm.into_iter().chain([height_mm]);
+        let is_finite =
+            numbers.all(f64::is_finite) && record.first.is_finite() && record.normal.is_finite();
+        if panel_px.contains(&0) || !is_finite {
             return Err(PrinterFault::Damaged("header"));
         }
         let (has_steps, layers_at) = (has_steps != 0, layers_at.into());
         Ok(Self { record, layers, has_steps, layers_at, is_little_endian })
     }
-}
-
-fn numbers_of(step: &PrintStep) -> impl Iterator<Item = f64> + use<> {
-    let times = [
-        step.exposure_s,
-        step.light_off_s,
-        step.wait_before_s,
-        step.wait_after_s,
-        step.wait_lifted_s,
-    ];
-    let moves =
-        [step.lift_mm, step.lift_mm_per_min, step.retract_mm, step.retract_mm_per_min].concat();
-    times.into_iter().chain(moves)
 }
 
 impl GooLayer {
@@ -194,7 +183,7 @@ impl GooLayer {
         }
         step.light = fields.u16();
         let delimiter: [u8; 2] = fields.bytes();
-        if delimiter != DELIMITER || !numbers_of(&step).all(f64::is_finite) {
+        if delimiter != DELIMITER || !step.is_finite() {
             return Err(PrinterFault::Damaged("layer"));
         }
         Ok(Self { top_mm, step, pauses, bytes: fields.u32() })

@@ -16,8 +16,8 @@
 
 use crate::error::PageFault;
 use crate::image::Image;
-use crate::image::gray::GrayMask;
 use crate::image::mask::Mask;
+use crate::printer::runs::{for_each_run, image_of};
 
 const MAGIC: u8 = 0x55;
 /// The longest run of a chunk.
@@ -26,16 +26,7 @@ const LONGEST: u64 = (1 << 28) - 1;
 /// Encodes an image.
 pub(crate) fn encode(image: &Image) -> Vec<u8> {
     let mut out = Encoder { bytes: vec![MAGIC], level: 0, length: 0 };
-    let width = image.width();
-    for row in 0..image.height() {
-        let mut column = 0;
-        for (start, end, level) in image.runs(row) {
-            out.put(start - column, 0);
-            out.put(end - start, level);
-            column = end;
-        }
-        out.put(width - column, 0);
-    }
+    for_each_run(image, |length, level| out.put(length, level));
     out.finish()
 }
 
@@ -156,86 +147,20 @@ pub(crate) fn is_gray(bytes: &[u8]) -> Result<bool, PageFault> {
 /// Decodes an image of this size, gray or not as [`is_gray`] says.
 pub(crate) fn decode(
     bytes: &[u8],
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     is_gray: bool,
     most_runs: usize,
 ) -> Result<Image, PageFault> {
     let mut chunks = chunks(bytes)?;
     if chunks.bytes.is_empty() {
-        return Ok(Image::Mask(Mask::black(width, height)));
+        return Ok(Image::Mask(Mask::black(size[0], size[1])));
     }
-    let mut rows = match is_gray {
-        true => Rows::Gray(GrayMask::new(width)),
-        false => Rows::Mask(Mask::without_rows(width)),
-    };
-    let mut row: Vec<(u32, u8)> = Vec::new();
-    let (mut done, mut column) = (0, 0);
-    while !chunks.bytes.is_empty() {
-        let (mut length, level) =
-            chunks.next().ok_or(PageFault::RunLengths("the last of them is cut off"))?;
-        while length > 0 {
-            if done == height {
-                return Err(PageFault::RunLengths("they are longer than the image"));
-            }
-            let part = length.min(width - column);
-            length -= part;
-            column += part;
-            row.push((part, level));
-            if column == width {
-                rows.push(&row);
-                row.clear();
-                (done, column) = (done + 1, 0);
-                if rows.change_count() > most_runs {
-                    return Err(PageFault::TooManyRuns);
-                }
-            }
-        }
-    }
-    match done == height {
-        true => Ok(rows.finish()),
-        false => Err(PageFault::RunLengths("they are shorter than the image")),
-    }
-}
-
-enum Rows {
-    Mask(Mask),
-    Gray(GrayMask),
-}
-
-impl Rows {
-    fn push(&mut self, runs: &[(u32, u8)]) {
-        match self {
-            Self::Mask(mask) => {
-                let (mut column, mut is_white) = (0, false);
-                let mut row = Vec::new();
-                for &(length, level) in runs {
-                    if (level > 0) != is_white {
-                        is_white = !is_white;
-                        row.push(column);
-                    }
-                    column += length;
-                }
-                mask.push(&row);
-            }
-            Self::Gray(gray) => {
-                gray.push_runs(runs.iter().copied()).expect("a row is as long as the width");
-            }
-        }
-    }
-
-    fn change_count(&self) -> usize {
-        match self {
-            Self::Mask(mask) => mask.change_count(),
-            Self::Gray(gray) => gray.change_count(),
-        }
-    }
-
-    fn finish(self) -> Image {
-        match self {
-            Self::Mask(mask) => Image::Mask(mask),
-            Self::Gray(gray) => Image::Gray(gray),
-        }
-    }
+    let runs = std::iter::from_fn(|| {
+        let is_end = chunks.bytes.is_empty();
+        let cut = || PageFault::RunLengths("the last of them is cut off");
+        (!is_end).then(|| chunks.next().ok_or_else(cut))
+    });
+    image_of(runs, size, is_gray, most_runs)
 }
 
 #[cfg(test)]
