@@ -291,7 +291,7 @@ impl Found {
 
     fn group(&mut self) {
         let owner = |record: &FindingRecord| self.owner(record);
-        self.features = lamp_supports::features(&self.records, owner);
+        self.features = lamp_supports::features(&self.records, self.findings.pitch, owner);
     }
 
     /// Returns the number of features that need a person.

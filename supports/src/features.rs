@@ -7,11 +7,13 @@
 use std::collections::HashMap;
 use std::hash::Hash;
 
+use lamp_stack::Pitch;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use serde::{Deserialize, Serialize};
 
 use crate::check::HeldAt;
+use crate::check::metric::Metric;
 use crate::record::{FindingRecord, IslandRecord, Joined, PocketRecord};
 
 /// A thing that a person would name, as numbers of findings in their list.
@@ -73,12 +75,14 @@ const NEAR_PX: u32 = 2;
 /// not, heights to within a layer, areas or volumes to within 5 %, or the pixels of the box's rim if these
 /// are less than a quarter. Overhangs are alike if they are held alike, and reach as far, to within a quarter or 2 pixels, over
 /// as many layers, to within a quarter or 2 layers, and none is 2.5 times as large as the first: rows of pins
-/// and holes. Copies that differ are alike if the first differs at most four times as much.
+/// and holes. Copies that differ are alike if the first differs at most four times as much. Pixels are widths of
+/// a pixel of this `pitch`; without one they are square.
 pub fn features<K: Clone + Eq + Hash>(
     records: &[FindingRecord],
+    pitch: Option<Pitch>,
     owner: impl Fn(&FindingRecord) -> K,
 ) -> Vec<Feature> {
-    let places = Places::of(records);
+    let (places, metric) = (Places::of(records), Metric::of(pitch));
     let mut features: Vec<Feature> = Vec::new();
     // The feature that a finding names, or is one of the like.
     let mut named: HashMap<usize, usize> = HashMap::new();
@@ -89,12 +93,12 @@ pub fn features<K: Clone + Eq + Hash>(
             followers.push((leader, at));
             continue;
         }
-        let (size, owner) = (Size::of(record), owner(record));
+        let (size, owner) = (Size::of(record, metric), owner(record));
         let near = size.as_ref().into_iter().flat_map(Size::keys).flat_map(|key| {
             kinds.get(&(record.kind(), owner.clone(), key)).map_or(&[][..], Vec::as_slice)
         });
         let like = near.copied().find(|&feature: &usize| {
-            let other = Size::of(&records[features[feature].finding]);
+            let other = Size::of(&records[features[feature].finding], metric);
             size.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| a.is_like(b))
         });
         if let Some(feature) = like {
@@ -314,7 +318,7 @@ struct Size {
 
 impl Size {
     /// Returns the size of findings that are often alike; none of others.
-    fn of(record: &FindingRecord) -> Option<Self> {
+    fn of(record: &FindingRecord, metric: Metric) -> Option<Self> {
         let amount = match record {
             FindingRecord::Island(island) => island.floating_px,
             FindingRecord::WeakJoint(joint) => joint.area.area_px,
@@ -328,7 +332,9 @@ impl Size {
             _ => return None,
         };
         let [left, right, top, bottom] = record.box_px()?;
-        let mut sides = [right.saturating_sub(left), bottom.saturating_sub(top)];
+        let sides = [right.saturating_sub(left), bottom.saturating_sub(top)].map(f64::from);
+        let mut sides = metric.place(sides).map(|side| side.round() as u32);
+        // One may be turned.
         sides.sort_unstable();
         let mut held_at = None;
         if let FindingRecord::Overhang(overhang) = record {

@@ -13,7 +13,7 @@ mod findings;
 mod islands;
 mod liquid;
 mod live;
-mod metric;
+pub(crate) mod metric;
 mod overhang;
 mod overhangs;
 mod pairs;

@@ -1,3 +1,5 @@
+use lamp_stack::{Dpi, Length};
+
 use super::*;
 use crate::record::{
     AreaRecord, BoxRecord, JointRecord, LayerPlace, LayerSpan, OverhangRecord, PartWord,
@@ -67,7 +69,7 @@ fn an_island_has_what_joins_it_and_where_it_grows() {
         joint(60, [100, 200, 100, 200]),
         overhang([16, 18], [231, 238, 100, 104]),
     ];
-    let found = features(&records, |_| ());
+    let found = features(&records, None, |_| ());
     let groups: Vec<_> = found.iter().map(|f| (f.finding, f.with.clone())).collect();
     // A joint beside no island, and one far above, are features of their own.
     assert_eq!(groups, [(0, vec![1, 2, 4, 7]), (3, vec![]), (5, vec![]), (6, vec![])]);
@@ -87,11 +89,27 @@ fn equal_holes_are_one_feature() {
         cup([10, 30], [120, 160, 0, 10], 6500),
         cup([10, 30], [0, 10, 120, 160], 6500),
     ];
-    let found = features(&records, |_| ());
+    let found = features(&records, None, |_| ());
     let alike: Vec<_> = found.iter().map(|f| (f.finding, f.alike.clone())).collect();
     assert_eq!(alike, [(0, vec![1, 2]), (3, vec![]), (4, vec![5])]);
     assert!(found[0].text(&records).ends_with("; and 2 more like it"));
-    assert_eq!(features(&[], |_| ()), []);
+    assert_eq!(features(&[], None, |_| ()), []);
+}
+
+#[test]
+fn a_turned_hole_is_as_large_in_millimeters() {
+    // 40 x 20 pixels of 14 x 19 um are 560 x 380 um; turned, they are 27 x 29 pixels.
+    let records = [
+        cup([10, 30], [0, 40, 0, 20], 16_000),
+        cup([10, 30], [100, 127, 0, 29], 16_000),
+        cup([10, 30], [200, 220, 0, 40], 16_000),
+    ];
+    let alike = |pitch: Option<Pitch>| -> Vec<Vec<usize>> {
+        features(&records, pitch, |_| ()).into_iter().map(|found| found.alike).collect()
+    };
+    let [x, y] = [14.0, 19.0].map(|um| Dpi::of_pitch(Length::from_um(um)).unwrap());
+    assert_eq!(alike(Some(Pitch { x, y })), [vec![1], vec![]]);
+    assert_eq!(alike(None), [vec![2], vec![]]);
 }
 
 #[test]
@@ -136,13 +154,13 @@ fn what_is_worse_has_its_own_line() {
         [resting(20.0), resting(9.0)],
     ] {
         let records = [a, b];
-        assert_eq!(features(&records, |_| ()).len(), 2, "{records:?}");
+        assert_eq!(features(&records, None, |_| ()).len(), 2, "{records:?}");
     }
     let alike = [wide(40), wide(99)];
-    assert_eq!(features(&alike, |_| ()).len(), 1);
+    assert_eq!(features(&alike, None, |_| ()).len(), 1);
     // Of two parts.
     let owner = |record: &FindingRecord| *record == alike[0];
-    assert_eq!(features(&alike, owner).len(), 2);
+    assert_eq!(features(&alike, None, owner).len(), 2);
 }
 
 #[test]
@@ -154,7 +172,7 @@ fn every_finding_is_in_one_feature() {
         island(3, 5, 9, Joined::Island(77), [40, 49, 0, 9]),
         joint(6, [0, 50, 0, 9]),
     ];
-    let found = features(&records[2..], |_| ());
+    let found = features(&records[2..], None, |_| ());
     let mut all: Vec<usize> =
         found.iter().flat_map(|f| [&[f.finding], &f.with[..], &f.alike].concat()).collect();
     all.sort_unstable();
@@ -175,11 +193,11 @@ fn a_pocket_has_its_ceiling() {
         overhang([31, 31], [150, 290, 110, 190]),
         overhang([34, 34], [110, 190, 110, 190]),
     ];
-    let found = features(&records, |_| ());
+    let found = features(&records, None, |_| ());
     let groups: Vec<_> = found.iter().map(|f| (f.finding, f.with.clone())).collect();
     assert_eq!(groups[0], (0, vec![1]));
     assert!(found[1..].iter().all(|feature| feature.with.is_empty()));
     // A cup has no ceiling.
     let open = [cup([10, 30], [100, 200, 100, 200], 65_000), records[1].clone()];
-    assert_eq!(features(&open, |_| ()).len(), 2);
+    assert_eq!(features(&open, None, |_| ()).len(), 2);
 }

@@ -120,7 +120,7 @@ fn judge(layers: Vec<Layer>, block: &Block, options: &CheckOptions, tally: &mut 
     islands_are_all_there(block, &simulated, &found, options, tally);
     pockets_are_all_there(block, &simulated, &found, options, tally);
     let records = records(&found, &Disagreements::default(), None);
-    let features = features(&records, |_| ());
+    let features = features(&records, None, |_| ());
     let mut listed: Vec<usize> = features
         .iter()
         .flat_map(|f: &Feature| [&[f.finding], &f.with[..], &f.alike].concat())
