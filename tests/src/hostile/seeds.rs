@@ -133,7 +133,7 @@ fn prints() -> Named {
         ..PrintRecord::default()
     };
     let layer = |index: u32| {
-        let mut stack = StackInfo::default();
+        let mut stack = StackInfo { layers: Some(3), ..StackInfo::default() };
         stack.set_print_record(&print);
         let info = PageInfo {
             index,
@@ -162,10 +162,31 @@ fn prints() -> Named {
     vec![
         ("plate.goo", goo.clone()),
         ("many_layers.goo", with(goo, start, &[0xFF; 4])),
+        ("plate.ctb", without_previews(file(PrinterFormat::Ctb))),
         ("plate.nanodlp", file(PrinterFormat::NanoDlp)),
         ("plate.sl1", file(PrinterFormat::Sl1)),
         ("plate.uvj", file(PrinterFormat::Uvj)),
     ]
+}
+
+/// Takes the previews, which are mostly zeros, out of a CTB file: all tables move up.
+fn without_previews(mut ctb: Vec<u8>) -> Vec<u8> {
+    let place = |ctb: &[u8], at: usize| {
+        u32::from_le_bytes(ctb[at..at + 4].try_into().expect("four bytes")) as usize
+    };
+    let [large, rows, print, slicer] = [60, 64, 84, 104].map(|at| place(&ctb, at));
+    let (layers, moved) = (place(&ctb, 68), print - large);
+    let in_slicer = [28, 64].map(|field| slicer + field);
+    let of_rows = (0..layers).map(|layer| rows + 36 * layer + 12);
+    for at in [64, 84, 104].into_iter().chain(in_slicer).chain(of_rows) {
+        let to = (place(&ctb, at) - moved) as u32;
+        ctb[at..at + 4].copy_from_slice(&to.to_le_bytes());
+    }
+    for at in [60, 72] {
+        ctb[at..at + 4].fill(0);
+    }
+    drop(ctb.drain(large..print));
+    ctb
 }
 
 fn objs() -> Named {
