@@ -296,7 +296,7 @@ mod tests {
         assert_eq!(PictureRegion::of_content(&Image::Mask(Mask::black(9, 9))), None);
     }
 
-    /// The middle third of the image's rows is white, and so is that of the picture.
+    /// The middle third of the image's rows is white, and so is the middle third of the picture.
     #[test]
     fn rows_are_as_high_as_pixels() {
         for (scale, aspect) in [

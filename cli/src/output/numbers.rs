@@ -24,7 +24,7 @@ pub(crate) fn size_in_words(bytes: u64) -> String {
     }
     let mut size = bytes as f64 / 1e3;
     let mut units = UNITS.iter();
-    // What rounds to 1000 is one of the next unit.
+    // A size that rounds to 1000 is one of the next unit.
     while size >= 999.5 && units.len() > 1 {
         size /= 1e3;
         units.next();

@@ -31,7 +31,7 @@ pub(crate) struct Progress {
     kept: Option<KeptRemarks>,
 }
 
-/// What the written layers have in common.
+/// The facts that written layers share.
 #[derive(Clone, Copy, Debug, Default)]
 struct CountedLayers {
     count: u64,

@@ -66,7 +66,7 @@ impl PageRecord for PrintStep {
 }
 
 impl PrintStep {
-    /// Returns whether all its numbers are finite, as those of damaged files need not be.
+    /// Returns whether all its numbers are finite; numbers of damaged files may not be.
     pub(crate) fn is_finite(&self) -> bool {
         let times = [
             self.exposure_s,
