@@ -215,7 +215,7 @@ fn an_ending_of_another_format_is_refused() {
     scratch.write("box.stl", &binary_stl("", 12));
     scratch.run("slice box.stl --dpi 254 -o box.tif").succeeds();
     let before = scratch.names();
-    let others = ["photon", "cbddlp", "ctb", "zip", "pdf", "obj", "gcode", "mp4", "STEPX", "3MF"];
+    let others = ["photon", "cbddlp", "phz", "zip", "pdf", "obj", "gcode", "mp4", "STEPX", "3MF"];
     for (line, writes, own) in [
         ("slice box.stl -o {}", "a stack is a TIFF", "svgz"),
         ("fix box.tif -o {}", "a stack is a TIFF", "png"),

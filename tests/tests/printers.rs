@@ -3,7 +3,7 @@
 use lamp_stack::{GrayMask, Layer, Mask, Pitch, white_in_both};
 use lamp_tests::{Scratch, ask_python, masks};
 
-/// A printer of which every format can state all but moves, of which GOO alone needs all. Its panel is wider than the tower and
+/// A printer of which every format can state all but moves, of which GOO and CTB need all. Its panel is wider than the tower and
 /// the torus.
 const PRINTER: &str = r#"name = "mine"
 description = "A printer of mine"
@@ -43,7 +43,7 @@ source = "measured"
 /// A part without symmetry, in layers of 2 mm.
 const SLICE: &str = "slice torus.stl tower.stl@26,0 --thickness 2mm -q";
 
-const ENDINGS: [&str; 5] = ["goo", "nanodlp", "sl1", "sl1s", "uvj"];
+const ENDINGS: [&str; 6] = ["goo", "ctb", "nanodlp", "sl1", "sl1s", "uvj"];
 
 fn with_printer() -> Scratch {
     let scratch = Scratch::with_tower_and_torus();
@@ -110,7 +110,7 @@ fn every_format_comes_back_with_its_images_and_times() {
         // A stack that came from a file makes the same file. Where the file has no speeds, the times of
         // moves are lost, once.
         let [mut from, mut file] = ["plate", "first"].map(str::to_owned);
-        for kept in [["goo", "uvj"].contains(&ending), true] {
+        for kept in [["goo", "ctb", "uvj"].contains(&ending), true] {
             scratch.run(&format!("lamp convert {from}.{ending} -q -o back.tif")).succeeds_quietly();
             scratch.run(&format!("lamp convert back.tif -q -o {file}.{ending}")).succeeds_quietly();
             let [old, new] = [&from, &file].map(|name| scratch.bytes(&format!("{name}.{ending}")));
@@ -180,6 +180,35 @@ for layer in range(count):
 assert data[at:] == bytes(3) + b'\\x07\\0\\0\\0DLP\\0'
 ";
 
+/// Prints the white pixels of each layer of a CTB file: a decoder of its own.
+const CTB_IN_PYTHON: &str = "
+import struct
+data = open('plate.ctb', 'rb').read()
+whole = lambda at: struct.unpack_from('<I', data, at)[0]
+number = lambda at: struct.unpack_from('<f', data, at)[0]
+assert whole(0) == 0x12FD0106 and whole(4) == 4
+width, height, rows, count = whole(52), whole(56), whole(64), whole(68)
+for layer in range(count):
+    row = rows + 36 * layer
+    at, length = whole(row + 12), whole(row + 16)
+    code = data[at:at + length]
+    k, white, pixels = 0, 0, 0
+    while k < length:
+        byte = code[k]
+        k += 1
+        run = 1
+        if byte & 128:
+            more = next(n for n in range(4) if not code[k] & 128 >> n)
+            run = int.from_bytes(code[k:k + 1 + more], 'big') & (1 << 7 * (more + 1)) - 1
+            k += 1 + more
+        assert byte & 127 in (0, 127)
+        pixels += run
+        white += run if byte & 127 else 0
+    assert pixels == width * height
+    print(white, round(number(row) * 1000), round(number(row + 4) * 1000))
+assert at + length == len(data)
+";
+
 /// Prints the white pixels of each image of an archive, whose names have `%d` for the number.
 fn images_in_python(file: &str, names: &str, first: u32, layers: usize) -> String {
     format!(
@@ -210,8 +239,10 @@ fn other_programs_see_the_same_layers() {
         let exposure = [30_000, 21_000, 12_000].get(layer.info.index as usize).unwrap_or(&3000);
         format!("{} {top} {exposure}\n", masks(std::slice::from_ref(layer))[0].white_pixels())
     };
-    let Some(said) = ask_python(&scratch, GOO_IN_PYTHON) else { return };
-    assert_eq!(said, layers.iter().map(line).collect::<String>());
+    for script in [GOO_IN_PYTHON, CTB_IN_PYTHON] {
+        let Some(said) = ask_python(&scratch, script) else { return };
+        assert_eq!(said, layers.iter().map(line).collect::<String>());
+    }
     if ask_python(&scratch, "import PIL").is_none() {
         return;
     }

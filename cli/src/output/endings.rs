@@ -18,7 +18,7 @@ pub(crate) struct Writes {
 
 /// A stack, as a TIFF or packed.
 pub(crate) const STACK: Writes = Writes {
-    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .nanodlp, .sl1 or .uvj",
+    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .ctb, .nanodlp, .sl1 or .uvj",
     endings: &STACK_ENDINGS,
 };
 
@@ -207,7 +207,7 @@ mod tests {
         for name in ["-", "x", "x.part", "blade.v2", "x.out", "x.7", ".hidden", "a.b/x", "x.TIF"] {
             assert!(check_ending(Path::new(name), &STACK).is_ok(), "{name}");
         }
-        for name in ["x.ctb", "x.PNG", "a.tif.gz", "x.obj", "x.json"] {
+        for name in ["x.cbddlp", "x.PNG", "a.tif.gz", "x.obj", "x.json"] {
             let message = check_ending(Path::new(name), &STACK).unwrap_err().to_string();
             assert!(message.starts_with(&format!("{name}: a stack is a TIFF")), "{message}");
         }

@@ -12,8 +12,8 @@ use crate::files::page_names::PageFiles;
 use crate::note::StackNote;
 
 /// The endings of names of stacks in one file, in small letters.
-pub const STACK_ENDINGS: [&str; 10] =
-    ["tif", "tiff", "btf", "tf8", "lamp", "goo", "nanodlp", "sl1", "sl1s", "uvj"];
+pub const STACK_ENDINGS: [&str; 11] =
+    ["tif", "tiff", "btf", "tf8", "lamp", "goo", "nanodlp", "sl1", "sl1s", "uvj", "ctb"];
 
 /// Returns whether a file has the extension of a stack in one file.
 pub fn is_stack_name(path: &Path) -> bool {
