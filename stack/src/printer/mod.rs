@@ -6,6 +6,7 @@
 pub(crate) mod archive;
 pub(crate) mod ctb;
 pub(crate) mod fault;
+pub(crate) mod fields;
 pub(crate) mod goo;
 pub(crate) mod panel;
 pub(crate) mod preview;

@@ -72,3 +72,9 @@ pub(crate) fn layers(record: &PrintRecord) -> Vec<Layer> {
     };
     (0..5).map(layer).collect()
 }
+
+/// Returns the levels of all pixels, row by row.
+pub(crate) fn levels(image: &Image) -> Vec<u8> {
+    let rows = 0..image.height();
+    rows.flat_map(|row| (0..image.width()).map(move |column| image.level(column, row))).collect()
+}

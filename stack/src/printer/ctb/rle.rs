@@ -119,6 +119,7 @@ mod tests {
 
     use super::*;
     use crate::image::mask::Mask;
+    use crate::printer::testing::levels;
     use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 
     const MOST: usize = 1 << 20;
@@ -149,12 +150,6 @@ mod tests {
             pixels.extend(std::iter::repeat_n(if code == 0 { 0 } else { 2 * code + 1 }, length));
         }
         pixels
-    }
-
-    fn levels(image: &Image) -> Vec<u8> {
-        let rows = 0..image.height();
-        rows.flat_map(|row| (0..image.width()).map(move |column| image.level(column, row)))
-            .collect()
     }
 
     fn check(image: &Image) {

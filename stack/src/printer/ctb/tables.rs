@@ -1,7 +1,7 @@
 //! The tables of a CTB file, as bytes.
 
 use crate::printer::fault::PrinterFault;
-use crate::printer::panel::decimal;
+use crate::printer::fields::Fields;
 use crate::printer::total::{PrintLayer, PrintTotals};
 use crate::record::{PrintRecord, PrintStep};
 
@@ -24,29 +24,9 @@ pub(crate) const VERSION: u32 = 4;
 /// Where the numbers of layers count, in version 4.
 const OWN_STEPS: u8 = 0x40;
 
-/// Numbers in a row.
-struct Fields<'a>(&'a [u8]);
-
-impl Fields<'_> {
-    /// # Panics
-    /// Panics if there are not as many bytes: callers read all of them first.
-    fn bytes<const N: usize>(&mut self) -> [u8; N] {
-        let (field, rest) = self.0.split_first_chunk().expect("all fields were read");
-        self.0 = rest;
-        *field
-    }
-
-    fn u16(&mut self) -> u16 {
-        u16::from_le_bytes(self.bytes())
-    }
-
-    fn u32(&mut self) -> u32 {
-        u32::from_le_bytes(self.bytes())
-    }
-
-    fn f32(&mut self) -> f64 {
-        decimal(f32::from_bits(self.u32()))
-    }
+/// Returns numbers in a row, the lowest byte of each first.
+fn fields(bytes: &[u8]) -> Fields<'_> {
+    Fields { rest: bytes, is_little_endian: true }
 }
 
 /// The header's statements, and where the other tables are.
@@ -72,7 +52,7 @@ pub(crate) struct Header {
 
 impl Header {
     pub(crate) fn new(bytes: &[u8]) -> Result<Self, PrinterFault> {
-        let mut fields = Fields(bytes);
+        let mut fields = fields(bytes);
         let _magic = fields.u32();
         let version = fields.u32();
         let panel_mm = [fields.f32(), fields.f32()];
@@ -146,7 +126,7 @@ pub(crate) struct Slicer {
 
 impl Slicer {
     pub(crate) fn new(bytes: &[u8]) -> Self {
-        let mut fields = Fields(bytes);
+        let mut fields = fields(bytes);
         let lift_2 = [[fields.f32(), fields.f32()], [fields.f32(), fields.f32()]];
         let retract_2 = [fields.f32(), fields.f32()];
         let wait_lifted_s = fields.f32();
@@ -186,12 +166,12 @@ pub(crate) fn record(
     version_4: Option<&[u8]>,
     printer: String,
 ) -> PrintRecord {
-    let mut fields = Fields(print);
+    let mut fields = fields(print);
     let lifts = [[fields.f32(), fields.f32()], [fields.f32(), fields.f32()]];
     let retract_mm_per_min = fields.f32();
     let _: [u8; 12] = fields.bytes();
     let light_off_s = [fields.f32(), fields.f32()];
-    let mut of_4 = version_4.map(Fields);
+    let mut of_4 = version_4.map(self::fields);
     let [first_speed, first_speed_2] = match &mut of_4 {
         Some(fields) => {
             let speeds = [fields.f32(), fields.f32()];
@@ -257,7 +237,7 @@ pub(crate) struct Row {
 
 impl Row {
     pub(crate) fn new(bytes: &[u8]) -> Self {
-        let mut fields = Fields(bytes);
+        let mut fields = fields(bytes);
         let (top_mm, exposure_s, light_off_s) = (fields.f32(), fields.f32(), fields.f32());
         let (at, bytes, page) = (fields.u32(), fields.u32(), fields.u32());
         // Addresses have 32 bits; a page is as much as they reach.
@@ -270,7 +250,7 @@ impl Row {
         let usual =
             PrintStep { exposure_s: self.exposure_s, light_off_s: self.light_off_s, ..usual };
         let Some(numbers) = numbers else { return usual };
-        let mut fields = Fields(&numbers[ROW_BYTES as usize + 4..]);
+        let mut fields = fields(&numbers[ROW_BYTES as usize + 4..]);
         let lift = [fields.f32(), fields.f32()];
         let lift_2 = [fields.f32(), fields.f32()];
         let speed = fields.f32();

@@ -1,8 +1,8 @@
 //! The numbers of a GOO file and of its layers, as bytes.
 
 use crate::printer::fault::PrinterFault;
+use crate::printer::fields::Fields;
 use crate::printer::goo::{MAGIC, VERSION};
-use crate::printer::panel::decimal;
 use crate::printer::total::{PrintLayer, PrintTotals};
 use crate::record::{PrintRecord, PrintStep};
 
@@ -40,43 +40,6 @@ pub(crate) struct GooLayer {
     pub(crate) pauses: bool,
     /// The bytes of its image.
     pub(crate) bytes: u32,
-}
-
-/// Numbers and texts in a row.
-struct Fields<'a> {
-    rest: &'a [u8],
-    is_little_endian: bool,
-}
-
-impl Fields<'_> {
-    /// # Panics
-    /// Panics if there are not as many bytes: callers read all of them first.
-    fn bytes<const N: usize>(&mut self) -> [u8; N] {
-        let (field, rest) = self.rest.split_first_chunk().expect("all fields were read");
-        self.rest = rest;
-        *field
-    }
-
-    fn u16(&mut self) -> u16 {
-        let bytes = self.bytes();
-        if self.is_little_endian { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) }
-    }
-
-    fn u32(&mut self) -> u32 {
-        let bytes = self.bytes();
-        if self.is_little_endian { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) }
-    }
-
-    fn f32(&mut self) -> f64 {
-        decimal(f32::from_bits(self.u32()))
-    }
-
-    /// Reads a text that ends before its first zero.
-    fn text<const N: usize>(&mut self) -> String {
-        let bytes: [u8; N] = self.bytes();
-        let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
-        String::from_utf8_lossy(text).trim().to_owned()
-    }
 }
 
 impl GooHeader {

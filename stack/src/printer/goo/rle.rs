@@ -168,6 +168,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::printer::testing::levels;
     use crate::testing::{arbitrary_gray, arbitrary_mask, mask_of};
 
     const MOST: usize = 1 << 20;
@@ -214,12 +215,6 @@ mod tests {
             pixels.extend(std::iter::repeat_n(level, length));
         }
         pixels
-    }
-
-    fn levels(image: &Image) -> Vec<u8> {
-        let rows = 0..image.height();
-        rows.flat_map(|row| (0..image.width()).map(move |column| image.level(column, row)))
-            .collect()
     }
 
     fn check(image: &Image) {
