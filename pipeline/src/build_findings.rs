@@ -19,10 +19,10 @@ pub fn left_over(placed: &[(String, usize)], counts: &[Option<u32>]) -> Option<S
 
 /// Passes the layers of a build on. A layer above the greatest height that the machine builds is an
 /// error.
-pub fn within_height<E: From<MachineLimit>>(
-    build: impl Iterator<Item = Result<Layer, E>>,
+pub fn within_height<E: From<MachineLimit>, I: Iterator<Item = Result<Layer, E>>>(
+    build: I,
     machine: Option<Machine>,
-) -> impl Iterator<Item = Result<Layer, E>> {
+) -> impl Iterator<Item = Result<Layer, E>> + use<E, I> {
     let mut bottom_um = None;
     build.map(move |layer| {
         let layer = layer?;

@@ -18,7 +18,7 @@ pub mod exposure;
 pub mod fix;
 pub mod heights;
 pub mod memory;
-mod panel;
+pub mod panel;
 pub mod part_file;
 pub mod placement;
 pub mod size;

@@ -1,6 +1,6 @@
 //! Slices for printers with a panel, and reads their files by every command and by other programs.
 
-use lamp_stack::{GrayMask, Layer, Mask, Pitch, white_in_both};
+use lamp_stack::{GrayMask, Layer, Mask, PageInfo, Pitch, PrintStep, white_in_both};
 use lamp_tests::{Scratch, ask_python, masks};
 
 /// A printer of which every format can state all but moves, of which GOO and CTB need all. Its panel is wider than the tower and
@@ -280,6 +280,127 @@ fn rectangular_pixels_keep_millimeters() {
             .map(|(mask, pixel)| mask.white_pixels() as f64 * pixel);
         assert!((mm2 - expected).abs() < 2e-4 * expected, "{mm2} mm2, not {expected}");
     }
+}
+
+/// Every pixel lies where the difference of both sizes puts it, and times are the machine's.
+#[test]
+fn a_stack_of_no_printer_moves_to_a_panel() {
+    let scratch = with_printer();
+    for margin in [0, 1, 2, 150] {
+        scratch
+            .run(&format!("{SLICE} --dpi 127 --margin {margin} -o plain.tif"))
+            .succeeds_quietly();
+        scratch
+            .run("lamp convert plain.tif --machine mine.toml -q -o moved.goo")
+            .succeeds_quietly();
+        scratch.run("lamp convert moved.goo -q -o moved.tif").succeeds_quietly();
+        let [plain, moved] = ["plain.tif", "moved.tif"].map(|name| scratch.layers(name));
+        assert_eq!(plain.len(), moved.len());
+        for (plain, moved) in masks(&plain).into_iter().zip(masks(&moved)) {
+            let sides = [plain.width(), plain.height()].map(f64::from);
+            let [left, top] = [(400.0, sides[0]), (300.0, sides[1])]
+                .map(|(panel, side)| ((panel - side) / 2.0_f64).ceil() as i64);
+            assert_eq!((moved.width(), moved.height()), (400, 300));
+            assert_eq!(moved.white_pixels(), plain.white_pixels());
+            for row in 0..plain.height() {
+                if plain.row(row).is_empty() {
+                    continue;
+                }
+                let put: Vec<u32> =
+                    plain.row(row).iter().map(|c| (i64::from(*c) + left) as u32).collect();
+                assert_eq!(moved.row((i64::from(row) + top) as u32), put);
+            }
+        }
+        let wanted = scratch.layers("part.tif");
+        let times = [30_000.0, 21_000.0, 12_000.0].into_iter().chain(std::iter::repeat(3000.0));
+        assert_eq!(exposures(&moved), times.take(wanted.len()).map(Some).collect::<Vec<_>>());
+    }
+    // The stack keeps the command, and a stack of the panel passes as it is.
+    scratch.run("lamp convert plain.tif --machine mine.toml -q -o moved.tif").succeeds_quietly();
+    let moved = scratch.layers("moved.tif");
+    let stack = moved[0].info.stack.as_ref().unwrap();
+    assert!(stack.commands.last().unwrap().starts_with("convert --machine mine.toml@blake3:"));
+    scratch.run("lamp convert part.tif --machine mine.toml -q -o same.tif").succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("same.tif")), masks(&scratch.layers("part.tif")));
+    // The corner in the part's coordinates moves with the image.
+    let plain = scratch.layers("plain.tif");
+    let corner = |layers: &[Layer]| {
+        let mask = masks(layers)[3];
+        let row = (0..mask.height()).find(|row| !mask.row(*row).is_empty()).unwrap();
+        let [x, y] = layers[3].info.origin_mm.unwrap();
+        [x + f64::from(mask.row(row)[0]) * 0.2, y - f64::from(row) * 0.2]
+    };
+    for (a, b) in corner(&plain).into_iter().zip(corner(&moved)) {
+        assert!((a - b).abs() < 2e-6, "{a} {b}");
+    }
+}
+
+/// Exposures that are the old printer's become the new one's; a layer's own stays.
+#[test]
+fn a_stack_of_another_printer_gets_the_new_ones_exposures() {
+    let scratch = with_printer();
+    let other = PRINTER
+        .replace("Mine 400", "Other")
+        .replace("exposure_s = 30", "exposure_s = 40")
+        .replace("exposure_s = 3\n", "exposure_s = 10\n")
+        .replace("lift_mm = [5, 0]", "lift_mm = [7, 0]");
+    scratch.write("other.toml", other.as_bytes());
+    scratch.run("lamp convert part.tif -q -o plate.goo").succeeds_quietly();
+    scratch.run("lamp convert plate.goo -q -o read.tif").succeeds_quietly();
+    let mut layers = scratch.layers("read.tif");
+    layers[5].info.exposure_ms = Some(4321.0);
+    layers[6].info.set_record(&PrintStep { wait_lifted_s: 9.0, ..PrintStep::default() });
+    let of_before = layers[0].info.stack.as_ref().unwrap().print_record().unwrap();
+    scratch.stack("own.tif", layers);
+    let ran = scratch.run("lamp convert own.tif --machine other.toml -o other.tif").succeeds();
+    assert!(ran.stderr.contains("1 layer with other moves than the rest"), "{}", ran.stderr);
+    let read = scratch.layers("other.tif");
+    let record = read[0].info.stack.as_ref().unwrap().print_record().unwrap();
+    assert_eq!((record.printer.as_str(), of_before.printer.as_str()), ("Other", "Mine 400"));
+    assert_eq!(record.normal.lift_mm, [7.0, 0.0]);
+    let times = exposures(&read);
+    let first = [40_000.0, 30_000.0, 20_000.0, 10_000.0, 10_000.0, 4321.0, 10_000.0];
+    assert_eq!(times[..7], first.map(Some));
+    assert!(!read[6].info.has_record::<PrintStep>());
+    scratch.run("lamp convert other.tif -q -o other.goo").succeeds_quietly();
+    scratch.run("lamp convert other.goo -q -o again.tif").succeeds_quietly();
+    assert_eq!(exposures(&scratch.layers("again.tif"))[..7], first.map(Some));
+}
+
+#[test]
+fn what_lies_beyond_the_panel_is_refused() {
+    let scratch = with_printer();
+    // A dot of white at a corner of an image that is a pixel wider on each side.
+    let mask_of = |column: u32| {
+        let ends: Vec<u32> = [column, column + 1].into_iter().filter(|end| *end < 402).collect();
+        Mask::new(402, vec![0, ends.len() as u32], ends).unwrap()
+    };
+    let with_dot = |column: u32, pitch: Option<Pitch>| Layer {
+        info: PageInfo { thickness_um: Some(50.0), ..PageInfo::default() },
+        pitch,
+        image: mask_of(column).into(),
+    };
+    let pitch = Pitch::of_dpi(127.0);
+    let convert = |column, pitch| {
+        scratch.stack("dot.tif", [with_dot(column, pitch)]);
+        scratch.run("lamp convert dot.tif --machine mine.toml -q -o out.goo")
+    };
+    for column in [1, 200, 400] {
+        convert(column, pitch).succeeds_quietly();
+    }
+    scratch.run("lamp convert out.goo -q -o out.tif").succeeds_quietly();
+    assert_eq!(masks(&scratch.layers("out.tif"))[0].row(150), [399]);
+    for column in [0, 401] {
+        convert(column, pitch).is_refused_with(&["layer 0", "402 x 1", "400 x 300", "mine"]);
+    }
+    convert(200, None).is_refused_with(&["layer 0", "does not state its resolution", "mine"]);
+    convert(200, Pitch::of_dpi(300.0)).is_refused_with(&["300 dpi", "mine has 127 dpi"]);
+    scratch
+        .run("lamp convert part.tif --machine alpha -q -o out.tif")
+        .is_wrong_usage(&["alpha has no [panel]"]);
+    scratch
+        .run("lamp convert torus.stl torus.step --machine mine.toml")
+        .is_wrong_usage(&["--machine are for stacks"]);
 }
 
 #[test]

@@ -2,9 +2,13 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use anyhow::anyhow;
 use clap::Args;
+use lamp_machine::Machine;
+use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::panel::on_panel;
 use lamp_pipeline::solid::part_notes;
 use lamp_pipeline::step::{ReaderSettings, bytes_of};
 use lamp_slicing::topology::{CornerTable, StepSolids};
@@ -19,7 +23,7 @@ use crate::exit::Exit;
 use crate::output::endings::is_step_name;
 use crate::output::numbers::number_of;
 use crate::streams::{
-    check_beside, check_stack_name, counting, for_tiffs, input_name, is_folder, is_stream,
+    Layers, check_beside, check_stack_name, counting, for_tiffs, input_name, is_folder, is_stream,
     layers_of_input, new_folder, open_pages, progress, unless_found, write_file, write_layers,
     written_to,
 };
@@ -29,7 +33,7 @@ use crate::terminal::stack_notes::doubts;
 /// Convert a stack to pages, PNGs or contours, a STEP part to STL, or a mesh to STEP
 ///
 /// Images and their metadata stay unchanged, and the command is not recorded: a stack converted
-/// from file to folder and back has the same bytes.
+/// from file to folder and back has the same bytes. Only --machine changes them, and is recorded.
 ///
 /// A mesh must be closed. In a STEP file, its facets become flat faces; facets in one plane become
 /// a single face.
@@ -41,6 +45,7 @@ Examples:
   lamp convert build.tif --layers 100..200 --png -o pictures/
   lamp convert build.tif --layers 600 -o layer.png
   lamp convert plate.goo -o plate.uvj
+  lamp convert build.tif --machine mars3 -o plate.goo
   lamp convert build.tif -o contours.cli
   lamp convert part.step part.stl --chord 5um
   lamp convert part.stl part.step")]
@@ -66,6 +71,13 @@ pub(crate) struct ConvertArgs {
 
     #[command(flatten)]
     reader: ReaderArgs,
+
+    /// Printer with a panel, by its name or a file: its panel's size, exposures and moves
+    ///
+    /// Images of another size are centered on the panel. Layers with an exposure time of their own
+    /// keep it
+    #[arg(long, value_name = "M")]
+    machine: Option<PathBuf>,
 
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png
     #[arg(long, conflicts_with = "classic")]
@@ -113,21 +125,37 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         }
         Ok(layer)
     });
+    let mut replaced = Rc::default();
+    let layers: Layers = match &args.machine {
+        Some(machine) => {
+            let (machine, word) = document_and_word::<Machine>(machine)?;
+            let (layers, own_moves) = on_panel(layers, machine, &word)?;
+            replaced = own_moves;
+            Box::new(layers)
+        }
+        None => Box::new(layers),
+    };
     let layers = unless_found(layers, || doubts().filter(|_| args.strict).map(Exit::Findings));
     match shape {
-        OutputKind::Tiff => write_layers(layers, &to, &progress),
+        OutputKind::Tiff => write_layers(layers, &to, &progress)?,
         OutputKind::Pngs => {
             let counted = layers.inspect(counting(&progress));
             let folder = new_folder(output, args.output.force)?;
-            written_to(output, write_png_folder(counted, folder), &progress)
+            written_to(output, write_png_folder(counted, folder), &progress)?;
         }
         OutputKind::Png => {
             let png = png_of_layer(&only_layer(layers, &input_name(&args.input.stack))?)?;
             write_file(output, |out| out.write_all(&png))?;
             progress.wrote(output, &[]);
-            Ok(())
         }
     }
+    if replaced.get() > 0 && !common.quiet {
+        let layers = number_of(replaced.get(), "layer");
+        let note =
+            format!("convert: {layers} with other moves than the rest: all get the machine's");
+        Severity::Note.say(&note);
+    }
+    Ok(())
 }
 
 enum OutputKind {
@@ -150,8 +178,9 @@ impl ConvertArgs {
 
     /// Refuses options of stacks.
     fn check_for_part(&self, output: &Path) -> Result<(), Exit> {
-        if self.input.layers.is_some() || self.png || self.output.classic {
-            let why = "--layers, --png and --classic are for stacks, not for parts";
+        let of_stacks = [self.input.layers.is_some(), self.png, self.output.classic];
+        if of_stacks.contains(&true) || self.machine.is_some() {
+            let why = "--layers, --png, --classic and --machine are for stacks, not for parts";
             return Err(Exit::usage(why));
         }
         check_beside(output, Path::new("-"), [&self.input.stack])

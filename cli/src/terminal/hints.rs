@@ -417,6 +417,7 @@ fn machine_limit(error: &MachineLimit) -> Option<String> {
         MachineLimit::Footprint { .. } => "check --units, or turn or scale the part",
         MachineLimit::Height { .. } => "check --units, or lay the part down with --rotate",
         MachineLimit::Dpi { .. } => "slice with such a --dpi",
+        MachineLimit::PanelPitch { .. } => "slice with that resolution",
         MachineLimit::Thickness { .. } => {
             "slice with such a --thickness, or --min and --max with --adaptive"
         }

@@ -76,14 +76,14 @@ pub enum PrinterFault {
     },
     /// The stack does not say which printer it is for.
     #[error(
-        "the stack does not say which printer it is for: slice it with --machine and a machine \
-         that has a [panel]"
+        "the stack does not say which printer it is for: slice or lamp convert it with --machine and \
+         a machine that has a [panel]"
     )]
     NoPanel,
     /// An image is not of the panel's size.
     #[error(
         "layer {layer} has {} x {} pixels, but the panel of {printer} has {} x {}: give \
-         lamp slice the same --machine, which centers the part on its panel",
+         lamp slice or lamp convert the same --machine, which centers images on its panel",
         size[0], size[1], panel[0], panel[1]
     )]
     Size {
