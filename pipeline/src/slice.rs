@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use lamp_grayscale::exposure::Exposure;
 use lamp_grayscale::resin::ExposureTime;
-use lamp_machine::{Machine, MachineLimit};
+use lamp_machine::{Machine, MachineGamma, MachineLimit};
 use lamp_slicing::{
     Bodies, Fill, FillDoubt, LayerHeights, LayerLevels, Part, Polished, Shading, SliceError,
     SliceOptions, Slices,
 };
-use lamp_stack::{Layer, Length, PageInfo, Size};
+use lamp_stack::{Image, Layer, LayerImage, Length, PageInfo, Size};
 use serde::Serialize;
 
 use crate::documents::{document_and_word, is_file, recorded_name};
@@ -87,6 +87,8 @@ pub struct Slicing<'a> {
     short: Cell<[u64; 2]>,
     is_blank: Cell<bool>,
     panel: Option<PanelFrame>,
+    /// The levels of gray edges by their shares, where the machine's light is not in proportion.
+    edge_levels: Option<[u8; 256]>,
 }
 
 /// Text that slicing writes on pages besides their images.
@@ -245,7 +247,7 @@ impl SliceStage {
             let name = fallback.file_name().unwrap_or_default().to_string_lossy();
             words.push_str(&option("fallback", &name));
         }
-        // Without a panel it changes no image, but refuses some.
+        // Without a panel and a curve of levels it changes no image, but refuses some.
         if let Some(machine) = &self.machine {
             let name = recorded_name::<Machine>(machine);
             words.push_str(&option("machine", &name.to_string_lossy()));
@@ -278,6 +280,14 @@ impl SliceStage {
             settings
                 .check_machine(machine)
                 .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
+            if machine.gamma.is_some() && settings.antialias && settings.gray != GrayRule::None {
+                let why = format!(
+                    "--gray chooses levels by the material, and the [gamma] of {} would change \
+                     them: leave out --gray or --antialias",
+                    machine.name
+                );
+                return Err(Error::settings(why));
+            }
         }
         let reading = Reading {
             pitch: settings.pitch,
@@ -315,6 +325,8 @@ impl SliceStage {
             check_part(machine, &slices)
                 .map_err(|limit| Error::from(limit).at(name_of_all(parts)))?;
         }
+        let gamma = machine.as_ref().and_then(|it| it.gamma.as_ref());
+        let edge_levels = gamma.filter(|_| settings.antialias).map(MachineGamma::levels_of_light);
         let panel = machine.and_then(|it| PanelFrame::new(&it, &slices, &settings.frame));
         let fallback = self.fallback.as_deref();
         let bridged = Bridged::new(slices, fallback, settings, self.layers.clone(), watcher)?;
@@ -331,6 +343,7 @@ impl SliceStage {
             short: Cell::default(),
             is_blank: Cell::new(true),
             panel,
+            edge_levels,
         })
     }
 }
@@ -373,6 +386,11 @@ impl Slicing<'_> {
                     self.short.set([layers + 1, all + pixels]);
                 }
                 see(&layer.info);
+            }
+            if let (Some(levels), Image::Gray(shares)) = (&self.edge_levels, &*layer.image) {
+                let image = shares.with_levels(levels);
+                // A page without gray pixels has one bit.
+                layer.image = image.to_mask().map_or_else(|| image.into(), LayerImage::from);
             }
             // Last: reports point into the images of the part alone.
             if let Some(panel) = &self.panel {

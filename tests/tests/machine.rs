@@ -128,6 +128,7 @@ fn json_says_what_is_known_of_machines() {
             "scan": null,
                 "fields": null,
             "panel": null,
+            "gamma": null,
             "recoating_pa": null,
             "times": {
                 "recoat_s": 8.0,

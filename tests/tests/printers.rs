@@ -367,6 +367,41 @@ fn a_stack_of_another_printer_gets_the_new_ones_exposures() {
     assert_eq!(exposures(&scratch.layers("again.tif"))[..7], first.map(Some));
 }
 
+/// Each level is that of its share's light, by the definition of the exponent.
+#[test]
+fn gray_edges_follow_the_curve_of_a_machine() {
+    let scratch = with_printer();
+    let gamma = "[gamma]\nvalue = 2.2\nleast_level = 60\nsource = \"measured\"\n";
+    scratch.write("curved.toml", format!("{PRINTER}{gamma}").as_bytes());
+    for machine in ["mine", "curved"] {
+        let slice = format!("{SLICE} --antialias --machine {machine}.toml -o {machine}.tif");
+        scratch.run(&slice).succeeds_quietly();
+    }
+    let of_share = |share: u8| {
+        let level = 255.0 * (f64::from(share) / 255.0).powf(1.0 / 2.2);
+        if level < 30.0 { 0 } else { level.max(60.0).round() as u8 }
+    };
+    let [shares, curved] = ["mine.tif", "curved.tif"].map(|name| levels(&scratch.layers(name)));
+    let mut seen = [false; 256];
+    assert_eq!(shares.len(), curved.len());
+    for (shares, curved) in shares.iter().zip(&curved) {
+        for (row, column) in (0..300).flat_map(|row| (0..400).map(move |column| (row, column))) {
+            let share = shares.level(column, row);
+            seen[usize::from(share)] = true;
+            assert_eq!(curved.level(column, row), of_share(share), "{share}");
+        }
+    }
+    assert!(seen.iter().filter(|seen| **seen).count() > 100);
+    let gray = "--gray --material lamp-suspension --antialias";
+    scratch
+        .run(&format!("slice torus.stl {gray} --machine curved.toml -o out.tif"))
+        .is_wrong_usage(&["the [gamma] of mine", "leave out --gray or --antialias"]);
+    scratch.write("bad.toml", format!("{PRINTER}{}", gamma.replace("2.2", "0")).as_bytes());
+    scratch
+        .run("slice torus.stl --antialias --machine bad.toml -o out.tif")
+        .is_refused_with(&["gamma: value: it must be between 0.1 and 10"]);
+}
+
 #[test]
 fn what_lies_beyond_the_panel_is_refused() {
     let scratch = with_printer();

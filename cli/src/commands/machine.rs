@@ -118,7 +118,7 @@ fn checked(path: &Path) -> Result<Machine, Exit> {
 /// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> Value {
     let Machine { name, description, area, height, dpi, thickness, .. } = machine;
-    let Machine { strips, scan, fields, panel, recoating, times, defaults, .. } = machine;
+    let Machine { strips, scan, fields, panel, gamma, recoating, times, defaults, .. } = machine;
     let swaths = machine.swaths();
     json!({
         "name": name,
@@ -145,6 +145,12 @@ fn fields(machine: &Machine) -> Value {
             "transition_layers": panel.transition_layers,
             "exposure_s": [panel.first.exposure_s, panel.normal.exposure_s],
             "source": panel.source,
+        })),
+        "gamma": gamma.as_ref().map(|gamma| json!({
+            "value": gamma.value,
+            "levels": gamma.levels,
+            "least_level": gamma.least_level,
+            "source": gamma.source,
         })),
         "recoating_pa": recoating.as_ref().map(Recoating::shear_pa),
         "times": times.as_ref().map(|times| json!({

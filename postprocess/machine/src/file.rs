@@ -64,6 +64,9 @@ pub enum MachineError {
     /// Impossible numbers of a panel.
     #[error("panel: {0}")]
     Panel(&'static str),
+    /// An impossible curve of gray levels.
+    #[error("gamma: {0}")]
+    Gamma(&'static str),
     /// Impossible numbers of a scan.
     #[error("scan: {0}")]
     Scan(ScanError),
@@ -169,6 +172,9 @@ impl Catalogued for Machine {
     }
 }
 
+        if let Some(gamma) = &self.gamma {
+            gamma.check()?;
+        }
 impl Machine {
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(pitch) = self.defaults.pitch {

@@ -13,6 +13,7 @@
 mod display;
 mod fields;
 mod file;
+mod gamma;
 mod light;
 mod limit;
 mod motion;
@@ -26,6 +27,7 @@ use serde::Deserialize;
 pub use display::{Display, DisplayError};
 pub use fields::MachineFields;
 pub use file::MachineError;
+pub use gamma::MachineGamma;
 pub use light::{LightError, LightTable};
 pub use limit::MachineLimit;
 pub use motion::{Acceleration, MotionError, Speed};
@@ -58,6 +60,8 @@ pub struct Machine {
     pub fields: Option<MachineFields>,
     /// The panel that exposes a layer at once, in place of `strips`, `scan` and `fields`.
     pub panel: Option<Panel>,
+    /// How much light a gray level gives, in proportion to it if absent.
+    pub gamma: Option<MachineGamma>,
     /// How a blade spreads the next layer.
     pub recoating: Option<Recoating>,
     /// How long the steps of a layer take.

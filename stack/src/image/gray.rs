@@ -76,6 +76,24 @@ impl GrayMask {
         Self::from_arrays(width, row_offsets, changes)
     }
 
+    /// Returns the image with `levels[level]` in place of each level. Black stays black.
+    #[must_use]
+    pub fn with_levels(&self, levels: &[u8; 256]) -> Self {
+        let (mut image, mut row) = (Self::new(self.width()), Vec::new());
+        for index in 0..self.height() {
+            row.clear();
+            for &LevelChange { column, level } in self.row(index) {
+                let level = if level == 0 { 0 } else { levels[usize::from(level)] };
+                // Two levels may become one.
+                if LevelChange::last_pixel(&row) != level {
+                    row.push(LevelChange { column, level });
+                }
+            }
+            image.push(&row);
+        }
+        image
+    }
+
     /// Returns the number of pixels that are not black.
     pub(crate) fn exposed_pixels(&self) -> u64 {
         let of_row = |changes: &[LevelChange]| {
@@ -181,6 +199,32 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn each_pixel_gets_the_level_of_its_level(
+            image in crate::testing::arbitrary_gray(),
+            levels in prop::collection::vec(0u8..4, 256),
+        ) {
+            let levels: [u8; 256] = levels.try_into().unwrap();
+            let mapped = image.with_levels(&levels);
+            let changes = (0..mapped.height()).flat_map(|row| mapped.row(row).to_vec()).collect();
+            let offsets = (0..=mapped.height()).scan(0, |sum, row| {
+                *sum += row.checked_sub(1).map_or(0, |row| mapped.row(row).len() as u32);
+                Some(*sum)
+            });
+            // It keeps the guarantees of runs.
+            let checked = GrayMask::from_changes(mapped.width(), offsets.collect(), changes);
+            prop_assert_eq!(checked.as_ref(), Ok(&mapped));
+            for row in 0..image.height() {
+                for column in 0..image.width() {
+                    let expected = match image.level(column, row) {
+                        0 => 0,
+                        level => levels[usize::from(level)],
+                    };
+                    prop_assert_eq!(mapped.level(column, row), expected);
+                }
+            }
+        }
+
         #[test]
         fn changes_of_all_rows_are_checked_as_those_of_each(
             rows in prop::collection::vec(prop::collection::vec((0u32..4, 0u8..3), 0..4), 1..4),
