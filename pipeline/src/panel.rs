@@ -77,7 +77,7 @@ struct Moving {
 ///
 /// # Errors
 /// Returns an error if the machine has no panel. Layers are errors if the machine does not build
-/// them, if their pixels are not the panel's, or if something white lies beyond the panel.
+/// them, if their pixels are not the panel's, or if a white pixel is beyond the panel.
 pub fn on_panel<E, I>(
     layers: I,
     machine: Machine,

@@ -280,6 +280,7 @@ impl SliceStage {
             settings
                 .check_machine(machine)
                 .map_err(|limit| Error::new(ErrorKind::Settings, limit))?;
+            settings.check_centered(machine)?;
             if machine.gamma.is_some() && settings.antialias && settings.gray != GrayRule::None {
                 let why = format!(
                     "--gray chooses levels by the material, and the [gamma] of {} would change \

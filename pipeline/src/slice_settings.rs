@@ -258,6 +258,30 @@ impl SliceSettings {
         }
     }
 
+    /// Checks that no setting would be in vain on a machine with a panel, whose images are as large as
+    /// it, with the part in their middle.
+    ///
+    /// # Errors
+    /// Returns an error if one would.
+    pub fn check_centered(&self, machine: &Machine) -> Result<(), Error> {
+        let Some(panel) = &machine.panel else { return Ok(()) };
+        let SliceFrame::Around { margin } = self.frame else { return Ok(()) };
+        let (name, [width, height]) = (&machine.name, panel.size_mm());
+        if (SliceFrame::Around { margin }) != Self::default().frame {
+            return Err(Error::settings(format!(
+                "--margin has no effect on {name}, whose images are as large as its panel: leave it out"
+            )));
+        }
+        let moved = self.solid.placement.translate.map_or([0.0; 3], |FiniteNumbers(mm)| mm);
+        if moved[..2] != [0.0; 2] {
+            return Err(Error::settings(format!(
+                "--translate has no effect across the panel of {name}, where the part lies in the \
+                 middle: leave it out, or give --origin X,Y and --size {width}x{height}mm"
+            )));
+        }
+        Ok(())
+    }
+
     /// Returns the height in each layer at which the part is cut: 0 at the bottom, 1 at the top.
     pub fn cut(&self) -> f64 {
         match self.plane {

@@ -94,6 +94,11 @@ pub enum LengthError {
         "`{0}` is not a resolution: write dots per inch, such as 1500 or 1814x1337, between 1 and 100000, or how far pixels are apart, such as 14um or 14x19um, with at most four decimals"
     )]
     NotAPitch(String),
+    /// Two numbers without a unit are so small that micrometers are meant.
+    #[error(
+        "`{0}` without a unit is dots per inch, which is very coarse: write {0}um for micrometers, or {0}dpi"
+    )]
+    CoarsePitch(String),
 }
 
 /// Splits `100um` into its number and the micrometers in its unit (`None` without a unit).

@@ -116,6 +116,26 @@ impl Pitch {
         if self.is_square() { Ok(self.x) } else { Err(NotSquare { pitch: self, work }) }
     }
 
+    /// Parses what a person writes. Unlike [`FromStr`], it refuses two small numbers without a unit:
+    /// they are dots per inch, and micrometers were meant.
+    ///
+    /// # Errors
+    /// Returns an error as [`FromStr`] does, or if the unit is missing.
+    pub fn stated(text: &str) -> Result<Self, LengthError> {
+        let pitch: Self = text.parse()?;
+        let mut letters = text.chars().filter(|letter| letter.is_alphabetic());
+        let has_unit = letters.any(|letter| !matches!(letter, 'x' | 'X'));
+        if text.contains(['x', 'X', '*']) && !has_unit && pitch.is_coarse() {
+            return Err(LengthError::CoarsePitch(text.to_owned()));
+        }
+        Ok(pitch)
+    }
+
+    /// Returns whether its dots per inch could be micrometers.
+    fn is_coarse(self) -> bool {
+        self.dpi().iter().all(|dpi| *dpi < 100.0)
+    }
+
     /// Returns the pixels per meter along x and y, rounded to whole numbers.
     pub(crate) fn per_metre(self) -> [u32; 2] {
         [self.x, self.y].map(Dpi::per_metre)
@@ -176,7 +196,8 @@ impl fmt::Display for Pitch {
             (true, false) => write!(f, "{x} x {y} {unit}"),
             (false, is_square) => {
                 // Numbers without a unit are dots per inch.
-                let unit = if unit == "um" { unit } else { "" };
+                let is_clear = unit == "dpi" && (is_square || !self.is_coarse());
+                let unit = if is_clear { "" } else { unit };
                 if is_square { write!(f, "{x}{unit}") } else { write!(f, "{x}x{y}{unit}") }
             }
         }
@@ -244,6 +265,20 @@ mod tests {
         {
             assert!(text.parse::<Pitch>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn two_small_numbers_need_a_unit() {
+        for text in ["14x19", "46.6x46.5", "35X35", "99*99.9"] {
+            let error = Pitch::stated(text).unwrap_err().to_string();
+            assert!(error.contains(&format!("write {text}um for")), "{error}");
+        }
+        for text in ["14x19um", "14x19dpi", "14 x 19 dpi", "14", "99x100", "1814x1337", "14umx19um"]
+        {
+            let stated = Pitch::stated(text).unwrap();
+            assert_eq!(Pitch::stated(&stated.to_string()), Ok(stated), "{text}");
+        }
+        assert!(Pitch::stated("14y19").is_err());
     }
 
     #[test]

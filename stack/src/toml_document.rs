@@ -49,9 +49,46 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, TomlError> {
         if let Ok(table) = DeTable::parse(text) {
             find_in_table(table.get_ref(), &at, &mut path);
         }
-        let problem = one_line(error.message()).replace(" field ", " key ");
+        let problem = plain(&one_line(error.message()).replace(" field ", " key "));
         TomlError { line: line_of(text, Some(at)), path: Some(path), problem }
     })
+}
+
+/// Puts what serde says of a value in the words of people: `the text "30s" is not a number`.
+fn plain(problem: &str) -> String {
+    let of_value = ["invalid type: ", "invalid value: ", "invalid length "];
+    let found = of_value.iter().find_map(|start| problem.strip_prefix(start));
+    let Some((found, expected)) = found.and_then(|found| found.split_once(", expected ")) else {
+        return problem.to_owned();
+    };
+    let of_word = |word: &str| found.strip_prefix(word).map(str::trim_start);
+    let number = ["integer", "floating point", "boolean"].iter().find_map(|word| of_word(word));
+    let found = match (number, of_word("string"), found) {
+        (Some(number), ..) => number.to_owned(),
+        (None, Some(text), _) => format!("the text {text}"),
+        (.., "sequence") => "a list".to_owned(),
+        (.., "map") => "a table".to_owned(),
+        (.., length) if length.parse::<u64>().is_ok() => format!("a list of {length}"),
+        (.., other) => other.to_owned(),
+    };
+    let whole = |most: &str| format!("a whole number from 0 to {most}");
+    let of_length = expected.rsplit_once(' ').filter(|(words, _)| words.ends_with("length"));
+    let expected = match (expected, of_length) {
+        (_, Some((_, length))) => format!("a list of {length}"),
+        ("f32" | "f64", _) => "a number".to_owned(),
+        ("u8", _) => whole("255"),
+        ("u16", _) => whole("65535"),
+        ("u32", _) => whole("4294967295"),
+        ("u64" | "usize", _) => "a whole number from 0 on".to_owned(),
+        ("i8" | "i16" | "i32" | "i64" | "isize", _) => "a whole number in range".to_owned(),
+        ("a string" | "a borrowed string", _) => "a text in quotes".to_owned(),
+        ("a boolean", _) => "true or false".to_owned(),
+        ("a sequence", _) => "a list".to_owned(),
+        ("a map", _) => "a table".to_owned(),
+        (other, _) if other.starts_with("struct ") => "a table".to_owned(),
+        (other, _) => other.to_owned(),
+    };
+    format!("{found} is not {expected}")
 }
 
 /// Leads `path` to the innermost value at a place of the text, or to the table that has a key there.
@@ -132,7 +169,7 @@ mod tests {
     fn an_error_names_the_innermost_value_or_the_table_that_has_or_lacks_a_key() {
         for (text, words) in [
             ("name = 'a'\nlamps = [", "2: -: "),
-            ("name = 1\nlamps = []", "1: name: invalid type: integer `1`"),
+            ("name = 1\nlamps = []", "1: name: `1` is not a text in quotes"),
             ("lamps = []", "1: : missing key `name`"),
             ("name = 'a'\nlamps = []\nq = 1", "3: : unknown key `q`"),
             (
@@ -140,12 +177,30 @@ mod tests {
                 "5: lamps/1: unknown key `wat`",
             ),
             ("name = 'a'\n[[lamps]]\nwatts = 1\n[[lamps]]\n", "4: lamps/1: missing key `watts`"),
-            ("name = 'a'\nlamps = [{watts = 'b'}]", "2: lamps/0/watts: invalid type"),
-            ("name = 'a'\nlamps = [{watts = 1, at = [1, 256]}]", "2: lamps/0/at/1: invalid value"),
+            (
+                "name = 'a'\nlamps = [{watts = 'b'}]",
+                "2: lamps/0/watts: the text \"b\" is not a number",
+            ),
+            ("name = 'a'\nlamps = [3]", "2: lamps/0: `3` is not a table"),
+            ("name = 'a'\nlamps = 3", "2: lamps: `3` is not a list"),
+            ("name = true\nlamps = []", "1: name: `true` is not a text in quotes"),
+            ("name = [1.5]\nlamps = []", "1: name: a list is not a text in quotes"),
+            (
+                "name = 'a'\nlamps = [{watts = 1, at = [1]}]",
+                "2: lamps/0/at: a list of 1 is not a list of 2",
+            ),
+            (
+                "name = 'a'\nlamps = [{watts = 1, at = [1, 1.5]}]",
+                "2: lamps/0/at/1: `1.5` is not a whole number from 0 to 255",
+            ),
+            (
+                "name = 'a'\nlamps = [{watts = 1, at = [1, 256]}]",
+                "2: lamps/0/at/1: `256` is not a whole number from 0 to 255",
+            ),
             ("name = 'a'\nlamps = []\nplace = 'floor'", "3: place: unknown variant `floor`"),
             ("name = 'a'\nlamps = []\nplace = { table = { legs = -1 } }", "3: place/table/legs: "),
             ("name = 'a'\nlamps = []\n[place.table]\nlegs = -1", "4: place/table/legs: "),
-            ("name = 1979-05-27\nlamps = []", "1: name: invalid type"),
+            ("name = 1979-05-27\nlamps = []", "1: name: "),
         ] {
             assert!(error(text).starts_with(words), "{text}: {}", error(text));
         }

@@ -36,7 +36,7 @@ fn both_options_and_a_machine_give_one_resolution() {
     let layers = read_stack(scratch.run(by_machine).succeeds_quietly().stdout);
     assert!(layers.iter().all(|layer| layer.pitch == Some(pitch())));
     scratch
-        .run("slice ball.stl --pitch 14x19 --thickness 100um -q --machine alpha")
+        .run("slice ball.stl --pitch 14x19dpi --thickness 100um -q --machine alpha")
         .is_wrong_usage(&["the stack has 14 x 19 dpi, and the machine alpha builds in 1500 to"]);
     for wrong in ["14x", "0.1um", "14x19furlong"] {
         let slice = format!("slice ball.stl --pitch {wrong}");

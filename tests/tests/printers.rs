@@ -444,6 +444,16 @@ fn what_does_not_fit_a_printer_is_refused() {
     let slice = |more: &str| scratch.run(&format!("slice tower.stl {more} -q -o plate.goo"));
     slice("--machine saturn4ultra16k --dpi 300").is_wrong_usage(&["300 dpi", "14 x 19 um"]);
     slice("--machine mine.toml --dpi 300").is_wrong_usage(&["300 dpi", "mine", "127 dpi"]);
+    slice("--machine mine.toml --margin 5").is_wrong_usage(&["--margin has no effect on mine"]);
+    slice("--machine mine.toml --translate 0,2,0")
+        .is_wrong_usage(&["--translate has no effect", "--size 80x60mm"]);
+    slice("--dpi 14x19").is_wrong_usage(&["write 14x19um for micrometers, or 14x19dpi"]);
+    scratch.write("margin.toml", format!("{PRINTER}[defaults]\nmargin = 3\n").as_bytes());
+    slice("--machine margin.toml").is_refused_with(&["panel: [defaults] has a margin"]);
+    let limits = "[defaults]\nthickness = \"5um\"\n[thickness]\nleast = \"10um\"\nmost = \"1mm\"\nsource = \"-\"\n";
+    scratch.write("thin.toml", format!("{PRINTER}{limits}").as_bytes());
+    let ran = slice("--machine thin.toml").is_refused_with(&["defaults: a layer is 5um thick"]);
+    assert_eq!(ran.stderr.matches("5um thick").count(), 1, "{}", ran.stderr);
     slice("--machine mine.toml --scale 1.3").is_refused_with(&["99.1mm", "90mm"]);
     slice("--machine mine.toml --scale 4").is_refused_with(&["the part takes"]);
     slice("--dpi 100 --thickness 1mm").is_refused_with(&["does not say which printer", "[panel]"]);

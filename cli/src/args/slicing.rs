@@ -26,7 +26,7 @@ pub(crate) struct SlicingArgs {
     ///
     /// Two numbers are along x and along y: 1814x1337
     #[arg(long, visible_alias = "pitch", alias = "resolution", value_name = "DPI")]
-    #[arg(default_value_t = SliceSettings::default().pitch)]
+    #[arg(default_value_t = SliceSettings::default().pitch, value_parser = Pitch::stated)]
     dpi: Pitch,
 
     /// Layer thickness: 100um, 0.1mm or 4mil [default: as in the file, or 100um]

@@ -34,6 +34,7 @@ pub(crate) struct BrepArgs {
 
     /// Resolution to check for; the default tolerance is a quarter of a pixel
     #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
+    #[arg(value_parser = Pitch::stated)]
     dpi: Pitch,
 
     #[command(flatten)]

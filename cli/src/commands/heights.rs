@@ -69,6 +69,7 @@ pub(crate) struct HeightsArgs {
 
     /// Resolution of the images, which sets the distance between the rows that are measured
     #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
+    #[arg(value_parser = Pitch::stated)]
     dpi: Pitch,
 
     #[command(flatten)]

@@ -10,6 +10,7 @@ use super::MachineError;
 #[serde(deny_unknown_fields)]
 pub struct MachineFields {
     /// The width and height of a field in pixels.
+    #[serde(deserialize_with = "crate::file::pair")]
     pub pixels: [u32; 2],
     /// How many columns, and how many rows, a field shares with the next.
     pub overlap: u32,

@@ -25,7 +25,7 @@ pub enum MachineError {
     NoThickness,
     /// A default beyond the machine's own limits.
     #[error("defaults: {0}")]
-    Default(#[from] MachineLimit),
+    Default(MachineLimit),
     /// A blade that stands still, or spreads nothing.
     #[error("recoating: travel, seconds, gap and viscosities must be above zero, the least first")]
     Recoating,
@@ -76,6 +76,12 @@ pub enum MachineError {
 impl From<ScanError> for MachineError {
     fn from(error: ScanError) -> Self {
         Self::Scan(error)
+    }
+}
+
+impl From<MachineLimit> for MachineError {
+    fn from(limit: MachineLimit) -> Self {
+        Self::Default(limit)
     }
 }
 
@@ -159,7 +165,15 @@ impl Catalogued for Machine {
                     "the file has [strips], [scan] or [fields], too: keep them, or [panel] alone";
                 return Err(MachineError::Panel(why));
             }
+            if self.defaults.margin.is_some() {
+                let why =
+                    "[defaults] has a margin, too, which has no effect on a panel: leave it out";
+                return Err(MachineError::Panel(why));
+            }
             panel.check()?;
+        }
+        if let Some(gamma) = &self.gamma {
+            gamma.check()?;
         }
         match &self.strips {
             // A swath needs a column of its own between its two seams: a seam joins two swaths,
@@ -172,9 +186,6 @@ impl Catalogued for Machine {
     }
 }
 
-        if let Some(gamma) = &self.gamma {
-            gamma.check()?;
-        }
 impl Machine {
     fn check_defaults(&self) -> Result<(), MachineError> {
         if let Some(pitch) = self.defaults.pitch {
@@ -206,7 +217,10 @@ pub(super) fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<L
 /// Reads a number of dots per inch, or the text of a pitch.
 pub(super) fn some_pitch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Pitch>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(
+        untagged,
+        expecting = "write dots per inch, such as 600, or a pitch, such as \"14x19um\""
+    )]
     enum Stated {
         Dpi(f64),
         Text(String),
@@ -215,11 +229,26 @@ pub(super) fn some_pitch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Pi
         Stated::Dpi(dpi) => dpi.to_string(),
         Stated::Text(text) => text,
     };
-    text.parse().map(Some).map_err(de::Error::custom)
+    Pitch::stated(&text).map(Some).map_err(de::Error::custom)
 }
 
 pub(super) fn nonempty_path<'de, D: Deserializer<'de>>(from: D) -> Result<PathBuf, D::Error> {
     nonempty_text(from).map(PathBuf::from)
+}
+
+/// Reads a list of exactly two values: of a longer list, serde would drop the rest in silence.
+pub(super) fn pair<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    from: D,
+) -> Result<[T; 2], D::Error> {
+    let list = Vec::deserialize(from)?;
+    let length = list.len();
+    list.try_into().map_err(|_| de::Error::invalid_length(length, &"an array of length 2"))
+}
+
+pub(super) fn some_pair<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<[T; 2]>, D::Error> {
+    pair(from).map(Some)
 }
 
 fn parsed<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {

@@ -166,6 +166,7 @@ pub struct Strips {
 #[serde(deny_unknown_fields)]
 pub struct Recoating {
     /// The least and the greatest viscosity of the suspension, in centipoise.
+    #[serde(deserialize_with = "file::pair")]
     pub viscosity_cp: [f64; 2],
     /// How far the blade goes, as `26cm`.
     #[serde(deserialize_with = "file::length")]

@@ -10,11 +10,13 @@ use super::{Defaults, Machine, MachineError, MachineLimit};
 #[serde(deny_unknown_fields)]
 pub struct Panel {
     /// The columns and rows.
+    #[serde(deserialize_with = "crate::file::pair")]
     pub pixels: [u32; 2],
     /// The width and height of a pixel in micrometers.
+    #[serde(deserialize_with = "crate::file::pair")]
     pub pitch_um: [f64; 2],
     /// Whether the panel shows images mirrored left to right, and top to bottom.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::file::pair")]
     pub mirrored: [bool; 2],
     /// The printer's name in its own files; the machine's if absent.
     pub printer: Option<String>,
@@ -51,15 +53,16 @@ pub struct PanelStep {
     #[serde(default)]
     pub wait_lifted_s: f64,
     /// How far the platform lifts, in millimeters, in two stages.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::file::pair")]
     pub lift_mm: [f64; 2],
     /// How fast it lifts, in millimeters per minute.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::file::pair")]
     pub lift_mm_per_min: [f64; 2],
     /// The way back in millimeters, in two stages; in one if absent.
+    #[serde(default, deserialize_with = "crate::file::some_pair")]
     pub retract_mm: Option<[f64; 2]>,
     /// How fast it comes back.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::file::pair")]
     pub retract_mm_per_min: [f64; 2],
     /// The section, table or data sheet.
     #[serde(deserialize_with = "nonempty_text")]
@@ -258,6 +261,9 @@ mod tests {
     #[test]
     fn impossible_panels_are_refused() {
         for (from, to, words) in [
+            ("[2000, 800]", "[2000, 800, 1]", "panel.pixels: a list of 3 is not a list of 2"),
+            ("[3, 4]", "[3]", "panel.first.lift_mm: a list of 1 is not a list of 2"),
+            ("exposure_s = 30", "exposure_s = \"30s\"", "the text \"30s\" is not a number"),
             ("[2000, 800]", "[2000, 0]", "panel: pixels: each must be"),
             ("[2000, 800]", "[65536, 800]", "panel: pixels: each must be"),
             ("[50, 50]", "[50, nan]", "panel: pitch_um: each must be"),

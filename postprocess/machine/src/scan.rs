@@ -33,10 +33,12 @@ pub struct Scan {
     pub display: Option<String>,
     /// The mirrors in use across the scan and along it, if they are not the display's. See
     /// [`mirrors`](Self::mirrors).
+    #[serde(default, deserialize_with = "crate::file::some_pair")]
     pub mirrors: Option<[u32; 2]>,
     /// The number of pixels that a swath shares with the next.
     pub overlap: u32,
     /// The least and the greatest speed of the head along a swath.
+    #[serde(deserialize_with = "crate::file::pair")]
     pub speed: [Speed; 2],
     /// The acceleration of the head at the ends of a swath.
     pub acceleration: Acceleration,

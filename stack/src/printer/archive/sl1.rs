@@ -117,7 +117,7 @@ pub(crate) fn job_name(part: &str) -> String {
 pub(crate) fn texts(print: &Print<'_>) -> Vec<(&'static str, String)> {
     let Print { record, totals, .. } = print;
     let PrintRecord { first, normal, panel_px, panel_mm, .. } = record;
-    let faded = record.first_layers + record.transition_layers;
+    let faded = record.first_layers.saturating_add(record.transition_layers);
     let ini = |pairs: &[(&str, &dyn std::fmt::Display)]| {
         pairs.iter().fold(String::new(), |mut text, (key, value)| {
             // A name that breaks lines would be two keys.
