@@ -1,5 +1,6 @@
 //! Holds upright prisms: polygons between two heights, as contour files have them.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -163,8 +164,43 @@ impl Drawing {
     }
 
     /// Adds a polygon that is turned so that it encloses material, or so that it is a hole in
-    /// another polygon.
+    /// another polygon. It may pass corners more than once, as bows and keyholes do.
     pub(crate) fn add_turned(
+        &mut self,
+        slab: u32,
+        ring: &[[f64; 2]],
+        is_hole: bool,
+    ) -> Result<(), ContourFault> {
+        let loops = loops(ring);
+        match self.windings_around(&loops) {
+            Some(around) if loops.len() > 1 => {
+                self.add_loops(slab, &loops, &around, Fill::Solid, is_hole)
+            }
+            _ => self.add_loop(slab, ring, is_hole),
+        }
+    }
+
+    /// Adds the loops of a shape that a rule fills, given the windings of the others around each.
+    fn add_loops(
+        &mut self,
+        slab: u32,
+        loops: &[Ring],
+        around: &[i32],
+        rule: Fill,
+        is_hole: bool,
+    ) -> Result<(), ContourFault> {
+        for (ring, &outside) in loops.iter().zip(around) {
+            let turn = if doubled_area(ring) < 0.0 { -1 } else { 1 };
+            let [out, within] = [outside, outside + turn].map(|winding| rule.is_inside(winding));
+            // A polygon with the same on both sides is no boundary.
+            if out != within {
+                self.add_loop(slab, ring, out != is_hole)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add_loop(
         &mut self,
         slab: u32,
         ring: &[[f64; 2]],
@@ -187,7 +223,8 @@ impl Drawing {
         if rings.iter().flatten().flatten().any(|c| !(*c as f32).is_finite()) {
             return Err(ContourFault::NotFinite);
         }
-        let Some(around) = self.windings_around(rings) else {
+        let loops: Vec<Ring> = rings.iter().flat_map(|ring| loops(ring)).collect();
+        let Some(around) = self.windings_around(&loops) else {
             // A body of its own, since its loops that turn right would cut others.
             if self.bodies.len() > MAX_CROSSED {
                 return Err(ContourFault::Crossed(MAX_CROSSED));
@@ -196,20 +233,12 @@ impl Drawing {
             let body = self.bodies.len() as u32 - 1;
             return rings.iter().try_for_each(|ring| self.add_to(body, slab, ring.iter().copied()));
         };
-        for (ring, outside) in rings.iter().zip(around) {
-            let turn = if doubled_area(ring) < 0.0 { -1 } else { 1 };
-            let [out, within] = [outside, outside + turn].map(|winding| rule.is_inside(winding));
-            // A polygon with the same on both sides is no boundary.
-            if out != within {
-                self.add_turned(slab, ring, out)?;
-            }
-        }
-        Ok(())
+        self.add_loops(slab, &loops, &around, rule, false)
     }
 
-    /// Returns true if no sides of a polygon cross, as far as comparing them takes no time.
+    /// Returns true if no sides of a polygon cross or touch, as far as comparing them takes no time.
     pub(crate) fn is_simple(&mut self, ring: &Ring) -> bool {
-        self.windings_around(std::slice::from_ref(ring)).is_some()
+        loops(ring).len() < 2 && self.windings_around(std::slice::from_ref(ring)).is_some()
     }
 
     /// Returns the winding number of the other polygons around each polygon of a shape; `None` if
@@ -234,7 +263,9 @@ impl Drawing {
                 }
                 self.steps_left = self.steps_left.checked_sub(1)?;
                 let [other_low, other_high] = ends(other, 1);
-                if other_low <= high && low <= other_high && cross(side, other) {
+                let is_near = other_low <= high && low <= other_high;
+                // Of several polygons, one may touch a side of another.
+                if is_near && (cross(side, other) || rings.len() == 1 && touch(side, other)) {
                     return None;
                 }
             }
@@ -316,6 +347,35 @@ impl Drawing {
     }
 }
 
+/// Returns the loops of a polygon, each of which passes its corners once. Ways there and back, as to the
+/// hole of a keyhole, enclose nothing, and are left out.
+fn loops(ring: &[[f64; 2]]) -> Vec<Ring> {
+    // Two triangles that share a corner have six.
+    if ring.len() < 6 {
+        return vec![ring.to_vec()];
+    }
+    // Adding zero turns -0 into 0.
+    let key = |corner: [f64; 2]| corner.map(|c| (c + 0.0).to_bits());
+    let (mut loops, mut path): (Vec<Ring>, Ring) = (Vec::new(), Vec::new());
+    let mut place_of: HashMap<[u64; 2], usize> = HashMap::with_capacity(ring.len());
+    for &corner in ring {
+        if let Some(&place) = place_of.get(&key(corner)) {
+            let ended = path.split_off(place + 1);
+            for &corner in &ended {
+                place_of.remove(&key(corner));
+            }
+            let ended: Ring = path.last().copied().into_iter().chain(ended).collect();
+            loops.push(ended);
+        } else {
+            place_of.insert(key(corner), path.len());
+            path.push(corner);
+        }
+    }
+    loops.push(path);
+    loops.retain(|it| it.len() > 2);
+    loops
+}
+
 /// Returns twice the area that a polygon encloses; below zero if it turns right.
 pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
     // From the first corner, so that a polygon far away loses no digits.
@@ -336,6 +396,23 @@ fn cross(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> bool {
         first < 0.0 && second > 0.0 || first > 0.0 && second < 0.0
     };
     parts(a, b) && parts(b, a)
+}
+
+/// Returns true if an end of one side lies within the other one.
+fn touch(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> bool {
+    let coord = |[x, y]: [f64; 2]| Coord { x, y };
+    let within = |line: &[[f64; 2]; 2], point: [f64; 2]| {
+        let is_between = |axis: usize| {
+            let [from, to] = [line[0][axis], line[1][axis]];
+            (from.min(to)..=from.max(to)).contains(&point[axis])
+        };
+        point != line[0]
+            && point != line[1]
+            && is_between(0)
+            && is_between(1)
+            && orient2d(coord(line[0]), coord(line[1]), coord(point)) == 0.0
+    };
+    b.iter().any(|&end| within(a, end)) || a.iter().any(|&end| within(b, end))
 }
 
 /// Returns the winding number of a polygon about a point.

@@ -7,6 +7,7 @@ use std::io::{self, BufRead, Read};
 use super::error::ContourFault;
 use super::{Located, Opened, Pages};
 use crate::fill::Fill;
+use crate::prisms::MAX_CORNERS;
 use crate::read_note::ReadNote;
 
 /// A limit above the length of any word: a command or a number.
@@ -172,6 +173,9 @@ impl<R: BufRead> CliReader<R> {
                         left -= 1.0;
                         let corner = [step!(self.number()), step!(self.number())];
                         self.corners.push(corner);
+                        if self.corners.len() > MAX_CORNERS {
+                            return Ok(Err(ContourFault::TooManyCorners(MAX_CORNERS)));
+                        }
                     }
                     if let Err(fault) = self.polyline(direction) {
                         return Ok(Err(fault));
@@ -259,6 +263,9 @@ impl<R: BufRead> CliReader<R> {
                     for _ in 0..count {
                         let [x, y] = [step!(self.bytes()), step!(self.bytes())];
                         self.corners.push([x, y].map(|it| f32::from_le_bytes(it).into()));
+                        if self.corners.len() > MAX_CORNERS {
+                            return Ok(Err(ContourFault::TooManyCorners(MAX_CORNERS)));
+                        }
                     }
                     if let Err(fault) = self.polyline(direction.into()) {
                         return Ok(Err(fault));

@@ -4,7 +4,7 @@
 //! Polygons at several heights are layers, whose tops are there. Else each layer of the drawing is a
 //! mask. All polygons of a layer or mask together are filled by even-odd.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::TAU;
 use std::io::{self, BufRead, Read};
 
@@ -112,6 +112,8 @@ struct DxfReader<R> {
     block: String,
     /// The polyline whose vertices are read.
     polyline: Option<Line>,
+    hidden_layers: HashSet<String>,
+    hidden: u64,
     others: u64,
 }
 
@@ -127,6 +129,8 @@ pub(super) fn read(text: impl BufRead, mask_mm: f64) -> io::Result<Result<Opened
         blocks: HashMap::from([(String::new(), Block::default())]),
         block: String::new(),
         polyline: None,
+        hidden_layers: HashSet::new(),
+        hidden: 0,
         others: 0,
     };
     let outcome = reader.read()?;
@@ -160,9 +164,13 @@ impl<R: BufRead> DxfReader<R> {
                 Err(fault) => return Ok(Err(fault)),
             };
             if code != 0 {
-                // Tables and objects are not kept.
-                if code != 999 && matches!(section.as_str(), "" | "HEADER" | "BLOCKS" | "ENTITIES")
-                {
+                // Other tables and objects are not kept.
+                let is_kept = match section.as_str() {
+                    "" | "HEADER" | "BLOCKS" | "ENTITIES" => true,
+                    "TABLES" => entity.name == "LAYER",
+                    _ => false,
+                };
+                if is_kept && code != 999 {
                     entity.groups.push((code, value));
                 }
                 continue;
@@ -174,6 +182,7 @@ impl<R: BufRead> DxfReader<R> {
                     // The header's variables follow the section's name.
                     self.header(&ended)
                 }
+                ("TABLES", "LAYER") => self.layer_state(&ended),
                 ("BLOCKS" | "ENTITIES", "") => Ok(()),
                 ("BLOCKS" | "ENTITIES", _) => self.entity(&ended),
                 _ => Ok(()),
@@ -215,6 +224,14 @@ impl<R: BufRead> DxfReader<R> {
         Ok(())
     }
 
+    /// Reads whether a layer is shown: not off (its color is below zero) or frozen (flag 1).
+    fn layer_state(&mut self, layer: &Entity) -> Result<(), ContourFault> {
+        if layer.number_or(62, 0.0)? < 0.0 || layer.flags(70)? & 1 == 1 {
+            self.hidden_layers.insert(layer.text(2).unwrap_or_default().to_owned());
+        }
+        Ok(())
+    }
+
     fn layer(&mut self, entity: &Entity) -> usize {
         let name = entity.text(8).unwrap_or("0");
         if let Some(&number) = self.numbers_of_layers.get(name) {
@@ -230,6 +247,13 @@ impl<R: BufRead> DxfReader<R> {
     }
 
     fn entity(&mut self, entity: &Entity) -> Result<(), ContourFault> {
+        let is_shape = !matches!(entity.name.as_str(), "BLOCK" | "ENDBLK" | "SEQEND" | "VERTEX");
+        let is_hidden = self.hidden_layers.contains(entity.text(8).unwrap_or("0"));
+        // On paper, or on a layer that is off.
+        if is_shape && (is_hidden || entity.number(67)? == Some(1.0)) {
+            self.hidden += 1;
+            return Ok(());
+        }
         let layer = self.layer(entity);
         let mut line = Line { layer, z: 0.0, corners: Vec::new(), is_closed: true };
         match entity.name.as_str() {
@@ -375,6 +399,7 @@ impl<R: BufRead> DxfReader<R> {
         let unit_mm = self.unit_mm.unwrap_or(1.0);
         let mut flat = Flat {
             blocks: &self.blocks,
+            unit_mm,
             tolerance: TOLERANCE_MM / unit_mm,
             visits: 0,
             corners: 0,
@@ -401,6 +426,11 @@ impl<R: BufRead> DxfReader<R> {
             "entities without an area (texts, hatches, points and others)",
         ];
         ReadNote::leave_out(&mut notes, what, self.others);
+        let what = [
+            "entity on paper or on a layer that is off or frozen",
+            "entities on paper or on layers that are off or frozen",
+        ];
+        ReadNote::leave_out(&mut notes, what, self.hidden);
         closed.sort_by(|a, b| a.1.total_cmp(&b.1));
         // Heights that differ by less are rounded.
         let nm = 1e-6 / unit_mm;
@@ -464,6 +494,7 @@ impl Placed {
 /// The lines of a drawing, with all blocks in their places.
 struct Flat<'a> {
     blocks: &'a HashMap<String, Block>,
+    unit_mm: f64,
     tolerance: f64,
     visits: usize,
     corners: usize,
@@ -475,8 +506,11 @@ struct Flat<'a> {
 impl Flat<'_> {
     fn expand(&mut self, name: &str, place: &Placed, depth: usize) -> Result<(), ContourFault> {
         self.visits += 1;
-        if depth > MAX_DEPTH || self.visits > MAX_VISITS {
+        if depth > MAX_DEPTH {
             return Err(ContourFault::Endless(shown(name)));
+        }
+        if self.visits > MAX_VISITS {
+            return Err(ContourFault::TooManyCopies(shown(name)));
         }
         let blocks = self.blocks;
         let Some(block) = blocks.get(name) else { return Err(ContourFault::Missing(shown(name))) };
@@ -497,7 +531,9 @@ impl Flat<'_> {
                 Some(layer) if line.layer == 0 => layer,
                 _ => line.layer,
             };
-            let z = place.z + line.z;
+            // Heights of rounded drawings differ in digits that say nothing.
+            let nm = 1e-6 / self.unit_mm;
+            let z = ((place.z + line.z) / nm).round() * nm + 0.0;
             if line.is_closed || ring.len() > 3 && ring.first() == ring.last() {
                 self.closed.push((layer, z, ring));
             } else if ring.len() > 1 {

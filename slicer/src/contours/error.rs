@@ -21,6 +21,15 @@ pub enum ContourFault {
     /// Lines do not close.
     #[error("has {0} lines that form no closed polygon: export closed polylines")]
     OpenLines(usize),
+    /// There is no polygon, and this was left out.
+    #[error("has no polygon to slice{0}")]
+    NoArea(String),
+    /// A name stands for two things.
+    #[error("defines {0} twice: export it again with one cell of each name")]
+    Twice(String),
+    /// Arrays make too many copies.
+    #[error("makes more copies of {0} than can be read: arrays are too large")]
+    TooManyCopies(String),
     /// A polygon comes before the first layer.
     #[error("has a polygon before the first layer")]
     NoLayer,

@@ -352,14 +352,18 @@ impl<R: BufRead> GdsReader<R> {
 
     fn finish(mut self, mask_mm: f64) -> Result<Opened, Located> {
         let cells = std::mem::take(&mut self.cells);
-        let numbers: HashMap<&str, usize> =
-            cells.iter().enumerate().map(|(number, cell)| (cell.name.as_str(), number)).collect();
+        let whole = |fault| ("the library".to_owned(), fault);
+        let mut numbers: HashMap<&str, usize> = HashMap::with_capacity(cells.len());
+        for (number, cell) in cells.iter().enumerate() {
+            if numbers.insert(&cell.name, number).is_some() {
+                return Err(whole(ContourFault::Twice(shown(&cell.name))));
+            }
+        }
         let placed: HashSet<&str> = cells
             .iter()
             .flat_map(|cell| &cell.references)
             .map(|reference| reference.cell.as_str())
             .collect();
-        let whole = |fault| ("the library".to_owned(), fault);
         let tops: Vec<_> =
             cells.iter().filter(|cell| !placed.contains(cell.name.as_str())).collect();
         if let (true, Some(cell)) = (tops.is_empty(), cells.first()) {
@@ -426,8 +430,11 @@ impl Flat<'_> {
     ) -> Result<(), ContourFault> {
         self.visits += 1;
         let cell = &self.cells[number];
-        if depth > MAX_DEPTH || self.visits > MAX_VISITS {
+        if depth > MAX_DEPTH {
             return Err(ContourFault::Endless(shown(&cell.name)));
+        }
+        if self.visits > MAX_VISITS {
+            return Err(ContourFault::TooManyCopies(shown(&cell.name)));
         }
         for Shape { mask: [layer, datatype], outline } in &cell.shapes {
             let slab = self.pages.mask(&(*layer, *datatype, String::new()));

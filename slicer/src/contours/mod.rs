@@ -43,12 +43,20 @@ pub(crate) fn read(
     mask: Length,
 ) -> io::Result<Result<Opened, Located>> {
     let text = BufReader::with_capacity(1 << 16, file.reader());
-    match format {
-        PartFormat::Cli => cli::read(text),
-        PartFormat::Svg => svg::read(text, mask.mm()),
-        PartFormat::Dxf => dxf::read(text, mask.mm()),
-        _ => gdsii::read(text, mask.mm()),
-    }
+    let opened = match format {
+        PartFormat::Cli => cli::read(text)?,
+        PartFormat::Svg => svg::read(text, mask.mm())?,
+        PartFormat::Dxf => dxf::read(text, mask.mm())?,
+        _ => gdsii::read(text, mask.mm())?,
+    };
+    Ok(opened.and_then(|opened| {
+        if !opened.pieces.is_empty() {
+            return Ok(opened);
+        }
+        // The reason is mostly in what is left out.
+        let notes = opened.notes.iter().map(|note| format!("; {note}")).collect();
+        Err(("the file".to_owned(), ContourFault::NoArea(notes)))
+    }))
 }
 
 /// The key of a mask among the masks of a file: numbers and a name.
@@ -120,7 +128,7 @@ impl Pages {
         let bottom = match (of_first, next) {
             (Some(thickness), _) => first - thickness,
             (None, Some(next)) if is_empty && !is_near(first, next) => first,
-            (None, Some(next)) if first > 0.0 && first <= 2.0 * next => 0.0,
+            (None, Some(next)) if first > 0.0 && first <= 2.001 * next => 0.0,
             (None, Some(next)) => first - next,
             (None, None) if first > 0.0 => 0.0,
             (None, None) => first - 0.1 / unit_mm,

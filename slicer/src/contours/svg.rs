@@ -36,6 +36,8 @@ struct Group {
     rule: Fill,
     is_filled: bool,
     is_hidden: bool,
+    /// Whether it, or a group around it, has a class of a style sheet.
+    has_class: bool,
     /// The layer or mask that contains it.
     page: Option<Page>,
 }
@@ -56,6 +58,8 @@ struct SvgReader {
     fault: Option<ContourFault>,
     inkscape_layers: u32,
     left_out: [u64; 5],
+    /// Shapes that a style sheet may fill or hide.
+    classes: u64,
 }
 
 /// Contents that are counted and left out.
@@ -82,6 +86,7 @@ pub(super) fn read(text: impl BufRead, mask_mm: f64) -> io::Result<Result<Opened
         fault: None,
         inkscape_layers: 0,
         left_out: [0; 5],
+        classes: 0,
     };
     let mut text = BoundedText::limited(text, MAX_TAG_BYTES);
     let outcome = for_each_piece(&mut text, |piece| match piece {
@@ -105,17 +110,22 @@ pub(super) fn read(text: impl BufRead, mask_mm: f64) -> io::Result<Result<Opened
         });
         return Ok(Err((format!("byte {at}"), fault)));
     }
+    if reader.classes > 0 && reader.left_out[STYLES] > 0 {
+        let what = "shapes that a style sheet fills or hides (export styles as attributes)";
+        return Ok(Err(("the drawing".to_owned(), ContourFault::Unread(what))));
+    }
     Ok(Ok(reader.finish(mask_mm)))
 }
 
 impl SvgReader {
     fn start(&mut self, tag: &BytesStart<'_>) -> Result<(), ContourFault> {
-        if self.passed_over > 0 {
-            self.passed_over += 1;
-            return Ok(());
-        }
         let local = tag.local_name();
         let name = local.as_ref();
+        if self.passed_over > 0 {
+            self.passed_over += 1;
+            self.left_out[STYLES] += u64::from(name == "style");
+            return Ok(());
+        }
         let Some(outer) = self.groups.last().cloned() else {
             let root = self.root(tag)?;
             self.groups.push(root);
@@ -146,13 +156,16 @@ impl SvgReader {
         }
         let mut group = group_of(tag, outer)?;
         if matches!(name, "g" | "a" | "switch") {
+            group.has_class |= has_attribute(tag, "class");
             if group.page.is_none() {
                 group.page = self.page_of(tag, &group)?;
             }
             self.groups.push(group);
             return Ok(());
         }
+        group.has_class |= has_attribute(tag, "class");
         let rings = self.rings(name, tag, &group.to_mm)?;
+        self.classes += u64::from(rings.is_some() && group.has_class);
         if let Some(rings) = rings {
             self.add(tag, &group, &rings)?;
         }
@@ -299,6 +312,7 @@ impl SvgReader {
             rule: Fill::Solid,
             is_filled: true,
             is_hidden: false,
+            has_class: false,
             page: None,
         };
         group_of(tag, group)
@@ -626,7 +640,7 @@ fn group_of(tag: &BytesStart<'_>, mut group: Group) -> Result<Group, ContourFaul
     }
     let style = attribute_of(tag, "style")?.unwrap_or_default();
     let mut words = Vec::new();
-    for name in ["fill", "fill-rule", "display", "visibility"] {
+    for name in ["fill", "fill-rule", "fill-opacity", "opacity", "display", "visibility"] {
         if let Some(value) = attribute_of(tag, name)? {
             words.push((name.to_owned(), value));
         }
@@ -641,6 +655,8 @@ fn group_of(tag: &BytesStart<'_>, mut group: Group) -> Result<Group, ContourFaul
             ("fill", _) => group.is_filled = !matches!(value, "none" | "transparent"),
             ("fill-rule", "evenodd") => group.rule = Fill::EvenOdd,
             ("fill-rule", "nonzero") => group.rule = Fill::Solid,
+            ("fill-opacity", value) if parsed(value) == Some(0.0) => group.is_filled = false,
+            ("opacity", value) if parsed(value) == Some(0.0) => group.is_hidden = true,
             ("display", "none") => group.is_hidden = true,
             ("visibility", _) => group.is_hidden = value != "visible",
             _ => {}

@@ -232,8 +232,10 @@ fn layers_of_cli_begin_where_the_last_one_ends() {
     // In units of 10 um.
     assert_eq!(of(&[("5", true), ("10", true), ("20", true)]), [0.0, 50.0, 100.0, 200.0]);
     assert_eq!(of(&[("5", false), ("10", true)]), [0.0, 50.0, 100.0]);
-    // A first layer of another thickness.
+    // A first layer of another thickness, also where twice is not exact.
     assert_eq!(of(&[("10", true), ("15", true)]), [0.0, 100.0, 150.0]);
+    assert_eq!(of(&[("0.2", true), ("0.3", true)]), [0.0, 2.0, 3.0]);
+    assert_eq!(of(&[("0.04", true), ("0.06", true)]), [0.0, 0.4, 0.6]);
     // Above the platform: the first layer is as thick as the next one.
     assert_eq!(of(&[("100", true), ("105", true)]), [950.0, 1000.0, 1050.0]);
     // A zero layer, as in the specification.
@@ -544,7 +546,7 @@ fn paths_of_gdsii_have_width_and_ends() {
         }
     }
     assert!(message(&path(3, 4000)).contains("type of path"));
-    assert!(message(&path(0, 0)).contains("no facets"));
+    assert!(message(&path(0, 0)).contains("no polygon to slice"));
 }
 
 #[test]
@@ -633,4 +635,124 @@ fn blocks_and_open_lines_of_dxf() {
     for end in (0..whole.len() - 5).step_by(7).skip(3) {
         message(&whole.as_bytes()[..end]);
     }
+}
+
+/// A bow whose lobes meet in a corner or on a side, and a square with a hole by way of a cut, each beside
+/// a rectangle that overlaps it.
+#[test]
+fn polygons_that_touch_themselves_unite_with_others() {
+    let rectangle = [[12.0, 5.0], [30.0, 5.0], [30.0, 15.0], [12.0, 15.0]];
+    let bow = [[0.0, 0.0], [10.0, 10.0], [20.0, 20.0], [20.0, 2.0], [10.0, 10.0], [0.0, 20.0]];
+    let on_side = [[0.0, 0.0], [20.0, 20.0], [20.0, 2.0], [10.0, 10.0], [0.0, 20.0]];
+    let keyhole = [
+        [0.0, 0.0],
+        [20.0, 0.0],
+        [20.0, 20.0],
+        [0.0, 20.0],
+        [0.0, 10.0],
+        [5.0, 10.0],
+        [5.0, 15.0],
+        [15.0, 15.0],
+        [15.0, 5.0],
+        [5.0, 5.0],
+        [5.0, 10.0],
+        [0.0, 10.0],
+    ];
+    // Off the grid, so that no center is on a side.
+    let (corner, size) = ([-1.03, 21.0637], [660, 460]);
+    let grid = GridRule::At { origin_mm: corner, pixels: size };
+    for ring in [&bow[..], &on_side, &keyhole] {
+        let expected =
+            drawn(size, corner, 0.05, |at| winding(at, ring) != 0 || winding(at, &rectangle) != 0);
+        let path = |ring: &[[f64; 2]]| {
+            let corners = ring.iter().map(|[x, y]| format!("{x},{} ", 40.0 - y));
+            format!("<polygon points='{}'/>", corners.collect::<String>())
+        };
+        let svg = format!(
+            "<svg width='40mm' height='40mm' viewBox='0 0 40 40'>{}{}</svg>",
+            path(ring),
+            path(&rectangle)
+        );
+        let nm = |ring: &[[f64; 2]]| -> Vec<[i32; 2]> {
+            ring.iter().map(|corner| corner.map(|c| (c * 1e6) as i32)).collect()
+        };
+        let gds = Gds::start().cell("TOP").boundary(1, &nm(ring)).boundary(1, &nm(&rectangle));
+        let gds = gds.end_cell().end();
+        let polyline = |ring: &[[f64; 2]]| {
+            let corners = ring.iter().chain(ring.first());
+            let corners: String =
+                corners.map(|[x, y]| format!(",{},{}", x * 100.0, y * 100.0)).collect();
+            format!("$$POLYLINE/1,1,{}{corners}\n", ring.len() + 1)
+        };
+        let cli = cli(&format!("$$LAYER/10\n{}{}", polyline(ring), polyline(&rectangle)));
+        // The specification of CLI has no polygons that meet their sides.
+        let files = if ring == on_side {
+            vec![svg.into_bytes(), gds]
+        } else {
+            vec![svg.into_bytes(), gds, cli]
+        };
+        for bytes in files {
+            let part = open(&bytes).unwrap();
+            let pitch = Pitch::of_dpi(508.0).unwrap();
+            assert!(masks(part, grid, pitch) == [expected.clone()], "{ring:?}");
+        }
+    }
+}
+
+#[test]
+fn contents_that_a_drawing_hides_are_left_out() {
+    let square = |at: i32, more: &str| {
+        let [low, high] = [at, at + 1];
+        format!(
+            "0\nLWPOLYLINE\n{more}70\n1\n10\n{low}\n20\n0\n10\n{high}\n20\n0\n10\n{high}\n20\n1\n10\n{low}\n20\n1\n"
+        )
+    };
+    let dxf = format!(
+        "0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n0\nLAYER\n2\noff\n70\n0\n62\n-7\n0\nLAYER\n2\nfrozen\n70\n1\n62\n7\n0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n{}{}{}{}0\nENDSEC\n0\nEOF\n",
+        square(0, "8\nshown\n"),
+        square(2, "8\noff\n"),
+        square(4, "8\nfrozen\n"),
+        square(6, "8\nshown\n67\n1\n"),
+    );
+    let found = area_mm2(&dxf, 508.0);
+    assert!((found - 1.0).abs() < 0.05, "{found}");
+    let notes: Vec<String> =
+        open(dxf.as_bytes()).unwrap().notes().iter().map(ReadNote::to_string).collect();
+    assert!(notes[1].starts_with("3 entities on paper or on layers that are off"), "{notes:?}");
+    let svg = |body: &str| {
+        format!(
+            "<svg width='40mm' height='40mm' viewBox='0 0 40 40'><rect width='3' height='2'/>{body}</svg>"
+        )
+    };
+    for hidden in ["opacity='0'", "fill-opacity='0'", "style='opacity: 0'"] {
+        let found = area_mm2(&svg(&format!("<rect x='9' width='9' height='9' {hidden}/>")), 508.0);
+        assert!((found - 6.0).abs() < 0.1, "{hidden}: {found}");
+    }
+    let classed =
+        svg("<defs><style>.a{fill:none}</style></defs><rect class='a' width='9' height='9'/>");
+    assert!(message(classed.as_bytes()).contains("style sheet"), "{}", message(classed.as_bytes()));
+    let nothing = "<svg width='9mm' height='9mm' viewBox='0 0 9 9'><text>a</text></svg>";
+    let said = message(nothing.as_bytes());
+    assert!(said.contains("has no polygon to slice; 1 text or picture is left out"), "{said}");
+}
+
+#[test]
+fn lines_of_a_drawing_meet_though_their_heights_are_rounded() {
+    let line = |[a, b, z]: [f64; 3], [c, d]: [f64; 2]| {
+        format!("0\nLINE\n8\n0\n10\n{a}\n20\n{b}\n30\n{z}\n11\n{c}\n21\n{d}\n31\n{z}\n")
+    };
+    let triangle = line([0.0, 0.0, 0.0], [4.0, 0.0])
+        + &line([4.0, 0.0, 1e-12], [0.0, 3.0])
+        + &line([0.0, 3.0, -1e-12], [0.0, 0.0]);
+    let dxf = format!("0\nSECTION\n2\nENTITIES\n{triangle}0\nENDSEC\n0\nEOF\n");
+    let found = area_mm2(&dxf, 508.0);
+    assert!((found - 6.0).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn two_cells_of_one_name_are_refused() {
+    let square = [[0, 0], [1000, 0], [1000, 1000], [0, 1000]];
+    let twice = Gds::start().cell("A").boundary(1, &square).end_cell();
+    let twice = twice.cell("A").boundary(1, &square).end_cell().end();
+    assert!(message(&twice).contains("A twice"), "{}", message(&twice));
 }
