@@ -57,6 +57,9 @@ fn move_to(layer: &mut Layer, frame: Frame) {
     layer.image = layer.image.framed(frame).into();
 }
 
+/// Layers on a panel, and the number of those whose own moves were replaced.
+type OnPanel<L> = (L, Rc<Cell<u64>>);
+
 /// A stack that moves to a machine's panel.
 struct Moving {
     machine: Machine,
@@ -82,7 +85,7 @@ pub fn on_panel<E, I>(
     layers: I,
     machine: Machine,
     word: &str,
-) -> Result<(impl Iterator<Item = Result<Layer, E>> + use<E, I>, Rc<Cell<u64>>), Error>
+) -> Result<OnPanel<impl Iterator<Item = Result<Layer, E>> + use<E, I>>, Error>
 where
     E: From<Error> + From<MachineLimit>,
     I: Iterator<Item = Result<Layer, E>>,

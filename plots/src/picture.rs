@@ -199,9 +199,10 @@ impl<'a> Picture<'a> {
         let [width, height] = scale.size(&region, aspect).map(|side| side as u32);
         let [up, down] = scale.factors();
         let side = NonZeroU32::new(down).expect("scales are not zero");
-        let bands = || RowScale::new(region.rows.clone(), scale, aspect).bands();
+        let PictureRegion { columns, rows } = region;
+        let bands = || RowScale::new(rows.clone(), scale, aspect).bands();
         let means = bands().map(|(band, _)| band);
-        let means = mean_levels_of_bands(image, region.columns.clone(), means, side);
+        let means = mean_levels_of_bands(image, columns, means, side);
         let rows = means.zip(bands()).flat_map(move |(row, (_, times))| {
             let wide: Vec<u8> =
                 row.iter().flat_map(|&level| std::iter::repeat_n(level, up as usize)).collect();

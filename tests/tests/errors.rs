@@ -157,14 +157,14 @@ fn a_part_that_cannot_be_sliced_is_named_with_what_is_wrong() {
         ("missing.stl", &["No such file"][..]),
         ("folder", &["not a file"]),
         ("empty.stl", &["empty"]),
-        ("text.stl", &["a text file, not an STL"]),
+        ("text.stl", &["a text file, neither an STL"]),
         ("truncated.stl", &["cut off after facet 20", "export it again"]),
         ("lying.stl", &["declares 4294967295 facets", "export it again"]),
         ("modest.stl", &["declares 10 facets", "bytes follow"]),
         ("none.stl", &["no facets"]),
         ("nan.stl", &["facet 5 ", "not a finite number"]),
         ("ascii.stl", &["facet 0 ", "export the part again"]),
-        ("cube.tif", &["a TIFF file, not an STL"]),
+        ("cube.tif", &["a TIFF file, neither an STL"]),
     ] {
         let place = format!("{name}: ");
         let words = [&[place.as_str()], words].concat();

@@ -22,7 +22,7 @@ const MISTAKES: &[(&str, Option<&str>)] = &[
     ("slice part.stl --machne alpha", Some("--machine")),
     ("slice part.stl --antialiasing", Some("--antialias")),
     ("slice part.stl --ouput x.tif", Some("--output")),
-    ("slice part.stl --dip 300", Some("--dpi")),
+    ("slice part.stl --dip 300", None),
     ("fix part.tif --metod spline", None),
     ("tile part.tif --copie 3", Some("--copies")),
     ("lamp show part.tif --layr 3", Some("--layer")),

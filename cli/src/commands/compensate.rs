@@ -61,5 +61,7 @@ pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     compensating.lines(&name).iter().for_each(|line| progress.say(line));
     let Some(path) = report.path() else { return Ok(()) };
     let (walls, layers) = compensating.report();
-    JsonReport::new(&walls.head(layers)).list("walls", walls.listed()).write(path)
+    JsonReport::of_schema("lamp-compensate-1", &walls.head(layers))
+        .list("walls", walls.listed())
+        .write(path)
 }

@@ -97,7 +97,7 @@ pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
         evidence.finish()?;
     }
     if let Some(path) = args.report.path() {
-        let report = JsonReport::new(&findings.head(layer_count));
+        let report = JsonReport::of_schema("lamp-fix-1", &findings.head(layer_count));
         report.list("bands", findings.bands()).write(path)?;
     }
     if let Some(line) = findings.text_of_corrected() {

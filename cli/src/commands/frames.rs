@@ -113,7 +113,7 @@ pub(crate) fn run(args: &FramesArgs, common: &Common) -> Result<(), Exit> {
     };
     if !is_stream(&args.output) {
         write_file(&args.output, write)?;
-        progress.wrote(&args.output, &[number_of(header.frames.into(), "frame")]);
+        progress.wrote(&args.output, &[number_of(header.frames, "frame")]);
         return Ok(());
     }
     let mut write = write;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::anyhow;
 use clap::Args;
 use lamp_build::is_fields;
 use lamp_stack::{
@@ -76,9 +77,11 @@ fn describe(input: &InputArgs, args: &InfoArgs) -> Result<(), Exit> {
             in_range(pages.headers(), header_info, input.stack.clone(), input.layers.clone());
         Facts::sum(headers.map(|page| Ok((with_stack(page?), None))))?
     };
-    let Some(facts) = facts else { return Ok(()) };
+    let name = || input_name(&input.stack);
+    let facts =
+        facts.ok_or_else(|| Exit::Failed(anyhow!("{}: there is no layer in it", name())))?;
     if args.json {
-        return print_answer("lamp-info-1", &facts.json());
+        return print_answer("lamp-info-1", &facts.json(&name()));
     }
     // The first page has named the part of standard input.
     print(&facts.text(&input_name(&input.stack)))
@@ -131,14 +134,15 @@ impl Facts {
         Ok(facts)
     }
 
-    fn json(&self) -> impl Serialize {
+    fn json<'a>(&'a self, input: &'a str) -> impl Serialize + 'a {
         #[derive(Serialize)]
         struct Info<'a> {
+            input: &'a str,
             #[serde(flatten)]
             stack: StackFacts<'a>,
             transitions: Option<u64>,
         }
-        Info { stack: StackFacts::new(&self.totals), transitions: self.runs }
+        Info { input, stack: StackFacts::new(&self.totals), transitions: self.runs }
     }
 
     fn text(&self, name: &str) -> String {

@@ -11,6 +11,13 @@ use crate::exit::Exit;
 use crate::output::endings::parse_report;
 use crate::streams::{is_stream, print, write_file};
 
+#[derive(Serialize)]
+struct Answer<'a, T> {
+    schema: &'a str,
+    #[serde(flatten)]
+    fields: &'a T,
+}
+
 /// Prints a command's answer as one line: an object with the name of its schema, then `fields`.
 /// docs/json.md describes each schema; keys may be added to one, but not change.
 pub(crate) fn print_answer(schema: &str, fields: &impl Serialize) -> Result<(), Exit> {
@@ -19,12 +26,6 @@ pub(crate) fn print_answer(schema: &str, fields: &impl Serialize) -> Result<(), 
 
 /// Writes a command's answer, as [`print_answer`] does, to a file, or prints it if `path` is `-`.
 pub(crate) fn write_answer(schema: &str, fields: &impl Serialize, path: &Path) -> Result<(), Exit> {
-    #[derive(Serialize)]
-    struct Answer<'a, T> {
-        schema: &'a str,
-        #[serde(flatten)]
-        fields: &'a T,
-    }
     let line = json(&Answer { schema, fields }) + "\n";
     if is_stream(path) {
         print(&line)
@@ -78,6 +79,11 @@ impl JsonReport {
         // Lists follow before the closing brace.
         text.pop();
         Self(text)
+    }
+
+    /// Starts a report with the name of its schema, and then the fields of `head`.
+    pub(crate) fn of_schema(schema: &str, head: &impl Serialize) -> Self {
+        Self::new(&Answer { schema, fields: head })
     }
 
     /// Adds a list.

@@ -64,7 +64,7 @@ impl MeshReport<'_> {
     /// Writes the report.
     pub(crate) fn write(&self, trace: &Trace, rows: RowPositions, path: &Path) -> Result<(), Exit> {
         let bands = trace.bands.iter().map(|band| band_line(band, rows));
-        JsonReport::new(self)
+        JsonReport::of_schema("lamp-slice-report-1", self)
             .list("edges", trace.edges.iter().enumerate().map(edge_line))
             .list("bands", bands)
             .write(path)

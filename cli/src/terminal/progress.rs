@@ -244,7 +244,7 @@ pub(crate) fn say(line: &str) {
 fn bytes_of(path: &Path) -> Option<u64> {
     let metadata = path.metadata().ok()?;
     if !metadata.is_dir() {
-        return metadata.is_file().then(|| metadata.len());
+        return metadata.is_file().then_some(metadata.len());
     }
     let files = path.read_dir().ok()?.map(|entry| Some(entry.ok()?.metadata().ok()?.len()));
     files.sum()

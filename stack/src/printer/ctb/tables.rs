@@ -397,7 +397,8 @@ impl Places {
 
 /// Returns as much of a printer's name as a file takes.
 fn name_of(printer: &str) -> &[u8] {
-    let end = printer.floor_char_boundary(MOST_NAME as usize);
+    let most = printer.len().min(MOST_NAME as usize);
+    let end = (0..=most).rev().find(|end| printer.is_char_boundary(*end)).unwrap_or(0);
     &printer.as_bytes()[..end]
 }
 
