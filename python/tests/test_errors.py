@@ -39,7 +39,7 @@ def test_sentences_are_those_of_the_program(tmp_path, stack, program):
         answer = program(*command)
         assert answer.returncode != 0
         # The program may add a hint that names options.
-        said = re.sub(r"^[a-z]+: ", "", answer.stderr.strip().splitlines()[-1])
+        said = re.sub(r"^error: [a-z]+: ", "", answer.stderr.strip().splitlines()[-1])
         assert said.startswith(str(caught.value)), (said, str(caught.value))
 
 
