@@ -125,7 +125,7 @@ fn each_command_that_writes_prints_one_line_of_it() {
         (
             format!("{slice} | fix | tile --area 14x4in --mesh none > build.tif"),
             "build.tif",
-            &["76 layers", "1,400 x 400", "39 copies"],
+            &["76 layers", "1,400 x 400", "30 copies"],
         ),
         ("lamp convert part.tif -o pages/".to_owned(), "pages/", &["76 layers", "128 x 102"]),
         ("lamp pack part.tif -o part.lamp".to_owned(), "part.lamp", &["76 layers", "128 x 102"]),

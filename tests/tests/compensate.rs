@@ -383,7 +383,6 @@ fn what_cannot_be_done_is_said() {
         "--uniform 1mm --report in.tif",
         "--material mine.toml --dose 300mJ/cm2 --report mine.toml",
         "--material mine.toml --dose 300mJ/cm2 -o mine.toml",
-        "--uniform 1mm --report -",
     ] {
         let ran = scratch.run(&format!("lamp compensate in.tif {line} {to}"));
         assert_eq!(ran.statuses, [Some(2)], "{ran:?}");

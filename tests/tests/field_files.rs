@@ -247,7 +247,7 @@ fn an_ending_of_another_format_is_refused() {
     }
     // All others say nothing.
     fs::create_dir(scratch.path("here.png")).unwrap();
-    for name in ["x.part", "blade.v2", "plain", "x.TIFF", "x.tf8", "pages.ctb/", "here.png"] {
+    for name in ["x.part", "blade.v2", "plain", "x.TIFF", "x.tf8", "pages.cbddlp/", "here.png"] {
         scratch.run(&format!("fix box.tif -o {name}")).succeeds();
         assert!(scratch.path(name).exists(), "{name}");
     }

@@ -195,7 +195,7 @@ fn a_report_in_a_file_is_what_json_prints() {
         &format!("{slice} -o again.tif"),
         "fix tower.tif -o fixed.tif",
         "lamp compensate tower.tif --uniform 10um --min-feature 0um -o offset.tif",
-        "lamp support tower.tif --to platform -o held.tif",
+        "lamp support tower.tif --part tower.stl --to platform -o held.tif",
         "tile tower.tif --area 4x4in --mesh none -o build.tif",
         "tile tower.tif --area 4x4in --mesh none --time",
         "lamp check tower.tif",

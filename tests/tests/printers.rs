@@ -135,7 +135,14 @@ fn every_command_reads_and_writes_the_files() {
                 scratch.run(&format!("lamp convert {name} -q -o images.tif")).succeeds_quietly();
                 levels(&scratch.layers("images.tif"))
             });
-            assert!(a == b, "{line} {ending}");
+            // CTB has no lowest bit.
+            let kept: [u8; 256] = std::array::from_fn(|level| match (ending, level) {
+                ("ctb", 0 | 1) => 0,
+                ("ctb", level) => level as u8 | 1,
+                (_, level) => level as u8,
+            });
+            let kept = |image: &GrayMask| image.with_levels(&kept);
+            assert!(a == b.iter().map(kept).collect::<Vec<_>>(), "{line} {ending}");
         }
         for line in ["info", "check", "verify", "show", "report"] {
             let output = match line {
