@@ -58,14 +58,14 @@ fn every_command_reads_and_writes_packed_stacks() {
         "fix",
         "dither",
         "tile --copies 1",
-        "lamp compensate --width 100um",
+        "lamp compensate --uniform 100um",
         "lamp check --json",
         "lamp info --json",
         "lamp show --layer 40 --ascii",
         "lamp show --layer 75 --ascii",
         "lamp convert --layers 70..",
         "lamp mesh-out -o -",
-        "lamp report --no-pictures -o -",
+        "lamp report -o -",
     ] {
         let (name, options) = match line.strip_prefix("lamp ") {
             Some(line) => {
@@ -80,7 +80,8 @@ fn every_command_reads_and_writes_packed_stacks() {
         let of_tiff = scratch.run(&format!("{name} tower.tif {options} -q"));
         let of_packed = scratch.run(&format!("{name} tower.lamp {options} -q"));
         assert_eq!(of_packed.statuses, of_tiff.statuses, "{line}: {of_packed:?}");
-        if !line.contains("info") && !line.contains("report") {
+        // Answers have the names of their inputs.
+        if !line.contains("--json") && !line.contains("report") {
             assert!(of_packed.stdout == of_tiff.stdout, "{line}: {of_packed:?}");
         }
         let piped = scratch.run_on(&format!("{name} - {options} -q"), &packed);
