@@ -56,16 +56,16 @@ export function listenToKeys(app) {
  * @param {HTMLElement} canvas
  */
 function giveFocusBack(canvas) {
-  let byPointer = false;
-  document.addEventListener("pointerdown", () => (byPointer = true), true);
+  let byKeys = false;
+  document.addEventListener("mousedown", () => (byKeys = false), true);
   document.addEventListener("keydown", ({ key, target }) => {
-    byPointer = false;
+    byKeys = target instanceof HTMLSelectElement;
     if (!takesKeys(target)) return;
     // The form reads its field first, and a field that loses the focus reports its change.
     if (key === "Enter" || key === "Escape") setTimeout(() => canvas.focus());
   }, true);
   document.addEventListener("change", ({ target }) => {
-    if (target instanceof HTMLSelectElement && byPointer) canvas.focus();
+    if (target instanceof HTMLSelectElement && !byKeys) canvas.focus();
   });
 }
 
