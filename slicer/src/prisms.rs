@@ -398,7 +398,7 @@ fn cross(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> bool {
     parts(a, b) && parts(b, a)
 }
 
-/// Returns true if an end of one side lies within the other one.
+/// Returns true if an end of one side is within the other one.
 fn touch(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> bool {
     let coord = |[x, y]: [f64; 2]| Coord { x, y };
     let within = |line: &[[f64; 2]; 2], point: [f64; 2]| {

@@ -128,6 +128,7 @@ impl Pages {
         let bottom = match (of_first, next) {
             (Some(thickness), _) => first - thickness,
             (None, Some(next)) if is_empty && !is_near(first, next) => first,
+            // Differences of decimal numbers are rounded.
             (None, Some(next)) if first > 0.0 && first <= 2.001 * next => 0.0,
             (None, Some(next)) => first - next,
             (None, None) if first > 0.0 => 0.0,

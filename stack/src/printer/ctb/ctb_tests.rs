@@ -47,7 +47,7 @@ fn plates(record: &PrintRecord) -> Vec<Layer> {
         let gray = rle::is_gray(&code).unwrap();
         layer.image = rle::decode(&code, size, gray, 1 << 20).unwrap().into();
     }
-    // Steps of its own, which lift as far as they come back.
+    // Steps of its own, whose way back is their lift.
     let own = PrintStep { exposure_s: 1.2345, light: 7, ..record.normal };
     layers[4].info.set_record(&own);
     layers

@@ -240,7 +240,7 @@ impl Row {
         let mut fields = fields(bytes);
         let (top_mm, exposure_s, light_off_s) = (fields.f32(), fields.f32(), fields.f32());
         let (at, bytes, page) = (fields.u32(), fields.u32(), fields.u32());
-        // Addresses have 32 bits; a page is as much as they reach.
+        // Addresses have 32 bits; a page has 2^32 bytes.
         let at = u64::from(page) << 32 | u64::from(at);
         Self { top_mm, exposure_s, light_off_s, at, bytes }
     }
