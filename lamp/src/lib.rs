@@ -126,7 +126,7 @@
 //!
 //! // Settings are plain structs; equal texts mean equal results, whatever the spelling was.
 //! let slice: SliceSettings = Default::default();
-//! assert!(slice.canonical().starts_with(" --dpi 1500 --thickness 100um"));
+//! assert!(slice.canonical().starts_with(" --dpi 1500"));
 //! let fix = Stage::Fix(FixSettings { use_neighbours: true, ..FixSettings::default() });
 //! assert!(fix.canonical().ends_with("--use-neighbours"));
 //! ```
