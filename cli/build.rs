@@ -1,7 +1,10 @@
 //! Notes what `lamp --version` says of the build: its commit, target and features.
 
-use std::env;
+use std::ffi::OsStr;
+use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::process::Command;
+use std::{env, fs};
 
 fn main() {
     println!("cargo::rustc-env=LAMP_TARGET={}", env::var("TARGET").expect("cargo sets it"));
@@ -16,6 +19,33 @@ fn main() {
     let commit = commit.unwrap_or_else(|| "unknown".to_owned());
     println!("cargo::rustc-env=LAMP_COMMIT_OF_BUILD={commit}");
     compile_for_musl();
+    gather_pages();
+}
+
+/// Writes the pages of the book as a list of names and texts, for `lamp help`.
+fn gather_pages() {
+    // Where links cannot be made, `docs` is a file that names the folder.
+    let manifest = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
+    let folders = [manifest.join("docs"), manifest.join("../docs")];
+    let folder = folders.iter().find(|folder| folder.is_dir()).expect("the book is there");
+    println!("cargo::rerun-if-changed={}", folder.display());
+    let files = fs::read_dir(folder).expect("the book can be read");
+    let mut pages: Vec<_> = files.map(|file| file.expect("its pages can be read").path()).collect();
+    pages.sort();
+    let mut list = String::from("&[");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"));
+    for page in pages.iter().filter(|page| page.extension().is_some_and(|ending| ending == "md")) {
+        let name = page.file_stem().and_then(OsStr::to_str).expect("it has a name");
+        match name {
+            "SUMMARY" => {
+                fs::copy(page, out.join("SUMMARY.md")).expect("a file can be written");
+            }
+            // It shows another file.
+            "benchmarks" => {}
+            _ => writeln!(list, "({name:?}, include_str!({page:?})),").expect("text takes all"),
+        }
+    }
+    fs::write(out.join("pages.rs"), list + "]").expect("a file can be written");
 }
 
 /// Compiles what programs that are linked with musl need: its allocator and copies are slow.

@@ -34,7 +34,7 @@ use terminal::usage::refuse;
 
 /// Turn CAD parts into layer images for projection photopolymerization.
 #[derive(Parser)]
-#[command(name = "lamp", version, long_version = LONG_VERSION, propagate_version = true, max_term_width = 100, after_help = EXAMPLES)]
+#[command(name = "lamp", version, long_version = LONG_VERSION, propagate_version = true, max_term_width = 100, disable_help_subcommand = true, after_help = EXAMPLES)]
 struct Lamp {
     #[command(subcommand)]
     command: Command,

@@ -43,4 +43,4 @@ pub use mirrors::{MirrorArray, MirrorError};
 pub use motion::move_s;
 pub use source::{BuildPages, SwathLayout};
 pub use tilt::TiltedMirrors;
-pub use time::{BuildClock, BuildTime, FieldTime, SwathTime};
+pub use time::{BuildClock, BuildTime, FieldTime, GivenTimes, SwathTime};

@@ -2,7 +2,7 @@
 
 use lamp_build::{FieldForm, FieldsError, Seam, Swaths, SwathsError};
 use lamp_machine::Machine;
-use lamp_stack::{Dpi, Image, PageInfo, Pitch};
+use lamp_stack::{Dpi, Image, PageInfo, Pitch, PrintRecord, PrintStep, StackInfo};
 
 use crate::clock::RowClock;
 use crate::error::GantryError;
@@ -19,6 +19,9 @@ pub struct BuildTime {
     pub exposure_s: Option<f64>,
     /// The time for recoating in seconds, if the machine's is known.
     pub recoating_s: Option<f64>,
+    /// The lifts, retractions and waits of a printer with a panel in seconds, if it states them for
+    /// each layer.
+    pub lifts_s: Option<f64>,
     /// The swaths of a projector that scans.
     pub swaths: Option<SwathTime>,
     /// The fields of a projector that steps.
@@ -61,31 +64,63 @@ impl FieldTime {
 }
 
 impl BuildTime {
-    /// Returns the time of the build in seconds, if the time of its light is known. Swaths take
-    /// their own time: the exposure of a place passes while a swath goes over it. Recoating counts
-    /// if it is known.
-    pub fn sum_s(&self) -> Option<f64> {
+    /// Returns the time of the build's light in seconds, if it is known. Swaths take their own time:
+    /// the exposure of a place passes while a swath goes over it.
+    fn light_s(&self) -> Option<f64> {
         if self.unscanned.is_some() {
             return None;
         }
-        let light_s = match (self.fields, self.swaths) {
+        match (self.fields, self.swaths) {
             (Some(fields), _) => fields.seconds(),
             (None, Some(swaths)) => Some(swaths.seconds),
             (None, None) => self.exposure_s,
-        };
-        Some(light_s? + self.recoating_s.unwrap_or(0.0))
+        }
     }
+
+    /// Returns the time of the build in seconds, if the time of its light is known. Recoating and
+    /// lifts count if they are known.
+    pub fn sum_s(&self) -> Option<f64> {
+        self.light_s().map(|_| self.least_s())
+    }
+
+    /// Returns the time that the build takes at least, in seconds: the sum of all that is known.
+    pub fn least_s(&self) -> f64 {
+        let between_s = self.recoating_s.unwrap_or(0.0) + self.lifts_s.unwrap_or(0.0);
+        self.light_s().unwrap_or(0.0) + between_s
+    }
+
+    /// Returns whether nothing is missing of the time: light, the way between layers, and between the
+    /// fields of a layer.
+    pub fn is_whole(&self) -> bool {
+        let is_between_known = self.recoating_s.is_some() || self.lifts_s.is_some();
+        let has_steps = self.fields.is_none_or(|fields| fields.steps_s.is_some());
+        self.light_s().is_some() && is_between_known && has_steps
+    }
+}
+
+/// Times that are given in place of a machine's and a stack's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GivenTimes {
+    /// The exposure of each layer in seconds, in place of its own.
+    pub expose_s: Option<f64>,
+    /// The seconds from the end of a layer's exposure to the start of the next one's.
+    pub recoat_s: Option<f64>,
 }
 
 /// Adds up the time of a build on a machine, layer by layer.
 ///
-/// A layer is recoated once. On a machine with `[scan]`, its swaths take the times that
+/// A layer is recoated once. A printer with a panel lifts and comes back instead, as its stack's record
+/// or the machine states. On a machine with `[scan]`, its swaths take the times that
 /// [`Job::plan`](crate::Job::plan) finds, with a comb. On a machine with `[strips]` and a swath speed v,
 /// it is exposed in n swaths of the images' height L, which take n L / v and n - 1 steps. Where a
 /// layer is cut into fields, its n fields that hold white take n exposures and n - 1 steps.
 #[derive(Debug)]
 pub struct BuildClock {
     machine: Option<Machine>,
+    given: GivenTimes,
+    /// How a printer with a panel exposes: the machine, or the stack by its first page.
+    print: Option<PrintRecord>,
+    lifts_s: Option<f64>,
     mirrors: Option<MirrorArray>,
     layers: u64,
     exposure_ms: Option<f64>,
@@ -115,6 +150,9 @@ impl BuildClock {
     pub fn new(machine: Option<&Machine>, mirrors: Option<MirrorArray>) -> Self {
         Self {
             machine: machine.cloned(),
+            given: GivenTimes::default(),
+            print: machine.and_then(Machine::print_record),
+            lifts_s: Some(0.0),
             mirrors,
             layers: 0,
             exposure_ms: Some(0.0),
@@ -136,6 +174,12 @@ impl BuildClock {
         Self { form: Some(form), ..self }
     }
 
+    /// Counts such times, in place of the machine's and the layers' own.
+    #[must_use]
+    pub fn with_times(self, given: GivenTimes) -> Self {
+        Self { given, ..self }
+    }
+
     /// Returns whether the images of layers decide the time, and not their size alone.
     pub fn needs_images(&self) -> bool {
         self.form.is_some() || self.mirrors.is_some()
@@ -145,8 +189,19 @@ impl BuildClock {
     /// [needed](Self::needs_images).
     pub fn add(&mut self, info: &PageInfo, pitch: Option<Pitch>, size: [u32; 2], image: &Image) {
         let times = self.machine.as_ref().and_then(|machine| machine.times.as_ref());
-        let usual_ms = times.and_then(|times| times.expose_s).map(|seconds| seconds * 1000.0);
-        let exposure_ms = info.exposure_ms.or(usual_ms);
+        let usual_s = times.and_then(|times| times.expose_s);
+        if self.layers == 0 && self.print.is_none() {
+            self.print = info.stack.as_ref().and_then(StackInfo::print_record);
+        }
+        let of_layer =
+            |print: &PrintRecord| print.step(u32::try_from(self.layers).unwrap_or(u32::MAX));
+        let step = info.record::<PrintStep>().or_else(|| self.print.as_ref().map(of_layer));
+        let lift_s = step.filter(PrintStep::moves).map(|step| step.time_s() - step.exposure_s);
+        self.lifts_s = self.lifts_s.zip(lift_s).map(|(sum, seconds)| sum + seconds);
+        let usual_s = usual_s.or(step.map(|step| step.exposure_s));
+        let given_ms = self.given.expose_s.map(|seconds| seconds * 1000.0);
+        let usual_ms = usual_s.map(|seconds| seconds * 1000.0);
+        let exposure_ms = given_ms.or(info.exposure_ms).or(usual_ms);
         self.layers += 1;
         self.exposure_ms = self.exposure_ms.zip(exposure_ms).map(|(sum, ms)| sum + ms);
         if let Some(form) = self.form {
@@ -208,14 +263,14 @@ impl BuildClock {
             .planner
             .get_or_insert_with(|| Planner::new(scan, layout, dpi.pitch(), mirrors.size()[1]));
         let mut layer = planner.layer(info, exposure_ms, clock, &white);
-        layer.recoat_s = machine.recoat_s();
+        layer.recoat_s = self.given.recoat_s.or(machine.recoat_s());
         self.sums.add(&layer, count.into());
         Ok(())
     }
 
     /// Returns the time of the layers so far.
     pub fn time(&self) -> BuildTime {
-        let recoat_s = self.machine.as_ref().and_then(Machine::recoat_s);
+        let recoat_s = self.given.recoat_s.or(self.machine.as_ref().and_then(Machine::recoat_s));
         let recoating_s = recoat_s.map(|seconds| seconds * self.layers as f64);
         let scanned = || {
             let JobSums { layers, swaths, empty_swaths, scan_s, steps_s, between_s, .. } =
@@ -234,6 +289,8 @@ impl BuildClock {
             layers: self.layers,
             exposure_s: self.exposure_ms.map(|ms| ms / 1000.0),
             recoating_s,
+            // What is given stands in for them.
+            lifts_s: self.lifts_s.filter(|_| self.layers > 0 && recoat_s.is_none()),
             swaths: if self.mirrors.is_some() && self.form.is_none() {
                 scanned()
             } else {
@@ -308,15 +365,10 @@ mod tests {
     fn time(more: &str, exposures_ms: &[Option<f64>]) -> BuildTime {
         let machine = machine(more).unwrap();
         let mirrors = machine.scan.as_ref().map(|scan| MirrorArray::of(scan, None).unwrap());
-        time_on(Some(&machine), mirrors, exposures_ms)
+        time_by(BuildClock::new(Some(&machine), mirrors), exposures_ms)
     }
 
-    fn time_on(
-        machine: Option<&Machine>,
-        mirrors: Option<MirrorArray>,
-        exposures_ms: &[Option<f64>],
-    ) -> BuildTime {
-        let mut clock = BuildClock::new(machine, mirrors);
+    fn time_by(mut clock: BuildClock, exposures_ms: &[Option<f64>]) -> BuildTime {
         // White is a square of 100 pixels on the left, in rows 50 to 149.
         let mut image = MaskBuilder::new(1000);
         image.push_black(50);
@@ -355,8 +407,43 @@ mod tests {
         let both = time(&format!("{blade}{times}"), &exposures);
         assert_eq!((both.exposure_s, both.recoating_s), (Some(2.25), Some(15.0)));
         assert_eq!(both.sum_s(), Some(17.25));
-        let none = time_on(None, None, &exposures);
+        let none = time_by(BuildClock::new(None, None), &exposures);
         assert_eq!((none.exposure_s, none.recoating_s, none.swaths), (None, None, None));
+    }
+
+    #[test]
+    fn printers_with_a_panel_lift_and_come_back_in_place_of_recoating() {
+        let panel = "[panel]\npixels = [1000, 400]\npitch_um = [50, 50]\nfirst_layers = 1\nsource = \"-\"\n";
+        let moves = "lift_mm = [6, 0]\nlift_mm_per_min = [60, 0]\nretract_mm_per_min = [120, 0]\n";
+        let step = |name: &str, exposure_s: f64| {
+            format!(
+                "[panel.{name}]\nexposure_s = {exposure_s}\nwait_before_s = 0.5\n{moves}source = \"-\"\n"
+            )
+        };
+        let text = format!("{panel}{}{}", step("first", 30.0), step("normal", 2.0));
+        // Up 6 mm at 1 mm/s, down at 2 mm/s, and the wait. A layer's own exposure goes first.
+        let both = time(&text, &[None, None, Some(1500.0)]);
+        assert_eq!((both.exposure_s, both.lifts_s), (Some(33.5), Some(3.0 * 9.5)));
+        assert_eq!((both.sum_s(), both.is_whole()), (Some(62.0), true));
+
+        let still = text.replace(moves, "");
+        let part = time(&still, &[None]);
+        assert_eq!((part.lifts_s, part.sum_s(), part.is_whole()), (None, Some(30.0), false));
+    }
+
+    #[test]
+    fn given_times_stand_in_for_all_others() {
+        let times = "[times]\nrecoat_s = 7.5\nexpose_s = 2\nsource = \"-\"\n";
+        let given = GivenTimes { expose_s: Some(4.0), recoat_s: Some(1.0) };
+        let clock = BuildClock::new(None, None).with_times(given);
+        let both = time_by(clock, &[Some(100.0), None]);
+        assert_eq!(
+            (both.exposure_s, both.recoating_s, both.least_s()),
+            (Some(8.0), Some(2.0), 10.0)
+        );
+        let unlit = time("[times]\nrecoat_s = 7.5\nsource = \"-\"\n", &[None]);
+        assert_eq!((unlit.sum_s(), unlit.least_s(), unlit.is_whole()), (None, 7.5, false));
+        assert!(time(times, &[None]).is_whole());
     }
 
     #[test]

@@ -15,9 +15,9 @@ from lamp_slicer import _native
 # Options that name files beside the stack, print, or choose layers of an input: Python has other
 # ways, or leaves them to the program.
 OF_COMMANDS = {
-    "classic", "evidence", "fields", "force", "help", "json", "layers", "layout-out",
+    "classic", "evidence", "expose", "fields", "force", "help", "json", "layers", "layout-out",
     "layout-picture", "memory", "mirrors", "no-config", "no-sync", "options", "output", "overlap", "packbits",
-    "quiet", "recipe", "report", "seam", "strict", "strips", "threads", "time", "timeout", "verbose",
+    "quiet", "recipe", "recoat", "report", "seam", "strict", "strips", "threads", "time", "timeout", "verbose",
     "version",
 }
 

@@ -163,9 +163,24 @@ fn the_time_is_told_in_words_with_what_is_missing() {
     assert_eq!(text, expected);
     let text = told(&format!("{line} --time"));
     assert!(text.starts_with("build time: not known, 50 layers\n"), "{text}");
-    for words in ["expose_s", "recoat_s", "lamp machine show beta"] {
+    for words in ["--expose", "expose_s", "--recoat", "recoat_s", "lamp machine show beta"] {
         assert!(text.contains(words), "{text}");
     }
+    let text = told(&format!("{line} --time --recoat 9s"));
+    assert!(
+        text.starts_with("build time: at least 7.50min, 50 layers\nrecoating:  7.50min\n"),
+        "{text}"
+    );
+    let text = told(&format!("{line} --time --recoat 9s --expose 1.5s"));
+    assert_eq!(text, "build time: 8.75min, 50 layers\nexposure:   75s\nrecoating:  7.5min\n");
+    scratch.run(&format!("{line} --recoat 9s -o b.tif")).is_wrong_usage(&["--recoat", "--time"]);
+    // The page and its numbers take the same options.
+    let told = told("lamp report box.tif --recoat 9s --expose 1.5s --json");
+    let told: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(
+        (&told["stacks"][0]["build_s"], &told["stacks"][0]["least_s"]),
+        (&json!(525.0), &json!(525.0))
+    );
     assert_eq!(scratch.names(), ["box.tif", "mine.toml"]);
     // Standard output is the build's.
     let line = format!("{line} --machine mine.toml");

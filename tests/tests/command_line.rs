@@ -1,5 +1,6 @@
 //! Checks completions, manual pages, versions and the help of all commands.
 
+use std::fs;
 use std::process::Command;
 
 use lamp_fixtures::Sample;
@@ -85,6 +86,48 @@ fn the_help_of_lamp_fits_a_screen() {
         let text = help(line);
         assert!(text.lines().count() <= 24 && text.lines().all(|line| line.len() <= 80), "{text}");
     }
+}
+
+#[test]
+fn topics_are_pages_of_the_book_or_commands() {
+    let topics = help("lamp help topics");
+    let book = fs::read_to_string("../docs/SUMMARY.md").unwrap();
+    let pages = book.matches(".md)").count();
+    // Each page but the benchmarks, which are of the checkout.
+    assert_eq!(topics.lines().filter(|line| line.starts_with("  ")).count(), pages - 1, "{topics}");
+    let page = help("lamp help PRINTERS");
+    assert!(
+        page.starts_with("Printers with a panel\n\n") && page.contains("See also: lamp help"),
+        "{page}"
+    );
+    assert!(help("lamp help tile").ends_with("\nlamp tile --help lists its options.\n"));
+    assert_eq!(help("lamp help plan voxels"), help("lamp plan voxels --help"));
+    let scratch = Scratch::new();
+    scratch.run("lamp help printer").is_wrong_usage(&["did you mean printers?"]);
+    scratch.run("lamp help by example").is_wrong_usage(&["lamp help machines"]);
+    scratch.run("lamp help zz").is_wrong_usage(&["lamp help topics"]);
+}
+
+#[test]
+fn a_new_machine_is_found_by_its_name() {
+    let scratch = Scratch::new();
+    let home = scratch.path("home");
+    let run = |line: &str| scratch.command(line).env("XDG_CONFIG_HOME", &home).output().unwrap();
+    let made =
+        run("lamp machine new mine --area 100x60mm --dpi 14x19um --recoat 9s --expose 1500ms");
+    assert!(made.status.success(), "{made:?}");
+    assert!(home.join("lamp/machines/mine.toml").is_file());
+    let shown = run("lamp machine show mine --json");
+    let shown: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!(shown["machines"][0]["area_mm"], serde_json::json!([100.0, 60.0]), "{shown}");
+    let again = run("lamp machine new mine --area 10x10mm");
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--force"), "{again:?}");
+    assert!(run("lamp machine new mine --area 10x10mm --force").status.success());
+
+    scratch.run("lamp machine new mine -o mine.toml").is_wrong_usage(&["--area"]);
+    scratch.run("lamp machine new beta --area 9x9mm -o b.toml").is_wrong_usage(&["built-in"]);
+    scratch.run("lamp machine new Mine! --area 9x9mm -o b.toml").is_wrong_usage(&["name"]);
+    assert_eq!(scratch.names(), ["home"]);
 }
 
 #[test]

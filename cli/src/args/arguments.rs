@@ -32,7 +32,7 @@ pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Ex
     let common = Common::from_arg_matches(of_command).expect("every command has these options");
     // Some report faults of these files themselves, and shells start with the others.
     let works_without =
-        ["config", "doctor", "completions", "man"].iter().any(|name| path == [*name]);
+        ["config", "doctor", "completions", "man", "help"].iter().any(|name| path == [*name]);
     if !works_without {
         arguments.fill_in_all(common.file().map(PathBuf::as_path), !common.ignores_config())?;
     }

@@ -9,7 +9,9 @@ use std::thread;
 use anyhow::anyhow;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use lamp_gantry::GivenTimes;
 use lamp_grayscale::resin::Intensity;
+use lamp_pipeline::heights::Seconds;
 use lamp_pipeline::memory::{in_words, within_limits};
 use lamp_stack::{Length, LengthError, Named, skip_sync};
 
@@ -17,6 +19,35 @@ use crate::exit::Exit;
 
 /// The heading of options that every command has.
 pub(crate) const GENERAL: &str = "General options";
+
+/// Known times of a build, in place of a machine's and a stack's own.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct TimeArgs {
+    /// Count this exposure for each layer, such as 1.5s, in place of its own
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    expose: Option<Seconds>,
+
+    /// Count this time from a layer's exposure to the next one's, such as 9s, in place of the
+    /// machine's
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    recoat: Option<Seconds>,
+}
+
+impl TimeArgs {
+    /// Returns the names of those options that are given.
+    pub(crate) fn given(&self) -> impl Iterator<Item = &'static str> {
+        [("--expose", self.expose), ("--recoat", self.recoat)]
+            .into_iter()
+            .filter_map(|(name, time)| time.map(|_| name))
+    }
+}
+
+impl From<TimeArgs> for GivenTimes {
+    fn from(args: TimeArgs) -> Self {
+        let seconds = |time: Option<Seconds>| time.map(|Seconds(seconds)| seconds);
+        Self { expose_s: seconds(args.expose), recoat_s: seconds(args.recoat) }
+    }
+}
 
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
@@ -240,6 +271,15 @@ pub(crate) fn parse_distance(text: &str) -> Result<Length, String> {
 pub(crate) fn parse_thickness(text: &str) -> Result<Length, String> {
     let length = parse_distance(text)?;
     if length.um() == 0.0 { Err("the length must be above zero".to_owned()) } else { Ok(length) }
+}
+
+/// Parses a time in the range of a machine's file.
+pub(crate) fn parse_time(text: &str) -> Result<Seconds, String> {
+    let time: Seconds = text.parse()?;
+    match time.0 {
+        1e-3..=1e6 => Ok(time),
+        _ => Err("a time is between 1ms and 1000000s".to_owned()),
+    }
 }
 
 /// Parses an area that is not below zero, in square millimeters.

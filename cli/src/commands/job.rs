@@ -12,7 +12,7 @@ use lamp_machine::{LightTable, Machine, Scan};
 use lamp_pipeline::documents::{document_and_text, without_digest};
 use lamp_pipeline::heights::time_text;
 
-use crate::args::options::{Common, one_of_described, parse_layers};
+use crate::args::options::{Common, TimeArgs, one_of_described, parse_layers};
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
 use crate::streams::{input_name, is_stream, new_folder, print};
@@ -110,10 +110,11 @@ pub(super) fn mirrors_of(
 pub(crate) fn build_clock(
     path: Option<&Path>,
     machine: Option<&Machine>,
+    times: TimeArgs,
 ) -> Result<BuildClock, Exit> {
     let scan = machine.and_then(|machine| machine.scan.as_ref());
     let mirrors = path.zip(scan).map(|(path, scan)| mirrors_of(path, scan)).transpose()?;
-    Ok(BuildClock::new(machine, mirrors.map(|(_, mirrors)| mirrors)))
+    Ok(BuildClock::new(machine, mirrors.map(|(_, mirrors)| mirrors)).with_times(times.into()))
 }
 
 /// A machine that scans, as its file has it.

@@ -19,6 +19,7 @@ mod expose;
 mod fix;
 mod frames;
 mod heights;
+mod help;
 mod info;
 mod info_fields;
 mod job;
@@ -93,6 +94,7 @@ pub(crate) enum Command {
     Doctor(doctor::DoctorArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
+    Help(help::HelpArgs),
 }
 
 impl Command {
@@ -151,6 +153,7 @@ impl Command {
             Self::Doctor(_) => doctor::run(),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
+            Self::Help(args) => help::run(args),
         }
     }
 }

@@ -35,7 +35,7 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 22] = [
+const REFUSED: [(&str, &str); 24] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
@@ -57,6 +57,8 @@ const REFUSED: [(&str, &str); 22] = [
     ("fields", "leave out --fields: cut fields from the finished build, with lamp tile"),
     ("recipe", "leave out --recipe: run lamp tile by hand for the recipe"),
     ("time", "leave out --time: run lamp tile by hand for the time of the build"),
+    ("expose", "leave out --expose: run lamp tile by hand for the time of the build"),
+    ("recoat", "leave out --recoat: run lamp tile by hand for the time of the build"),
     ("layout_out", "leave out --layout-out: run lamp tile by hand for the layout"),
     ("layout_picture", "leave out --layout-picture: run lamp tile by hand for the picture"),
     ("name", "leave out --name: a stack's part is named after its file"),

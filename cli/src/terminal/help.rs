@@ -5,30 +5,30 @@ use clap::{Arg, ArgAction, Command};
 use crate::args::options::GENERAL;
 
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
-const LAMP: &str = "\
-Turn parts into images for photopolymerization. Usage: lamp COMMAND [OPTIONS]
-From part to build:        slice blade.stl | fix | dither | tile > build.tif
-  slice       cut a part into layers        fix           correct stray rows
-  dither      turn gray levels into dots    tile          lay out copies
-  compensate  offset edges for cure width   edit          change a design
-  compose     make layers from a recipe     batch         run jobs overnight
-  job         plan the scan of a build      frames        write what is shown
-Stacks:
-  view        look at layers in a browser   show          draw layers
-  check       find islands and pockets      support       hold islands
-  info        describe a stack              report        write a page to send
-  verify      check for damage              compare       show differences
-  join split  join or split layer ranges    convert pack  change the format
-Parts, resins and machines; for setting up: config doctor completions man
-  mesh        check and repair a mesh       orient        find an orientation
-  brep        check a STEP part             heights       find thicknesses
-  sample      write a sample part           demo          run all on a sample
-  mesh-out    write a stack's surface       cure          draw what is cured
-  material    list and check resins         machine       check machines
-  calibrate   make a resin file             target        make test images
-  plan        plan exposures                learn         correct exposures
-  projector   list and check projectors     expose        check doses of a job
--h lists the usual options of a command, --help all; all have --quiet, --options
+pub(crate) const LAMP: &str = "\
+Turn parts into images for printing: slice part.stl | fix | dither > part.tif
+Make    slice       cut a part into layers   fix         correct stray rows
+        dither      turn gray into dots      compensate  shift edges
+        tile        lay out copies           compose     make pages of a recipe
+        edit        change a design          support     hold islands
+        orient      find an orientation      heights     find thicknesses
+        batch       run jobs overnight
+Look    view        see layers in a browser  show        draw layers
+        info        describe a stack         report      write a page to send
+        mesh-out    write the surface        cure        draw what is cured
+Prove   check       find islands, pockets    verify      find damage
+        compare     find differences         expose      check doses of a job
+        mesh        check, repair a mesh     brep        check a STEP part
+Light   plan        plan exposures           learn       learn from a print
+        calibrate   make a resin file        target      make test images
+        material    list, check resins       projector   list, check projectors
+        machine     list, make machines      job         plan the scan
+Files   convert     change the format        pack        pack a stack
+        join split  join, split layers       frames      write what is shown
+Set up  demo        run all on a sample      sample      write a sample part
+        doctor      check this computer      config      show your options
+        man         write manual pages       completions for your shell
+lamp COMMAND -h lists the usual options, --help all; lamp help TOPIC is a page.
 ";
 
 /// Examples stand between usage and options.

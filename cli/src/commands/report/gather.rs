@@ -109,7 +109,7 @@ impl StackReport {
             warnings.push(format!("The machine cannot scan it: {why}."));
         } else if self.time.sum_s().is_none() {
             warnings.push(
-                "Not every layer states an exposure: the build time is not known.".to_owned(),
+                "Not every layer states an exposure, so the build time is not known: give --expose.".to_owned(),
             );
         }
         warnings
@@ -128,9 +128,11 @@ impl StackReport {
             "warnings": self.warnings(),
             "build_exposure_s": self.time.exposure_s,
             "recoating_s": self.time.recoating_s,
+            "lifts_s": self.time.lifts_s,
             "swaths_s": self.time.swaths.map(|swaths| swaths.seconds),
             "fields_s": self.time.fields.and_then(|fields| fields.seconds()),
             "build_s": self.time.sum_s(),
+            "least_s": self.time.least_s(),
             "fixed_rows": self.layers.iter().map(|layer| layer.fixed_rows).sum::<u64>(),
             "unchecked": self.found.as_ref().err(),
             "finding_count": found.map(Found::count),

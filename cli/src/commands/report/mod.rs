@@ -16,7 +16,7 @@ use lamp_machine::Machine;
 use lamp_stack::stacks_in;
 use serde_json::json;
 
-use crate::args::options::Common;
+use crate::args::options::{Common, TimeArgs};
 use crate::commands::job::build_clock;
 use crate::exit::Exit;
 use crate::output::endings::{HTML, check_ending};
@@ -42,6 +42,7 @@ pub(super) use pictures::{InlinePicture, of_layer};
 #[command(after_help = "\
 Examples:
   lamp report build.tif
+  lamp report build.tif --expose 1.5s --recoat 9s
   lamp report night/ -o reports/
   lamp report build.tif --json | jq .stacks[0].findings
   slice blade.stl | fix | lamp report --machine alpha -o report.html
@@ -62,6 +63,9 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "M")]
     machine: Option<PathBuf>,
 
+    #[command(flatten)]
+    times: TimeArgs,
+
     /// Replace a folder of reports that an earlier run wrote
     #[arg(long, alias = "overwrite")]
     force: bool,
@@ -81,8 +85,12 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
     if stacks.is_empty() {
         return Err(Exit::Failed(anyhow!("{}: there is no stack in it", input_name(&args.stack))));
     }
-    let work =
-        ReportWork { machine: machine.as_ref(), machine_path: args.machine.as_deref(), common };
+    let work = ReportWork {
+        machine: machine.as_ref(),
+        machine_path: args.machine.as_deref(),
+        times: args.times,
+        common,
+    };
     let beside = || match &stacks[..] {
         [stack] if !is_stream(stack) => Ok(stack.with_extension("html")),
         [_] => Err(Exit::usage("name the page: -o report.html")),
@@ -105,6 +113,7 @@ pub(crate) fn run(args: &ReportArgs, common: &Common) -> Result<(), Exit> {
 struct ReportWork<'a> {
     machine: Option<&'a Machine>,
     machine_path: Option<&'a Path>,
+    times: TimeArgs,
     common: &'a Common,
 }
 
@@ -118,7 +127,7 @@ impl ReportWork<'_> {
             &stack,
             &shown_name(path),
             self.machine,
-            build_clock(self.machine_path, self.machine)?,
+            build_clock(self.machine_path, self.machine, self.times)?,
             &progress,
         );
         progress.done();

@@ -99,7 +99,10 @@ fn build_time(report: &StackReport) -> Markup {
             None => p {
                 @match &time.unscanned {
                     Some(why) => { "Not known: " (why) "." }
-                    None => { "Not known: not every layer states its exposure." }
+                    None => {
+                        "Not known: not every layer states its exposure."
+                        @if time.least_s() > 0.0 { " The rest takes " (time_text(time.least_s())) "." }
+                    }
                 }
             },
             Some(sum) => table.facts {
@@ -113,12 +116,15 @@ fn build_time(report: &StackReport) -> Markup {
                 @if let Some(seconds) = time.recoating_s {
                     tr { th { "recoating" } td { (time_text(seconds)) } }
                 }
-                tr { th { "in all" } td { (time_text(sum)) } }
+                @if let Some(seconds) = time.lifts_s {
+                    tr { th { "lifts and waits" } td { (time_text(seconds)) } }
+                }
+                tr { th { (if time.is_whole() { "in all" } else { "at least" }) } td { (time_text(sum)) } }
             },
         }
-        @if time.recoating_s.is_none() {
-            p.note { "Recoating, peeling and moving are not in it: name a machine whose recoating is known with --machine." }
-        } @else {
+        @if time.recoating_s.is_none() && time.lifts_s.is_none() {
+            p.note { "Recoating, peeling and moving are not in it: give --recoat, or name a machine whose recoating is known with --machine." }
+        } @else if time.lifts_s.is_none() {
             p.note { "Peeling, waiting and moving are not in it." }
         }
     }

@@ -25,6 +25,14 @@ impl TileArgs {
                 "--shares is for several stacks: one stack is placed as often as it fits anyway",
             ));
         }
+        if let Some(name) = self.times.given().next()
+            && !self.time
+            && self.report.path().is_none()
+        {
+            return Err(Exit::usage(format!(
+                "{name} counts in --time and --report: add one of them"
+            )));
+        }
         self.check_plan()?;
         self.settings.mesh.check()?;
         self.cut.check(

@@ -22,7 +22,7 @@ use lamp_pipeline::build_findings::{NoMesh, StrayTotals, describe_stray, within_
 use lamp_pipeline::documents::document_and_word;
 use lamp_pipeline::tile::TileSettings;
 
-use crate::args::options::{Common, Output, parse_layers};
+use crate::args::options::{Common, Output, TimeArgs, parse_layers};
 use crate::args::parsed::Parsed;
 use crate::args::tile::TileStageArgs;
 use crate::commands::job::build_clock;
@@ -65,7 +65,8 @@ Examples:
   tile blade.tif --area 90x50mm --fields 2560x1600 --overlap 4 -o fields/
   tile blade.tif --machine beta --recipe build.json
   tile blade.tif --machine mine.toml --report report.json -o build.tif
-  tile blade.tif --machine mine.toml --time")]
+  tile blade.tif --machine mine.toml --time
+  tile blade.tif --machine beta --time --expose 1.5s --recoat 9s")]
 pub(crate) struct TileArgs {
     /// Stacks to read, each with its number of copies: TIFF or picture files, folders of pages, or
     /// - for standard input [default count: as many as fit for one stack, one each for several]
@@ -95,10 +96,13 @@ pub(crate) struct TileArgs {
     #[command(flatten)]
     report: ReportTo,
 
-    /// Print how long the build takes, from [times] and [recoating] in the machine's file. Without
-    /// -o, the build itself is not written
+    /// Print how long the build takes, from the machine's times, or from --expose and --recoat.
+    /// Without -o, the build itself is not written
     #[arg(long)]
     time: bool,
+
+    #[command(flatten)]
+    times: TimeArgs,
 
     /// Stop with status 3 if a part's pages list stray rows, not all copies fit, or pages of a
     /// folder may be missing: no build is written
@@ -239,8 +243,11 @@ impl TileArgs {
         let (found, progress) = (Rc::clone(&stray_rows), progress.clone());
         let told = recipe.clone();
         let is_timed = self.time || self.report.path().is_some();
-        let clock =
-            build_clock(self.settings.machine.as_deref().filter(|_| is_timed), machine.as_ref())?;
+        let clock = build_clock(
+            self.settings.machine.as_deref().filter(|_| is_timed),
+            machine.as_ref(),
+            self.times,
+        )?;
         let clock = match fields::of_steps(self.cut.form(machine.as_ref())?) {
             Some(form) => clock.with_fields(form),
             None => clock,

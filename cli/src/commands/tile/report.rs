@@ -87,6 +87,7 @@ impl BuildTotals {
             "mesh": cured(&self.mesh),
             "build_exposure_s": time.exposure_s.map(to_nm),
             "recoating_s": time.recoating_s.map(to_nm),
+            "lifts_s": time.lifts_s.map(to_nm),
             "swaths_s": time.swaths.map(|swaths| to_nm(swaths.seconds)),
             "swaths": time.swaths.map(|swaths| swaths.count),
             "black_swaths": time.swaths.map(|swaths| swaths.black),
@@ -94,6 +95,7 @@ impl BuildTotals {
             "fields": time.fields.map(|fields| fields.count),
             "black_fields": time.fields.map(|fields| fields.black),
             "build_s": time.sum_s().map(to_nm),
+            "least_s": to_nm(time.least_s()),
             "warnings": time::missing(time, machine),
         });
         let part = |part: usize| {

@@ -11,7 +11,12 @@ pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
         1 => "1 layer".to_owned(),
         layers => format!("{layers} layers"),
     };
-    let whole = time.sum_s().map_or("not known".to_owned(), time_text);
+    let known = time_text(time.least_s());
+    let whole = match time.is_whole() {
+        true => known,
+        false if time.unscanned.is_some() || time.least_s() == 0.0 => "not known".to_owned(),
+        false => format!("at least {known}"),
+    };
     let mut text = format!("build time: {whole}, {layers}\n");
     let mut line = |name: &str, seconds: f64, how: &str| {
         text += &format!("{:<12}{}{how}\n", format!("{name}:"), time_text(seconds));
@@ -39,6 +44,9 @@ pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
     if let Some(seconds) = time.recoating_s {
         line("recoating", seconds, "");
     }
+    if let Some(seconds) = time.lifts_s {
+        line("lifts", seconds, ", with the waits of the printer");
+    }
     for sentence in missing(time, machine) {
         text += &format!("{sentence}\n");
     }
@@ -63,15 +71,16 @@ pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String
             false => ", or swath_speed_mm_per_s for a projector that scans,",
         };
         missing
-            .push(format!("not every layer states an exposure: write expose_s{speed} into {file}"));
+            .push(format!("not every layer states an exposure: give --expose, or write expose_s{speed} into {file}"));
     }
     if time.fields.is_some_and(|fields| fields.steps_s.is_none()) {
         missing.push(format!(
             "steps between fields are not in it: write step_s into [fields] of {which}"
         ));
     }
-    if time.recoating_s.is_none() {
-        missing.push(format!("recoating is not in it: write recoat_s into {file}"));
+    if time.recoating_s.is_none() && time.lifts_s.is_none() {
+        missing
+            .push(format!("recoating is not in it: give --recoat, or write recoat_s into {file}"));
     }
     missing
 }

@@ -1,5 +1,7 @@
 //! `lamp machine`: lists, shows and checks machines.
 
+mod new;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
@@ -16,11 +18,14 @@ use crate::output::json_report::print_answer;
 use crate::streams::{input_name, print};
 use crate::terminal::progress::printable;
 
-/// List, show or check machines: build area, height, resolution, layer thickness and scan
+use new::NewArgs;
+
+/// List, show, check or make machines: build area, height, resolution, layer thickness and scan
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   lamp machine list
+  lamp machine new mine
   lamp machine show beta > mine.toml
   lamp machine check mine.toml
   tile blade.tif --machine mine.toml -o build.tif")]
@@ -48,6 +53,15 @@ enum MachineAction {
         #[arg(long)]
         json: bool,
     },
+    /// Make a file for your machine from a few answers
+    ///
+    /// It asks at a terminal for the numbers that no option gives.
+    #[command(after_help = "\
+Examples:
+  lamp machine new mine
+  lamp machine new mine --area 100x60mm --recoat 9s --expose 1.5s
+  lamp machine new mine --area 100x60mm --dpi 1500 -o mine.toml")]
+    New(NewArgs),
     /// Check machine files, and the light files that they name
     ///
     /// Each file gets one line.
@@ -71,6 +85,7 @@ pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
             answer(&json!({ "machines": [fields(&document(machine)?)] }))
         }
         MachineAction::Show { machine, json: false } => show::<Machine>(machine),
+        MachineAction::New(args) => new::run(args),
         MachineAction::Check { files } => check(files),
     }
 }
