@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         _ => {
             let stop = Stop { gap: 1e-4, steps: 100_000 };
-            let times = nearest_times(&light, &wanted, LONGEST, &[0.0], stop);
+            let times = nearest_times(&light, &wanted, LONGEST, &[0.0], stop, &|| false);
             println!("{} steps", times.steps);
             write(&folder.join("times"), &times.seconds)?;
         }

@@ -81,7 +81,7 @@ fn planned(mut setting: KineticSetting, name: &str) -> Result<Vec<f64>, Box<dyn 
         setting.sigma_um = 8.0;
     }
     let start = Instant::now();
-    let plan = plan(setting, round.radius_um(), |r| round.height_um(r), Method::Joint)?;
+    let plan = plan(setting, round.radius_um(), |r| round.height_um(r), Method::Joint, || false)?;
     Ok(vec![plan.wanted.rms_um(&plan.cured), start.elapsed().as_secs_f64()])
 }
 

@@ -105,7 +105,8 @@ impl PlanFolder {
 }
 
 impl PlanPages<'_> {
-    fn layers(&self) -> impl Iterator<Item = Result<Layer, StackError>> {
+    /// Returns the pages, each with its time.
+    pub fn layers(&self) -> impl Iterator<Item = Result<Layer, StackError>> {
         let stack = StackInfo {
             part: self.part.to_owned(),
             commands: vec![self.command.to_owned()],

@@ -1,9 +1,11 @@
 //! Column cure (000): the times, clusters and bitmaps that are found are the best ones.
 
+use std::cell::Cell;
+
 use lamp_grayscale::material::Material;
 use lamp_planning::column::{
-    ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread, Setup, Stop,
-    Tracing, plan,
+    ColumnError, ColumnObjective, ColumnOptions, GlassLight, HeightCurve, Measures, MirrorSpread,
+    Setup, Stop, Tracing, plan,
 };
 use lamp_planning::target::{Grid, HeightMap, Target};
 use lamp_stack::{Catalogued, Image, Length, Mask};
@@ -59,7 +61,8 @@ fn exact_light_gives_the_smoother_sphere() {
     // Computed separately from this code, in Python.
     let target = map("sphere", 300);
     let planned = |tracing| {
-        plan(&zhao(300, tracing), &target, pegda(), &options(ColumnObjective::Dose)).unwrap()
+        plan(&zhao(300, tracing), &target, pegda(), &options(ColumnObjective::Dose), || false)
+            .unwrap()
     };
     let exact = planned(Tracing::Exact);
     assert!(exact.best.relative_gap() <= 1e-6, "{:e}", exact.best.relative_gap());
@@ -82,7 +85,8 @@ fn exact_light_gives_the_smoother_sphere() {
 fn light_that_cures_nothing_may_fall_beside_the_part() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);
-    let planned = plan(&light, &target, pegda(), &options(ColumnObjective::Height)).unwrap();
+    let planned =
+        plan(&light, &target, pegda(), &options(ColumnObjective::Height), || false).unwrap();
     assert!(planned.best.relative_gap() <= 1e-6, "{:e}", planned.best.relative_gap());
     let best = measures(&planned.best_doses, &target);
     assert!((best.relative_rms - 0.02127).abs() < 1e-4, "{best:?}");
@@ -96,13 +100,13 @@ fn five_gray_bitmaps_are_as_good_as_any_times() {
     let shares = std::array::from_fn(|level| level as f64 / 255.0);
     let five = ColumnOptions { bitmaps: 5, ..options(ColumnObjective::Dose) };
     let gray = ColumnOptions { gray: Some(Box::new(shares)), ..five.clone() };
-    let gray = plan(&light, &target, pegda(), &gray).unwrap();
+    let gray = plan(&light, &target, pegda(), &gray, || false).unwrap();
     assert!(gray.excess() < 1e-4, "{}", gray.excess());
     let measured = measures(&gray.doses, &target);
     assert!((measured.ra_um - 7.380).abs() < 0.002, "{measured:?}");
     // 000's clusters, which have no cluster at zero and whose times are not solved again, give 18.6
     // um.
-    let white = plan(&light, &target, pegda(), &five).unwrap();
+    let white = plan(&light, &target, pegda(), &five, || false).unwrap();
     assert!(measures(&white.doses, &target).ra_um < 15.2);
 }
 
@@ -111,7 +115,7 @@ fn a_plan_that_bears_a_shift_is_better_where_it_is_shifted() {
     let target = map("sphere", 300);
     let light = zhao(300, Tracing::Exact);
     let robust = ColumnOptions { robust: Length::from_um(3.0), ..options(ColumnObjective::Dose) };
-    let planned = plan(&light, &target, pegda(), &robust).unwrap();
+    let planned = plan(&light, &target, pegda(), &robust, || false).unwrap();
     assert!((planned.best.error / 24356.69 - 1.0).abs() < 1e-6, "{}", planned.best.error);
     assert!(planned.best.relative_gap() <= 1e-6);
 }
@@ -120,7 +124,8 @@ fn a_plan_that_bears_a_shift_is_better_where_it_is_shifted() {
 fn bitmaps_are_each_within_the_one_before() {
     let target = map("lens-array", 330);
     let light = zhao(330, Tracing::Exact);
-    let planned = plan(&light, &target, pegda(), &options(ColumnObjective::Dose)).unwrap();
+    let planned =
+        plan(&light, &target, pegda(), &options(ColumnObjective::Dose), || false).unwrap();
     let masks: Vec<_> = planned
         .bitmaps
         .iter()
@@ -153,7 +158,7 @@ fn what_cannot_be_planned_is_told() {
     let light = zhao(300, Tracing::Exact);
     let target = map("sphere", 300);
     let error = |light: &GlassLight, target: &HeightMap, options: &ColumnOptions| {
-        plan(light, target, pegda(), options).unwrap_err().to_string()
+        plan(light, target, pegda(), options, || false).unwrap_err().to_string()
     };
     // 151 mirrors cover 4.2 mm.
     let wide = Grid { columns: 500, rows: 500, pitch_um: 10.0 };
@@ -169,4 +174,31 @@ fn what_cannot_be_planned_is_told() {
     let said =
         error(&light, &target, &ColumnOptions { step_s: 1e4, ..options(ColumnObjective::Dose) });
     assert!(said.contains("under the display's step"), "{said}");
+}
+
+#[test]
+fn a_search_that_is_stopped_gives_no_plan() {
+    let target = map("sphere", 300);
+    let light = zhao(300, Tracing::Exact);
+    for objective in [ColumnObjective::Dose, ColumnObjective::Height] {
+        let looks = Cell::new(0);
+        let is_stopped = || {
+            looks.set(looks.get() + 1);
+            looks.get() > 3
+        };
+        let planned = plan(&light, &target, pegda(), &options(objective), is_stopped);
+        assert_eq!(planned.unwrap_err(), ColumnError::Stopped);
+        // The search ends where it is stopped: its rounds and the plan look once more each.
+        assert!(looks.get() <= 6, "{}", looks.get());
+    }
+}
+
+#[test]
+fn texts_of_rays_are_read_back() {
+    for tracing in [Tracing::Exact, RAYS, Tracing::Rays { points: 1, directions: 99 }] {
+        assert_eq!(tracing.to_string().parse(), Ok(tracing));
+    }
+    for wrong in ["", "9", "9x", "x9", "0x9", "9x100", "9x15x1", "-1x5", "Exact"] {
+        assert!(wrong.parse::<Tracing>().unwrap_err().to_string().contains(wrong));
+    }
 }

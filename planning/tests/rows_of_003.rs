@@ -172,8 +172,9 @@ fn plans_that_the_display_cannot_show_are_refused() {
     assert!(RingSimulation::of_plan(setting(LIGHT, BLUR_UM), &[ok], 0.0).is_ok());
 }
 
-static LENS_OF_150: LazyLock<RingPlan> =
-    LazyLock::new(|| plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Joint).unwrap());
+static LENS_OF_150: LazyLock<RingPlan> = LazyLock::new(|| {
+    plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Joint, || false).unwrap()
+});
 
 #[test]
 fn times_planned_together_leave_less_than_a_micrometre() {
@@ -188,7 +189,7 @@ fn times_planned_together_leave_less_than_a_micrometre() {
         let nests = |ring| !pair[1].is_white(ring) || pair[0].is_white(ring);
         assert!((0..pair[1].reach()).all(nests), "{pair:?}");
     }
-    let seed = plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Seed).unwrap();
+    let seed = plan(setting(LIGHT, 8.0), 150.0, cap(150.0, 60.0), Method::Seed, || false).unwrap();
     let seed_rms = seed.wanted.rms_um(&seed.cured);
     assert!(rms < 0.2 * seed_rms, "{rms} {seed_rms}");
 }
@@ -197,7 +198,8 @@ fn times_planned_together_leave_less_than_a_micrometre() {
 fn plans_are_the_same_for_any_number_of_threads() {
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let small = || plan(setting(LIGHT, 8.0), 40.0, cap(40.0, 15.0), Method::Joint).unwrap();
+        let small =
+            || plan(setting(LIGHT, 8.0), 40.0, cap(40.0, 15.0), Method::Joint, || false).unwrap();
         pool.install(small)
     };
     let [one, three] = [1, 3].map(on);
@@ -208,7 +210,7 @@ fn plans_are_the_same_for_any_number_of_threads() {
 #[test]
 fn parts_of_many_rings_are_planned_at_knots() {
     let low = KineticSetting { chamber_um: 60.0, ..setting(LIGHT, 8.0) };
-    let planned = plan(low, 310.0, cap(310.0, 25.0), Method::Joint).unwrap();
+    let planned = plan(low, 310.0, cap(310.0, 25.0), Method::Joint, || false).unwrap();
     let rms = planned.wanted.rms_um(&planned.cured);
     assert!(rms <= 1.0, "{rms}");
 }
@@ -231,7 +233,8 @@ fn a_part_aside_is_off_by_more_the_farther_it_lies() {
 
 #[test]
 fn bitmap_after_bitmap_begins_with_twelve_pixels() {
-    let planned = plan(setting(LIGHT, BLUR_UM), 100.0, cap(100.0, 100.0), Method::Seed).unwrap();
+    let planned =
+        plan(setting(LIGHT, BLUR_UM), 100.0, cap(100.0, 100.0), Method::Seed, || false).unwrap();
     let first = &planned.exposures[0];
     // The text has 7.9 s; its own equation 15 would choose a film of 18 um.
     assert_eq!((first.reach(), first.time), (12, seconds(10.0)));
@@ -239,9 +242,17 @@ fn bitmap_after_bitmap_begins_with_twelve_pixels() {
 }
 
 #[test]
+fn a_search_that_is_stopped_gives_no_plan() {
+    for method in [Method::Joint, Method::Seed] {
+        let planned = plan(setting(LIGHT, 8.0), 40.0, cap(40.0, 15.0), method, || true);
+        assert_eq!(planned.unwrap_err(), RingPlanError::Stopped);
+    }
+}
+
+#[test]
 fn what_cannot_be_planned_is_refused() {
     let refused = |setting, radius, height: &dyn Fn(f64) -> f64| {
-        plan(setting, radius, height, Method::Joint).unwrap_err()
+        plan(setting, radius, height, Method::Joint, || false).unwrap_err()
     };
     let usual = setting(LIGHT, 8.0);
     assert!(matches!(refused(usual, 30.0, &|_| f64::NAN), RingPlanError::NoHeight { .. }));

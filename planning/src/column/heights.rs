@@ -62,8 +62,14 @@ impl HeightMisfit<'_> {
 }
 
 /// Finds the times, at most `max_s` seconds, whose heights are nearest to the target's: Newton's
-/// method, which minimizes its squares as squares of doses are.
-pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) -> MirrorTimes {
+/// method, which minimizes its squares as squares of doses are. The search also ends once
+/// `is_stopped` returns true.
+pub(super) fn nearest_heights(
+    error: &HeightMisfit<'_>,
+    max_s: f64,
+    stop: Stop,
+    is_stopped: &dyn Fn() -> bool,
+) -> MirrorTimes {
     let mirrors = error.lights[0].setup().mirrors.iter().product();
     let mut x = vec![0.0; mirrors];
     let mut squares = error.all_squares(&x);
@@ -81,7 +87,7 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
         let problem = Bounded { curvature: &curvature, pull: &pull, high: max_s };
         let here = problem.place(x);
         let gap = frank_wolfe_gap(&here, max_s);
-        if gap <= stop.gap * value || steps >= stop.steps {
+        if gap <= stop.gap * value || steps >= stop.steps || is_stopped() {
             return MirrorTimes { seconds: here.x, error: value, gap, steps };
         }
         // A step that leaves less than a tenth of the gap gains nothing: the squares change with
@@ -90,7 +96,7 @@ pub(super) fn nearest_heights(error: &HeightMisfit<'_>, max_s: f64, stop: Stop) 
         let before = steps;
         let next = problem.search(here.x.clone(), 8, |place, step| {
             steps = before + step;
-            frank_wolfe_gap(place, max_s) <= enough || steps >= stop.steps
+            frank_wolfe_gap(place, max_s) <= enough || steps >= stop.steps || is_stopped()
         });
         (x, squares) = nearer(error, &here, &next.x, value);
         steps += 1;

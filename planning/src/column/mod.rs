@@ -20,5 +20,5 @@ pub use curve::{HeightCurve, NoHeights};
 pub use light::{GlassLight, GridError, Setup};
 pub use measures::Measures;
 pub use plan::{ColumnError, ColumnObjective, ColumnOptions, ColumnPlan, plan};
-pub use spread::{MirrorSpread, Tracing};
+pub use spread::{MirrorSpread, NoTracing, Tracing};
 pub use times::{MirrorTimes, Stop, nearest_times};

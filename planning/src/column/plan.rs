@@ -85,6 +85,9 @@ pub enum ColumnError {
         /// The display's step.
         step_s: f64,
     },
+    /// Nobody wants the plan anymore.
+    #[error("the search was stopped")]
+    Stopped,
 }
 
 /// A plan of bitmaps.
@@ -124,19 +127,24 @@ struct ColumnProblem<'a> {
     options: &'a ColumnOptions,
 }
 
-/// Plans the bitmaps that cure a target through a glass.
+/// Plans the bitmaps that cure a target through a glass. The search asks `is_stopped` every few
+/// steps whether to end without a plan.
 ///
 /// # Errors
 /// Returns an error if light does not reach a column that has a height, if no dose cures it, if
-/// there are fewer distinct times than bitmaps, or if all are too short.
+/// there are fewer distinct times than bitmaps, if all are too short, or if the search is stopped.
 pub fn plan(
     light: &GlassLight,
     target: &HeightMap,
     curve: HeightCurve,
     options: &ColumnOptions,
+    is_stopped: impl Fn() -> bool,
 ) -> Result<ColumnPlan, ColumnError> {
     let problem = ColumnProblem::new(light, target, curve, options)?;
-    let best = problem.best_times();
+    let best = problem.best_times(&is_stopped);
+    if is_stopped() {
+        return Err(ColumnError::Stopped);
+    }
     let longest_s = best.seconds.iter().copied().fold(0.0, f64::max);
     if longest_s < options.step_s {
         return Err(ColumnError::UnderAStep { longest_s, step_s: options.step_s });
@@ -187,13 +195,16 @@ impl<'a> ColumnProblem<'a> {
         HeightMisfit { lights: &self.lights, heights_um: self.heights_um, curve: self.curve }
     }
 
-    fn best_times(&self) -> MirrorTimes {
+    fn best_times(&self, is_stopped: &dyn Fn() -> bool) -> MirrorTimes {
         let ColumnOptions { objective, max_s, stop, .. } = *self.options;
         match objective {
             ColumnObjective::Dose => {
-                nearest_times(self.light, &self.wanted, max_s, &self.options.shifts_um(), stop)
+                let shifts_um = self.options.shifts_um();
+                nearest_times(self.light, &self.wanted, max_s, &shifts_um, stop, is_stopped)
             }
-            ColumnObjective::Height => nearest_heights(&self.height_error(), max_s, stop),
+            ColumnObjective::Height => {
+                nearest_heights(&self.height_error(), max_s, stop, is_stopped)
+            }
         }
     }
 

@@ -1,5 +1,10 @@
 //! The distribution of a mirror's light along one axis of the glass.
 
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
 use super::taps::Taps;
 
 /// How light from a point of a mirror spreads on the glass.
@@ -25,6 +30,40 @@ pub enum Tracing {
         /// Directions over the cone, both ends included.
         directions: usize,
     },
+}
+
+/// Why a text does not say how light is computed.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{0}` is not a number of rays: write 9x15, each from 1 to 99")]
+pub struct NoTracing(String);
+
+impl FromStr for Tracing {
+    type Err = NoTracing;
+
+    /// Parses `exact`, or rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
+    ///
+    /// # Errors
+    /// Returns an error if the text is neither, or a number is not from 1 to 99.
+    fn from_str(text: &str) -> Result<Self, NoTracing> {
+        if text == "exact" {
+            return Ok(Self::Exact);
+        }
+        // 99 points and directions a side are already 96 million rays of each mirror.
+        let number = |text: &str| text.parse().ok().filter(|number| (1..=99).contains(number));
+        let rays = text.split_once('x').and_then(|(points, directions)| {
+            Some(Self::Rays { points: number(points)?, directions: number(directions)? })
+        });
+        rays.ok_or_else(|| NoTracing(text.to_owned()))
+    }
+}
+
+impl fmt::Display for Tracing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exact => f.write_str("exact"),
+            Self::Rays { points, directions } => write!(f, "{points}x{directions}"),
+        }
+    }
 }
 
 /// A line of mirrors: their image on the glass, in um.

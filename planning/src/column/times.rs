@@ -59,13 +59,14 @@ const NOTHING: f64 = 1e-12;
 
 /// Finds the times, at most `max_s` seconds, whose doses are nearest to `wanted` in mJ/cm2: the
 /// least half sum of squares (000 eq. 4.4), or its mean over lights shifted by `shifts_um` along
-/// each axis.
+/// each axis. The search also ends once `is_stopped` returns true.
 pub fn nearest_times(
     light: &GlassLight,
     wanted: &[f64],
     max_s: f64,
     shifts_um: &[f64],
     stop: Stop,
+    is_stopped: &dyn Fn() -> bool,
 ) -> MirrorTimes {
     let curvature = Normal::mean(light, shifts_um);
     let pull = mean_pull(light, wanted, shifts_um);
@@ -77,7 +78,8 @@ pub fn nearest_times(
     let (mut steps, mut gap) = (0, f64::INFINITY);
     let place = problem.search(vec![0.0; pull.len()], 8, |place, step| {
         (steps, gap) = (step, frank_wolfe_gap(place, max_s));
-        gap <= stop.gap * error(place).max(NOTHING * dark) || step >= stop.steps
+        let is_near = gap <= stop.gap * error(place).max(NOTHING * dark);
+        is_near || step >= stop.steps || is_stopped()
     });
     // Slopes summed over steps carry rounding errors: the proof uses newly computed ones.
     let place = problem.place(place.x);

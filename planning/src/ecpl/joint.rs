@@ -56,16 +56,17 @@ struct Slopes {
     by_knot: Vec<Vec<f64>>,
 }
 
-/// Plans the times of all rings at once.
+/// Plans the times of all rings at once. The search ends early once `is_stopped` returns true.
 pub(super) fn plan(
     simulation: &RingSimulation,
     wanted: &WantedProfile,
+    is_stopped: &dyn Fn() -> bool,
 ) -> Result<Vec<RingExposure>, RingPlanError> {
     let wide = simulation.wide_field(wanted.highest_um(), LONGEST_S)?;
     let search = KnotSearch::new(simulation, wanted, LONGER * wide[wide.len() - 1].0);
     let mut times = search.first_times(&wide);
-    search.smooth(&mut times);
-    let steps = search.whole(&times);
+    search.smooth(&mut times, is_stopped);
+    let steps = search.whole(&times, is_stopped);
     Ok(nested(&steps, simulation.setting().step))
 }
 
@@ -184,11 +185,14 @@ impl<'a> KnotSearch<'a> {
 
     /// Moves the times of knots toward the least mean square, by Gauss-Newton steps damped as by K.
     /// Levenberg and D. Marquardt.
-    fn smooth(&self, times: &mut Vec<f64>) {
+    fn smooth(&self, times: &mut Vec<f64>, is_stopped: &dyn Fn() -> bool) {
         let mut held = HELD;
         let mut slopes = self.slopes(times);
         let mut now = square(&slopes.residuals);
         for _ in 0..ROUNDS {
+            if is_stopped() {
+                return;
+            }
             let next = slopes.step(times, held, self.longest_s);
             let then = square(&self.cured(&self.by_ring(&next)));
             if then >= now {
@@ -209,7 +213,7 @@ impl<'a> KnotSearch<'a> {
 
     /// Returns the times of rings in whole steps of the display, near the times of knots: the best
     /// ones, if each ring has its own knot.
-    fn whole(&self, knots: &[f64]) -> Vec<u32> {
+    fn whole(&self, knots: &[f64], is_stopped: &dyn Fn() -> bool) -> Vec<u32> {
         if self.knots < self.simulation.rings() {
             return self.rounded(&self.by_ring(knots));
         }
@@ -220,6 +224,9 @@ impl<'a> KnotSearch<'a> {
         };
         let mut least = square(&self.cured(&seconds(&best)));
         for _ in 0..WHOLE_ROUNDS {
+            if is_stopped() {
+                break;
+            }
             let slopes = self.slopes(&seconds(&best));
             let next = slopes.whole_steps(&best, self.step_s);
             let then = square(&self.cured(&seconds(&next)));

@@ -116,6 +116,9 @@ pub enum RingPlanError {
         /// The wanted height.
         wanted_um: f64,
     },
+    /// Nobody wants the plan anymore.
+    #[error("the search was stopped")]
+    Stopped,
 }
 
 /// Bitmaps and times, and the profile that they cure.
@@ -132,16 +135,17 @@ pub struct RingPlan {
 }
 
 /// Plans a round part of `radius_um`, whose height at each distance from its axis is given in
-/// micrometers.
+/// micrometers. The search asks `is_stopped` in each round whether to end without a plan.
 ///
 /// # Errors
 /// Returns an error if a height is impossible, the part does not fit the chamber or the display,
-/// or the light does not cure it.
+/// the light does not cure it, or the search is stopped.
 pub fn plan(
     setting: KineticSetting,
     radius_um: f64,
     height_um: impl Fn(f64) -> f64,
     method: Method,
+    is_stopped: impl Fn() -> bool,
 ) -> Result<RingPlan, RingPlanError> {
     setting.check()?;
     let lit_um = f64::from(setting.pixels) * setting.pixel_um;
@@ -153,9 +157,12 @@ pub fn plan(
     let wanted = WantedProfile::new(simulation.reaction().cells(), &height_um);
     wanted.check(&simulation)?;
     let exposures = match method {
-        Method::Joint => joint::plan(&simulation, &wanted)?,
-        Method::Seed => seed::plan(&simulation, &wanted),
+        Method::Joint => joint::plan(&simulation, &wanted, &is_stopped)?,
+        Method::Seed => seed::plan(&simulation, &wanted, &is_stopped),
     };
+    if is_stopped() {
+        return Err(RingPlanError::Stopped);
+    }
     if exposures.is_empty() {
         return Err(RingPlanError::TooSmall { pixel_um: setting.pixel_um, step: setting.step });
     }

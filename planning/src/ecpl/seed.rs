@@ -21,8 +21,12 @@ const LONGEST_S: f64 = 10.0;
 const WORSE_S: f64 = 1.0;
 
 /// Plans a first disc from the database, and then one smaller disc after the other, until the cured
-/// height is the wanted one, or no disc improves it.
-pub(super) fn plan(simulation: &RingSimulation, wanted: &WantedProfile) -> Vec<RingExposure> {
+/// height is the wanted one, or no disc improves it, or `is_stopped` returns true.
+pub(super) fn plan(
+    simulation: &RingSimulation,
+    wanted: &WantedProfile,
+    is_stopped: &dyn Fn() -> bool,
+) -> Vec<RingExposure> {
     let Some((pixels, seconds)) = first_disc(simulation, wanted) else { return Vec::new() };
     let mut plan =
         vec![RingExposure::disc(pixels, ExposureTime::from_ms(f64::from(seconds) * 1000.0))];
@@ -30,7 +34,9 @@ pub(super) fn plan(simulation: &RingSimulation, wanted: &WantedProfile) -> Vec<R
     let shown = [disc(simulation, pixels, f64::from(seconds))];
     simulation.expose(&mut chamber, &shown, 0, |_, _| ());
     let mut reach = pixels;
-    while let Some(next) = next_disc(simulation, wanted, &chamber, reach) {
+    while !is_stopped()
+        && let Some(next) = next_disc(simulation, wanted, &chamber, reach)
+    {
         plan.push(RingExposure::disc(next.pixels, next.time));
         (reach, chamber) = (next.pixels, next.chamber);
     }

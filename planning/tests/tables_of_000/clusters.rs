@@ -76,7 +76,7 @@ fn no_other_times_of_the_bitmaps_are_better() {
             step_s: 1e-7,
             ..options(ColumnObjective::Dose, bitmaps)
         };
-        let planned = plan(&light, &part.map, pegda(), &fine).unwrap();
+        let planned = plan(&light, &part.map, pegda(), &fine, || false).unwrap();
         let columns = of_bitmaps(&light, &planned);
         assert_eq!(columns.len(), bitmaps);
         let least = least_error(&columns, &part.doses, 600.0);
@@ -93,7 +93,8 @@ fn any_number_of_threads_writes_the_same_bitmaps() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let setup: Setup = zhao(151, 300, Tracing::Exact);
         let planned = pool.install(|| {
-            plan(&GlassLight::new(setup), &part.map, pegda(), &options(objective, 25)).unwrap()
+            plan(&GlassLight::new(setup), &part.map, pegda(), &options(objective, 25), || false)
+                .unwrap()
         });
         let images: Vec<_> =
             planned.bitmaps.into_iter().map(|bitmap| (bitmap.steps, bitmap.image)).collect();

@@ -125,7 +125,7 @@ fn table_4_4_comes_out() {
     let part = Part::builtin("small-sphere", 200);
     let light = GlassLight::new(zhao(101, 200, RAYS));
     let of = |objective: ColumnObjective| {
-        let planned = plan(&light, &part.map, pegda(), &options(objective, 25)).unwrap();
+        let planned = plan(&light, &part.map, pegda(), &options(objective, 25), || false).unwrap();
         assert!(planned.best.relative_gap() <= 1e-6, "{:e}", planned.best.relative_gap());
         let (doses, _) = in_clusters(&light, &planned.best.seconds, 25);
         (part.measures(&doses), planned.best.error)
@@ -183,6 +183,7 @@ fn four_bitmaps_beside_none_are_five_of_000() {
     // Dynamic programming over all times; the shortest of five clusters has a mean of 0.14 s.
     let part = Part::builtin("sphere", 300);
     let light = GlassLight::new(zhao(151, 300, Tracing::Exact));
-    let planned = plan(&light, &part.map, pegda(), &options(ColumnObjective::Dose, 4)).unwrap();
+    let planned =
+        plan(&light, &part.map, pegda(), &options(ColumnObjective::Dose, 4), || false).unwrap();
     assert_within("Ra", part.measures(&planned.doses).ra_um, 18.6, 0.5);
 }

@@ -51,7 +51,7 @@ pub(crate) fn least_error(light: &[Vec<f64>], wanted: &[f64], high: f64) -> f64 
 fn planned(setup: Setup, wanted: &[f64], high: f64) -> (GlassLight, Vec<f64>, f64) {
     let light = GlassLight::new(setup);
     let stop = Stop { gap: 1e-8, steps: 100_000 };
-    let times = nearest_times(&light, wanted, high, &[0.0], stop);
+    let times = nearest_times(&light, wanted, high, &[0.0], stop, &|| false);
     let missing = light.doses(&times.seconds).into_iter().zip(wanted).map(|(e, e0)| e - e0);
     let error = missing.map(|off| off * off).sum::<f64>() / 2.0;
     assert!((error - times.error).abs() <= 1e-9 * error, "{error} is told as {}", times.error);

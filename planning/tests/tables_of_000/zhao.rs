@@ -95,7 +95,7 @@ impl Part {
 
     /// Finds the times for which 000 optimizes E.
     pub(crate) fn times(&self, light: &GlassLight) -> MirrorTimes {
-        let times = nearest_times(light, &self.doses, LONGEST_S, &[0.0], CERTAIN);
+        let times = nearest_times(light, &self.doses, LONGEST_S, &[0.0], CERTAIN, &|| false);
         assert!(times.relative_gap() <= CERTAIN.gap, "{:e}", times.relative_gap());
         assert!(times.seconds.iter().all(|&time| time < LONGEST_S));
         times

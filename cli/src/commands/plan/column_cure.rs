@@ -148,7 +148,7 @@ pub(super) fn run(args: &ColumnCureArgs, common: &Common) -> Result<(), Exit> {
         progress.warn(&text);
     }
     let options = args.options(&projector, &map, &curve)?;
-    let plan = plan(&light, &map, curve, &options)
+    let plan = plan(&light, &map, curve, &options, || false)
         .with_context(|| args.target.target.display().to_string())?;
     let reported = Reported {
         target: target.name(),

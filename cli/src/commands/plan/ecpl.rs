@@ -71,7 +71,8 @@ pub(super) fn run(args: &EcplArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("plan", common, true);
     let target = args.target.open(&projector, &progress)?;
     let round = target.profile()?;
-    let planned = plan(setting, round.radius_um(), |r| round.height_um(r), args.method)
+    let height_um = |radius_um| round.height_um(radius_um);
+    let planned = plan(setting, round.radius_um(), height_um, args.method, || false)
         .map_err(|error| failed(error).at(args.target.target.display().to_string()))?;
     let RingPlan { simulation, wanted, exposures, cured } = &planned;
     let reported = Cured { simulation, exposures, cured, wanted: Some(wanted) };
