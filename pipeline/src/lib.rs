@@ -16,6 +16,7 @@ pub mod documents;
 pub mod edit;
 pub mod exposure;
 pub mod fix;
+pub mod glass;
 pub mod heights;
 pub mod memory;
 pub mod panel;

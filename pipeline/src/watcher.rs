@@ -47,6 +47,11 @@ pub trait Watcher {
 
     /// Takes the end of such a search.
     fn heights_found(&self) {}
+
+    /// Returns whether nobody waits for the work anymore, so that a long search may end.
+    fn is_stopped(&self) -> bool {
+        false
+    }
 }
 
 /// Keeps lines that are worth knowing, each after the name of its stage. Clones share the lines.

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
+use lamp_pipeline::glass::GlassPlan;
 use lamp_planning::target::HeightMap;
-use lamp_planning::{MirrorSeconds, PlanFolder, PlanFolderError, PlanPages, ShownBitmap};
-use lamp_stack::Length;
-use serde_json::Value;
+use lamp_planning::{MirrorSeconds, PlanFolder, PlanFolderError};
 
 use crate::exit::Exit;
 use crate::streams::new_folder;
@@ -16,23 +15,6 @@ const SECTION: &str = "section.svg";
 const RESIDUAL: &str = "residual.png";
 const TIMES: &str = "times.png";
 
-/// A plan, and what it cures.
-pub(crate) struct PlanFiles<'a> {
-    /// The target's name, or another for what is cured.
-    pub(crate) part: &'a str,
-    /// The command that made the plan.
-    pub(crate) command: String,
-    /// The distance from the image of a mirror to the image of the next.
-    pub(crate) pitch: Length,
-    /// In the order in which they are displayed.
-    pub(crate) bitmaps: &'a [ShownBitmap],
-    pub(crate) report: &'a Value,
-    /// The wanted heights, if known.
-    pub(crate) target: Option<&'a HeightMap>,
-    /// The cured heights, on the same columns.
-    pub(crate) cured: &'a HeightMap,
-}
-
 /// Creates a plan's folder, before the work. With `force` it will replace one that an earlier run
 /// wrote.
 pub(crate) fn plan_folder(path: &Path, force: bool) -> Result<PlanFolder, Exit> {
@@ -40,16 +22,15 @@ pub(crate) fn plan_folder(path: &Path, force: bool) -> Result<PlanFolder, Exit> 
 }
 
 /// Writes all of a plan, and gives the folder its name.
-pub(crate) fn write_plan(folder: PlanFolder, files: &PlanFiles<'_>) -> Result<(), Exit> {
-    let PlanFiles { part, command, pitch, bitmaps, .. } = files;
-    folder.add_bitmaps(&PlanPages { part, command, pitch: *pitch, bitmaps })?;
-    let report = serde_json::to_string_pretty(files.report).expect("reports have text keys");
+pub(crate) fn write_plan(folder: PlanFolder, plan: &GlassPlan) -> Result<(), Exit> {
+    folder.add_bitmaps(&plan.pages())?;
+    let report = serde_json::to_string_pretty(&plan.report).expect("reports have text keys");
     folder.add(REPORT, (report + "\n").as_bytes())?;
-    folder.add(SECTION, &drawn(&[section(files)], SECTION.as_ref())?)?;
-    if let Some(target) = files.target {
-        folder.add(RESIDUAL, &heat_map(&residual(files, target))?)?;
+    folder.add(SECTION, &drawn(&[section(plan)], SECTION.as_ref())?)?;
+    if let Some(target) = &plan.wanted {
+        folder.add(RESIDUAL, &heat_map(&residual(plan, target))?)?;
     }
-    folder.add(TIMES, &heat_map(&times(files))?)?;
+    folder.add(TIMES, &heat_map(&times(plan))?)?;
     Ok(folder.finish()?)
 }
 
@@ -68,15 +49,15 @@ impl From<PlanFolderError> for Exit {
 }
 
 /// The section along the row nearest to the middle that holds a highest column.
-fn section(files: &PlanFiles<'_>) -> Plot {
-    let seen = files.target.unwrap_or(files.cured);
+fn section(plan: &GlassPlan) -> Plot {
+    let seen = plan.wanted.as_ref().unwrap_or(&plan.cured);
     let grid = seen.grid;
     let row = seen.highest_row();
     let x_mm = |column: usize| grid.x_um(column) / 1000.0;
     let pitch_mm = grid.pitch_um / 1000.0;
-    let cured = (0..grid.columns).map(|column| (x_mm(column), files.cured.height_um(column, row)));
+    let cured = (0..grid.columns).map(|column| (x_mm(column), plan.cured.height_um(column, row)));
     let mut series = vec![curve("cured", cured.collect())];
-    if let Some(target) = files.target {
+    if let Some(target) = &plan.wanted {
         let steps = (0..grid.columns)
             .map(|column| (x_mm(column) - pitch_mm / 2.0, target.height_um(column, row)));
         series.push(curve("target", stairs(steps, pitch_mm)));
@@ -85,7 +66,7 @@ fn section(files: &PlanFiles<'_>) -> Plot {
     let most = series.iter().flat_map(|series| &series.curve).map(|at| at.1).fold(1e-9, f64::max);
     let half_mm = grid.columns as f64 * pitch_mm / 2.0;
     Plot {
-        title: format!("{}: section at y = {:.3} mm", files.part, grid.y_um(row) / 1000.0),
+        title: format!("{}: section at y = {:.3} mm", plan.part, grid.y_um(row) / 1000.0),
         x: linear("x (mm)", -half_mm..half_mm),
         // Room for the legend.
         y: linear("height (um)", 0.0..1.3 * most),
@@ -93,26 +74,26 @@ fn section(files: &PlanFiles<'_>) -> Plot {
     }
 }
 
-fn residual(files: &PlanFiles<'_>, target: &HeightMap) -> HeatMap {
+fn residual(plan: &GlassPlan, target: &HeightMap) -> HeatMap {
     HeatMap {
-        title: format!("{}: cured less target", files.part),
+        title: format!("{}: cured less target", plan.part),
         label: "height (um)".to_owned(),
         columns: target.grid.columns,
-        values: files.cured.less(target),
+        values: plan.cured.less(target),
         pitch_mm: target.grid.pitch_um / 1000.0,
         colors: Colors::AboutZero,
     }
 }
 
 /// The time that each mirror is on; a gray level counts as its share of it.
-fn times(files: &PlanFiles<'_>) -> HeatMap {
-    let sum = MirrorSeconds::of(files.bitmaps, |level| f64::from(level) / 255.0);
+fn times(plan: &GlassPlan) -> HeatMap {
+    let sum = MirrorSeconds::of(&plan.bitmaps, |level| f64::from(level) / 255.0);
     HeatMap {
-        title: format!("{}: time of each mirror", files.part),
+        title: format!("{}: time of each mirror", plan.part),
         label: "time (s)".to_owned(),
         columns: sum.mirrors[0],
         values: sum.seconds,
-        pitch_mm: files.pitch.mm(),
+        pitch_mm: plan.pitch.mm(),
         colors: Colors::FromZero,
     }
 }

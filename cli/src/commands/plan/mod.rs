@@ -1,10 +1,7 @@
 //! `lamp plan`: chooses exposures.
 
 mod column_cure;
-mod column_measures;
-mod column_report;
 mod ecpl;
-mod kinetics_report;
 mod layer_map;
 mod simulate;
 mod speed;

@@ -1,5 +1,6 @@
 //! Simulates what bitmaps cure where doses add up, column by column (000).
 
+use lamp_pipeline::glass::{measures_fields, measures_line, unmeasured_heights};
 use lamp_planning::MirrorSeconds;
 use lamp_planning::column::{GlassLight, HeightCurve, Measures, Setup, Tracing};
 use lamp_planning::target::HeightMap;
@@ -7,7 +8,6 @@ use lamp_stack::Length;
 use serde_json::{Map, json};
 
 use super::{ShownExposures, SimulationOutcome};
-use crate::commands::plan::column_measures;
 use crate::exit::Exit;
 
 /// Returns the heights that the doses of all bitmaps together cure.
@@ -43,9 +43,9 @@ pub(super) fn cured(shown: &ShownExposures, tracing: Tracing) -> Result<Simulati
         vec![format!("in {seconds:.1} s {bitmaps} up to {highest:.1} um, {volume_mm3:.4} mm3")];
     if let Some(target) = &wanted {
         let measures = Measures::of(&doses, &target.heights_um, &curve);
-        lines.push(column_measures::line(&measures));
-        lines.extend(column_measures::doubt(target, &curve, material));
-        report.insert("measures".to_owned(), column_measures::fields(&measures));
+        lines.push(measures_line(&measures));
+        lines.extend(unmeasured_heights(target, &curve, material));
+        report.insert("measures".to_owned(), measures_fields(&measures));
     }
     Ok(SimulationOutcome { cured, wanted, lines, report })
 }

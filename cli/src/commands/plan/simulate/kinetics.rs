@@ -1,20 +1,19 @@
 //! Simulates what bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
 
 use anyhow::anyhow;
+use lamp_pipeline::glass::{CuredRings, kinetic_setting, map_grid};
 use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::{RingExposure, RingSimulation, WantedProfile};
 use lamp_planning::target::Round;
 use lamp_stack::Image;
 
 use super::{ShownExposures, SimulationOutcome};
-use crate::commands::plan::ecpl::{failed, grid_of, setting_of};
-use crate::commands::plan::kinetics_report::{Cured, fields, lines_of};
 use crate::exit::Exit;
 
 /// Returns the heights that all bitmaps cure, one after the other.
 pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
     let ShownExposures { exposures, projector, material, target } = shown;
-    let setting = setting_of(projector, material)?;
+    let setting = kinetic_setting(projector, material)?;
     let place = || exposures.name.clone();
     let bitmaps = (1..).zip(&exposures.bitmaps).map(exposure).collect::<Result<Vec<_>, _>>();
     let bitmaps = bitmaps.map_err(|error| error.at(place()))?;
@@ -27,20 +26,24 @@ pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
         .map_err(|error| failed(error).at(place()))?;
     let cured = simulation.cure(&bitmaps);
     let cells = simulation.reaction().cells();
-    let grid = grid_of(&cured, radius_um);
+    let grid = map_grid(&cured, radius_um);
     let wanted = round.as_ref().map(|round| WantedProfile::new(cells, |um| round.height_um(um)));
-    let reported = Cured {
+    let reported = CuredRings {
         simulation: &simulation,
         exposures: &bitmaps,
         cured: &cured,
         wanted: wanted.as_ref(),
     };
     Ok(SimulationOutcome {
-        lines: lines_of(&reported),
-        report: fields(&reported),
+        lines: reported.lines(),
+        report: reported.fields(),
         wanted: round.map(|round| grid.round(|um| round.height_um(um))),
         cured: cured.on(&grid),
     })
+}
+
+fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Exit {
+    Exit::Failed(error.into())
 }
 
 fn exposure((of, bitmap): (usize, &ShownBitmap)) -> Result<RingExposure, Exit> {

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::document;
+use lamp_pipeline::glass::{GivenTarget, GlassPlan};
 use lamp_planning::PlanFolder;
 use lamp_planning::column::Tracing;
 use lamp_planning::projector::Projector;
@@ -18,9 +19,9 @@ use lamp_stack::named;
 use serde_json::{Map, Value, json};
 
 use crate::args::options::{Common, one_of_described};
-use crate::args::target_arg::{GivenTarget, TargetReading};
+use crate::args::target_arg::TargetReading;
 use crate::exit::Exit;
-use crate::output::plan_folder::{PlanFiles, plan_folder, write_plan};
+use crate::output::plan_folder::{plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 use exposures::Exposures;
 
@@ -59,7 +60,7 @@ pub(super) struct SimulateArgs {
 
     /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions,
     /// instead of integrating light exactly; 000 uses 9x15
-    #[arg(long, value_name = "POINTSxDIRECTIONS", value_parser = parse_rays)]
+    #[arg(long, value_name = "POINTSxDIRECTIONS")]
     rays: Option<Tracing>,
 
     /// Target to compare with, in any form that lamp plan column-cure accepts
@@ -86,16 +87,6 @@ enum SimulationModel {
 }
 
 named!(SimulationModel { Column = "column", Kinetics = "kinetics" });
-
-/// Parses rays: `9x15` are 9 x 9 points of a mirror and 15 x 15 directions.
-pub(super) fn parse_rays(text: &str) -> Result<Tracing, String> {
-    // 99 points and directions a side are already 96 million rays of each mirror.
-    let number = |text: &str| text.parse().ok().filter(|number| (1..=99).contains(number));
-    let rays = text.split_once('x').and_then(|(points, directions)| {
-        Some(Tracing::Rays { points: number(points)?, directions: number(directions)? })
-    });
-    rays.ok_or_else(|| format!("`{text}` is not a number of rays: write 9x15, each from 1 to 99"))
-}
 
 /// Exposures of bitmaps, and the setup in which they are shown.
 struct ShownExposures {
@@ -125,7 +116,7 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     let progress = Progress::new("plan", common, true);
     let projector: Projector = document(&args.projector)?;
     let target = match &args.target {
-        Some(path) => Some(args.reading.open(path, &projector, &progress)?),
+        Some(path) => Some(args.reading.settings(path).open(&projector, &progress)?),
         None => None,
     };
     let shown = ShownExposures {
@@ -144,7 +135,7 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
     };
     outcome.lines.iter().for_each(|line| progress.say(line));
     match folder {
-        Some(folder) => write(folder, args.model, &shown, &outcome),
+        Some(folder) => write(folder, args.model, shown, outcome),
         None => Ok(()),
     }
 }
@@ -152,8 +143,8 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
 fn write(
     folder: PlanFolder,
     model: SimulationModel,
-    shown: &ShownExposures,
-    outcome: &SimulationOutcome,
+    shown: ShownExposures,
+    outcome: SimulationOutcome,
 ) -> Result<(), Exit> {
     let ShownExposures { exposures, projector, material, target } = shown;
     let name = target.as_ref().map(|target| target.name());
@@ -167,19 +158,19 @@ fn write(
         "exposure_s": exposures.seconds(),
     });
     let fields = report.as_object_mut().expect("it is an object");
-    fields.extend(outcome.report.clone());
+    fields.extend(outcome.report);
     let compared = name.map_or_else(String::new, |name| format!(" --target {name}"));
-    let files = PlanFiles {
-        part: name.unwrap_or(&exposures.name),
+    let plan = GlassPlan {
+        part: name.unwrap_or(&exposures.name).to_owned(),
         command: format!(
             "lamp plan simulate {} --model {model} --projector {} --material {}{compared}",
             exposures.name, projector.name, material.name
         ),
         pitch: projector.pitch.value,
-        bitmaps: &exposures.bitmaps,
-        report: &report,
-        target: outcome.wanted.as_ref(),
-        cured: &outcome.cured,
+        bitmaps: exposures.bitmaps,
+        report,
+        wanted: outcome.wanted,
+        cured: outcome.cured,
     };
-    write_plan(folder, &files)
+    write_plan(folder, &plan)
 }

@@ -1,74 +1,44 @@
 //! The result of a plan of column cure, in lines and as JSON.
 
-use lamp_planning::column::{
-    ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Measures, Tracing,
-};
-use lamp_planning::projector::Projector;
-use lamp_planning::target::HeightMap;
+use lamp_planning::column::{ColumnObjective, Measures, Tracing};
 use serde_json::{Value, json};
 
-use super::column_measures::{fields, line};
-
-/// A plan, and what it was for.
-pub(super) struct Reported<'a> {
-    pub(super) target: &'a str,
-    pub(super) projector: &'a Projector,
-    pub(super) material: &'a str,
-    pub(super) options: &'a ColumnOptions,
-    pub(super) light: &'a GlassLight,
-    pub(super) map: &'a HeightMap,
-    pub(super) curve: HeightCurve,
-    pub(super) plan: &'a ColumnPlan,
-}
+use super::column_cure::ColumnCure;
+use super::column_measures::{measures_fields, measures_line};
 
 /// How far the glass may stand off, in um.
 const SHIFTS_UM: [f64; 3] = [1.0, 3.0, 5.0];
 /// How much brighter or darker light may be.
 const LIGHT: f64 = 0.02;
 
-/// The lines that are printed.
-pub(super) fn lines_of(reported: &Reported<'_>) -> Vec<String> {
-    let plan = reported.plan;
-    let measures = reported.measures(&plan.doses);
-    let steps: u64 = plan.bitmaps.iter().map(|bitmap| bitmap.steps).sum();
-    let seconds = steps as f64 * reported.options.step_s;
-    let mut lines = vec![
-        match plan.bitmaps.len() {
-            1 => format!("1 bitmap of {seconds:.3} s"),
-            count => format!("{count} bitmaps in {seconds:.3} s"),
-        },
-        line(&measures),
-        format!(
-            "the bitmaps' error is {:.2}% above the error of the best times, which is within {:.1e} of \
-             the least possible",
-            100.0 * plan.excess(),
-            plan.best.relative_gap()
-        ),
-    ];
-    if plan.best.relative_gap() > reported.options.stop.gap {
-        lines.push(format!(
-            "the search stopped after {} steps, before it was within {:.1e}: a shorter --max-time \
-             or a wider --gap ends sooner",
-            plan.best.steps, reported.options.stop.gap
-        ));
+impl ColumnCure {
+    /// Returns lines about the plan, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let plan = &self.plan;
+        let measures = self.measures(&plan.doses);
+        let steps: u64 = plan.bitmaps.iter().map(|bitmap| bitmap.steps).sum();
+        let seconds = steps as f64 * self.options.step_s;
+        vec![
+            match plan.bitmaps.len() {
+                1 => format!("1 bitmap of {seconds:.3} s"),
+                count => format!("{count} bitmaps in {seconds:.3} s"),
+            },
+            measures_line(&measures),
+            format!(
+                "the bitmaps' error is {:.2}% above the error of the best times, which is within {:.1e} of \
+                 the least possible",
+                100.0 * plan.excess(),
+                plan.best.relative_gap()
+            ),
+        ]
     }
-    let at_max = plan.best.at_most(reported.options.max_s);
-    if at_max > 0 {
-        lines.push(format!(
-            "{at_max} mirrors need more than --max-time {:.3}s",
-            reported.options.max_s
-        ));
-    }
-    lines
-}
 
-impl Reported<'_> {
     fn measures(&self, doses: &[f64]) -> Measures {
-        Measures::of(doses, &self.map.heights_um, &self.curve)
+        Measures::of(doses, &self.wanted.heights_um, &self.curve)
     }
 
     fn measured(&self, doses: &[f64]) -> Value {
-        fields(&self.measures(doses))
+        measures_fields(&self.measures(doses))
     }
 
     /// The plan where the glass stands off along x or y: the direction that is the worst.
@@ -100,8 +70,8 @@ impl Reported<'_> {
 }
 
 /// The report, as docs/json.md describes it.
-pub(super) fn report_of(reported: &Reported<'_>) -> Value {
-    let Reported { plan, options, light, .. } = reported;
+pub(super) fn report_of(cure: &ColumnCure) -> Value {
+    let ColumnCure { plan, options, light, .. } = cure;
     let setup = light.setup();
     let step_ms = 1000.0 * options.step_s;
     let times_ms: Vec<_> =
@@ -113,9 +83,9 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
     let lights = [1.0 - LIGHT, 1.0 + LIGHT];
     json!({
         "schema": "lamp-plan-column-cure-2",
-        "target": reported.target,
-        "projector": reported.projector.name,
-        "material": reported.material,
+        "target": cure.target,
+        "projector": cure.projector.name,
+        "material": cure.material,
         "optimize": options.objective.to_string(),
         "gray": options.gray.is_some(),
         "rays": match setup.tracing {
@@ -136,16 +106,16 @@ pub(super) fn report_of(reported: &Reported<'_>) -> Value {
             "gap": plan.best.gap,
             "relative_gap": plan.best.relative_gap(),
             "steps": plan.best.steps,
-            "measures": reported.measured(&plan.best_doses),
+            "measures": cure.measured(&plan.best_doses),
         },
         "bitmaps": {
             "times_ms": times_ms,
             "error": plan.error,
             "excess": plan.excess(),
-            "time_rms_s": reported.time_rms(),
-            "measures": reported.measured(&plan.doses),
+            "time_rms_s": cure.time_rms(),
+            "measures": cure.measured(&plan.doses),
         },
-        "misaligned": SHIFTS_UM.map(|um| reported.shifted(um)),
-        "other_light": lights.map(|by| reported.brighter(by)),
+        "misaligned": SHIFTS_UM.map(|um| cure.shifted(um)),
+        "other_light": lights.map(|by| cure.brighter(by)),
     })
 }

@@ -7,7 +7,7 @@ use lamp_stack::Length;
 use serde_json::{Value, json};
 
 /// Returns the measures as a report has them.
-pub(super) fn fields(measures: &Measures) -> Value {
+pub fn measures_fields(measures: &Measures) -> Value {
     json!({
         "dose_rms_mj_per_cm2": measures.dose_rms,
         "dose_rms_share": measures.relative_rms,
@@ -21,7 +21,7 @@ pub(super) fn fields(measures: &Measures) -> Value {
 }
 
 /// Returns the measures in a line.
-pub(super) fn line(measures: &Measures) -> String {
+pub fn measures_line(measures: &Measures) -> String {
     let columns = |count: u64, what: &str| match count {
         0 => String::new(),
         1 => format!("; 1 column is {what}"),
@@ -41,7 +41,7 @@ pub(super) fn line(measures: &Measures) -> String {
 
 /// Returns a warning of columns for which the material's numbers do not hold, or were not measured,
 /// if there are some.
-pub(super) fn doubt(
+pub fn unmeasured_heights(
     target: &HeightMap,
     curve: &HeightCurve,
     material: &Material,

@@ -1,0 +1,387 @@
+//! The settings of column cure, and the plan that they ask for.
+
+use std::fmt;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use lamp_grayscale::material::Material;
+use lamp_grayscale::resin::ExposureTime;
+use lamp_planning::ShownBitmap;
+use lamp_planning::column::{
+    ColumnObjective, ColumnOptions, ColumnPlan, GlassLight, HeightCurve, Setup, Stop, Tracing, plan,
+};
+use lamp_planning::projector::Projector;
+use lamp_planning::target::{GrayPicture, HeightMap};
+use lamp_stack::{Length, quoted};
+use serde::{Deserialize, Serialize};
+
+use super::GlassPlan;
+use super::column_measures::unmeasured_heights;
+use super::column_report::report_of;
+use super::target::{GivenTarget, TargetSettings, of_work};
+use crate::documents::document_and_word;
+use crate::error::Error;
+use crate::heights::parse_share;
+use crate::watcher::{Remark, Watcher};
+use crate::words::{option, optional, optional_path, path, text};
+
+/// Bitmaps where none are asked for, as in 000.
+const BITMAPS: usize = 25;
+/// No resin is exposed for longer.
+const A_DAY_S: f64 = 86_400.0;
+/// Steps after which a search ends, however near it is.
+const MOST_STEPS: usize = 20_000;
+
+/// A target, a projector and a resin, and how to plan the bitmaps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct ColumnCureSettings {
+    /// The part to cure.
+    #[serde(flatten)]
+    pub target: TargetSettings,
+    /// A built-in projector's name or a file.
+    #[serde(with = "path")]
+    pub projector: PathBuf,
+    /// A built-in material's name or a file.
+    #[serde(with = "path")]
+    pub material: PathBuf,
+    /// Number of bitmaps; `None` is 25, or the number of distinct times if it is smaller.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub bitmaps: Option<BitmapCount>,
+    /// Makes 8-bit bitmaps, for displays that show gray levels.
+    pub gray: bool,
+    /// The quantity to bring nearest to the target's.
+    #[serde(with = "text")]
+    pub optimize: ColumnObjective,
+    /// The longest time of a mirror; `None` is four times the flood exposure time of the highest
+    /// column.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub max_time: Option<LongestTime>,
+    /// How far the glass may be off along each axis.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub robust: Option<Length>,
+    /// How light is computed.
+    #[serde(with = "text")]
+    pub rays: Tracing,
+    /// A gray PNG of the display's size, the light of each mirror relative to its mean.
+    #[serde(with = "optional_path", skip_serializing_if = "Option::is_none")]
+    pub flat_field: Option<PathBuf>,
+    /// The side of a column; `None` is the side in the projector's file.
+    #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
+    pub voxel: Option<Length>,
+    /// How near the best times a search ends.
+    #[serde(with = "text")]
+    pub gap: SearchGap,
+}
+
+/// A number of bitmaps, from 1 to 1000.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitmapCount(usize);
+
+impl FromStr for BitmapCount {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim().parse() {
+            Ok(count @ 1..=1000) => Ok(Self(count)),
+            _ => Err(format!("`{text}` is not a number of bitmaps: write 1 to 1000")),
+        }
+    }
+}
+
+impl fmt::Display for BitmapCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// The longest time of a mirror: above zero, and a day at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LongestTime(ExposureTime);
+
+impl FromStr for LongestTime {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse::<ExposureTime>() {
+            Ok(time) if time.ms() > 0.0 && time.ms() <= 1000.0 * A_DAY_S => Ok(Self(time)),
+            Ok(_) => Err("a mirror must be allowed some time, and a day at most".to_owned()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for LongestTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// The distance from the best times at which a search ends, as a share of the error; above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchGap(f64);
+
+impl Default for SearchGap {
+    fn default() -> Self {
+        Self(1e-6)
+    }
+}
+
+impl FromStr for SearchGap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match parse_share(text)? {
+            0.0 => Err("the best is never reached: write 1e-6".to_owned()),
+            gap => Ok(Self(gap)),
+        }
+    }
+}
+
+impl fmt::Display for SearchGap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Small shares with an exponent, as people write them.
+        write!(f, "{:?}", self.0)
+    }
+}
+
+/// A plan of column cure, and what it was for.
+#[derive(Clone, Debug)]
+pub struct ColumnCure {
+    /// The target's name.
+    pub target: String,
+    /// The projector.
+    pub projector: Projector,
+    /// The material's name.
+    pub material: String,
+    /// The command, as the bitmaps record it.
+    pub command: String,
+    /// How the bitmaps were planned.
+    pub options: ColumnOptions,
+    /// The light of the mirrors on the columns.
+    pub light: GlassLight,
+    /// The wanted height of each column.
+    pub wanted: HeightMap,
+    /// The height that each dose cures.
+    pub curve: HeightCurve,
+    /// The bitmaps, their times and doses.
+    pub plan: ColumnPlan,
+}
+
+impl ColumnCureSettings {
+    /// Plans the bitmaps. `watcher` takes doubts about the resin, the target and the plan.
+    ///
+    /// # Errors
+    /// Returns an error if the target, projector, resin or flat field cannot be read, if settings
+    /// contradict them, or if there is no plan.
+    pub fn plan(&self, watcher: &dyn Watcher) -> Result<ColumnCure, Error> {
+        let (projector, projector_word) = document_and_word::<Projector>(&self.projector)?;
+        let (material, material_word) = document_and_word::<Material>(&self.material)?;
+        let curve = HeightCurve::of(&material).map_err(of_work)?;
+        let target = self.target.open(&projector, watcher)?;
+        let (wanted, light) = self.light(&projector, &target)?;
+        if let Some(text) = unmeasured_heights(&wanted, &curve, &material) {
+            watcher.remark(Remark::warning(text));
+        }
+        let options = self.options(&projector, &wanted, &curve)?;
+        let plan = plan(&light, &wanted, curve, &options, || watcher.is_stopped())
+            .map_err(|error| of_work(error).at(self.target.given()))?;
+        let cure = ColumnCure {
+            target: target.name().to_owned(),
+            command: self.command(target.name(), &projector_word, &material_word, &options),
+            material: material.name,
+            projector,
+            options,
+            light,
+            wanted,
+            curve,
+            plan,
+        };
+        cure.doubts().into_iter().for_each(|doubt| watcher.remark(Remark::note(doubt)));
+        Ok(cure)
+    }
+
+    /// Returns the target's columns, with room for light around it, and the light on them.
+    fn light(
+        &self,
+        projector: &Projector,
+        target: &GivenTarget,
+    ) -> Result<(HeightMap, GlassLight), Error> {
+        let voxel = self.voxel.or(projector.voxel.as_ref().map(|voxel| voxel.value));
+        let Some(voxel) = voxel else {
+            let name = self.projector.display();
+            let most = projector.pitch.value.to_whole_nm();
+            return Err(Error::work(format!(
+                "{name} does not state how wide columns are: give --voxel, at most {most}"
+            )));
+        };
+        let grid = Setup::grid_around(projector, target.size(), voxel)
+            .map_err(|error| of_work(error).at(self.target.given()))?;
+        let wanted = target.heights(&grid, projector)?;
+        let mut setup = Setup::of(projector, &grid, self.rays);
+        if let Some(path) = &self.flat_field {
+            let flat = flat_field(path, &setup);
+            setup.flat_field = flat.map_err(|error| error.at(path.display().to_string()))?;
+        }
+        Ok((wanted, GlassLight::new(setup)))
+    }
+
+    fn options(
+        &self,
+        projector: &Projector,
+        wanted: &HeightMap,
+        curve: &HeightCurve,
+    ) -> Result<ColumnOptions, Error> {
+        let max_s = match self.max_time {
+            Some(LongestTime(time)) => time.ms() / 1000.0,
+            None => self.usual_max_s(projector, wanted, curve)?,
+        };
+        let reach = Setup::reach(projector);
+        if let Some(robust) = self.robust.filter(|robust| *robust > reach) {
+            // Rounded down, so that the length in the message is accepted.
+            let reach = Length::from_um(reach.um().floor());
+            return Err(Error::settings(format!(
+                "--robust {robust}: a mirror's light is about {reach} wide: give less"
+            )));
+        }
+        let shares: [f64; 256] = std::array::from_fn(|level| projector.share(level as u8));
+        if self.gray && !shares.is_sorted() {
+            let name = self.projector.display();
+            return Err(Error::work(format!(
+                "{name}: the light of gray levels must rise for gray bitmaps"
+            )));
+        }
+        Ok(ColumnOptions {
+            objective: self.optimize,
+            bitmaps: self.bitmaps.map_or(BITMAPS, |BitmapCount(count)| count),
+            // A number that was asked for is kept. By default, fewer distinct times need fewer
+            // bitmaps.
+            fewer: self.bitmaps.is_none(),
+            gray: self.gray.then(|| Box::new(shares)),
+            max_s,
+            robust: self.robust.unwrap_or_default(),
+            step_s: projector.step.value.ms() / 1000.0,
+            stop: Stop { gap: self.gap.0, steps: MOST_STEPS },
+        })
+    }
+
+    /// Four times what a wide white field takes for the highest column.
+    fn usual_max_s(
+        &self,
+        projector: &Projector,
+        wanted: &HeightMap,
+        curve: &HeightCurve,
+    ) -> Result<f64, Error> {
+        let highest = Length::from_um(wanted.highest_um());
+        // A height that no dose cures takes forever, and is refused below.
+        let dose = curve.dose(highest.um()).unwrap_or(f64::INFINITY);
+        let wide_s = dose / projector.irradiance().mw_per_cm2();
+        if wide_s > A_DAY_S {
+            let name = self.target.given();
+            return Err(Error::work(format!(
+                "{name}: a column of {highest} takes more than a day of white light"
+            )));
+        }
+        Ok((4.0 * wide_s).min(A_DAY_S))
+    }
+
+    /// The command, as the bitmaps record it.
+    fn command(
+        &self,
+        target: &str,
+        projector: &str,
+        material: &str,
+        options: &ColumnOptions,
+    ) -> String {
+        // Values that were used, not given: defaults may change, and the command must not.
+        let mut command = format!(
+            "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimize {} \
+             --max-time {:.3}s --gap {}",
+            quoted(target),
+            quoted(projector),
+            quoted(material),
+            options.bitmaps,
+            self.optimize,
+            options.max_s,
+            self.gap
+        );
+        if self.gray {
+            command += " --gray";
+        }
+        if self.rays != Tracing::Exact {
+            command += &format!(" --rays {}", self.rays);
+        }
+        if let Some(robust) = self.robust {
+            command += &format!(" --robust {robust}");
+        }
+        if let Some(voxel) = self.voxel {
+            command += &format!(" --voxel {voxel}");
+        }
+        if let Some(name) = self.flat_field.as_deref().and_then(Path::file_name) {
+            command += &option("flat-field", &name.to_string_lossy());
+        }
+        command
+    }
+}
+
+impl ColumnCure {
+    /// Returns the bitmaps with their report, and what they cure.
+    pub fn glass_plan(&self) -> GlassPlan {
+        let step_ms = self.projector.step.value.ms();
+        let bitmaps = self.plan.bitmaps.iter().map(|bitmap| ShownBitmap {
+            image: bitmap.image.clone(),
+            time: ExposureTime::from_ms(step_ms * bitmap.steps as f64),
+        });
+        let heights_um = self.plan.doses.iter().map(|&dose| self.curve.height_um(dose)).collect();
+        GlassPlan {
+            part: self.target.clone(),
+            command: self.command.clone(),
+            pitch: self.projector.pitch.value,
+            bitmaps: bitmaps.collect(),
+            report: report_of(self),
+            cured: HeightMap { grid: self.wanted.grid, heights_um },
+            wanted: Some(self.wanted.clone()),
+        }
+    }
+
+    /// Returns what is doubtful about the times.
+    fn doubts(&self) -> Vec<String> {
+        let (best, options) = (&self.plan.best, &self.options);
+        let late = (best.relative_gap() > options.stop.gap).then(|| {
+            format!(
+                "the search stopped after {} steps, before it was within {:.1e}: a shorter \
+                 --max-time or a wider --gap ends sooner",
+                best.steps, options.stop.gap
+            )
+        });
+        let at_max = best.at_most(options.max_s);
+        let held = (at_max > 0)
+            .then(|| format!("{at_max} mirrors need more than --max-time {:.3}s", options.max_s));
+        late.into_iter().chain(held).collect()
+    }
+}
+
+/// Reads the light of the mirrors that a setup uses.
+fn flat_field(path: &Path, setup: &Setup) -> Result<Vec<f64>, Error> {
+    let file = File::open(path)?;
+    let picture = GrayPicture::read(BufReader::new(file)).map_err(of_work)?;
+    let [columns, rows] = setup.display;
+    if [picture.columns, picture.rows] != [columns, rows] {
+        let (width, height) = (picture.columns, picture.rows);
+        return Err(Error::work(format!(
+            "{width} x {height} pixels, but the display has {columns} x {rows} mirrors"
+        )));
+    }
+    let sum: f64 = picture.levels.iter().map(|&level| f64::from(level)).sum();
+    if sum == 0.0 {
+        return Err(Error::work("all black: no mirror has light"));
+    }
+    let mean = sum / picture.levels.len() as f64;
+    // The mirrors in use are the middle of the display.
+    let [left, top] = [0, 1].map(|axis| (setup.display[axis] - setup.mirrors[axis]) / 2);
+    let row = |row: usize| &picture.levels[row * columns + left..][..setup.mirrors[0]];
+    let used = (top..top + setup.mirrors[1]).flat_map(row);
+    Ok(used.map(|&level| f64::from(level) / mean).collect())
+}
