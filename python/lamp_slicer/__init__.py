@@ -25,8 +25,8 @@ from lamp_slicer._errors import (
 )
 from lamp_slicer._native import VERSION as __version__
 from lamp_slicer._native import Layer, Layers, Stack
-from lamp_slicer._plan import plan_speed, plan_voxels
-from lamp_slicer._records import Feature, Finding, Findings, Record, Runs
+from lamp_slicer._plan import plan_column_cure, plan_ecpl, plan_speed, plan_voxels
+from lamp_slicer._records import Feature, Finding, Findings, Plan, Record, Runs
 from lamp_slicer._slice import slice
 from lamp_slicer._stages import check, compensate, dither, edit, fix, layers, open, tile, write
 from lamp_slicer._zarr import zarr
@@ -43,6 +43,7 @@ __all__ = [
     "LampWarning",
     "Layer",
     "Layers",
+    "Plan",
     "Record",
     "Runs",
     "Stack",
@@ -53,6 +54,8 @@ __all__ = [
     "fix",
     "layers",
     "open",
+    "plan_column_cure",
+    "plan_ecpl",
     "plan_speed",
     "plan_voxels",
     "slice",

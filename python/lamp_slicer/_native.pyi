@@ -8,7 +8,7 @@ from typing import Any, Optional, Union, overload
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from lamp_slicer._records import Record, Runs
+from lamp_slicer._records import Plan, Record, Runs
 
 VERSION: str
 
@@ -120,6 +120,8 @@ def plan_speed(
 def plan_voxels(
     layers: Any, keywords: dict[str, Any], *, memory_bytes: Optional[int]
 ) -> Layers: ...
+def plan_column_cure(keywords: dict[str, Any]) -> Plan: ...
+def plan_ecpl(keywords: dict[str, Any]) -> Plan: ...
 def check(layers: Any, keywords: dict[str, Any]) -> Record: ...
 def write(
     path: Path,

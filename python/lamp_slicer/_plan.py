@@ -1,4 +1,4 @@
-"""Plans of exposures, from the doses of all layers together."""
+"""Plans of exposures: of layers, from the doses of all together, and of bitmaps on a fixed glass."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Literal, Optional, Union
 
 from lamp_slicer import _native
 from lamp_slicer._native import Layers
+from lamp_slicer._records import Plan
 from lamp_slicer._stages import LayersLike, Path
 
 
@@ -71,3 +72,75 @@ def plan_voxels(
         "exposure": exposure,
     }
     return _native.plan_voxels(layers, keywords, memory_bytes=memory_bytes)
+
+
+def plan_column_cure(
+    target: Path,
+    *,
+    projector: Path,
+    material: Path,
+    pixel: Optional[str] = None,
+    full: Optional[str] = None,
+    units: Optional[Literal["mm", "cm", "m", "um", "inch", "ft"]] = None,
+    bitmaps: Optional[int] = None,
+    gray: bool = False,
+    optimize: Optional[Literal["dose", "height"]] = None,
+    max_time: Optional[str] = None,
+    robust: Optional[str] = None,
+    rays: Optional[str] = None,
+    flat_field: Optional[Path] = None,
+    voxel: Optional[str] = None,
+    gap: Union[float, str, None] = None,
+) -> Plan:
+    """Chooses bitmaps and times that cure a part through glass, without layers.
+
+    The keywords are the options of `lamp plan column-cure`, which `lamp plan column-cure --help`
+    describes. `plan.bitmaps.measures` has the errors of heights and doses, `plan.best` those of the
+    best times and the bound on them.
+    """
+    keywords = {
+        "target": target,
+        "projector": projector,
+        "material": material,
+        "pixel": pixel,
+        "full": full,
+        "units": units,
+        "bitmaps": bitmaps,
+        "gray": gray,
+        "optimize": optimize,
+        "max_time": max_time,
+        "robust": robust,
+        "rays": rays,
+        "flat_field": flat_field,
+        "voxel": voxel,
+        "gap": gap,
+    }
+    return _native.plan_column_cure(keywords)
+
+
+def plan_ecpl(
+    target: Path,
+    *,
+    projector: Path,
+    material: Path,
+    pixel: Optional[str] = None,
+    full: Optional[str] = None,
+    units: Optional[Literal["mm", "cm", "m", "um", "inch", "ft"]] = None,
+    method: Optional[Literal["joint", "seed"]] = None,
+) -> Plan:
+    """Chooses bitmaps and times that cure an axisymmetric part, by the kinetics of resin and oxygen.
+
+    The keywords are the options of `lamp plan ecpl`, which `lamp plan ecpl --help` describes.
+    `plan.measures` has the errors of heights, `plan.profile` the heights over the distance from the
+    axis.
+    """
+    keywords = {
+        "target": target,
+        "projector": projector,
+        "material": material,
+        "pixel": pixel,
+        "full": full,
+        "units": units,
+        "method": method,
+    }
+    return _native.plan_ecpl(keywords)

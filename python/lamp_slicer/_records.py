@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from lamp_slicer._native import Layer
+
 
 class Runs(NamedTuple):
     """An image as runs: each row is the sorted list of columns where its value changes.
@@ -109,10 +111,42 @@ class Findings(list[Feature]):
         return f"<lamp_slicer.Findings: {self.layers} layers, {self.needs_a_person} findings>"
 
 
+class Plan(Record):
+    """Bitmaps and times on a fixed glass, with the keys of the program's report.
+
+    `layers` are the bitmaps in the order of their display: `array()` and `exposure_ms` of each, and
+    `write` takes all of them. `target_um` and `cured_um` are the wanted and the cured height of each
+    column of resin in micrometers, and `column_um` is the side of a column. Their first row has the
+    greatest y, as images have.
+    """
+
+    layers: list[Layer]
+    target_um: NDArray[np.float64]
+    cured_um: NDArray[np.float64]
+    column_um: float
+
+    def __init__(
+        self,
+        report: Record,
+        layers: list[Layer],
+        target_um: NDArray[np.float64],
+        cured_um: NDArray[np.float64],
+        column_um: float,
+    ) -> None:
+        super().__init__(report)
+        self.layers = layers
+        self.target_um = target_um
+        self.cured_um = cured_um
+        self.column_um = column_um
+
+    def __repr__(self) -> str:
+        return f"<lamp_slicer.Plan: {self['target']}, {len(self.layers)} bitmaps>"
+
+
 def records(text: str) -> Any:
     """Returns JSON text as objects."""
     return json.loads(text, object_hook=Record)
 
 
-for _class in (Runs, Record, Finding, Feature, Findings):
+for _class in (Runs, Record, Finding, Feature, Findings, Plan):
     _class.__module__ = "lamp_slicer"

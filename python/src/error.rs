@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 
 use lamp_pipeline::{Error, ErrorKind};
+use lamp_planning::target::TargetError;
 use lamp_slicing::SliceError;
 use lamp_stack::StackError;
 use pyo3::prelude::*;
@@ -79,5 +80,9 @@ fn io_cause(error: &Error) -> Option<&io::Error> {
         Some(SliceError::Io(error)) => Some(error),
         _ => None,
     };
-    error.cause().or(of_stack).or(of_part)
+    let of_target = match error.cause() {
+        Some(TargetError::Io(error) | TargetError::Part(SliceError::Io(error))) => Some(error),
+        _ => None,
+    };
+    error.cause().or(of_stack).or(of_part).or(of_target)
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lamp_pipeline::Error;
+use lamp_planning::target::HeightMap;
 use lamp_stack::{
     GrayMask, Image, Layer, LevelChange, MAX_SIDE, Mask, MaskBuilder, PageInfo, Pitch, gray_runs,
     white_runs,
@@ -200,6 +201,13 @@ pub(crate) fn array_of<'py>(py: Python<'py>, image: &Image) -> PyResult<Bound<'p
         }
     };
     filled(py, width * height, dtype, fill)?.call_method1("reshape", ((height, width),))
+}
+
+/// Returns heights as an array of rows.
+pub(crate) fn heights_of<'py>(py: Python<'py>, map: &HeightMap) -> PyResult<Bound<'py, PyAny>> {
+    let memory = PyByteArray::new(py, bytemuck::cast_slice(&map.heights_um));
+    let shape = (map.grid.rows, map.grid.columns);
+    array_over(py, &memory, "float64")?.call_method1("reshape", (shape,))
 }
 
 /// Returns an image as arrays of runs.

@@ -7,6 +7,7 @@
 mod chain;
 mod check;
 mod error;
+mod glass;
 mod layer;
 mod layers;
 mod plan;
@@ -25,6 +26,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::check::check;
+    #[pymodule_export]
+    use crate::glass::{plan_column_cure, plan_ecpl};
     #[pymodule_export]
     use crate::layer::PyLayer;
     #[pymodule_export]

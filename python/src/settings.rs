@@ -50,7 +50,7 @@ fn text_of(value: &Bound<'_, PyAny>) -> PyResult<String> {
 pub(crate) type Probe = fn(&str, &str) -> Result<(), String>;
 
 /// Lengths that must be above zero.
-const ABOVE_ZERO: [&str; 10] = [
+const ABOVE_ZERO: [&str; 14] = [
     "thickness",
     "min",
     "max",
@@ -61,6 +61,10 @@ const ABOVE_ZERO: [&str; 10] = [
     "cell",
     "wall",
     "break-pitch",
+    "pixel",
+    "full",
+    "robust",
+    "voxel",
 ];
 
 /// Checks lengths: only edges move by less than zero.

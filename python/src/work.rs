@@ -106,6 +106,10 @@ impl Watcher for StageWatcher {
     fn remark(&self, remark: Remark) {
         self.work.say(self.stage, remark);
     }
+
+    fn is_stopped(&self) -> bool {
+        self.work.stop.load(Ordering::Relaxed)
+    }
 }
 
 /// Work that goes on in a thread.
@@ -152,11 +156,18 @@ impl Running {
         next
     }
 
-    /// Waits for the end of work that gives no layers.
-    pub(crate) fn finish(mut self, py: Python<'_>) -> PyResult<Value> {
+    /// Waits for the end of work, and returns its report.
+    pub(crate) fn finish(self, py: Python<'_>) -> PyResult<Value> {
+        self.finish_with_layers(py).map(|(_, report)| report)
+    }
+
+    /// Waits for the end of work, and returns its layers and its report.
+    pub(crate) fn finish_with_layers(mut self, py: Python<'_>) -> PyResult<(Vec<Layer>, Value)> {
+        let mut layers = Vec::new();
         loop {
-            if let Next::End(report) = self.next_for(py, WRAPPED)? {
-                return Ok(report);
+            match self.next_for(py, WRAPPED)? {
+                Next::Layer(layer) => layers.push(*layer),
+                Next::End(report) => return Ok((layers, report)),
             }
         }
     }

@@ -15,21 +15,25 @@ from lamp_slicer import _native
 # Options that name files beside the stack, print, or choose layers of an input: Python has other
 # ways, or leaves them to the program.
 OF_COMMANDS = {
-    "classic", "evidence", "expose", "fields", "force", "help", "json", "layers", "layout-out",
-    "layout-picture", "memory", "mirrors", "no-config", "no-sync", "options", "output", "overlap", "packbits",
-    "quiet", "recipe", "recoat", "report", "seam", "strict", "strips", "threads", "time", "timeout", "verbose",
-    "version",
+    "around", "classic", "evidence", "expose", "fields", "force", "help", "json", "keep", "layers", "layout-out",
+    "layout-picture", "map", "map-layer", "map-region", "memory", "mirrors", "no-config", "no-sync",
+    "options", "output", "overlap", "packbits", "plot", "profile", "quiet", "recipe", "recoat", "report", "seam",
+    "sources", "strict", "strips", "threads", "time", "timeout", "verbose", "version",
 }
 
 
-@pytest.mark.parametrize("name", ["slice", "fix", "dither", "compensate", "tile"])
+STAGES = ["slice", "fix", "dither", "compensate", "tile"]
+PLANNERS = ["plan speed", "plan voxels", "plan column-cure", "plan ecpl"]
+
+
+@pytest.mark.parametrize("name", STAGES + PLANNERS)
 def test_each_option_is_a_keyword(name, program):
-    text = program("lamp", name, "--help", check=True).stdout
+    text = program("lamp", *name.split(), "--help", check=True).stdout
     options = set(re.findall(r"^ +(?:-\w, )?--([a-z][a-z-]*)", text, re.MULTILINE))
-    keywords = inspect.signature(getattr(lamp, name)).parameters
+    keywords = inspect.signature(getattr(lamp, name.replace(" ", "_").replace("-", "_"))).parameters
     keywords = {keyword.replace("_", "-") for keyword in keywords}
     assert options - OF_COMMANDS <= keywords
-    own = {"part", "parts", "layers", "name", "memory-bytes"}
+    own = {"part", "parts", "layers", "target", "name", "memory-bytes"}
     assert keywords - own <= options
 
 
@@ -61,7 +65,10 @@ def test_types_hold(tmp_path):
         "for report in lamp.write('a.tif', layers): print(report.stage)\n"
         "stack: lamp.Stack = lamp.open('a.tif')\n"
         "area: int = stack[3].exposed_px + len(list(stack[2:5]))\n"
-        "for feature in lamp.check(stack): print(feature.finding.text)\n",
+        "for feature in lamp.check(stack): print(feature.finding.text)\n"
+        "plan: lamp.Plan = lamp.plan_ecpl('lens', projector='jariwala', material='tmpta')\n"
+        "height: float = plan.cured_um.max()\n"
+        "times = [layer.exposure_ms for layer in plan.layers]\n",
         encoding="utf-8",
     )
     command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache")]

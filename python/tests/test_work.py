@@ -85,6 +85,47 @@ def test_control_c_ends_work(tmp_path, stl, work):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it counts threads as Linux lists them")
+def test_control_c_ends_a_search(tmp_path):
+    """A search that would take minutes leaves Python its lock, and ends with its thread."""
+    code = """
+        import os, threading, time, lamp_slicer as lamp
+        tasks = lambda: len(os.listdir("/proc/self/task"))
+        turns, ended, before = 0, False, tasks()
+        def count():
+            global turns
+            while not ended:
+                time.sleep(0.001)
+                turns += 1
+        counting = threading.Thread(target=count)
+        counting.start()
+        print("begins", flush=True)
+        try:
+            lamp.plan_column_cure(
+                "lens-array", projector="zhao", material="pegda-mw700",
+                optimize="height", voxel="2um", gap=1e-99,
+            )
+        except KeyboardInterrupt:
+            ended = True
+            counting.join()
+            deadline = time.monotonic() + 20
+            # The threads of the pool stay.
+            while tasks() > before + os.cpu_count() and time.monotonic() < deadline:
+                time.sleep(0.05)
+            print(turns, tasks() - before - os.cpu_count(), flush=True)
+    """
+    started = run(code)
+    assert started.stdout.readline() == "begins\n"
+    time.sleep(2.0)
+    assert started.poll() is None
+    begun = time.monotonic()
+    started.send_signal(signal.SIGINT)
+    out, errors = started.communicate(timeout=60)
+    assert time.monotonic() - begun < 30
+    turns, left = map(int, out.split())
+    assert turns > 20 and left <= 0, errors
+
+
 @pytest.fixture(scope="module")
 def stripes(tmp_path_factory):
     """Two stacks of stripes: a layer takes 400 kB as runs and 200 kB as an array."""
