@@ -59,7 +59,7 @@ pub(crate) fn write_stack_or_fields(
     let cut_as = FieldForm::of(&input.stack).map_err(|error| failed(&input.stack, error))?;
     let form = form(cut_as);
     let to = &output.output;
-    if is_stream(to) || is_stack_name(to) {
+    if is_stream(to) || is_stack_name(to) || output.format.is_some() {
         return Err(Exit::usage(format!(
             "{}: the result of {kind}s is a folder of {kind}s: name one with -o, or make one stack \
              of them with lamp join first",

@@ -12,14 +12,14 @@ use anyhow::{Context, anyhow};
 pub(crate) use lamp_pipeline::documents::is_stream;
 use lamp_pipeline::documents::{open_stack, refuse_terminal};
 use lamp_stack::{
-    ContourFormat, Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel,
-    Page, PageInfo, PageWriter, Pages, PassingLayer, PrinterFormat, StackError, StackInfo, close,
+    Destination, FileBeside, FolderBeside, Format, IndexedStack, Layer, PackLevel, Page, PageInfo,
+    PageWriter, Pages, PassingLayer, PrinterFormat, StackError, StackFormat, StackInfo, close,
     map_in_order, sync, write_contours, write_packed, write_printer_file, write_stack,
 };
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
-use crate::output::endings::{FOLDER, STACK, check_ending, check_no_stack, is_packed_name};
+use crate::output::endings::{FOLDER, STACK, check_ending, check_format, check_no_stack};
 use crate::terminal::progress::{Counted, Progress};
 use crate::terminal::stack_notes::{noting, print_note};
 
@@ -299,20 +299,26 @@ pub(crate) fn write_layers(
 ) -> Result<(), Exit> {
     let layers = layers.map(|layer| layer.map(Into::into));
     let decode = |layer: PassingLayer| Ok(layer.decode()?);
-    if is_packed_name(&output.output) {
-        let layers = map_in_order(layers, decode);
-        return write_packed_layers(layers, output, PackLevel::default(), progress);
-    }
-    if let Some(format) = PrinterFormat::of_name(&output.output) {
-        let layers = map_in_order(layers, decode);
-        return write_print(layers, output, format, progress);
+    match stack_format(output)? {
+        StackFormat::Packed => {
+            let layers = map_in_order(layers, decode);
+            return write_packed_layers(layers, output, PackLevel::default(), progress);
+        }
+        StackFormat::Printer(format) => {
+            let layers = map_in_order(layers, decode);
+            return write_print(layers, output, format, progress);
+        }
+        StackFormat::Contours(format) => {
+            refuse_tiff_options(output)?;
+            let Destination::File(path) = destination(output)? else {
+                return Err(not_a_file(StackFormat::Contours(format)));
+            };
+            let counted = map_in_order(layers, decode).inspect(counting(progress));
+            return written_to(&output.output, write_contours(counted, &path, format), progress);
+        }
+        StackFormat::Tiff => {}
     }
     let to = destination(output)?;
-    if let (Some(format), Destination::File(path)) = (ContourFormat::of_name(&output.output), &to) {
-        refuse_tiff_options(output)?;
-        let counted = map_in_order(layers, decode).inspect(counting(progress));
-        return written_to(&output.output, write_contours(counted, path, format), progress);
-    }
     let (counted, format) = (layers.inspect(counting(progress)), format(output.classic));
     let written = if output.packbits {
         let coded = map_in_order(counted, |layer| {
@@ -418,18 +424,45 @@ pub(crate) fn written_to(
     })
 }
 
-/// Refuses to write a stack under the name of another kind of file.
-pub(crate) fn check_stack_name(path: &Path) -> Result<(), Exit> {
-    if ContourFormat::of_name(path).is_some() {
-        return Ok(());
-    }
-    check_ending(path, &STACK).map_err(|error| match &*extension(path) {
-        "png" => {
-            let path = path.display();
-            Exit::usage(format!("{path}: a stack is a TIFF; lamp convert turns it into PNGs"))
+/// Returns the format of the stack that is written: `--format`, or the format of the name's ending, or
+/// a TIFF.
+///
+/// # Errors
+/// Returns wrong usage if the name ends as another kind of file does, or if a folder or a pipe cannot
+/// take the format that is asked for.
+pub(crate) fn stack_format(output: &Output) -> Result<StackFormat, Exit> {
+    let path = output.output.as_path();
+    let named = StackFormat::of_name(path);
+    match output.format {
+        // Any name of a folder will do for pages.
+        None if is_folder(path) => Ok(named
+            .filter(|it| !matches!(it, StackFormat::Contours(_)))
+            .unwrap_or(StackFormat::Tiff)),
+        None if named.is_some() || is_stream(path) => Ok(named.unwrap_or(StackFormat::Tiff)),
+        None => {
+            check_ending(path, &STACK).map(|()| StackFormat::Tiff).map_err(
+                |error| match &*extension(path) {
+                    "png" => {
+                        let path = path.display();
+                        Exit::usage(format!(
+                            "{path}: a stack is a TIFF; lamp convert turns it into PNGs"
+                        ))
+                    }
+                    _ => error,
+                },
+            )
         }
-        _ => error,
-    })
+        Some(format) if is_folder(path) && format != StackFormat::Tiff => Err(not_a_file(format)),
+        Some(format) if is_stream(path) && !format.is_streamed() => Err(not_a_file(format)),
+        Some(format) if is_folder(path) || is_stream(path) => Ok(format),
+        Some(format) => check_format(path, format).map(|()| format),
+    }
+}
+
+/// Refuses a pipe or a folder for a format that is one file.
+fn not_a_file(format: StackFormat) -> Exit {
+    let to = if format.is_streamed() { "a folder" } else { "a pipe or a folder" };
+    Exit::usage(format!("{format} cannot be written to {to}: name a file with -o"))
 }
 
 fn destination(output: &Output) -> Result<Destination, Exit> {
@@ -448,8 +481,6 @@ fn destination(output: &Output) -> Result<Destination, Exit> {
     if is_folder(path) {
         return Ok(Destination::Folder(new_folder(path, output.force)?));
     }
-    // After folders, whose names may end in anything.
-    check_stack_name(path)?;
     Ok(match open_device(path)? {
         Some(device) => Destination::Stream(Box::new(device)),
         None => Destination::File(behind_links(path)),

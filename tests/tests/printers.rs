@@ -121,6 +121,78 @@ fn every_format_comes_back_with_its_images_and_times() {
 }
 
 #[test]
+fn an_option_gives_the_format_that_an_ending_does_not() {
+    let scratch = with_printer();
+    let formats = [
+        ["tiff", "tif"],
+        ["lamp", "lamp"],
+        ["goo", "goo"],
+        ["ctb", "ctb"],
+        ["nanodlp", "nanodlp"],
+        ["sl1", "sl1s"],
+        ["uvj", "uvj"],
+        ["svg", "svg"],
+        ["cli", "cli"],
+        ["dxf", "dxf"],
+    ];
+    for [format, ending] in formats {
+        let slice = format!("{SLICE} --machine mine.toml");
+        for line in ["lamp convert part.tif -q", "fix part.tif -q", &slice] {
+            scratch.run(&format!("{line} -o plain.{ending}")).succeeds_quietly();
+            scratch.run(&format!("{line} --format {format} -o build.v2")).succeeds_quietly();
+            // An ending of the same format does not contradict.
+            scratch.run(&format!("{line} --format {format} -o same.{ending}")).succeeds_quietly();
+            let [plain, named, same] =
+                [format!("plain.{ending}"), "build.v2".to_owned(), format!("same.{ending}")]
+                    .map(|name| scratch.bytes(&name));
+            assert!(plain == named && plain == same, "{line} {format}");
+        }
+    }
+    for format in ["nanodlp", "sl1", "uvj"] {
+        scratch.run(&format!("lamp convert part.tif --format {format} -q -o plate.zip")).succeeds();
+        scratch.run(&format!("lamp convert part.tif -q -o plate.{format}")).succeeds();
+        assert!(scratch.bytes("plate.zip") == scratch.bytes(&format!("plate.{format}")));
+    }
+    scratch
+        .run("tile part.tif --mesh none --format uvj -q -o build --machine mine.toml")
+        .succeeds();
+    scratch.run("lamp convert build -q -o build.tif").succeeds();
+    // A pipe takes what is written as it comes.
+    let packed = scratch.run("lamp convert part.tif --format lamp").succeeds().stdout;
+    scratch.write("piped", &packed);
+    assert_eq!(scratch.layers("piped"), scratch.layers("part.tif"));
+}
+
+#[test]
+fn a_format_that_contradicts_the_output_is_refused() {
+    let scratch = with_printer();
+    for (options, words) in [
+        ("--format goo", &["a GOO file cannot be written to a pipe or a folder"][..]),
+        ("--format uvj -o x/", &["a UVJ file cannot be written to a pipe or a folder"]),
+        ("--format svg", &["a contour file (svg) cannot be written to a pipe or a folder"]),
+        ("--format lamp -o x/", &["a packed stack cannot be written to a folder"]),
+        ("--format goo -o x.ctb", &["x.ctb: .ctb names a CTB file", "--format goo writes a GOO"]),
+        ("--format uvj -o x.tif", &["x.tif: .tif names a TIFF", "leave out --format"]),
+        ("--format tiff -o x.svg", &["x.svg: .svg names a contour file (svg)"]),
+        ("--format goo -o x.zip", &["x.zip: .zip names a packed file"]),
+        ("--format goo -o x.png", &["x.png: .png names a PNG"]),
+        ("--format goo -o x.json", &["x.json: .json names structured text"]),
+        ("--format goo -o x.stl", &["--format, --classic and --machine are for stacks"]),
+        ("--format goo --png -o x/", &["cannot be used with", "--png"]),
+        ("--format gif -o x", &["'gif'", "nanodlp"]),
+        ("-o x.zip", &["or give --format"]),
+    ] {
+        scratch.run(&format!("lamp convert part.tif {options}")).is_wrong_usage(words);
+    }
+    scratch.run("lamp pack part.tif --format goo -o x").is_wrong_usage(&["leave out --format"]);
+    scratch
+        .run("tile part.tif --mesh none --recipe r.json --format goo")
+        .is_wrong_usage(&["--format is for a stack"]);
+    scratch.run("lamp join part.tif --format lamp -o x.tif").is_wrong_usage(&[".tif names a TIFF"]);
+    assert!(!scratch.names().iter().any(|name| name.starts_with('x')));
+}
+
+#[test]
 fn every_command_reads_and_writes_the_files() {
     let scratch = with_printer();
     for ending in ENDINGS {

@@ -13,7 +13,7 @@ use lamp_gantry::GivenTimes;
 use lamp_grayscale::resin::Intensity;
 use lamp_pipeline::heights::Seconds;
 use lamp_pipeline::memory::{in_words, within_limits};
-use lamp_stack::{Length, LengthError, Named, skip_sync};
+use lamp_stack::{Length, LengthError, Named, StackFormat, skip_sync};
 
 use crate::exit::Exit;
 
@@ -167,6 +167,10 @@ pub(crate) struct Output {
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: PathBuf,
 
+    /// Format of the file, if the ending of its name does not give it
+    #[arg(long, value_name = "FORMAT", value_parser = format_parser())]
+    pub(crate) format: Option<StackFormat>,
+
     /// Write a classic TIFF (at most 4 GiB) instead of a BigTIFF
     #[arg(long)]
     pub(crate) classic: bool,
@@ -179,6 +183,12 @@ pub(crate) struct Output {
     /// Replace a folder that an earlier run wrote, once the new one is complete
     #[arg(long, alias = "overwrite")]
     pub(crate) force: bool,
+}
+
+/// Returns a parser of the formats of stacks, which `--help` lists.
+pub(crate) fn format_parser() -> impl TypedValueParser<Value = StackFormat> {
+    PossibleValuesParser::new(StackFormat::all().map(StackFormat::name))
+        .map(|name| StackFormat::named(&name).expect("only names of formats pass"))
 }
 
 /// Returns a parser of a library's named values, which `--help` lists.

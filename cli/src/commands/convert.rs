@@ -23,8 +23,8 @@ use crate::exit::Exit;
 use crate::output::endings::is_step_name;
 use crate::output::numbers::number_of;
 use crate::streams::{
-    Layers, check_beside, check_stack_name, counting, for_tiffs, input_name, is_folder, is_stream,
-    layers_of_input, new_folder, open_pages, progress, unless_found, write_file, write_layers,
+    Layers, check_beside, counting, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
+    new_folder, open_pages, progress, stack_format, unless_found, write_file, write_layers,
     written_to,
 };
 use crate::terminal::progress::{Progress, Severity};
@@ -80,7 +80,7 @@ pub(crate) struct ConvertArgs {
     machine: Option<PathBuf>,
 
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png
-    #[arg(long, conflicts_with = "classic")]
+    #[arg(long, conflicts_with_all = ["classic", "format"])]
     png: bool,
 
     /// Accept pages that another program has changed, and make new checks
@@ -137,7 +137,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     };
     let layers = unless_found(layers, || doubts().filter(|_| args.strict).map(Exit::Findings));
     match shape {
-        OutputKind::Tiff => write_layers(layers, &to, &progress)?,
+        OutputKind::Stack => write_layers(layers, &to, &progress)?,
         OutputKind::Pngs => {
             let counted = layers.inspect(counting(&progress));
             let folder = new_folder(output, args.output.force)?;
@@ -160,7 +160,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
 
 enum OutputKind {
     /// A file, a folder or a stream, as every stage writes it.
-    Tiff,
+    Stack,
     /// A folder of PNGs.
     Pngs,
     /// A PNG of the only layer.
@@ -178,9 +178,11 @@ impl ConvertArgs {
 
     /// Refuses options of stacks.
     fn check_for_part(&self, output: &Path) -> Result<(), Exit> {
-        let of_stacks = [self.input.layers.is_some(), self.png, self.output.classic];
+        let Output { format, classic, .. } = self.output;
+        let of_stacks = [self.input.layers.is_some(), self.png, classic, format.is_some()];
         if of_stacks.contains(&true) || self.machine.is_some() {
-            let why = "--layers, --png, --classic and --machine are for stacks, not for parts";
+            let why =
+                "--layers, --png, --format, --classic and --machine are for stacks, not for parts";
             return Err(Exit::usage(why));
         }
         check_beside(output, Path::new("-"), [&self.input.stack])
@@ -239,18 +241,17 @@ impl ConvertArgs {
     }
 
     fn shape(&self) -> Result<OutputKind, Exit> {
-        let Output { output, classic, packbits, .. } = &self.output;
+        let Output { output, format, classic, packbits, .. } = &self.output;
         let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         match (is_folder(output), self.png) {
             (true, true) => Ok(OutputKind::Pngs),
             (false, _) if named_png && *classic => Err(for_tiffs("--classic")),
             (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
-            (false, _) if named_png => Ok(OutputKind::Png),
+            (false, _) if named_png && format.is_none() => Ok(OutputKind::Png),
             (false, true) => {
                 Err(Exit::usage("PNGs go into a folder: name it, such as -o pictures/"))
             }
-            (true, false) => Ok(OutputKind::Tiff),
-            (false, false) => check_stack_name(output).map(|()| OutputKind::Tiff),
+            (_, false) => stack_format(&self.output).map(|_| OutputKind::Stack),
         }
     }
 }

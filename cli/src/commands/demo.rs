@@ -215,7 +215,13 @@ fn write(
 ) -> Result<(), Exit> {
     write_layers(
         layers,
-        &Output { output: stack.to_owned(), classic: false, packbits: false, force: false },
+        &Output {
+            output: stack.to_owned(),
+            format: None,
+            classic: false,
+            packbits: false,
+            force: false,
+        },
         progress,
     )
 }

@@ -16,7 +16,7 @@ use crate::args::options::{Common, Output, parse_distance, parse_layers, parse_r
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
 use crate::output::json_report::print_answer;
-use crate::streams::{check_stack_name, input_name, is_stream, print, write_file, write_layers};
+use crate::streams::{input_name, is_stream, print, stack_format, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
 /// Check a job: show its frames on a virtual machine and add up the dose of every pixel
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
         if is_stream(output) {
             return Err(Exit::usage("the report goes to standard output: name a file with -o"));
         }
-        check_stack_name(output)?;
+        stack_format(&args.written_to(output))?;
     }
     let folder = JobFolder::open(&args.job)?;
     let job = &folder.job;
@@ -158,9 +158,8 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     });
     match &args.output {
         Some(output) => {
-            let (classic, packbits, force) = (false, false, args.force);
-            let output = Output { output: output.clone(), classic, packbits, force };
-            write_layers(shown.by_ref().filter_map(Result::transpose), &output, &progress)?;
+            let output = &args.written_to(output);
+            write_layers(shown.by_ref().filter_map(Result::transpose), output, &progress)?;
         }
         None => {
             shown.try_for_each(|layer| {
@@ -250,6 +249,12 @@ impl Exposing<'_> {
 }
 
 impl ExposeArgs {
+    /// Returns the output of the doses.
+    fn written_to(&self, output: &Path) -> Output {
+        let (classic, packbits, force) = (false, false, self.force);
+        Output { output: output.to_owned(), format: None, classic, packbits, force }
+    }
+
     fn machine(&self, folder: &JobFolder) -> Result<Disturbance, Exit> {
         let job = &folder.job;
         let pitch_um = job.pitch_um;

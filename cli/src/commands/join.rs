@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lamp_build::{is_fields, join_fields};
-use lamp_stack::{Layer, PackLevel, Pages, join, join_packed};
+use lamp_stack::{Layer, PackLevel, Pages, StackFormat, join, join_packed};
 
 use crate::args::options::{Common, Output};
 use crate::exit::Exit;
-use crate::output::endings::is_packed_name;
 use crate::streams::{
-    format, input_name, is_stream, packed_destination, progress, write_layers, written_to,
+    format, input_name, is_stream, packed_destination, progress, stack_format, write_layers,
+    written_to,
 };
 use crate::terminal::progress::Progress;
 use crate::terminal::stack_notes::print_note;
@@ -62,7 +62,8 @@ pub(crate) fn run(args: &JoinArgs, common: &Common) -> Result<(), Exit> {
             }
         }
     }
-    if is_packed_name(&args.output.output) && args.stacks.iter().all(|stack| is_packed(stack)) {
+    let is_packed_output = stack_format(&args.output)? == StackFormat::Packed;
+    if is_packed_output && args.stacks.iter().all(|stack| is_packed(stack)) {
         return join_frames(&args.stacks, &args.output, &progress);
     }
     let layers =

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clap::Args;
-use lamp_stack::{Format, PackLevel};
+use lamp_stack::{Format, PackLevel, StackFormat};
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
@@ -39,6 +39,11 @@ pub(crate) struct PackArgs {
 pub(crate) fn run(args: &PackArgs, common: &Common) -> Result<(), Exit> {
     let output = args.output.output.as_path();
     check_ending(output, &PACKED_STACK)?;
+    if args.output.format.is_some_and(|format| format != StackFormat::Packed) {
+        return Err(Exit::usage(
+            "lamp pack writes a packed stack: leave out --format, or use lamp convert",
+        ));
+    }
     let progress = progress("pack", common, &args.output);
     let path = &args.input.stack;
     let pages = open_pages(path)?;

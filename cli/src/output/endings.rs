@@ -2,8 +2,9 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-use lamp_stack::STACK_ENDINGS;
+use lamp_stack::{STACK_ENDINGS, StackFormat};
 
 use crate::exit::Exit;
 use crate::streams::extension;
@@ -17,10 +18,10 @@ pub(crate) struct Writes {
 }
 
 /// A stack, as a TIFF or packed.
-pub(crate) const STACK: Writes = Writes {
-    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .ctb, .nanodlp, .sl1 or .uvj",
+pub(crate) static STACK: LazyLock<Writes> = LazyLock::new(|| Writes {
+    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .ctb, .nanodlp, .sl1 or .uvj, or give --format",
     endings: &STACK_ENDINGS,
-};
+});
 
 /// A packed stack.
 pub(crate) const PACKED_STACK: Writes =
@@ -120,6 +121,32 @@ pub(crate) fn check_ending(path: &Path, writes: &Writes) -> Result<(), Exit> {
     }
 }
 
+/// Refuses to write a format to a name with the ending of another.
+///
+/// # Errors
+/// As [`check_ending`].
+pub(crate) fn check_format(path: &Path, format: StackFormat) -> Result<(), Exit> {
+    let ending = extension(path);
+    let is_zip = matches!(format, StackFormat::Printer(printer) if printer.is_zip());
+    let of_other = |(endings, _): &&(&[&str], &str)| endings.contains(&&*ending);
+    match FORMATS.iter().find(of_other) {
+        Some((_, other))
+            if !format.endings().contains(&&*ending) && !(is_zip && ending == "zip") =>
+        {
+            // Stacks have names of their own.
+            let other = StackFormat::of_name(path)
+                .map(|other| other.to_string())
+                .unwrap_or((*other).to_owned());
+            let (path, name) = (path.display(), format.name());
+            Err(Exit::usage(format!(
+                "{path}: .{ending} names {other}, but --format {name} writes {format}: leave out \
+                 --format, or give the file another ending"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses the name of a stack for a file beside one.
 ///
 /// # Errors
@@ -169,11 +196,6 @@ fn parse(text: &str, writes: &Writes) -> Result<PathBuf, String> {
     }
 }
 
-/// Returns true if a name ends as a packed stack does.
-pub(crate) fn is_packed_name(path: &Path) -> bool {
-    extension(path) == "lamp"
-}
-
 /// Returns true if a name ends as a STEP file does.
 pub(crate) fn is_step_name(path: &Path) -> bool {
     let is_step = |end: &OsStr| ["step", "stp"].iter().any(|name| end.eq_ignore_ascii_case(name));
@@ -182,8 +204,6 @@ pub(crate) fn is_step_name(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use lamp_stack::PrinterFormat;
-
     use super::*;
 
     #[test]
@@ -195,11 +215,11 @@ mod tests {
         all.dedup();
         assert_eq!(all.len(), count);
         let known = |writes: &Writes| writes.endings.iter().all(|end| all.contains(end));
-        let kinds = [&STACK, &PACKED_STACK, &PNG, &STL, &SAMPLE, &JSON, &TABLE, &TOML, &HTML];
+        let kinds = [&*STACK, &PACKED_STACK, &PNG, &STL, &SAMPLE, &JSON, &TABLE, &TOML, &HTML];
         assert!(kinds.into_iter().all(known));
-        // Stacks are read and written as the files of every printer.
-        let of_printers = PrinterFormat::ALL.iter().flat_map(|(_, endings)| *endings);
-        assert!(of_printers.into_iter().all(|ending| STACK.endings.contains(ending)));
+        assert!(
+            StackFormat::all().flat_map(StackFormat::endings).all(|ending| all.contains(ending))
+        );
     }
 
     #[test]

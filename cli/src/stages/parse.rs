@@ -35,8 +35,9 @@ use crate::terminal::usage::sentence;
 const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
 
 /// Options that make no sense in a list of stages, and what to do instead.
-const REFUSED: [(&str, &str); 24] = [
+const REFUSED: [(&str, &str); 25] = [
     ("output", "leave out -o: results go where the whole list of stages sends them"),
+    ("format", "leave out --format: results are stored packed"),
     ("classic", "leave out --classic: results are stored packed"),
     ("packbits", "leave out --packbits: results are stored packed"),
     ("force", "leave out --force: no existing file is replaced"),

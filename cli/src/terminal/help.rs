@@ -38,7 +38,7 @@ const FORM: &str = "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\
 const FEW: usize = 3;
 
 /// Options that few people need, of any command.
-const RARE: [&str; 3] = ["classic", "packbits", "force"];
+const RARE: [&str; 4] = ["format", "classic", "packbits", "force"];
 
 /// The options that `-h` shows, of the commands that have many.
 const USUAL: [(&str, &[&str]); 14] = [
@@ -171,7 +171,7 @@ const SLICE_HEADINGS: [(&str, &[&str]); 3] = [
     ("Part", &["units", "fill", "trust_extent"]),
     (
         "Output and memory",
-        &["memory", "report", "json", "strict", "output", "force", "classic", "packbits"],
+        &["memory", "report", "json", "strict", "output", "format", "force", "classic", "packbits"],
     ),
 ];
 

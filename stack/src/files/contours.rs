@@ -48,13 +48,6 @@ pub enum ContourError {
     },
 }
 
-impl ContourFormat {
-    /// Returns the format that a file's name ends in.
-    pub fn of_name(path: &Path) -> Option<Self> {
-        path.extension()?.to_str()?.to_ascii_lowercase().parse().ok()
-    }
-}
-
 /// Writes the outlines of black and white layers along the edges of their pixels, as polygons:
 /// counterclockwise around areas, and clockwise around holes. Areas that touch only at corners are
 /// apart. Each layer is at the height of its top.

@@ -9,16 +9,13 @@ use crate::error::StackError;
 use crate::files::file_format::{FORMAT_BYTES, FileFormat};
 use crate::files::input::Pages;
 use crate::files::page_names::PageFiles;
+use crate::files::stack_format::StackFormat;
 use crate::note::StackNote;
-
-/// The endings of names of stacks in one file, in small letters.
-pub const STACK_ENDINGS: [&str; 11] =
-    ["tif", "tiff", "btf", "tf8", "lamp", "goo", "nanodlp", "sl1", "sl1s", "uvj", "ctb"];
 
 /// Returns whether a file has the extension of a stack in one file.
 pub fn is_stack_name(path: &Path) -> bool {
-    let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
-    extension.is_some_and(|end| STACK_ENDINGS.contains(&&*end))
+    let format = StackFormat::of_name(path);
+    format.is_some_and(|format| !matches!(format, StackFormat::Contours(_)))
 }
 
 /// Returns the stacks at a path, by name: the path itself if it is a file or a folder of pages,

@@ -13,5 +13,6 @@ pub(crate) mod output;
 pub(crate) mod page_folder;
 pub(crate) mod page_names;
 pub(crate) mod split;
+pub(crate) mod stack_format;
 pub(crate) mod temporary;
 pub(crate) mod verify;

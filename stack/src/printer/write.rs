@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::error::StackError;
 use crate::files::output::Destination;
+use crate::files::stack_format::StackFormat;
 use crate::files::temporary::FileBeside;
 use crate::image::Image;
 use crate::layer::Layer;
@@ -41,26 +42,36 @@ pub enum PrinterFormat {
 }
 
 impl PrinterFormat {
-    /// All formats, and the endings of the names of their files.
-    pub const ALL: [(Self, &'static [&'static str]); 5] = [
-        (Self::Goo, &["goo"]),
-        (Self::NanoDlp, &["nanodlp"]),
-        (Self::Sl1, &["sl1", "sl1s"]),
-        (Self::Uvj, &["uvj"]),
-        (Self::Ctb, &["ctb"]),
-    ];
+    /// All formats.
+    pub const ALL: [Self; 5] = [Self::Goo, Self::NanoDlp, Self::Sl1, Self::Uvj, Self::Ctb];
 
-    /// Returns the format that a file's name ends in.
-    pub fn of_name(path: &Path) -> Option<Self> {
-        let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
-        let found = Self::ALL.iter().find(|(_, endings)| endings.contains(&&*ending));
-        found.map(|(format, _)| *format)
+    /// Returns the name of the format in options.
+    pub fn name(self) -> &'static str {
+        self.endings()[0]
+    }
+
+    /// Returns the endings of the names of its files, in small letters.
+    pub fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Goo => &["goo"],
+            Self::NanoDlp => &["nanodlp"],
+            Self::Sl1 => &["sl1", "sl1s"],
+            Self::Uvj => &["uvj"],
+            Self::Ctb => &["ctb"],
+        }
+    }
+
+    /// Returns whether its files are ZIP archives.
+    pub fn is_zip(self) -> bool {
+        matches!(self, Self::NanoDlp | Self::Sl1 | Self::Uvj)
     }
 
     /// Explains why a file cannot be opened, if its name promises a printer's file.
     pub(crate) fn explain(path: &Path, error: StackError) -> StackError {
-        match (error, Self::of_name(path)) {
-            (StackError::NotTiff { .. }, Some(format)) => PrinterFault::NotAsNamed(format).into(),
+        match (error, StackFormat::of_name(path)) {
+            (StackError::NotTiff { .. }, Some(StackFormat::Printer(format))) => {
+                PrinterFault::NotAsNamed(format).into()
+            }
             (error, _) => error,
         }
     }
@@ -81,7 +92,7 @@ impl PrinterFormat {
         added: &PrintLayer,
         layer: u32,
     ) -> Result<(), PrinterFault> {
-        let format = self.name();
+        let format = self.noun();
         if matches!(self, Self::Goo | Self::Uvj) {
             return Ok(());
         }
@@ -115,12 +126,12 @@ impl PrinterFormat {
 impl Display for PrinterFormat {
     /// Formats as a name with an article, such as `a GOO file`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        f.write_str(self.noun())
     }
 }
 
 impl PrinterFormat {
-    fn name(self) -> &'static str {
+    fn noun(self) -> &'static str {
         match self {
             Self::Goo => "a GOO file",
             Self::NanoDlp => "a NanoDLP file",
@@ -203,7 +214,7 @@ where
     E: From<StackError> + Display + Send,
 {
     let Destination::File(path) = to else {
-        return Err(StackError::from(PrinterFault::NotAFile(format.name())).into());
+        return Err(StackError::from(PrinterFault::NotAFile(format.noun())).into());
     };
     let mut layers = layers.peekable();
     let first = match layers.next_if(Result::is_err) {
@@ -220,7 +231,7 @@ where
     let mut file: Box<dyn PrinterWriter> = match format {
         PrinterFormat::Goo => Box::new(GooWriter::new(out)?),
         PrinterFormat::Ctb => {
-            let layers = stack_layers.ok_or(PrinterFault::NoCount(format.name()));
+            let layers = stack_layers.ok_or(PrinterFault::NoCount(format.noun()));
             Box::new(CtbWriter::new(out, layers.map_err(StackError::from)?, &record)?)
         }
         _ => Box::new(ArchiveWriter::new(out, format, &part)),
@@ -248,12 +259,12 @@ fn record_of(first: &Layer, format: PrinterFormat) -> Result<PrintRecord, StackE
     let record = stack.and_then(StackInfo::print_record).ok_or(PrinterFault::NoPanel)?;
     let most = format.most_side();
     if record.panel_px.iter().any(|side| *side > most) {
-        return Err(PrinterFault::Side { format: format.name(), most }.into());
+        return Err(PrinterFault::Side { format: format.noun(), most }.into());
     }
     // The printer moves as the file says, even if that is not at all.
     let states_moves = matches!(format, PrinterFormat::Goo | PrinterFormat::Ctb);
     if states_moves && !(record.first.moves() && record.normal.moves()) {
-        let (format, printer) = (format.name(), record.printer);
+        let (format, printer) = (format.noun(), record.printer);
         return Err(PrinterFault::NoMoves { format, printer }.into());
     }
     Ok(record)

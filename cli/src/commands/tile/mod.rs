@@ -21,8 +21,9 @@ use lamp_machine::Machine;
 use lamp_pipeline::build_findings::{NoMesh, StrayTotals, describe_stray, within_height};
 use lamp_pipeline::documents::document_and_word;
 use lamp_pipeline::tile::TileSettings;
+use lamp_stack::StackFormat;
 
-use crate::args::options::{Common, Output, TimeArgs, parse_layers};
+use crate::args::options::{Common, Output, TimeArgs, format_parser, parse_layers};
 use crate::args::parsed::Parsed;
 use crate::args::tile::TileStageArgs;
 use crate::commands::job::build_clock;
@@ -117,6 +118,10 @@ pub(crate) struct TileArgs {
     /// nowhere with --strips, --recipe, --time or --json]
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+
+    /// Format of the file, if the ending of its name does not give it
+    #[arg(long, value_name = "FORMAT", value_parser = format_parser(), conflicts_with = "fields")]
+    format: Option<StackFormat>,
 
     /// Write classic TIFFs (at most 4 GiB) instead of BigTIFFs
     #[arg(long)]
@@ -296,6 +301,7 @@ impl TileArgs {
         let answers = self.time || self.report.is_printed();
         let is_alone = self.cut_folder().is_none() && self.recipe.is_none() && !answers;
         let output = self.output.clone().or_else(|| is_alone.then(|| PathBuf::from("-")))?;
-        Some(Output { output, classic: self.classic, packbits: self.packbits, force: self.force })
+        let &Self { format, classic, packbits, force, .. } = self;
+        Some(Output { output, format, classic, packbits, force })
     }
 }

@@ -27,9 +27,13 @@ impl TileArgs {
     ) -> Result<(), Exit> {
         let Some(recipe) = &self.recipe else { return Ok(()) };
         if !self.needs_images()
-            && let Some(option) = [("--classic", self.classic), ("--packbits", self.packbits)]
-                .iter()
-                .find_map(|(option, is_given)| is_given.then_some(option))
+            && let Some(option) = [
+                ("--format", self.format.is_some()),
+                ("--classic", self.classic),
+                ("--packbits", self.packbits),
+            ]
+            .iter()
+            .find_map(|(option, is_given)| is_given.then_some(option))
         {
             return Err(Exit::usage(format!(
                 "{option} is for a stack, and --recipe by itself writes none: give it to lamp \
