@@ -341,6 +341,65 @@ fn other_programs_see_the_same_layers() {
     }
 }
 
+/// Prints the white pixels, the height in micrometers and the milliseconds of each layer in the order
+/// of the G-code of an archive for Klipper.
+const KLIPPER_IN_PYTHON: &str = "
+import io, re, zipfile
+from PIL import Image
+archive = zipfile.ZipFile('plate.zip')
+assert archive.testzip() is None and archive.read('.klipper') == b''
+gcode, = [name for name in archive.namelist() if name.endswith('.gcode')]
+z = white = 0
+for line in archive.read(gcode).decode().splitlines():
+    word = line.split(';')[0].split()
+    if word[:1] == ['G1']:
+        assert re.fullmatch('G1 Z[0-9.]+ F[0-9.]+', line)
+        z = float(word[1][1:])
+    elif word[:1] == ['M1451']:
+        image = Image.open(io.BytesIO(archive.read(re.fullmatch('M1451 F\"(.*)\"', line)[1])))
+        assert image.mode == 'L' and image.size == (400, 300)
+        histogram = image.histogram()
+        assert histogram[0] + histogram[255] == 400 * 300
+        # The panel is mirrored left to right.
+        white = histogram[255], sum(image.crop((200, 0, 400, 300)).histogram()[255:])
+    elif word[:1] == ['M1400']:
+        assert word[1] == 'S255'
+        print(*white, round(z * 1000), word[2][1:])
+";
+
+#[test]
+fn archives_for_klipper_come_back_and_others_read_them() {
+    let scratch = with_printer();
+    let layers = scratch.layers("part.tif");
+    let slice = format!("{SLICE} --machine mine.toml --format klipper -o plate.zip");
+    scratch.run(&slice).succeeds_quietly();
+    scratch.run("lamp compare part.tif plate.zip").succeeds();
+    scratch.run("lamp convert plate.zip -q -o back.tif").succeeds_quietly();
+    let read = scratch.layers("back.tif");
+    assert_eq!(masks(&read), masks(&layers));
+    assert_eq!(exposures(&read)[..4], [30_000.0, 21_000.0, 12_000.0, 3000.0].map(Some));
+    assert_eq!((read[9].info.z_um, read[0].pitch), (Some(18_000.0), Pitch::of_dpi(127.0)));
+    // The archive keeps all that other formats have.
+    scratch.run("lamp convert plate.zip --format uvj -q -o by-klipper").succeeds_quietly();
+    scratch.run("lamp convert part.tif --format uvj -q -o at-once").succeeds_quietly();
+    for name in ["by-klipper", "at-once"] {
+        scratch.run(&format!("lamp convert {name} --format klipper -q -o {name}.zip")).succeeds();
+    }
+    assert!(scratch.bytes("by-klipper.zip") == scratch.bytes("at-once.zip"));
+    if ask_python(&scratch, "import PIL").is_none() {
+        return;
+    }
+    let line = |layer: &Layer| {
+        let mask = &masks(std::slice::from_ref(layer))[0];
+        let left = (0..300).map(|row| white_in_both(mask.row(row), &[0, 200], 400)).sum::<u64>();
+        let top = layer.info.z_um.unwrap() + 2000.0;
+        let exposure = [30_000, 21_000, 12_000].get(layer.info.index as usize).unwrap_or(&3000);
+        format!("{} {left} {top} {exposure}\n", mask.white_pixels())
+    };
+    let expected: String = layers.iter().map(line).collect();
+    assert_eq!(ask_python(&scratch, KLIPPER_IN_PYTHON).unwrap(), expected);
+}
+
 /// A built-in printer with pixels of 14 x 19 um: every millimeter is right, in its file and back.
 #[test]
 fn rectangular_pixels_keep_millimeters() {

@@ -5,6 +5,9 @@ use crate::printer::fault::PrinterFault;
 use crate::printer::panel::thousandths;
 use crate::record::{PrintRecord, PrintStep};
 
+/// The key of a layer before which the printer waits for a person.
+pub(crate) const PAUSE: &str = "pause";
+
 /// The sums of a print so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PrintTotals {
@@ -28,6 +31,8 @@ pub(crate) struct PrintLayer {
     /// The height of its top above the platform, in millimeters.
     pub(crate) top_mm: f64,
     pub(crate) step: PrintStep,
+    /// Whether the printer waits for a person before it.
+    pub(crate) pauses: bool,
 }
 
 impl PrintTotals {
@@ -64,7 +69,8 @@ impl PrintTotals {
             .map(|side| record.panel_mm[side] / f64::from(record.panel_px[side].max(1)))
             .product();
         self.volume_mm3 += exposed_px * pixel_mm2 * thickness_um / 1000.0;
-        Ok(PrintLayer { top_mm, step })
+        let pauses = info.other.get(PAUSE).is_some_and(|is| is == true);
+        Ok(PrintLayer { top_mm, step, pauses })
     }
 }
 

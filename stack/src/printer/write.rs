@@ -39,18 +39,22 @@ pub enum PrinterFormat {
     Uvj,
     /// CTB of printers with Chitu boards.
     Ctb,
+    /// Archives for printers that Klipper drives.
+    Klipper,
 }
 
 impl PrinterFormat {
     /// All formats.
-    pub const ALL: [Self; 5] = [Self::Goo, Self::NanoDlp, Self::Sl1, Self::Uvj, Self::Ctb];
+    pub const ALL: [Self; 6] =
+        [Self::Goo, Self::NanoDlp, Self::Sl1, Self::Uvj, Self::Ctb, Self::Klipper];
 
     /// Returns the name of the format in options.
     pub fn name(self) -> &'static str {
-        self.endings()[0]
+        self.endings().first().unwrap_or(&"klipper")
     }
 
-    /// Returns the endings of the names of its files, in small letters.
+    /// Returns the endings of the names of its files, in small letters. Files for Klipper have the
+    /// ending of all ZIP archives.
     pub fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Goo => &["goo"],
@@ -58,12 +62,13 @@ impl PrinterFormat {
             Self::Sl1 => &["sl1", "sl1s"],
             Self::Uvj => &["uvj"],
             Self::Ctb => &["ctb"],
+            Self::Klipper => &[],
         }
     }
 
     /// Returns whether its files are ZIP archives.
     pub fn is_zip(self) -> bool {
-        matches!(self, Self::NanoDlp | Self::Sl1 | Self::Uvj)
+        matches!(self, Self::NanoDlp | Self::Sl1 | Self::Uvj | Self::Klipper)
     }
 
     /// Explains why a file cannot be opened, if its name promises a printer's file.
@@ -80,7 +85,7 @@ impl PrinterFormat {
     fn most_side(self) -> u32 {
         match self {
             Self::Goo => super::goo::header::MOST_SIDE,
-            Self::NanoDlp | Self::Sl1 | Self::Uvj | Self::Ctb => MAX_SIDE,
+            Self::NanoDlp | Self::Sl1 | Self::Uvj | Self::Ctb | Self::Klipper => MAX_SIDE,
         }
     }
 
@@ -97,10 +102,10 @@ impl PrinterFormat {
             return Ok(());
         }
         let unstated = |what| Err(PrinterFault::Unstated { format, what });
-        if self == Self::Ctb {
+        if matches!(self, Self::Ctb | Self::Klipper) {
             let [up, down] = [added.step.lift_mm, added.step.retract_mm].map(|mm| mm[0] + mm[1]);
             return match (record.mirrored, (up - down).abs() < 1e-6) {
-                ([_, true], _) => unstated("a panel mirrored top to bottom"),
+                ([_, true], _) if self == Self::Ctb => unstated("a panel mirrored top to bottom"),
                 (_, false) => unstated("a way back that is not as long as the lift"),
                 _ => Ok(()),
             };
@@ -138,6 +143,7 @@ impl PrinterFormat {
             Self::Sl1 => "an SL1 file",
             Self::Uvj => "a UVJ file",
             Self::Ctb => "a CTB file",
+            Self::Klipper => "an archive for Klipper",
         }
     }
 }
@@ -262,7 +268,8 @@ fn record_of(first: &Layer, format: PrinterFormat) -> Result<PrintRecord, StackE
         return Err(PrinterFault::Side { format: format.noun(), most }.into());
     }
     // The printer moves as the file says, even if that is not at all.
-    let states_moves = matches!(format, PrinterFormat::Goo | PrinterFormat::Ctb);
+    let states_moves =
+        matches!(format, PrinterFormat::Goo | PrinterFormat::Ctb | PrinterFormat::Klipper);
     if states_moves && !(record.first.moves() && record.normal.moves()) {
         let (format, printer) = (format.noun(), record.printer);
         return Err(PrinterFault::NoMoves { format, printer }.into());

@@ -166,6 +166,7 @@ fn prints() -> Named {
         ("plate.nanodlp", file(PrinterFormat::NanoDlp)),
         ("plate.sl1", file(PrinterFormat::Sl1)),
         ("plate.uvj", file(PrinterFormat::Uvj)),
+        ("plate_klipper.zip", file(PrinterFormat::Klipper)),
     ]
 }
 

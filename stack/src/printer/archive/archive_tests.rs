@@ -14,8 +14,8 @@ use crate::{
     StackError, write_printer_file,
 };
 
-const FORMATS: [(PrinterFormat, &str); 3] =
-    [(PrinterFormat::NanoDlp, "nanodlp"), (PrinterFormat::Sl1, "sl1"), (PrinterFormat::Uvj, "uvj")];
+const FORMATS: [PrinterFormat; 4] =
+    [PrinterFormat::NanoDlp, PrinterFormat::Sl1, PrinterFormat::Uvj, PrinterFormat::Klipper];
 
 /// A file in a folder that is removed with it.
 struct Written {
@@ -61,6 +61,14 @@ fn printer(format: PrinterFormat) -> PrintRecord {
             let (first, normal) = (plain(known.first, 0.0), plain(known.normal, 0.0));
             PrintRecord { first_layers: 1, transition_layers: 9, first, normal, ..known }
         }
+        PrinterFormat::Klipper => {
+            let closed = |step: PrintStep| {
+                let up = step.lift_mm[0] + step.lift_mm[1];
+                PrintStep { retract_mm: [up - 1.5, 1.5], ..step }
+            };
+            let (first, normal) = (closed(known.first), closed(known.normal));
+            PrintRecord { mirrored: [true, true], first, normal, ..known }
+        }
         _ => known,
     }
 }
@@ -73,7 +81,12 @@ fn plates(format: PrinterFormat) -> Vec<Layer> {
         PrinterFormat::Uvj => String::new(),
         _ => "blade".to_owned(),
     };
-    if format != PrinterFormat::Uvj {
+    if format == PrinterFormat::Klipper {
+        layers[2].info.other.insert("pause".to_owned(), true.into());
+        layers[4].info.exposure_ms = Some(1234.0);
+        let own = PrintStep { exposure_s: 1.234, light: 7, ..record.normal };
+        layers[4].info.set_record(&own);
+    } else if format != PrinterFormat::Uvj {
         let third = layers[3].info.clone();
         let exposure_ms = Some(thousandths(record.step(4).exposure_s));
         layers[4].info = PageInfo { index: 4, z_um: Some(200.0), exposure_ms, ..third };
@@ -90,7 +103,7 @@ fn text(path: &Path, name: &str) -> String {
 
 #[test]
 fn stacks_are_read_back() {
-    for (format, _) in FORMATS {
+    for format in FORMATS {
         let written = written(plates(format), format).unwrap();
         assert_eq!(read(&written.path).unwrap(), plates(format), "{format}");
         let stack = IndexedStack::open(&written.path).unwrap();
@@ -165,6 +178,19 @@ fn names_and_numbers_are_the_formats() {
     assert_eq!(config["Properties"]["Size"]["Millimeter"]["X"].as_f64(), Some(1.4));
     assert_eq!(config["Properties"]["Bottom"]["LightOnTime"].as_f64(), Some(30.0));
     assert_eq!(config["Layers"][4]["Exposure"]["LightPWM"].as_u64(), Some(7));
+
+    let (written, names) = files(PrinterFormat::Klipper);
+    let images = ["1.png", "2.png", "3.png", "4.png", "5.png"];
+    let others = ["blade.gcode", "preview.png", "preview_cropping.png"];
+    assert_eq!(names, [&[".klipper"], &images[..], &others].concat());
+    let gcode = text(&written.path, "blade.gcode");
+    assert!(gcode.contains(";BottomExposureTime:30\n;"), "{gcode}");
+    assert!(gcode.contains("RESOLUTION=40,24 PIXEL=0.035,0.035\n"), "{gcode}");
+    // By hand from the record: up by 3.3 and 4.3 mm from its own height, and down by 6.1 and 1.5 mm.
+    let fourth = "M1451 F\"4.png\"\nG1 Z3.5 F5.3\nG1 Z7.8 F6.3\nM400\nG4 P3050\nG1 Z1.7 F9.3\n\
+                  G1 Z0.2 F10.3\nM400\nG4 P2550\nM1400 S240 P2300\nG4 P2800\nAFTER_LAYER_CHANGE\n";
+    assert!(gcode.contains(fourth), "{gcode}");
+    assert!(gcode.contains("M1451 F\"3.png\"\nM25\n"), "{gcode}");
 }
 
 #[test]
@@ -173,13 +199,13 @@ fn what_a_format_cannot_state_is_refused() {
         Ok(_) => "nothing".to_owned(),
         Err(error) => error.to_string(),
     };
-    for (format, _) in &FORMATS[..2] {
-        let mut uneven = plates(*format);
+    for &format in &FORMATS[..2] {
+        let mut uneven = plates(format);
         uneven[3].info.thickness_um = Some(25.0);
-        assert!(message(uneven, *format).contains("layer 3 has another than the first"));
-        let mut own = plates(*format);
+        assert!(message(uneven, format).contains("layer 3 has another than the first"));
+        let mut own = plates(format);
         own[2].info.exposure_ms = Some(9.0);
-        assert!(message(own, *format).contains("layer 2 has others than its printer's"));
+        assert!(message(own, format).contains("layer 2 has others than its printer's"));
     }
     let with = |record: &PrintRecord| {
         let mut layers = plates(PrinterFormat::NanoDlp);
@@ -225,7 +251,8 @@ fn said(format: PrinterFormat, name: &str, from: &str, to: &str) -> String {
 
 #[test]
 fn archives_with_faults_are_refused_in_a_sentence() {
-    use PrinterFormat::{NanoDlp, Sl1, Uvj};
+    use PrinterFormat::{Klipper, NanoDlp, Sl1, Uvj};
+    const GCODE: &str = "blade.gcode";
     for (format, name, from, to, words) in [
         (NanoDlp, "meta.json", ":2", ":3", "its version is 3"),
         (NanoDlp, "plate.json", "{", "[", "its plate.json cannot be read"),
@@ -253,6 +280,17 @@ fn archives_with_faults_are_refused_in_a_sentence() {
         ),
         (Uvj, "config.json", "\"Layers\":5", "\"Layers\":7", "lacks slice/00000005.png"),
         (Uvj, "config.json", "\"Z\":0.1,", "\"Z\":0.01,", "its height of a layer is damaged"),
+        (Klipper, GCODE, "M1451 F\"3.png\"", "M1451 F\"4.png\"", "it does not show 3.png"),
+        (Klipper, GCODE, "M1451 F\"5.png\"", "M400", "a move behind the exposure"),
+        (Klipper, GCODE, "G4 P3050", "G4 P3,05", "`3,050` is no number"),
+        (Klipper, GCODE, "M1451 F\"3.png\"\nM25", "PAUSE\nM1451 F\"3.png\"", "nothing"),
+        (Klipper, GCODE, "M25", "M106 S255", "M106 here is not read"),
+        (Klipper, GCODE, "M25", "G1 Z1\nG1 Z2\nG1 Z3", "more than two stages"),
+        (Klipper, GCODE, "P2300", "P2300\nG1 Z9", "a move behind the exposure"),
+        (Klipper, GCODE, "G1 Z0.2 ", "G1 Z0.1 ", "its height of a layer is damaged"),
+        (Klipper, GCODE, ";ResolutionX:40", ";ResolutionX:41", "the image of layer 0 has 40 x 24"),
+        (Klipper, GCODE, ";LiftSpeed:", ";LiftSpeed:x", "LiftSpeed is no number"),
+        (Klipper, GCODE, ";ResolutionX:40", "", "nothing"),
         (Uvj, "config.json", "\"X\":40", "\"X\":-40", "its config.json cannot be read"),
     ] {
         let said = said(format, name, from, to);
@@ -262,6 +300,8 @@ fn archives_with_faults_are_refused_in_a_sentence() {
         (NanoDlp, "3.png", "lacks 3.png"),
         (NanoDlp, "profile.json", "lacks profile.json"),
         (Sl1, "blade00002.png", "lacks blade00002.png"),
+        (Klipper, "2.png", "lacks 2.png"),
+        (Klipper, "blade.gcode", "lacks a .gcode file"),
         (Sl1, "config.ini", "neither a TIFF stack nor"),
     ] {
         let good = written(plates(format), format).unwrap();
@@ -273,7 +313,9 @@ fn archives_with_faults_are_refused_in_a_sentence() {
 
 #[test]
 fn a_name_says_what_a_file_without_its_directory_was() {
-    for (format, ending) in FORMATS {
+    for (format, ending) in
+        FORMATS.into_iter().filter_map(|format| Some((format, *format.endings().first()?)))
+    {
         let good = written(plates(format), format).unwrap();
         let bytes = fs::read(&good.path).unwrap();
         let path = good.path.with_file_name(format!("cut.{ending}"));
@@ -285,7 +327,7 @@ fn a_name_says_what_a_file_without_its_directory_was() {
 
 #[test]
 fn any_damage_gives_layers_or_an_error() {
-    for (format, _) in FORMATS {
+    for format in FORMATS {
         let good = written(plates(format), format).unwrap();
         let bytes = fs::read(&good.path).unwrap();
         let path = good.path.with_extension("bad");

@@ -1,8 +1,9 @@
-//! Printers' files that are ZIP archives of PNGs and texts: NanoDLP, SL1 and UVJ.
+//! Printers' files that are ZIP archives of PNGs and texts: NanoDLP, SL1, UVJ and Klipper.
 //!
-//! Sources: UVtools' description of the three in its readers and writers, and for NanoDLP
+//! Sources: UVtools' description of the four in its readers and writers, and for NanoDLP
 //! docs.nanodlp.com/manual/format. Each format's file has its own numbers.
 
+pub(crate) mod klipper;
 pub(crate) mod nanodlp;
 pub(crate) mod png;
 pub(crate) mod read;
@@ -40,6 +41,8 @@ pub(crate) struct PlateLayer {
     /// The height of its top above the platform.
     pub(crate) top_mm: f64,
     pub(crate) step: PrintStep,
+    /// Whether the printer waits for a person before it.
+    pub(crate) pauses: bool,
 }
 
 /// Parses a JSON file of an archive.
@@ -66,6 +69,7 @@ fn even_layers(
         file,
         top_mm: (f64::from(number + 1) * thickness_um * 1e3).round() / 1e6,
         step: record.step(number),
+        pauses: false,
     };
     Ok((0..).zip(files).map(layer).collect())
 }

@@ -12,10 +12,10 @@ use crate::codec::tiff::{Page, PanelPage};
 use crate::error::{PageFault, StackError, malformed};
 use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::limits::Limits;
-use crate::printer::archive::{Plate, nanodlp, png, sl1, uvj};
+use crate::printer::archive::{Plate, klipper, nanodlp, png, sl1, uvj};
 use crate::printer::fault::PrinterFault;
 use crate::printer::panel::pitch;
-use crate::printer::total::ReadHeight;
+use crate::printer::total::{PAUSE, ReadHeight};
 
 /// The most bytes of a text: layers take a few hundred each.
 const MOST_TEXT: u64 = 64 << 20;
@@ -93,12 +93,19 @@ impl ArchiveReader {
             () if archive.number(nanodlp::PLATE).is_some() => nanodlp::read(&mut archive)?,
             () if archive.number(sl1::CONFIG).is_some() => sl1::read(&mut archive)?,
             () if archive.number(uvj::CONFIG).is_some() => uvj::read(&mut archive)?,
+            () if klipper::is_one(&archive) => klipper::read(&mut archive)?,
             () => return Ok(None),
         };
         let record = &plate.record;
         let mut height = ReadHeight::default();
         let layers = (0..).zip(&plate.layers);
-        let infos = layers.map(|(index, it)| height.info(record, index, it.top_mm, it.step));
+        let infos = layers.map(|(index, it)| {
+            let mut info = height.info(record, index, it.top_mm, it.step)?;
+            if it.pauses {
+                info.other.insert(PAUSE.to_owned(), true.into());
+            }
+            Ok::<_, PrinterFault>(info)
+        });
         let infos = infos.collect::<Result<Vec<_>, _>>()?;
         Ok(Some(Self { archive, plate, infos, next: 0 }))
     }

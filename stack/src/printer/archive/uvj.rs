@@ -168,11 +168,14 @@ pub(crate) fn read(archive: &mut Archive) -> Result<Plate, StackError> {
     let texts = config.layers.unwrap_or_default();
     // Layers without a text of their own are the printer's.
     let layer = |(number, file): (u32, usize)| match texts.get(number as usize) {
-        Some(text) => PlateLayer { file, top_mm: text.z, step: text.exposure.step() },
+        Some(text) => {
+            PlateLayer { file, top_mm: text.z, step: text.exposure.step(), pauses: false }
+        }
         None => PlateLayer {
             file,
             top_mm: (f64::from(number + 1) * size.layer_height * 1e6).round() / 1e6,
             step: record.step(number),
+            pauses: false,
         },
     };
     let layers = (0..).zip(files).map(layer).collect();

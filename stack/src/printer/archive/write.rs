@@ -8,7 +8,7 @@ use zip::{CompressionMethod, ZipWriter};
 
 use crate::error::StackError;
 use crate::printer::archive::png::encode_levels;
-use crate::printer::archive::{nanodlp, sl1, uvj};
+use crate::printer::archive::{klipper, nanodlp, sl1, uvj};
 use crate::printer::total::PrintLayer;
 use crate::printer::write::{CodedLayer, Print, PrinterFile, PrinterFormat, PrinterWriter};
 
@@ -67,6 +67,7 @@ impl PrinterWriter for ArchiveWriter {
         let name = match self.format {
             PrinterFormat::NanoDlp => nanodlp::image_name(number),
             PrinterFormat::Sl1 => sl1::image_name(&sl1::job_name(&self.part), number),
+            PrinterFormat::Klipper => klipper::image_name(number),
             _ => uvj::image_name(number),
         };
         self.layers.push(*added);
@@ -89,6 +90,15 @@ impl PrinterWriter for ArchiveWriter {
                 for [width, height] in [[400, 400], [800, 480]] {
                     let name = format!("thumbnail/thumbnail{width}x{height}.png");
                     self.put_picture(&name, [width, height], print)?;
+                }
+            }
+            PrinterFormat::Klipper => {
+                let layers = std::mem::take(&mut self.layers);
+                self.put(klipper::MARK, &[], CompressionMethod::Stored)?;
+                let gcode = klipper::gcode(print, &layers);
+                self.put_text(&klipper::gcode_name(&self.part), &gcode)?;
+                for (name, size) in klipper::PICTURES {
+                    self.put_picture(name, size, print)?;
                 }
             }
             _ => {

@@ -233,10 +233,10 @@ pub(crate) fn header(
 }
 
 /// Returns a layer's numbers and image.
-pub(crate) fn layer(layer: &PrintLayer, pauses: bool, image: &[u8]) -> Vec<u8> {
-    let PrintLayer { top_mm, step, .. } = layer;
+pub(crate) fn layer(layer: &PrintLayer, image: &[u8]) -> Vec<u8> {
+    let PrintLayer { top_mm, step, pauses } = layer;
     let mut out = Vec::with_capacity(LAYER_BYTES as usize + image.len() + 2);
-    out.extend_from_slice(&u16::from(pauses).to_be_bytes());
+    out.extend_from_slice(&u16::from(*pauses).to_be_bytes());
     put_f32(&mut out, [*top_mm, *top_mm, step.exposure_s, step.light_off_s]);
     put_f32(&mut out, [step.wait_after_s, step.wait_lifted_s, step.wait_before_s]);
     for stage in 0..2 {

@@ -11,10 +11,7 @@ use crate::printer::goo::header::{
 };
 use crate::printer::goo::{MAGIC, VERSION, rle};
 use crate::printer::panel::{orientation, pitch};
-use crate::printer::total::ReadHeight;
-
-/// The key of a layer before which the printer waits for a person.
-pub(crate) const PAUSE: &str = "pause";
+use crate::printer::total::{PAUSE, ReadHeight};
 
 /// Reads a GOO file behind its first eight bytes.
 #[derive(Debug)]

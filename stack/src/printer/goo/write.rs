@@ -4,7 +4,6 @@ use std::io::{Seek, SeekFrom, Write};
 
 use crate::error::StackError;
 use crate::printer::goo::header::{NUMBER_BYTES, NUMBERS_AT, PREVIEWS, footer, header, layer};
-use crate::printer::goo::read::PAUSE;
 use crate::printer::total::PrintLayer;
 use crate::printer::write::{CodedLayer, Print, PrinterFile, PrinterWriter};
 
@@ -22,8 +21,7 @@ impl GooWriter {
 
 impl PrinterWriter for GooWriter {
     fn push(&mut self, added: &PrintLayer, coded: &CodedLayer) -> Result<(), StackError> {
-        let pauses = coded.info.other.get(PAUSE).is_some_and(|is| is == true);
-        Ok(self.out.write_all(&layer(added, pauses, &coded.code))?)
+        Ok(self.out.write_all(&layer(added, &coded.code))?)
     }
 
     fn finish(mut self: Box<Self>, print: &Print<'_>) -> Result<(), StackError> {
