@@ -142,9 +142,9 @@ fn from_heights(
 /// Returns the pixel and the layer of a measured face.
 fn face_of(job: &Job, row: &HeightRow) -> Result<([u32; 2], usize), LearnError> {
     let corner = job.origin_mm().ok_or(LearnError::NoPosition)?;
-    let pitch = job.part.pitch().mm();
+    let [width, height] = job.part.pitch().mm();
     let [x, y] = row.place_mm;
-    let place = [(x - corner[0]) / pitch, (corner[1] - y) / pitch].map(f64::floor);
+    let place = [(x - corner[0]) / width, (corner[1] - y) / height].map(f64::floor);
     let outside =
         place.iter().zip(job.part.size()).any(|(at, size)| !(0.0..f64::from(size)).contains(at));
     if outside {

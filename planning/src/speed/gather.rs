@@ -236,21 +236,26 @@ fn sampled(corner: [i64; 2], side: usize, step: u32) -> Vec<[usize; 2]> {
 #[cfg(test)]
 mod tests {
     use lamp_fixtures::cavity_staircase;
+    use lamp_stack::Layer;
 
     use super::*;
+    use crate::speed::part::PartPages;
     use crate::speed::testing::{part, pegda};
 
-    /// Returns the light of a pixel, summed over all others.
-    fn light(part: &TimedPart, layer: usize, [column, row]: [i64; 2], sigma: f64) -> f64 {
-        let one = (-60..=60).map(|at: i64| (-0.5 * (at as f64 / sigma).powi(2)).exp());
-        let field = one.sum::<f64>().powi(2);
+    /// Returns the light of a pixel, summed over all others, by their distances in micrometers.
+    fn light(part: &TimedPart, layer: usize, [column, row]: [i64; 2], sigma_um: f64) -> f64 {
+        let pitch_um = part.pitch().um();
+        let weight = |away: [i64; 2]| {
+            let square = |k: usize| (away[k] as f64 * pitch_um[k]).powi(2);
+            (-0.5 * (square(0) + square(1)) / (sigma_um * sigma_um)).exp()
+        };
+        let near = || -60..=60;
+        let field: f64 = near().flat_map(|x| near().map(move |y| weight([x, y]))).sum();
         let mut sum = 0.0;
         for y in 0..part.size()[1] {
             for (from, to, _) in part.images[layer].runs(y) {
                 for x in from..to {
-                    let away = [i64::from(x) - column, i64::from(y) - row];
-                    let square = (away[0] * away[0] + away[1] * away[1]) as f64;
-                    sum += (-0.5 * square / (sigma * sigma)).exp();
+                    sum += weight([i64::from(x) - column, i64::from(y) - row]);
                 }
             }
         }
@@ -259,13 +264,22 @@ mod tests {
 
     #[test]
     fn light_is_the_sum_over_all_pixels() {
-        let part = part(&cavity_staircase(1));
-        let gather = Gather::new(&part, &pegda(200.0));
-        for pixel in [[0, 0], [5, 7], [20, 14], [44, 24], [49, 29]] {
-            let lights = gather.light_at(pixel);
-            for layer in [0, 20, 59] {
-                let exact = light(&part, layer, pixel.map(i64::from), 2.0);
-                assert!((f64::from(lights[layer]) - exact).abs() < 1e-4, "{pixel:?} {layer}");
+        let voxels = cavity_staircase(1);
+        let square = voxels.layers().next().unwrap().pitch.unwrap();
+        for pitch in [square, "100x170um".parse().unwrap(), "230x90um".parse().unwrap()] {
+            let mut pages = PartPages::new(128);
+            voxels.layers().for_each(|layer| {
+                pages.push(Layer { pitch: Some(pitch), ..layer }).unwrap();
+            });
+            let part = pages.finish().unwrap();
+            let gather = Gather::new(&part, &pegda(200.0));
+            for pixel in [[0, 0], [5, 7], [20, 14], [44, 24], [49, 29]] {
+                let lights = gather.light_at(pixel);
+                for layer in [0, 20, 59] {
+                    let exact = light(&part, layer, pixel.map(i64::from), 200.0);
+                    let off = (f64::from(lights[layer]) - exact).abs();
+                    assert!(off < 1e-4, "{pitch} {pixel:?} {layer}");
+                }
             }
         }
     }

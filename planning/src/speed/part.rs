@@ -1,7 +1,7 @@
 //! Gathers the data of a stack's pages that planners of times need.
 
 use lamp_grayscale::resin::ExposureTime;
-use lamp_stack::{Change, Dpi, Image, Layer, Length, NotSquare, RunImage};
+use lamp_stack::{Change, Image, Layer, Length, Pitch, RunImage};
 use thiserror::Error;
 
 use crate::light::{LayerLight, LayerTime, Light, LightError};
@@ -11,7 +11,7 @@ use crate::light::{LayerLight, LayerTime, Light, LightError};
 pub struct TimedPart {
     pub(crate) images: Vec<Image>,
     layers: Vec<TimedLayer>,
-    dpi: Dpi,
+    pitch: Pitch,
     wanted: u8,
 }
 
@@ -38,9 +38,6 @@ pub enum PartError {
     /// A page does not state its resolution.
     #[error("{0} does not state its resolution")]
     NoResolution(String),
-    /// The pixels of a page are not square.
-    #[error("{0}: {1}")]
-    NotSquare(String, NotSquare),
     /// A page does not state its height and thickness.
     #[error("{0} does not state its height and thickness")]
     NoThickness(String),
@@ -60,14 +57,14 @@ pub enum PartError {
 pub struct PartPages {
     images: Vec<Image>,
     layers: Vec<TimedLayer>,
-    dpi: Option<Dpi>,
+    pitch: Option<Pitch>,
     wanted: u8,
 }
 
 impl PartPages {
     /// Begins with no pages. Pixels of level `wanted` or more belong to the part.
     pub fn new(wanted: u8) -> Self {
-        Self { images: Vec::new(), layers: Vec::new(), dpi: None, wanted }
+        Self { images: Vec::new(), layers: Vec::new(), pitch: None, wanted }
     }
 
     /// Takes the next page.
@@ -78,7 +75,6 @@ impl PartPages {
     pub fn push(&mut self, layer: Layer) -> Result<(), PartError> {
         let name = || layer.info.name();
         let pitch = layer.pitch.ok_or_else(|| PartError::NoResolution(name()))?;
-        let dpi = pitch.square("plans need").map_err(|why| PartError::NotSquare(name(), why))?;
         let heights = layer.info.z_um.zip(layer.info.thickness_um);
         let (z_um, thickness_um) = heights.ok_or_else(|| PartError::NoThickness(name()))?;
         let positive = |number: f64| number > 0.0 && number.is_finite();
@@ -87,7 +83,7 @@ impl PartPages {
         }
         let size = |image: &Image| (image.width(), image.height());
         let unlike = |first: &Image| size(first) != size(&layer.image);
-        if self.images.first().is_some_and(unlike) || *self.dpi.get_or_insert(dpi) != dpi {
+        if self.images.first().is_some_and(unlike) || *self.pitch.get_or_insert(pitch) != pitch {
             return Err(PartError::Unlike(name()));
         }
         self.layers.push(TimedLayer {
@@ -105,12 +101,12 @@ impl PartPages {
     /// # Errors
     /// Returns an error if there was no page.
     pub fn finish(self) -> Result<TimedPart, PartError> {
-        let Self { mut images, mut layers, dpi, wanted } = self;
-        let dpi = dpi.ok_or(PartError::NoLayers)?;
+        let Self { mut images, mut layers, pitch, wanted } = self;
+        let pitch = pitch.ok_or(PartError::NoLayers)?;
         // Light comes from above: doses add up from the last layer down.
         images.reverse();
         layers.reverse();
-        Ok(TimedPart { images, layers, dpi, wanted })
+        Ok(TimedPart { images, layers, pitch, wanted })
     }
 }
 
@@ -120,9 +116,9 @@ impl TimedPart {
         &self.layers
     }
 
-    /// Returns the size of a pixel.
-    pub fn pitch(&self) -> Length {
-        self.dpi.pitch()
+    /// Returns the distances of pixels.
+    pub fn pitch(&self) -> Pitch {
+        self.pitch
     }
 
     /// Returns the images' width and height in pixels.
@@ -143,16 +139,16 @@ impl TimedPart {
     /// that passes from the layer above.
     pub(crate) fn per_second(&self, light: &Light) -> Result<Vec<LayerLight>, PartError> {
         light.check()?;
-        light.check_spread(self.dpi)?;
+        light.check_spread(self.pitch)?;
         let second = ExposureTime::from_ms(1000.0);
         let layer = |layer: &TimedLayer| LayerTime { thickness: layer.thickness, time: second };
         let layers: Vec<_> = self.layers.iter().map(layer).collect();
-        Ok(light.layers(self.dpi, &layers))
+        Ok(light.layers(self.pitch, &layers))
     }
 
     /// Returns σ in pixels, along rows and along columns.
     pub(crate) fn spread_pixels(&self, light: &Light) -> [f64; 2] {
-        light.spread_pixels(self.dpi)
+        light.spread_pixels(self.pitch)
     }
 
     /// Returns the least level of the part.
