@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use lamp_fixtures::{Facet, Mesh, Sample};
-use lamp_stack::{Length, Pitch};
+use lamp_stack::{Image, Layer, Length, MaskBuilder, PageInfo, Pitch};
 use lamp_tests::{Scratch, ask_python, mask, read_stack};
 use serde_json::{Value, json};
 
@@ -136,10 +136,31 @@ fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
         let ran = scratch.run(line).is_refused_with(&["14 x 19 um", "square pixels"]);
         assert!(ran.stdout.is_empty(), "{line}");
     }
-    scratch
-        .run("lamp compare ball.tif ball.tif --tolerance 20um")
-        .is_wrong_usage(&["14 x 19 um", "a length needs square pixels"]);
-    scratch.run("lamp compare ball.tif ball.tif").succeeds();
+}
+
+/// A square that is shifted: its farthest pixel is as far off as the shift is long, in micrometers.
+#[test]
+fn a_tolerance_in_micrometers_is_as_long_along_both_axes() {
+    let scratch = Scratch::new();
+    let stack = |name: &str, left: u32, top: u32| {
+        let mut mask = MaskBuilder::new(60);
+        for row in 0..60 {
+            let ends = [left, left + 30];
+            let is_white = (top..top + 30).contains(&row);
+            mask.push_row(if is_white { &ends } else { &[] }).unwrap();
+        }
+        let image = Image::from(mask.finish()).into();
+        scratch.stack(name, [Layer { info: PageInfo::default(), pitch: Some(pitch()), image }]);
+    };
+    stack("a.tif", 10, 10);
+    for [columns, rows] in [[2, 0], [0, 2], [3, 2], [1, 5]] {
+        stack("b.tif", 10 + columns, 10 + rows);
+        let off_um = (f64::from(columns) * 14.0).hypot(f64::from(rows) * 19.0);
+        for (tolerance_um, status) in [(off_um + 0.01, 0), (off_um - 0.01, 1)] {
+            let line = format!("lamp compare a.tif b.tif --tolerance {tolerance_um:.4}um -q");
+            assert_eq!(scratch.run(&line).statuses[0], Some(status), "{columns} {rows}");
+        }
+    }
 }
 
 /// A box, by columns, rows and tenths of a millimeter at 14 x 19 um.

@@ -135,7 +135,7 @@ const MAX_RADIUS: f64 = (1 << 27) as f64;
 
 /// Squared lengths in pixels this close to a whole number are whole: lengths come from
 /// micrometers and are rounded.
-const ROUNDING: f64 = 1e-7;
+pub(super) const ROUNDING: f64 = 1e-7;
 
 /// Returns the squared distance from which on pixels are at least `radius` away.
 pub(super) fn at_least(radius: f64) -> u64 {
@@ -147,6 +147,18 @@ pub(super) fn at_least(radius: f64) -> u64 {
 pub(super) fn more_than(radius: f64) -> u64 {
     let radius = radius.clamp(0.0, MAX_RADIUS);
     (radius * radius + ROUNDING).floor() as u64 + 1
+}
+
+/// Returns the half widths of an ellipse by the distance in rows from its center, as far as an image
+/// of `height` rows needs them. Its half axes are along the row and across it, in pixels; their
+/// squares are larger by `rounding`.
+pub(super) fn half_widths(axes: [f64; 2], rounding: f64, height: u32) -> Vec<f64> {
+    let [along, across] = axes.map(|pixels| pixels.clamp(0.0, MAX_RADIUS));
+    // The height of a pixel in widths. An ellipse without a size has its center alone.
+    let aspect = if across > 0.0 { along / across } else { 1.0 };
+    let left = |away: u32| along * along + rounding - (f64::from(away) * aspect).powi(2);
+    let rows = (0..height + 1).map(left).take_while(|left| *left >= 0.0);
+    rows.map(f64::sqrt).collect()
 }
 
 impl Disc {
@@ -163,6 +175,20 @@ impl Disc {
         // limit keeps sums with a column within an i32.
         let half = |away: u64| (square - 1 - away * away).isqrt().min(BEYOND as u64 / 2) as i32;
         Self::of_halves(rows.map(half).collect())
+    }
+
+    /// Returns the pixels within a distance of the center, given in pixels along the row and across
+    /// it, as far as an image of `height` rows needs them.
+    pub(super) fn within(distance: [f64; 2], height: u32) -> Self {
+        Self::of_widths(&half_widths(distance, ROUNDING, height))
+    }
+
+    /// Returns the pixels of half widths that are not rounded.
+    pub(super) fn of_widths(widths: &[f64]) -> Self {
+        // The limit keeps sums with a column within an i32.
+        Self::of_halves(
+            widths.iter().map(|width| width.min(f64::from(BEYOND / 2)) as i32).collect(),
+        )
     }
 
     /// Returns the pixels that lie in an ellipse of these half axes, along the row and across it,

@@ -2,11 +2,11 @@
 
 use lamp_stack::{Difference, GrayMask, Image, Mask, Op};
 
-use super::erode::{Disc, DistanceSources, SourceColour, more_than};
+use super::erode::{Disc, DistanceSources, SourceColour};
 use super::row_runs::RowRuns;
 
-/// Returns the part of the difference of two images that is farther than `distance` pixels from
-/// their edges, center to center.
+/// Returns the part of the difference of two images that is farther than a distance from their
+/// edges, center to center. `distance` is in pixels, along rows and along columns.
 ///
 /// A pixel that differs is forgiven if, within the distance of it, the first image somewhere has
 /// the color that the second has at the pixel, and the second somewhere has the color of the first.
@@ -25,7 +25,7 @@ use super::row_runs::RowRuns;
 /// });
 /// let difference = Overlaid::new(&a, &b, [0, 0]).difference().unwrap();
 /// assert_eq!(difference.added.row(1), [5, 6, 10, 11]);
-/// let left = beyond_tolerance(&a, &b, &difference, 1.0).unwrap();
+/// let left = beyond_tolerance(&a, &b, &difference, [1.0; 2]).unwrap();
 /// assert_eq!(left.added.row(1), [10, 11]);
 /// ```
 ///
@@ -37,9 +37,9 @@ pub fn beyond_tolerance(
     a: &Image,
     b: &Image,
     difference: &Difference,
-    distance: f64,
+    distance: [f64; 2],
 ) -> Option<Difference> {
-    let disc = Disc::below(more_than(distance), a.height());
+    let disc = Disc::within(distance, a.height());
     Some(Difference {
         added: beyond(&difference.added, a, b, &disc)?,
         missing: beyond(&difference.missing, b, a, &disc)?,
@@ -132,13 +132,21 @@ mod tests {
         #[test]
         fn what_is_forgiven_is_what_the_rule_says(
             [a, b] in images(),
-            distance in prop_oneof![Just(0.0), Just(1.0), Just(1.5), Just(3.0)],
+            distance in prop_oneof![
+                Just([0.0; 2]), Just([1.0; 2]), Just([1.5; 2]), Just([3.0; 2]),
+                // 40 um at pixels of 14 x 19 um, of 40 x 20 um, and of 15 x 60 um.
+                Just([40.0 / 14.0, 40.0 / 19.0]), Just([1.0, 2.0]), Just([40.0 / 15.0, 40.0 / 60.0]),
+            ],
         ) {
             let difference = Overlaid::new(&a, &b, [0, 0]).difference().unwrap();
             let left = beyond_tolerance(&a, &b, &difference, distance).unwrap();
             let near: Vec<[i64; 2]> = (-3..=3)
                 .flat_map(|x| (-3..=3).map(move |y| [x, y]))
-                .filter(|&[x, y]| ((x * x + y * y) as f64) <= distance * distance)
+                .filter(|at| {
+                    // As a share of the distance; nothing but the pixel itself is at no distance.
+                    let share = |k: usize| if at[k] == 0 { 0.0 } else { at[k] as f64 / distance[k] };
+                    share(0).hypot(share(1)) <= 1.0 + 1e-9
+                })
                 .collect();
             for (x, y) in (0..i64::from(SIDE)).flat_map(|x| (0..i64::from(SIDE)).map(move |y| (x, y))) {
                 let [of_a, of_b] = [level(&a, x, y), level(&b, x, y)];

@@ -70,18 +70,15 @@ pub(crate) enum Tolerance {
 }
 
 impl Tolerance {
-    /// Returns it in pixels.
+    /// Returns it in pixels, along rows and along columns.
     ///
     /// # Errors
-    /// Returns an error if it is a length, and pixels have no known size or are not square.
-    fn pixels(self, pitch: Option<Pitch>) -> Result<f64, String> {
+    /// Returns an error if it is a length, and pixels have no known size.
+    fn pixels(self, pitch: Option<Pitch>) -> Result<[f64; 2], String> {
         match (self, pitch) {
-            (Self::Pixels(pixels), _) => Ok(pixels),
+            (Self::Pixels(pixels), _) => Ok([pixels; 2]),
             (Self::Length(_), None) => Err("it states no resolution".to_owned()),
-            (Self::Length(length), Some(pitch)) => match pitch.square("a length needs") {
-                Ok(dpi) => Ok(length.pixels(dpi)),
-                Err(why) => Err(why.to_string()),
-            },
+            (Self::Length(length), Some(pitch)) => Ok(pitch.pixels(length)),
         }
     }
 }
@@ -177,12 +174,11 @@ mod tests {
         assert_eq!("1.5px".parse(), Ok(Tolerance::Pixels(1.5)));
         assert_eq!("20um".parse(), Ok(Tolerance::Length(Length::from_um(20.0))));
         let dpi = Pitch::of_dpi(254.0);
-        assert_eq!(Tolerance::Length(Length::from_um(150.0)).pixels(dpi), Ok(1.5));
-        let refused =
-            |pitch: Option<Pitch>| Tolerance::Length(Length::from_um(150.0)).pixels(pitch);
-        assert!(refused(None).unwrap_err().contains("no resolution"));
-        let why = refused(Some("14x19um".parse().unwrap())).unwrap_err();
-        assert_eq!(why, "its pixels are 14 x 19 um, and a length needs square pixels");
+        assert_eq!(Tolerance::Length(Length::from_um(150.0)).pixels(dpi), Ok([1.5; 2]));
+        let refused = Tolerance::Length(Length::from_um(150.0)).pixels(None);
+        assert!(refused.unwrap_err().contains("no resolution"));
+        let two = Tolerance::Length(Length::from_um(38.0)).pixels("19x38um".parse().ok());
+        assert_eq!(two, Ok([2.0, 1.0]));
         for wrong in ["", "px", "-1px", "nanpx", "1e9px", "-3um"] {
             assert!(wrong.parse::<Tolerance>().is_err(), "{wrong}");
         }

@@ -42,7 +42,7 @@ pub(super) fn write_picture(
     path: &Path,
     stacks: [NamedStack<'_>; 2],
     section: &Section,
-    tolerance: f64,
+    tolerance: [f64; 2],
 ) -> Result<(), Exit> {
     let image = |(stack, name): NamedStack<'_>, position: Option<usize>| {
         let layer = position.map(|position| stack.layer(position)).transpose();

@@ -21,7 +21,7 @@ pub(super) struct StackComparison<'a> {
     /// The headers of the pages of the first and of the second stack.
     pub(super) headers: [&'a [PageHeader]; 2],
     /// In pixels.
-    pub(super) tolerance: f64,
+    pub(super) tolerance: [f64; 2],
     /// The sections that differ or in which something was forgiven, from the bottom up.
     pub(super) sections: Vec<SectionDifference>,
 }
@@ -186,7 +186,8 @@ pub(super) fn answer(comparison: &StackComparison<'_>) -> impl Serialize {
         "by": if comparison.pairing.is_by_height() { "heights" } else { "indices" },
         "compared": comparison.pairing.sections().len(),
         "different": comparison.told().count(),
-        "tolerance_px": comparison.tolerance,
+        // In widths of a pixel.
+        "tolerance_px": comparison.tolerance[0],
         "added_px": comparison.sum(|found| found.added),
         "missing_px": comparison.sum(|found| found.missing),
         "forgiven_px": comparison.sum(|found| found.forgiven),

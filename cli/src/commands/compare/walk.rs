@@ -68,7 +68,7 @@ impl MemorySize for PagePair {
 pub(super) fn walk(
     stacks: [NamedStack<'_>; 2],
     pairing: &Pairing,
-    tolerance: f64,
+    tolerance: [f64; 2],
     progress: &Progress,
 ) -> Result<Vec<SectionDifference>, Exit> {
     let pages = pairing.sections().iter().map(|section| {
@@ -93,7 +93,7 @@ fn page((stack, name): NamedStack<'_>, position: Option<usize>) -> Result<Option
 fn of_pages(
     stacks: [NamedStack<'_>; 2],
     PagePair { section, a, b }: PagePair,
-    tolerance: f64,
+    tolerance: [f64; 2],
 ) -> Result<SectionDifference, Exit> {
     // Before decoding: images that cannot be compared cost nothing.
     let shift = shift_of(stacks, &section)?;
@@ -147,7 +147,7 @@ pub(super) struct Images {
     a: Image,
     b: Image,
     shift: [i64; 2],
-    tolerance: f64,
+    tolerance: [f64; 2],
 }
 
 /// Two images on one frame, and where they differ.
@@ -160,15 +160,20 @@ pub(super) struct Compared<'a> {
 
 impl Images {
     /// Takes a section's images. One that is missing is black, and no edge of it is near.
-    pub(super) fn new(a: Option<Image>, b: Option<Image>, shift: [i64; 2], tolerance: f64) -> Self {
+    pub(super) fn new(
+        a: Option<Image>,
+        b: Option<Image>,
+        shift: [i64; 2],
+        tolerance: [f64; 2],
+    ) -> Self {
         let black = |other: &Image| Image::Mask(Mask::black(other.width(), other.height()));
         let (a, b, tolerance) = match (a, b) {
             (Some(a), Some(b)) => (a, b, tolerance),
             (Some(a), None) => {
                 let b = black(&a);
-                (a, b, 0.0)
+                (a, b, [0.0; 2])
             }
-            (None, Some(b)) => (black(&b), b, 0.0),
+            (None, Some(b)) => (black(&b), b, [0.0; 2]),
             (None, None) => unreachable!("a section has a layer"),
         };
         Self { a, b, shift, tolerance }
@@ -178,7 +183,7 @@ impl Images {
     pub(super) fn compared(&self) -> Option<Compared<'_>> {
         let overlaid = Overlaid::new(&self.a, &self.b, self.shift);
         let all = overlaid.difference()?;
-        let left = if self.tolerance > 0.0 {
+        let left = if self.tolerance[0] > 0.0 {
             beyond_tolerance(&overlaid.a, &overlaid.b, &all, self.tolerance)?
         } else {
             all.clone()
