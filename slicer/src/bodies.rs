@@ -531,6 +531,12 @@ pub struct FillDoubt {
     pub inward_mm3: f64,
 }
 
+impl FillDoubt {
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.unsigned_rows > 0 || self.repeated_mm3 > 0.0 || self.inward_mm3 > 0.0
+    }
+}
+
 /// Adds up the doubts of layers.
 #[derive(Debug, Default)]
 pub(crate) struct DoubtSum {
@@ -562,9 +568,6 @@ impl DoubtSum {
             sum.repeated_mm3 += some(doubt.repeated_mm3);
             sum.inward_mm3 += some(doubt.inward_mm3);
         }
-        let is_doubtful = |doubt: &FillDoubt| {
-            doubt.unsigned_rows > 0 || doubt.repeated_mm3 > 0.0 || doubt.inward_mm3 > 0.0
-        };
-        files.into_values().filter(is_doubtful).collect()
+        files.into_values().filter(FillDoubt::is_doubtful).collect()
     }
 }

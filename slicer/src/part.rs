@@ -53,6 +53,12 @@ impl Part {
         Self { layers_mm, ..self }
     }
 
+    /// Returns whether a file has polygons between heights: contours, or masks of a layout.
+    pub(crate) fn is_drawing(&self, file: usize) -> bool {
+        let mut of_file = self.pieces.iter().filter(|piece| piece.file == file);
+        of_file.any(|piece| matches!(piece.facets, Facets::Prisms(_)))
+    }
+
     /// Returns the layers that its files state, if it has a placement: the layers of contours, and
     /// the masks of layouts. Files with different layers state none together, nor does a part that
     /// is tilted or turned over.

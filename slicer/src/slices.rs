@@ -398,7 +398,15 @@ impl Slices {
     /// Returns the files with fill doubts in the layers made so far. Under [`Fill::EvenOdd`] the
     /// list is empty.
     pub fn fill_doubts(&self) -> Vec<FillDoubt> {
-        self.doubts.of_files(|body| self.model.model.body_in_file(body).0)
+        let mut doubts = self.doubts.of_files(|body| self.model.model.body_in_file(body).0);
+        doubts.retain_mut(|doubt| {
+            // Shapes of a drawing unite by design.
+            if self.model.model.is_drawing(doubt.file) {
+                doubt.repeated_mm3 = 0.0;
+            }
+            doubt.is_doubtful()
+        });
+        doubts
     }
 
     /// Fills the table with the next slab, as the iterator does on demand. Benchmarks use it to

@@ -23,7 +23,7 @@ use lamp_planning::voxels::VoxelPlanError;
 use lamp_plots::PlotError;
 use lamp_slicing::brep::{BrepError, Matter, StepError};
 use lamp_slicing::topology::NoSolid;
-use lamp_slicing::{SliceError, ThreeMfError};
+use lamp_slicing::{ContourFault, SliceError, ThreeMfError};
 use lamp_stack::{CatalogueError, FileFormat, Length, PartFormat, StackError};
 use lamp_supports::SupportError;
 use lamp_view::SurfaceError;
@@ -76,8 +76,8 @@ pub(crate) fn hint(error: &(dyn Error + 'static)) -> Option<String> {
 
 fn slicing(error: &SliceError) -> Option<String> {
     let hint = match error {
-        SliceError::EmptyFile | SliceError::Ascii { .. } => "export the part again",
-        SliceError::Count { .. } => "export it again",
+        SliceError::Ascii { .. } => "export the part again",
+        SliceError::EmptyFile | SliceError::Count { .. } => "export it again",
         SliceError::Folder => "name the part's file in it",
         SliceError::Changed { .. } => "slice it again once nothing writes to it",
         SliceError::Packed(_) => "pack it again",
@@ -104,7 +104,8 @@ fn slicing(error: &SliceError) -> Option<String> {
             ThreeMfError::NothingToBuild { .. } => "give items to build the type part",
             _ => "export the part again",
         },
-        SliceError::Obj { .. } | SliceError::Contours { .. } => "export the part again",
+        SliceError::Obj { .. } => "export the part again",
+        SliceError::Contours { fault, .. } => return contours(fault),
         SliceError::NotFinite { .. } => "repair or export the part again",
         SliceError::NothingLeft { .. } => "export the part again",
         SliceError::TooManyFacets { .. } => "export it with fewer facets",
@@ -129,6 +130,24 @@ fn slicing(error: &SliceError) -> Option<String> {
             ));
         }
         _ => return None,
+    };
+    Some(hint.to_owned())
+}
+
+/// Returns what to do about a contour file or a layout, unless the fault says it.
+fn contours(fault: &ContourFault) -> Option<String> {
+    let hint = match fault {
+        ContourFault::CutOff | ContourFault::CutHeader => "copy or export the file again",
+        ContourFault::Open
+        | ContourFault::OpenLines(_)
+        | ContourFault::Twice(_)
+        | ContourFault::Crossed(_) => return None,
+        ContourFault::NoArea(_) => "check which layers and shapes were exported",
+        ContourFault::TooManyCopies(_) | ContourFault::TooManyCorners(_) => {
+            "export fewer shapes to a file"
+        }
+        ContourFault::Unread(_) => "export plain closed polygons",
+        _ => "export the file again",
     };
     Some(hint.to_owned())
 }
@@ -200,9 +219,7 @@ fn tile(error: &TileError) -> Option<String> {
         TileError::WideMoat { .. } => "give a smaller --clearance, or --mesh none",
         TileError::TooManyRuns { .. } => "place fewer copies",
         TileError::Resolutions { .. } => "slice the parts at one resolution",
-        TileError::NotSquare { .. } => {
-            "give --mesh none, and no --turns quarters or turn of 90 degrees"
-        }
+        TileError::NotSquare { .. } => "give no --turns quarters, and no turn of 90 degrees",
         TileError::Changed { .. } => "run tile again",
         TileError::Overlap { .. } => {
             "move one of them, or give --fit if only their black margins do"

@@ -56,8 +56,11 @@ impl<R: BufRead> CliReader<R> {
     fn read(&mut self) -> Step<f64> {
         let (mut unit_mm, mut is_binary) = (1.0, false);
         loop {
-            let Some(name) = self.command()? else { return Ok(Err(ContourFault::CutOff)) };
+            let Some(name) = self.command()? else { return Ok(Err(ContourFault::CutHeader)) };
             match name.as_str() {
+                _ if self.peek()?.is_none() && name != "HEADEREND" => {
+                    return Ok(Err(ContourFault::CutHeader));
+                }
                 "UNITS" => match step!(self.number()) {
                     unit if unit > 0.0 => unit_mm = unit,
                     _ => return Ok(Err(ContourFault::Malformed("a unit in millimeters"))),
@@ -109,8 +112,11 @@ impl<R: BufRead> CliReader<R> {
             name.push(byte.to_ascii_uppercase().into());
             self.byte()?;
         }
-        if self.peek()? == Some(b'/') && name != "HEADEREND" {
-            self.byte()?;
+        match self.peek()? {
+            Some(b'/') if name != "HEADEREND" => drop(self.byte()?),
+            // The name may go on where the file was cut off.
+            None if !["HEADEREND", "GEOMETRYEND"].contains(&&*name) => return Ok(None),
+            _ => {}
         }
         Ok(Some(name))
     }
@@ -322,9 +328,9 @@ impl<R: BufRead> CliReader<R> {
             let what = ["name of a part", "names of parts, which are one part here,"];
             ReadNote::leave_out(&mut notes, what, self.labels);
         }
-        self.pages
-            .into_stack(unit_mm, notes)
-            .ok_or_else(|| ("the end".to_owned(), ContourFault::NoLayer))
+        let none =
+            || ("the geometry".to_owned(), ContourFault::NoArea("; it has no layer".to_owned()));
+        self.pages.into_stack(unit_mm, notes).ok_or_else(none)
     }
 }
 

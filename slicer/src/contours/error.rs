@@ -9,6 +9,9 @@ pub enum ContourFault {
     /// The file ends too early.
     #[error("is the last one: the file was cut off")]
     CutOff,
+    /// The file ends before its header does.
+    #[error("is the last one: the file was cut off within its header")]
+    CutHeader,
     /// Something else stands where a word or number should be.
     #[error("is not {0}")]
     Malformed(&'static str),

@@ -55,7 +55,7 @@ pub(crate) fn read(
         }
         // The reason is mostly in what is left out.
         let notes = opened.notes.iter().map(|note| format!("; {note}")).collect();
-        Err(("the file".to_owned(), ContourFault::NoArea(notes)))
+        Err(("the geometry".to_owned(), ContourFault::NoArea(notes)))
     }))
 }
 

@@ -302,6 +302,40 @@ fn faults_of_cli_are_named() {
     }
 }
 
+#[test]
+fn a_cli_file_that_is_empty_or_was_cut_off_says_where() {
+    let whole = cli(&format!("$$LAYER/10\n{SQUARE}"));
+    let header = whole.windows(11).position(|at| at == b"$$HEADEREND").unwrap() + 11;
+    assert!(open(&whole).is_ok());
+    for end in b"$$HEADERSTART".len()..whole.trim_ascii_end().len() {
+        let said = message(&whole[..end]);
+        let place = if end < header { "cut off within its header" } else { "was cut off" };
+        assert!(said.contains(place) && said.contains(&format!("byte {end} ")), "{end}: {said}");
+    }
+    assert_eq!(
+        message(&cli("")),
+        "the geometry of a CLI file has no polygon to slice; it has no layer"
+    );
+    assert_eq!(message(&cli("$$LAYER/1\n")), "the geometry of a CLI file has no polygon to slice");
+}
+
+#[test]
+fn shapes_that_overlap_are_no_doubt_of_a_drawing() {
+    let square = |at: u32| format!("<rect x='{at}' y='{at}' width='20' height='20'/>");
+    let text = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='40mm' height='40mm' viewBox='0 0 40 40'>{}{}</svg>",
+        square(2),
+        square(7)
+    );
+    let mut slices = Slices::new(open(text.as_bytes()).unwrap(), &SliceOptions::default()).unwrap();
+    let layer = slices.next().unwrap().unwrap();
+    assert_eq!(slices.fill_doubts(), []);
+    // Two squares of 20 mm that share one of 15 mm.
+    let pixel_mm2 = layer.pitch.unwrap().pixel_mm2();
+    let Image::Mask(mask) = &*layer.image else { unreachable!("slices are masks") };
+    assert!((mask.white_pixels() as f64 * pixel_mm2 - 575.0).abs() < 1.5);
+}
+
 fn area_mm2(text: &str, dpi: f64) -> f64 {
     let part = open(text.as_bytes()).unwrap();
     let pitch = Pitch::of_dpi(dpi).unwrap();
