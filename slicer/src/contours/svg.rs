@@ -23,6 +23,8 @@ use crate::three_mf::xml::{BoundedText, Xml, attribute, for_each_piece, prefixed
 const MAX_TAG_BYTES: usize = 1 << 28;
 /// The deepest nesting of groups.
 const MAX_DEPTH: usize = 256;
+/// The attribute of the sheet's place, which other programs pass over.
+const ORIGIN: &str = "data-origin-mm";
 /// Millimeters in a pixel of CSS.
 const PIXEL_MM: f64 = 25.4 / 96.0;
 
@@ -303,11 +305,21 @@ impl SvgReader {
         if !is_good {
             return Err(ContourFault::Malformed("a size"));
         }
+        // Where the sheet's top left corner lies in the part's coordinates, as LAMP writes it.
+        let [left_mm, top_mm] = match attribute_of(tag, ORIGIN)? {
+            None => [0.0, height],
+            Some(text) => {
+                let numbers: Vec<f64> = Numbers::new(&text).collect();
+                let finite = |place: &[f64; 2]| place.iter().all(|mm| mm.is_finite());
+                let place = <[f64; 2]>::try_from(numbers).ok().filter(finite);
+                place.ok_or(ContourFault::Malformed("a position in millimeters"))?
+            }
+        };
         let group = Group {
             // y goes down in the drawing.
             to_mm: [
-                [scales[0], 0.0, -left_top[0] * scales[0]],
-                [0.0, -scales[1], height + left_top[1] * scales[1]],
+                [scales[0], 0.0, left_mm - left_top[0] * scales[0]],
+                [0.0, -scales[1], top_mm + left_top[1] * scales[1]],
             ],
             rule: Fill::Solid,
             is_filled: true,

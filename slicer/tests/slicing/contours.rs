@@ -122,19 +122,13 @@ proptest! {
         let white: Vec<_> = (0..expected.len()).filter(|&k| expected[k].white_pixels() > 0).collect();
         prop_assume!(white.len() > 1);
         let folder = tempfile::tempdir().unwrap();
-        let height_mm = f64::from(SIDE) * 25.4 / dpi[1];
-        for (format, origin_mm) in [
-            (ContourFormat::Cli, [-3.25, 107.5]),
-            (ContourFormat::Dxf, [-3.25, 107.5]),
-            // A drawing begins at its own corner.
-            (ContourFormat::Svg, [0.0, height_mm]),
-        ] {
+        for format in ContourFormat::ALL {
             let path = folder.path().join("contours");
             let layers = layers.clone().into_iter().map(Ok::<_, StackError>);
             write_contours(layers, &path, format).unwrap();
             let part = Part::open(&path, &OpenOptions::default()).unwrap();
             let stated = part.stated_layers(&Placement::default()).unwrap().unwrap();
-            let found = masks(part, GridRule::At { origin_mm, pixels: [SIDE; 2] }, pitch);
+            let found = masks(part, GridRule::At { origin_mm: [-3.25, 107.5], pixels: [SIDE; 2] }, pitch);
             // A DXF has no black layers below and above; one of layers far apart takes them as
             // neighbors.
             let first = white[0];
@@ -334,6 +328,26 @@ fn shapes_that_overlap_are_no_doubt_of_a_drawing() {
     let pixel_mm2 = layer.pitch.unwrap().pixel_mm2();
     let Image::Mask(mask) = &*layer.image else { unreachable!("slices are masks") };
     assert!((mask.white_pixels() as f64 * pixel_mm2 - 575.0).abs() < 1.5);
+}
+
+#[test]
+fn the_place_of_a_sheet_is_read() {
+    let boxed = |place: &str| {
+        let text = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='8mm' height='6mm' viewBox='1 2 8 6'{place}>\
+             <rect x='2' y='3' width='4' height='4'/></svg>"
+        );
+        let slices = Slices::new(open(text.as_bytes())?, &SliceOptions::default())?;
+        let [low, high] = slices.box_mm();
+        Ok::<_, SliceError>([low[0], low[1], high[0], high[1]])
+    };
+    // The square begins a millimeter below and right of the sheet's corner.
+    assert_eq!(boxed("").unwrap(), [1.0, 1.0, 5.0, 5.0]);
+    assert_eq!(boxed(" data-origin-mm='-3 107.5'").unwrap(), [-2.0, 102.5, 2.0, 106.5]);
+    for wrong in ["1", "1 2 3", "1 inf", ""] {
+        let said = boxed(&format!(" data-origin-mm='{wrong}'")).unwrap_err().to_string();
+        assert!(said.contains("a position in millimeters"), "{said}");
+    }
 }
 
 fn area_mm2(text: &str, dpi: f64) -> f64 {

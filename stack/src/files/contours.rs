@@ -53,7 +53,8 @@ pub enum ContourError {
 /// apart. Each layer is at the height of its top.
 ///
 /// x and y are the part's coordinates, if the layers have them, or else distances from the left and
-/// from the bottom. In SVG y goes down, from the image's top left corner.
+/// from the bottom. In SVG y goes down, from the image's top left corner, whose place is in
+/// `data-origin-mm`.
 ///
 /// # Errors
 /// Returns the first error among the layers, or an error if a layer is gray or has no resolution, or
@@ -128,11 +129,16 @@ impl Contours {
     fn head(&self, format: ContourFormat, first: &Layer) -> String {
         let [width, height] = self.mm(self.size).map(Mm);
         match format {
-            ContourFormat::Svg => format!(
-                "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-                 <svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:slic3r=\"http://slic3r.org/namespaces/slic3r\" \
-                 width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\">\n"
-            ),
+            ContourFormat::Svg => {
+                let place = self.origin_mm.map(|at| at.map(Mm));
+                let place = place.map(|[x, y]| format!(" data-origin-mm=\"{x} {y}\""));
+                let place = place.unwrap_or_default();
+                format!(
+                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+                     <svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:slic3r=\"http://slic3r.org/namespaces/slic3r\" \
+                     width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\"{place}>\n"
+                )
+            }
             ContourFormat::Cli => {
                 let count = first.info.stack.as_ref().and_then(|StackInfo { layers, .. }| *layers);
                 let count = count.map(|count| format!("$$LAYERS/{count}\n")).unwrap_or_default();
@@ -286,7 +292,9 @@ mod tests {
     #[test]
     fn svg_and_dxf_have_a_polygon_for_each_outline() {
         let svg = written(ContourFormat::Svg);
-        assert!(svg.contains("width=\"0.8mm\" height=\"0.3mm\" viewBox=\"0 0 0.8 0.3\""));
+        assert!(svg.contains(
+            "width=\"0.8mm\" height=\"0.3mm\" viewBox=\"0 0 0.8 0.3\" data-origin-mm=\"-1 2\">"
+        ));
         assert!(svg.contains("<g id=\"layer1\" slic3r:z=\"0.1\">"));
         let contour = "<polygon slic3r:type=\"contour\" points=\"0.1,0 0.1,0.3 0.4,0.3 0.4,0\"";
         assert!(svg.contains(contour), "{svg}");
