@@ -129,12 +129,37 @@ fn edges_move_by_the_same_distance_along_both_axes() {
 #[test]
 fn stages_that_need_square_pixels_refuse_others_in_a_sentence() {
     let scratch = with_ball();
-    for line in [
-        "tile ball.tif --area 20x20mm -o build.tif",
-        "tile ball.tif --area 20x20mm --mesh none --turns quarters -o build.tif",
+    let line = "tile ball.tif --area 20x20mm --mesh none --turns quarters -o build.tif";
+    let ran = scratch.run(line).is_refused_with(&["14 x 19 um", "square pixels"]);
+    assert!(ran.stdout.is_empty());
+}
+
+/// The mesh around a ball has the area that it has at square pixels, in layers with a moat and in base
+/// layers.
+#[test]
+fn a_mesh_is_the_same_in_millimeters() {
+    let scratch = with_ball();
+    let slice = "slice ball.stl --pitch 16um --thickness 100um --scale 0.1 -o square.tif -q";
+    scratch.run(slice).succeeds_quietly();
+    // Break lines are as wide as whole pixels, which differ.
+    for (mesh, part) in [
+        ("--break-width 0um", 0.003),
+        ("--break-width 0um --mesh square --cell 0.9mm --wall 0.3mm", 0.003),
+        ("--mesh square --cell 0.7mm --wall 0.2mm --break-width 0.456mm --break-pitch 2mm", 0.02),
     ] {
-        let ran = scratch.run(line).is_refused_with(&["14 x 19 um", "square pixels"]);
-        assert!(ran.stdout.is_empty(), "{line}");
+        let [rectangles, squares] = ["ball", "square"].map(|name| {
+            let tile = format!("tile {name}.tif --area 20x16mm --copies 1 {mesh} -q -o build.tif");
+            scratch.run(&tile).succeeds_quietly();
+            let layers = scratch.layers("build.tif");
+            let area_mm2 = |layer: &Layer| {
+                mask(layer).white_pixels() as f64 * layer.pitch.unwrap().pixel_mm2()
+            };
+            layers.iter().map(area_mm2).collect::<Vec<_>>()
+        });
+        assert_eq!(rectangles.len(), squares.len());
+        for (layer, (a, b)) in rectangles.iter().zip(&squares).enumerate() {
+            assert!((a / b - 1.0).abs() < part, "{mesh} {layer}: {a} and {b} mm2");
+        }
     }
 }
 

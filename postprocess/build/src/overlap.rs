@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use lamp_stack::{Frame, Length, Mask, white_runs};
 
 use super::{CopyName, CopyPlacement, Layout};
-use lamp_offset::{offset_by_ellipse, offset_one_bit};
+use lamp_offset::grow_one_bit;
 
 impl Layout {
     /// Returns the pairs of copies that are nearer to each other than a gap, as packing keeps it.
@@ -39,11 +39,7 @@ impl Layout {
         let wide = outline.framed(Frame { left: by, top: by, width, height });
         match margin {
             0 => wide,
-            _ if self.pitch.is_square() => offset_one_bit(&wide, by as f64),
-            _ => {
-                let whole = self.pitch.pixels(gap).map(|by| -(by - 1e-6).ceil());
-                offset_by_ellipse(&wide, whole).at_least(128)
-            }
+            _ => grow_one_bit(&wide, self.pitch.pixels(gap).map(|by| (by - 1e-6).ceil())),
         }
     }
 }

@@ -171,8 +171,16 @@ fn pixels_that_are_not_square_keep_every_millimeter() {
     let refused = "p: its pixels are 14000 x 19000 um, and quarter turns need square pixels";
     assert_eq!(packed(Turns::Quarters).unwrap_err().to_string(), refused);
     assert_eq!(placed(90).unwrap_err().to_string(), refused);
-    let mesh = layout.with_mesh(&MeshOptions::default()).unwrap_err().to_string();
-    assert_eq!(mesh, "p: its pixels are 14000 x 19000 um, and meshes need square pixels");
+    // 70 mm are 5 columns, but fewer than 4 rows.
+    let mesh = |cell_mm: f64| {
+        let [cell, wall] = [cell_mm, 20.0].map(Length::from_mm);
+        let pattern = MeshPattern::Cells { shape: CellShape::Square, cell, wall };
+        let options =
+            MeshOptions { pattern, clearance: Length::default(), ..MeshOptions::default() };
+        layout.clone().with_mesh(&options).map(drop)
+    };
+    assert!(mesh(70.0).unwrap_err().to_string().contains("has no holes"));
+    assert!(mesh(77.0).is_ok());
 }
 
 #[test]

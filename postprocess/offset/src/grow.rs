@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::erode::{Disc, DistanceSources, Erosion};
+use super::erode::{Disc, DistanceSources, Erosion, ROUNDING, half_widths};
 use super::row_runs::{RowRuns, Run, join_runs, subtract};
 
 /// The fewest rows that are grown at a time.
@@ -24,7 +24,7 @@ const SHEET_ROWS: usize = 4;
 /// only large discs have, are cut by rows.
 const MAX_RUNS: usize = 1 << 22;
 
-/// The pixels around a center whose squared distance from it is below a limit.
+/// The pixels around a center that are nearer to it than a distance along the row and one across it.
 #[derive(Debug)]
 pub(super) struct Reach {
     disc: Disc,
@@ -34,14 +34,12 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Returns the pixels whose squared distance is below `square`, the center at least, as far as
-    /// an image of `height` rows needs them.
-    pub(super) fn below(square: u64, height: u32) -> Self {
-        let square = square.max(1);
-        let disc = Disc::below(square, height);
-        // Not rounded, because rounded circles may cross more than once.
-        let squares = (0..disc.halves().len() as u64).map(|away| square - 1 - away * away);
-        Self { exact: squares.map(|square| (square as f64).sqrt()).collect(), disc }
+    /// Returns the pixels that are nearer than distances in pixels, the center at least, as far as an
+    /// image of `height` rows needs them.
+    pub(super) fn nearer(distances: [f64; 2], height: u32) -> Self {
+        // Not rounded, because rounded ellipses may cross more than once. No distance is NaN.
+        let exact = half_widths(distances.map(|by| by.max(0.5)), -ROUNDING, height);
+        Self { disc: Disc::of_widths(&exact), exact }
     }
 
     /// Returns the number of rows that it reaches to each side.
@@ -320,7 +318,7 @@ mod tests {
 
     use super::super::erode::{Disc, DistanceSources, SourceColour, at_least};
     use super::super::offset_tests::{drawn, masks};
-    use super::super::{offset_one_bit, region};
+    use super::super::{grow_one_bit, offset_one_bit, region};
     use super::*;
 
     /// Grows or shrinks by cutting every row by every row of the disc.
@@ -330,6 +328,35 @@ mod tests {
         let left = DistanceSources::new(mask, colour).erode_all(&disc, &region(mask, colour));
         let left = left.mask(mask.width());
         if inwards < 0.0 { left.inverted() } else { left }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Every pixel against every white one.
+        #[test]
+        fn growing_by_two_distances_reaches_what_is_near(
+            mask in masks(),
+            by in prop_oneof![Just([3.0, 2.0]), Just([1.5, 4.25]), Just([0.0, 2.0]), Just([2.5; 2])],
+        ) {
+            let grown = grow_one_bit(&mask, by);
+            let whites: Vec<[f64; 2]> = (0..mask.height())
+                .flat_map(|row| (0..mask.width()).map(move |column| [column, row]))
+                .filter(|&[column, row]| mask.is_white(column, row))
+                .map(|at| at.map(f64::from))
+                .collect();
+            for row in 0..mask.height() {
+                for column in 0..mask.width() {
+                    let share = |white: &[f64; 2]| {
+                        let along = (f64::from(column) - white[0]) / (by[0] + 0.5);
+                        let across = (f64::from(row) - white[1]) / (by[1] + 0.5);
+                        along * along + across * across
+                    };
+                    let is_near = whites.iter().any(|white| share(white) < 1.0 - 1e-9);
+                    prop_assert_eq!(grown.is_white(column, row), is_near, "{} {}", column, row);
+                }
+            }
+        }
     }
 
     /// Bars whose edges sway from row to row, which branch, end and begin, over several bands.
@@ -349,7 +376,7 @@ mod tests {
 
     /// Grows a whole mask by its sheets, and by rows of the disc.
     fn both_ways(mask: &Mask, by: f64) -> [Mask; 2] {
-        let reach = Reach::below(at_least(by + 0.5), mask.height());
+        let reach = Reach::nearer([by + 0.5; 2], mask.height());
         let runs = RowRuns::white(mask);
         let [width, height] = [mask.width() as i32, mask.height() as i32];
         let sheets = sheets(&runs, 0..height);

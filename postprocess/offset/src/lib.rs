@@ -125,12 +125,21 @@ pub fn offset_by_ellipse(mask: &Mask, [x, y]: [f64; 2]) -> GrayMask {
 /// pixel. Edges are taken as the stairs that they are: of what is left, no pixel's middle is
 /// nearer than the distance and half a pixel to the middle of one of the other color.
 pub fn offset_one_bit(mask: &Mask, inwards: f64) -> Mask {
-    let reach = Reach::below(erode::at_least(inwards.abs() + 0.5), mask.height());
-    let [width, height] = [mask.width() as i32, mask.height() as i32];
     if inwards < 0.0 {
-        return reach.grown(&RowRuns::white(mask), 0, width, height).mask(mask.width());
+        return grow_one_bit(mask, [-inwards; 2]);
     }
+    let reach = Reach::nearer([inwards + 0.5; 2], mask.height());
+    let [width, height] = [mask.width() as i32, mask.height() as i32];
     reach.grown(&RowRuns::black_around(mask), -1, width, height).mask(mask.width()).inverted()
+}
+
+/// Moves all edges of a mask outwards by distances in pixels along x and y, as [`offset_one_bit`]
+/// does by one: pixels become white whose middle is in an ellipse around a white pixel's middle, of
+/// half axes that are half a pixel longer than the distances.
+pub fn grow_one_bit(mask: &Mask, by: [f64; 2]) -> Mask {
+    let reach = Reach::nearer(by.map(|by| by + 0.5), mask.height());
+    let [width, height] = [mask.width() as i32, mask.height() as i32];
+    reach.grown(&RowRuns::white(mask), 0, width, height).mask(mask.width())
 }
 
 /// Moves the edges of a mask inwards by distances that depend on the sizes of features, and keeps

@@ -31,11 +31,17 @@ impl BreakLines {
     /// Creates the lines of parts, `width` wide. They go up, down, left and right through the
     /// middle of each part's box and at every `pitch` from there. They end in the middle of the
     /// next part's box, whose outline they meet before, or at the build's edge. Lengths are in
-    /// pixels. Returns `None` if there are too many.
-    pub(crate) fn new(parts: &[Rect], area: [u32; 2], width: u32, pitch: u32) -> Option<Self> {
+    /// pixels along x and y. Returns `None` if there are too many.
+    pub(crate) fn new(
+        parts: &[Rect],
+        area: [u32; 2],
+        width: [u32; 2],
+        pitch: [u32; 2],
+    ) -> Option<Self> {
         let of_part = |part: &Rect| {
             let sides = [part.right - part.left, part.bottom - part.top];
-            sides.map(|side| u64::from(side / pitch.max(width + 1)) + 1).iter().sum::<u64>()
+            let count = |axis: usize| u64::from(sides[axis] / pitch[axis].max(width[axis] + 1)) + 1;
+            count(0) + count(1)
         };
         // Counted before any is made: each line is compared with all parts, and each band with all
         // lines.
@@ -43,8 +49,8 @@ impl BreakLines {
             return None;
         }
         let transposed: Vec<Rect> = parts.iter().map(|part| part.transposed()).collect();
-        let mut lines = upright(parts, area, width, pitch);
-        let across = upright(&transposed, [area[1], area[0]], width, pitch);
+        let mut lines = upright(parts, area, width[0], pitch[0]);
+        let across = upright(&transposed, [area[1], area[0]], width[1], pitch[1]);
         lines.extend(across.into_iter().map(Rect::transposed));
         Some(Self { bands: bands(&lines, area[1]) })
     }
@@ -130,7 +136,7 @@ mod tests {
 
     #[test]
     fn lines_run_from_a_part_to_the_edge() {
-        let breaks = BreakLines::new(&[rect(3, 2, 8, 5)], [10, 7], 1, 100).unwrap();
+        let breaks = BreakLines::new(&[rect(3, 2, 8, 5)], [10, 7], [1; 2], [100; 2]).unwrap();
         let expected = [
             ".....|....",
             ".....|....",
@@ -146,7 +152,7 @@ mod tests {
     #[test]
     fn lines_end_at_other_parts_and_stand_a_pitch_apart() {
         let parts = [rect(2, 1, 7, 3), rect(1, 6, 6, 8)];
-        let breaks = BreakLines::new(&parts, [9, 10], 1, 2).unwrap();
+        let breaks = BreakLines::new(&parts, [9, 10], [1; 2], [2; 2]).unwrap();
         // The upper part's are in columns 2, 4 and 6, the lower one's in 1, 3 and 5;
         // 1 and 6 pass the other part by.
         let expected = [
@@ -166,13 +172,13 @@ mod tests {
 
     #[test]
     fn no_part_has_no_lines() {
-        assert!(BreakLines::new(&[], [9, 10], 1, 2).unwrap().row(4).is_empty());
+        assert!(BreakLines::new(&[], [9, 10], [1; 2], [2; 2]).unwrap().row(4).is_empty());
     }
 
     #[test]
     fn too_many_lines_are_none() {
         let parts = vec![rect(0, 0, 6_000, 6_000); 2];
-        assert!(BreakLines::new(&parts, [6_000; 2], 1, 3).is_some());
-        assert!(BreakLines::new(&parts, [6_000; 2], 1, 2).is_none());
+        assert!(BreakLines::new(&parts, [6_000; 2], [1; 2], [3; 2]).is_some());
+        assert!(BreakLines::new(&parts, [6_000; 2], [1; 2], [2; 2]).is_none());
     }
 }

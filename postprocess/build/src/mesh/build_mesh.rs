@@ -7,7 +7,7 @@ use super::Moat;
 use super::break_lines::BreakLines;
 use super::lattice::Lattice;
 use super::mesh_rows::MeshRows;
-use lamp_offset::{offset_one_bit, without_holes};
+use lamp_offset::{grow_one_bit, without_holes};
 
 /// The mesh of a layout. Lengths are in pixels.
 #[derive(Clone, Debug)]
@@ -15,7 +15,8 @@ pub(crate) struct BuildMesh {
     pub(super) lattice: Lattice,
     /// The walls that break lines leave.
     pub(super) standing: MeshRows,
-    pub(super) clearance: f64,
+    /// Along x and y.
+    pub(super) clearance: [f64; 2],
     pub(crate) moat: Moat,
     /// The least number of pixels that a piece of mesh has.
     pub(super) least_piece: u64,
@@ -50,7 +51,7 @@ impl BuildMesh {
 
     /// Returns the number of pixels that a moat may reach beyond its part.
     pub(super) fn reach(&self) -> u32 {
-        self.clearance.ceil() as u32 + 1
+        self.clearance[0].max(self.clearance[1]).ceil() as u32 + 1
     }
 
     /// Returns the moat around the white pixels, on an image that is larger by the
@@ -66,7 +67,7 @@ impl BuildMesh {
         };
         // Offsets round to whole pixels: half a pixel more leaves no less than the
         // clearance between the last pixel of the part and the first of the mesh.
-        without_holes(&offset_one_bit(&white.framed(frame), -(self.clearance + 0.5)))
+        without_holes(&grow_one_bit(&white.framed(frame), self.clearance.map(|by| by + 0.5)))
     }
 
     /// Returns the mesh without moats and break lines.

@@ -14,7 +14,7 @@ pub(crate) enum Lattice {
     Image(Mask),
 }
 
-/// Holes between walls, in rows that repeat.
+/// Holes between walls, in rows that repeat. Lengths are in columns, also down.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LatticeCells {
     shape: CellShape,
@@ -22,20 +22,23 @@ pub(crate) struct LatticeCells {
     pitch: f64,
     /// The distance from a hole's center to its left and right wall.
     reach: f64,
+    /// The height of a row in columns.
+    aspect: f64,
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl LatticeCells {
-    /// Creates cells whose centers are `pitch` apart, with walls between them.
-    pub(crate) fn new(shape: CellShape, pitch: f64, wall: f64) -> Self {
-        Self { shape, pitch, reach: 0.5 * (pitch - wall) }
+    /// Creates cells whose centers are `pitch` apart, with walls between them, for pixels that are
+    /// `aspect` columns high.
+    pub(crate) fn new(shape: CellShape, pitch: f64, wall: f64, aspect: f64) -> Self {
+        Self { shape, pitch, reach: 0.5 * (pitch - wall), aspect }
     }
 
     /// Returns the center and half the width of two holes that a horizontal line
     /// crosses, from the left. They repeat at every pitch.
     fn holes(&self, y: f64) -> [(f64, f64); 2] {
-        let Self { shape, pitch, reach } = *self;
+        let Self { shape, pitch, reach, .. } = *self;
         match shape {
             CellShape::Square => {
                 let from_centre = (y / pitch).rem_euclid(1.0) - 0.5;
@@ -66,7 +69,7 @@ impl LatticeCells {
     }
 
     fn row(&self, row: u32, width: u32, out: &mut Vec<u32>) {
-        let holes = self.holes(f64::from(row) + 0.5);
+        let holes = self.holes((f64::from(row) + 0.5) * self.aspect);
         // A pixel is a wall's if its center is in no hole.
         let column = |x: f64| ceil(x - 0.5).min(width);
         out.push(0);
@@ -170,12 +173,15 @@ mod tests {
 
     #[test]
     fn walls_are_half_way_between_the_middles_of_cells() {
-        for (pitch, wall) in [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)] {
+        let square = [(17.3, 4.1), (9.0, 1.0), (30.0, 0.4), (11.7, 8.0)].map(|(a, b)| (a, b, 1.0));
+        let others = [(17.3, 4.1, 19.0 / 14.0), (21.0, 5.0, 0.6)];
+        for (pitch, wall, aspect) in square.into_iter().chain(others) {
             for shape in CellShape::ALL {
-                let mask = drawn(&Lattice::Cells(LatticeCells::new(shape, pitch, wall)), 150, 110);
+                let cells = LatticeCells::new(shape, pitch, wall, aspect);
+                let mask = drawn(&Lattice::Cells(cells), 150, 110);
                 for row in 0..110 {
                     for column in 0..150 {
-                        let place = [f64::from(column) + 0.5, f64::from(row) + 0.5];
+                        let place = [f64::from(column) + 0.5, (f64::from(row) + 0.5) * aspect];
                         let away = from_wall(shape, pitch, place) - 0.5 * wall;
                         if away.abs() > 1e-9 {
                             let is_white = mask.is_white(column, row);
@@ -189,7 +195,8 @@ mod tests {
 
     #[test]
     fn an_image_repeats() {
-        let image = drawn(&Lattice::Cells(LatticeCells::new(CellShape::Square, 5.0, 2.0)), 7, 5);
+        let image =
+            drawn(&Lattice::Cells(LatticeCells::new(CellShape::Square, 5.0, 2.0, 1.0)), 7, 5);
         let mask = drawn(&Lattice::Image(image.clone()), 33, 23);
         for row in 0..23 {
             for column in 0..33 {

@@ -1,6 +1,6 @@
 //! Options of a mesh, and the walls that they ask for.
 
-use lamp_stack::{Dpi, Length, MAX_RUNS, Mask, quoted};
+use lamp_stack::{Length, MAX_RUNS, Mask, Pitch, quoted};
 
 use super::super::{PixelSize, TileError};
 use super::lattice::{Lattice, LatticeCells};
@@ -144,17 +144,25 @@ impl MeshOptions {
     ///
     /// # Errors
     /// Returns an error if they leave no holes, or have more runs than an image can hold.
-    pub(super) fn lattice(&self, dpi: Dpi, build: PixelSize) -> Result<Lattice, TileError> {
+    pub(super) fn lattice(&self, pitch: Pitch, build: PixelSize) -> Result<Lattice, TileError> {
         let (lattice, runs_of_row) = match &self.pattern {
             &MeshPattern::Cells { shape, cell, wall } => {
-                let [pitch, thickness] = [cell, wall].map(|length| length.pixels(dpi));
-                if pitch < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
+                let [cells, thickness] = [cell, wall].map(|length| pitch.pixels(length));
+                if cells[0].min(cells[1]) < MIN_CELL_PIXELS || wall >= cell || wall.um() <= 0.0 {
                     return Err(TileError::NoCells { cell, wall });
                 }
                 // A hole has two edges. Hexagons of two rows interlock in a third of the rows at
                 // most, for which the half below has room, too.
-                let runs = 2.0 * f64::from(build.width) / pitch;
-                (Lattice::Cells(LatticeCells::new(shape, pitch, thickness)), runs)
+                let runs = 2.0 * f64::from(build.width) / cells[0];
+                (
+                    Lattice::Cells(LatticeCells::new(
+                        shape,
+                        cells[0],
+                        thickness[0],
+                        pitch.aspect(),
+                    )),
+                    runs,
+                )
             }
             MeshPattern::Image { name, image } => {
                 if image.width() == 0 || image.height() == 0 {

@@ -10,27 +10,27 @@ impl Layout {
     /// Surrounds the copies with a mesh.
     ///
     /// # Errors
-    /// Returns an error if pixels are not square, if the mesh would have no holes, no room next to
+    /// Returns an error if the mesh would have no holes, no room next to
     /// the moats or more runs than an image can hold, or if moats are to follow outlines and a part
     /// was read without its outline.
     pub fn with_mesh(mut self, options: &MeshOptions) -> Result<Self, TileError> {
-        let dpi = self.square("meshes need")?;
-        let pixels = |length: Length| length.pixels(dpi).max(0.0);
+        let pixels = |length: Length| self.pitch.pixels(length).map(|pixels| pixels.max(0.0));
         let clearance = pixels(options.clearance);
         let longest = self.pixels.width.max(self.pixels.height);
         // A wider moat leaves no mesh. The limit also keeps pixels within u32 below.
-        if clearance > f64::from(longest) {
+        if clearance[0].max(clearance[1]) > f64::from(longest) {
             return Err(TileError::WideMoat { clearance: options.clearance, area_mm: self.area });
         }
-        let least_piece = options.least_piece_mm2 / dpi.pitch().mm().powi(2);
+        let least_piece = options.least_piece_mm2 / self.pitch.pixel_mm2();
         if least_piece > f64::from(self.pixels.width) * f64::from(self.pixels.height) {
             let least_mm2 = options.least_piece_mm2;
             return Err(TileError::LargePiece { least_mm2, area_mm: self.area });
         }
-        let lattice = options.lattice(dpi, self.pixels)?;
-        let whole = |length| (pixels(length).round().min(f64::from(longest))) as u32;
+        let lattice = options.lattice(self.pitch, self.pixels)?;
+        let whole =
+            |length| pixels(length).map(|pixels| pixels.round().min(f64::from(longest)) as u32);
         let breaks = match whole(options.break_width) {
-            0 => BreakLines::default(),
+            width if width.contains(&0) => BreakLines::default(),
             width => {
                 let area = [self.pixels.width, self.pixels.height];
                 BreakLines::new(&self.places(clearance), area, width, whole(options.break_pitch))
@@ -59,15 +59,15 @@ impl Layout {
     }
 
     /// Returns the boxes around the copies and their clearance.
-    fn places(&self, clearance: f64) -> Vec<Rect> {
-        let free = clearance.ceil() as u32;
+    fn places(&self, clearance: [f64; 2]) -> Vec<Rect> {
+        let [aside, above] = clearance.map(|pixels| pixels.ceil() as u32);
         let place = |at: &CopyPlacement| {
             let PixelSize { width, height } = self.parts[at.part].size(at.turn);
             Rect {
-                left: at.left.saturating_sub(free),
-                top: at.top.saturating_sub(free),
-                right: (at.left + width + free).min(self.pixels.width),
-                bottom: (at.top + height + free).min(self.pixels.height),
+                left: at.left.saturating_sub(aside),
+                top: at.top.saturating_sub(above),
+                right: (at.left + width + aside).min(self.pixels.width),
+                bottom: (at.top + height + above).min(self.pixels.height),
             }
         };
         self.placements.iter().map(place).collect()
