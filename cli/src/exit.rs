@@ -25,6 +25,7 @@ use lamp_supports::{CheckError, SupportError};
 use lamp_view::SurfaceError;
 
 use crate::terminal::hints::hint;
+use crate::terminal::usage::in_given_words;
 
 /// Why a command exits early. The cause decides the status.
 #[derive(Debug)]
@@ -116,11 +117,11 @@ impl fmt::Display for Exit {
             Self::Findings(message) | Self::Task(_, message) => f.write_str(message),
             Self::Different => f.write_str("the stacks differ"),
             Self::Usage(error) | Self::Failed(error) | Self::Output(error) => {
-                write!(f, "{error:#}")?;
-                match causes(error).find_map(hint) {
-                    Some(hint) => write!(f, ": {hint}"),
-                    None => Ok(()),
-                }
+                let hint = causes(error).find_map(hint).map(|hint| format!(": {hint}"));
+                let text = format!("{error:#}{}", hint.unwrap_or_default());
+                // Wrong usage names options as they are meant.
+                let is_usage = matches!(self, Self::Usage(_));
+                f.write_str(&if is_usage { text } else { in_given_words(text) })
             }
         }
     }

@@ -40,8 +40,12 @@ fn both_options_and_a_machine_give_one_resolution() {
         .is_wrong_usage(&["the stack has 14 x 19 dpi, and the machine alpha builds in 1500 to"]);
     for wrong in ["14x", "0.1um", "14x19furlong"] {
         let slice = format!("slice ball.stl --pitch {wrong}");
-        scratch.run(&slice).is_wrong_usage(&["is not a resolution", "14x19um"]);
+        // By the name that was given.
+        let words = ["is not a resolution", "14x19um", "'--pitch <DPI>'"];
+        scratch.run(&slice).is_wrong_usage(&words);
     }
+    let small = scratch.run("slice ball.stl --pitch 14 -o small.tif");
+    small.is_wrong_usage(&["--pitch 14um for micrometers", "--dpi 14 for dots"]);
 }
 
 #[test]

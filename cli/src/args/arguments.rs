@@ -18,7 +18,7 @@ use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::streams::{input_name, is_stream};
 use crate::terminal::progress::say;
-use crate::terminal::usage::show;
+use crate::terminal::usage::{check_pitch, show};
 
 /// An options file has a line for each option.
 const MAX_OPTIONS_BYTES: u64 = 1 << 20;
@@ -26,7 +26,9 @@ const MAX_OPTIONS_BYTES: u64 = 1 << 20;
 /// Parses a program's arguments. `lamp` has all commands, and `program` is it or one of its stages.
 /// Ends the process where clap does: with a wrong command line, or with help that was asked for.
 pub(crate) fn matches(lamp: &Command, program: Command) -> Result<ArgMatches, Exit> {
-    let mut arguments = Arguments::new(lamp, program, crate::started::words());
+    let words = crate::started::words();
+    check_pitch(&words).map_err(Exit::usage)?;
+    let mut arguments = Arguments::new(lamp, program, words);
     let given = arguments.parsed_so_far();
     let (path, of_command) = arguments.command(&given);
     let common = Common::from_arg_matches(of_command).expect("every command has these options");

@@ -12,6 +12,8 @@ use lamp_stack::{line_of, one_line};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::terminal::usage::check_pitch;
+
 /// Options that make no sense in a file.
 const NOT_IN_FILES: [&str; 3] = ["options", "help", "version"];
 
@@ -110,6 +112,7 @@ fn setting(
     let Some(option) = option_of(runs.unwrap_or(command), key) else {
         return if is_below(command, key) { Ok(None) } else { Err(unknown(command)) };
     };
+    check_pitch(&words_of(option, key, value.get_ref())?)?;
     // An alias stands for the same option.
     let key = option.get_long().unwrap_or(key);
     check(option, &words_of(option, ALONE, value.get_ref())?)?;
@@ -237,6 +240,7 @@ fit = true
             ("[tile]\ngray = true", "line 2: gray: tile has no such option"),
             ("\n[slic]", "line 2: slic: there is no such command"),
             ("dpi = 0", "line 1: dpi: `0` is not a resolution"),
+            ("pitch = 14", "line 1: pitch: a pitch of 14 has no unit"),
             ("dpi = [1]", "line 1: dpi: it takes one value, not a list"),
             ("dpi = true", "line 1: dpi: write its value as a text or a number"),
             ("dpi = 1979-05-27", "line 1: dpi: write its value as a text or a number"),

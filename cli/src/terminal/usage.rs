@@ -1,6 +1,7 @@
 //! Shows errors of usage, in words that people know.
 
 use std::error::Error as _;
+use std::ffi::OsString;
 use std::io;
 use std::num::{IntErrorKind, ParseIntError};
 use std::path::Path;
@@ -24,9 +25,13 @@ pub(crate) fn show(error: clap::Error) -> i32 {
         let arg = arg.to_string_lossy();
         printable(&arg) != arg
     };
+    let text = error.render().to_string();
+    let as_given = in_given_words(text.clone());
     if error.use_stderr() && started::words().into_iter().any(steers_terminal) {
         // One line, since a line break may be the argument's.
-        say(error.render().to_string().trim_end().trim_end_matches(MORE).trim_end());
+        say(as_given.trim_end().trim_end_matches(MORE).trim_end());
+    } else if error.use_stderr() && as_given != text {
+        as_given.trim_end().lines().for_each(say);
     } else if let Err(failed) = error.print()
         && !error.use_stderr()
         && failed.kind() != io::ErrorKind::BrokenPipe
@@ -36,6 +41,47 @@ pub(crate) fn show(error: clap::Error) -> i32 {
         return failed.status().into();
     }
     error.exit_code()
+}
+
+/// Returns a message in which an option has the name that the command line gives it: `--pitch` is
+/// another name of `--dpi`.
+pub(crate) fn in_given_words(message: String) -> String {
+    let words = started::words();
+    let is = |word: &OsString, name: &str| {
+        let word = word.to_string_lossy();
+        word.split('=').next() == Some(name)
+    };
+    let gives = |name| words.iter().any(|word| is(word, name));
+    match gives("--pitch") && !gives("--dpi") {
+        true => message.replace("--dpi", "--pitch"),
+        false => message,
+    }
+}
+
+/// Refuses a number behind `--pitch` that has no unit and is as small as a pitch in micrometers,
+/// though it would be dots per inch.
+///
+/// # Errors
+/// Returns a sentence with both spellings.
+pub(crate) fn check_pitch(words: &[OsString]) -> Result<(), String> {
+    let options = words.iter().take_while(|word| *word != "--");
+    let mut is_value = false;
+    for word in options.map(|word| word.to_string_lossy()) {
+        let value = match word.strip_prefix("--pitch=") {
+            Some(value) => Some(value),
+            None => is_value.then_some(&*word),
+        };
+        // Pixels of less than 100 dpi are coarser than any projector's.
+        let is_small = |value: &str| value.parse().is_ok_and(|it| (0.0..100.0).contains(&it));
+        if let Some(value) = value.filter(|value| is_small(value)) {
+            return Err(format!(
+                "a pitch of {value} has no unit: write --pitch {value}um for micrometers, or \
+                 --dpi {value} for dots per inch"
+            ));
+        }
+        is_value = word == "--pitch";
+    }
+    Ok(())
 }
 
 /// Returns an error of usage as one sentence.
@@ -127,6 +173,26 @@ mod tests {
         let text = said(&["--method", "best"]);
         assert!(text.starts_with("invalid value 'best' for '--method <method>'"), "{text}");
         assert!(text.ends_with("[possible values: nearest, spline]"), "{text}");
+    }
+
+    #[test]
+    fn a_pitch_without_a_unit_is_refused_in_both_spellings() {
+        let said =
+            |words: &[&str]| check_pitch(&words.iter().map(OsString::from).collect::<Vec<_>>());
+        for words in [&["slice", "x", "--pitch", "14"][..], &["slice", "--pitch=14", "x"]] {
+            let text = said(words).unwrap_err();
+            assert!(text.contains("--pitch 14um") && text.contains("--dpi 14 "), "{text}");
+        }
+        for words in [
+            &["slice", "--pitch", "14um"][..],
+            &["slice", "--pitch", "1500"],
+            &["slice", "--pitch=14x19um", "14"],
+            &["slice", "--dpi", "14"],
+            &["slice", "--", "--pitch", "14"],
+            &["slice", "--pitch"],
+        ] {
+            assert_eq!(said(words), Ok(()), "{words:?}");
+        }
     }
 
     #[test]
