@@ -62,6 +62,8 @@ impl<R: BufRead> CliReader<R> {
                     return Ok(Err(ContourFault::CutHeader));
                 }
                 "UNITS" => match step!(self.number()) {
+                    // The number may go on, too.
+                    _ if self.peek()?.is_none() => return Ok(Err(ContourFault::CutHeader)),
                     unit if unit > 0.0 => unit_mm = unit,
                     _ => return Ok(Err(ContourFault::Malformed("a unit in millimeters"))),
                 },
