@@ -131,7 +131,7 @@ pub(crate) fn check_format(path: &Path, format: StackFormat) -> Result<(), Exit>
     let of_other = |(endings, _): &&(&[&str], &str)| endings.contains(&&*ending);
     match FORMATS.iter().find(of_other) {
         Some((_, other))
-            if !format.endings().contains(&&*ending) && !(is_zip && ending == "zip") =>
+            if !(format.endings().contains(&&*ending) || is_zip && ending == "zip") =>
         {
             // Stacks have names of their own.
             let other = StackFormat::of_name(path)

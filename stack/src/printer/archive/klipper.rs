@@ -241,7 +241,7 @@ impl GCode {
                         return Err("a second exposure of a layer is not read".to_owned());
                     }
                     (true, None) => {
-                        layer.exposure = Some((light as u16, ms.max(0.0).round() as u64))
+                        layer.exposure = Some((light as u16, ms.max(0.0).round() as u64));
                     }
                 }
             }
