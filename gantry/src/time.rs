@@ -289,7 +289,7 @@ impl BuildClock {
             layers: self.layers,
             exposure_s: self.exposure_ms.map(|ms| ms / 1000.0),
             recoating_s,
-            // What is given stands in for them.
+            // A given recoating stands in for them.
             lifts_s: self.lifts_s.filter(|_| self.layers > 0 && recoat_s.is_none()),
             swaths: if self.mirrors.is_some() && self.form.is_none() {
                 scanned()

@@ -172,7 +172,7 @@ fn the_time_is_told_in_words_with_what_is_missing() {
         "{text}"
     );
     let text = told(&format!("{line} --time --recoat 9s --expose 1.5s"));
-    assert_eq!(text, "build time: 8.75min, 50 layers\nexposure:   75s\nrecoating:  7.5min\n");
+    assert_eq!(text, "build time: 8.75min, 50 layers\nexposure:   75.0s\nrecoating:  7.50min\n");
     scratch.run(&format!("{line} --recoat 9s -o b.tif")).is_wrong_usage(&["--recoat", "--time"]);
     // The page and its numbers take the same options.
     let told = told("lamp report box.tif --recoat 9s --expose 1.5s --json");

@@ -6,7 +6,7 @@ use crate::args::options::GENERAL;
 
 /// The help of `lamp`, for a screen of 24 lines and 80 columns.
 pub(crate) const LAMP: &str = "\
-Turn parts into images for printing: slice part.stl | fix | dither > part.tif
+Usage: lamp COMMAND, or a pipe: slice blade.stl | fix | dither | tile > a.tif
 Make    slice       cut a part into layers   fix         correct stray rows
         dither      turn gray into dots      compensate  shift edges
         tile        lay out copies           compose     make pages of a recipe
@@ -28,7 +28,7 @@ Files   convert     change the format        pack        pack a stack
 Set up  demo        run all on a sample      sample      write a sample part
         doctor      check this computer      config      show your options
         man         write manual pages       completions for your shell
-lamp COMMAND -h lists the usual options, --help all; lamp help TOPIC is a page.
+-h lists usual options, --help all; all have --quiet. lamp help TOPIC: a page.
 ";
 
 /// Examples stand between usage and options.
