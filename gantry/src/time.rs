@@ -193,9 +193,8 @@ impl BuildClock {
         if self.layers == 0 && self.print.is_none() {
             self.print = info.stack.as_ref().and_then(StackInfo::print_record);
         }
-        let of_layer =
-            |print: &PrintRecord| print.step(u32::try_from(self.layers).unwrap_or(u32::MAX));
-        let step = info.record::<PrintStep>().or_else(|| self.print.as_ref().map(of_layer));
+        let layer = u32::try_from(self.layers).unwrap_or(u32::MAX);
+        let step = self.print.as_ref().map(|print| print.step_of_page(layer, info));
         let lift_s = step.filter(PrintStep::moves).map(|step| step.time_s() - step.exposure_s);
         self.lifts_s = self.lifts_s.zip(lift_s).map(|(sum, seconds)| sum + seconds);
         let usual_s = usual_s.or(step.map(|step| step.exposure_s));

@@ -60,9 +60,7 @@ impl PrintTotals {
                 most_mm: record.height_mm,
             });
         }
-        let step = info.record::<PrintStep>().unwrap_or_else(|| record.step(self.layers));
-        let exposure_s = info.exposure_ms.map_or(step.exposure_s, |ms| ms / 1000.0);
-        let step = PrintStep { exposure_s, ..step };
+        let step = record.step_of_page(self.layers, info);
         self.layers += 1;
         self.time_s += step.time_s();
         let pixel_mm2: f64 = (0..2)

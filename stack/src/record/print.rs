@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::layer::page_info::StackInfo;
+use crate::layer::page_info::{PageInfo, StackInfo};
 use crate::record::PageRecord;
 
 /// How a printer with a panel exposes a stack, as its files state it. It belongs to the stack, and
@@ -123,6 +123,14 @@ impl PrintRecord {
         let part = (f64::from(past) + 1.0) / (f64::from(self.transition_layers) + 1.0);
         let [first, normal] = [self.first, self.normal].map(|step| step.exposure_s);
         PrintStep { exposure_s: first + (normal - first) * part, ..self.normal }
+    }
+
+    /// Returns the steps of a layer as its own page has them, or else as [`step`](Self::step) does. The
+    /// page's exposure counts in any case.
+    pub fn step_of_page(&self, layer: u32, page: &PageInfo) -> PrintStep {
+        let step = page.record::<PrintStep>().unwrap_or_else(|| self.step(layer));
+        let exposure_s = page.exposure_ms.map_or(step.exposure_s, |ms| ms / 1000.0);
+        PrintStep { exposure_s, ..step }
     }
 }
 
