@@ -52,7 +52,7 @@ Examples:
   slice blade.stl | fix | dither | tile > build.tif
   lamp sample blade -o blade.stl --facets 750k
   lamp info build.tif
-  lamp show build.tif --layer 600 --scale 1/8 -o layer.png
+  lamp show build.tif --layer 600 --zoom 1/8 -o layer.png
 
 slice, fix, dither and tile are short for lamp slice, lamp fix, lamp dither and lamp tile.";
 

@@ -112,7 +112,7 @@ pub enum GantryError {
     },
     /// A layer has gray levels, and nothing shows them.
     #[error(
-        "{layer} has gray levels: make dots of them with dither, or show them with --gray time"
+        "{layer} has gray levels: make dots of them with dither, or show them with --gray-by time"
     )]
     Gray {
         /// The layer's name.

@@ -106,7 +106,7 @@ fn gray_layers_and_missing_exposures_are_refused() {
     let build = Build::new(vec![gray(3, &[0, 100, 255])]);
     let (array, scanner) = (MirrorArray::even(2, 2), machine([2, 2], 0, ""));
     let error = build.job(&scanner, &array, JobSeam::Comb, GrayBy::Dots).unwrap_err().to_string();
-    assert!(error.contains("layer 0") && error.contains("--gray time"), "{error}");
+    assert!(error.contains("layer 0") && error.contains("--gray-by time"), "{error}");
     assert!(build.job(&scanner, &array, JobSeam::Comb, GrayBy::Time).is_ok());
     let gray_seam = build.job(&scanner, &array, JobSeam::Gray, GrayBy::Time).unwrap_err();
     assert!(gray_seam.to_string().contains("comb or time"), "{gray_seam}");

@@ -16,9 +16,9 @@ def plan_speed(
     material: Path,
     lamp_intensity: Optional[str] = None,
     wanted: Optional[int] = None,
-    margin: Union[float, str, None] = None,
-    gap: Union[float, str, None] = None,
-    at: Optional[Literal["top", "middle", "bottom"]] = None,
+    dose_margin: Union[float, str, None] = None,
+    search_gap: Union[float, str, None] = None,
+    dose_at: Optional[Literal["top", "middle", "bottom"]] = None,
     speed: Optional[str] = None,
     max_change: Union[float, str, None] = None,
     memory_bytes: Optional[int] = None,
@@ -32,9 +32,9 @@ def plan_speed(
         "material": material,
         "lamp_intensity": lamp_intensity,
         "wanted": wanted,
-        "margin": margin,
-        "gap": gap,
-        "at": at,
+        "dose_margin": dose_margin,
+        "search_gap": search_gap,
+        "dose_at": dose_at,
         "speed": speed,
         "max_change": max_change,
     }
@@ -47,12 +47,12 @@ def plan_voxels(
     material: Path,
     lamp_intensity: Optional[str] = None,
     wanted: Optional[int] = None,
-    margin: Union[float, str, None] = None,
-    gap: Union[float, str, None] = None,
-    at: Optional[Literal["top", "middle", "bottom"]] = None,
+    dose_margin: Union[float, str, None] = None,
+    search_gap: Union[float, str, None] = None,
+    dose_at: Optional[Literal["top", "middle", "bottom"]] = None,
     objective: Optional[Literal["wrong", "boundary"]] = None,
     min_level: Optional[int] = None,
-    exposure: Optional[str] = None,
+    expose: Optional[str] = None,
     memory_bytes: Optional[int] = None,
 ) -> Layers:
     """Chooses the gray level of each pixel, so that as few voxels as possible are cured wrongly.
@@ -64,12 +64,12 @@ def plan_voxels(
         "material": material,
         "lamp_intensity": lamp_intensity,
         "wanted": wanted,
-        "margin": margin,
-        "gap": gap,
-        "at": at,
+        "dose_margin": dose_margin,
+        "search_gap": search_gap,
+        "dose_at": dose_at,
         "objective": objective,
         "min_level": min_level,
-        "exposure": exposure,
+        "expose": expose,
     }
     return _native.plan_voxels(layers, keywords, memory_bytes=memory_bytes)
 
@@ -90,7 +90,7 @@ def plan_column_cure(
     rays: Optional[str] = None,
     flat_field: Optional[Path] = None,
     voxel: Optional[str] = None,
-    gap: Union[float, str, None] = None,
+    search_gap: Union[float, str, None] = None,
 ) -> Plan:
     """Chooses bitmaps and times that cure a part through glass, without layers.
 
@@ -113,7 +113,7 @@ def plan_column_cure(
         "rays": rays,
         "flat_field": flat_field,
         "voxel": voxel,
-        "gap": gap,
+        "search_gap": search_gap,
     }
     return _native.plan_column_cure(keywords)
 

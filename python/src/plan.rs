@@ -39,11 +39,11 @@ struct PlanSettings {
     #[serde(with = "text")]
     wanted: NonZeroU8,
     #[serde(with = "text")]
-    margin: Share,
+    dose_margin: Share,
     #[serde(with = "text")]
-    gap: Share,
+    search_gap: Share,
     #[serde(with = "text")]
-    at: SampleHeight,
+    dose_at: SampleHeight,
 }
 
 impl Default for PlanSettings {
@@ -53,9 +53,9 @@ impl Default for PlanSettings {
             material: PathBuf::new(),
             lamp_intensity: None,
             wanted,
-            margin: Share(margin),
-            gap: Share(gap),
-            at: SampleHeight::Top,
+            dose_margin: Share(margin),
+            search_gap: Share(gap),
+            dose_at: SampleHeight::Top,
         }
     }
 }
@@ -81,7 +81,7 @@ struct VoxelSettings {
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
     objective: Option<VoxelObjective>,
     #[serde(with = "optional", skip_serializing_if = "Option::is_none")]
-    exposure: Option<ExposureTime>,
+    expose: Option<ExposureTime>,
     min_level: u8,
 }
 
@@ -179,8 +179,8 @@ pub(crate) fn plan_voxels(
 
 fn probe(key: &str, text: &str) -> Result<(), String> {
     match (key, parse_share(text)) {
-        ("gap" | "max-change", Ok(0.0)) => Err("the share must be above zero".to_owned()),
-        ("exposure", _) => match text.parse::<ExposureTime>() {
+        ("search-gap" | "max-change", Ok(0.0)) => Err("the share must be above zero".to_owned()),
+        ("expose", _) => match text.parse::<ExposureTime>() {
             Ok(time) if time.ms() > 0.0 => Ok(()),
             Ok(_) => Err("an exposure takes some time".to_owned()),
             Err(error) => Err(error.to_string()),
@@ -231,9 +231,11 @@ impl Planner {
 
     /// Returns the plan as words of a command, as pages record it.
     fn words(&self, resin: &str) -> String {
-        let PlanSettings { wanted, margin, gap, at, .. } = self.settings();
-        let (margin, gap) = (100.0 * margin.0, 100.0 * gap.0);
-        let shared = format!("--wanted {wanted} --margin {margin}% --gap {gap}% --at {at}");
+        let PlanSettings { wanted, dose_margin, search_gap, dose_at, .. } = self.settings();
+        let (margin, gap) = (100.0 * dose_margin.0, 100.0 * search_gap.0);
+        let shared = format!(
+            "--wanted {wanted} --dose-margin {margin}% --search-gap {gap}% --dose-at {dose_at}"
+        );
         match self {
             Self::Speed(SpeedSettings { speed, max_change, .. }) => {
                 let change = max_change
@@ -279,7 +281,7 @@ impl PlanSource {
             Some(light) => light.material(&material).map_err(of_work)?,
             None => (material, None),
         };
-        let light = Light::of(&material, shared.at).map_err(of_work)?;
+        let light = Light::of(&material, shared.dose_at).map_err(of_work)?;
         let lamp = lamp.map(|light| option("lamp-intensity", &light.to_string()));
         let resin = format!("--material {}{}", quoted(&word), lamp.unwrap_or_default());
         let command = self.planner.words(&resin);
@@ -349,8 +351,8 @@ fn plan_times(
     let options = SpeedOptions {
         light: resin.light,
         platform: Platform { slowest, fastest, max_change },
-        margin: settings.plan.margin.0,
-        gap: settings.plan.gap.0,
+        margin: settings.plan.dose_margin.0,
+        gap: settings.plan.search_gap.0,
         memory,
     };
     let plan = speed::plan(&part, &options).map_err(|error| at_name(of_work(error)))?;
@@ -392,12 +394,12 @@ fn plan_levels(
     then: &mut dyn FnMut(Flow<'_>) -> Result<(), Error>,
 ) -> Result<Vec<Value>, Error> {
     let name = chain.name();
-    let PlanSettings { wanted, margin, gap, .. } = settings.plan;
+    let PlanSettings { wanted, dose_margin, search_gap, .. } = settings.plan;
     let options = Options {
         wanted,
         objective: settings.objective.unwrap_or(VoxelObjective::Wrong),
-        margin: margin.0,
-        gap: gap.0,
+        margin: dose_margin.0,
+        gap: search_gap.0,
         min_level: settings.min_level,
         memory: Some(memory),
         ..Options::default()
@@ -406,7 +408,7 @@ fn plan_levels(
     let mut reports = chain.run(work, true, &mut |layers| {
         let layers = layers.map(|layer| {
             let mut layer = layer?.decode().map_err(Error::from)?;
-            let given_ms = settings.exposure.map(ExposureTime::ms);
+            let given_ms = settings.expose.map(ExposureTime::ms);
             layer.info.exposure_ms = layer.info.exposure_ms.or(given_ms);
             times.extend(layer.info.exposure_ms.map(ExposureTime::from_ms));
             resin.record(&mut layer);

@@ -45,9 +45,9 @@ def test_times_are_those_of_the_program(tmp_path, bridge, program):
 @pytest.mark.filterwarnings("ignore:plan")
 def test_levels_are_those_of_the_program(tmp_path, bridge, program):
     ours, theirs = tmp_path / "ours.tif", tmp_path / "theirs.tif"
-    words = ["--material", RESIN, "--exposure", "3s", "--min-level", "20", "--margin", "0.1"]
+    words = ["--material", RESIN, "--expose", "3s", "--min-level", "20", "--dose-margin", "0.1"]
     program("lamp", "plan", "voxels", bridge.path, *words, "-o", theirs, check=True)
-    layers = lamp.plan_voxels(bridge, material=RESIN, exposure="3s", min_level=20, margin="10%")
+    layers = lamp.plan_voxels(bridge, material=RESIN, expose="3s", min_level=20, dose_margin="10%")
     plan = lamp.write(ours, layers)[-1]
     assert ours.read_bytes() == theirs.read_bytes()
     assert plan.layers == 12 and plan.bound <= plan.cost
@@ -200,7 +200,7 @@ def test_rings_cure_the_profile_that_a_plan_states(glass, sharp):
     ("command", "target", "words"),
     [
         ("column-cure", "map.png", "--pixel 20um --full 150um --bitmaps 5 --optimize height --robust 2um"),
-        ("column-cure", "map.png", "--pixel 20um --full 150um --gray --rays 9x15 --voxel 8um --gap 1%"),
+        ("column-cure", "map.png", "--pixel 20um --full 150um --gray --rays 9x15 --voxel 8um --search-gap 1%"),
         ("ecpl", "lens.toml", ""),
         ("ecpl", "lens.toml", "--method seed"),
     ],

@@ -103,7 +103,7 @@ def test_control_c_ends_a_search(tmp_path):
         try:
             lamp.plan_column_cure(
                 "lens-array", projector="zhao", material="pegda-mw700",
-                optimize="height", voxel="2um", gap=1e-99,
+                optimize="height", voxel="2um", search_gap=1e-99,
             )
         except KeyboardInterrupt:
             ended = True

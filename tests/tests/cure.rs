@@ -160,7 +160,7 @@ fn areas_of_white_are_those_without_pixels() {
         let slice =
             format!("slice part.stl --dpi 15000 --thickness {thick_um}um --layers {first}..");
         scratch.run(&format!("{slice} --material lamp-suspension -o white.tif")).succeeds();
-        let cure = "lamp cure white.tif --material lamp-suspension --section y=0.1mm --scale 1/50";
+        let cure = "lamp cure white.tif --material lamp-suspension --section y=0.1mm --zoom 1/50";
         let ran = scratch.run(&format!("{cure} --part part.stl -o s.png")).succeeds();
         let (found, row) = told(&String::from_utf8(ran.stdout).unwrap(), "white");
         let layers = scratch.layers("white.tif");

@@ -108,7 +108,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("lamp sample tower --facets some -o x.stl", &["`some` is not a count", "750k"]),
         ("lamp sample tower --seed 5 -o x.stl", &["--defect"]),
         ("lamp show cube.tif -o x.png", &["--layer"]),
-        ("lamp show cube.tif --layer 3 --scale 2/3 -o x.png", &["`2/3` is not a scale", "1/8"]),
+        ("lamp show cube.tif --layer 3 --zoom 2/3 -o x.png", &["`2/3` is not a scale", "1/8"]),
         ("lamp show cube.tif --layer 3 --region 1,2,3 -o x.png", &["is not a region", "X,Y,W,H"]),
         ("lamp show cube.tif --layer 3 --region 96,0,1,1 -o x.png", &["outside", "96 x 81"]),
         ("lamp show cube.tif --layer 3 --region 0,81,1,1 -o x.png", &["outside", "96 x 81"]),

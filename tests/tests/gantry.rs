@@ -101,7 +101,7 @@ fn a_tilted_display_gives_wide_white_its_exposure() {
     let job =
         |words: &str| scratch.run(&format!("lamp job {words} --machine tilted.toml -o other"));
     job("strips/").is_refused_with(&["slanted swaths"]);
-    job("build.tif --gray time").is_refused_with(&["neither gray nor seams"]);
+    job("build.tif --gray-by time").is_refused_with(&["neither gray nor seams"]);
 }
 
 #[test]
@@ -283,9 +283,9 @@ fn gray_layers_are_shown_in_time() {
     let slice = "slice torus.stl --dpi 100 --thickness 1mm --gray --material lamp-suspension -q -o gray.tif";
     scratch.run(slice).succeeds();
     let line = "lamp job gray.tif --machine mine.toml -o job/";
-    scratch.run(line).is_refused_with(&["gray.tif: layer", "--gray time"]);
-    scratch.run(&format!("{line} --gray time --seam time")).succeeds();
-    let found = scratch.run("lamp expose job/ --json --tolerance 100").succeeds_quietly();
+    scratch.run(line).is_refused_with(&["gray.tif: layer", "--gray-by time"]);
+    scratch.run(&format!("{line} --gray-by time --seam time")).succeeds();
+    let found = scratch.run("lamp expose job/ --json --dose-tolerance 100").succeeds_quietly();
     let found = json(&found.stdout);
     // Within half of 48 rows, also for the faintest level.
     let worst = found["layers"].as_array().unwrap().iter().flat_map(|layer| {
@@ -401,7 +401,7 @@ fn compare_with_dots(part: Sample, layer: u32) {
     let slice = "slice part.stl --dpi 1587.5 --gray --material lamp-suspension -q";
     scratch.run(&format!("{slice} --layers {layer} -o gray.tif")).succeeds();
     scratch.run("dither gray.tif -q -o dots.tif").succeeds();
-    scratch.run("lamp job gray.tif --machine mine.toml --gray time -q -o job/").succeeds();
+    scratch.run("lamp job gray.tif --machine mine.toml --gray-by time -q -o job/").succeeds();
     let folder = JobFolder::open(&scratch.path("job")).unwrap();
     let (job, pages) = (&folder.job, folder.build().unwrap());
     let (wanted, layer) = (pages.image(0).unwrap(), &job.layers[0]);

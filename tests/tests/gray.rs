@@ -385,7 +385,7 @@ fn a_section_needs_its_own_part() {
     is_wrong_usage(&scratch.run(&format!("{upright} -o t.png")), "is not a section");
     let line = format!("{cure} --along 90mm..95mm -o t.png");
     scratch.run(&line).is_refused_with(&["no pixel of the section"]);
-    scratch.run(&format!("{cure} --scale 1000 -o t.png")).is_refused_with(&["smaller --scale"]);
+    scratch.run(&format!("{cure} --zoom 1000 -o t.png")).is_refused_with(&["smaller --zoom"]);
     assert!(!scratch.path("t.png").exists());
 }
 
@@ -400,7 +400,7 @@ fn doses_add_up_to_those_of_001() {
     layers.iter_mut().for_each(|layer| layer.info.exposure_ms = Some(1000.0));
     scratch.stack("cylinder.tif", layers);
     let cure = "lamp cure cylinder.tif --material zsg-amber --section y=0.0392mm -o s.png";
-    let said = scratch.run(&format!("{cure} --at top")).succeeds_quietly().stdout;
+    let said = scratch.run(&format!("{cure} --dose-at top")).succeeds_quietly().stdout;
     let said = String::from_utf8(said).unwrap();
     // Figure A.21: all 7 x 7 pixels of the third layer, and so of those below; 21 voxels here.
     assert!(said.contains("white   cured 0.0026\n"), "{said}");
@@ -408,9 +408,9 @@ fn doses_add_up_to_those_of_001() {
     let [dark, lit] = [2 * width, 3 * width];
     assert_eq!((width, pixels), (7, [vec![EMPTY; dark], vec![CURED; lit]].concat()));
     // A layer's bottom has 10^-0.008 of its top's dose: too little only in corners.
-    let bottom = scratch.run(&format!("{cure} --at bottom")).succeeds_quietly().stdout;
+    let bottom = scratch.run(&format!("{cure} --dose-at bottom")).succeeds_quietly().stdout;
     assert_eq!(String::from_utf8(bottom).unwrap(), said);
-    is_wrong_usage(&scratch.run(&format!("{cure} --at bottom --alone")), "--alone");
+    is_wrong_usage(&scratch.run(&format!("{cure} --dose-at bottom --alone")), "--alone");
     is_wrong_usage(&scratch.run(&format!("{cure} --add-up --alone")), "--alone");
     let told = |options: &str, material: &str| {
         let line = format!("{cure} {options}").replace("zsg-amber", material);
@@ -420,7 +420,7 @@ fn doses_add_up_to_those_of_001() {
     for (options, material, words) in [
         ("", "zsg-amber", "doses added up, with spread"),
         ("", "lamp-suspension", "doses added up straight down"),
-        ("--at top", "lamp-suspension", "doses added up layer by layer"),
+        ("--dose-at top", "lamp-suspension", "doses added up layer by layer"),
         ("--alone", "lamp-suspension", "each layer alone"),
     ] {
         assert!(told(options, material).contains(words), "{options} {material}");

@@ -179,7 +179,7 @@ fn show_draws_the_layer_pixel_for_pixel() {
 #[test]
 fn show_enlarges_each_pixel_to_a_square() {
     let (scratch, image) = with_blade();
-    let large = show(&scratch, "--region 100,90,70,50 --scale 4");
+    let large = show(&scratch, "--region 100,90,70,50 --zoom 4");
     let small = levels(&image, 100..170, 90..140);
     assert_eq!((large.len(), large[0].len()), (200, 280));
     let same = |row: usize, column: usize| large[row][column] == small[row / 4][column / 4];
@@ -190,8 +190,8 @@ fn show_enlarges_each_pixel_to_a_square() {
 fn show_reduces_squares_to_their_mean() {
     let (scratch, image) = with_blade();
     for (options, left, top, width, height) in [
-        ("--scale 1/8", 0, 0, image.width(), image.height()),
-        ("--scale 1/8 --region 101,93,64,40", 101, 93, 64, 40),
+        ("--zoom 1/8", 0, 0, image.width(), image.height()),
+        ("--zoom 1/8 --region 101,93,64,40", 101, 93, 64, 40),
     ] {
         let small = show(&scratch, options);
         let size = (height.div_ceil(8) as usize, width.div_ceil(8) as usize);
@@ -250,7 +250,7 @@ fn show_puts_layers_on_a_sheet() {
     assert!(caption.iter().any(white));
 
     scratch.run("lamp show blade.tif --layers 200..").is_refused_with(&["no layer is in that"]);
-    let large = "lamp show blade.tif --layers ..20 --scale 100";
+    let large = "lamp show blade.tif --layers ..20 --zoom 100";
     scratch.run(large).is_wrong_usage(&["choose fewer layers", "--layers 0..1270/40"]);
     let both = "lamp show blade.tif --layer 3 --layers 4..6";
     scratch.run(both).is_wrong_usage(&["cannot be used with"]);

@@ -104,7 +104,7 @@ fn heights() {
     scratch.part("tower.stl", Sample::Tower, 2_000);
     scratch.write("times.csv", b"thickness_um,exposure_ms\n1000,200\n2000,800\n");
     let line = "lamp heights tower.stl --min 1mm --max 2mm --step 0.5mm --exposure-table times.csv \
-                --layer-overhead 10s --uniform 2mm --csv heights.csv --json";
+                --layer-overhead 10s --uniform-thickness 2mm --csv heights.csv --json";
     let answer = answer(&scratch, line);
     assert_eq!(keys(&answer), ["schema", "part", "criterion", "bound", "choices", "layers"]);
     assert_eq!(answer["schema"], "lamp-heights-1");

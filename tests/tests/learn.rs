@@ -4,7 +4,8 @@ use lamp_fixtures::cavity_staircase;
 use lamp_tests::Scratch;
 use serde_json::Value;
 
-const PLAN: &str = "lamp plan speed stairs.tif --material pegda-sudan --gap 5% -q -o timed.tif";
+const PLAN: &str =
+    "lamp plan speed stairs.tif --material pegda-sudan --search-gap 5% -q -o timed.tif";
 
 /// A folder with a job of the staircase.
 fn with_job() -> Scratch {
@@ -179,7 +180,7 @@ fn what_teaches_nothing_is_refused_and_changes_nothing() {
 #[test]
 fn a_job_is_of_one_stack() {
     let scratch = with_job();
-    scratch.run("lamp plan speed stairs.tif --material pegda-sudan --gap 5% --layers 0..30 -q -o half.tif").succeeds();
+    scratch.run("lamp plan speed stairs.tif --material pegda-sudan --search-gap 5% --layers 0..30 -q -o half.tif").succeeds();
     let other = scratch.run("lamp learn job/ --start half.tif --material pegda-sudan");
     other.is_refused_with(&["whose stack is not half.tif: name another folder"]);
     scratch.write("good.csv", areas(|_| 1, |_| 0).as_bytes());

@@ -298,7 +298,7 @@ fn supports_have_the_same_millimeters() {
 #[test]
 fn pictures_are_not_stretched() {
     let scratch = with_ball();
-    scratch.run("lamp show ball.tif --layer 15 --scale 2 -o ball.png").succeeds();
+    scratch.run("lamp show ball.tif --layer 15 --zoom 2 -o ball.png").succeeds();
     let sides = |scratch: &Scratch, name: &str| {
         let mut reader =
             png::Decoder::new(std::io::Cursor::new(scratch.bytes(name))).read_info().unwrap();

@@ -45,7 +45,7 @@ fn the_figure_of_001_comes_out_as_printed() {
     let scratch = Scratch::new();
     stack(&scratch, "cylinder.tif", &example_cylinder(), 1000.0);
     let line = "lamp plan voxels cylinder.tif --material zsg-amber --objective boundary \
-        --gap 0.0001% --around 0px --map a21.svg --map-layer 2 --report plan.json --plot plan.svg -o planned.tif";
+        --search-gap 0.0001% --around 0px --map a21.svg --map-layer 2 --report plan.json --plot plan.svg -o planned.tif";
     scratch.run(line).succeeds();
     let map = String::from_utf8(scratch.bytes("a21.svg")).unwrap();
     let half = |case: usize| A_21.iter().flat_map(move |row| &row[7 * case..7 * case + 7]).copied();
@@ -134,7 +134,7 @@ fn plans_light_the_pixels_they_may() {
     assert!(lit_outside > 0);
     plan("--sources shell:1px");
     each_pixel(&scratch, |depth, level| assert!(depth <= 1 || level == 255));
-    plan("--keep wall:2px");
+    plan("--keep-white wall:2px");
     each_pixel(&scratch, |depth, level| assert!(!(1..=2).contains(&depth) || level == 255));
     plan("--min-level 40");
     each_pixel(&scratch, |_, level| assert!(level == 0 || level >= 40));
@@ -151,7 +151,7 @@ fn a_plan_says_what_sections_show() {
     let count = |when: &str, what: &str| told[when][what].as_f64().unwrap();
     for (stack, panel, when) in [("slope", "white", "before"), ("planned", "gray", "after")] {
         let cure = format!(
-            "lamp cure {stack}.tif --material zsg-amber --section y=0.005mm --at top -o s.png"
+            "lamp cure {stack}.tif --material zsg-amber --section y=0.005mm --dose-at top -o s.png"
         );
         let said = String::from_utf8(scratch.run(&cure).succeeds_quietly().stdout).unwrap();
         let row = said.lines().find_map(|row| row.strip_prefix(panel)).unwrap();
@@ -211,16 +211,16 @@ fn pages_without_a_time_get_the_one_given() {
     scratch.stack("silent.tif", cavity_staircase(1).layers());
     scratch.run(&format!("{STAIRS} -o stated.tif")).succeeds();
     let silent = STAIRS.replace("stairs.tif", "silent.tif");
-    scratch.run(&format!("{silent} --exposure 0.3s -o given.tif")).succeeds();
+    scratch.run(&format!("{silent} --expose 0.3s -o given.tif")).succeeds();
     assert!(scratch.bytes("stated.tif") == scratch.bytes("given.tif"));
     // The exposure on pages wins.
-    scratch.run(&format!("{STAIRS} --exposure 9s -o kept.tif")).succeeds();
+    scratch.run(&format!("{STAIRS} --expose 9s -o kept.tif")).succeeds();
     assert!(scratch.bytes("stated.tif") == scratch.bytes("kept.tif"));
     scratch.run(&format!("{silent} -o none.tif")).is_refused_with(&[
         "silent.tif",
         "layer 22",
         "does not state its exposure",
-        "--exposure",
+        "--expose",
     ]);
     assert!(!scratch.path("none.tif").exists());
 }
@@ -306,12 +306,12 @@ fn wrong_options_are_status_2() {
     for (options, word) in [
         ("--sources glow:3px", "grow:3px"),
         ("--sources grow:0px", "1px to 1000px"),
-        ("--keep 3px", "wall:3px"),
-        ("--margin 100%", "below 100%"),
-        ("--gap 0%", "0.1%"),
+        ("--keep-white 3px", "wall:3px"),
+        ("--dose-margin 100%", "below 100%"),
+        ("--search-gap 0%", "0.1%"),
         ("--wanted 0", "--wanted"),
         ("--min-level 256", "--min-level"),
-        ("--exposure 0s", "takes some time"),
+        ("--expose 0s", "takes some time"),
         ("--plot plan.pdf", ".svg or .png"),
         ("--report stairs.tif", "that is an input"),
         ("--report p.svg --plot p.svg", "written as JSON"),
@@ -348,7 +348,7 @@ fn dots_of_a_plan_with_margin_lose_little() {
     let slice = "slice stairs.stl --dpi 1016 --thickness 100um --layers 24..44";
     scratch.run(&format!("{slice} --material pegda-sudan -o part.tif")).succeeds();
     scratch
-        .run("lamp plan voxels part.tif --material pegda-sudan --margin 10% | dither > dots.tif")
+        .run("lamp plan voxels part.tif --material pegda-sudan --dose-margin 10% | dither > dots.tif")
         .succeeds();
     let light = Light::of(&Material::builtin("pegda-sudan").unwrap(), SampleHeight::Top).unwrap();
     let (part, dots) = (scratch.layers("part.tif"), scratch.layers("dots.tif"));

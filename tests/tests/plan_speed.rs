@@ -22,7 +22,7 @@ fn wrong(counts: &Value) -> u64 {
 #[test]
 fn pages_profile_and_report_have_the_same_times() {
     let scratch = with_stairs();
-    let line = "lamp plan speed stairs.tif --material pegda-sudan --gap 1% -o timed.tif \
+    let line = "lamp plan speed stairs.tif --material pegda-sudan --search-gap 1% -o timed.tif \
                 --profile speed.csv --report plan.json --plot plan.svg";
     let said = scratch.run(line).succeeds().stderr;
     assert!(said.contains("error better; exposures take"), "{said}");
@@ -62,7 +62,7 @@ fn pages_profile_and_report_have_the_same_times() {
 fn a_platform_keeps_its_limits_and_threads_change_nothing() {
     let scratch = with_stairs();
     let line = "lamp plan speed stairs.tif --material pegda-sudan --speed 0.2mm/s..1mm/s \
-                --max-change 20% --gap 5%";
+                --max-change 20% --search-gap 5%";
     scratch.run(&format!("{line} --threads 1 -o one.tif")).succeeds();
     scratch.run(&format!("{line} --threads 3 > three.tif")).succeeds();
     assert_eq!(scratch.bytes("one.tif"), scratch.bytes("three.tif"));
@@ -81,7 +81,7 @@ fn a_pipe_is_planned_and_so_is_gray() {
         Layer { image: image.into(), ..layer }
     });
     scratch.stack("gray.tif", gray);
-    let line = "lamp plan speed --material pegda-sudan --gap 20% -o g.tif";
+    let line = "lamp plan speed --material pegda-sudan --search-gap 20% -o g.tif";
     scratch.run_on(line, &scratch.bytes("gray.tif")).succeeds();
     assert!(scratch.layers("g.tif").iter().all(|layer| layer.info.exposure_ms.is_some()));
 }
@@ -110,7 +110,7 @@ fn what_cannot_be_planned_is_refused_with_a_sentence() {
     );
     refused("stairs.tif --material pegda-mw700", "[spread]");
     refused("stairs.tif --material pegda-sudan --layers 70..80", "no layer is in that range");
-    for options in ["--speed 2mm/s..5um/s", "--speed 3", "--max-change 0%", "--margin 100%"] {
+    for options in ["--speed 2mm/s..5um/s", "--speed 3", "--max-change 0%", "--dose-margin 100%"] {
         let line =
             format!("lamp plan speed stairs.tif --material pegda-sudan {options} -o out.tif");
         scratch.run(&line).is_wrong_usage(&[]);
@@ -121,7 +121,7 @@ fn what_cannot_be_planned_is_refused_with_a_sentence() {
 #[test]
 fn a_lamp_that_ages_takes_longer() {
     let scratch = with_stairs();
-    let plan = "lamp plan speed stairs.tif --gap 5% --speed 0.001um/s..1m/s";
+    let plan = "lamp plan speed stairs.tif --search-gap 5% --speed 0.001um/s..1m/s";
     let shown = scratch.run("lamp material show pegda-sudan").succeeds().stdout;
     let follows = "\n[dimmed-lamp.critical-dose]\nat-zero = \"6 mJ/cm2\"\nrise = \"171.2 mJ/cm2\"\n\
                    source = \"a test\"\n";

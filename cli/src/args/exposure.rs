@@ -15,7 +15,7 @@ pub(crate) struct ExposureArgs {
     /// Resin: a built-in material's name (see lamp material list) or a file
     ///
     /// Each page then states its exposure time
-    #[arg(long, value_name = "NAME|FILE", help_heading = EXPOSURE)]
+    #[arg(long, value_name = "MATERIAL", help_heading = EXPOSURE)]
     material: Option<PathBuf>,
 
     /// Depth that full white cures, in layers: 1 cures just the layer, more bonds it to the layer

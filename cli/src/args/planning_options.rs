@@ -24,7 +24,7 @@ pub(crate) const SAMPLE_HEIGHTS: [&str; 3] =
 pub(crate) struct PlanningOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file. It must state how far
     /// light spreads ([spread]) and which dose cures ([working-curve])
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "MATERIAL")]
     pub(crate) material: PathBuf,
 
     #[command(flatten)]
@@ -37,17 +37,17 @@ pub(crate) struct PlanningOptions {
     /// Margin to the critical dose: wanted voxels should be this far above it, all others this far
     /// below
     #[arg(long, value_name = "SHARE", default_value = "5%", value_parser = parse_margin)]
-    pub(crate) margin: f64,
+    pub(crate) dose_margin: f64,
 
     /// Stop when the plan is proved to be this close to the best one, as a share of the error
     /// without a plan
     #[arg(long, value_name = "SHARE", default_value = "0.1%", value_parser = parse_gap)]
-    pub(crate) gap: f64,
+    pub(crate) search_gap: f64,
 
     /// Height in its layer at which a voxel's dose is computed
     #[arg(long, value_name = "HEIGHT", default_value = "top")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
-    pub(crate) at: SampleHeight,
+    pub(crate) dose_at: SampleHeight,
 }
 
 /// A resin under the light of a plan.
@@ -65,7 +65,7 @@ impl PlanningOptions {
     pub(crate) fn resin(&self) -> Result<PlannedResin, Exit> {
         let (material, word) = document_and_word(&self.material)?;
         let (material, doubt) = self.lamp.material(material)?;
-        let light = Light::of(&material, self.at)?;
+        let light = Light::of(&material, self.dose_at)?;
         let lamp = self.lamp.canonical().map(|light| option("lamp-intensity", &light));
         let words = format!("--material {}{}", quoted(&word), lamp.unwrap_or_default());
         Ok(PlannedResin { material, light, doubt, words })

@@ -127,7 +127,7 @@ pub(crate) struct SliceStageArgs {
     /// A part, a resolution or a layer thickness beyond the machine's limits is refused at the
     /// start. The machine's defaults apply to resolution, thickness and margin unless you give
     /// others. On a machine with a panel, images have its size, with the part in the middle
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "MACHINE")]
     machine: Option<PathBuf>,
 
     /// Use only these layers: A..B is A to B - 1; A.. and ..B are open-ended

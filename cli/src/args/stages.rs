@@ -57,7 +57,7 @@ pub(crate) struct CompensateStageArgs {
     uniform: Option<EdgeDistance>,
 
     /// Move edges inwards by the cure width of a material: a built-in one or a file (see lamp material)
-    #[arg(long, value_name = "M", conflicts_with = "uniform")]
+    #[arg(long, value_name = "MATERIAL", conflicts_with = "uniform")]
     material: Option<PathBuf>,
 
     /// Dose of full white, for example 300mJ/cm2 [default: the page's exposure times the material's
@@ -142,7 +142,7 @@ pub(crate) struct CheckStageArgs {
     /// Machine whose blade drags on floating features: alpha, beta or a file (see lamp machine)
     ///
     /// The machine's defaults apply to resolution, thickness and margin unless you give others
-    #[arg(long, value_name = "M", default_value = "alpha")]
+    #[arg(long, value_name = "MACHINE", default_value = "alpha")]
     machine: PathBuf,
 }
 
@@ -257,7 +257,7 @@ pub(crate) struct SupportStageArgs {
     /// Number of supports to list for each place: the one that is drawn, and alternatives
     #[arg(long, value_name = "N", default_value_t = 3, help_heading = CHOICE)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..))]
-    keep: u16,
+    listed: u16,
 
     /// Share of an island's first layer that its supports must hold
     #[arg(long, value_name = "SHARE", default_value = "25%", value_parser = parse_percent)]
@@ -362,7 +362,7 @@ impl From<SupportStageArgs> for SupportSettings {
             max_curvature: args.max_curvature,
             hold: args.hold,
             candidates: NonZeroU32::new(args.candidates).expect("its range is above zero"),
-            keep: args.keep,
+            keep: args.listed,
             least_support: args.least_support,
             speck: args.speck,
             speck_layers: args.speck_layers,

@@ -16,7 +16,7 @@ use crate::args::options::{one_of_described, parse_area, parse_distance, parse_t
 pub(crate) struct TileStageArgs {
     /// Machine: alpha, beta or a file (see lamp machine). A build beyond its area, height,
     /// resolution or layer thickness is refused
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "MACHINE")]
     machine: Option<PathBuf>,
 
     /// Build area, for example 4x4.5in or 100x80mm [default: the machine's, or 4x4.5in]

@@ -76,7 +76,7 @@ pub(crate) struct ConvertArgs {
     ///
     /// Images of another size are centered on the panel. Layers with an exposure time of their own
     /// keep it
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "MACHINE")]
     machine: Option<PathBuf>,
 
     /// Write a folder of PNGs instead of TIFFs; a single layer may be a file that ends in .png

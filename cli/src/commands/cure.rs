@@ -44,15 +44,15 @@ use lamp_plots::SectionPicture;
 Examples:
   lamp cure gray.tif --material lamp-suspension --section y=12mm --part blade.stl -o section.png
   lamp cure gray.tif --material lamp-suspension --section y=12mm --alone -o section.png
-  lamp cure planned.tif --material mine.toml --section y=12mm --at top -o section.png
+  lamp cure planned.tif --material mine.toml --section y=12mm --dose-at top -o section.png
   lamp cure gray.tif --material mine.toml --section x=3mm --along 10mm..14mm --layers 80..120 \\
-      --scale 4 -o detail.png")]
+      --zoom 4 -o detail.png")]
 pub(crate) struct CureArgs {
     #[command(flatten)]
     input: InputArgs,
 
     /// Resin: a built-in material's name (see lamp material list) or a file
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "MATERIAL")]
     material: PathBuf,
 
     #[command(flatten)]
@@ -64,7 +64,7 @@ pub(crate) struct CureArgs {
 
     /// Part that the stack was sliced from, for its outline; the stack's record places it. Give
     /// several files in the same order as to slice, each with its own placement
-    #[arg(long, value_name = "FILE", value_parser = part_file())]
+    #[arg(long, value_name = "PART", value_parser = part_file())]
     part: Vec<PartFile>,
 
     /// Draw only this part of the section, for example 10mm..14mm
@@ -83,12 +83,12 @@ pub(crate) struct CureArgs {
     /// the layer, as planners do. By default, cure may end at any height in a layer
     #[arg(long, value_name = "HEIGHT", conflicts_with = "alone")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
-    at: Option<SampleHeight>,
+    dose_at: Option<SampleHeight>,
 
     /// Scale of the picture: 4 draws each pixel 4 wide, 1/8 draws every eighth pixel; heights have the
     /// same scale
     #[arg(long, value_name = "N|1/N", default_value = "1")]
-    scale: PictureScale,
+    zoom: PictureScale,
 
     /// PNG file to write
     #[arg(short, long, value_name = "FILE.png")]
@@ -101,7 +101,7 @@ impl CureArgs {
         if self.alone {
             return Ok(CureRule::Alone);
         }
-        if let Some(at) = self.at {
+        if let Some(at) = self.dose_at {
             return Ok(CureRule::Voxels(Light::of_any(material, at)?));
         }
         if material.spread.is_some() {
@@ -159,8 +159,8 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let shown = ShownSection::new(&section, outline, args.along.as_ref());
     let panels = SectionPicture(shown.map_err(no_section)?);
     // Before the file is begun: a picture at a wrong scale could fill the disk.
-    panels.check_size(args.scale).map_err(|error| failed(error.into()))?;
-    write_file(&args.output, |out| panels.write_png(args.scale, out))?;
+    panels.check_size(args.zoom).map_err(|error| failed(error.into()))?;
+    write_file(&args.output, |out| panels.write_png(args.zoom, out))?;
     print(&panels.text(&material.name))
 }
 

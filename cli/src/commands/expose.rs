@@ -67,7 +67,7 @@ pub(crate) struct ExposeArgs {
 
     /// How far a white pixel's dose may be off, in percent of the dose that it should get
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0, value_parser = parse_percent)]
-    tolerance: f64,
+    dose_tolerance: f64,
 
     /// Stop with status 3 if a white pixel misses its dose by more than the tolerance, or a black
     /// one gets more light
@@ -147,7 +147,7 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     let mut shown = layers.into_iter().map(|layer| {
         let (dose, map) = exposing.layer(layer).map_err(|error| error.at(name.clone()))?;
         if !args.json {
-            print(&text(&dose, layer, args.tolerance))?;
+            print(&text(&dose, layer, args.dose_tolerance))?;
         }
         doses.push(dose);
         if let Some((picture, map)) = args.picture.as_ref().zip(map.as_ref()) {
@@ -171,7 +171,7 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
     }
     drop(shown);
     if args.json {
-        print_answer("lamp-expose-1", &json(&doses, args.tolerance))?;
+        print_answer("lamp-expose-1", &json(&doses, args.dose_tolerance))?;
     }
     let unjudged = doses.iter().find(|dose| dose.all.white_px == 0 && dose.edge_px > 0);
     if let Some(dose) = unjudged.filter(|_| args.strict) {
@@ -186,7 +186,7 @@ pub(crate) fn run(args: &ExposeArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::Findings(format!(
             "by more than {} % of the exposure, {off} white pixels miss their dose, and {over} black \
              pixels get light",
-            args.tolerance
+            args.dose_tolerance
         )));
     }
     Ok(())
@@ -291,7 +291,7 @@ impl ExposeArgs {
             blur_px,
             samples: 1,
             region: [columns, rows],
-            tolerance: self.tolerance / 100.0,
+            tolerance: self.dose_tolerance / 100.0,
         })
     }
 }

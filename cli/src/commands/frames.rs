@@ -132,7 +132,7 @@ impl FramesArgs {
         }
         if !self.scan.is_default() {
             return Err(Exit::usage(
-                "a job has its machine, seams and gray: give --machine, --seam and --gray to lamp job",
+                "a job has its machine, seams and gray: give --machine, --seam and --gray-by to lamp job",
             ));
         }
         let folder = JobFolder::open(&self.input)?;

@@ -65,7 +65,7 @@ pub(crate) struct HeightsArgs {
     /// Uniform thicknesses to compare with; the first thickness is plotted [default: the thickest
     /// layer]
     #[arg(long, value_name = "LENGTH", value_parser = parse_thickness, value_delimiter = ',')]
-    uniform: Vec<Length>,
+    uniform_thickness: Vec<Length>,
 
     /// Resolution of the images, which sets the distance between the rows that are measured
     #[arg(long, visible_alias = "pitch", value_name = "DPI", default_value = "1500")]
@@ -188,7 +188,8 @@ impl HeightsArgs {
         part: &LayeredPart,
     ) -> Result<Vec<(String, Heights)>, lamp_pipeline::Error> {
         let thickest = [thickest];
-        let uniform = if self.uniform.is_empty() { &thickest[..] } else { &self.uniform };
+        let uniform =
+            if self.uniform_thickness.is_empty() { &thickest[..] } else { &self.uniform_thickness };
         let layers = |thickness: &Length| {
             Ok((format!("uniform {thickness}"), uniform_heights(part, *thickness)?))
         };

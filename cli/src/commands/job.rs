@@ -32,7 +32,7 @@ use crate::terminal::progress::say;
 Examples:
   lamp job build.tif --machine mine.toml -o job/
   lamp job strips/ --machine mine.toml -o job/
-  lamp job build.tif --machine mine.toml --seam time --gray time -o job/
+  lamp job build.tif --machine mine.toml --seam time --gray-by time -o job/
   lamp frames job/ --layer 812 --swath 3 -o swath.frames
   lamp expose job/ --layers 812")]
 pub(crate) struct JobArgs {
@@ -84,7 +84,7 @@ pub(super) struct ScanArgs {
         "No dots: a gray pixel is on for a share of the rows of mirrors that pass over it, in \
          proportion to its level",
     ]))]
-    gray: GrayBy,
+    gray_by: GrayBy,
 }
 
 /// Reads the light across the mirrors of a machine, whose file is at `path`.
@@ -128,7 +128,7 @@ pub(super) struct Scanner {
 impl ScanArgs {
     /// Returns whether none of the options is given.
     pub(super) fn is_default(&self) -> bool {
-        self.machine.is_none() && self.seam.is_none() && self.gray == GrayBy::default()
+        self.machine.is_none() && self.seam.is_none() && self.gray_by == GrayBy::default()
     }
 
     fn scanner(&self) -> Result<Scanner, Exit> {
@@ -154,7 +154,7 @@ impl ScanArgs {
         let scanner = self.scanner()?;
         let at = |error: GantryError| Exit::from(error).at(input_name(build));
         let pages = BuildPages::open(build).map_err(at)?;
-        let options = JobOptions { seam: self.seam, gray: self.gray, layers };
+        let options = JobOptions { seam: self.seam, gray: self.gray_by, layers };
         let job = Job::plan(&pages, name, &scanner.machine, &scanner.mirrors, &options);
         Ok((job.map_err(at)?, pages, scanner))
     }

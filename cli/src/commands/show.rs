@@ -25,8 +25,8 @@ use lamp_plots::{Thumbnail, contact_sheet, write_animation};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  lamp show build.tif --layer 600 --scale 1/8 -o layer.png
-  lamp show build.tif --z 12mm --region 2000,1500,200,100 --scale 4 -o detail.png
+  lamp show build.tif --layer 600 --zoom 1/8 -o layer.png
+  lamp show build.tif --z 12mm --region 2000,1500,200,100 --zoom 4 -o detail.png
   lamp show build.tif --layers 0..1270/40 -o sheet.png
   lamp show build.tif --layers 0..1270/10 --animate -o build.png
   lamp show build.tif --layer 600 --ascii")]
@@ -47,7 +47,7 @@ pub(crate) struct ShowArgs {
     /// [default: 1; for several layers, at most 400 pixels wide and high each; in a terminal, its
     /// width]
     #[arg(long, value_name = "N|1/N")]
-    scale: Option<PictureScale>,
+    zoom: Option<PictureScale>,
 
     /// Show the layers one after the other, as an animated PNG
     #[arg(long, conflicts_with_all = ["layer", "z"])]
@@ -77,7 +77,7 @@ pub(crate) struct ShowArgs {
 #[group(required = true, multiple = false)]
 struct ShownLayers {
     /// Index of the layer
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "N")]
     layer: Option<u32>,
 
     /// Show the layer at this height, for example 12mm; where two layers meet, it shows the upper
@@ -122,7 +122,7 @@ fn show_one(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
     let form = args.terminal_form();
     // A file takes pixels as they are; a terminal has only so many columns.
     let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region));
-    let scale = args.scale.unwrap_or_else(fitting);
+    let scale = args.zoom.unwrap_or_else(fitting);
     let aspect = pitch.map_or(1.0, Pitch::aspect);
     check_size(scale.size(&region, aspect))?;
     let picture = Picture::new(&image, region, scale, aspect);
@@ -153,13 +153,13 @@ fn show_many(args: &ShowArgs, layers: &EveryNth, common: &Common) -> Result<(), 
         let region = region_on(args, &layer.image)?;
         let aspect = layer.pitch.map_or(1.0, Pitch::aspect);
         let fitting = || PictureScale::fitting(&region, THUMBNAIL_SIDE, aspect);
-        let scale = args.scale.unwrap_or_else(fitting);
+        let scale = args.zoom.unwrap_or_else(fitting);
         let [width, height] = scale.size(&region, aspect);
         // Counted before the pictures take their memory, by all threads together.
         if pixels.fetch_add(width * height, Ordering::Relaxed) + width * height > MAX_PIXELS {
             return Err(Exit::usage(format!(
                 "the pictures of the layers would have more than {MAX_PIXELS} pixels: choose fewer \
-                 layers, such as every 40th with --layers 0..1270/40, or a smaller --scale"
+                 layers, such as every 40th with --layers 0..1270/40, or a smaller --zoom"
             )));
         }
         Ok(Thumbnail::new(&layer, region, scale)?)
@@ -190,7 +190,7 @@ fn check_size([width, height]: [u64; 2]) -> Result<(), Exit> {
         return Ok(());
     }
     Err(Exit::usage(format!(
-        "the picture would be more than {MAX_PICTURE_SIDE} pixels wide or high: choose a --region or a smaller --scale"
+        "the picture would be more than {MAX_PICTURE_SIDE} pixels wide or high: choose a --region or a smaller --zoom"
     )))
 }
 

@@ -100,7 +100,15 @@ const USUAL: [(&str, &[&str]); 14] = [
     (
         "learn",
         &[
-            "start", "material", "measured", "print", "law", "gain", "step", "report", "plot",
+            "start",
+            "material",
+            "measured",
+            "print",
+            "law",
+            "gain",
+            "correction",
+            "report",
+            "plot",
             "output",
         ],
     ),
@@ -236,6 +244,8 @@ pub(crate) fn version() -> Arg {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
     use clap::CommandFactory;
 
     use super::*;
@@ -267,6 +277,27 @@ mod tests {
             command.get_subcommands().for_each(|command| check(command, &path));
         }
         check(&formed(Lamp::command()), "");
+    }
+
+    #[test]
+    fn an_option_has_one_kind_of_value_in_all_commands() {
+        fn gather(command: &Command, kinds: &mut BTreeMap<String, BTreeSet<String>>) {
+            for option in command.get_arguments().filter(|option| !option.is_hide_set()) {
+                // The value of an output is the kind of its file.
+                let Some(name) = option.get_long().filter(|name| *name != "output") else {
+                    continue;
+                };
+                let values =
+                    option.get_value_names().filter(|_| option.get_action().takes_values());
+                let kind = values.map_or("a switch".into(), |values| values.join(" "));
+                kinds.entry(name.to_owned()).or_default().insert(kind);
+            }
+            command.get_subcommands().for_each(|command| gather(command, kinds));
+        }
+        let mut kinds = BTreeMap::new();
+        gather(&formed(Lamp::command()), &mut kinds);
+        kinds.retain(|_, kinds| kinds.len() > 1);
+        assert!(kinds.is_empty(), "{kinds:?}");
     }
 
     #[test]

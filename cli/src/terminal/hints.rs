@@ -30,7 +30,7 @@ use lamp_view::SurfaceError;
 
 fn plot(error: &PlotError) -> Option<String> {
     let hint = match error {
-        PlotError::TooLarge(_) => "choose a smaller --scale, or less with --along and --layers",
+        PlotError::TooLarge(_) => "choose a smaller --zoom, or less with --along and --layers",
         _ => return None,
     };
     Some(hint.to_owned())
@@ -331,7 +331,7 @@ fn plan(error: &VoxelPlanError) -> Option<String> {
     let hint = match error {
         // It is transparent, so that it is no cause of its own.
         VoxelPlanError::Light(error) => return light(error),
-        VoxelPlanError::Silent { what: "exposure", .. } => "give --exposure, as 2s",
+        VoxelPlanError::Silent { what: "exposure", .. } => "give --expose, as 2s",
         VoxelPlanError::Silent { .. } => "plan the stack that slice wrote",
         VoxelPlanError::Unlike { .. } => "plan the stack before its layers are cropped",
         _ => return None,

@@ -73,7 +73,7 @@ pub struct ColumnCureSettings {
     pub voxel: Option<Length>,
     /// How near the best times a search ends.
     #[serde(with = "text")]
-    pub gap: SearchGap,
+    pub search_gap: SearchGap,
 }
 
 /// A number of bitmaps, from 1 to 1000.
@@ -263,7 +263,7 @@ impl ColumnCureSettings {
             max_s,
             robust: self.robust.unwrap_or_default(),
             step_s: projector.step.value.ms() / 1000.0,
-            stop: Stop { gap: self.gap.0, steps: MOST_STEPS },
+            stop: Stop { gap: self.search_gap.0, steps: MOST_STEPS },
         })
     }
 
@@ -298,14 +298,14 @@ impl ColumnCureSettings {
         // Values that were used, not given: defaults may change, and the command must not.
         let mut command = format!(
             "lamp plan column-cure {} --projector {} --material {} --bitmaps {} --optimize {} \
-             --max-time {:.3}s --gap {}",
+             --max-time {:.3}s --search-gap {}",
             quoted(target),
             quoted(projector),
             quoted(material),
             options.bitmaps,
             self.optimize,
             options.max_s,
-            self.gap
+            self.search_gap
         );
         if self.gray {
             command += " --gray";
@@ -352,7 +352,7 @@ impl ColumnCure {
         let late = (best.relative_gap() > options.stop.gap).then(|| {
             format!(
                 "the search stopped after {} steps, before it was within {:.1e}: a shorter \
-                 --max-time or a wider --gap ends sooner",
+                 --max-time or a wider --search-gap ends sooner",
                 best.steps, options.stop.gap
             )
         });

@@ -104,7 +104,7 @@ const KINDS: [Kind; 12] = [
         ending: "png",
         line: "tile base.tif --layers ..2 --area 30x30mm --mesh mutant.png -q -o out.tif",
         seeds: |scratch| {
-            scratch.run("lamp show base.tif --layer 3 --scale 1/8 -o layer.png").succeeds();
+            scratch.run("lamp show base.tif --layer 3 --zoom 1/8 -o layer.png").succeeds();
             vec![scratch.bytes("layer.png")]
         },
     },

@@ -81,7 +81,7 @@ struct CalibrationFiles {
     name: Option<String>,
 
     /// Plot points and curves: a file that ends in .svg or .png
-    #[arg(long, value_name = "PLOT")]
+    #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 

@@ -26,7 +26,7 @@ pub(super) fn begin(
 ) -> Result<(), Exit> {
     let (material, lamp_doubt) = kept.lamp.material(document(material)?)?;
     lamp_doubt.iter().for_each(|doubt| progress.say(doubt));
-    let light = Light::of(&material, kept.at.unwrap_or_default())?;
+    let light = Light::of(&material, kept.dose_at.unwrap_or_default())?;
     light.check().map_err(|error| Exit::Failed(error.into()).at(material.name.clone()))?;
     let name = input_name(stack);
     let input = InputArgs { stack: stack.to_owned(), layers: None };
@@ -64,7 +64,7 @@ pub(super) fn begin(
     }
     let part_pages = pages.finish().map_err(|error| Exit::from(error).at(name))?;
     let platform = kept.platform();
-    let margin = kept.margin.unwrap_or(0.05);
+    let margin = kept.dose_margin.unwrap_or(0.05);
     let job = JobFile {
         part,
         digest,

@@ -73,7 +73,7 @@ pub(crate) struct LearnArgs {
 
     /// Share of the full correction by which measured heights change the doses
     #[arg(long, value_name = "SHARE", default_value = "0.5", value_parser = parse_step)]
-    step: f64,
+    correction: f64,
 
     /// Write the layers' times for the next print
     #[arg(short, long, value_name = "NEXT.csv", requires = "measured", value_parser = parse_table)]
@@ -95,7 +95,7 @@ pub(crate) struct LearnArgs {
 #[derive(Args, Clone, Debug)]
 struct KeptOptions {
     /// Resin: a built-in material's name (see lamp material list) or a file
-    #[arg(long, value_name = "NAME|FILE", requires = "start")]
+    #[arg(long, value_name = "MATERIAL", requires = "start")]
     material: Option<PathBuf>,
 
     #[command(flatten)]
@@ -108,11 +108,11 @@ struct KeptOptions {
     /// Height in its layer at which a voxel's dose is computed [default: top]
     #[arg(long, value_name = "HEIGHT", requires = "start")]
     #[arg(value_parser = one_of_described::<SampleHeight>(&SAMPLE_HEIGHTS))]
-    at: Option<SampleHeight>,
+    dose_at: Option<SampleHeight>,
 
     /// Margin to the critical dose: plans keep voxels this far from it [default: 5%]
     #[arg(long, value_name = "SHARE", requires = "start", value_parser = parse_margin)]
-    margin: Option<f64>,
+    dose_margin: Option<f64>,
 
     /// Slowest and fastest speed of the platform [default: 5um/s..2mm/s]
     #[arg(long, value_name = "A..B", requires = "start", value_parser = parse_speeds)]
@@ -162,7 +162,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     }
     if let Some(stack) = &args.start {
         let Some(material) = &args.kept.material else {
-            return Err(Exit::usage("--start needs the resin: give --material NAME|FILE"));
+            return Err(Exit::usage("--start needs the resin: give --material MATERIAL"));
         };
         return begin::begin(&args.job, stack, material, &args.kept, &progress);
     }
@@ -187,7 +187,7 @@ pub(crate) fn run(args: &LearnArgs, common: &Common) -> Result<(), Exit> {
     let again = if may_be_again { job.take_back(&text) } else { None };
     let print_number = again.map_or_else(|| job.print_to_learn_from(args.print), Ok)?;
     job.refuse_known(print_number, &text)?;
-    let learned = learn(&job, print_number, &measured, &law, args.step, memory)
+    let learned = learn(&job, print_number, &measured, &law, args.correction, memory)
         .map_err(|error| Exit::from(error).at(name))?;
     match again {
         Some(print) => {

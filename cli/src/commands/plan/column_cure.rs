@@ -32,12 +32,12 @@ pub(super) struct ColumnCureArgs {
     target: TargetArg,
 
     /// Projector: a built-in projector's name (see lamp projector list) or a file
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "PROJECTOR")]
     projector: PathBuf,
 
     /// Resin: a built-in material's name (see lamp material list) or a file. It must state how deep
     /// each dose cures ([two-depth] or [working-curve])
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "MATERIAL")]
     material: PathBuf,
 
     /// Number of bitmaps [default: 25, or the number of distinct times if smaller]
@@ -79,7 +79,7 @@ pub(super) struct ColumnCureArgs {
 
     /// Stop when the times are proved to be this close to the best ones, as a share of the error
     #[arg(long, value_name = "SHARE", default_value_t)]
-    gap: SearchGap,
+    search_gap: SearchGap,
 
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER")]
@@ -114,7 +114,7 @@ impl ColumnCureArgs {
             rays: self.rays.unwrap_or_default(),
             flat_field: self.flat_field.clone(),
             voxel: self.voxel,
-            gap: self.gap,
+            search_gap: self.search_gap,
         }
     }
 }

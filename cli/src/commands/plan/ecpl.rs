@@ -31,12 +31,12 @@ pub(super) struct EcplArgs {
 
     /// Projector: a built-in projector's name (see lamp projector list) or a file. It must state
     /// the chamber's height, and spread light as a Gaussian
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "PROJECTOR")]
     projector: PathBuf,
 
     /// Resin: a built-in material's name (see lamp material list) or a file. It must have
     /// [kinetics]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "MATERIAL")]
     material: PathBuf,
 
     /// How to find bitmaps and times

@@ -24,7 +24,7 @@ Examples:
   lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
   lamp plan column-cure lens-array --projector zhao --material pegda-mw700 -o plan/
   lamp plan ecpl hemisphere --projector jariwala --material tmpta -o plan/
-  lamp cure planned.tif --material mine.toml --section y=12mm --at top -o section.png")]
+  lamp cure planned.tif --material mine.toml --section y=12mm --dose-at top -o section.png")]
 pub(crate) struct PlanArgs {
     #[command(subcommand)]
     what: PlanCommand,

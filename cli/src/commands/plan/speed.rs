@@ -74,8 +74,8 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     let options = SpeedOptions {
         light,
         platform: args.platform.platform(),
-        margin: args.planning.margin,
-        gap: args.planning.gap,
+        margin: args.planning.dose_margin,
+        gap: args.planning.search_gap,
         memory: args.memory.unwrap_or_else(|| memory::available() / 4),
     };
     let progress = progress("plan", common, &args.output);
@@ -97,7 +97,7 @@ pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
         write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
     }
     if let Some(path) = args.report.path() {
-        write_report(&planned, args.planning.margin, path)?;
+        write_report(&planned, args.planning.dose_margin, path)?;
     }
     if let Some(path) = &args.plot {
         let bytes = plots::drawn(&plots_of(&planned), path)?;
@@ -154,11 +154,11 @@ impl SpeedArgs {
 
     /// The command, as pages record it.
     fn command(&self, resin: &str) -> String {
-        let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
+        let PlanningOptions { wanted, dose_margin, search_gap, dose_at, .. } = &self.planning;
         format!(
-            "lamp plan speed {resin} --wanted {wanted} --margin {}% --gap {}% --at {at}{}",
-            100.0 * margin,
-            100.0 * gap,
+            "lamp plan speed {resin} --wanted {wanted} --dose-margin {}% --search-gap {}% --dose-at {dose_at}{}",
+            100.0 * dose_margin,
+            100.0 * search_gap,
             self.platform.words()
         )
     }

@@ -37,7 +37,7 @@ Examples:
   lamp plan voxels part.tif --material mine.toml -o planned.tif
   lamp plan voxels part.tif --material mine.toml --sources grow:3px --plot plan.svg -o planned.tif
   slice part.stl --material mine.toml | lamp plan voxels --material mine.toml | dither > dots.tif
-  lamp plan voxels part.tif --material zsg-amber --exposure 373ms --objective boundary \\
+  lamp plan voxels part.tif --material zsg-amber --expose 373ms --objective boundary \\
       --sources shell:1px --min-level 40 --report plan.json -o planned.tif")]
 pub(super) struct VoxelsArgs {
     #[command(flatten)]
@@ -64,7 +64,7 @@ pub(super) struct VoxelsArgs {
 
     /// Keep this many pixels along the part's outlines white, for example wall:3px
     #[arg(long, value_name = "WALL", value_parser = parse_wall)]
-    keep: Option<u32>,
+    keep_white: Option<u32>,
 
     /// Also count this many voxels around the images, for example 0px [default: as far as light
     /// spreads]
@@ -73,7 +73,7 @@ pub(super) struct VoxelsArgs {
 
     /// Exposure time of pages that state none
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
-    exposure: Option<ExposureTime>,
+    expose: Option<ExposureTime>,
 
     #[command(flatten)]
     report: ReportTo,
@@ -173,7 +173,7 @@ pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     let planned = PlannedVoxels {
         material: &material.name,
         objective: args.objective,
-        margin: args.planning.margin,
+        margin: args.planning.dose_margin,
         outcome: &planned.outcome(),
     };
     let doubts = doubt.into_iter().chain(doses.doubt("layers"));
@@ -226,11 +226,11 @@ impl VoxelsArgs {
         Options {
             wanted: self.planning.wanted,
             objective: self.objective,
-            margin: self.planning.margin,
+            margin: self.planning.dose_margin,
             sources: self.sources,
             min_level: self.min_level,
-            keep_wall: self.keep.unwrap_or(0),
-            gap: self.planning.gap,
+            keep_wall: self.keep_white.unwrap_or(0),
+            gap: self.planning.search_gap,
             around: self.around,
             memory: Some(self.memory.unwrap_or_else(|| memory::available() / 4)),
             ..Options::default()
@@ -239,12 +239,12 @@ impl VoxelsArgs {
 
     /// The command, as pages record it.
     fn command(&self, resin: &str) -> String {
-        let PlanningOptions { wanted, margin, gap, at, .. } = &self.planning;
+        let PlanningOptions { wanted, dose_margin, search_gap, dose_at, .. } = &self.planning;
         let mut command = format!(
-            "lamp plan voxels {resin} --objective {} --wanted {wanted} --margin {}% --gap {}% --at {at}",
+            "lamp plan voxels {resin} --objective {} --wanted {wanted} --dose-margin {}% --search-gap {}% --dose-at {dose_at}",
             self.objective,
-            100.0 * margin,
-            100.0 * gap
+            100.0 * dose_margin,
+            100.0 * search_gap
         );
         match self.sources {
             Sources::Lit => {}
@@ -254,8 +254,8 @@ impl VoxelsArgs {
         if self.min_level > 0 {
             command += &format!(" --min-level {}", self.min_level);
         }
-        if let Some(wall) = self.keep {
-            command += &format!(" --keep wall:{wall}px");
+        if let Some(wall) = self.keep_white {
+            command += &format!(" --keep-white wall:{wall}px");
         }
         if let Some(around) = self.around {
             command += &format!(" --around {around}px");
@@ -265,7 +265,7 @@ impl VoxelsArgs {
 
     /// Gives a page its exposure, if it states none, and records the command.
     fn prepared(&self, mut layer: Layer, command: &str) -> Layer {
-        let given = self.exposure.map(ExposureTime::ms);
+        let given = self.expose.map(ExposureTime::ms);
         layer.info.exposure_ms = layer.info.exposure_ms.or(given);
         if let Some(stack) = &mut layer.info.stack {
             stack.commands.push(command.to_owned());

@@ -60,7 +60,7 @@ pub(crate) struct ReportArgs {
 
     /// Machine that builds the stack: alpha, beta or a file (see lamp machine). Its recoating
     /// counts in the build time, and its blade drags on floating features
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "MACHINE")]
     machine: Option<PathBuf>,
 
     #[command(flatten)]

@@ -112,7 +112,7 @@ pub(crate) struct SupportArgs {
     settings: Parsed<SupportStageArgs, SupportSettings>,
 
     /// Machine whose blade drags on floating features: alpha, beta or a file (see lamp machine)
-    #[arg(long, value_name = "M", default_value = "alpha")]
+    #[arg(long, value_name = "MACHINE", default_value = "alpha")]
     pub(crate) machine: PathBuf,
 
     #[command(flatten)]

@@ -18,7 +18,7 @@ use crate::streams::{progress, write_layers};
 #[command(after_help = "\
 Examples:
   lamp target screens -o screens.tif
-  lamp target screens --gray 25% --exposure 600ms | dither > screens.tif")]
+  lamp target screens --level 25% --expose 600ms | dither > screens.tif")]
 pub(super) struct ScreensArgs {
     /// Resolution in dots per inch
     #[arg(long, default_value = "1500")]
@@ -26,12 +26,12 @@ pub(super) struct ScreensArgs {
 
     /// Gray level of all tiles, to the nearest 64th on the screens; 50% is a checkerboard
     #[arg(long, value_name = "PERCENT", default_value = "50%", value_parser = parse_level)]
-    gray: GrayLevel,
+    level: GrayLevel,
 
     /// Sides of the screens' squares, in pixels; 1, 5, 10 and 15 are 17, 85, 170 and 255 um at 1500
     /// dpi
     #[arg(long, value_name = "PIXELS,...", value_delimiter = ',', default_value = "1,5,10,15")]
-    cells: Vec<u32>,
+    squares: Vec<u32>,
 
     /// Side of a tile, in pixels; a multiple of eight times each square gives exactly the gray
     /// level
@@ -44,7 +44,7 @@ pub(super) struct ScreensArgs {
 
     /// Exposure time
     #[arg(long, value_name = "TIME")]
-    exposure: Option<ExposureTime>,
+    expose: Option<ExposureTime>,
 
     #[command(flatten)]
     output: Output,
@@ -52,7 +52,7 @@ pub(super) struct ScreensArgs {
 
 pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
     let gap = whole_pixels(args.gap, args.dpi);
-    let image = screens(args.gray, args.tile, gap, &args.cells)?;
+    let image = screens(args.level, args.tile, gap, &args.squares)?;
     let stack = StackInfo {
         part: "screens".to_owned(),
         commands: vec![args.command()],
@@ -60,7 +60,7 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
         ..StackInfo::default()
     };
     let info = PageInfo {
-        exposure_ms: args.exposure.map(ExposureTime::ms),
+        exposure_ms: args.expose.map(ExposureTime::ms),
         stack: Some(stack),
         ..PageInfo::default()
     };
@@ -71,11 +71,11 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
 
 impl ScreensArgs {
     fn command(&self) -> String {
-        let cells: Vec<String> = self.cells.iter().map(u32::to_string).collect();
-        let Self { dpi, tile, gray, gap, .. } = self;
-        let (cells, percent) = (cells.join(","), 100.0 * gray.get());
+        let squares: Vec<String> = self.squares.iter().map(u32::to_string).collect();
+        let Self { dpi, tile, level, gap, .. } = self;
+        let (squares, percent) = (squares.join(","), 100.0 * level.get());
         format!(
-            "target screens --dpi {dpi} --gray {percent}% --cells {cells} --tile {tile} --gap {gap}"
+            "target screens --dpi {dpi} --level {percent}% --squares {squares} --tile {tile} --gap {gap}"
         )
     }
 }

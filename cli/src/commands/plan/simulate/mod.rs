@@ -51,11 +51,11 @@ pub(super) struct SimulateArgs {
     model: SimulationModel,
 
     /// Projector: a built-in projector's name (see lamp projector list) or a file
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "PROJECTOR")]
     projector: PathBuf,
 
     /// Resin: a built-in material's name (see lamp material list) or a file
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "MATERIAL")]
     material: PathBuf,
 
     /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions,
