@@ -228,7 +228,7 @@ impl From<BatchError> for Exit {
 impl From<PlotError> for Exit {
     fn from(error: PlotError) -> Self {
         match error {
-            PlotError::Name(_) => Self::Usage(error.into()),
+            PlotError::Name(_) | PlotError::PictureName(_) => Self::Usage(error.into()),
             error => Self::Failed(error.into()),
         }
     }

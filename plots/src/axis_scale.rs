@@ -3,6 +3,10 @@
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::{Drawn, FAMILY, GRAY_INK, PlotArea};
 
 /// The range of an axis and how values lie on it.
 #[derive(Clone, Debug)]
@@ -39,6 +43,63 @@ impl ValueFormatter<f64> for AxisScale {
         // Ticks are multiples of steps: their last digits are rounding.
         ((value * 1e9).round() / 1e9).to_string()
     }
+}
+
+/// An axis beside a picture, whose places are pixels.
+pub(super) struct PixelAxis<'a> {
+    /// The quantity, with its unit.
+    pub(super) name: &'a str,
+    /// Where it begins and ends: across below the picture, or up at its left.
+    pub(super) line: [(i32, i32); 2],
+    /// The values there.
+    pub(super) ends: [f64; 2],
+    /// Whether only whole numbers are places.
+    pub(super) whole: bool,
+}
+
+/// The least distance between the numbers of an axis, across and up, in pixels.
+const TICKS_APART: [i32; 2] = [64, 24];
+/// The distance from an axis that goes up to its name, in pixels.
+const NAME_LEFT: i32 = 68;
+
+impl PixelAxis<'_> {
+    /// Draws the line, numbers and the name.
+    pub(super) fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
+        let Self { name, line: [from, to], ends: [start, end], whole } = *self;
+        area.draw(&PathElement::new([from, to], GRAY_INK))?;
+        let is_up = from.0 == to.0;
+        let mut ticks = ticks(&(start.min(end)..start.max(end)), false);
+        ticks.retain(|tick| !whole || tick.fract() == 0.0);
+        let length = f64::from((to.0 - from.0).abs() + (to.1 - from.1).abs());
+        let most = (length / f64::from(TICKS_APART[usize::from(is_up)])).max(1.0) as usize;
+        let every = ticks.len().div_ceil(most).max(1);
+        for tick in ticks.into_iter().step_by(every) {
+            let share = (tick - start) / (end - start);
+            let along = |from: i32, to: i32| from + (share * f64::from(to - from)).round() as i32;
+            let (x, y) = (along(from.0, to.0), along(from.1, to.1));
+            let (stroke, label, pos) = if is_up {
+                ((x - 6, y), (x - 9, y), Pos::new(HPos::Right, VPos::Center))
+            } else {
+                ((x, y + 6), (x, y + 9), Pos::new(HPos::Center, VPos::Top))
+            };
+            area.draw(&PathElement::new([(x, y), stroke], GRAY_INK))?;
+            area.draw(&Text::new(AxisScale::format(&tick), label, text(area, 15.0).pos(pos)))?;
+        }
+        let middle = (i32::midpoint(from.0, to.0), i32::midpoint(from.1, to.1));
+        let pos = Pos::new(HPos::Center, VPos::Top);
+        let (place, style) = if is_up {
+            let style = text(area, 16.0).transform(FontTransform::Rotate270);
+            ((middle.0 - NAME_LEFT, middle.1), style.pos(pos))
+        } else {
+            ((middle.0, middle.1 + 28), text(area, 16.0).pos(pos))
+        };
+        area.draw(&Text::new(name.to_owned(), place, style))
+    }
+}
+
+/// Letters of a height in pixels.
+pub(super) fn text<B: DrawingBackend>(area: &PlotArea<B>, size: f64) -> TextStyle<'static> {
+    (FAMILY, size).into_text_style(area).color(&RGBColor(40, 40, 40))
 }
 
 /// More ticks than this cannot be read.

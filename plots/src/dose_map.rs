@@ -5,6 +5,7 @@ use std::path::Path;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use crate::axis_scale::PixelAxis;
 use crate::{Drawing, Drawn, FAMILY, GRAY_INK, PlotArea, PlotError, picture_of, with_font};
 
 /// Doses of the same voxels in two cases, side by side.
@@ -15,6 +16,8 @@ pub struct DoseMap {
     pub critical_mj: f64,
     /// Voxels in a row.
     pub width: usize,
+    /// The column and the row of the first voxel.
+    pub corner: [u32; 2],
     /// Which voxels are wanted, row by row.
     pub wanted: Vec<bool>,
     /// The cases: a name, and the doses in units of the critical dose.
@@ -27,6 +30,9 @@ const CELL: [usize; 2] = [4, 80];
 /// Cells from this side on have room for a number.
 const NUMBERED: i32 = 32;
 const MARGIN: i32 = 30;
+/// Room for the rows and the columns of voxels.
+const LEFT: i32 = 76;
+const BELOW: i32 = 56;
 const TITLE: i32 = 90;
 const LEGEND: i32 = 60;
 
@@ -51,13 +57,13 @@ impl DoseMap {
     fn size(&self) -> (u32, u32) {
         let [width, height] = [self.width, self.height()].map(|count| count as i32 * self.cell());
         // Titles need room, too.
-        let width = (2 * width + 3 * MARGIN).max(900);
-        (width as u32, (TITLE + height + LEGEND + MARGIN) as u32)
+        let width = (2 * (width + LEFT + MARGIN)).max(900);
+        (width as u32, (TITLE + height + BELOW + LEGEND + MARGIN) as u32)
     }
 
     /// The top left corner of a case's map.
     fn corner(&self, case: usize) -> (i32, i32) {
-        (MARGIN + case as i32 * (self.size().0 as i32 - MARGIN) / 2, TITLE)
+        (LEFT + case as i32 * self.size().0 as i32 / 2, TITLE)
     }
 
     fn draw_case<B: DrawingBackend>(&self, area: &PlotArea<B>, case: usize) -> Drawn<B> {
@@ -86,7 +92,22 @@ impl DoseMap {
                 area.draw(&Text::new(number, (x + cell / 2, y + cell / 2), style))?;
             }
         }
-        self.draw_outline(area, (left, top))
+        self.draw_outline(area, (left, top))?;
+        let [width, height] = [self.width, self.height()].map(|count| count as i32 * cell);
+        // A voxel's number stands at its middle.
+        let ends = |first: u32, count: usize| {
+            let first = f64::from(first) - 0.5;
+            [first, first + count as f64]
+        };
+        let below = top + height;
+        let line = [(left, below), (left + width, below)];
+        let columns =
+            PixelAxis { name: "column", line, ends: ends(self.corner[0], self.width), whole: true };
+        columns.draw(area)?;
+        let line = [(left, top), (left, below)];
+        let rows =
+            PixelAxis { name: "row", line, ends: ends(self.corner[1], self.height()), whole: true };
+        rows.draw(area)
     }
 
     /// Draws a line between voxels that are wanted and others.

@@ -24,7 +24,8 @@ pub struct HeatMap {
 /// How numbers are colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colors {
-    /// Blue below zero, red above, as far in both directions.
+    /// Blue below zero, red above, as far in both directions. The greatest hundredth of the numbers has
+    /// the colors of the ends, or a few would leave all others pale.
     AboutZero,
     /// Dark at zero, light at the most.
     FromZero,
@@ -94,12 +95,35 @@ impl HeatMap {
         ((width + beside * SCALE).max(460 * SCALE), height)
     }
 
+    /// The greatest distance from zero.
+    fn most(&self) -> f64 {
+        self.values.iter().map(|value| value.abs()).fold(0.0, f64::max)
+    }
+
     fn scale(&self) -> ColorScale {
         // A map of zeros needs a scale of some length.
-        let most = self.values.iter().map(|value| value.abs()).fold(0.0, f64::max).max(1e-9);
+        let most = self.most().max(1e-9);
         match self.colors {
-            Colors::AboutZero => ColorScale { least: -most, most, stops: &DIVERGING },
+            Colors::AboutZero => {
+                let mut sizes: Vec<f64> = self.values.iter().map(|value| value.abs()).collect();
+                let last = sizes.len() - 1;
+                let (_, &mut cut, _) =
+                    sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp);
+                // Few columns may be wrong at all, and their colors must differ.
+                let end = if cut.is_finite() && cut > most / 1000.0 { cut } else { most };
+                ColorScale { least: -end, most: end, stops: &DIVERGING }
+            }
             Colors::FromZero => ColorScale { least: 0.0, most, stops: &RISING },
+        }
+    }
+
+    /// The name of the numbers; if some have the colors of the ends, how far they go.
+    fn label(&self) -> String {
+        let (most, end) = (self.most(), self.scale().most);
+        if most > end {
+            format!("{}; a hundredth is beyond the colors, up to {most:.3}", self.label)
+        } else {
+            self.label.clone()
         }
     }
 
@@ -155,7 +179,7 @@ impl HeatMap {
             .configure_mesh()
             .disable_mesh()
             .disable_x_axis()
-            .y_desc(&self.label)
+            .y_desc(self.label())
             .axis_desc_style(font(15))
             .label_style(font(13))
             .axis_style(GRAY_INK.stroke_width(SCALE))
@@ -237,10 +261,32 @@ mod tests {
     #[test]
     fn zero_is_white_and_the_ends_are_as_far() {
         let scale = map(2, vec![-1.0, 0.0, 0.5, 4.0], Colors::AboutZero).scale();
-        assert_eq!([scale.least, scale.most], [-4.0, 4.0]);
+        assert_eq!([scale.least, scale.most], [-0.5, 0.5]);
         assert_eq!(scale.color(0.0), RGBColor(247, 247, 247));
         assert_eq!(scale.color(4.0), RGBColor(178, 24, 43));
         assert_eq!(scale.color(-9.0), RGBColor(33, 102, 172));
+    }
+
+    #[test]
+    fn a_hundredth_of_the_numbers_may_lie_beyond_the_colors_and_the_label_says_so() {
+        let numbers = |wild: usize| {
+            let small = (0..1000 - wild).map(|k| 0.5 + 0.5 * (k as f64 * 0.1).sin());
+            let all = small.chain(std::iter::repeat_n(-20.0, wild)).collect();
+            map(50, all, Colors::AboutZero)
+        };
+        assert!((numbers(10).scale().most - 1.0).abs() < 1e-3);
+        assert_eq!(
+            numbers(10).label(),
+            "height (um); a hundredth is beyond the colors, up to 20.000"
+        );
+        assert_eq!(
+            (numbers(11).scale().most, numbers(11).label()),
+            (20.0, "height (um)".to_owned())
+        );
+        // Where nearly all is right, what is wrong has colors.
+        let mut rare = vec![0.0; 1000];
+        rare[3] = 2.0;
+        assert_eq!(map(50, rare, Colors::AboutZero).scale().most, 2.0);
     }
 
     #[test]

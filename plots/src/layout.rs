@@ -26,7 +26,6 @@ pub fn layout_picture(layout: &Layout, path: &Path) -> Result<Vec<u8>, PlotError
 
 struct LayoutPicture<'a> {
     layout: &'a Layout,
-    /// Pixels of the picture for one of the build.
     /// Pixels of the picture for a column and for a row of the build.
     scale: [f64; 2],
     /// Of parts whose outlines are known, what they look like.

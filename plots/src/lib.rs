@@ -27,6 +27,7 @@ mod section;
 mod shades;
 mod sphere;
 mod thumbnails;
+mod views;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -48,14 +49,18 @@ pub use section::SectionPicture;
 pub use shades::{Shade, ShadedPicture};
 pub use sphere::sphere_picture;
 pub use thumbnails::{Thumbnail, contact_sheet, write_animation};
+pub use views::{StackViews, ViewGrid};
 
 /// The error of a plot.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
     /// The file's name ends in no format of plots.
-    #[error("{}: a plot is an SVG or a PNG: end its name in .svg or .png", .0.display())]
+    #[error("{}: a plot is an SVG, a PNG or a table: end its name in .svg, .png or .csv", .0.display())]
     Name(PathBuf),
+    /// The file's name ends in no format of pictures.
+    #[error("{}: the picture is an SVG or a PNG: end its name in .svg or .png", .0.display())]
+    PictureName(PathBuf),
     /// A picture has more pixels on a side, across and up, than people look at.
     #[error("the picture would be {} x {} pixels", .0[0], .0[1])]
     TooLarge([usize; 2]),
@@ -146,9 +151,9 @@ pub fn by_layer(title: String, label: &str, series: Vec<Series>) -> Plot {
     Plot { title, x: linear("z (mm)", first..last), y, series }
 }
 
-/// File formats of plots.
+/// File formats of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum PlotFormat {
+enum PictureFormat {
     Svg,
     Png,
 }
@@ -162,35 +167,71 @@ const PAGE_SIZE: (u32, u32) = (560, 390);
 /// numbers of them.
 const SCALE: u32 = 2;
 
-/// Checks, before the work, that a plot can have that name.
+/// Checks, before the work, that a plot of curves can have that name.
 ///
 /// # Errors
 /// Returns an error if the name ends in no format of plots.
 pub fn check_name(path: &Path) -> Result<(), PlotError> {
+    let is_plot = ends_in(path, "csv") || format_of(path).is_ok();
+    if is_plot { Ok(()) } else { Err(PlotError::Name(path.to_owned())) }
+}
+
+/// Checks, before the work, that a picture can have that name.
+///
+/// # Errors
+/// Returns an error if the name ends in no format of pictures.
+pub fn check_picture_name(path: &Path) -> Result<(), PlotError> {
     format_of(path).map(|_| ())
 }
 
-fn format_of(path: &Path) -> Result<PlotFormat, PlotError> {
-    let is = |end: &str| path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end));
-    if is("svg") {
-        Ok(PlotFormat::Svg)
-    } else if is("png") {
-        Ok(PlotFormat::Png)
+fn ends_in(path: &Path, end: &str) -> bool {
+    path.extension().is_some_and(|have| have.eq_ignore_ascii_case(end))
+}
+
+fn format_of(path: &Path) -> Result<PictureFormat, PlotError> {
+    if ends_in(path, "svg") {
+        Ok(PictureFormat::Svg)
+    } else if ends_in(path, "png") {
+        Ok(PictureFormat::Png)
     } else {
-        Err(PlotError::Name(path.to_owned()))
+        Err(PlotError::PictureName(path.to_owned()))
     }
 }
 
-/// The bytes of plots below each other, in the format that the file's name says.
-/// Equal plots give equal bytes.
+/// The bytes of plots, in the format that the file's name says: below each other as a picture, or
+/// all their numbers as a table. Equal plots give equal bytes.
 ///
 /// # Errors
 /// Returns an error if the name ends in no format of plots, or the plots cannot be drawn.
 pub fn drawn(plots: &[Plot], path: &Path) -> Result<Vec<u8>, PlotError> {
-    match format_of(path)? {
-        PlotFormat::Svg => Ok(svg(plots, SIZE).into_bytes()),
-        PlotFormat::Png => png(plots),
+    check_name(path)?;
+    if ends_in(path, "csv") {
+        return Ok(table(plots).into_bytes());
     }
+    match format_of(path)? {
+        PictureFormat::Svg => Ok(svg(plots, SIZE).into_bytes()),
+        PictureFormat::Png => png(plots),
+    }
+}
+
+/// The numbers of plots as CSV (RFC 4180): a line for each point of a series, and for each corner of
+/// its curve and its band.
+fn table(plots: &[Plot]) -> String {
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut table = "plot,x_axis,y_axis,series,kind,x,y,y_high\n".to_owned();
+    for plot in plots {
+        let names = [&plot.title, &plot.x.label, &plot.y.label].map(|text| quoted(text)).join(",");
+        for series in &plot.series {
+            let begin = format!("{names},{}", quoted(&series.name));
+            for (kind, places) in [("point", &series.points), ("curve", &series.curve)] {
+                table.extend(places.iter().map(|(x, y)| format!("{begin},{kind},{x},{y},\n")));
+            }
+            table.extend(
+                series.band.iter().map(|[x, low, high]| format!("{begin},band,{x},{low},{high}\n")),
+            );
+        }
+    }
+    table
 }
 
 /// A rectangle to draw on.
@@ -206,7 +247,7 @@ trait Drawing {
 /// The bytes of a picture, in the format that the file's name says.
 fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<Vec<u8>, PlotError> {
     match format_of(path)? {
-        PlotFormat::Svg => {
+        PictureFormat::Svg => {
             let mut text = String::new();
             let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
             // A text takes all that is drawn on it.
@@ -214,7 +255,7 @@ fn picture_of(drawing: &impl Drawing, size: (u32, u32), path: &Path) -> Result<V
             drop(area);
             Ok(text.into_bytes())
         }
-        PlotFormat::Png => png_of(size, |area| drawing.draw(area)),
+        PictureFormat::Png => png_of(size, |area| drawing.draw(area)),
     }
 }
 
@@ -242,14 +283,9 @@ fn png(plots: &[Plot]) -> Result<Vec<u8>, PlotError> {
 /// The bytes of a PNG of what is drawn.
 fn png_of<E: std::error::Error + Send + Sync>(
     (width, height): (u32, u32),
-    draw: impl FnOnce(
-        &DrawingArea<BitMapBackend<'_>, plotters::coord::Shift>,
-    ) -> Result<(), DrawingAreaErrorKind<E>>,
+    draw: impl FnOnce(&PlotArea<BitMapBackend<'_>>) -> Result<(), DrawingAreaErrorKind<E>>,
 ) -> Result<Vec<u8>, PlotError> {
-    let mut pixels = vec![0; width as usize * height as usize * 3];
-    let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
-    draw(&area).map_err(|error| PlotError::Drawing(error.to_string()))?;
-    drop(area);
+    let pixels = pixels_of((width, height), draw)?;
     let mut bytes = Vec::new();
     let mut png = png::Encoder::new(&mut bytes, width, height);
     png.set_color(png::ColorType::Rgb);
@@ -257,6 +293,18 @@ fn png_of<E: std::error::Error + Send + Sync>(
     let written = png.write_header().and_then(|mut png| png.write_image_data(&pixels));
     written.map_err(|error| PlotError::Drawing(error.to_string()))?;
     Ok(bytes)
+}
+
+/// The red, green and blue of what is drawn, row by row.
+fn pixels_of<E: std::error::Error + Send + Sync>(
+    size: (u32, u32),
+    draw: impl FnOnce(&PlotArea<BitMapBackend<'_>>) -> Result<(), DrawingAreaErrorKind<E>>,
+) -> Result<Vec<u8>, PlotError> {
+    let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
+    let area = BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area();
+    draw(&area).map_err(|error| PlotError::Drawing(error.to_string()))?;
+    drop(area);
+    Ok(pixels)
 }
 
 /// A size in pixels of a PNG, or units of an SVG.
@@ -429,10 +477,33 @@ mod tests {
     }
 
     #[test]
-    fn a_plot_is_an_svg_or_a_png() {
-        for name in ["a.svg", "b/a.PNG"] {
+    fn a_table_has_each_number_of_a_plot() {
+        let plot = &plots()[0];
+        let text = String::from_utf8(drawn(&plots()[..1], Path::new("a.csv")).unwrap()).unwrap();
+        let of = |series: &Series| series.points.len() + series.curve.len() + series.band.len();
+        let numbers: usize = plot.series.iter().map(of).sum();
+        assert!(numbers > 0);
+        assert_eq!(text.lines().count(), 1 + numbers);
+        let mut odd = Plot {
+            title: "a \"b\", c".to_owned(),
+            x: linear("x (mm)", 0.0..1.0),
+            y: linear("y", 0.0..1.0),
+            series: vec![curve("d", vec![(0.1, -2.5e-7)])],
+        };
+        odd.series[0].points = vec![(3.0, 4.0)];
+        odd.series[0].band = vec![[1.0, 2.0, 3.5]];
+        let head = r#""a ""b"", c","x (mm)","y","d""#;
+        let rows = ["point,3,4,", "curve,0.1,-0.00000025,", "band,1,2,3.5"];
+        let rows: String = rows.iter().map(|row| format!("{head},{row}\n")).collect();
+        assert_eq!(table(&[odd]), format!("plot,x_axis,y_axis,series,kind,x,y,y_high\n{rows}"));
+    }
+
+    #[test]
+    fn a_plot_is_an_svg_a_png_or_a_table() {
+        for name in ["a.svg", "b/a.PNG", "a.csv"] {
             assert!(check_name(Path::new(name)).is_ok(), "{name}");
         }
+        assert!(check_picture_name(Path::new("a.csv")).is_err());
         for name in ["-", "a", "a.pdf", "svg"] {
             let refused = check_name(Path::new(name));
             assert!(matches!(refused, Err(PlotError::Name(_))), "{name}");

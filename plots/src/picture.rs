@@ -1,5 +1,6 @@
 //! Draws layers as PNG pictures.
 
+use std::fmt;
 use std::io::{self, Write};
 use std::num::NonZeroU32;
 use std::ops::Range;
@@ -107,6 +108,16 @@ impl PictureScale {
     pub fn fitting(region: &PictureRegion, side: u32, aspect: f64) -> Self {
         let longer = region.longer_side(aspect);
         Self::Down(longer.div_ceil(side).clamp(1, MAX_FACTOR))
+    }
+}
+
+impl fmt::Display for PictureScale {
+    /// Writes `4` or `1/8`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Up(up) => write!(f, "{up}"),
+            Self::Down(down) => write!(f, "1/{down}"),
+        }
     }
 }
 

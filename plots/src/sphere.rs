@@ -20,16 +20,17 @@ const LEGEND: i32 = 110;
 const SIZE: (u32, u32) =
     ((4 * RADIUS + 3 * MARGIN) as u32, (2 * RADIUS + 2 * MARGIN + HEAD + LEGEND) as u32);
 
-/// Colors of no island, one, and more: dark where there are many (after Viridis).
+/// Colors of no island, one, and more, from good to bad: blue over yellow to red, distinct also to
+/// people who see few colors (after ColorBrewer's RdYlBu).
 const SHADES: [(&str, RGBColor); 5] = [
-    ("no island", RGBColor(253, 231, 37)),
-    ("1", RGBColor(94, 201, 98)),
-    ("2", RGBColor(33, 145, 140)),
-    ("3 to 5", RGBColor(59, 82, 139)),
-    ("more", RGBColor(68, 1, 84)),
+    ("no island", RGBColor(69, 117, 180)),
+    ("1", RGBColor(145, 191, 219)),
+    ("2", RGBColor(254, 224, 144)),
+    ("3 to 5", RGBColor(252, 141, 89)),
+    ("more", RGBColor(215, 48, 39)),
 ];
 
-const BEST: RGBColor = RGBColor(213, 94, 0);
+const BEST: RGBColor = RGBColor(0, 0, 0);
 
 fn shade(islands: usize) -> RGBColor {
     SHADES[match islands {

@@ -303,9 +303,10 @@ fn a_section_shows_what_gray_saves() {
         assert!(white[0] > 1.0 && gray[0] < 0.2 * white[0], "{white:?} {gray:?}");
         assert!((gray[1] - white[1]).abs() < 0.12 * white[0], "{white:?} {gray:?}");
         let (width, pixels) = rgb_pixels(&scratch.bytes("s.png"));
-        // Red only on the left, blue on both sides.
+        // Red only on the left, blue on both sides. The legend below has both.
         let count = |colour: [u8; 3], left: bool| {
-            let of_half = |k: usize| (k % width < width / 2) == left;
+            let end = pixels.len() - 88 * width;
+            let of_half = |k: usize| (k % width < width / 2) == left && k < end;
             (0..).zip(&pixels).filter(|(k, pixel)| of_half(*k) && **pixel == colour).count()
         };
         let [red, blue] = [[226, 72, 52], [52, 130, 226]];
@@ -394,6 +395,42 @@ const CURED: [u8; 3] = [200, 204, 208];
 const EMPTY: [u8; 3] = [24, 26, 30];
 
 #[test]
+fn a_section_is_also_drawn_as_shapes() {
+    let scratch = with_tower();
+    scratch.run("slice tower.stl --dpi 300 --thickness 500um -o t.tif").succeeds_quietly();
+    let cure =
+        "lamp cure t.tif --material lamp-suspension --section y=0mm --part tower.stl --alone";
+    let said = scratch.run(&format!("{cure} -o s.svg")).succeeds_quietly().stdout;
+    let text = String::from_utf8(scratch.bytes("s.svg")).unwrap();
+    // The area that each color covers, of rectangles M x y H x V y H x Z.
+    let area = |color: &str| -> f64 {
+        let begin = format!("fill=\"{color}\" d=\"");
+        let path = text.split(&begin).nth(1).unwrap().split('"').next().unwrap();
+        let rectangles = path.split('Z').filter(|rectangle| !rectangle.is_empty());
+        rectangles
+            .map(|rectangle| {
+                let numbers: Vec<f64> = rectangle
+                    .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+                    .filter_map(|number| number.parse().ok())
+                    .collect();
+                let [left, top, right, bottom, _] = numbers[..] else { panic!("{rectangle}") };
+                (right - left) * (bottom - top)
+            })
+            .sum()
+    };
+    let side_mm = 25.4 / 300.0;
+    let [cured, over, missing] =
+        ["#c8ccd0", "#e24834", "#3482e2"].map(|color| area(color) * side_mm * side_mm);
+    let [overshoot, lost] = areas(&said)[0];
+    // Shapes are of pixels' centers, the printed areas of the part's outline within each pixel.
+    assert!((over - overshoot).abs() < 0.05 * overshoot, "{over} {overshoot}");
+    assert!((missing - lost).abs() < 0.1 * lost.max(0.2), "{missing} {lost}");
+    assert!(cured > 10.0 * over, "{cured}");
+    assert!(text.contains("x (mm)") && text.contains("z (mm)"));
+    is_wrong_usage(&scratch.run(&format!("{cure} -o s.pdf")), "end its name in .svg or .png");
+}
+
+#[test]
 fn doses_add_up_to_those_of_001() {
     let scratch = Scratch::new();
     let mut layers: Vec<_> = example_cylinder().layers().collect();
@@ -405,8 +442,13 @@ fn doses_add_up_to_those_of_001() {
     // Figure A.21: all 7 x 7 pixels of the third layer, and so of those below; 21 voxels here.
     assert!(said.contains("white   cured 0.0026\n"), "{said}");
     let (width, pixels) = rgb_pixels(&scratch.bytes("s.png"));
-    let [dark, lit] = [2 * width, 3 * width];
-    assert_eq!((width, pixels), (7, [vec![EMPTY; dark], vec![CURED; lit]].concat()));
+    // Below the title and beside the heights.
+    let section = |row: usize| &pixels[(60 + row) * width + 76..][..7];
+    for row in 0..5 {
+        assert_eq!(section(row), [if row < 2 { EMPTY } else { CURED }; 7], "{row}");
+    }
+    let beside = |row: usize, column: usize| pixels[row * width + column];
+    assert_eq!([beside(59, 76), beside(62, 83)], [[255; 3]; 2]);
     // A layer's bottom has 10^-0.008 of its top's dose: too little only in corners.
     let bottom = scratch.run(&format!("{cure} --dose-at bottom")).succeeds_quietly().stdout;
     assert_eq!(String::from_utf8(bottom).unwrap(), said);

@@ -193,7 +193,7 @@ fn what_cannot_be_is_said() {
     usage("slice tower.stl --adaptive --cusp 9um --criterion volume", "--criterion cusp");
     usage("lamp heights tower.stl --criterion cusp", "needs a bound, such as --cusp");
     usage("lamp heights tower.stl --time-budget 1h", "give --material or --exposure-table");
-    usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg or .png");
+    usage("lamp heights tower.stl --plot x.pdf", "end its name in .svg, .png or .csv");
     usage("lamp heights tower.stl --plot x.svg --csv x.svg", "a table is CSV");
     usage("lamp heights tower.stl --deviation 2", "write 2% or 0.02");
     usage(

@@ -312,7 +312,7 @@ fn wrong_options_are_status_2() {
         ("--wanted 0", "--wanted"),
         ("--min-level 256", "--min-level"),
         ("--expose 0s", "takes some time"),
-        ("--plot plan.pdf", ".svg or .png"),
+        ("--plot plan.pdf", ".svg, .png or .csv"),
         ("--report stairs.tif", "that is an input"),
         ("--report p.svg --plot p.svg", "written as JSON"),
         ("--map m.svg", "--map-layer"),

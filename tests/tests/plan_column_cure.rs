@@ -15,7 +15,9 @@ fn report(scratch: &Scratch, folder: &str) -> Value {
 fn one_command_plans_a_lens_array() {
     let scratch = Scratch::new();
     scratch.run(LENSES).succeeds();
-    for file in ["bitmaps.tif", "report.json", "section.svg", "residual.png", "times.png"] {
+    for file in
+        ["bitmaps.tif", "report.json", "section.svg", "section.csv", "residual.png", "times.png"]
+    {
         assert!(!scratch.bytes(&format!("plan/{file}")).is_empty(), "{file}");
     }
     let report = report(&scratch, "plan");

@@ -22,7 +22,6 @@ use crate::args::options::{Common, InputArgs, one_of_described};
 use crate::args::planning_options::SAMPLE_HEIGHTS;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
-use crate::output::endings::{PNG, check_ending};
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::PictureScale;
@@ -90,8 +89,8 @@ pub(crate) struct CureArgs {
     #[arg(long, value_name = "N|1/N", default_value = "1")]
     zoom: PictureScale,
 
-    /// PNG file to write
-    #[arg(short, long, value_name = "FILE.png")]
+    /// Picture to write: a file that ends in .png or .svg
+    #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
 
@@ -116,7 +115,7 @@ impl CureArgs {
 pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
-    check_ending(&args.output, &PNG)?;
+    lamp_plots::check_picture_name(&args.output)?;
     let (material, lamp_doubt) = args.lamp.material(document(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
@@ -160,7 +159,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let panels = SectionPicture(shown.map_err(no_section)?);
     // Before the file is begun: a picture at a wrong scale could fill the disk.
     panels.check_size(args.zoom).map_err(|error| failed(error.into()))?;
-    write_file(&args.output, |out| panels.write_png(args.zoom, out))?;
+    write_file(&args.output, |out| panels.write(&material.name, args.zoom, &args.output, out))?;
     print(&panels.text(&material.name))
 }
 

@@ -29,7 +29,7 @@ Examples:
   lamp show build.tif --z 12mm --region 2000,1500,200,100 --zoom 4 -o detail.png
   lamp show build.tif --layers 0..1270/40 -o sheet.png
   lamp show build.tif --layers 0..1270/10 --animate -o build.png
-  lamp show build.tif --layer 600 --ascii")]
+  lamp show build.tif --layer 600 --draw ascii")]
 pub(crate) struct ShowArgs {
     /// The stack: a TIFF or picture file, a folder of pages, or - for standard input
     #[arg(value_name = "STACK", default_value = "-")]
@@ -58,14 +58,14 @@ pub(crate) struct ShowArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
     fps: u16,
 
-    /// Print the layer as text, with denser characters for brighter pixels; a line shows two rows
-    /// of pixels
-    #[arg(long, conflicts_with_all = ["animate", "layers"])]
-    ascii: bool,
+    /// Draw the layer in the terminal, from its first to its last pixel that is not black, as large as
+    /// fits [default, without -o: the best that the terminal is known to draw]
+    #[arg(long, value_name = "FORM", conflicts_with_all = ["animate", "layers"])]
+    draw: Option<TerminalForm>,
 
-    /// Print the layer as a sixel picture, for terminals that draw them
-    #[arg(long, conflicts_with_all = ["ascii", "animate", "layers"])]
-    sixel: bool,
+    /// Short for --draw ascii
+    #[arg(long, hide = true, conflicts_with_all = ["draw", "animate", "layers"])]
+    ascii: bool,
 
     /// Where to write the picture: a file, or - for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
@@ -93,43 +93,62 @@ struct ShownLayers {
 impl ShowArgs {
     /// Returns how the layer is drawn in the terminal, if it is.
     fn terminal_form(&self) -> Option<TerminalForm> {
-        let sixel = self.sixel.then_some(TerminalForm::Sixel);
-        self.ascii.then_some(TerminalForm::Ascii).or(sixel)
+        let given = self.draw.or(self.ascii.then_some(TerminalForm::Ascii));
+        let is_one = self.shown.layers.is_none() && !self.animate;
+        let to_terminal = || is_one && is_stream(&self.output) && io::stdout().is_terminal();
+        given.or_else(|| to_terminal().then(TerminalForm::of_terminal))
     }
 }
 
 pub(crate) fn run(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
-    if args.terminal_form().is_none() {
+    let form = args.terminal_form();
+    if form.is_none() {
         if is_stream(&args.output) && io::stdout().is_terminal() {
             return Err(Exit::usage(
-                "a PNG is not for terminals: name a file with -o, pipe it on, or give --ascii or --sixel",
+                "a PNG is not for terminals: name a file with -o, or pipe it on",
             ));
         }
         check_ending(&args.output, &PNG)?;
     }
     match &args.shown.layers {
         Some(layers) => show_many(args, layers, common),
-        None => show_one(args, common),
+        None => show_one(args, form, common),
     }
 }
 
-fn show_one(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
+fn show_one(args: &ShowArgs, form: Option<TerminalForm>, common: &Common) -> Result<(), Exit> {
     let Layer { image, pitch, .. } = match (args.shown.layer, args.shown.z) {
         (Some(index), _) => layer_numbered(&args.stack, index)?,
         (None, z) => layer_at(&args.stack, z.expect("one of the options is required"))?,
     };
-    let region = region_on(args, &image)?;
-    let form = args.terminal_form();
-    // A file takes pixels as they are; a terminal has only so many columns.
-    let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region));
-    let scale = args.zoom.unwrap_or_else(fitting);
+    // A file takes the whole image as it is; a terminal has no room for black around the part.
+    let content = || form.and_then(|_| PictureRegion::of_content(&image));
+    let region = match &args.region {
+        Some(region) => region_on(region, &image)?,
+        None => content().unwrap_or_else(|| PictureRegion::of(&image)),
+    };
     let aspect = pitch.map_or(1.0, Pitch::aspect);
+    let fitting = || form.map_or(PictureScale::Up(1), |form| form.fitting(&region, aspect));
+    let scale = args.zoom.unwrap_or_else(fitting);
     check_size(scale.size(&region, aspect))?;
+    let place = format!(
+        "columns {} to {}, rows {} to {}, of {} x {} pixels, at {scale}",
+        region.columns.start,
+        region.columns.end - 1,
+        region.rows.start,
+        region.rows.end - 1,
+        image.width(),
+        image.height()
+    );
     let picture = Picture::new(&image, region, scale, aspect);
     write(args, common, |out| match form {
         Some(form) => form.write(picture, out),
         None => picture.write_png(out),
-    })
+    })?;
+    if form.is_some() && is_stream(&args.output) && io::stdout().is_terminal() {
+        Progress::new("show", common, true).say(&place);
+    }
+    Ok(())
 }
 
 fn show_many(args: &ShowArgs, layers: &EveryNth, common: &Common) -> Result<(), Exit> {
@@ -150,7 +169,10 @@ fn show_many(args: &ShowArgs, layers: &EveryNth, common: &Common) -> Result<(), 
     let pixels = AtomicU64::new(0);
     let thumbnails = map_in_order(shown, |page: Page| {
         let layer = page.decode().map_err(failed)?;
-        let region = region_on(args, &layer.image)?;
+        let region = match &args.region {
+            Some(region) => region_on(region, &layer.image)?,
+            None => PictureRegion::of(&layer.image),
+        };
         let aspect = layer.pitch.map_or(1.0, Pitch::aspect);
         let fitting = || PictureScale::fitting(&region, THUMBNAIL_SIDE, aspect);
         let scale = args.zoom.unwrap_or_else(fitting);
@@ -194,10 +216,9 @@ fn check_size([width, height]: [u64; 2]) -> Result<(), Exit> {
     )))
 }
 
-/// Returns the region to show of an image.
-fn region_on(args: &ShowArgs, image: &Image) -> Result<PictureRegion, Exit> {
-    let whole = PictureRegion::of(image);
-    args.region.as_ref().unwrap_or(&whole).on(image).ok_or_else(|| {
+/// Returns the part of a region that lies on an image.
+fn region_on(region: &PictureRegion, image: &Image) -> Result<PictureRegion, Exit> {
+    region.on(image).ok_or_else(|| {
         let (width, height) = (image.width(), image.height());
         Exit::usage(format!(
             "the region lies outside the image, which is {width} x {height} pixels"

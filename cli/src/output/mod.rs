@@ -1,6 +1,7 @@
 //! Files and answers of commands: JSON, pictures, the endings of names.
 
 pub(crate) mod band_pictures;
+pub(crate) mod base64;
 pub(crate) mod endings;
 pub(crate) mod json_report;
 pub(crate) mod mesh_report;

@@ -11,7 +11,7 @@ use crate::streams::new_folder;
 use lamp_plots::{Colors, HeatMap, Plot, curve, drawn, heat_map, linear, stairs};
 
 const REPORT: &str = "report.json";
-const SECTION: &str = "section.svg";
+const SECTION: [&str; 2] = ["section.svg", "section.csv"];
 const RESIDUAL: &str = "residual.png";
 const TIMES: &str = "times.png";
 
@@ -26,7 +26,10 @@ pub(crate) fn write_plan(folder: PlanFolder, plan: &GlassPlan) -> Result<(), Exi
     folder.add_bitmaps(&plan.pages())?;
     let report = serde_json::to_string_pretty(&plan.report).expect("reports have text keys");
     folder.add(REPORT, (report + "\n").as_bytes())?;
-    folder.add(SECTION, &drawn(&[section(plan)], SECTION.as_ref())?)?;
+    let section = [section(plan)];
+    for name in SECTION {
+        folder.add(name, &drawn(&section, name.as_ref())?)?;
+    }
     if let Some(target) = &plan.wanted {
         folder.add(RESIDUAL, &heat_map(&residual(plan, target))?)?;
     }

@@ -1,52 +1,109 @@
-//! Draws pictures in a terminal: with characters, or as sixels.
+//! Draws pictures in a terminal: with characters, or as the terminal's own pictures.
 
 use std::io::{self, Write};
 
+use clap::ValueEnum;
 use lamp_plots::{Picture, PictureRegion, PictureScale};
 
-/// The width to draw for where the terminal does not report its own, in characters.
+use crate::output::base64::base64;
+
+/// The size to draw for where the terminal does not report its own, in characters.
 const USUAL_COLUMNS: u32 = 80;
-/// The width of a character of most terminals, in pixels.
+/// The size of a character of most terminals, in pixels.
 const COLUMN_PIXELS: u32 = 8;
+const LINE_PIXELS: u32 = 16;
+/// Lines that stay free for the command, a message and the next prompt.
+const OTHER_LINES: u32 = 3;
 /// Characters that look the brighter the later they stand.
 const RAMP: &[u8; 10] = b" .:-=+*#%@";
 /// The gray levels of a sixel picture. Terminals have 16 colors at least.
 const GRAYS: u32 = 16;
 /// The rows of pixels that a row of sixels has.
 const SIXEL_ROWS: usize = 6;
+/// The most letters of a part of a picture in Kitty's protocol.
+const KITTY_LETTERS: usize = 4096;
 
 /// How a picture is drawn in a terminal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TerminalForm {
+    /// Letters, denser for brighter pixels
     Ascii,
+    /// Half blocks in 26 grays
+    Blocks,
+    /// A sixel picture: foot, mlterm, xterm -ti vt340
     Sixel,
+    /// A picture in Kitty's protocol: Kitty, Ghostty
+    Kitty,
+    /// A picture in iTerm2's protocol: iTerm2, WezTerm
+    Iterm,
 }
 
 impl TerminalForm {
-    /// Returns the scale, at most 1, at which a region is as wide as the terminal.
-    pub(crate) fn fitting(self, region: &PictureRegion) -> PictureScale {
-        let across = match self {
-            Self::Ascii => columns(),
-            Self::Sixel => columns() * COLUMN_PIXELS,
+    /// Returns the best form that the terminal is known to draw.
+    pub(crate) fn of_terminal() -> Self {
+        let variable = |name: &str| std::env::var(name).unwrap_or_default();
+        let (term, program) = (variable("TERM"), variable("TERM_PROGRAM"));
+        // The first that is set decides (POSIX, 8.2).
+        let locale = ["LC_ALL", "LC_CTYPE", "LANG"].map(variable);
+        let locale = locale.into_iter().find(|it| !it.is_empty()).unwrap_or_default();
+        let is_utf8 = ["utf-8", "utf8"].iter().any(|it| locale.to_lowercase().ends_with(it));
+        if ["kitty", "ghostty"].iter().any(|it| term.contains(it)) {
+            Self::Kitty
+        } else if ["iTerm.app", "WezTerm"].contains(&&*program) {
+            Self::Iterm
+        } else if ["foot", "mlterm"].iter().any(|it| term.starts_with(it)) {
+            Self::Sixel
+        } else if term != "dumb" && (is_utf8 || cfg!(windows)) {
+            Self::Blocks
+        } else {
+            Self::Ascii
+        }
+    }
+
+    /// Returns the scale, at most 1, at which a region fits the terminal. Pixels are `aspect` widths
+    /// high.
+    pub(crate) fn fitting(self, region: &PictureRegion, aspect: f64) -> PictureScale {
+        // A character is two pixels high.
+        let [wide, high] = match self {
+            Self::Ascii | Self::Blocks => [1, 2],
+            _ => [COLUMN_PIXELS, LINE_PIXELS],
         };
-        PictureScale::Down((region.columns.len() as u32).div_ceil(across).max(1))
+        let across = (region.columns.len() as u32).div_ceil(columns() * wide);
+        let rows = (region.rows.len() as f64 * aspect).ceil() as u32;
+        let up = lines().map_or(1, |lines| rows.div_ceil(lines * high));
+        PictureScale::Down(across.max(up).max(1))
     }
 
     /// Writes a picture.
     pub(crate) fn write(self, picture: Picture<'_>, out: impl Write) -> io::Result<()> {
         match self {
             Self::Ascii => write_ascii(picture, out),
+            Self::Blocks => write_blocks(picture, out),
             Self::Sixel => write_sixel(picture, out),
+            Self::Kitty => write_kitty(picture, out),
+            Self::Iterm => write_iterm(picture, out),
         }
     }
 }
 
 /// Returns the terminal's width in characters: from `COLUMNS`, or from the terminal itself.
 fn columns() -> u32 {
-    let told = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse::<u16>().ok());
     let own = || terminal_size::terminal_size().map(|(width, _)| width.0);
-    // A width of 0 means that it is not known.
-    told.filter(|&columns| columns > 0).or_else(own).map_or(USUAL_COLUMNS, u32::from).max(1)
+    stated("COLUMNS").or_else(own).map_or(USUAL_COLUMNS, u32::from).max(1)
+}
+
+/// Returns the lines of a terminal that a picture may take: from `LINES`, or from the terminal
+/// itself. A pipe has as many as it needs.
+fn lines() -> Option<u32> {
+    let own = || terminal_size::terminal_size().map(|(_, height)| height.0);
+    let lines = u32::from(stated("LINES").or_else(own)?);
+    Some(lines.saturating_sub(OTHER_LINES).max(1))
+}
+
+/// Returns the number above zero in an environment variable.
+fn stated(name: &str) -> Option<u16> {
+    let number = std::env::var(name).ok()?.trim().parse().ok();
+    number.filter(|&number| number > 0)
 }
 
 /// Writes a line for each two rows: characters are twice as high as wide. Pixels that are not black
@@ -74,6 +131,66 @@ fn character(sum: u32, count: u32) -> u8 {
     // Rounds to the nearest step in whole numbers: the sum is at most 510, so 32 bits are enough.
     let step = (2 * sum * steps + 255 * count) / (2 * 255 * count);
     RAMP[step.max(u32::from(sum > 0)) as usize]
+}
+
+/// Writes a line for each two rows, the upper one as the upper half of a block.
+fn write_blocks(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
+    let mut rows = picture.into_rows();
+    while let Some(upper) = rows.next() {
+        let lower = rows.next();
+        let mut last = None;
+        for (column, &level) in upper.iter().enumerate() {
+            let inks =
+                [Some(level), lower.as_ref().map(|row| row[column])].map(|it| it.map(gray_of));
+            if last != Some(inks) {
+                // Below a last single row, the terminal's own background shows.
+                let below = inks[1].map_or("49".into(), |gray| format!("48;5;{gray}"));
+                write!(out, "\x1b[38;5;{};{below}m", inks[0].unwrap_or_default())?;
+                last = Some(inks);
+            }
+            out.write_all("\u{2580}".as_bytes())?;
+        }
+        out.write_all(b"\x1b[0m\n")?;
+    }
+    out.flush()
+}
+
+/// Returns the nearest gray of a terminal's 256 colors: black and white of its cube, and 24 grays
+/// between them. No gray pixel is as black as black.
+fn gray_of(level: u8) -> u8 {
+    match level {
+        0 => 16,
+        255 => 231,
+        // They are 8, 18 and so on, up to 238.
+        level => 232 + ((i32::from(level) - 3) / 10).clamp(0, 23) as u8,
+    }
+}
+
+/// Writes a PNG in the protocol of Kitty: parts of at most 4096 letters (`m=1` until the last).
+fn write_kitty(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
+    let letters = base64(&png_of(picture)?);
+    let parts: Vec<&[u8]> = letters.as_bytes().chunks(KITTY_LETTERS).collect();
+    for (number, part) in parts.iter().enumerate() {
+        let begin = if number == 0 { "a=T,f=100," } else { "" };
+        write!(out, "\x1b_G{begin}m={};", u8::from(number + 1 < parts.len()))?;
+        out.write_all(part)?;
+        out.write_all(b"\x1b\\")?;
+    }
+    out.write_all(b"\n")?;
+    out.flush()
+}
+
+/// Writes a PNG in the protocol of iTerm2.
+fn write_iterm(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
+    let png = png_of(picture)?;
+    writeln!(out, "\x1b]1337;File=inline=1;size={}:{}\x07", png.len(), base64(&png))?;
+    out.flush()
+}
+
+fn png_of(picture: Picture<'_>) -> io::Result<Vec<u8>> {
+    let mut png = Vec::new();
+    picture.write_png(&mut png)?;
+    Ok(png)
 }
 
 /// Writes a picture in the form of DEC's VT340: rows of sixels, each color of a row by itself.
@@ -142,6 +259,30 @@ mod tests {
     fn characters_stand_for_two_rows_and_thin_lines_stay() {
         let rows: [&[u8]; 3] = [&[0, 255, 255, 1, 0], &[0, 255, 0, 0, 0], &[255, 0, 0, 0, 0]];
         assert_eq!(drawn(&rows, TerminalForm::Ascii), " @+.\n@\n");
+    }
+
+    #[test]
+    fn blocks_hold_two_rows() {
+        let rows: [&[u8]; 3] = [&[0, 255, 255], &[0, 0, 0], &[1, 254, 128]];
+        let half = "\u{2580}";
+        let two = format!("\x1b[38;5;16;48;5;16m{half}\x1b[38;5;231;48;5;16m{half}{half}\x1b[0m\n");
+        let one = format!("\x1b[38;5;232;49m{half}\x1b[38;5;255;49m{half}\x1b[38;5;244;49m{half}");
+        assert_eq!(drawn(&rows, TerminalForm::Blocks), format!("{two}{one}\x1b[0m\n"));
+    }
+
+    #[test]
+    fn each_level_has_the_nearest_gray() {
+        // xterm's: black, white, and 8 + 10 k.
+        let value = |color: u8| match color {
+            16 => 0,
+            231 => 255,
+            color => 8 + 10 * i32::from(color - 232),
+        };
+        for level in 1..=254 {
+            let off = (value(gray_of(level)) - i32::from(level)).abs();
+            let least = (0..24).map(|k| (8 + 10 * k - i32::from(level)).abs()).min().unwrap();
+            assert_eq!(off, least, "{level}");
+        }
     }
 
     #[test]

@@ -99,6 +99,16 @@ impl SectionLine {
         self.along().pitch().mm()
     }
 
+    /// Returns the coordinate in millimeters at a distance from its first pixel's edge, in pixels: x
+    /// along a row, y along a column.
+    pub fn place_mm(&self, pixels: f64) -> f64 {
+        let along = pixels * self.pixel_mm();
+        match self.line {
+            PixelLine::Row(_) => self.corner_mm[0] + along,
+            PixelLine::Column(_) => self.corner_mm[1] - along,
+        }
+    }
+
     /// Returns the plane through the centers of its pixels.
     pub fn plane(&self) -> SectionPlane {
         let [wide, high] = self.pitch.mm();

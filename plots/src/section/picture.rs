@@ -1,16 +1,22 @@
 //! A vertical section of what is cured, as a table of areas and as a picture.
 
+use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::ops::Range;
+use std::path::Path;
 
 use lamp_grayscale::PixelLine;
 use lamp_planning::cure_section::ShownSection;
 use lamp_stack::write_rgb_png;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::painter::SectionScene;
-use crate::PlotError;
+use super::painter::{CURED, EMPTY, MISSING, OUTLINE, OVERSHOOT, SectionScene, factor};
+use crate::axis_scale::{PixelAxis, text};
 use crate::picture::PictureScale;
+use crate::{Drawing, Drawn, PictureFormat, PlotArea, PlotError, format_of, pixels_of, with_font};
 
-/// A section's pictures side by side, and its areas as a table.
+/// A section's pictures side by side, each with its axes, and its areas as a table.
 pub struct SectionPicture(
     /// The section.
     pub ShownSection,
@@ -18,6 +24,19 @@ pub struct SectionPicture(
 
 /// Pictures wider or higher than this cannot be looked at.
 const MAX_PICTURE_SIDE: f64 = 50_000.0;
+
+/// Room beside the pictures, in pixels: for heights on the left, titles, and places and the legend
+/// below.
+const LEFT: usize = 76;
+const RIGHT: usize = 24;
+const TOP: usize = 60;
+const BOTTOM: usize = 88;
+/// Room between two pictures, where numbers of one end and of the next begin.
+pub(super) const GAP: usize = 32;
+/// The height of half a number, with some air.
+const TEXT: usize = 12;
+/// The legend needs this much.
+const LEAST_WIDTH: usize = 560;
 
 impl SectionPicture {
     /// The areas, as a table.
@@ -51,25 +70,22 @@ impl SectionPicture {
         text
     }
 
-    fn scene(&self) -> SectionScene<'_> {
-        let Self(shown) = self;
-        SectionScene {
-            pixels: shown.pixels.clone(),
-            heights_um: shown.heights_um.clone(),
-            pitch_um: shown.course.along().pitch().um(),
-            cured: shown.cured.iter().map(|(_, cured)| &cured[..]).collect(),
-            part: shown.part.as_deref(),
-        }
-    }
-
-    /// Draws the pictures.
+    /// Draws the pictures, in the format that the name of their file says.
     ///
     /// # Errors
     /// Returns the errors of `out`.
-    pub fn write_png(&self, scale: PictureScale, out: impl Write) -> io::Result<()> {
-        let scene = self.scene();
-        let size = [scene.whole_width(scale), scene.size(scale)[1]].map(|side| side as u32);
-        write_rgb_png(out, size[0], size[1], scene.rows(scale))
+    pub fn write(
+        &self,
+        material: &str,
+        scale: PictureScale,
+        path: &Path,
+        out: impl Write,
+    ) -> io::Result<()> {
+        let drawing = SectionDrawing::new(&self.0, material, scale);
+        match format_of(path).map_err(io::Error::other)? {
+            PictureFormat::Svg => drawing.write_svg(out),
+            PictureFormat::Png => drawing.write_png(out),
+        }
     }
 
     /// Checks that a picture can be looked at.
@@ -77,8 +93,237 @@ impl SectionPicture {
     /// # Errors
     /// Returns an error if it would be too large.
     pub fn check_size(&self, scale: PictureScale) -> Result<(), PlotError> {
-        let size = self.scene().size(scale);
+        let size = SectionDrawing::new(&self.0, "", scale).panel;
         let is_large = size.iter().any(|&side| side as f64 > MAX_PICTURE_SIDE);
         if is_large { Err(PlotError::TooLarge(size)) } else { Ok(()) }
+    }
+}
+
+/// The pictures of a section at a scale, and what stands around them.
+struct SectionDrawing<'a> {
+    scene: SectionScene<'a>,
+    scale: PictureScale,
+    /// The width and height of a picture.
+    panel: [usize; 2],
+    title: String,
+    names: Vec<&'a str>,
+    axis: &'static str,
+    /// The places at the left and the right end, in millimeters.
+    ends_mm: [f64; 2],
+}
+
+impl<'a> SectionDrawing<'a> {
+    fn new(shown: &'a ShownSection, material: &str, scale: PictureScale) -> Self {
+        let scene = SectionScene {
+            pixels: shown.pixels.clone(),
+            heights_um: shown.heights_um.clone(),
+            pitch_um: shown.course.along().pitch().um(),
+            cured: shown.cured.iter().map(|(_, cured)| &cured[..]).collect(),
+            part: shown.part.as_deref(),
+        };
+        Self {
+            panel: scene.size(scale),
+            scene,
+            scale,
+            title: format!("{}, cured as {material}, {}", shown.course.plane(), shown.rule.text()),
+            names: shown.cured.iter().map(|(name, _)| *name).collect(),
+            axis: match shown.course.line {
+                PixelLine::Row(_) => "x (mm)",
+                PixelLine::Column(_) => "y (mm)",
+            },
+            ends_mm: [shown.pixels.start, shown.pixels.end]
+                .map(|pixel| shown.course.place_mm(f64::from(pixel))),
+        }
+    }
+
+    fn size(&self) -> [usize; 2] {
+        let panels = self.panel_left(self.names.len()) - GAP;
+        [(panels + RIGHT).max(LEAST_WIDTH), TOP + self.panel[1] + BOTTOM]
+    }
+
+    fn panel_left(&self, number: usize) -> usize {
+        LEFT + number * (self.panel[0] + GAP)
+    }
+
+    /// Writes the rows one by one, as the pictures may be larger than memory.
+    fn write_png(&self, out: impl Write) -> io::Result<()> {
+        let [width, height] = self.size();
+        let below = TOP + self.panel[1];
+        let strip = |side: Side, top: usize, [width, height]: [usize; 2]| {
+            let strip = Strip { drawing: self, sides: &[side], top: top as i32 };
+            pixels_of((width as u32, height as u32), |area| strip.draw(area))
+                .map_err(io::Error::other)
+        };
+        let above = strip(Side::Above, 0, [width, TOP])?;
+        let beside = strip(Side::Left, TOP - TEXT, [LEFT, self.panel[1] + 2 * TEXT])?;
+        let under = strip(Side::Below, below, [width, BOTTOM])?;
+        let row_of =
+            |strip: &[u8], width: usize, row: usize| strip[3 * width * row..][..3 * width].to_vec();
+        let mut panels = self.scene.rows(self.scale);
+        let rows = (0..height).map(|y| {
+            let mut row = if y < TOP {
+                row_of(&above, width, y)
+            } else if y >= below {
+                row_of(&under, width, y - below)
+            } else {
+                let mut row = vec![255; 3 * LEFT];
+                let colors = panels.next().unwrap_or_default();
+                for panel in colors.chunks_exact(3 * self.panel[0]) {
+                    row.extend_from_slice(panel);
+                    row.resize(row.len() + 3 * GAP, 255);
+                }
+                row.resize(3 * width, 255);
+                row
+            };
+            // Numbers at the ends of the heights reach into the other strips.
+            if (TOP - TEXT..below + TEXT).contains(&y) {
+                let beside = row_of(&beside, LEFT, y + TEXT - TOP);
+                row.iter_mut().zip(beside).for_each(|(ink, other)| *ink = other.min(*ink));
+            }
+            row
+        });
+        write_rgb_png(out, width as u32, height as u32, rows)
+    }
+
+    /// Writes the pictures as shapes, exact to a hundredth of a pixel.
+    fn write_svg(&self, mut out: impl Write) -> io::Result<()> {
+        let [width, height] = self.size().map(|side| side as u32);
+        let mut text = String::new();
+        let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+        // A text takes all that is drawn on it.
+        let all = Strip { drawing: self, sides: &[Side::Above, Side::Left, Side::Below], top: 0 };
+        all.draw(&area).expect("a text takes all");
+        drop(area);
+        let mut shapes = String::new();
+        let pixel = factor(self.scale);
+        let top_um = self.scene.heights_um.end;
+        let y_of = |um: f64| TOP as f64 + (top_um - um) * pixel / self.scene.pitch_um;
+        for number in 0..self.names.len() {
+            let left = self.panel_left(number) as f64;
+            let x_of = |place: f64| left + place * pixel;
+            let [_, panel_height] = self.panel;
+            let _ = write!(
+                shapes,
+                r##"<rect x="{left}" y="{TOP}" width="{}" height="{panel_height}" fill="{}"/>"##,
+                self.panel[0],
+                hex(EMPTY)
+            );
+            for (color, columns) in self.scene.shapes(number) {
+                let _ = write!(shapes, r#"<path fill="{}" d=""#, hex(color));
+                for (columns, [low, high]) in columns {
+                    let Range { start, end } = columns;
+                    let (left, right) = (x_of(f64::from(start)), x_of(f64::from(end)));
+                    let (low, high) = (y_of(low), y_of(high));
+                    let _ = write!(shapes, "M{left:.2} {high:.2}H{right:.2}V{low:.2}H{left:.2}Z");
+                }
+                shapes += "\"/>\n";
+            }
+            let edges = self.scene.edges();
+            if !edges.is_empty() {
+                let ink = hex(OUTLINE);
+                let _ =
+                    write!(shapes, r#"<path fill="none" stroke="{ink}" stroke-width="1.5" d=""#);
+                for [(x0, z0), (x1, z1)] in edges {
+                    let ends = [(x_of(x0), y_of(z0)), (x_of(x1), y_of(z1))];
+                    let [(x0, y0), (x1, y1)] = ends;
+                    let _ = write!(shapes, "M{x0:.2} {y0:.2}L{x1:.2} {y1:.2}");
+                }
+                shapes += "\"/>\n";
+            }
+        }
+        let end = text.rfind("</svg>").expect("a drawing ends");
+        text.insert_str(end, &shapes);
+        out.write_all(text.as_bytes())
+    }
+}
+
+fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// Where titles, axes and legend stand around the pictures.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Above,
+    Left,
+    Below,
+}
+
+/// A strip around the pictures, `top` pixels below the drawing's own top. Plotters moves all that lies
+/// beyond an area to its edge, so that each strip draws only its own.
+struct Strip<'a> {
+    drawing: &'a SectionDrawing<'a>,
+    sides: &'a [Side],
+    top: i32,
+}
+
+impl Strip<'_> {
+    fn at(&self, x: usize, y: usize) -> (i32, i32) {
+        (x as i32, y as i32 - self.top)
+    }
+
+    fn draw_above<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
+        let Self { drawing, .. } = self;
+        area.draw(&Text::new(drawing.title.clone(), self.at(12, 10), text(area, 18.0)))?;
+        for (number, name) in drawing.names.iter().enumerate() {
+            let place = self.at(drawing.panel_left(number), TOP - 22);
+            area.draw(&Text::new((*name).to_owned(), place, text(area, 16.0)))?;
+        }
+        Ok(())
+    }
+
+    fn draw_left<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
+        let Self { drawing, .. } = self;
+        let heights = &drawing.scene.heights_um;
+        let ends = [heights.start, heights.end].map(|um| um / 1000.0);
+        let line = [TOP + drawing.panel[1], TOP].map(|y| self.at(LEFT - 1, y));
+        PixelAxis { name: "z (mm)", line, ends, whole: false }.draw(area)
+    }
+
+    fn draw_below<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
+        let Self { drawing, .. } = self;
+        let [width, height] = drawing.panel;
+        let below = TOP + height;
+        for number in 0..drawing.names.len() {
+            let left = drawing.panel_left(number);
+            let line = [left, left + width].map(|x| self.at(x, below));
+            PixelAxis { name: drawing.axis, line, ends: drawing.ends_mm, whole: false }
+                .draw(area)?;
+        }
+        let legend = match drawing.scene.part {
+            None => vec![("cured", CURED)],
+            Some(_) => vec![
+                ("cured part", CURED),
+                ("cured outside it", OVERSHOOT),
+                ("not cured", MISSING),
+                ("the part's outline", OUTLINE),
+            ],
+        };
+        let mut x = 12;
+        for (name, [red, green, blue]) in legend {
+            let corner = self.at(x, below + BOTTOM - 28);
+            let corners = [corner, (corner.0 + 16, corner.1 + 16)];
+            area.draw(&Rectangle::new(corners, RGBColor(red, green, blue).filled()))?;
+            let style = text(area, 15.0).pos(Pos::new(HPos::Left, VPos::Center));
+            let (wide, _) = area.estimate_text_size(name, &style)?;
+            area.draw(&Text::new(name, (corner.0 + 22, corner.1 + 8), style))?;
+            x += 22 + wide as usize + 20;
+        }
+        Ok(())
+    }
+}
+
+impl Drawing for Strip<'_> {
+    fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
+        with_font();
+        area.fill(&WHITE)?;
+        for side in self.sides {
+            match side {
+                Side::Above => self.draw_above(area)?,
+                Side::Left => self.draw_left(area)?,
+                Side::Below => self.draw_below(area)?,
+            }
+        }
+        area.present()
     }
 }

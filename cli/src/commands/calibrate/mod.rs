@@ -80,7 +80,8 @@ struct CalibrationFiles {
     #[arg(long, value_name = "NAME", requires = "output")]
     name: Option<String>,
 
-    /// Plot points and curves: a file that ends in .svg or .png
+    /// Plot points and curves: a file that ends in .svg or .png, or in .csv for a
+    /// table
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }

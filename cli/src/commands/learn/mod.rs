@@ -82,7 +82,8 @@ pub(crate) struct LearnArgs {
     #[command(flatten)]
     report: ReportTo,
 
-    /// Plot the errors and the times of all prints: a file that ends in .svg or .png
+    /// Plot the errors and the times of all prints: a file that ends in .svg or .png, or in .csv for a
+    /// table
     #[arg(long, value_name = "FILE", requires = "measured")]
     plot: Option<PathBuf>,
 

@@ -102,7 +102,7 @@ impl ComparedPoses {
 
 pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
     let solid = SolidSettings::from(&args.solid);
-    args.plot.as_deref().map_or(Ok(()), plots::check_name)?;
+    args.plot.as_deref().map_or(Ok(()), plots::check_picture_name)?;
     for beside in args.plot.iter().chain(args.report.path()) {
         check_beside(beside, Path::new("-"), paths(&args.parts).chain(solid.cutters()))?;
     }

@@ -43,6 +43,7 @@ pub(super) struct LayerMap<'a> {
 struct Begun {
     title: String,
     width: usize,
+    corner: [u32; 2],
     wanted: Vec<bool>,
     before: RegionDoses,
     after: RegionDoses,
@@ -95,9 +96,11 @@ impl<'a> LayerMap<'a> {
         });
         let wanted = wanted.collect();
         let doses = || RegionDoses::new(self.light, pitch, columns.clone(), rows.clone());
-        let title = format!("Doses of {name} in mJ/cm2");
+        let corner = [columns.start, rows.start];
+        let [wide, high] = pitch.mm().map(|mm| 1000.0 * mm);
+        let title = format!("Doses of {name} in mJ/cm2, voxels of {wide:.4} x {high:.4} um");
         let (before, after) = (doses(), doses());
-        Ok(Some(Begun { title, width: columns.len(), wanted, before, after }))
+        Ok(Some(Begun { title, width: columns.len(), corner, wanted, before, after }))
     }
 
     /// Checks, once all layers were looked at, that the layer was there.
@@ -128,6 +131,7 @@ impl<'a> LayerMap<'a> {
             title: begun.title,
             critical_mj: self.light.critical_dose.mj_per_cm2(),
             width: begun.width,
+            corner: begun.corner,
             wanted: begun.wanted,
             cases: [
                 ("by white light", begun.before.doses().to_vec()),

@@ -55,7 +55,7 @@ pub(super) struct SpeedArgs {
     report: ReportTo,
 
     /// Plot wrong voxels and times by layer, doses, counts at 5% less and more light, and the
-    /// course of the search: a file that ends in .svg or .png
+    /// course of the search: a file that ends in .svg or .png, or in .csv for a table
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 

@@ -79,7 +79,7 @@ pub(super) struct VoxelsArgs {
     report: ReportTo,
 
     /// Plot wrong voxels by layer, doses, counts at 5% less and more light, and the course of the
-    /// search: a file that ends in .svg or .png
+    /// search: a file that ends in .svg or .png, or in .csv for a table
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
@@ -207,9 +207,8 @@ fn seen_by(
 
 impl VoxelsArgs {
     fn check_outputs(&self) -> Result<(), Exit> {
-        for picture in self.plot.iter().chain(&self.map.map) {
-            plots::check_name(picture)?;
-        }
+        self.plot.as_deref().map_or(Ok(()), plots::check_name)?;
+        self.map.map.as_deref().map_or(Ok(()), plots::check_picture_name)?;
         self.report.check_output(&self.output.output)?;
         let beside = || self.report.path().into_iter().chain(&self.plot).chain(&self.map.map);
         for (number, path) in beside().enumerate() {

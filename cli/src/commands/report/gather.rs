@@ -6,13 +6,13 @@ use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
 use lamp_pipeline::build_copies::BuildCopies;
 use lamp_pipeline::check::{CheckSettings, Found};
-use lamp_plots::EvidencePicture;
-use lamp_stack::{IndexedStack, Layer, Mask, Page, StackTotals, map_in_order};
+use lamp_plots::{EvidencePicture, StackViews, ViewGrid};
+use lamp_stack::{IndexedStack, Layer, Mask, Page, Pitch, StackTotals, map_in_order};
 use lamp_supports::{CheckError, Severity};
 use serde_json::{Value, json};
 
 use super::measure::{LayerNumbers, new_pixels};
-use super::pictures::{InlinePicture, of_finding, of_layer};
+use super::pictures::{InlinePicture, of_finding, of_layer, of_views};
 use crate::exit::Exit;
 use crate::output::stack_facts::StackFacts;
 use crate::terminal::progress::Progress;
@@ -29,6 +29,8 @@ pub(super) struct StackReport {
     /// The findings of `lamp check`, or why it cannot check the stack.
     pub(super) found: Result<Drawn, String>,
     pub(super) sheet: Vec<InlinePicture>,
+    /// The whole stack from three sides.
+    pub(super) views: Vec<InlinePicture>,
     pub(super) time: BuildTime,
 }
 
@@ -53,13 +55,26 @@ impl StackReport {
         headers[1..].iter().for_each(|header| totals.add(header));
         // The check draws the layers, and what they leave on the way is needed behind it.
         let (numbers, sheet) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+        let pitch = headers[0].pitch;
+        let grid = ViewGrid::new(headers[0].size, pitch.map_or(1.0, Pitch::aspect));
+        let views = RefCell::new(StackViews::new(grid, pitch.map(|pitch| pitch.x.pitch().um())));
         let clock = RefCell::new(clock);
-        let mut layers = measured(stack, &numbers, &sheet, progress).inspect(|layer| {
-            if let Ok(layer) = layer {
-                let size = [layer.image.width(), layer.image.height()];
-                clock.borrow_mut().add(&layer.info, layer.pitch, size, &layer.image);
-            }
-        });
+        let seen = measured(stack, grid, &numbers, &sheet, progress);
+        let mut layers = seen
+            .map(|seen| {
+                seen.map(|(layer, exposed)| {
+                    if let Some(exposed) = exposed {
+                        views.borrow_mut().add(&layer.info, &exposed);
+                    }
+                    layer
+                })
+            })
+            .inspect(|layer| {
+                if let Ok(layer) = layer {
+                    let size = [layer.image.width(), layer.image.height()];
+                    clock.borrow_mut().add(&layer.info, layer.pitch, size, &layer.image);
+                }
+            });
         let build = BuildCopies::of(&headers[0].info, headers[0].size);
         let found = match CheckSettings::default().find(build, &mut layers, Ok, machine) {
             Ok(found) => Ok(found),
@@ -78,7 +93,8 @@ impl StackReport {
         };
         let layers = numbers.into_inner();
         let time = clock.into_inner().time();
-        Ok(Self { name: name.to_owned(), totals, layers, found, sheet: sheet.into_inner(), time })
+        let (sheet, views) = (sheet.into_inner(), of_views(&views.into_inner()));
+        Ok(Self { name: name.to_owned(), totals, layers, found, sheet, views, time })
     }
 
     /// Returns what needs a person, the worst first.
@@ -185,23 +201,25 @@ fn found_text(found: &Found) -> Option<String> {
     Some(format!("{count} of lamp check: {}.", kinds.join(", ")))
 }
 
-/// Decodes all layers, in order, and counts and draws them on the way.
+/// Decodes all layers, in order, with the cells of a grid that they expose; counts and draws them on
+/// the way.
 fn measured<'a>(
     stack: &'a IndexedStack,
+    grid: ViewGrid,
     numbers: &'a RefCell<Vec<LayerNumbers>>,
     sheet: &'a RefCell<Vec<InlinePicture>>,
     progress: &'a Progress,
-) -> impl Iterator<Item = Result<Layer, Exit>> + 'a {
+) -> impl Iterator<Item = Result<(Layer, Option<Vec<bool>>), Exit>> + 'a {
     let count = stack.headers().len();
     let pages = (0..count).map(|position| stack.page(position).map_err(failed));
-    let decoded = map_in_order(pages, |page: Page| {
+    let decoded = map_in_order(pages, move |page: Page| {
         let layer = page.decode().map_err(failed)?;
-        let numbers = LayerNumbers::of(&layer);
-        Ok((layer, numbers))
+        let (numbers, exposed) = (LayerNumbers::of(&layer), grid.exposed(&layer.image));
+        Ok((layer, numbers, exposed))
     });
     let mut below: Option<Mask> = None;
     decoded.enumerate().map(move |(position, decoded)| {
-        let (layer, of_layer_numbers) = decoded?;
+        let (layer, of_layer_numbers, cells) = decoded?;
         let exposed = layer.image.exposed().into_owned();
         let new_px = new_pixels(&exposed, below.as_ref());
         numbers.borrow_mut().push(LayerNumbers { new_px, ..of_layer_numbers });
@@ -210,7 +228,7 @@ fn measured<'a>(
             sheet.borrow_mut().push(of_layer(&layer));
         }
         progress.layer_done();
-        Ok(layer)
+        Ok((layer, cells))
     })
 }
 

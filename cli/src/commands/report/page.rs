@@ -46,6 +46,11 @@ pub(super) fn html(report: &StackReport, index: Option<&str>) -> String {
         section { h2 { "Build time" } (build_time(report)) }
         @if let Ok(drawn) = &report.found { section { h2 { "Findings" } (findings(drawn)) } }
         section {
+            h2 { "Views" }
+            p.note { "Black is empty; the brighter, the nearer. The front is below in the view from above." }
+            div.views { @for picture in &report.views { (figure(picture)) } }
+        }
+        section {
             h2 { "Layers" }
             div.sheet { @for picture in &report.sheet { (figure(picture)) } }
         }

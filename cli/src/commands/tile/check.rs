@@ -59,7 +59,7 @@ impl TileArgs {
             check_beside(folder, output, inputs())?;
         }
         self.check_recipe(output.as_ref().or(self.cut_folder()), inputs())?;
-        self.layout_picture.as_deref().map(plots::check_name).transpose()?;
+        self.layout_picture.as_deref().map(plots::check_picture_name).transpose()?;
         let read = self
             .settings
             .layout
