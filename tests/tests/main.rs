@@ -72,6 +72,7 @@ mod sets;
 mod shared_files;
 mod show_terminal;
 mod step;
+mod stories;
 mod strips;
 mod support;
 mod target;

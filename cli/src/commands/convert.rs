@@ -44,18 +44,18 @@ Examples:
   lamp convert pages/ --classic -o build.tif
   lamp convert build.tif --layers 100..200 --png -o pictures/
   lamp convert build.tif --layers 600 -o layer.png
-  lamp convert plate.goo -o plate.uvj
-  lamp convert build.tif --machine mars3 -o plate.goo
+  lamp convert plate.goo plate.uvj
+  lamp convert build.tif --machine mars3 plate.goo
   lamp convert build.tif -o contours.cli
   lamp convert part.step part.stl --chord 5um
   lamp convert part.stl part.step")]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     input: InputArgs,
-    /// File to write for a part, in millimeters: a binary STL from a STEP part, or a STEP file from
-    /// a mesh
-    #[arg(value_name = "PART.stl|PART.step", value_parser = parse_part)]
-    part: Option<PathBuf>,
+    /// Where to write, as -o says. From a part, in millimeters: a binary STL from a STEP part, or a
+    /// STEP file from a mesh
+    #[arg(value_name = "OUT", conflicts_with = "output")]
+    out: Option<PathBuf>,
 
     #[command(flatten)]
     output: Output,
@@ -101,9 +101,10 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
         None => {}
     }
     let path = &args.input.stack;
-    let output = args.output.output.as_path();
-    let progress = progress("convert", common, &args.output);
-    let shape = args.shape()?;
+    let mut to = Output { output: args.to().to_owned(), ..args.output.clone() };
+    let output = args.to();
+    let progress = progress("convert", common, &to);
+    let shape = shape_of(&to, args.png)?;
     let mut pages = open_pages(path).map_err(|error| match error.cause() {
         Some(StackError::NotTiff { format: Some(FileFormat::Part(PartFormat::Step)), .. }) => {
             let name = input_name(path);
@@ -114,7 +115,6 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     if args.ignore_checks {
         pages = pages.without_checks();
     }
-    let mut to = args.output.clone();
     // A packed stack gives the TIFF back that it was made of.
     to.classic |= pages.packed_format() == Some(Format::Classic);
     let layers = layers_of_input(pages, &args.input, &progress).map(|layer| {
@@ -170,10 +170,12 @@ enum OutputKind {
 impl ConvertArgs {
     /// The part to write, if one is named.
     fn part(&self) -> Option<&Path> {
-        // `-o part.stl` means the same as a second name.
-        let output = Some(self.output.output.as_path());
-        let output = output.filter(|output| parse_part(&output.to_string_lossy()).is_ok());
-        self.part.as_deref().or(output)
+        Some(self.to()).filter(|output| is_stl_name(output) || is_step_name(output))
+    }
+
+    /// Where to write: a second name means the same as `-o`.
+    fn to(&self) -> &Path {
+        self.out.as_deref().unwrap_or(&self.output.output)
     }
 
     /// Refuses options of stacks.
@@ -239,20 +241,18 @@ impl ConvertArgs {
         progress.wrote(stl, &[number_of(model.facet_count() as u64, "facet")]);
         Ok(())
     }
+}
 
-    fn shape(&self) -> Result<OutputKind, Exit> {
-        let Output { output, format, classic, packbits, .. } = &self.output;
-        let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-        match (is_folder(output), self.png) {
-            (true, true) => Ok(OutputKind::Pngs),
-            (false, _) if named_png && *classic => Err(for_tiffs("--classic")),
-            (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
-            (false, _) if named_png && format.is_none() => Ok(OutputKind::Png),
-            (false, true) => {
-                Err(Exit::usage("PNGs go into a folder: name it, such as -o pictures/"))
-            }
-            (_, false) => stack_format(&self.output).map(|_| OutputKind::Stack),
-        }
+fn shape_of(to: &Output, pngs: bool) -> Result<OutputKind, Exit> {
+    let Output { output, format, classic, packbits, .. } = to;
+    let named_png = output.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    match (is_folder(output), pngs) {
+        (true, true) => Ok(OutputKind::Pngs),
+        (false, _) if named_png && *classic => Err(for_tiffs("--classic")),
+        (false, _) if named_png && *packbits => Err(for_tiffs("--packbits")),
+        (false, _) if named_png && format.is_none() => Ok(OutputKind::Png),
+        (false, true) => Err(Exit::usage("PNGs go into a folder: name it, such as -o pictures/")),
+        (_, false) => stack_format(to).map(|_| OutputKind::Stack),
     }
 }
 
@@ -269,12 +269,6 @@ fn only_layer(
             "{name}: a PNG holds one layer: choose it with --layers, or write a folder of them with --png"
         ))),
     }
-}
-
-fn parse_part(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    let is_part = is_stl_name(&path) || is_step_name(&path);
-    if is_part { Ok(path) } else { Err(format!("`{text}` does not end in .stl or .step")) }
 }
 
 pub(super) fn is_stl_name(path: &Path) -> bool {

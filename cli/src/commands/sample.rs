@@ -69,7 +69,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Exit> {
     let part = args.part;
     check_ending(&args.output, &SAMPLE)?;
     if is_step_name(&args.output) {
-        return args.write_step(part);
+        return args.write_step(part, common);
     }
     let mut mesh = build(part, args.facets).map_err(Exit::wrong_options)?;
     if let Some(name) = &args.defect {
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &SampleArgs, common: &Common) -> Result<(), Exit> {
 }
 
 impl SampleArgs {
-    fn write_step(&self, part: Sample) -> Result<(), Exit> {
+    fn write_step(&self, part: Sample, common: &Common) -> Result<(), Exit> {
         let part = match part {
             Sample::Sphere => StepSample::Sphere,
             Sample::Torus => StepSample::Torus,
@@ -114,7 +114,9 @@ impl SampleArgs {
             return Err(Exit::usage("--ascii and --defect are for STL: name a .stl file"));
         }
         let text = step(part, StepUnit::Millimetre);
-        write_file(&self.output, |out| out.write_all(text.as_bytes()))
+        write_file(&self.output, |out| out.write_all(text.as_bytes()))?;
+        Progress::new("sample", common, true).wrote(&self.output, &[]);
+        Ok(())
     }
 }
 

@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::output::json_report::print_answer;
+use crate::output::numbers::number_of;
 use crate::output::stack_facts::StackFacts;
 use crate::streams::{input_name, is_stream, learning_part, open_pages, print};
 use crate::terminal::progress::printable;
@@ -147,8 +148,8 @@ impl Verdict {
         let z = totals.first.info.z().zip(totals.top_mm());
         let z = z.map(|(bottom, top)| format!(", z {:.3} to {top:.3} mm", bottom.mm()));
         let compared = if self.compared { ", made from the given part" } else { "" };
-        let word = if layers == 1 { "layer" } else { "layers" };
-        let facts = format!("{layers} {word}{}{compared}", z.unwrap_or_default());
+        let layers = number_of(layers, "layer");
+        let facts = format!("{layers}{}{compared}", z.unwrap_or_default());
         if totals.has_checks() {
             format!("{name}: whole, {facts}")
         } else {

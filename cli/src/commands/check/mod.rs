@@ -25,6 +25,7 @@ use crate::args::stages::CheckStageArgs;
 use crate::exit::Exit;
 use crate::kept_stack::KeptStack;
 use crate::output::json_report::ReportTo;
+use crate::output::numbers::number_of;
 use crate::streams::{check_beside, failed_at, in_range, input_name, is_stream, new_folder, print};
 use crate::terminal::progress::{Progress, printable};
 use crate::terminal::stack_notes::doubts;
@@ -129,8 +130,7 @@ pub(crate) fn run(args: &CheckArgs, common: &Common) -> Result<(), Exit> {
     let found: usize = checked.iter().map(|checked| checked.found.count()).sum();
     let found = match found {
         0 => doubts(),
-        1 => Some("1 finding".to_owned()),
-        found => Some(format!("{found} findings")),
+        found => Some(number_of(found as u64, "finding")),
     };
     found.filter(|_| args.strict).map_or(Ok(()), |found| Err(Exit::Findings(found)))
 }
@@ -292,19 +292,14 @@ const MOST_LINES: usize = 20;
 
 /// Returns the lines to print for an input.
 fn printed(name: &str, found: &Found, all: bool) -> String {
-    let layers = match found.findings.layers.len() {
-        1 => "1 layer".to_owned(),
-        layers => format!("{layers} layers"),
-    };
+    let layers = number_of(found.findings.layers.len() as u64, "layer");
     let specks = match found.findings.specks.count() {
         0 => String::new(),
-        1 => ", 1 speck".to_owned(),
-        specks => format!(", {specks} specks"),
+        specks => format!(", {}", number_of(specks, "speck")),
     };
     let count = match found.count() {
         0 => "no findings".to_owned(),
-        1 => "1 finding".to_owned(),
-        count => format!("{count} findings"),
+        count => number_of(count as u64, "finding"),
     };
     let accepted = match found.accepted {
         0 => String::new(),

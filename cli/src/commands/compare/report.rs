@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::walk::{DifferenceBox, SectionDifference};
+use crate::output::numbers::{grouped, number_of};
 use crate::terminal::progress::printable;
 
 /// The most layers, and the most boxes of a layer, that are printed unless all are asked for.
@@ -88,16 +89,16 @@ pub(super) fn text(comparison: &StackComparison<'_>, all: bool) -> String {
         1 => [", except 1 pixel that the tolerance forgives", "; the tolerance forgives 1 more"]
             .map(str::to_owned),
         pixels => [
-            format!(", except {pixels} pixels that the tolerance forgives"),
-            format!("; the tolerance forgives {pixels} more"),
+            format!(", except {} that the tolerance forgives", number_of(pixels, "pixel")),
+            format!("; the tolerance forgives {} more", grouped(pixels)),
         ],
     };
     let mut text = match told.len() {
         0 => format!("{a} and {b} are the same at {sections} {unit}{but}\n"),
         differ => format!(
             "{a} and {b} differ at {differ} of {sections} {unit}: {} added, {} missing{besides}\n",
-            pixels_text(comparison.sum(|found| found.added)),
-            pixels_text(comparison.sum(|found| found.missing)),
+            number_of(comparison.sum(|found| found.added), "pixel"),
+            number_of(comparison.sum(|found| found.missing), "pixel"),
         ),
     };
     told.sort_by_key(|found| Reverse(found.pixels()));
@@ -120,8 +121,11 @@ fn lines(comparison: &StackComparison<'_>, found: &SectionDifference, all: bool)
         _ => String::new(),
     };
     let (name, added, missing) = (comparison.name(found), found.added, found.missing);
-    let mut text =
-        format!("  {name}{only}: {} added, {} missing\n", pixels_text(added), pixels_text(missing));
+    let mut text = format!(
+        "  {name}{only}: {} added, {} missing\n",
+        number_of(added, "pixel"),
+        number_of(missing, "pixel")
+    );
     let boxes = if all { found.boxes.len() } else { found.boxes.len().min(MOST_BOX_LINES) };
     for each in &found.boxes[..boxes] {
         let ([left, right], [top, bottom]) = (each.columns, each.rows);
@@ -131,7 +135,7 @@ fn lines(comparison: &StackComparison<'_>, found: &SectionDifference, all: bool)
         };
         text += &format!(
             "    {} in columns {left} to {}, rows {top} to {}{place}\n",
-            pixels_text(each.pixels),
+            number_of(each.pixels, "pixel"),
             right - 1,
             bottom - 1
         );
@@ -141,10 +145,6 @@ fn lines(comparison: &StackComparison<'_>, found: &SectionDifference, all: bool)
         more => text += &format!("    {more} more places\n"),
     }
     text
-}
-
-fn pixels_text(pixels: u64) -> String {
-    if pixels == 1 { "1 pixel".to_owned() } else { format!("{pixels} pixels") }
 }
 
 /// Returns least and greatest x and y of a box, if the page says where its image lies.

@@ -113,6 +113,16 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
     let left = faults_left(&repaired).map_err(failed)?;
     if !common.quiet {
         tell(&repaired, &left, weld * unit);
+        let widths = repaired.left.loops.iter().map(|hole| hole.width_mm() * unit);
+        let widest = widths.filter(|width| *width > args.close.mm()).fold(0.0, f64::max);
+        if widest > 0.0 {
+            // A tenth of a millimeter up, so that the widest hole is no wider.
+            say(&format!(
+                "mesh repair: holes wider than {} stay open: to close them, give --close {:.1}mm",
+                args.close,
+                (widest * 10.0).floor() / 10.0 + 0.1
+            ));
+        }
     }
     if let Some(report) = args.report.path() {
         write_report(report, &name, &repaired)?;

@@ -7,6 +7,7 @@ use lamp_slicing::topology::{
 };
 
 use crate::commands::mesh::check::MeshFindings;
+use crate::output::numbers::grouped;
 
 /// The most shells that are described one by one.
 const MAX_SHELLS: usize = 10;
@@ -16,7 +17,8 @@ const MAX_NAMED: usize = 5;
 /// Returns the answer to `lamp mesh check`.
 pub(super) fn check_text(name: &str, findings: &MeshFindings) -> String {
     let MeshFindings { table, check, welded, crossings, overlaps } = findings;
-    let (facets, vertices, edges) = (table.facet_count(), table.points().len(), table.edge_count());
+    let [facets, vertices, edges] = [table.facet_count(), table.points().len(), table.edge_count()]
+        .map(|it| grouped(it as u64));
     let mut text = format!(
         "part:       {name}\nmesh:       {facets} facets, {vertices} vertices, {edges} edges\n\
          shells:     {}\nlumps:      {}\n",

@@ -5,12 +5,11 @@ use lamp_machine::Machine;
 
 use lamp_pipeline::heights::time_text;
 
+use crate::output::numbers::number_of;
+
 /// Returns a line for the build, each part of its time, and what is not known of it.
 pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
-    let layers = match time.layers {
-        1 => "1 layer".to_owned(),
-        layers => format!("{layers} layers"),
-    };
+    let layers = number_of(time.layers, "layer");
     let known = time_text(time.least_s());
     let whole = match time.is_whole() {
         true => known,
