@@ -69,7 +69,9 @@ pub use journal::{Event, Journal, events, host, now};
 pub use key::{Key, KeyError, Kind, TaskRecipe};
 pub use ledger::{End, Ledger, State};
 pub use named::{NamedTask, NamedTasks};
-pub use night::{Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage};
+pub use night::{
+    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, part_names,
+};
 pub use perform::perform;
 pub use plan::{NightPlan, Subject, WantedResults};
 pub use room::DiskRoom;

@@ -126,13 +126,28 @@ impl Night {
     /// # Errors
     /// Returns an error if it is no night file: one sentence, with its place.
     pub fn parse(text: &str, path: &Path) -> Result<Self, NightError> {
-        read::night(text, path)
+        read::night(text, path, None)
+    }
+
+    /// Reads the text of a night file, which may name no part. Each file of `others` that it does not
+    /// name is a part with the defaults.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_with(text: &str, path: &Path, others: &[PathBuf]) -> Result<Self, NightError> {
+        read::night(text, path, Some(others))
     }
 
     /// Returns the part with a name.
     pub fn part(&self, name: &str) -> Option<&Part> {
         self.parts.iter().find(|part| part.name == name)
     }
+}
+
+/// Returns a name for the part of each file that no other has and a night file accepts: the file's own,
+/// with its ending where several would have the same.
+pub fn part_names(files: &[PathBuf]) -> Vec<String> {
+    read::part_names(files, [])
 }
 
 /// Returns `: did you mean X?` for the nearest of some words, if one is near.

@@ -1,7 +1,9 @@
 //! Reads night files, so that every error has its place.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::ffi::OsStr;
 use std::io;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use lamp_stack::{one_line, words};
@@ -21,7 +23,8 @@ const PART_KEYS: [&str; 5] = ["file", "name", "check", "ranges", "stages"];
 
 const TABLES: [&str; 5] = ["defaults", "part", "build", "store", "output"];
 
-pub(super) fn night(text: &str, path: &Path) -> Read<Night> {
+/// Reads a night file. `others` are files that are parts, too; without them, it must name some itself.
+pub(super) fn night(text: &str, path: &Path, others: Option<&[PathBuf]>) -> Read<Night> {
     let folder = match path.parent() {
         // The parent of a bare file name is the empty path, which is no folder.
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -32,7 +35,7 @@ pub(super) fn night(text: &str, path: &Path) -> Read<Night> {
         let problem = format!("{}: a night file is TOML", one_line(error.message()));
         NightError { place: reader.place(error.span().map_or(0, |span| span.start)), problem }
     })?;
-    reader.night(table.get_ref(), path)
+    reader.night(table.get_ref(), path, others)
 }
 
 struct Reader<'a> {
@@ -88,7 +91,7 @@ impl Reader<'_> {
         NightError { place: self.place(spanned.span().start), problem: problem.into() }
     }
 
-    fn night(&self, table: &DeTable<'_>, path: &Path) -> Read<Night> {
+    fn night(&self, table: &DeTable<'_>, path: &Path, others: Option<&[PathBuf]>) -> Read<Night> {
         self.check_keys(table, &TABLES, "a night file has no")?;
         let defaults = match table.get("defaults") {
             Some(value) => self.part_table(self.table(value)?, &PART_KEYS[2..])?,
@@ -98,17 +101,22 @@ impl Reader<'_> {
         for value in self.tables(table, "part")? {
             self.part(value, &mut drafts)?;
         }
-        if drafts.list.is_empty() {
-            let place = Place { line: 1, column: 1 };
+        let start = Place { line: 1, column: 1 };
+        if drafts.list.is_empty() && others.is_none() {
             let problem = "there is no part: add [[part]] and below it file = \"parts/*.stl\"";
-            return Err(NightError { place, problem: problem.to_owned() });
+            return Err(NightError { place: start, problem: problem.to_owned() });
         }
+        let is_other = |file: &&PathBuf| !drafts.places.contains_key(&real(file));
+        let others: Vec<PathBuf> = others.into_iter().flatten().filter(is_other).cloned().collect();
         // Not before all are read: a later [[part]] may change an earlier one's settings.
-        let parts = drafts
-            .list
-            .into_iter()
-            .map(|draft| finished(draft, &defaults))
-            .collect::<Read<Vec<_>>>()?;
+        let finished = |draft: Draft| finished(draft, &defaults);
+        let mut parts = drafts.list.into_iter().map(finished).collect::<Read<Vec<_>>>()?;
+        let names = part_names(&others, parts.iter().map(|part| part.name.as_str()));
+        for (file, name) in others.into_iter().zip(names) {
+            let table = PartTable { name: Some((name, start)), ..PartTable::default() };
+            let file = self.below_here(file);
+            parts.push(finished(Draft { file, fault: None, place: start, table })?);
+        }
         // Results are delivered under these names: one would replace the other.
         if let Some((before, part)) = twice(&parts, |part| &part.name) {
             let problem = format!(
@@ -306,17 +314,18 @@ impl Reader<'_> {
                 self.at(value, format!("no file matches {name}: check its folder and its ending"))
             );
         }
-        let from_here = |path: PathBuf| match path.strip_prefix(self.folder) {
-            Ok(below) => below.to_owned(),
-            Err(_) => path,
-        };
         let fault = |(folder, error): (PathBuf, io::Error)| {
-            let folder = from_here(folder);
+            let folder = self.below_here(folder);
             let fault = format!("{}: not all files in it can be found: {error}", folder.display());
             (folder, Some(fault))
         };
-        let files = files.into_iter().map(|file| (from_here(file), None));
+        let files = files.into_iter().map(|file| (self.below_here(file), None));
         Ok(files.chain(closed.into_iter().map(fault)).collect())
+    }
+
+    /// Returns a path from the folder of the night file, if it is below it.
+    fn below_here(&self, path: PathBuf) -> PathBuf {
+        path.strip_prefix(self.folder).map(Path::to_owned).unwrap_or(path)
     }
 
     fn build(&self, value: &TomlValue<'_>, parts: &[Part]) -> Read<Build> {
@@ -485,12 +494,56 @@ fn stem_of(file: &Path) -> String {
     one_line(&file.file_name().unwrap_or_default().to_string_lossy())
 }
 
+/// Returns a name for the part of each file that no other has, `taken` ones included: the file's own,
+/// with its ending where another has the same.
+pub(super) fn part_names<'a>(
+    files: &[PathBuf],
+    taken: impl IntoIterator<Item = &'a str>,
+) -> Vec<String> {
+    let cleaned = |name: Option<&OsStr>, most: usize| {
+        let name = one_line(&name.unwrap_or_default().to_string_lossy());
+        let mut name = name.trim_start_matches('.').replace(is_no_letter, "-");
+        while name.len() > most {
+            name.pop();
+        }
+        if name.is_empty() { "part".to_owned() } else { name }
+    };
+    let stem = |file: &Path| cleaned(file.file_stem(), MOST_BYTES - 30);
+    // Some systems do not distinguish capitals in names of files.
+    let mut taken: HashSet<String> = taken.into_iter().map(str::to_lowercase).collect();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for file in files {
+        *counts.entry(stem(file).to_lowercase()).or_default() += 1;
+    }
+    let name = |file: &PathBuf| {
+        let stem = stem(file);
+        let is_alone = counts[&stem.to_lowercase()] == 1 && !taken.contains(&stem.to_lowercase());
+        let ending = || cleaned(file.extension(), 10);
+        let wanted = if is_alone { stem } else { format!("{stem}-{}", ending()) };
+        let numbered = (2..).map(|number| format!("{wanted}-{number}"));
+        let mut free = iter::once(wanted.clone()).chain(numbered);
+        free.find(|name| taken.insert(name.to_lowercase())).expect("there is always a next number")
+    };
+    files.iter().map(name).collect()
+}
+
+/// The most bytes of a part's name.
+const MOST_BYTES: usize = 100;
+
+/// Returns whether names of parts are without a letter: results are files of these names, on any
+/// system, and a colon parts a name from its copies.
+fn is_no_letter(c: char) -> bool {
+    c.is_control() || matches!(c, '/' | '\\' | ':')
+}
+
 /// Returns why a text cannot be the name of a file and of a part in a build.
 fn bad_name(name: &str) -> Option<String> {
-    // Results are files of these names, on any system; a colon parts a name from its copies.
-    let is_bad = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');
     let name = one_line(name);
-    if name.contains(is_bad) || name.starts_with('.') || name.is_empty() || name.len() > 100 {
+    if name.contains(is_no_letter)
+        || name.starts_with('.')
+        || name.is_empty()
+        || name.len() > MOST_BYTES
+    {
         return Some(format!(
             "{name} cannot name a part or a build: use letters, digits, - and _, such as name = \
              \"blade-7\""

@@ -188,3 +188,42 @@ fn damaged_files_are_read_or_refused_in_one_line() {
     }
     assert!(refused > NIGHT.len(), "{refused}");
 }
+
+#[test]
+fn other_files_are_parts_with_names_of_their_own() {
+    let folder = folder(&["a.stl", "a.step", "A.3mf", "b.stl", "x:1.stl", ".h.stl", "new.stl"]);
+    let at = |name: &str| folder.path().join("parts").join(name);
+    let text = "[defaults]\nstages = [\"slice\", \"fix\"]\n[[part]]\nfile = \"parts/b.stl\"\n\
+                fix = \"--max-width 9\"\nname = \"new\"\n";
+    let long = format!("{}.stl", "\u{e4}".repeat(120));
+    let files =
+        ["A.3mf", "a.step", "a.stl", "b.stl", "x:1.stl", ".h.stl", "new.stl", &long].map(at);
+    let path = folder.path().join("night.toml");
+    let night = Night::parse_with(text, &path, &files).unwrap();
+    // A file that the night file names is one part, with its own options.
+    let names: Vec<_> = night.parts.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names[..7], ["new", "A-3mf", "a-step", "a-stl", "x-1", "h", "new-stl"]);
+    assert!((60..=100).contains(&names[7].len()), "{}", names[7]);
+    let words: Vec<_> = night.parts.iter().map(|part| part.stages[1].words.len()).collect();
+    assert_eq!(words, [3, 1, 1, 1, 1, 1, 1, 1]);
+    assert_eq!(night.parts[2].file, Path::new("parts/a.step"));
+    // They may be all, or there may be none yet, but their stages must be known.
+    let defaults = text.split("[[part]]").next().unwrap();
+    assert_eq!(Night::parse_with(defaults, &path, &files).unwrap().parts.len(), 8);
+    assert_eq!(Night::parse_with(defaults, &path, &[]).unwrap().parts, []);
+    assert!(Night::parse(defaults, &path).is_err());
+    assert!(Night::parse_with("", &path, &files).is_err());
+
+    // As a night file, the names are accepted.
+    let names = part_names(&files);
+    assert_eq!(names[..4], ["A-3mf", "a-step", "a-stl", "b"]);
+    for (file, name) in files.iter().zip(&names) {
+        let text = toml::Table::from_iter([
+            ("file".to_owned(), file.to_string_lossy().into_owned().into()),
+            ("name".to_owned(), name.clone().into()),
+            ("stages".to_owned(), toml::Value::Array(vec!["slice".into()])),
+        ]);
+        let night = Night::parse(&format!("[[part]]\n{text}"), &path).unwrap();
+        assert_eq!(night.parts[0].name, *name);
+    }
+}
