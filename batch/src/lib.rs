@@ -39,6 +39,7 @@ mod commands;
 mod deliver;
 mod engine;
 mod error;
+mod forecast;
 mod gc;
 mod journal;
 mod key;
@@ -64,6 +65,7 @@ pub use engine::{
     Attempt, Engine, EngineError, Launcher, Local, SchedulerError, Work, end_children, status,
 };
 pub use error::BatchError;
+pub use forecast::Forecast;
 pub use gc::{Removed, collect};
 pub use journal::{Event, Journal, events, host, now};
 pub use key::{Key, KeyError, Kind, TaskRecipe};

@@ -49,6 +49,8 @@ pub struct WantedResults {
     pub names: Vec<(String, String)>,
     /// The bytes of the stack, estimated.
     pub bytes: u64,
+    /// The layers of the stack, of a build at least.
+    pub layers: u32,
 }
 
 impl WantedResults {
@@ -272,7 +274,13 @@ impl<C: Commands> NightPlanner<'_, C> {
             Work::Check { words: check.words },
         );
         let file = part.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(WantedResults { stack, check: Some(check), names: vec![(stored, file)], bytes })
+        Ok(WantedResults {
+            stack,
+            check: Some(check),
+            names: vec![(stored, file)],
+            bytes,
+            layers: survey.layers,
+        })
     }
 
     /// Adds the tasks that make the layers of a part: ranges and their join, or one task where one
@@ -392,7 +400,8 @@ impl<C: Commands> NightPlanner<'_, C> {
         let names = of_parts.iter().flat_map(|(part, _)| part.names.clone()).collect();
         let work = Work::Tile { words: tile.words, copies };
         let stack = self.add(recipe, &build.name, label, needs, tile.files, cost, work);
-        Ok(WantedResults { stack, check: None, names, bytes })
+        let layers = of_parts.iter().map(|(part, _)| part.layers).max().unwrap_or(0);
+        Ok(WantedResults { stack, check: None, names, bytes, layers })
     }
 
     #[expect(clippy::too_many_arguments, reason = "they are the fields of a task")]
