@@ -286,6 +286,60 @@ fn what_is_wrong_with_a_night_is_told_before_anything_runs() {
     assert_eq!(status, "3 of 3 are done (2 parts and 1 build), 0 tasks are to do\n");
 }
 
+/// A folder becomes a night file that runs as it stands, and what is no part is named.
+#[test]
+fn a_night_file_is_made_from_a_folder() {
+    let scratch = Scratch::new();
+    fs::create_dir_all(scratch.path("in/more")).unwrap();
+    scratch.part("in/ball.stl", Sample::Sphere, 600);
+    scratch.part("in/cube.stl", Sample::Cube, 64);
+    scratch.run("lamp convert in/cube.stl in/cube.step -q").succeeds();
+    fs::rename(scratch.path("in/ball.stl"), scratch.path("in/a \"ball\".stl")).unwrap();
+    let whole = scratch.bytes("in/cube.stl");
+    scratch.write("in/cut.stl", &whole[..whole.len() / 2]);
+    scratch.write("in/list.txt", b"cube, ball\n");
+    scratch.write("in/x.ply", b"ply\nformat ascii 1.0\n");
+    let init = "lamp batch init in --slice=--dpi=60";
+    let ran = scratch.run(init).succeeds();
+    for line in [
+        "batch init: more: left out, a folder in the folder",
+        "batch init: list.txt: left out, a text file",
+        "batch init: x.ply: left out, a PLY file",
+        "batch init: cut.stl: left out, ",
+        "night.toml: 3 parts, ",
+    ] {
+        let mut lines = ran.stderr.lines().chain(ran.written.iter().map(String::as_str));
+        assert!(lines.any(|found| found.starts_with(line)), "{line}: {ran:?}");
+    }
+    let plan = scratch.run("lamp batch plan night.toml").succeeds_quietly();
+    assert!(String::from_utf8(plan.stdout).unwrap().contains("check  3 of 3 tasks to do"));
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    for part in ["a \"ball\"", "cube-stl", "cube-step"] {
+        assert!(scratch.path(&format!("night/parts/{part}.lamp")).exists(), "{part}");
+    }
+    // Each line of its examples may become one of the file.
+    let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
+    let (start, examples) = text.split_once("# A later entry").unwrap();
+    let examples = examples.replace("\n# ", "\n").replace("A build has", "# A build has");
+    let all = format!("{start}# A later entry{examples}");
+    scratch.write("all.toml", all.as_bytes());
+    scratch.run("lamp batch plan all.toml").succeeds_quietly();
+    // An existing file stays, and wrong options leave none.
+    scratch.run(init).is_wrong_usage(&["night.toml exists", "--force"]);
+    assert_eq!(scratch.bytes("night.toml"), text.as_bytes());
+    let wrong = "lamp batch init in --slice=--dpp=3 -o other.toml";
+    scratch.run(wrong).is_wrong_usage(&["slice: ", "--dpp"]);
+    scratch.run("lamp batch init gone").is_wrong_usage(&["gone: there is no such folder"]);
+    let none = scratch.run("lamp batch init in/more -o other.toml");
+    assert!(none.statuses == [Some(1)] && none.stderr.contains("no part"), "{none:?}");
+    assert!(!scratch.path("other.toml").exists());
+    // From another folder, and with a machine of one's own.
+    fs::create_dir(scratch.path("nights")).unwrap();
+    scratch.run("lamp machine new mine --area 90x90mm --recoat 9s -o mine.toml").succeeds();
+    scratch.run(&format!("{init} --machine mine.toml -o nights/n.toml")).succeeds();
+    scratch.run("lamp batch plan nights/n.toml").succeeds_quietly();
+}
+
 /// Names are bytes, and no link and no file is passed over.
 #[test]
 #[cfg(target_os = "linux")]

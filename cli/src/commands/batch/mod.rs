@@ -1,8 +1,10 @@
 //! `lamp batch`: parts and builds overnight, from one file.
 
+mod init;
 mod keep;
 mod night_file;
 mod notify;
+mod part_files;
 mod plan_text;
 mod report;
 mod run;
@@ -29,8 +31,9 @@ use crate::output::json_report::ReportTo;
     args_conflicts_with_subcommands = true,
     after_help = "\
 Examples:
-  lamp batch night.toml
+  lamp batch init parts/ --machine beta
   lamp batch plan night.toml
+  lamp batch night.toml
   lamp batch night.toml --jobs 4 --memory 16GB --notify 'mail -s night ada@example.org'
   lamp batch night.toml --engine slurm
   lamp batch status night.toml
@@ -99,6 +102,13 @@ lamp_stack::named!(EngineName {
 
 #[derive(Subcommand)]
 enum BatchCommand {
+    /// Write a night file from a folder of parts
+    #[command(after_help = "\
+Examples:
+  lamp batch init parts/
+  lamp batch init parts/ --machine mine.toml -o monday.toml
+  lamp batch init parts/ --slice '--dpi 2400 --thickness 25um'")]
+    Init(init::InitArgs),
     /// Print a night's plan: tasks, existing results, and the tasks' time, memory and disk space
     Plan(NightArgs),
     /// Print the state of each part and build
@@ -165,6 +175,7 @@ struct TaskArgs {
 pub(crate) fn run(args: &BatchArgs, common: &Common) -> Result<(), Exit> {
     match &args.command {
         None => run::run(&args.run, common),
+        Some(BatchCommand::Init(args)) => init::run(args, common),
         Some(BatchCommand::Plan(args)) => plan_text::run(args, common),
         Some(BatchCommand::Status(args)) => status::run(args, common),
         Some(BatchCommand::Verify(args)) => keep::verify(args, common),
