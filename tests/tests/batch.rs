@@ -340,6 +340,54 @@ fn a_night_file_is_made_from_a_folder() {
     scratch.run("lamp batch plan nights/n.toml").succeeds_quietly();
 }
 
+/// The times of a plan are those that tasks took, and that the machine states.
+#[test]
+fn a_plan_has_the_times_that_are_known() {
+    let scratch = two_cubes();
+    let plan = |options: &str| {
+        let ran = scratch.run(&format!("lamp batch plan night.toml --jobs 2 {options}"));
+        String::from_utf8(ran.succeeds_quietly().stdout).unwrap()
+    };
+    let json = |options: &str| -> serde_json::Value {
+        serde_json::from_str(&plan(&format!("--json {options}"))).unwrap()
+    };
+    assert!(
+        plan("")
+            .contains("expected: not known\nnot in it: tasks of the kind range, join, check, tile")
+    );
+    assert!(plan("").contains("time on the machine: not known\n"));
+    let before = json("");
+    assert_eq!((&before["earlier_tasks"], before["most_s"].is_null()), (&0.into(), true));
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    assert!(!plan("").contains("expected"), "there is nothing to do");
+    // A removed result takes what it took, by the journal.
+    let journal = fs::read_dir(scratch.path("lamp-store/journal")).unwrap().next().unwrap();
+    let journal = fs::read_to_string(journal.unwrap().path()).unwrap();
+    let events: Vec<serde_json::Value> =
+        journal.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let tile = events.iter().find(|event| event["kind"] == "tile").unwrap();
+    let key = tile["key"].as_str().unwrap();
+    fs::remove_file(scratch.path(&format!("lamp-store/tasks/{}/{key}.json", &key[..2]))).unwrap();
+    let again = json("");
+    let seconds = |value: &serde_json::Value| value.as_f64().unwrap();
+    assert_eq!(again["to_do"], 1);
+    assert!((seconds(&again["least_s"]) - seconds(&tile["cpu_s"]) / 2.0).abs() < 1e-9, "{again}");
+    let longest = seconds(&tile["cpu_s"]).max(seconds(&tile["seconds"]));
+    assert!((seconds(&again["most_s"]) - longest).abs() < 1e-9, "{again}");
+    assert!(plan("").contains("; started now, it ends "));
+    // Before it is made, the build may have more layers than its parts; then each takes 9 s and 1.5 s.
+    let build = || json("--recoat 9s --expose 1.5s")["machine_times"][0].clone();
+    let open = build();
+    assert!(open["build_s"].is_null() && open["missing"][0].as_str().unwrap().contains("is made"));
+    assert_eq!(night(&scratch).statuses, [Some(0)]);
+    let made = build();
+    let layers = scratch.layers("night/builds/both.lamp").len();
+    assert_eq!(made["layers"], layers);
+    assert!((seconds(&made["build_s"]) - 10.5 * layers as f64).abs() < 1e-6, "{made}");
+    let text = plan("--recoat 9s");
+    assert!(text.contains("  both: at least ") && text.contains("give --expose"), "{text}");
+}
+
 /// Names are bytes, and no link and no file is passed over.
 #[test]
 #[cfg(target_os = "linux")]

@@ -39,6 +39,11 @@ impl Tiling {
         Ok(Self(args))
     }
 
+    /// Returns the machine, if one is named.
+    pub(crate) fn machine(&self) -> Option<&Path> {
+        self.0.settings.machine.as_deref()
+    }
+
     /// Lays out copies of stacks, and gives the layers of the build to `write`. Returns what is to
     /// be said.
     ///

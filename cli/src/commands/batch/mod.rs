@@ -2,6 +2,7 @@
 
 mod init;
 mod keep;
+mod machine_time;
 mod night_file;
 mod notify;
 mod part_files;
@@ -12,12 +13,14 @@ mod status;
 mod task;
 
 use std::path::PathBuf;
+use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
-use lamp_batch::Key;
+use lamp_batch::{Key, Local};
+use lamp_pipeline::memory::available;
 
-use crate::args::options::{Common, one_of_described, parse_memory};
+use crate::args::options::{Common, TimeArgs, one_of_described, parse_memory};
 use crate::exit::Exit;
 use crate::output::json_report::ReportTo;
 
@@ -66,14 +69,8 @@ pub(crate) struct RunArgs {
     ]))]
     engine: EngineName,
 
-    /// Number of threads for all tasks together [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
-    jobs: Option<u16>,
-
-    /// Memory that all tasks may use together, by their estimates [default: three quarters of all
-    /// memory]
-    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
-    memory: Option<u64>,
+    #[command(flatten)]
+    local: LocalArgs,
 
     /// How many times a crashed task is tried again
     #[arg(long, value_name = "N", default_value = "2")]
@@ -83,6 +80,28 @@ pub(crate) struct RunArgs {
     /// status in LAMP_BATCH_STATUS
     #[arg(long, value_name = "CMD")]
     notify: Option<String>,
+}
+
+/// The share of this machine that tasks may use.
+#[derive(Args)]
+struct LocalArgs {
+    /// Number of threads for all tasks together [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=512))]
+    jobs: Option<u16>,
+
+    /// Memory that all tasks may use together, by their estimates [default: three quarters of all
+    /// memory]
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
+    memory: Option<u64>,
+}
+
+impl LocalArgs {
+    fn engine(&self) -> Local {
+        let usual = || thread::available_parallelism().map_or(1, usize::from);
+        let jobs = self.jobs.map_or_else(usual, usize::from);
+        let memory = self.memory.unwrap_or_else(|| available() / 4 * 3);
+        Local { jobs, memory }
+    }
 }
 
 /// The engine that runs tasks, by the name that people use.
@@ -109,8 +128,9 @@ Examples:
   lamp batch init parts/ --machine mine.toml -o monday.toml
   lamp batch init parts/ --slice '--dpi 2400 --thickness 25um'")]
     Init(init::InitArgs),
-    /// Print a night's plan: tasks, existing results, and the tasks' time, memory and disk space
-    Plan(NightArgs),
+    /// Print a night's plan: tasks, existing results, the tasks' time, memory and disk space, and the
+    /// time on the machine
+    Plan(PlanArgs),
     /// Print the state of each part and build
     Status(NightArgs),
     /// Hash all results and delivered files again, and remove damaged results
@@ -120,6 +140,18 @@ Examples:
     /// Do one task, as engines call it
     #[command(hide = true)]
     Task(TaskArgs),
+}
+
+#[derive(Args)]
+struct PlanArgs {
+    #[command(flatten)]
+    night: NightArgs,
+
+    #[command(flatten)]
+    local: LocalArgs,
+
+    #[command(flatten)]
+    times: TimeArgs,
 }
 
 #[derive(Args)]

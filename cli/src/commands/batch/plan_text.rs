@@ -2,22 +2,27 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use lamp_batch::{Cost, Deliverer, DiskRoom, Key, Kind, Ledger};
+use lamp_batch::{Cost, Deliverer, DiskRoom, Forecast, Key, Kind, Ledger, Local, events};
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 
 use serde_json::json;
 
-use super::NightArgs;
+use super::PlanArgs;
+use super::machine_time::{Clock, MachineTime};
 use super::night_file::NightFile;
 use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::output::json_report::write_answer;
+use crate::output::numbers::number_of;
 use crate::streams::print;
 use crate::terminal::progress::printable;
 
-pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
-    let file = NightFile::open(&args.night)?;
+/// The stacks whose times on the machine are listed.
+const MOST_STACKS: usize = 12;
+
+pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
+    let file = NightFile::open(&args.night.night)?;
     let store = file.store()?;
     let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
@@ -54,10 +59,21 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
         text += &printable(shortage);
         text.push('\n');
     }
-    if !args.report.is_printed() {
+    let local = args.local.engine();
+    let done = events(&store).map_err(|error| Exit::Failed(error.into()))?;
+    let forecast = Forecast::new(&plan.graph, &ledger.keys(), &store, &done, &local);
+    let is_known = forecast.unknown.is_empty();
+    if !to_do.is_empty() {
+        text += &expected(&forecast, &local);
+    }
+    let wait_s = is_known.then_some(forecast.seconds[1]);
+    let most = if common.verbose { usize::MAX } else { MOST_STACKS };
+    let machine_times = MachineTime::of_night(&file, &plan, &store, args.times)?;
+    text += &printable_lines(&MachineTime::text(&machine_times, wait_s, most));
+    if !args.night.report.is_printed() {
         print(&text)?;
     }
-    let Some(path) = args.report.path() else { return Ok(()) };
+    let Some(path) = args.night.report.path() else { return Ok(()) };
     let faults = plan.subjects.iter().filter_map(|subject| {
         let why = subject.wanted.as_ref().err()?;
         Some(json!({ "name": subject.name, "why": why.to_string() }))
@@ -65,6 +81,8 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
     let kinds = kinds.iter().map(|(kind, (all, to_do, cost))| {
         json!({ "kind": kind.name(), "tasks": all, "to_do": to_do, "cost": cost })
     });
+    let unknown = forecast.unknown.iter();
+    let unknown = unknown.map(|(kind, tasks)| json!({ "kind": kind.name(), "tasks": tasks }));
     let answer = json!({
         "tasks": plan.graph.keys().len(),
         "to_do": to_do.len(),
@@ -72,6 +90,12 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
         "kinds": kinds.collect::<Vec<_>>(),
         "cannot_be_made": faults.collect::<Vec<_>>(),
         "disk_shortage": shortage,
+        "threads": local.jobs,
+        "least_s": forecast.seconds[0],
+        "most_s": wait_s,
+        "earlier_tasks": forecast.earlier,
+        "unknown": unknown.collect::<Vec<_>>(),
+        "machine_times": machine_times.iter().map(MachineTime::json).collect::<Vec<_>>(),
     });
     write_answer("lamp-batch-plan-1", &answer, path)
 }
@@ -88,4 +112,45 @@ fn line(kind: &str, missing: usize, all: usize, cost: &Cost) -> String {
         ),
     };
     format!("{kind:<6} {missing} of {all} tasks to do{takes}\n")
+}
+
+/// Returns lines about the time of the tasks to do: how long, until when, and what is not known.
+fn expected(forecast: &Forecast, local: &Local) -> String {
+    let Forecast { seconds: [least, most], earlier, unknown } = forecast;
+    let threads = number_of(local.jobs as u64, "thread");
+    let from = format!("with {threads}, from {}", number_of(*earlier as u64, "earlier task"));
+    let end = |seconds: f64| {
+        Clock::after(seconds).map_or("a distant day".to_owned(), |at| at.to_string())
+    };
+    let mut text = match (*earlier, unknown.is_empty()) {
+        (0, _) => "expected: not known\n".to_owned(),
+        (_, true) => {
+            let ends = match [*least, *most].map(Clock::after) {
+                [Some(first), Some(last)] if first == last => format!("at {last}"),
+                [Some(first), Some(last)] if first.day == last.day => {
+                    format!("between {} and {last}", first.time)
+                }
+                _ => format!("between {} and {}", end(*least), end(*most)),
+            };
+            let [least, most] = [*least, *most].map(time_text);
+            format!("expected: {least} to {most} {from}; started now, it ends {ends}\n")
+        }
+        (_, false) => {
+            let (least, end) = (time_text(*least), end(*least));
+            format!("expected: at least {least} {from}; started now, it ends after {end}\n")
+        }
+    };
+    if !unknown.is_empty() {
+        let kinds: Vec<&str> = unknown.iter().map(|(kind, _)| kind.name()).collect();
+        text += &format!(
+            "not in it: tasks of the kind {}, of which this store and machine have done none\n",
+            kinds.join(", ")
+        );
+    }
+    text
+}
+
+/// Escapes what could steer a terminal in each line.
+fn printable_lines(text: &str) -> String {
+    text.lines().map(|line| format!("{}\n", printable(line))).collect()
 }

@@ -4,10 +4,9 @@ use std::thread;
 
 use anyhow::{Context, anyhow};
 use lamp_batch::{
-    Attempt, Deliverer, DiskRoom, End, Engine, Event, Journal, Launcher, Ledger, Local, NamedTasks,
+    Attempt, Deliverer, DiskRoom, End, Engine, Event, Journal, Launcher, Ledger, NamedTasks,
     NightPlan, SubjectState, Summary, Work, host, now,
 };
-use lamp_pipeline::memory::available;
 
 use super::night_file::NightFile;
 use super::notify::notify;
@@ -91,11 +90,8 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
 
 impl RunArgs {
     fn engine(&self) -> Engine {
-        let usual = || thread::available_parallelism().map_or(1, usize::from);
-        let jobs = self.jobs.map_or_else(usual, usize::from);
-        let memory = self.memory.unwrap_or_else(|| available() / 4 * 3);
         match self.engine {
-            EngineName::Local => Engine::Local(Local { jobs, memory }),
+            EngineName::Local => Engine::Local(self.local.engine()),
             EngineName::HyperQueue => Engine::HyperQueue,
             EngineName::Slurm => Engine::Slurm,
         }

@@ -8,7 +8,7 @@ mod plan;
 mod recipe;
 mod report;
 mod stacks;
-mod time;
+pub(crate) mod time;
 
 use std::cell::RefCell;
 use std::ops::Range;

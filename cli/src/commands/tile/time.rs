@@ -53,7 +53,7 @@ pub(super) fn text(time: &BuildTime, machine: Option<&Machine>) -> String {
 }
 
 /// Returns sentences about what is missing of the time, and which keys of the machine's file give it.
-pub(super) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String> {
+pub(crate) fn missing(time: &BuildTime, machine: Option<&Machine>) -> Vec<String> {
     let (which, name) = match machine {
         Some(machine) => ("the machine's file", machine.name.as_str()),
         None => ("a file for --machine", "beta"),
