@@ -1,7 +1,11 @@
 //! `lamp batch`: nights that go on, do nothing twice, and say what needs a person.
 
 use std::fs;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use lamp_fixtures::{Defect, Sample, inject};
 use lamp_tests::{Ran, Scratch, tilted_ball};
@@ -386,6 +390,63 @@ fn a_plan_has_the_times_that_are_known() {
     assert!((seconds(&made["build_s"]) - 10.5 * layers as f64).abs() < 1e-6, "{made}");
     let text = plan("--recoat 9s");
     assert!(text.contains("  both: at least ") && text.contains("give --expose"), "{text}");
+}
+
+/// Parts of a watched folder are made as they come, whole, and a signal ends it.
+#[test]
+#[cfg(unix)]
+fn parts_of_a_watched_folder_are_made_as_they_come() {
+    let scratch = Scratch::new();
+    fs::create_dir(scratch.path("in")).unwrap();
+    scratch.part("first.stl", Sample::Cube, 64);
+    scratch.part("second.stl", Sample::Sphere, 600);
+    scratch.write("night.toml", format!("defaults.stages = [\"{STAGES}\"]\n").as_bytes());
+    let mut watching = Command::new(lamp_tests::bin("lamp"));
+    watching.args(["batch", "night.toml", "--watch", "in"]).current_dir(scratch.path("."));
+    let mut watching = watching.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let made = |name: &str| scratch.path(&format!("night/parts/{name}.lamp"));
+    let wait = |is_there: &dyn Fn() -> bool| {
+        let start = Instant::now();
+        while !is_there() {
+            assert!(start.elapsed() < Duration::from_secs(120), "it waits in vain");
+            thread::sleep(Duration::from_millis(50));
+        }
+    };
+    fs::copy(scratch.path("first.stl"), scratch.path("in/a.stl")).unwrap();
+    // A file that grows at each look is not begun.
+    let bytes = scratch.bytes("second.stl");
+    let mut growing = fs::File::create(scratch.path("in/b.stl")).unwrap();
+    for piece in bytes.chunks(bytes.len() / 40 + 1) {
+        growing.write_all(piece).unwrap();
+        thread::sleep(Duration::from_millis(150));
+        assert!(!made("b").exists());
+    }
+    drop(growing);
+    wait(&|| made("a").exists() && made("b").exists());
+    let first = scratch.bytes("night/parts/a.lamp");
+    fs::copy(scratch.path("second.stl"), scratch.path("in/a.stl")).unwrap();
+    wait(&|| scratch.bytes("night/parts/a.lamp") != first);
+    scratch.write("in/c.txt", b"no part\n");
+    wait(&|| scratch.path("night/report.html").exists());
+    thread::sleep(Duration::from_secs(5));
+    let pid = watching.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    assert_eq!(watching.wait().unwrap().code(), Some(143));
+    let mut said = String::new();
+    watching.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    let lines = |start: &str| said.lines().filter(|line| line.starts_with(start)).count();
+    assert_eq!((lines("batch: a: done, "), lines("batch: b: done, ")), (2, 1), "{said}");
+    assert_eq!(lines("batch: c.txt: left out, a text file"), 1, "{said}");
+    for (name, part) in [("a", "second"), ("b", "second")] {
+        scratch.run(&format!("{STAGES} {part}.stl -q > {name}.tif")).succeeds();
+        let by_watch = scratch.layers(&format!("night/parts/{name}.lamp"));
+        let by_hand = scratch.layers(&format!("{name}.tif"));
+        assert!(
+            by_watch.iter().map(|layer| &layer.image).eq(by_hand.iter().map(|layer| &layer.image))
+        );
+    }
+    let watch = "lamp batch night.toml --watch gone";
+    scratch.run(watch).is_wrong_usage(&["--watch gone: there is no such folder"]);
 }
 
 /// Names are bytes, and no link and no file is passed over.

@@ -11,6 +11,7 @@ mod report;
 mod run;
 mod status;
 mod task;
+mod watch;
 
 use std::path::PathBuf;
 use std::thread;
@@ -37,6 +38,7 @@ Examples:
   lamp batch init parts/ --machine beta
   lamp batch plan night.toml
   lamp batch night.toml
+  lamp batch night.toml --watch parts/
   lamp batch night.toml --jobs 4 --memory 16GB --notify 'mail -s night ada@example.org'
   lamp batch night.toml --engine slurm
   lamp batch status night.toml
@@ -80,6 +82,11 @@ pub(crate) struct RunArgs {
     /// status in LAMP_BATCH_STATUS
     #[arg(long, value_name = "CMD")]
     notify: Option<String>,
+
+    /// Keep running, and make each new or changed part of this folder by the stages of [defaults]. Ctrl-C
+    /// ends it
+    #[arg(long, value_name = "FOLDER")]
+    watch: Option<PathBuf>,
 }
 
 /// The share of this machine that tasks may use.

@@ -27,6 +27,11 @@ impl NightFile {
     /// Reads a night file. From here on this process works in its folder, so that all names of
     /// files in it are from there.
     pub(super) fn open(path: &Path) -> Result<Self, Exit> {
+        Self::open_with(path, None)
+    }
+
+    /// Reads a night file as [`open`](Self::open) does. Each of `others` is a part, too, if there are any.
+    pub(super) fn open_with(path: &Path, others: Option<&[PathBuf]>) -> Result<Self, Exit> {
         let name = path.display().to_string();
         let failed = |error: anyhow::Error| Exit::Usage(error).at(name.clone());
         if !path.is_file() {
@@ -35,7 +40,11 @@ impl NightFile {
         }
         let text = read_text(path, MAX_FILE, "a night file").map_err(failed)?;
         let path = path.canonicalize().with_context(|| name.clone())?;
-        let night = Night::parse(&text, &path).map_err(|error| failed(error.into()))?;
+        let night = match others {
+            None => Night::parse(&text, &path),
+            Some(others) => Night::parse_with(&text, &path, others),
+        };
+        let night = night.map_err(|error| failed(error.into()))?;
         let folder = path.parent().unwrap_or(Path::new("/"));
         env::set_current_dir(folder).with_context(|| folder.display().to_string())?;
         Ok(Self { night, path, name })

@@ -11,6 +11,7 @@ use lamp_batch::{
 use super::night_file::NightFile;
 use super::notify::notify;
 use super::report;
+use super::watch::watch;
 use super::{EngineName, RunArgs};
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -23,8 +24,29 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
             "name a night file, such as lamp batch night.toml (docs/batch.md)",
         ));
     };
+    if let Some(folder) = &args.watch {
+        return watch(night, folder, args, common);
+    }
     let progress = Progress::new("batch", common, true);
     let file = NightFile::open(night)?;
+    let done = make(&file, args, &progress)?;
+    if done.end.is_ok() {
+        let folder = file.night.output.folder.display();
+        progress.say(&format!("all is done: {folder} has {}", counts(&done.summary)));
+    }
+    done.end
+}
+
+/// The outcome of making a night.
+pub(super) struct Made {
+    pub(super) summary: Summary,
+    /// Whether tasks wait, since the store's disk is full.
+    pub(super) is_full: bool,
+    pub(super) end: Result<(), Exit>,
+}
+
+/// Makes what is missing of a night.
+pub(super) fn make(file: &NightFile, args: &RunArgs, progress: &Progress) -> Result<Made, Exit> {
     let store = file.store()?;
     let plan = file.plan(&store)?;
     let goals = plan.goals();
@@ -46,8 +68,9 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let report = file.night.output.folder.join("report.html");
     let launcher = Launcher { program: started::program().context("this program")? };
     let work = Work { graph: &plan.graph, store: &store, launcher: &launcher };
-    let mut running = Running { plan: &plan, progress: &progress, engine: args.engine(), done: 0 };
-    running.begin(&ledger);
+    let mut running = Running { plan: &plan, progress, engine: args.engine(), done: 0 };
+    // Who watches a folder gets a line for each part.
+    running.begin(&ledger, args.watch.is_none());
     let failed = thread::scope(|scope| {
         let (deliver, delivered) = deliverer.start(scope, &plan.subjects);
         for &(place, subject) in &open {
@@ -75,17 +98,13 @@ pub(super) fn run(args: &RunArgs, common: &Common) -> Result<(), Exit> {
     let failed = failed.into_iter().map(|(name, error)| (name, Exit::from(error).to_string()));
     summary.add_failures(&failed.collect::<Vec<_>>());
     if is_new || !report::is_written(&report, &store, &summary)? {
-        report::write(&report, &file, &plan, &store, &summary)?;
+        report::write(&report, file, &plan, &store, &summary)?;
     }
     let end = end(&summary, &ledger);
     if let Some(command) = &args.notify {
-        notify(command, end.as_ref().err().map_or(0, Exit::status), &summary, &progress);
+        notify(command, end.as_ref().err().map_or(0, Exit::status), &summary, progress);
     }
-    if end.is_ok() {
-        let folder = file.night.output.folder.display();
-        progress.say(&format!("all is done: {folder} has {}", counts(&summary)));
-    }
-    end
+    Ok(Made { is_full: ledger.no_room().is_some(), summary, end })
 }
 
 impl RunArgs {
@@ -107,10 +126,10 @@ struct Running<'a> {
 }
 
 impl Running<'_> {
-    fn begin(&self, ledger: &Ledger<'_>) {
+    fn begin(&self, ledger: &Ledger<'_>, with_faults: bool) {
         let NightPlan { graph, subjects } = self.plan;
         let to_do = ledger.keys().len();
-        for subject in subjects.iter().filter(|subject| !subject.is_build) {
+        for subject in subjects.iter().filter(|subject| with_faults && !subject.is_build) {
             if let Err(why) = &subject.wanted {
                 self.progress.warn(&format!("{}: failed: {why}", subject.name));
             }
