@@ -17,6 +17,7 @@ use super::run::counts;
 use super::task::{CheckResult, middle};
 use crate::commands::report::{InlinePicture, document};
 use crate::exit::Exit;
+use crate::output::numbers::{grouped, number_of};
 use crate::streams::write_file;
 use crate::terminal::progress::printable;
 use lamp_plots::{Plot, curve, inline_svg, linear};
@@ -44,16 +45,16 @@ pub(super) fn write(
     let took = took(&done);
     let pictures: HashMap<usize, (InlinePicture, Vec<String>)> =
         summary.lines().filter_map(|line| Some((line.place, seen(line, plan, store)?))).collect();
-    let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = file.path.file_name().unwrap_or_default().to_string_lossy();
     let content = html! {
-        h1 { "Night " (printable(&stem)) }
+        h1 { "Night run: " (printable(&name)) }
         p.subtitle { (counts(summary)) ", " (plan.graph.keys().len()) " tasks" }
         (first(summary))
         @for (title, lines) in [("Builds", &summary.builds), ("Parts", &summary.parts)] {
             @if !lines.is_empty() { section { h2 { (title) } (table(lines, &took)) } }
         }
         section {
-            h2 { "Layers in the middle" }
+            h2 { "A layer of each stack" }
             div.sheet {
                 @for line in summary.builds.iter().chain(&summary.parts) {
                     @if let Some((picture, lines)) = pictures.get(&line.place) {
@@ -62,7 +63,7 @@ pub(super) fn write(
                             figcaption {
                                 b { (printable(&line.name)) } ", " (picture.caption)
                                 @for finding in lines.iter().take(MOST_LINES) { br; (printable(finding)) }
-                                @if lines.len() > MOST_LINES { br; (lines.len() - MOST_LINES) " more findings" }
+                                @if lines.len() > MOST_LINES { br; "and " (number_of((lines.len() - MOST_LINES) as u64, "more finding")) }
                             }
                         }
                     }
@@ -70,13 +71,13 @@ pub(super) fn write(
             }
         }
         section {
-            h2 { "Over time" }
+            h2 { "Tasks over time" }
             div.charts { @for chart in charts(&done) { div.chart { (PreEscaped(chart)) } } }
         }
     };
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let page = document(&format!("Night {stem}"), &content);
+    let page = document(&format!("Night run: {name}"), &content);
     write_file(path, |out| out.write_all(page.as_bytes()))?;
     // Without the note it is written again.
     let _ = store.keep_note(note(path), &digest(summary)?);
@@ -148,36 +149,46 @@ fn first(summary: &Summary) -> Markup {
 }
 
 fn table(lines: &[SubjectSummary], took: &HashMap<&str, Took>) -> Markup {
-    let known = |number: Option<u64>| number.map_or_else(String::new, |n| n.to_string());
+    let known = |number: Option<u64>| number.map_or_else(String::new, grouped);
     html! {
         table.index {
             thead { tr {
-                th { "name" } th { "state" } th { "layers" } th { "stray bands fixed" } th { "left" }
-                th { "islands" } th { "time" } th { "of processors" } th { "peak memory" } th { "digest" }
+                th { "name" } th { "state" } th { "layers" } th { "stray bands corrected" }
+                th { "stray bands left" } th { "islands" } th { "time of its tasks" } th { "CPU time" }
+                th { "most memory" } th { "BLAKE3 digest begins" }
             } }
             tbody {
                 @for line in lines {
                     tr {
-                        td { (printable(&line.name)) }
+                        td {
+                            // Long names break between their words.
+                            @for word in printable(&line.name).split_inclusive(['_', '-', '.']) { (word) wbr; }
+                        }
                         td { (line.state.words()) }
-                        td { (known(line.layers)) }
-                        td { (known(line.layers.map(|_| line.stray_fixed))) }
-                        td { (known(line.layers.map(|_| line.stray_left))) }
-                        td { (known(line.layers.map(|_| line.islands))) }
+                        td.whole { (known(line.layers)) }
+                        td.whole { (known(line.layers.map(|_| line.stray_fixed))) }
+                        td.whole { (known(line.layers.map(|_| line.stray_left))) }
+                        td.whole { (known(line.layers.map(|_| line.islands))) }
                         @match took.get(line.name.as_str()) {
                             Some(took) => {
-                                td { (time_text(took.seconds)) }
-                                td { (time_text(took.cpu_s)) }
-                                td { (in_words(took.memory)) }
+                                td.whole { (time_text(took.seconds)) }
+                                td.whole { (time_text(took.cpu_s)) }
+                                td.whole { (in_words(took.memory)) }
                             }
                             None => { td {} td {} td {} }
                         }
-                        td { (line.digest.as_deref().map_or("", |digest| &digest[..digest.len().min(23)])) }
+                        td.whole { (line.digest.as_deref().map_or("", shown_digest)) }
                     }
                 }
             }
         }
     }
+}
+
+/// Returns enough digits of a digest for people to compare files.
+fn shown_digest(digest: &str) -> &str {
+    let digits = digest.split_once(':').map_or(digest, |(_, digits)| digits);
+    digits.get(..12).unwrap_or(digits)
 }
 
 /// Returns the picture of a part or a build, and its findings.
