@@ -58,4 +58,9 @@ pub fn shared_data(kind: &str) -> Option<PathBuf> {
 pub fn note(line: &str) {
     // A closed stream is no failure of the test.
     let _ = writeln!(std::io::stderr().lock(), "note: {line}");
+    // `.ci/run` lists them at its end.
+    if let Some(path) = std::env::var_os("LAMP_NOTES") {
+        let file = std::fs::OpenOptions::new().append(true).create(true).open(path);
+        let _ = file.and_then(|mut file| file.write_all(format!("{line}\n").as_bytes()));
+    }
 }

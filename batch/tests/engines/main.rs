@@ -12,6 +12,8 @@ mod slurm;
 mod task;
 
 use std::env;
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::iter;
 use std::path::Path;
 use std::process::Command;
@@ -65,13 +67,23 @@ fn in_engine(engine: &str, folder: &Path) {
     match engine {
         "slurm" => match slurm::Slurm::start(folder) {
             Ok(mut slurm) => scenarios(engine, Some(&mut slurm)),
-            Err(why) => println!("not tested: Slurm, since {why}"),
+            Err(why) => skipped("Slurm", &why),
         },
         "hyperqueue" => match hyperqueue::HyperQueue::start(folder) {
             Ok(mut hq) => scenarios(engine, Some(&mut hq)),
-            Err(why) => println!("not tested: HyperQueue, since {why}"),
+            Err(why) => skipped("HyperQueue", &why),
         },
         _ => scenarios(engine, None),
+    }
+}
+
+/// Says that an engine was not tried, also in the summary of `.ci/run`.
+fn skipped(engine: &str, why: &str) {
+    let line = format!("the engine {engine} was not tried: {why}");
+    println!("{line}");
+    if let Some(path) = env::var_os("LAMP_NOTES") {
+        let mut notes = OpenOptions::new().append(true).create(true).open(path).unwrap();
+        writeln!(notes, "{line}").unwrap();
     }
 }
 
