@@ -25,7 +25,9 @@ fn report(scratch: &Scratch) -> Value {
 
 /// Numbers that an SVG shows in cells, in its order.
 fn numbers_of(svg: &str) -> Vec<u32> {
-    let texts = svg.split("</text>").filter_map(|text| text.rsplit('>').next());
+    // Doses are black, and the numbers of columns and rows are gray.
+    let texts = svg.split("</text>").filter(|text| !text.contains("#282828"));
+    let texts = texts.filter_map(|text| text.rsplit('>').next());
     texts.filter_map(|text| text.trim().parse().ok()).collect()
 }
 

@@ -64,7 +64,7 @@ fn scale_and_region_hold_for_characters_too() {
     scratch.stack("ring.tif", layer(ring()));
     let part = lines(&scratch, "80", "--region 58,10,3,4 --zoom 2");
     assert_eq!(part, ["@@@@@@"; 4]);
-    assert_eq!(lines(&scratch, "20", "--zoom 1/2").len(), 30);
+    assert_eq!(lines(&scratch, "20", "--zoom 1/2").len(), 28);
     let ran = scratch.run("lamp show ring.tif --layers 0..1 --draw ascii");
     assert_eq!(ran.statuses, [Some(2)]);
     scratch.run("lamp show ring.tif --layer 0 --draw ascii -o ring.txt").succeeds_quietly();

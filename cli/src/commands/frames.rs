@@ -102,7 +102,9 @@ pub(crate) fn run(args: &FramesArgs, common: &Common) -> Result<(), Exit> {
         is_upward: pass.direction == ScanDirection::Up,
     };
     if ["png", "apng"].contains(&extension(&args.output).as_str()) {
-        return args.write_picture(&mut frames, &header);
+        args.write_picture(&mut frames, &header)?;
+        progress.wrote(&args.output, &[number_of(header.frames, "frame")]);
+        return Ok(());
     }
     let write = |out: &mut dyn Write| -> io::Result<()> {
         let mut writer = FrameWriter::new(out, header)?;
