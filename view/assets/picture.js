@@ -69,6 +69,8 @@ export class Picture extends EventTarget {
     this.#viewer.addHandler("viewport-change", () => {
       this.#viewer.drawer.setImageSmoothingEnabled(this.zoom < 1);
     });
+    // The canvas on which overlays are drawn first keeps its own setting.
+    this.#viewer.addHandler("tile-drawing", ({ context }) => (context.imageSmoothingEnabled = this.zoom < 1));
     for (const name of ["update-viewport", "resize"]) {
       this.#viewer.addHandler(name, () => this.dispatchEvent(new Event("view")));
     }
