@@ -549,7 +549,7 @@ fn memory_stays_within_its_limit() {
 const NUMBERS: &str =
     "0 0 0 0 0 0 1 1 7 15 16 31 32 255 256 4294967295 -1 1e9 18446744073709551616 %31 x";
 const WORDS: &str = "tiles api stacks layers assets session layer new below findings surface \
-                     surface.bin pixel edge index.html style.css .. %2e%2e % %ff";
+                     surface.bin pixel edge copies index.html style.css .. %2e%2e % %ff";
 const TARGETS: [&str; 10] = [
     "/tiles/0/#/layer/#/0/0.png",
     "/tiles/0/#/layer/0/0/0.png?threshold=#",

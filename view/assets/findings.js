@@ -1,7 +1,7 @@
-/** The list of findings, and the way from one to the next. */
+/** The table of findings, its filters, and the way from one to the next. */
 
 import { poll } from "./api.js";
-import { byId, element } from "./format.js";
+import { byId, element, mm, pitchOf } from "./format.js";
 
 /** So many findings are listed at a time. */
 const PAGE = 200;
@@ -10,8 +10,12 @@ const PAGE = 200;
 export class Findings extends EventTarget {
   #app;
   /** @type {any[]} worst first */
+  #all = [];
+  /** @type {any[]} those that the filters leave, in the order of the table */
   list = [];
   #listed = 0;
+  /** @type {{by: string, down: boolean} | null} the column that sorts; null: worst first */
+  #order = null;
   /** @type {number | null} the one that was gone to */
   current = null;
 
@@ -22,15 +26,26 @@ export class Findings extends EventTarget {
     byId("next-finding").addEventListener("click", () => this.step(1));
     byId("previous-finding").addEventListener("click", () => this.step(-1));
     byId("more-findings").addEventListener("click", () => this.#listMore());
+    byId("findings-filters").addEventListener("input", () => this.#choose());
+    byId("findings-filters").addEventListener("submit", (event) => event.preventDefault());
+    // The fields are empty only after the event.
+    byId("findings-filters").addEventListener("reset", () => setTimeout(() => this.#choose()));
+    for (const head of byId("findings-list").querySelectorAll("th")) {
+      head.querySelector("button").addEventListener("click", () => this.#sortBy(head.dataset.by));
+    }
+    byId("findings-list").addEventListener("click", ({ target }) => {
+      const rows = target.closest("tbody");
+      if (rows) this.show(this.#all[rows.dataset.id]);
+    });
     poll("/api/findings", (state) => this.#take(state)).catch(app.fail);
   }
 
   /** The line of a finding. */
   text(id) {
-    return this.list[id]?.text;
+    return this.#all[id]?.text;
   }
 
-  /** Goes to the next finding up (1) or down (-1) from this layer. */
+  /** Goes to the next finding up (1) or down (-1) from this layer, among those of the table. */
   step(by) {
     const { layer } = this.#app.state.view;
     const ordered = [...this.list].sort((a, b) => by * (a.layer - b.layer || a.id - b.id));
@@ -49,17 +64,15 @@ export class Findings extends EventTarget {
     overlays.set("findings", true);
     this.mark();
     if (finding.box) picture.fit(finding.box);
-    for (const button of byId("findings-list").querySelectorAll("button")) {
-      button.setAttribute("aria-current", `${button.dataset.id === `${finding.id}`}`);
-    }
-    this.#app.say(`${finding.kind.replaceAll("-", " ")}: ${finding.text}`);
+    this.#markRow();
+    this.#app.say(`${wordsOf(finding.kind)}: ${finding.text}`);
     this.dispatchEvent(new Event("change"));
   }
 
   /** Draws the rectangle of the current finding, where it is in the layer that is viewed. */
   mark() {
     const { marks, state } = this.#app;
-    const finding = this.list.find(({ id }) => id === this.current);
+    const finding = this.#all[this.current];
     const { stack, layer } = state.view;
     const isHere = finding && stack === 0 && finding.layer <= layer && layer <= finding.last_layer;
     marks.setBox("finding", isHere ? finding.box : null);
@@ -69,32 +82,109 @@ export class Findings extends EventTarget {
     const words = {
       running: state.of ? `Looking: ${state.done} of ${state.of} layers.` : "Looking …",
       failed: state.message ?? "They could not be found.",
-      ready: state.list.length ? `${state.list.length}, the worst first.` : "Nothing was found.",
+      ready: "Nothing was found.",
     };
     byId("findings-state").textContent = words[state.status] ?? "";
-    if (state.status !== "ready") return;
-    this.list = state.list;
-    this.#listMore();
-    this.#app.heights.mark([...new Set(this.list.map((finding) => finding.layer))]);
+    if (state.status !== "ready" || !state.list.length) return;
+    const pitch = pitchOf(this.#app.session.stacks[0].dpi);
+    this.#all = state.list.map((finding) => ({ ...finding, size: sizeOf(finding.box, pitch) }));
+    byId("size-unit").textContent = pitch ? "mm" : "px";
+    byId("findings-body").hidden = false;
+    this.#offerKinds();
+    this.#choose();
     this.#app.redraw();
+  }
+
+  #offerKinds() {
+    const counts = new Map();
+    for (const { kind } of this.#all) counts.set(kind, (counts.get(kind) ?? 0) + 1);
+    const options = [...counts].map(([kind, number]) =>
+      Object.assign(element("option", `${wordsOf(kind)} (${number})`), { value: kind }),
+    );
+    byId("filter-kind").append(...options);
+  }
+
+  /** Lists the findings that the filters leave. */
+  #choose() {
+    const { index } = this.#app.columnsOf(0);
+    const limit = (id, none) => (byId(id).value === "" ? none : Number(byId(id).value));
+    const kind = byId("filter-kind").value;
+    const [from, to] = [limit("filter-from", -Infinity), limit("filter-to", Infinity)];
+    const least = limit("filter-size", 0);
+    this.list = this.#all.filter(
+      (one) =>
+        (!kind || one.kind === kind) && index[one.last_layer] >= from && index[one.layer] <= to && one.size >= least,
+    );
+    if (this.#order) {
+      const { by, down } = this.#order;
+      const order = by === "kind" ? (a, b) => a.kind.localeCompare(b.kind) : (a, b) => a[by] - b[by];
+      this.list.sort((a, b) => (down ? -1 : 1) * order(a, b));
+    }
+    this.#listed = 0;
+    for (const rows of [...byId("findings-list").tBodies]) rows.remove();
+    this.#listMore();
+    const all = this.#all.length;
+    const number = this.list.length === all ? `${all}` : `${this.list.length} of ${all}`;
+    byId("findings-state").textContent = `${number}${this.#order ? "" : ", the worst first"}.`;
+    this.#app.heights.mark([...new Set(this.list.map(({ layer }) => layer))]);
     this.dispatchEvent(new Event("change"));
+  }
+
+  /** Sorts by a column: upward, downward, and then the worst first again. */
+  #sortBy(by) {
+    const down = this.#order?.by === by && !this.#order.down;
+    this.#order = this.#order?.by === by && this.#order.down ? null : { by, down };
+    for (const head of byId("findings-list").querySelectorAll("th")) {
+      const sorts = head.dataset.by === this.#order?.by;
+      head.ariaSort = sorts ? (down ? "descending" : "ascending") : "none";
+    }
+    this.#choose();
   }
 
   #listMore() {
     const next = this.list.slice(this.#listed, this.#listed + PAGE);
     this.#listed += next.length;
-    byId("findings-list").append(...next.map((finding) => this.#row(finding)));
+    byId("findings-list").append(...next.map((finding) => this.#rows(finding)));
     byId("more-findings").hidden = this.#listed >= this.list.length;
+    this.#markRow();
   }
 
-  #row(finding) {
-    const { kind, text, layer } = finding;
-    const place = text.startsWith("layer") ? "" : `layer ${this.#app.columnsOf(0).index[layer]}, `;
-    const button = element("button", `${kind.replaceAll("-", " ")}: ${place}${text}`);
-    button.dataset.id = finding.id;
-    button.addEventListener("click", () => this.show(finding));
-    const row = element("li");
-    row.append(button);
-    return row;
+  #rows({ id, kind, text, layer, last_layer: last, size }) {
+    const { index, z_um } = this.#app.columnsOf(0);
+    const pitch = pitchOf(this.#app.session.stacks[0].dpi);
+    const name = element("td");
+    name.append(element("button", wordsOf(kind)));
+    const layers = element("td", layer === last ? `${index[layer]}` : `${index[layer]}–${index[last]}`);
+    const length = size ? (pitch ? mm(size) : `${size} px`) : "";
+    const first = element("tr");
+    first.append(name, layers, element("td", length));
+    // The layers have a column of their own.
+    const about = text.replace(/^layers? \d+(?: to \d+)?(?: \(z [^)]*\))?[:,]? ?/, "");
+    const z = z_um[layer] == null || about.includes("(z ") ? "" : `z ${mm(z_um[layer] / 1000)}`;
+    const facts = element("td", [z, about].filter(Boolean).join(", "));
+    facts.colSpan = 3;
+    const second = element("tr");
+    second.append(facts);
+    const rows = element("tbody");
+    rows.dataset.id = id;
+    rows.append(first, second);
+    return rows;
   }
+
+  #markRow() {
+    for (const rows of byId("findings-list").tBodies) {
+      rows.ariaCurrent = `${rows.dataset.id === `${this.current}`}`;
+    }
+  }
+}
+
+/** The name of a kind as people read it. */
+const wordsOf = (kind) => kind.replaceAll("-", " ");
+
+/** The longer side of a rectangle: millimetres if they are known, or else pixels; 0 without a place. */
+function sizeOf(box, pitch) {
+  if (!box) return 0;
+  const [left, top, right, bottom] = box;
+  const [wide, high] = pitch ?? [1, 1];
+  return Math.max((right - left) * wide, (bottom - top) * high);
 }

@@ -7,7 +7,7 @@ import { byId, element } from "./format.js";
  * @param {any} app
  */
 export function listenToKeys(app) {
-  const { heights, measure, overlays, picture, pixelAtCentre } = app;
+  const { heights, measure, overlays, picture, pixelAtCentre, play, solid, swipe } = app;
   const finding = (by) => () => app.findings?.step(by);
   const press = (id) => () => byId(id).click();
   /** @type {[string[], string, () => void][]} keys, what they do */
@@ -19,6 +19,9 @@ export function listenToKeys(app) {
     [["Home"], "lowest layer", () => heights.to(0)],
     [["End"], "highest layer", () => heights.to(Infinity)],
     [["g"], "type a layer or height", () => byId("layer").select()],
+    [[" "], "play the layers, or stop", () => play.toggle()],
+    [["."], "play faster", () => play.faster(1)],
+    [[","], "play slower", () => play.faster(-1)],
     [["n"], "next finding up", finding(1)],
     [["p"], "next finding down", finding(-1)],
     [["+", "="], "zoom in", () => picture.zoomBy(1.5)],
@@ -30,8 +33,10 @@ export function listenToKeys(app) {
     [["Shift+ArrowUp"], "move up", () => picture.pan(0, -0.15)],
     [["Shift+ArrowDown"], "move down", () => picture.pan(0, 0.15)],
     [["Enter"], "tell the pixel in the middle, with the focus on the picture", null],
+    [["3"], "the part in 3D, or hide it", () => solid.toggle()],
+    [["s"], "both stacks, with a border to move, or one", () => swipe.toggle()],
     [["m"], "measure", () => measure.toggle()],
-    [["Escape"], "end measuring", () => measure.toggle(false)],
+    [["Escape"], "end measuring and playing", () => [measure, play].forEach((one) => one.toggle(false))],
     [["o"], "overlays on or off", () => overlays.toggleAll()],
     [["c"], "copy a link to this view", press("link")],
     [["d"], "download the picture", press("download")],
@@ -51,21 +56,29 @@ export function listenToKeys(app) {
 }
 
 /**
- * Gives the focus back to the picture once a field or a list has what it was asked for: it would take all
- * further keys. Who chooses from a list by keys goes on in it.
+ * Gives the focus back to the picture once a field has what it was asked for, and after each click: a
+ * control would keep keys for itself. Who uses a control by keys goes on in it.
  * @param {HTMLElement} canvas
  */
 function giveFocusBack(canvas) {
+  const isControl = (target) => target.closest("button, select, input, label, #solid-view, #swipe") != null;
   let byKeys = false;
   document.addEventListener("mousedown", () => (byKeys = false), true);
   document.addEventListener("keydown", ({ key, target }) => {
-    byKeys = target instanceof HTMLSelectElement;
-    if (!takesKeys(target)) return;
+    byKeys = isControl(target);
     // The form reads its field first, and a field that loses the focus reports its change.
-    if (key === "Enter" || key === "Escape") setTimeout(() => canvas.focus());
+    if (takesKeys(target) && (key === "Enter" || key === "Escape")) setTimeout(() => canvas.focus());
   }, true);
-  document.addEventListener("change", ({ target }) => {
-    if (target instanceof HTMLSelectElement && !byKeys) canvas.focus();
+  const back = ({ target }) => {
+    const isField = target instanceof HTMLInputElement && takesKeys(target);
+    if (!byKeys && isControl(target) && !isField && !byId("help").open) canvas.focus({ preventScroll: true });
+  };
+  // A list is open from its click to its change.
+  document.addEventListener("click", (event) => event.target.closest("select") || back(event));
+  document.addEventListener("change", back);
+  byId("help").addEventListener("close", () => {
+    byKeys = false;
+    canvas.focus();
   });
 }
 
@@ -75,11 +88,12 @@ function takesKeys(target) {
     (target instanceof HTMLInputElement && !["checkbox", "range"].includes(target.type));
 }
 
-/** Whether a key is for what has the focus: a field, a list, or the dialog. */
+/** Whether a key is for what has the focus: a field, a list, a button, or the dialog. */
 function isElsewhere(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || byId("help").open) return true;
   const { target } = event;
   if (target.id === "slider") return false;
+  if (event.key === " " && target.matches("button, input[type=checkbox]")) return true;
   const moves = event.key.startsWith("Arrow") || ["Home", "End", "PageUp", "PageDown"].includes(event.key);
   if (target instanceof HTMLInputElement && target.type === "range") return moves;
   return takesKeys(target) && event.key !== "Escape";
@@ -89,7 +103,7 @@ function nameOf({ key, shiftKey }) {
   return shiftKey && key.startsWith("Arrow") ? `Shift+${key}` : key.length === 1 ? key.toLowerCase() : key;
 }
 
-const SIGNS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", PageUp: "Page ↑", PageDown: "Page ↓" };
+const SIGNS = { " ": "Space", ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", PageUp: "Page ↑", PageDown: "Page ↓" };
 
 function row(key, what) {
   const term = element("dt");

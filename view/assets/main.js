@@ -1,6 +1,7 @@
 /** Puts the page together: what is viewed is the state, and the parts follow it. */
 
 import { get } from "./api.js";
+import { numberCopies } from "./copies.js";
 import { Findings } from "./findings.js";
 import { aspectOf, byId, count, element, mm, pitchOf, resolution } from "./format.js";
 import { Heights } from "./heights.js";
@@ -10,9 +11,11 @@ import { Measure } from "./measure.js";
 import { Overlays } from "./overlays.js";
 import { Picture } from "./picture.js";
 import { Pixel, tellLayer } from "./pixel.js";
+import { Play } from "./play.js";
 import { listenToShare } from "./share.js";
 import { SolidPanel } from "./solid_panel.js";
 import { State, fromHash, linkAddress } from "./state.js";
+import { Swipe } from "./swipe.js";
 
 /** Tells what went wrong, until something else is shown. */
 function fail(error) {
@@ -54,12 +57,15 @@ async function start() {
   app.overlays = new Overlays(app, () => show(app));
   app.marks = new Marks(app);
   app.heights = new Heights(app);
+  app.play = new Play(app);
   app.pixel = new Pixel(app);
   app.measure = new Measure(app);
   const choose = (at) => (app.measure.isOn ? app.measure.choose(at) : app.pixel.choose(at));
   picture.onClick(choose);
   app.pixelAtCentre = () => choose(picture.centre);
+  numberCopies(app);
   if (session.findings) app.findings = new Findings(app);
+  app.swipe = new Swipe(app);
   app.solid = new SolidPanel(app);
   listenToKeys(app);
   listenToShare(app);
@@ -75,7 +81,7 @@ function connect(app) {
   byId("stack").addEventListener("change", ({ target }) => {
     const stack = Number(target.value);
     // The other stack's layer at this height, if it has one.
-    const layer = (stack < 2 ? partner : null) ?? state.view.layer;
+    const layer = (stack < 2 ? app.columns.partner[state.view.layer] : null) ?? state.view.layer;
     state.set({ stack, layer: Math.min(layer, session.stacks[stack].layers - 1) });
   });
   byId("zoom-in").addEventListener("click", () => picture.zoomBy(1.5));
@@ -92,6 +98,11 @@ function connect(app) {
     if (placed) state.set({ centre: picture.centre, zoom: picture.zoom });
   });
   state.on(["stack", "layer", "overlays", "threshold"], () => show(app));
+  let isBoth = state.view.swipe != null;
+  state.on(["swipe"], () => {
+    if (isBoth !== (state.view.swipe != null)) show(app);
+    isBoth = state.view.swipe != null;
+  });
   state.on(["stack", "layer"], () => app.findings?.mark());
   state.on(["stack"], () => tellStack(app));
   addEventListener("hashchange", () => place(app));
@@ -118,15 +129,21 @@ function tellStack({ session, state }) {
 }
 
 /** Shows the layer of the state with its overlays; the next one is expected in the same direction. */
-function show({ columns, overlays, picture, session, state }) {
+function show({ columns, columnsOf, overlays, picture, session, state }) {
   byId("message").hidden = true;
-  const { stack, layer, threshold } = state.view;
-  const sheets = (layer) => {
-    const [width, height] = [columns.width[layer], columns.height[layer]];
+  const { stack, layer, swipe, threshold } = state.view;
+  const sheetOf = (stack, layer, [left, top] = [0, 0]) => {
+    const { gray, height, width } = columnsOf(stack);
     const aspect = aspectOf(session.stacks[stack].dpi);
-    const sheet = { stack, layer, width, height, aspect, threshold: null };
-    const over = state.view.overlays.map((kind) => ({ ...sheet, kind }));
-    return [{ ...sheet, kind: "layer", threshold: columns.gray[layer] ? threshold : null }, ...over];
+    const sheet = { stack, layer, kind: "layer", width: width[layer], height: height[layer], aspect, left, top };
+    return { ...sheet, threshold: gray[layer] ? threshold : null };
+  };
+  const sheets = (layer) => {
+    const sheet = sheetOf(stack, layer);
+    const over = state.view.overlays.map((kind) => ({ ...sheet, kind, threshold: null }));
+    const partner = swipe != null && stack < 2 ? columns.partner[layer] : null;
+    const other = partner == null ? [] : [sheetOf(1 - stack, partner, columns.shift[layer])];
+    return [sheet, ...over, ...other];
   };
   if (layer !== shownLayer) direction = Math.sign(layer - shownLayer);
   shownLayer = layer;
@@ -137,21 +154,18 @@ function show({ columns, overlays, picture, session, state }) {
 
 let shownLayer = 0;
 let direction = 1;
-/** The layer of the other stack that belongs to the one that is shown. */
-let partner = null;
 let asked = new AbortController();
 
 /** Tells about the layer that has come; the server then expects its neighbours. */
-async function tellShown({ columns, fail, picture, say, state }) {
+async function tellShown({ fail, picture, play, say, state }) {
   const { stack, layer } = state.view;
   asked.abort();
   asked = new AbortController();
   try {
     const facts = await get(`/api/stacks/${stack}/layers/${layer}`, asked.signal);
-    ({ partner } = facts);
     tellLayer(facts);
     picture.canvas.setAttribute("aria-label", `Layer picture: ${facts.name}`);
-    say(facts.name);
+    if (!play.isOn) say(facts.name);
   } catch (error) {
     if (error.name !== "AbortError") fail(error);
   }

@@ -5,12 +5,18 @@ import { byId } from "./format.js";
 /** From this zoom on, pixels have a grid. */
 const GRID_ZOOM = 12;
 
+/** The room that a letter of a label takes, in screen pixels. */
+const LABEL_PX = 12;
+
+const SVG = "http://www.w3.org/2000/svg";
+
 /** Lines over the picture. A set of lines has a name, and is drawn white on black. */
 export class Marks {
   #app;
   #svg = byId("marks");
   /** @type {Map<string, [number, number][][]>} lines of points, in pixels of the image */
   #lines = new Map();
+  #labels = [];
 
   constructor(app) {
     this.#app = app;
@@ -31,6 +37,15 @@ export class Marks {
     this.set(name, [corners]);
   }
 
+  /**
+   * Sets texts in the middle of rectangles; those that have no room are left out.
+   * @param {{text: string, box: [number, number, number, number]}[]} labels
+   */
+  setLabels(labels) {
+    this.#labels = labels;
+    this.draw();
+  }
+
   /** Draws all for the present place and zoom. */
   draw() {
     const { picture } = this.#app;
@@ -38,8 +53,26 @@ export class Marks {
     const path = (lines) => lines.map((line) => `M${line.map(place).join("L")}`).join("");
     const drawn = [path([...this.#lines.values()].flat())];
     const paths = [line("grid", path(this.#grid())), line("under", drawn), line("", drawn)];
-    this.#svg.replaceChildren(...paths);
+    this.#svg.replaceChildren(...paths, ...this.#texts());
     this.#scale();
+  }
+
+  #texts() {
+    const { picture } = this.#app;
+    const { clientWidth, clientHeight } = this.#svg;
+    const placed = this.#labels.map(({ text, box: [left, top, right, bottom] }) => {
+      const [low, high] = [picture.toScreen([left, top]), picture.toScreen([right, bottom])];
+      return { text, width: high[0] - low[0], at: low.map((start, axis) => (start + high[axis]) / 2) };
+    });
+    const isSeen = ({ text, width, at: [x, y] }) =>
+      width > LABEL_PX * text.length && x > 0 && y > 0 && x < clientWidth && y < clientHeight;
+    return placed.filter(isSeen).map(({ text, at: [x, y] }) => {
+      const made = document.createElementNS(SVG, "text");
+      made.setAttribute("x", x.toFixed(1));
+      made.setAttribute("y", y.toFixed(1));
+      made.textContent = text;
+      return made;
+    });
   }
 
   #grid() {
@@ -71,7 +104,7 @@ export class Marks {
 }
 
 function line(name, path) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  const made = document.createElementNS(SVG, "path");
   made.setAttribute("class", name);
   made.setAttribute("d", path);
   return made;

@@ -16,7 +16,8 @@ export class Overlays {
   /** @param {() => void} faded is called when an overlay becomes more or less opaque */
   constructor(app, faded) {
     this.#app = app;
-    this.#last = app.session.overlays.slice(0, 1).map(({ id }) => id);
+    const { overlays } = app.session;
+    this.#last = (overlays.some(({ on }) => on) ? overlays.filter(({ on }) => on) : overlays.slice(0, 1)).map(({ id }) => id);
     byId("overlays").replaceChildren(...app.session.overlays.map((one) => this.#row(one, faded)));
     app.state.on(["overlays"], () => this.#check());
     this.#check();
@@ -39,13 +40,14 @@ export class Overlays {
     this.#app.state.set({ overlays: known.filter((id) => chosen.has(id)) });
   }
 
-  #row({ id, label, color }, faded) {
+  #row({ id, label, colors }, faded) {
     this.opacity[id] = OPACITY;
     const box = Object.assign(element("input"), { type: "checkbox", id: `overlay-${id}` });
     box.addEventListener("change", () => this.set(id, box.checked));
     const swatch = element("span");
     swatch.className = "swatch";
-    swatch.style.background = color;
+    const stripe = (color, at) => `${color} ${(100 * at) / colors.length}% ${(100 * (at + 1)) / colors.length}%`;
+    swatch.style.background = `linear-gradient(90deg, ${colors.map(stripe)})`;
     const name = element("label");
     name.className = "row";
     name.append(box, swatch, label);

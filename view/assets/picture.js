@@ -28,6 +28,7 @@ export class Picture extends EventTarget {
   #still = 0;
   #busySince = 0;
   #loading = null;
+  #swipe = null;
 
   /**
    * @param {HTMLElement} element
@@ -68,6 +69,7 @@ export class Picture extends EventTarget {
     // Pixels that are larger than the screen's stay sharp. Told before it draws, not after.
     this.#viewer.addHandler("viewport-change", () => {
       this.#viewer.drawer.setImageSmoothingEnabled(this.zoom < 1);
+      this.#clip();
     });
     // The canvas on which overlays are drawn first keeps its own setting.
     this.#viewer.addHandler("tile-drawing", ({ context }) => (context.imageSmoothingEnabled = this.zoom < 1));
@@ -94,6 +96,26 @@ export class Picture extends EventTarget {
     this.#viewer.addHandler("canvas-click", (event) => {
       if (event.quick) call(this.fromScreen([event.position.x, event.position.y]));
     });
+  }
+
+  /** The share of the screen's width where the second stack begins; null: one stack is shown. */
+  set swipe(share) {
+    this.#swipe = share;
+    this.#clip();
+  }
+
+  /** Cuts the sheets at the border between the stacks, of which the second is on its right. */
+  #clip() {
+    const border = this.fromScreen([(this.#swipe ?? 0) * this.#viewer.viewport.getContainerSize().x, 0])[0];
+    for (const item of this.#items.values()) {
+      const { aspect, height, left, stack, width } = item.sheet;
+      const at = Math.max(0, Math.min(width, border - left));
+      const [from, to] = this.#swipe == null ? [0, width] : stack === 0 ? [0, at] : [at, width];
+      // A clip that is set anew is drawn anew, which would never end.
+      if (item.range?.[0] === from && item.range?.[1] === to) continue;
+      item.range = [from, to];
+      item.setClip(to - from === width ? null : new OpenSeadragon.Rect(from, 0, to - from, height * aspect));
+    }
   }
 
   /** The height of a pixel of what is wanted in widths. */
@@ -150,6 +172,14 @@ export class Picture extends EventTarget {
   /** Shows the whole layer. */
   home() {
     this.#viewer.viewport.goHome();
+  }
+
+  /** Shows the whole layer again once the screen has another size, if it is whole now. */
+  stayWhole() {
+    const { viewport } = this.#viewer;
+    const [now, home] = [viewport.getBounds(true), viewport.getHomeBounds()];
+    const isWhole = now.width > 0.98 * home.width && now.height > 0.98 * home.height;
+    if (isWhole) this.#viewer.addOnceHandler("resize", () => viewport.goHome(true));
   }
 
   /** Zooms about the middle. */
@@ -226,6 +256,8 @@ export class Picture extends EventTarget {
     const item = await new Promise((success, error) => {
       this.#viewer.addTiledImage({
         tileSource: source,
+        x: sheet.left / this.#unit,
+        y: (sheet.top * sheet.aspect) / this.#unit,
         width: sheet.width / this.#unit,
         index: sheet.kind === "layer" ? 0 : undefined,
         opacity: 0,
@@ -237,7 +269,9 @@ export class Picture extends EventTarget {
     // Meanwhile what was fetched ahead may have become what is wanted.
     if (this.#items.has(nameOf(sheet))) return this.#viewer.world.removeItem(item);
     item.addHandler("fully-loaded-change", () => this.#tellBusy());
+    item.sheet = sheet;
     this.#items.set(nameOf(sheet), item);
+    this.#clip();
   }
 
   /** Tells why a sheet that is wanted does not come. One fetched ahead is tried again once it is. */
@@ -259,8 +293,9 @@ export class Picture extends EventTarget {
 
   /** Whether an image has all tiles that the screen shows. Beside the screen, none are loaded. */
   #hasAll(item) {
-    const seen = this.#viewer.viewport.getBoundsWithMargins().intersection(item.getBounds());
-    return !seen || item.getFullyLoaded();
+    const [from, to] = item.range;
+    const seen = this.#viewer.viewport.getBoundsWithMargins().intersection(item.getClippedBounds());
+    return from === to || !seen || item.getFullyLoaded();
   }
 
   #reveal(scene) {

@@ -1,10 +1,10 @@
-/** The part in 3D, with the current layer as a plane in it. Loaded when its panel is opened. */
+/** The part in 3D, with the current layer as a plane in it. Loaded when it is first shown. */
 
 import * as THREE from "./three.module.min.js";
 import { Orbit } from "./orbit.js";
 
 const HEAD_BYTES = 16;
-const COLOURS = { part: 0xb9c4cf, plane: 0x2f8fff, finding: 0x990066, chosen: 0xff7799 };
+const COLOURS = { part: 0xb9c4cf, plane: 0x2f8fff, frame: 0xffffff, finding: 0x990066, chosen: 0xff7799 };
 
 /**
  * Reads a surface as the server writes it.
@@ -32,7 +32,9 @@ export class Solid {
   #camera = new THREE.PerspectiveCamera(35, 1, 1, 10);
   #material = new THREE.MeshStandardMaterial({ color: COLOURS.part, roughness: 0.75, side: THREE.DoubleSide });
   #cut = new THREE.Plane(new THREE.Vector3(0, 0, -1), 0);
+  #part;
   #plane;
+  #frame;
   #markers = null;
   #box;
   #due = false;
@@ -47,7 +49,8 @@ export class Solid {
     this.#renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.#renderer.localClippingEnabled = true;
     this.#box = geometry.boundingBox;
-    this.#scene.add(new THREE.Mesh(geometry, this.#material), this.#camera);
+    this.#part = new THREE.Mesh(geometry, this.#material);
+    this.#scene.add(this.#part, this.#camera);
     this.#scene.add(new THREE.HemisphereLight(0xffffff, 0x5a6068, 1.6));
     const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
     lamp.position.set(1, 1, 1);
@@ -61,7 +64,7 @@ export class Solid {
     parent.replaceChildren(domElement);
     const [target, size] = [new THREE.Vector3(), new THREE.Vector3()];
     this.#box.getCenter(target);
-    const distance = 1.9 * this.#box.getSize(size).length();
+    const distance = 1.7 * this.#box.getSize(size).length();
     this.orbit = new Orbit(this.#camera, domElement, { target, distance }, () => this.#draw());
     new ResizeObserver(() => this.#resize(parent)).observe(parent);
     this.#resize(parent);
@@ -72,12 +75,19 @@ export class Solid {
     return this.#renderer.domElement;
   }
 
-  /** Puts the plane of the layer at a height, and cuts the part there if wished. */
-  setPlane(z, isCut) {
+  /**
+   * Puts the plane of the layer at a height, and cuts the part there if wished.
+   * @param {number} z
+   * @param {boolean} isCut
+   * @param {[number, number, number][]} frame corners of what the picture shows of the layer
+   */
+  setPlane(z, isCut, frame) {
     this.#plane.position.z = z;
+    this.#frame.geometry.setFromPoints(frame.map((corner) => new THREE.Vector3(...corner)));
     this.#cut.constant = z;
-    this.#material.clippingPlanes = isCut ? [this.#cut] : null;
-    this.#material.needsUpdate = true;
+    const planes = isCut ? [this.#cut] : null;
+    if ((planes == null) !== (this.#material.clippingPlanes == null)) this.#material.needsUpdate = true;
+    this.#material.clippingPlanes = planes;
     this.#draw();
   }
 
@@ -113,13 +123,27 @@ export class Solid {
    * Returns the marker at a place of the canvas, if there is one.
    * @param {PointerEvent} event
    */
-  markerAt({ offsetX, offsetY }) {
-    if (!this.#markers) return null;
+  markerAt(event) {
+    return this.#markers && (this.#ray(event).intersectObject(this.#markers)[0]?.instanceId ?? null);
+  }
+
+  /**
+   * Returns the place of the part that is seen at a place of the canvas, if there is one.
+   * @param {PointerEvent} event
+   * @returns {[number, number, number] | undefined}
+   */
+  placeAt(event) {
+    const isCut = this.#material.clippingPlanes != null;
+    const hits = this.#ray(event).intersectObject(this.#part);
+    return hits.find(({ point }) => !isCut || point.z <= this.#cut.constant)?.point.toArray();
+  }
+
+  #ray({ offsetX, offsetY }) {
     const { clientWidth, clientHeight } = this.element;
     const at = new THREE.Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight);
     const ray = new THREE.Raycaster();
     ray.setFromCamera(at, this.#camera);
-    return ray.intersectObject(this.#markers)[0]?.instanceId ?? null;
+    return ray;
   }
 
   #addPlane() {
@@ -129,7 +153,11 @@ export class Solid {
     this.#plane = new THREE.Mesh(shape, new THREE.MeshBasicMaterial(look));
     this.#box.getCenter(this.#plane.position);
     this.#plane.renderOrder = 1;
-    this.#scene.add(this.#plane);
+    const line = new THREE.LineBasicMaterial({ color: COLOURS.frame, depthTest: false, transparent: true });
+    this.#frame = new THREE.LineLoop(new THREE.BufferGeometry(), line);
+    this.#frame.renderOrder = 2;
+    this.#frame.frustumCulled = false;
+    this.#scene.add(this.#plane, this.#frame);
   }
 
   #resize({ clientWidth, clientHeight }) {

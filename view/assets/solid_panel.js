@@ -1,23 +1,35 @@
-/** The panel of the part in 3D: loads what it needs when it is opened. */
+/** The part in 3D beside the layer: loads what it needs when it is first shown. */
 
 import { ask, get, poll } from "./api.js";
 import { byId, pitchOf } from "./format.js";
 
-/** Shows the part of the first stack, its layer and findings. */
+/** Shows the part of the first stack, its layer, what of it the picture shows, and findings. */
 export class SolidPanel {
   #app;
   #solid = null;
   #places = null;
+  #isAsked = false;
 
   constructor(app) {
     this.#app = app;
-    const panel = byId("solid");
-    panel.addEventListener("toggle", () => panel.open && this.#open(), { once: true });
+    byId("beside").addEventListener("click", () => this.toggle());
     app.state.on(["stack", "layer"], () => this.#update());
+    app.picture.addEventListener("view", () => this.#update());
     byId("cut").addEventListener("change", () => this.#update());
   }
 
+  /** Shows the part, or hides it. */
+  toggle() {
+    const on = byId("solid").hidden;
+    this.#app.picture.stayWhole();
+    byId("solid").hidden = !on;
+    byId("beside").setAttribute("aria-pressed", `${on}`);
+    if (on && !this.#isAsked) this.#open();
+    this.#update();
+  }
+
   async #open() {
+    this.#isAsked = true;
     const tell = (text) => (byId("solid-state").textContent = text);
     try {
       if (!hasWebGl()) return tell("This browser shows no 3D: it has no WebGL, or it is switched off.");
@@ -48,7 +60,9 @@ export class SolidPanel {
     element.addEventListener("click", (event) => {
       if (Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
       const marker = this.#solid.markerAt(event);
-      if (marker != null) this.#app.findings.show(this.#marked[marker]);
+      if (marker != null) return this.#app.findings.show(this.#marked[marker]);
+      const place = this.#solid.placeAt(event);
+      if (place) this.#goTo(place);
     });
     const keys = {
       ArrowLeft: () => orbit.turn(0.1, 0),
@@ -67,7 +81,17 @@ export class SolidPanel {
     this.#app.findings?.addEventListener("change", () => this.#mark());
   }
 
-  /** The findings that have a place. */
+  /** Goes to the layer and the pixel of a place on the part. */
+  #goTo([x, y, z]) {
+    const { picture, pixel, state } = this.#app;
+    const layer = this.#places.layerAt(z);
+    state.set({ stack: 0, layer });
+    const at = this.#places.pixelAt([x, y]);
+    picture.lookAt(at, picture.zoom);
+    pixel.choose(at);
+  }
+
+  /** The findings of the table that have a place. */
   get #marked() {
     return (this.#app.findings?.list ?? []).filter((finding) => finding.at);
   }
@@ -78,9 +102,23 @@ export class SolidPanel {
     this.#solid.choose(marked.findIndex(({ id }) => id === this.#app.findings.current));
   }
 
+  /** Puts the plane at the layer, with a frame around what the picture shows of it. */
   #update() {
-    const { stack, layer } = this.#app.state.view;
-    if (this.#solid && stack === 0) this.#solid.setPlane(this.#places.top(layer), byId("cut").checked);
+    const { picture, state } = this.#app;
+    const { stack, layer } = state.view;
+    if (!this.#solid || byId("solid").hidden || stack !== 0) return;
+    const size = this.#app.size();
+    const { clientWidth, clientHeight } = picture.canvas;
+    const seen = [[0, 0], [clientWidth, clientHeight]].map((corner) =>
+      picture.fromScreen(corner).map((at, axis) => Math.max(0, Math.min(size[axis], at))),
+    );
+    const [[left, top], [right, bottom]] = seen;
+    const corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
+    this.#solid.setPlane(
+      this.#places.top(layer),
+      byId("cut").checked,
+      corners.map((at) => this.#places.point(at, layer)),
+    );
   }
 }
 
@@ -99,5 +137,15 @@ async function placesOf(columns) {
   const bottom = (layer) => (scaled ? columns.z_um[layer] / 1000 : layer);
   const thickness = (layer) => (scaled ? (columns.thickness_um[layer] ?? 0) / 1000 : 1);
   const top = (layer) => bottom(layer) + thickness(layer);
-  return { top, point: ([x, y], layer) => [left + x * wide, upper - y * high, top(layer)] };
+  return {
+    top,
+    point: ([x, y], layer) => [left + x * wide, upper - y * high, top(layer)],
+    pixelAt: ([x, y]) => [(x - left) / wide, (upper - y) / high],
+    /** The layer at a height: the first whose top is not below it. */
+    layerAt: (z) => {
+      const last = columns.index.length - 1;
+      const found = columns.index.findIndex((_, layer) => top(layer) >= z);
+      return found < 0 ? last : found;
+    },
+  };
 }

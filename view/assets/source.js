@@ -11,14 +11,17 @@ import { ask } from "./api.js";
  * @property {number} width in pixels
  * @property {number} height in pixels
  * @property {number} aspect the height of a pixel in widths
+ * @property {number} left where it begins in columns of the first sheet
+ * @property {number} top where it begins in rows of the first sheet
  */
 
 /**
  * Returns a name that tells sheets apart.
  * @param {Sheet} sheet
  */
-export function nameOf({ stack, layer, kind, threshold }) {
-  return `${stack}/${layer}/${kind}${threshold ? `?threshold=${threshold}` : ""}`;
+export function nameOf({ stack, layer, kind, threshold, left, top }) {
+  const place = left || top ? `@${left},${top}` : "";
+  return `${stack}/${layer}/${kind}${threshold ? `?threshold=${threshold}` : ""}${place}`;
 }
 
 /**

@@ -7,13 +7,14 @@
  * @property {[number, number] | null} centre column and row in the middle; null: the whole layer
  * @property {number | null} zoom screen pixels for the width of a pixel
  * @property {string[]} overlays
+ * @property {number | null} swipe where the second stack begins, as a share of the picture's width
  * @property {number | null} threshold gray levels from this one on are shown as cured
  */
 
 /** The view; `change` events name what changed. */
 export class State extends EventTarget {
   /** @type {View} */
-  view = { stack: 0, layer: 0, centre: null, zoom: null, overlays: [], threshold: null };
+  view = { stack: 0, layer: 0, centre: null, zoom: null, overlays: [], swipe: null, threshold: null };
 
   /** @param {Partial<View>} changes */
   set(changes) {
@@ -40,12 +41,13 @@ export class State extends EventTarget {
  * Returns a view as the part of an address after `#`.
  * @param {View} view
  */
-export function toHash({ stack, layer, centre, zoom, overlays, threshold }) {
+export function toHash({ stack, layer, centre, zoom, overlays, swipe, threshold }) {
   const parts = [`stack=${stack}`, `layer=${layer}`];
   if (centre && zoom) {
     parts.push(`at=${centre.map((at) => +at.toFixed(2)).join(",")}`, `zoom=${+zoom.toPrecision(5)}`);
   }
   if (overlays.length) parts.push(`overlays=${overlays.join(",")}`);
+  if (swipe) parts.push(`swipe=${+swipe.toFixed(3)}`);
   if (threshold) parts.push(`threshold=${threshold}`);
   return `#${parts.join("&")}`;
 }
@@ -67,15 +69,22 @@ export function fromHash(hash, session) {
   const zoom = Number(fields.get("zoom"));
   const placed = centre.length === 2 && centre.every(Number.isFinite) && zoom > 0 && zoom < 1e6;
   const known = new Set(session.overlays.map((overlay) => overlay.id));
+  const first = session.overlays.filter(({ on }) => on).map(({ id }) => id);
+  const named = (fields.get("overlays") ?? "").split(",").filter((id) => known.has(id));
   return {
     stack,
     layer: whole("layer", session.stacks[stack].layers - 1),
     centre: placed ? centre : null,
     zoom: placed ? zoom : null,
-    overlays: (fields.get("overlays") ?? "").split(",").filter((id) => known.has(id)),
+    // A link without overlays has none; an address without a view starts with those of faults.
+    overlays: fields.has("layer") ? named : first,
+    swipe: isSwipe(Number(fields.get("swipe")), session) ? Number(fields.get("swipe")) : null,
     threshold: whole("threshold", 255) || null,
   };
 }
+
+/** Whether a share of the width lets both of two stacks that can be compared be seen. */
+export const isSwipe = (share, session) => session.comparable && share >= 0.02 && share <= 0.98;
 
 /**
  * Keeps the page's address and the state alike.

@@ -2,20 +2,33 @@
 
 use crate::overlay::Overlay;
 
+/// The colors of copies. A search found these six: they are apart from each other, from black and
+/// white, and from findings and stray rows, which are seen on them, also for eyes that lack the
+/// cones for red, green or blue.
+pub(crate) const OF_COPIES: [[u8; 3]; 6] = [
+    [0x99, 0xbb, 0xdd],
+    [0xff, 0xdd, 0x33],
+    [0x99, 0x33, 0xdd],
+    [0x99, 0xff, 0xbb],
+    [0xbb, 0x99, 0x55],
+    [0xbb, 0x77, 0xff],
+];
+
 impl Overlay {
-    /// The overlay's color: red, green and blue.
+    /// The overlay's colors: red, green and blue of each.
     ///
-    /// A search among strong colors found these seven: they are far apart from each other, and
-    /// from black and white, also for eyes that lack the cones for red, green or blue.
-    pub fn colour(self) -> [u8; 3] {
+    /// A search among strong colors found the colors of all but copies: they are far apart from each
+    /// other, and from black and white, also for eyes that lack the cones for red, green or blue.
+    pub fn colours(self) -> &'static [[u8; 3]] {
         match self {
-            Self::Below => [0xaa, 0x99, 0xff],
-            Self::New => [0x33, 0x99, 0x00],
-            Self::Added => [0x88, 0xff, 0x11],
-            Self::Missing => [0x11, 0x33, 0xff],
-            Self::Fixed => [0x33, 0x55, 0x00],
-            Self::Stray => [0xff, 0x77, 0x99],
-            Self::Findings => [0x99, 0x00, 0x66],
+            Self::Below => &[[0xaa, 0x99, 0xff]],
+            Self::New => &[[0x33, 0x99, 0x00]],
+            Self::Added => &[[0x88, 0xff, 0x11]],
+            Self::Missing => &[[0x11, 0x33, 0xff]],
+            Self::Fixed => &[[0x33, 0x55, 0x00]],
+            Self::Stray => &[[0xff, 0x77, 0x99]],
+            Self::Copies => &OF_COPIES,
+            Self::Findings => &[[0x99, 0x00, 0x66]],
         }
     }
 }
@@ -119,18 +132,30 @@ mod tests {
         }
     }
 
-    /// A difference of 2 to 3 is just visible side by side.
-    #[test]
-    fn overlays_are_told_apart_in_colour_blindness() {
-        let mut colours: Vec<_> = Overlay::ALL.into_iter().map(Overlay::colour).collect();
-        colours.extend([[0; 3], [255; 3]]);
+    /// Checks that each two colors differ by more than `least`, for every eye. A difference of 2 to 3
+    /// is just visible side by side.
+    fn are_apart(colours: &[[u8; 3]], least: f64) {
         for eye in &EYES {
             for (index, &one) in colours.iter().enumerate() {
                 for &other in &colours[..index] {
                     let apart = difference(lab(one, eye), lab(other, eye));
-                    assert!(apart > 20.0, "{one:x?} and {other:x?} are {apart:.1} apart");
+                    assert!(apart > least, "{one:x?} and {other:x?} are {apart:.1} apart");
                 }
             }
         }
+    }
+
+    #[test]
+    fn overlays_are_told_apart_in_colour_blindness() {
+        let overlays = Overlay::ALL.into_iter().filter(|&overlay| overlay != Overlay::Copies);
+        let mut colours: Vec<_> = overlays.flat_map(Overlay::colours).copied().collect();
+        colours.extend([[0; 3], [255; 3]]);
+        are_apart(&colours, 20.0);
+    }
+
+    #[test]
+    fn copies_are_told_apart_in_colour_blindness() {
+        let faults = [Overlay::Stray, Overlay::Findings].map(Overlay::colours).concat();
+        are_apart(&[&OF_COPIES[..], &faults, &[[0; 3], [255; 3]]].concat(), 12.0);
     }
 }

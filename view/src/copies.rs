@@ -1,20 +1,24 @@
 //! Which copy of a build, and of which part, a pixel belongs to.
 
 use lamp_stack::{BuiltPart, Orientation, PageInfo};
+use serde_json::{Value, json};
+
+use crate::colours::OF_COPIES;
 
 /// A copy of a part on a build, as `tile` records it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Placed {
+pub(crate) struct Placed {
     part: String,
     /// Counted from 1 among the copies of the part.
     number: usize,
     /// The number of copies of the part.
     of: usize,
-    left: i64,
-    top: i64,
+    pub(crate) left: i64,
+    pub(crate) top: i64,
     /// The part's width and height before it was turned.
     size: [u32; 2],
     turn: Orientation,
+    pub(crate) colour: [u8; 3],
 }
 
 /// The copies of a build.
@@ -54,8 +58,36 @@ fn placed(built: &BuiltPart, name: &str) -> Vec<Placed> {
             top,
             size: built.part_pixels,
             turn: turn(index),
+            colour: OF_COPIES[0],
         })
         .collect()
+}
+
+/// Copies beyond so many take colors in turn: for each, all before it are looked at.
+const MOST_APART: usize = 4_096;
+
+/// Gives copies colors, so that copies of one color are far from each other.
+fn color(copies: &mut [Placed]) {
+    // Twice the middle, so that it is whole.
+    let middle = |copy: &Placed| {
+        let [width, height] = copy.turned_size();
+        [(copy.left, width), (copy.top, height)]
+            .map(|(start, length)| start as f64 * 2.0 + f64::from(length))
+    };
+    for at in 0..copies.len().min(MOST_APART) {
+        let [x, y] = middle(&copies[at]);
+        let nearest = OF_COPIES.map(|colour| {
+            let others = copies[..at].iter().filter(|other| other.colour == colour).map(middle);
+            others.map(|other| (x - other[0]).hypot(y - other[1])).fold(f64::INFINITY, f64::min)
+        });
+        // Of equal ones the first, so that the colors come in their order.
+        let farthest = (1..nearest.len())
+            .fold(0, |best, one| if nearest[one] > nearest[best] { one } else { best });
+        copies[at].colour = OF_COPIES[farthest];
+    }
+    for (at, copy) in copies.iter_mut().enumerate().skip(MOST_APART) {
+        copy.colour = OF_COPIES[at % OF_COPIES.len()];
+    }
 }
 
 impl Copies {
@@ -64,7 +96,23 @@ impl Copies {
     pub(crate) fn of(info: &PageInfo) -> Self {
         let Some(stack) = &info.stack else { return Self::default() };
         let parts = stack.built_parts().into_iter().flatten().flatten();
-        Self(parts.flat_map(|part| placed(&part, &stack.part)).collect())
+        let mut copies: Vec<Placed> = parts.flat_map(|part| placed(&part, &stack.part)).collect();
+        color(&mut copies);
+        Self(copies)
+    }
+
+    pub(crate) fn all(&self) -> &[Placed] {
+        &self.0
+    }
+
+    /// Returns the rectangle of each copy, and its name for people.
+    pub(crate) fn to_json(&self) -> Value {
+        let copy = |copy: &Placed| {
+            let ([width, height], Placed { left, top, number, .. }) = (copy.turned_size(), copy);
+            let ends = [left.saturating_add(width.into()), top.saturating_add(height.into())];
+            json!({"part": copy.part, "number": number, "box": [left, top, &ends[0], &ends[1]]})
+        };
+        self.0.iter().map(copy).collect()
     }
 
     /// Returns the copy whose rectangle holds a pixel.
@@ -74,9 +122,13 @@ impl Copies {
 }
 
 impl Placed {
+    /// Its width and height on the build.
+    pub(crate) fn turned_size(&self) -> [u32; 2] {
+        self.turn.size(self.size[0], self.size[1]).into()
+    }
+
     fn at(&self, x: u32, y: u32) -> Option<InCopy> {
-        let [width, height] = self.size;
-        let (across, down) = self.turn.size(width, height);
+        let [across, down] = self.turned_size();
         let inside = |at: u32, start: i64, size: u32| {
             // Places come from the text of pages, and may be any number.
             let at = u32::try_from(i64::from(at).checked_sub(start)?).ok()?;
@@ -129,6 +181,22 @@ mod tests {
             assert_eq!(copies.at(9, 20), None);
             assert_eq!(copies.at(10 + turned.width(), 20), None);
         }
+    }
+
+    #[test]
+    fn copies_beside_each_other_differ_in_color() {
+        let places: Vec<[i64; 2]> =
+            (0..5).flat_map(|row| (0..7).map(move |column| [10 * column, 12 * row])).collect();
+        let copies = copies(json!({"part_pixels": [8, 9], "copies": places}));
+        for (index, one) in copies.all().iter().enumerate() {
+            for other in &copies.all()[..index] {
+                let near = (one.left - other.left).abs() <= 10 && (one.top - other.top).abs() <= 12;
+                assert!(!near || one.colour != other.colour, "{one:?} {other:?}");
+            }
+        }
+        let many: Vec<[i64; 2]> = (0..20_000).map(|column| [column, i64::MAX - column]).collect();
+        let copies = super::tests::copies(json!({"part_pixels": [8, 9], "copies": many}));
+        assert_eq!(copies.all().len(), 20_000);
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub enum Overlay {
     Fixed,
     /// Rows that are stray.
     Stray,
+    /// Each copy of a build in a color of its own.
+    Copies,
     /// Pixels of findings.
     Findings,
 }
@@ -30,6 +32,7 @@ lamp_stack::named!(Overlay {
     Missing = "missing",
     Fixed = "fixed",
     Stray = "stray",
+    Copies = "copies",
     Findings = "findings",
 });
 
@@ -43,6 +46,7 @@ impl Overlay {
             Self::Missing => "Not in the second stack",
             Self::Fixed => "Rows that fix changed",
             Self::Stray => "Stray rows",
+            Self::Copies => "Copies",
             Self::Findings => "Findings",
         }
     }

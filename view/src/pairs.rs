@@ -21,7 +21,7 @@ pub(crate) struct Partner {
     pub(crate) stack: usize,
     pub(crate) layer: usize,
     /// Where its image begins, in columns and rows of the layer's image.
-    shift: [i64; 2],
+    pub(crate) shift: [i64; 2],
 }
 
 impl Partners {
@@ -54,10 +54,15 @@ impl Partners {
         of.map_or(&[], Vec::as_slice)
     }
 
-    /// Returns the other stack's layer in the middle of a layer.
-    pub(crate) fn middle(&self, stack: usize, layer: usize) -> Option<usize> {
+    /// Returns the other stack's layer in the middle of a layer of these stacks.
+    pub(crate) fn middle(
+        &self,
+        stacks: &[ViewedStack],
+        stack: usize,
+        layer: usize,
+    ) -> Option<Partner> {
         let sections = self.sections(stack, layer);
-        *sections.get(sections.len() / 2)?
+        partner_of(stacks, stack, layer, (*sections.get(sections.len() / 2)?)?)
     }
 
     /// Returns the layers of the other stack that belong to a layer of these stacks; `None` where
@@ -68,16 +73,19 @@ impl Partners {
         stack: usize,
         layer: usize,
     ) -> Vec<Option<Partner>> {
-        let header = |stack: usize, layer: usize| -> Option<&PageHeader> {
-            stacks.get(stack)?.headers().get(layer)
-        };
-        let partner = |other: usize| {
-            // Origins and sizes may change from layer to layer.
-            let shift = shift_between(header(stack, layer)?, header(1 - stack, other)?).ok()?;
-            Some(Partner { stack: 1 - stack, layer: other, shift })
-        };
+        let partner = |other: usize| partner_of(stacks, stack, layer, other);
         self.sections(stack, layer).iter().map(|other| other.and_then(partner)).collect()
     }
+}
+
+/// Returns a layer of the other of the first two stacks, with its place in a layer.
+fn partner_of(stacks: &[ViewedStack], stack: usize, layer: usize, other: usize) -> Option<Partner> {
+    let header = |stack: usize, layer: usize| -> Option<&PageHeader> {
+        stacks.get(stack)?.headers().get(layer)
+    };
+    // Origins and sizes may change from layer to layer.
+    let shift = shift_between(header(stack, layer)?, header(1 - stack, other)?).ok()?;
+    Some(Partner { stack: 1 - stack, layer: other, shift })
 }
 
 impl Partner {

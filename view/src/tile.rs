@@ -6,6 +6,8 @@ use std::ops::Range;
 
 use lamp_stack::{Image, mean_levels};
 
+use crate::copies::Copies;
+
 /// The width and height of a tile in pixels; at the right and lower border tiles have fewer.
 pub(crate) const TILE_SIDE: u32 = 512;
 
@@ -37,23 +39,63 @@ impl TileAt {
 }
 
 /// How a tile's levels become colors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Inks {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Inks<'a> {
     /// Levels are shades of gray.
     Gray,
     /// Levels are the opacity of one color.
     One([u8; 3]),
+    /// Levels are the opacity of the color of the copy in whose rectangle the pixel's middle is;
+    /// beside copies, nothing is drawn.
+    Each(&'a Copies),
 }
 
 /// Draws a tile of an image, if there is one at that place.
-pub(crate) fn tile(image: &Image, at: TileAt, inks: Inks) -> Option<Vec<u8>> {
+pub(crate) fn tile(image: &Image, at: TileAt, inks: Inks<'_>) -> Option<Vec<u8>> {
     let (side, [columns, rows]) = at.on([image.width(), image.height()])?;
     let size = [columns.len(), rows.len()].map(|pixels| pixels.div_ceil(side.get() as usize));
+    let start = [columns.start, rows.start];
     let levels: Vec<u8> = mean_levels(image, columns, rows, side).flatten().collect();
-    Some(png(size.map(|pixels| pixels as u32), &levels, inks).expect("memory takes any bytes"))
+    let pixels = match inks {
+        Inks::Gray | Inks::One(_) => levels,
+        Inks::Each(copies) => colored(copies, &levels, size, start, side),
+    };
+    Some(png(size.map(|pixels| pixels as u32), &pixels, inks).expect("memory takes any bytes"))
 }
 
-fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u8>> {
+/// Returns red, green, blue and opacity of each pixel of a tile that begins at a column and a row.
+fn colored(
+    copies: &Copies,
+    levels: &[u8],
+    size: [usize; 2],
+    start: [u32; 2],
+    side: NonZeroU32,
+) -> Vec<u8> {
+    let mut pixels = vec![0; 4 * levels.len()];
+    // The pixels of a tile whose middle is in a range of columns or rows.
+    let within = |axis: usize, from: i64, length: u32| {
+        let (half, side) = (i64::from(side.get() / 2), i64::from(side.get()));
+        let first = |at: i64| {
+            let pixel = at.saturating_sub(half).saturating_sub(i64::from(start[axis]));
+            (pixel.saturating_add(side - 1).max(0) / side).min(size[axis] as i64) as usize
+        };
+        first(from)..first(from.saturating_add(length.into()))
+    };
+    // The first copy that holds a pixel names it, so it comes last.
+    for copy in copies.all().iter().rev() {
+        let [width, height] = copy.turned_size();
+        let columns = within(0, copy.left, width);
+        for row in within(1, copy.top, height) {
+            for at in columns.clone().map(|column| row * size[0] + column) {
+                pixels[4 * at..4 * at + 3].copy_from_slice(&copy.colour);
+                pixels[4 * at + 3] = levels[at];
+            }
+        }
+    }
+    pixels
+}
+
+fn png([width, height]: [u32; 2], pixels: &[u8], inks: Inks<'_>) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_depth(png::BitDepth::Eight);
@@ -67,8 +109,9 @@ fn png([width, height]: [u32; 2], levels: &[u8], inks: Inks) -> io::Result<Vec<u
             encoder.set_palette(colour.repeat(256));
             encoder.set_trns((0..=255).collect::<Vec<u8>>());
         }
+        Inks::Each(_) => encoder.set_color(png::ColorType::Rgba),
     }
-    encoder.write_header()?.write_image_data(levels)?;
+    encoder.write_header()?.write_image_data(pixels)?;
     Ok(file)
 }
 
@@ -111,6 +154,35 @@ mod tests {
         assert_eq!(drawn, (2, 2, vec![1, 2, 3, 255, 1, 2, 3, 0, 1, 2, 3, 255, 1, 2, 3, 255]));
         assert_eq!(pixels(&tile(&image, at(1), Inks::Gray).unwrap()), (1, 1, vec![191]));
     }
+    /// The color of each pixel is the color of the first copy whose rectangle has its middle.
+    #[test]
+    fn tiles_have_the_colors_of_copies() {
+        let tile_record = serde_json::json!({
+            "part_pixels": [300, 500],
+            "copies": [[-40, 7], [290, -100], [700, 650], [561, 0]],
+            "turns": ["0", "90", "0", "0"],
+        });
+        let other = [("tile".to_owned(), tile_record)].into_iter().collect();
+        let stack = lamp_stack::StackInfo { other, ..lamp_stack::StackInfo::default() };
+        let info = lamp_stack::PageInfo { stack: Some(stack), ..lamp_stack::PageInfo::default() };
+        let copies = Copies::of(&info);
+        let image = Image::Mask(Mask::black(1100, 900).inverted());
+        for (reduction, x, y) in [(0, 0, 0), (0, 1, 1), (0, 2, 0), (1, 0, 0), (3, 0, 0), (9, 0, 0)]
+        {
+            let drawn =
+                pixels(&tile(&image, TileAt { reduction, x, y }, Inks::Each(&copies)).unwrap());
+            let side = 1u32 << reduction;
+            for (at, pixel) in (0..).zip(drawn.2.chunks_exact(4)) {
+                let middle = |tile: u32, pixel: u32| (tile * TILE_SIDE + pixel) * side + side / 2;
+                let [column, row] = [middle(x, at % drawn.0), middle(y, at / drawn.0)];
+                let wanted =
+                    copies.at(column, row).map(|copy| copies.all()[copy.number - 1].colour);
+                let wanted = wanted.map_or([0; 4], |[r, g, b]| [r, g, b, 255]);
+                assert_eq!(pixel, wanted, "{column} {row} at {reduction}");
+            }
+        }
+    }
+
     /// Gray images of any size up to two and a half tiles, of long runs and of short ones.
     fn images() -> impl Strategy<Value = Image> {
         let side = || prop_oneof![1u32..40, 480..1300u32];

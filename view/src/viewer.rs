@@ -129,9 +129,14 @@ impl Viewer {
             .into_iter()
             .filter(|overlay| self.has(*overlay))
             .map(|overlay| {
-                let [red, green, blue] = overlay.colour();
-                let colour = format!("#{red:02x}{green:02x}{blue:02x}");
-                json!({"id": overlay.name(), "label": overlay.label(), "color": colour})
+                let colours = overlay.colours().iter();
+                let colours: Vec<String> = colours
+                    .map(|[red, green, blue]| format!("#{red:02x}{green:02x}{blue:02x}"))
+                    .collect();
+                // Who asks for findings wants to see at once where they are.
+                let faults = matches!(overlay, Overlay::Stray | Overlay::Findings);
+                let on = faults && self.findings.is_wanted();
+                json!({"id": overlay.name(), "label": overlay.label(), "colors": colours, "on": on})
             })
             .collect();
         json!({
@@ -139,6 +144,7 @@ impl Viewer {
             "tile": TILE_SIDE,
             "stacks": self.stacks.iter().map(ViewedStack::summary).collect::<Vec<_>>(),
             "overlays": overlays,
+            "comparable": self.partners.are_comparable(),
             "findings": self.findings.is_wanted(),
         })
     }
@@ -152,6 +158,7 @@ impl Viewer {
             Overlay::Added | Overlay::Missing => self.partners.are_comparable(),
             Overlay::Fixed => any(&|header| header.info.has_record::<FixRecord>()),
             Overlay::Stray => any(&|header| !header.info.stray_rows.is_empty()),
+            Overlay::Copies => self.stacks.iter().any(|stack| !stack.copies.all().is_empty()),
             Overlay::Findings => self.findings.is_wanted(),
         }
     }
@@ -162,9 +169,20 @@ impl Viewer {
 
     /// Returns what is known of a layer without its image.
     pub(crate) fn layer(&self, stack: usize, layer: usize) -> Result<Value, ViewError> {
-        let mut facts = self.stack(stack)?.layer(layer)?;
-        facts["partner"] = self.partners.middle(stack, layer).into();
-        Ok(facts)
+        self.stack(stack)?.layer(layer)
+    }
+
+    /// Returns the facts of all layers of a stack, as columns.
+    pub(crate) fn layers(&self, stack: usize) -> Result<Value, ViewError> {
+        let of = self.stack(stack)?;
+        let partner = |layer: usize| self.partners.middle(&self.stacks, stack, layer);
+        let partners: Vec<_> = (0..of.headers().len()).map(partner).collect();
+        let mut columns = of.layers();
+        columns["partner"] =
+            partners.iter().map(|partner| partner.as_ref().map(|partner| partner.layer)).collect();
+        columns["shift"] =
+            partners.iter().map(|partner| partner.as_ref().map(|partner| partner.shift)).collect();
+        Ok(columns)
     }
 
     /// Draws a tile.
@@ -182,7 +200,8 @@ impl Viewer {
         let image = self.image(stack, layer, kind, given_up)?;
         given_up.check()?;
         let inks = match kind {
-            ImageKind::Over(overlay) => Inks::One(overlay.colour()),
+            ImageKind::Over(Overlay::Copies) => Inks::Each(&self.stacks[stack].copies),
+            ImageKind::Over(overlay) => Inks::One(overlay.colours()[0]),
             ImageKind::Layer | ImageKind::Cured(_) => Inks::Gray,
         };
         tile(&image, at, inks).ok_or(ViewError::NoSuch("tile"))
@@ -261,6 +280,12 @@ impl Viewer {
             Overlay::Stray => {
                 DrawingSource::Rows { bands: bands(&header.info.stray_rows), size: header.size }
             }
+            // All white of the layer: the tile has the colors.
+            Overlay::Copies => DrawingSource::Differs {
+                layer: image(stack, layer)?,
+                others: vec![None],
+                in_layer: true,
+            },
             Overlay::Findings => {
                 let of_layer = |found: &Vec<Finding>| {
                     found.iter().filter(|found| stack == 0 && found.is_in(layer)).cloned().collect()

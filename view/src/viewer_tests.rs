@@ -96,7 +96,8 @@ fn a_thick_layer_differs_where_any_thin_one_does() {
     is(0, 0, Overlay::Missing, &[1, 4]);
     is(1, 0, Overlay::Added, &[4, 5]);
     is(1, 1, Overlay::Missing, &[1, 2]);
-    assert_eq!(viewer.layer(0, 0).unwrap()["partner"], json!(1));
+    let layers = viewer.layers(0).unwrap();
+    assert_eq!((&layers["partner"], &layers["shift"]), (&json!([1]), &json!([[0, 0]])));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 mod browser;
 
-use lamp_stack::{Image, Layer, Mask, MaskBuilder, PageInfo, Pitch};
+use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_tests::{Scratch, Viewing, mask};
 use serde_json::{Value, json};
 
@@ -11,9 +11,11 @@ use browser::Browser;
 
 const WINDOW: [u32; 2] = [1400, 900];
 /// The tower's layers fit into it, each pixel 4 screen pixels wide.
-const LARGE: [u32; 2] = [1800, 1500];
+const LARGE: [u32; 2] = [1900, 1500];
 const UP: char = '\u{e013}';
 const END: char = '\u{e010}';
+const HOME: char = '\u{e011}';
+const ESCAPE: char = '\u{e00c}';
 const TAB: char = '\u{e004}';
 
 const BLACK: [u8; 3] = [0; 3];
@@ -58,6 +60,9 @@ fn the_demo_build_is_seen_to_the_pixel() {
     let viewing = Viewing::unopened(&scratch, "lamp-demo/alpha.tif --check", &[]);
     let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
     let layers = scratch.layers("lamp-demo/alpha.tif");
+    // Findings were asked for, so they are shown from the start.
+    browser.shows(&["0/0/layer", "0/0/findings"]);
+    browser.press('o');
     browser.shows(&["0/0/layer"]);
 
     // Zoomed in by keys from where pixels are smaller than the screen's, they are squares.
@@ -119,26 +124,25 @@ fn the_private_file_leads_to_the_page() {
 }
 
 fn follow_a_finding(browser: &Browser) {
-    browser.wait_for("document.querySelector('#findings-list button')");
-    let list = "document.querySelectorAll('#findings-list button')";
+    browser.wait_for("document.querySelector('#findings-list td')");
     // The first has a place; white at the border, the last, has none.
-    browser.run(&format!("{list}[0].click()"), vec![]);
-    let line = browser.run(&format!("return {list}[0].textContent"), vec![]);
+    browser.run("document.querySelector('#findings-list td').click()", vec![]);
+    let layers = browser
+        .run("return document.querySelector('#findings-list tr td + td').textContent", vec![]);
     browser.settle();
     let layer = browser.text("#layer-facts");
     let number = layer.lines().nth(1).unwrap();
-    let mut words =
-        line.as_str().unwrap().split([' ', ',']).skip_while(|word| !word.starts_with("layer"));
-    assert_eq!(words.nth(1), Some(number), "{line}");
+    assert_eq!(layers.as_str().unwrap().split('–').next(), Some(number), "{layers}");
     let place = browser.place();
-    assert_eq!(place["overlays"], "findings");
+    assert_eq!(place["overlays"], "findings", "a row switches them on again");
     let marked = "return document.querySelector('#marks path.under').getAttribute('d').length";
     assert!(browser.run(marked, vec![]).as_u64() > Some(10), "a rectangle is around it");
 }
 
-/// Opens the panel of the part, which must draw more than its ground.
+/// Shows the part beside the layer, where it must draw more than its ground. A click on it goes to
+/// the layer and the place that are seen there.
 fn see_the_part(browser: &Browser) {
-    browser.run("document.querySelector('#solid').open = true", vec![]);
+    browser.press('3');
     browser.wait_for("document.querySelector('#solid-view canvas')");
     browser.settle();
     let script = "const canvas = document.querySelector('#solid-view canvas');
@@ -154,6 +158,18 @@ fn see_the_part(browser: &Browser) {
         return seen.size;";
     let colours = browser.run(script, vec![]);
     assert!(colours.as_u64() > Some(50), "shades of the part: {colours}");
+    let before = browser.place();
+    browser.click("#solid-view canvas");
+    browser.wait_for("document.querySelector('#pixel').textContent.includes('Column')");
+    browser.settle();
+    let after = browser.place();
+    assert_ne!((&before["layer"], &before["at"]), (&after["layer"], &after["at"]));
+    let pixel = browser.text("#pixel");
+    let at = pixel.lines().nth(1).unwrap().split(", ").map(|at| at.parse::<f64>().unwrap());
+    let middle = after["at"].as_str().unwrap().split(',').map(|at| at.parse::<f64>().unwrap());
+    for (pixel, middle) in at.zip(middle) {
+        assert!((pixel..=pixel + 1.0).contains(&middle), "{pixel} is in the middle, {middle}");
+    }
 }
 
 /// The demo's blade is whole, so overlays of rows are seen on a tower with defects.
@@ -195,53 +211,270 @@ fn overlays_cover_the_pixels_that_they_tell_of() {
     browser.was_quiet();
 }
 
-/// After each control that takes keys, each kind of key does what it says.
+/// After each control that is used by mouse, and after each field that ends with Enter or Escape, each
+/// kind of key does what it says.
 #[test]
-fn keys_work_after_fields_and_lists() {
-    let scratch = Scratch::with_tower_and_torus();
-    let viewing = Viewing::unopened(&scratch, "tower.tif torus.tif", &[]);
-    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
-    browser.shows(&["0/0/layer"]);
-    let by_field = |browser: &Browser| {
-        browser.press('g');
-        browser.type_where_the_focus_is("7\u{e007}");
+fn keys_work_after_each_control() {
+    let scratch = Scratch::new();
+    scratch.stack("gray.tif", faulty(2_000).map(grayed));
+    scratch.stack("again.tif", faulty(2_000).skip(1));
+    let viewing = Viewing::unopened(&scratch, "gray.tif again.tif --check", &[]);
+    let Some(browser) = Browser::open(&viewing, LARGE) else { return };
+    browser.wait_for("document.querySelector('#findings-list td')");
+    // The picture is offered as a file, which would land beside the test.
+    browser.run("HTMLAnchorElement.prototype.click = () => {};", vec![]);
+    browser.click("#beside");
+    browser.wait_for("document.querySelector('#solid-view canvas')");
+    let typed = |keys: &'static str| {
+        move |browser: &Browser| {
+            browser.press('g');
+            browser.type_where_the_focus_is(keys);
+        }
     };
-    let given_up = |browser: &Browser| {
-        browser.press('g');
-        browser.type_where_the_focus_is("999\u{e00c}");
-    };
-    type Control<'a> = (&'a str, &'a dyn Fn(&Browser));
-    let controls: [Control; 3] = [
-        ("the field and Enter", &by_field),
-        ("the field and Escape", &given_up),
-        ("a choice from the list", &|browser| browser.click("#stack option:last-child")),
+    type Control = Box<dyn Fn(&Browser)>;
+    let mut controls: Vec<(String, Control)> = vec![
+        ("the field and Enter".to_owned(), Box::new(typed("4\u{e007}"))),
+        ("the field and Escape".to_owned(), Box::new(typed("999\u{e00c}"))),
     ];
-    let number = |key: &str| browser.place()[key].as_str().unwrap().parse::<f64>().unwrap();
+    controls.push((
+        "a finding".to_owned(),
+        Box::new(|browser| browser.click("#findings-list td button")),
+    ));
+    // A field takes keys until it gets Enter.
+    for field in ["#threshold", "#filter-from", "#filter-size"] {
+        controls.push((field.to_owned(), Box::new(move |browser| browser.type_into(field, "1"))));
+    }
+    // All others that there are are clicked: buttons, boxes, sliders, lists, rows, the part.
+    let clicked = browser.run(
+        "const one = (element) => element.id ? `#${element.id}` :
+           element.ariaLabel ? `${element.localName}[aria-label='${element.ariaLabel}']` :
+           element.title ? `${element.localName}[title='${element.title}']` : null;
+         return [...document.querySelectorAll('button, select, input, #solid-view canvas, #findings-list td')]
+           .filter((element) => element.checkVisibility() && !element.closest('.navigator, dialog'))
+           .filter((element) => !['number', 'text'].includes(element.type))
+           .map((element) => element.localName === 'select' ? `${one(element)} option:last-child` : one(element))
+           .filter((selector) => selector && selector !== '#keys');",
+        vec![],
+    );
+    let clicked: Vec<String> = serde_json::from_value(clicked).unwrap();
+    for known in ["#play", "#slider", "#overlay-new", "#cut", "#speed option:last-child", "#whole"]
+    {
+        assert!(clicked.iter().any(|selector| selector == known), "{known} in {clicked:?}");
+    }
+    for selector in clicked {
+        let control = selector.clone();
+        controls.push((selector, Box::new(move |browser| browser.click(&control))));
+    }
+    let dialog = |browser: &Browser| {
+        browser.click("#keys");
+        browser.click("#help button");
+    };
+    controls.push(("the dialog of keys".to_owned(), Box::new(dialog)));
+    let layer = || browser.run("return document.querySelector('#slider').value", vec![]);
+    let is_pressed = |id: &str| {
+        let script = format!("return document.querySelector('#{id}').ariaPressed === 'true'");
+        browser.run(&script, vec![]).as_bool().unwrap()
+    };
+    let overlays = || {
+        let script = "return document.querySelectorAll('#overlays input:checked').length > 0";
+        browser.run(script, vec![]).as_bool().unwrap()
+    };
     for (name, control) in controls {
         browser.go("#stack=0&layer=3&at=20.5,20.5&zoom=4");
+        // Where no GPU draws the part, it takes its time: it is shown where it is needed.
+        let wanted = ["#cut", "canvas"].iter().any(|part| name.contains(part));
+        browser.run("if (solid.hidden === arguments[0]) beside.click()", vec![json!(wanted)]);
         control(&browser);
-        browser.settle();
-        if name == "the field and Enter" {
-            assert_eq!(number("layer"), 7.0);
+        if is_pressed("play") {
+            browser.press(' ');
+            assert!(!is_pressed("play"), "Space after {name}");
         }
-        let before = [number("layer"), number("zoom")];
-        browser.press('+');
-        browser.settle();
-        let near = number("zoom");
-        assert!(near > before[1], "+ after {name}");
-        browser.press('-');
-        browser.settle();
-        assert!(number("zoom") < near, "- after {name}");
+        if name == "the field and Enter" {
+            assert_eq!(layer(), "4");
+        }
+        browser.press(HOME);
+        assert_eq!(layer(), "0", "Home after {name}");
         browser.press(UP);
+        assert_eq!(layer(), "1", "an arrow after {name}");
+        // The six layers must not come to their end between two keys.
+        browser.run("speed.value = 1", vec![]);
+        for key in ['1', '+', '+', '-'] {
+            browser.press(key);
+        }
         browser.settle();
-        assert_eq!(number("layer"), before[0] + 1.0, "an arrow after {name}");
-        for open in [true, false] {
-            browser.press('m');
-            let pressed =
-                browser.run("return document.querySelector('#measure').ariaPressed", vec![]);
-            assert_eq!(pressed, json!(open.to_string()), "m after {name}");
+        let zoom: f64 = browser.place()["zoom"].as_str().unwrap().parse().unwrap();
+        assert!((zoom - 1.5).abs() < 0.01, "1, +, + and - after {name}: {zoom}");
+        for (key, id) in [('m', "measure"), ('s', "compare"), (' ', "play")] {
+            let before = is_pressed(id);
+            for wanted in [!before, before] {
+                browser.press(key);
+                assert_eq!(is_pressed(id), wanted, "{key:?} after {name}");
+            }
+        }
+        let before = overlays();
+        browser.press('o');
+        assert_eq!(overlays(), !before, "o after {name}");
+        browser.press('?');
+        browser.wait_for("document.querySelector('#help').open");
+        browser.press(ESCAPE);
+        browser.wait_for("!document.querySelector('#help').open");
+    }
+    browser.was_quiet();
+}
+
+/// Layers follow each other up to the highest one, and none is left out.
+#[test]
+fn layers_are_played_one_after_the_other() {
+    let scratch = Scratch::with_tower_and_torus();
+    let viewing = Viewing::unopened(&scratch, "torus.tif", &[]);
+    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    let last = scratch.layers("torus.tif").len() - 1;
+    browser.run(
+        "const canvas = document.querySelector('#sheets > * > .openseadragon-canvas');
+         window.shown = [];
+         new MutationObserver(() => shown.push(canvas.dataset.shown))
+           .observe(canvas, { attributeFilter: ['data-shown'] });",
+        vec![],
+    );
+    browser.go("#stack=0&layer=2&at=20.5,20.5&zoom=4");
+    browser.press('.');
+    browser.press(' ');
+    browser.wait_for(&format!("shown.includes('0/{last}/layer')"));
+    browser.wait_for("document.querySelector('#play').ariaPressed === 'false'");
+    let shown: Vec<String> = serde_json::from_value(browser.run("return shown", vec![])).unwrap();
+    let wanted: Vec<String> = (2..=last).map(|layer| format!("0/{layer}/layer")).collect();
+    assert_eq!(shown, wanted);
+    assert_eq!(browser.run("return document.querySelector('#speed').value", vec![]), json!("20"));
+    // From the highest one, it starts at the bottom again.
+    browser.press(' ');
+    browser.wait_for("shown.includes('0/1/layer')");
+    browser.press(' ');
+    browser.was_quiet();
+}
+
+/// On the left of the border the canvas has the first stack, on the right the second.
+#[test]
+fn two_stacks_are_seen_on_both_sides_of_a_border() {
+    let scratch = Scratch::new();
+    // The second begins 3 columns further right and 2 rows further down, and is smaller.
+    let layer = |origin_mm, size: [u32; 2], every: u32| Layer {
+        info: PageInfo {
+            z_um: Some(0.0),
+            thickness_um: Some(100.0),
+            origin_mm: Some(origin_mm),
+            ..PageInfo::default()
+        },
+        pitch: Pitch::of_dpi(254.0),
+        image: Image::Mask(stripes(size, every)).into(),
+    };
+    let (first, second) = (layer([0.0, 6.0], [90, 60], 5), layer([0.3, 5.8], [80, 50], 3));
+    scratch.stack("a.tif", [first.clone()]);
+    scratch.stack("b.tif", [second.clone()]);
+    let viewing = Viewing::unopened(&scratch, "a.tif b.tif", &[]);
+    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    let pixels: Vec<[u32; 2]> = (0..60).flat_map(|y| (0..90).map(move |x| [x, y])).collect();
+    for (share, stack) in [(0.5, 0), (0.35, 1)] {
+        browser.go(&format!("#stack={stack}&layer=0&at=45,30&zoom=12&swipe={share}"));
+        let sheets = match stack {
+            0 => ["0/0/layer", "1/0/layer@3,2"],
+            _ => ["1/0/layer", "0/0/layer@-3,-2"],
+        };
+        browser.shows(&sheets);
+        let width = browser.run("return document.querySelector('#picture').clientWidth", vec![]);
+        let border = 45.0 + (share - 0.5) * width.as_f64().unwrap() / 12.0;
+        let mut sides = [0; 2];
+        for (&[x, y], colour) in pixels.iter().zip(browser.colours(&pixels)) {
+            // The pixel that the border cuts may be of either, and some are beside the screen.
+            let Some(colour) = colour.filter(|_| (f64::from(x) + 0.5 - border).abs() > 1.0) else {
+                continue;
+            };
+            let side = usize::from(f64::from(x) > border);
+            // The shown stack's pixels are where they are; the other's begin 3 and 2 further or less far.
+            let by = match (stack, side) {
+                (0, 1) => [-3, -2],
+                (1, 0) => [3, 2],
+                _ => [0, 0],
+            };
+            let of = [&first, &second][side];
+            let at =
+                moved([x, y], by).filter(|&[x, y]| x < of.image.width() && y < of.image.height());
+            let Some(at) = at else { continue };
+            sides[side] += 1;
+            let wanted = if white(of, at) { WHITE } else { BLACK };
+            assert_eq!(
+                colour,
+                wanted,
+                "{x} {y} with the border at {border}, stack {stack}, {}",
+                browser.place()
+            );
+        }
+        assert!(sides.iter().all(|&seen| seen > 500), "{sides:?}");
+    }
+    browser.press('s');
+    browser.shows(&["1/0/layer"]);
+    browser.was_quiet();
+}
+
+/// Returns a pixel that is moved, if it is in the image still.
+fn moved(at: [u32; 2], by: [i32; 2]) -> Option<[u32; 2]> {
+    Some([at[0].checked_add_signed(by[0])?, at[1].checked_add_signed(by[1])?])
+}
+
+/// Columns are black and white in turn, each so wide; the rows at the border are black.
+fn stripes([width, height]: [u32; 2], every: u32) -> Mask {
+    let mut mask = MaskBuilder::new(width);
+    let columns: Vec<u32> =
+        (1..).map(|stripe| stripe * every).take_while(|&at| at < width).collect();
+    for row in 0..height {
+        let inside = row > 3 && row + 3 < height;
+        mask.push_row(if inside { &columns } else { &[] }).unwrap();
+    }
+    mask.finish()
+}
+
+/// Each copy of a build has a color of its own, and its number; the mesh beside has none.
+#[test]
+fn copies_have_colors() {
+    let scratch = Scratch::with_tower_and_torus();
+    scratch.run("slice torus.stl --dpi 50 --thickness 1mm -o small.tif").succeeds();
+    scratch.run("tile small.tif --area 135x135mm --copies 4 --mesh none -o build.tif").succeeds();
+    let layers = scratch.layers("build.tif");
+    let viewing = Viewing::unopened(&scratch, "build.tif", &[]);
+    let Some(browser) = Browser::open(&viewing, LARGE) else { return };
+    let layer = &layers[layers.len() / 2];
+    let [width, height] = [layer.image.width(), layer.image.height()];
+    let position = layers.len() / 2;
+    browser.go(&format!(
+        "#stack=0&layer={position}&at={},{}&zoom=5",
+        f64::from(width) / 2.0,
+        f64::from(height) / 2.0
+    ));
+    browser.click("#overlay-copies");
+    browser.shows(&[&format!("0/{position}/layer"), &format!("0/{position}/copies")]);
+    let info = layers[0].info.stack.clone().unwrap();
+    let built = info.built_parts().unwrap().next().unwrap().unwrap();
+    let pixels: Vec<_> = (0..height).flat_map(|y| (0..width).map(move |x| [x, y])).collect();
+    let mut colours: Vec<Vec<[u8; 3]>> = vec![Vec::new(); built.copies.len()];
+    for (&[x, y], colour) in pixels.iter().zip(browser.colours(&pixels)) {
+        // The border of the layer, which is black, may be beside the screen.
+        let Some(colour) = colour else { continue };
+        let holds = |&[left, top]: &[i64; 2]| {
+            (left..left + i64::from(built.part_pixels[0])).contains(&x.into())
+                && (top..top + i64::from(built.part_pixels[1])).contains(&y.into())
+        };
+        match built.copies.iter().position(holds) {
+            Some(copy) if white(layer, [x, y]) => colours[copy].push(colour),
+            _ => assert_eq!(colour, if white(layer, [x, y]) { WHITE } else { BLACK }, "{x} {y}"),
         }
     }
+    let firsts: std::collections::BTreeSet<[u8; 3]> = colours.iter().map(|of| of[0]).collect();
+    assert_eq!(firsts.len(), 4, "four copies have four colors");
+    for of in &colours {
+        assert!(of.len() > 50 && of.iter().all(|colour| colour == &of[0] && *colour != WHITE));
+    }
+    let numbers =
+        "return [...document.querySelectorAll('#marks text')].map((one) => one.textContent)";
+    assert_eq!(browser.run(numbers, vec![]), json!(["1", "2", "3", "4"]));
     browser.was_quiet();
 }
 
@@ -255,21 +488,10 @@ fn bands(json: &Value) -> Vec<std::ops::Range<u32>> {
 #[test]
 fn an_island_is_coloured_and_all_is_reached_by_keys() {
     let scratch = Scratch::new();
-    let layer = |index: u32| Layer {
-        info: PageInfo {
-            index,
-            z_um: Some(100.0 * f64::from(index)),
-            thickness_um: Some(100.0),
-            origin_mm: Some([0.0, 0.0]),
-            ..PageInfo::default()
-        },
-        pitch: Pitch::of_dpi(300.0),
-        image: Image::Mask(block_and_island(index == 1)).into(),
-    };
-    scratch.stack("island.tif", (0..3).map(layer));
+    scratch.stack("island.tif", faulty(40).take(3));
     let viewing = Viewing::unopened(&scratch, "island.tif --check", &[]);
     let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
-    browser.wait_for("document.querySelector('#findings-list button')");
+    browser.wait_for("document.querySelector('#findings-list td')");
     browser.press('n');
     browser.shows(&["0/1/layer", "0/1/findings"]);
     browser.press('0');
@@ -281,11 +503,116 @@ fn an_island_is_coloured_and_all_is_reached_by_keys() {
     browser.was_quiet();
 }
 
-fn block_and_island(island: bool) -> Mask {
-    let mut mask = MaskBuilder::new(40);
+/// The table has the findings that its filters leave, in the order of a column.
+#[test]
+fn findings_are_filtered_and_sorted() {
+    let scratch = Scratch::new();
+    scratch.stack("faulty.tif", faulty(40));
+    let viewing = Viewing::unopened(&scratch, "faulty.tif --check", &[]);
+    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    browser.wait_for("document.querySelector('#findings-list td')");
+    filter_findings(&browser);
+    browser.was_quiet();
+}
+
+fn filter_findings(browser: &Browser) {
+    let all = rows(browser);
+    let kinds: Vec<&String> = all.iter().map(|row| &row[0]).collect();
+    let islands: Vec<&Vec<String>> = all.iter().filter(|row| row[0] == "island").collect();
+    let island = |layer: &str, size: &str| ["island", layer, size].map(str::to_owned).to_vec();
+    let [small, large] = [island("1", "0.423 mm"), island("3", "1.016 mm")];
+    assert!(
+        islands.len() == 2 && islands.contains(&&small) && islands.contains(&&large),
+        "{all:?}"
+    );
+    assert!(all.len() > 2, "{all:?}");
+    browser.run(
+        "const kind = document.querySelector('#filter-kind');
+         kind.value = 'island';
+         kind.dispatchEvent(new Event('input', { bubbles: true }));",
+        vec![],
+    );
+    assert_eq!(rows(browser).iter().collect::<Vec<_>>(), islands);
+    assert!(browser.text("#findings-state").starts_with(&format!("2 of {}", all.len())));
+    browser.click("#findings-filters [type=reset]");
+    browser.wait_for(&format!(
+        "document.querySelectorAll('#findings-list tbody').length === {}",
+        all.len()
+    ));
+    browser.type_into("#filter-from", "2");
+    let left = rows(browser);
+    assert!(left.contains(&large) && !left.contains(&small), "{left:?}");
+    browser.click("#findings-filters [type=reset]");
+    browser.wait_for(&format!(
+        "document.querySelectorAll('#findings-list tbody').length === {}",
+        all.len()
+    ));
+    browser.type_into("#filter-size", "0.5");
+    let left = rows(browser);
+    assert!(left.contains(&large) && !left.contains(&small), "{left:?}");
+    browser.click("#findings-filters [type=reset]");
+    browser.wait_for(&format!(
+        "document.querySelectorAll('#findings-list tbody').length === {}",
+        all.len()
+    ));
+    let mut sorted = kinds.clone();
+    sorted.sort();
+    let by_kind = || rows(browser).into_iter().map(|row| row[0].clone()).collect::<Vec<_>>();
+    browser.click("[data-by=kind] button");
+    assert_eq!(by_kind().iter().collect::<Vec<_>>(), sorted);
+    browser.click("[data-by=kind] button");
+    sorted.reverse();
+    assert_eq!(by_kind().iter().collect::<Vec<_>>(), sorted);
+    browser.click("[data-by=kind] button");
+    assert_eq!(rows(browser), all, "the worst first again");
+}
+
+/// The table of findings: kind, layers and size of each.
+fn rows(browser: &Browser) -> Vec<Vec<String>> {
+    let script = "return [...document.querySelectorAll('#findings-list tbody')].map((rows) =>
+        [...rows.rows[0].cells].map((cell) => cell.textContent))";
+    serde_json::from_value(browser.run(script, vec![])).unwrap()
+}
+
+/// Six layers of a block in images so wide, with islands of 5 x 4 pixels in layer 1 and of 12 x 9 pixels in layer 3, and
+/// with white at the border of layer 5.
+fn faulty(width: u32) -> impl Iterator<Item = Layer> {
+    (0..6).map(move |index| Layer {
+        info: PageInfo {
+            index,
+            z_um: Some(100.0 * f64::from(index)),
+            thickness_um: Some(100.0),
+            origin_mm: Some([0.0, 0.0]),
+            ..PageInfo::default()
+        },
+        pitch: Pitch::of_dpi(300.0),
+        image: Image::Mask(block_and_island(index, width)).into(),
+    })
+}
+
+/// The same layer, its white a light gray.
+fn grayed(layer: Layer) -> Layer {
+    let mut gray = GrayMask::new(layer.image.width());
+    for row in 0..layer.image.height() {
+        let ends = mask(&layer).row(row).iter().copied().chain([layer.image.width()]);
+        let mut start = 0;
+        let runs = ends.zip([0, 200].into_iter().cycle()).map(|(end, level)| {
+            let run = (end - start, level);
+            start = end;
+            run
+        });
+        gray.push_runs(runs.filter(|&(length, _)| length > 0)).unwrap();
+    }
+    Layer { image: Image::Gray(gray).into(), ..layer }
+}
+
+fn block_and_island(index: u32, width: u32) -> Mask {
+    let mut mask = MaskBuilder::new(width);
     for row in 0..30 {
         let columns: &[u32] = match row {
-            10..14 if island => &[5, 20, 30, 35],
+            10..14 if index == 1 => &[5, 20, 30, 35],
+            10..19 if index == 3 => &[5, 20, 25, 37],
+            8 if index == 5 => &[0, 20],
             5..25 => &[5, 20],
             _ => &[],
         };
@@ -296,8 +623,9 @@ fn block_and_island(island: bool) -> Mask {
 
 /// Tab goes to each control that is shown, and each has a name.
 fn reach_all_by_keys(browser: &Browser) {
-    browser
-        .run("document.querySelector('#solid').open = true; document.activeElement.blur()", vec![]);
+    browser.press('3');
+    browser.wait_for("document.querySelector('#solid-view canvas')");
+    browser.run("document.activeElement.blur()", vec![]);
     browser.settle();
     let controls =
         "[...document.querySelectorAll('button, input, select, summary, [tabindex=\"0\"]')]
@@ -312,7 +640,7 @@ fn reach_all_by_keys(browser: &Browser) {
     );
     assert_eq!(nameless, json!([]));
     browser.run("window.reached = new Set()", vec![]);
-    for _ in 0..60 {
+    for _ in 0..80 {
         browser.press(TAB);
         browser.run("reached.add(document.activeElement)", vec![]);
     }
@@ -332,10 +660,11 @@ fn screenshot() {
     let scratch = demo();
     let viewing = Viewing::unopened(&scratch, "lamp-demo/build.tif --check", &[]);
     let browser = Browser::open(&viewing, WINDOW).expect("Chromium takes the picture");
-    browser.go("#stack=0&layer=965&overlays=new");
-    browser.run("document.querySelector('#solid').open = true", vec![]);
+    browser.go("#stack=0&layer=965&overlays=new,findings");
+    browser.wait_for("document.querySelector('#findings-list td')");
+    browser.press('3');
     browser.wait_for("document.querySelector('#solid-view canvas')");
-    browser.run("document.querySelector('#solid').scrollIntoView()", vec![]);
+    browser.run("document.activeElement.blur()", vec![]);
     browser.settle();
     let path = lamp_tests::workspace_root().join("docs/view.png");
     std::fs::write(path, browser.screenshot()).unwrap();

@@ -33,6 +33,7 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
         .route("/api/findings", get(findings))
         .route("/api/surface", get(surface_state))
         .route("/api/surface.bin", get(surface))
+        .route("/api/stacks/{stack}/copies", get(copies))
         .route("/api/stacks/{stack}/layers", get(layers))
         .route("/api/stacks/{stack}/layers/{layer}", get(layer))
         .route("/api/stacks/{stack}/layers/{layer}/pixel", get(pixel))
@@ -97,9 +98,14 @@ async fn surface(State(workers): State<Arc<Workers>>) -> Answer {
     workers.run(|viewer, _| viewer.surface().map(binary)).await
 }
 
+async fn copies(State(workers): State<Arc<Workers>>, path: AddressNames<usize>) -> Answer {
+    let stack = named(path)?;
+    json(workers, move |viewer, _| Ok(viewer.stack(stack)?.copies.to_json())).await
+}
+
 async fn layers(State(workers): State<Arc<Workers>>, path: AddressNames<usize>) -> Answer {
     let stack = named(path)?;
-    json(workers, move |viewer, _| Ok(viewer.stack(stack)?.layers())).await
+    json(workers, move |viewer, _| viewer.layers(stack)).await
 }
 
 async fn layer(State(workers): State<Arc<Workers>>, path: AddressNames<(usize, usize)>) -> Answer {
