@@ -9,6 +9,7 @@ use crate::store::{Manifest, Store};
 
 /// The parts and builds of a night: failures first, then results that need a person.
 #[derive(Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Summary {
     /// The parts.
     pub parts: Vec<SubjectSummary>,
@@ -18,6 +19,7 @@ pub struct Summary {
 
 /// A part or a build.
 #[derive(Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SubjectSummary {
     /// The name in the night file.
     pub name: String,
@@ -27,7 +29,7 @@ pub struct SubjectSummary {
     pub why: Option<String>,
     /// Where its stack is.
     pub file: Option<String>,
-    /// The layers of its stack.
+    /// The number of layers of its stack.
     pub layers: Option<u64>,
     /// Bands of stray rows that `fix` corrected.
     pub stray_fixed: u64,
@@ -47,6 +49,7 @@ pub struct SubjectSummary {
 /// The state of a part or a build, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum SubjectState {
     /// It failed.
     Failed,

@@ -40,6 +40,7 @@ pub struct InputFile {
 
 /// The estimated cost of a task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Cost {
     /// Seconds of one processor.
     pub cpu_s: f64,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lamp_slicing::brep::{BodyMeasure, BodyPair, Comparison, MeasurePair, Prepared};
 use lamp_slicing::{OpenOptions, body_name};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::exit::Exit;
 
@@ -26,27 +26,68 @@ pub(crate) fn asked(_: &Prepared, _: Arc<[u8]>, _: &OpenOptions) -> Result<Compa
     Err(lamp_pipeline::step::without_occt("--both").into())
 }
 
-/// Returns a comparison as JSON.
-pub(crate) fn fields(second: &Comparison) -> Value {
-    let pair = |pair: &BodyPair| {
-        let [ours, theirs] = pair.bodies.each_ref().map(|body| body.index);
-        json!({
-            "body": ours,
-            "other_body": theirs,
-            "measures": pair.measures.iter().map(measured_fields).collect::<Vec<_>>(),
-        })
-    };
-    let indices = |k: usize| second.only[k].iter().map(|body| body.index).collect::<Vec<_>>();
-    json!({
-        "kernel": second.kernels[1],
-        "differences": difference_lines(second),
-        "pairs": second.pairs.iter().map(pair).collect::<Vec<_>>(),
-        "only_in_first": indices(0),
-        "only_in_second": indices(1),
-    })
+/// A part as a second kernel reads it.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct SecondOpinion<'a> {
+    /// Name of the kernel: `OpenCASCADE`.
+    kernel: &'a str,
+    /// Differences beyond those allowed, as sentences.
+    differences: Vec<String>,
+    /// The bodies that both kernels read.
+    pairs: Vec<PairFields>,
+    /// Indices of bodies that only the first kernel reads.
+    only_in_first: Vec<usize>,
+    /// Indices of bodies that only the second kernel reads.
+    only_in_second: Vec<usize>,
 }
 
-fn measured_fields(measured: &MeasurePair) -> Value {
+/// A body that both kernels read.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct PairFields {
+    /// Its index by the first kernel.
+    body: usize,
+    /// Its index by the second kernel.
+    other_body: usize,
+    /// Its measures by both.
+    measures: Vec<MeasureFields>,
+}
+
+/// A measure of a body by both kernels.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct MeasureFields {
+    /// `least_x_mm` to `greatest_z_mm`, `volume_mm3` or `section_mm2`.
+    what: String,
+    /// Height of a section, in millimeters.
+    z_mm: Option<f64>,
+    /// Value by the first kernel.
+    first: f64,
+    /// Value by the second kernel.
+    second: f64,
+    /// The greatest difference that is allowed.
+    allowed: f64,
+}
+
+/// Returns a comparison as JSON has it.
+pub(crate) fn fields(second: &Comparison) -> SecondOpinion<'_> {
+    let pair = |pair: &BodyPair| {
+        let [ours, theirs] = pair.bodies.each_ref().map(|body| body.index);
+        let measures = pair.measures.iter().map(measured_fields).collect();
+        PairFields { body: ours, other_body: theirs, measures }
+    };
+    let indices = |k: usize| second.only[k].iter().map(|body| body.index).collect();
+    SecondOpinion {
+        kernel: second.kernels[1],
+        differences: difference_lines(second),
+        pairs: second.pairs.iter().map(pair).collect(),
+        only_in_first: indices(0),
+        only_in_second: indices(1),
+    }
+}
+
+fn measured_fields(measured: &MeasurePair) -> MeasureFields {
     let (what, z_mm) = match measured.what {
         BodyMeasure::Least(axis) => (format!("least_{}_mm", AXES[axis]), None),
         BodyMeasure::Greatest(axis) => (format!("greatest_{}_mm", AXES[axis]), None),
@@ -54,8 +95,7 @@ fn measured_fields(measured: &MeasurePair) -> Value {
         BodyMeasure::Section { z_mm } => ("section_mm2".to_owned(), Some(z_mm)),
     };
     let [first, second] = measured.values;
-    let allowed = measured.allowed;
-    json!({"what": what, "z_mm": z_mm, "first": first, "second": second, "allowed": allowed})
+    MeasureFields { what, z_mm, first, second, allowed: measured.allowed }
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];

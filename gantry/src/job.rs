@@ -66,8 +66,9 @@ as_name!(JobSeam, GrayBy);
 /// The work of a machine for a build. Lengths along the scan are in rows of the image, from the top.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Job {
-    /// [`JOB_SCHEMA`].
+    /// Name of the form.
     pub schema: String,
     /// The build's file or folder, as seen from the job's folder.
     pub build: String,
@@ -81,9 +82,11 @@ pub struct Job {
     pub mirrors: [u32; 2],
     /// The columns that neighboring swaths share.
     pub overlap: u32,
-    /// How they share them.
+    /// How they share them: `comb`, `gray` or `time`.
+    #[cfg_attr(feature = "schema", schemars(with = "String"))]
     pub seam: JobSeam,
-    /// How gray levels are shown.
+    /// How gray levels are shown: `dots` or `time`.
+    #[cfg_attr(feature = "schema", schemars(with = "String"))]
     pub gray: GrayBy,
     /// The pixels of a layer across the scan, and along it.
     pub pixels: [u32; 2],
@@ -105,6 +108,7 @@ pub struct Job {
 /// How a display is turned against the scan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JobTilt {
     /// The angle from the image's rows to the rows of mirrors, in degrees: above zero if the right end
     /// of a row of mirrors is over later rows of the image.
@@ -116,6 +120,7 @@ pub struct JobTilt {
 /// The times and counts of a whole job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JobSums {
     /// The number of layers.
     pub layers: u64,
@@ -127,43 +132,45 @@ pub struct JobSums {
     pub frames: u64,
     /// The time of swaths, from rest to rest, in seconds.
     pub scan_s: f64,
-    /// The time of moves between swaths.
+    /// The time of moves between swaths, in seconds.
     pub steps_s: f64,
-    /// The time between layers: recoating, or the way to the first swath if that takes longer.
+    /// The time between layers, in seconds: recoating, or the way to the first swath if that takes longer.
     pub between_s: f64,
-    /// All of these.
+    /// The sum of these times, in seconds.
     pub seconds: f64,
 }
 
 /// A layer of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JobLayer {
     /// The layer's index.
     pub layer: u32,
     /// The page of the build, or of each strip, from 0.
     pub page: usize,
-    /// The height of the layer's bottom.
+    /// The height of the layer's bottom, in micrometers.
     pub z_um: Option<f64>,
-    /// The layer's thickness.
+    /// The layer's thickness, in micrometers.
     pub thickness_um: Option<f64>,
-    /// The time for which white has light, in all passes.
+    /// The time for which white has light, in all passes, in milliseconds.
     pub exposure_ms: f64,
     /// The dose of white in mJ/cm2, if the machine's irradiance is known.
     pub dose_mj_per_cm2: Option<f64>,
     /// How often each swath is scanned.
     pub passes: u32,
-    /// The speed of the head on swaths.
+    /// The speed of the head on swaths, in millimeters a second.
     pub speed_mm_per_s: f64,
     /// The rows per second.
     pub row_clock_hz: f64,
-    /// The time of recoating before the layer, if it is known.
+    /// The time of recoating before the layer, in seconds, if it is known.
     pub recoat_s: Option<f64>,
-    /// The time from where the head stands to the first swath; it passes while the layer is recoated.
+    /// The time from where the head stands to the first swath, in seconds; it passes while the layer is
+    /// recoated.
     pub approach_s: f64,
-    /// The time of swaths, from rest to rest.
+    /// The time of swaths, from rest to rest, in seconds.
     pub scan_s: f64,
-    /// The time of moves between swaths.
+    /// The time of moves between swaths, in seconds.
     pub steps_s: f64,
     /// The swaths, in the order in which they are scanned.
     pub swaths: Vec<JobSwath>,
@@ -172,6 +179,7 @@ pub struct JobLayer {
 /// A pass over a swath.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JobSwath {
     /// The swath's number, from the left.
     pub swath: u32,
@@ -180,10 +188,11 @@ pub struct JobSwath {
     pub strip: Option<String>,
     /// The number of the pass.
     pub pass: u32,
-    /// The corner of its first mirror, from the left edge of the build.
+    /// The corner of its first mirror, from the left edge of the build, in millimeters.
     pub x_mm: f64,
-    /// The direction of the scan.
+    /// The direction of the scan: `down` from the image's first row on, or `up`.
     #[serde(with = "direction_name")]
+    #[cfg_attr(feature = "schema", schemars(with = "String"))]
     pub direction: ScanDirection,
     /// The first row that holds white.
     pub first_row: u32,
@@ -191,7 +200,7 @@ pub struct JobSwath {
     pub last_row: u32,
     /// The number of frames.
     pub frames: u64,
-    /// The time from rest to rest.
+    /// The time from rest to rest, in seconds.
     pub seconds: f64,
 }
 

@@ -268,14 +268,15 @@ pub struct Found {
 
 /// A finding, and the part of a build that it belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PlacedFinding<F> {
     /// The finding.
     #[serde(flatten)]
     pub finding: F,
-    /// The part's name.
+    /// Of a build: the name of the part that has the finding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub part: Option<String>,
-    /// The number of its copies.
+    /// Of a build: the number of the part's copies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies: Option<usize>,
 }

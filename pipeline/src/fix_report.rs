@@ -21,41 +21,65 @@ pub struct FixReport {
     first_left: Option<String>,
 }
 
-/// The numbers of a run of `fix`, for reports.
+/// Bands of stray rows, by `fix --report`.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FixHead {
+    /// How bands are corrected, by `--method`.
     method: &'static str,
+    /// The most rows of a band that is corrected, by `--max-width`, or null.
     max_width: Option<u32>,
+    /// The least confidence of a correction, by `--min-confidence`, from 0 to 1.
     min_confidence: f64,
+    /// Whether `--use-neighbors` was given.
     use_neighbors: bool,
+    /// Number of layers.
     layers: usize,
+    /// Number of corrected bands.
     bands_corrected: usize,
+    /// Number of bands that were left.
     bands_left: usize,
+    /// Number of changed pixels.
     pixels_changed: u64,
 }
 
-/// A band of stray rows, for reports.
+/// A band of stray rows.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ReportedBand {
+    /// Index of the layer.
     layer: u32,
+    /// Height of the layer's bottom, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     z_mm: Option<f64>,
+    /// First row of the band.
     first_row: u32,
+    /// Last row of the band.
     last_row: u32,
+    /// Least and greatest y of the band's rows, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     y_mm: Option<[f64; 2]>,
+    /// First and last column that changed, or would change if the band was left.
     #[serde(skip_serializing_if = "Option::is_none")]
     columns: Option<[u32; 2]>,
+    /// Least and greatest x of these columns, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     x_mm: Option<[f64; 2]>,
+    /// First and last column of the mesh's gap, where crossings are missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     gap_columns: Option<[u32; 2]>,
+    /// Least and greatest x of the gap, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     gap_x_mm: Option<[f64; 2]>,
+    /// Evidence of stray rows, such as `ends white`.
     kinds: Vec<&'static str>,
+    /// How the band is corrected, by `--method`.
     method: &'static str,
+    /// Confidence in the correction, from 0 to 1.
     confidence: f64,
+    /// Number of pixels that changed, or would change if the band was left.
     pixels: u64,
+    /// `corrected`, `left: doubtful` or `left: too wide`.
     outcome: &'static str,
 }
 

@@ -55,6 +55,7 @@ pub struct SliceStage {
 
 /// Counts of layers and stray rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Counts {
     /// Layers.
     pub layers: usize,
@@ -62,7 +63,7 @@ pub struct Counts {
     pub open_layers: usize,
     /// Layers with rows whose crossings do not balance.
     pub stray_layers: usize,
-    /// Such rows.
+    /// Rows whose crossings do not balance.
     pub stray_rows: usize,
 }
 

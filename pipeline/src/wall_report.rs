@@ -34,38 +34,59 @@ pub struct WallReport {
     cut_off: Option<(String, usize)>,
 }
 
-/// The numbers of a run of `compensate`, for reports.
+/// Walls and pieces that moved edges narrow or lose, by `lamp compensate --report`.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WallHead {
+    /// Number of layers.
     layers: usize,
+    /// Number of layers whose edges were moved.
     layers_changed: usize,
+    /// Number of layers that grew beyond their image and were cut off.
     layers_cut_off: usize,
+    /// Number of walls that were narrowed less than asked.
     thin_walls: usize,
+    /// Number of walls and pieces of which the move alone would have left nothing.
     would_be_lost: usize,
+    /// Number of pieces that were lost.
     lost: usize,
+    /// Number of pieces that broke apart.
     broken: usize,
+    /// Number of walls and pieces that the list leaves out.
     not_listed: usize,
 }
 
-/// A wall that was narrowed less than asked, or a piece that was lost, for reports.
+/// A wall that was narrowed less than asked, or a piece that was lost.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NarrowedWall {
+    /// Index of the layer.
     layer: u32,
+    /// Height of the layer's bottom, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     z_mm: Option<f64>,
+    /// First and last column of the wall's middle, or of the piece.
     columns: [u32; 2],
+    /// Least and greatest x of these columns, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     x_mm: Option<[f64; 2]>,
+    /// First and last row of the wall's middle, or of the piece.
     rows: [u32; 2],
+    /// Least and greatest y of these rows, in millimeters.
     #[serde(skip_serializing_if = "Option::is_none")]
     y_mm: Option<[f64; 2]>,
+    /// Of a wall: its median width before, in micrometers.
     #[serde(skip_serializing_if = "Option::is_none")]
     width_um: Option<f64>,
+    /// Of a wall: the width asked for, in micrometers.
     #[serde(skip_serializing_if = "Option::is_none")]
     asked_um: Option<f64>,
+    /// Of a wall: the width made, in micrometers.
     #[serde(skip_serializing_if = "Option::is_none")]
     made_um: Option<f64>,
+    /// Whether the move alone would have left nothing.
     would_be_lost: bool,
+    /// Of a lost or broken piece: the number of pieces left.
     #[serde(skip_serializing_if = "Option::is_none")]
     pieces_left: Option<usize>,
 }

@@ -211,6 +211,27 @@ impl Serialize for Pitch {
     }
 }
 
+#[cfg(feature = "schema")]
+impl schemars::JsonSchema for Pitch {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Pitch".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "Dots per inch: a number for square pixels, and else one along x and one along y.",
+            "oneOf": [
+                { "type": "number" },
+                { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+            ],
+        })
+    }
+}
+
 impl<'de> Deserialize<'de> for Pitch {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]

@@ -18,19 +18,21 @@ use crate::record::{FindingRecord, IslandRecord, Joined, PocketRecord};
 
 /// A thing that a person would name, as numbers of findings in their list.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Feature {
     /// How much it matters.
     pub severity: Severity,
-    /// The finding that names it.
+    /// The finding that names it, by its place in the list of findings, from 0.
     pub finding: usize,
-    /// The findings that it has, too: of an island, what joins it and where it grows.
+    /// The findings that it has, too, by their places: of an island, what joins it and where it grows.
     pub with: Vec<usize>,
-    /// The findings that name other features like it.
+    /// The findings that name other features like it, by their places.
     pub alike: Vec<usize>,
 }
 
 /// How much a feature matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
     /// The build fails, or the stack is broken: stray rows, islands, white that the image may cut

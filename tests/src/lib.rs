@@ -19,6 +19,7 @@ mod golden;
 pub mod hostile;
 mod images;
 mod referees;
+mod schemas;
 mod scratch;
 mod viewing;
 

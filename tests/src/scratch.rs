@@ -13,6 +13,7 @@ use lamp_stack::{
 use tempfile::TempDir;
 
 use crate::binaries::bin;
+use crate::schemas::check_answers;
 
 /// A temporary folder that commands run in.
 #[derive(Debug)]
@@ -79,9 +80,14 @@ impl Scratch {
         fs::write(self.path(name), bytes).expect("the folder can be written to");
     }
 
-    /// Reads a file.
+    /// Reads a file, and checks the answer of a command in it against its schema.
+    ///
+    /// # Panics
+    /// Panics if there is no such file, or if the answer is not as its schema says.
     pub fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+        let bytes = fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        check_answers(name, &bytes);
+        bytes
     }
 
     /// Writes a sample part.
@@ -214,8 +220,13 @@ fn says_what_was_written(line: &str) -> bool {
 }
 
 impl Ran {
-    /// Returns what a command line did, given all of its standard error.
+    /// Returns what a command line did, given all of its standard error. Checks an answer on standard
+    /// output against its schema.
+    ///
+    /// # Panics
+    /// Panics if the answer is not as its schema says.
     pub fn new(line: &str, statuses: Vec<Option<i32>>, stdout: Vec<u8>, stderr: &str) -> Self {
+        check_answers(line, &stdout);
         let (written, stderr): (Vec<_>, Vec<_>) =
             stderr.split_inclusive('\n').partition(|line| says_what_was_written(line));
         let written = written.into_iter().map(str::trim_end).map(str::to_owned).collect();

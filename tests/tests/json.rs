@@ -1,7 +1,11 @@
 //! Checks the keys and values that docs/json.md gives for `--json`.
 
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use lamp_fixtures::{Sample, StepDefect, StepSample, StepUnit, broken_step, step};
-use lamp_tests::Scratch;
+use lamp_tests::{Scratch, workspace_root};
 use serde_json::{Value, json};
 
 /// Returns the one object that a command prints, in one line.
@@ -215,4 +219,51 @@ fn a_report_in_a_file_is_what_json_prints() {
         scratch.run(&format!("{line} --json")).is_wrong_usage(&["name a file with -o"]);
     }
     assert!(!scratch.names().contains(&"-".to_owned()));
+}
+
+#[test]
+fn batches() {
+    let scratch = Scratch::new();
+    scratch.part("torus.stl", Sample::Torus, 500);
+    scratch.write("bad.stl", b"nonsense\n");
+    let night = "[defaults]\nstages = [\"slice --dpi 100 --thickness 1mm\"]\n\n\
+                 [[part]]\nfile = \"torus.stl\"\n\n[[part]]\nfile = \"bad.stl\"\n";
+    scratch.write("night.toml", night.as_bytes());
+    let plan = answer(&scratch, "lamp batch plan night.toml --json");
+    assert_eq!(plan["schema"], "lamp-batch-plan-1");
+    assert_eq!(plan["cannot_be_made"][0]["name"], "bad");
+    let status = answer(&scratch, "lamp batch status night.toml --json");
+    assert_eq!(status["schema"], "lamp-batch-status-1");
+    assert_eq!(status["tasks_to_do"], plan["to_do"]);
+    let states: Vec<_> =
+        status["parts"].as_array().unwrap().iter().map(|it| &it["state"]).collect();
+    assert_eq!(states, ["failed", "waiting"]);
+}
+
+#[test]
+fn each_form_in_the_book_has_a_schema() {
+    let docs = workspace_root().join("docs");
+    let files = |folder: &Path, ending: &str| -> Vec<PathBuf> {
+        let files = fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
+        files.filter(|path| path.extension().is_some_and(|found| found == ending)).collect()
+    };
+    let schemas = files(&docs.join("schemas"), "json").into_iter();
+    let schemas: BTreeSet<String> =
+        schemas.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+    let pages: Vec<String> =
+        files(&docs, "md").iter().map(|page| fs::read_to_string(page).unwrap()).collect();
+    let words = pages.iter().flat_map(|page| {
+        page.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '-')
+    });
+    let is_form = |word: &&str| {
+        let parts = word.strip_prefix("lamp-").and_then(|rest| rest.rsplit_once('-'));
+        parts.is_some_and(|(name, number)| {
+            name.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-')
+                && number.parse::<u32>().is_ok()
+        })
+    };
+    let forms: BTreeSet<String> = words.filter(is_form).map(str::to_owned).collect();
+    // Only LAMP reads recipes.
+    let without = BTreeSet::from(["lamp-recipe-1".to_owned()]);
+    assert_eq!(&forms - &without, schemas);
 }

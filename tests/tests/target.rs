@@ -106,7 +106,7 @@ fn screens_are_checkerboards_of_the_study() {
         assert_eq!((level(left - 1, gap), level(left + 720, gap)), (0, 0));
     }
     // The gray tile as dots, and the screens unchanged.
-    scratch.run("lamp target screens --level 25% | dither > dots.tif").succeeds();
+    scratch.run("lamp target screens --gray-level 25% | dither > dots.tif").succeeds();
     let white = mask(&scratch.layers("dots.tif")[0]).white_pixels() as f64;
     assert!((white / (5.0 * 720.0 * 720.0) - 0.25).abs() < 0.001, "{white}");
 }
@@ -126,7 +126,7 @@ fn impossible_targets_are_wrong_usage() {
         (&format!("{squares} --doses 1e-300..1e300mJ/cm2"), "is not a plausible dose"),
         (&format!("{squares} --doses 1,2mJ/cm2 --gap 0um"), "it must be above zero"),
         (&format!("{squares} --doses 1,2mJ/cm2 --gap 1um"), "gaps of 0 pixels"),
-        ("lamp target screens --level 120% -o a.tif", "0% (black) to 100% (white)"),
+        ("lamp target screens --gray-level 120% -o a.tif", "0% (black) to 100% (white)"),
         ("lamp target screens --tile 9999999 -o a.tif", "tiles of 9999999 pixels"),
         ("lamp target screens --squares 0 -o a.tif", "screen squares of 0 pixels"),
     ] {

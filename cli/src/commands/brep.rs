@@ -8,12 +8,13 @@ use lamp_pipeline::step::{Kernel, StepSettings, bytes_of, length, notes};
 use lamp_slicing::brep::{Body, BodyReport, Comparison, PreparationAttempt, Prepared};
 use lamp_slicing::{SliceError, body_name, read_step};
 use lamp_stack::{Pitch, one_line};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Map, Value};
 
 use crate::args::solid::StepArgs;
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
-use crate::second_opinion;
+use crate::output::json_report::{print_answer, schemas};
+use crate::second_opinion::{self, SecondOpinion};
 use crate::streams::{input_name, print};
 
 /// Describe a STEP part, and check whether it can be sliced
@@ -84,37 +85,104 @@ pub(crate) fn run(args: &BrepArgs) -> Result<(), Exit> {
     Ok(())
 }
 
-fn answer(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> Value {
-    let attempt = |attempt: &PreparationAttempt| json!({"chordal_deviation_mm": attempt.chord_mm, "heal_mm": attempt.heal_mm, "why": attempt.why});
-    let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
-    let mut answer = json!({
-        "part": name,
-        "unit": prepared.kernel.unit(),
-        "facets": prepared.mesh.facets.len(),
-        "chordal_deviation_mm": prepared.chord_mm,
-        "heal_mm": prepared.heal_mm,
-        "notes": notes(prepared),
-        "tries": prepared.tries.iter().map(attempt).collect::<Vec<_>>(),
-        "bodies": bodies.map(|(body, report)| fields(body, report, prepared)).collect::<Vec<_>>(),
-    });
-    if let Some(second) = second {
-        answer["second"] = second_opinion::fields(second);
-    }
-    answer
+/// A STEP part, by `lamp brep PART --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct BrepAnswer<'a> {
+    /// Name of the part, as given.
+    part: &'a str,
+    /// The file's unit of length.
+    unit: &'a str,
+    /// Number of facets.
+    facets: usize,
+    /// Greatest chordal deviation of facets from surfaces, in millimeters.
+    chordal_deviation_mm: f64,
+    /// Distance within which edges were joined, in millimeters; 0 without healing.
+    heal_mm: f64,
+    /// Findings, repairs and omissions, as sentences.
+    notes: Vec<String>,
+    /// Rejected tries.
+    tries: Vec<Attempt<'a>>,
+    /// The bodies, in the file's order.
+    bodies: Vec<BodyFields>,
+    /// With `--both`: the second opinion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<SecondOpinion<'a>>,
 }
 
-fn fields(body: &Body, report: &BodyReport, prepared: &Prepared) -> Value {
+/// A rejected try.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Attempt<'a> {
+    /// Greatest chordal deviation, in millimeters.
+    chordal_deviation_mm: f64,
+    /// Distance within which edges were joined, in millimeters; 0 without healing.
+    heal_mm: f64,
+    /// Why it was rejected.
+    why: &'a str,
+}
+
+/// A body.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct BodyFields {
+    /// Its name in the file, often empty.
+    name: String,
+    /// Number of its faces of each kind of surface, the most frequent first.
+    #[cfg_attr(test, schemars(with = "std::collections::BTreeMap<String, usize>"))]
+    faces: Map<String, Value>,
+    /// Number of its facets.
+    facets: usize,
+    /// Its box: least x, y and z, and greatest, in millimeters.
+    box_mm: [[f64; 3]; 2],
+    /// Volume by its surfaces, in cubic millimeters.
+    volume_mm3: f64,
+    /// Volume by its facets, in cubic millimeters.
+    facet_volume_mm3: f64,
+    /// Area of its facets, in square millimeters.
+    facet_area_mm2: f64,
+    /// Reasons to refuse it, as sentences.
+    faults: Vec<String>,
+}
+
+schemas! { "lamp-brep-2": BrepAnswer<'_>; }
+
+fn answer<'a>(
+    name: &'a str,
+    prepared: &'a Prepared,
+    second: Option<&'a Comparison>,
+) -> BrepAnswer<'a> {
+    let attempt = |attempt: &'a PreparationAttempt| Attempt {
+        chordal_deviation_mm: attempt.chord_mm,
+        heal_mm: attempt.heal_mm,
+        why: &attempt.why,
+    };
+    let bodies = prepared.kernel.bodies().iter().zip(&prepared.reports);
+    BrepAnswer {
+        part: name,
+        unit: prepared.kernel.unit(),
+        facets: prepared.mesh.facets.len(),
+        chordal_deviation_mm: prepared.chord_mm,
+        heal_mm: prepared.heal_mm,
+        notes: notes(prepared),
+        tries: prepared.tries.iter().map(attempt).collect(),
+        bodies: bodies.map(|(body, report)| fields(body, report, prepared)).collect(),
+        second: second.map(second_opinion::fields),
+    }
+}
+
+fn fields(body: &Body, report: &BodyReport, prepared: &Prepared) -> BodyFields {
     let faces = kinds(body, prepared).into_iter();
-    json!({
-        "name": one_line(&report.name),
-        "faces": faces.map(|(kind, count)| (kind.to_owned(), count.into())).collect::<Map<_, _>>(),
-        "facets": report.facets,
-        "box_mm": report.box_mm,
-        "volume_mm3": report.exact_volume_mm3,
-        "facet_volume_mm3": report.volume_mm3,
-        "facet_area_mm2": report.area_mm2,
-        "faults": report.faults.iter().map(ToString::to_string).collect::<Vec<_>>(),
-    })
+    BodyFields {
+        name: one_line(&report.name),
+        faces: faces.map(|(kind, count)| (kind.to_owned(), count.into())).collect(),
+        facets: report.facets,
+        box_mm: report.box_mm,
+        volume_mm3: report.exact_volume_mm3,
+        facet_volume_mm3: report.volume_mm3,
+        facet_area_mm2: report.area_mm2,
+        faults: report.faults.iter().map(ToString::to_string).collect(),
+    }
 }
 
 fn text(name: &str, prepared: &Prepared, second: Option<&Comparison>) -> String {

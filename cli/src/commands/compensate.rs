@@ -7,7 +7,7 @@ use lamp_pipeline::compensate::{CompensateSettings, Compensating, NoDose};
 use crate::args::options::{Common, InputArgs, Output};
 use crate::args::stages::CompensateStageArgs;
 use crate::exit::Exit;
-use crate::output::json_report::{JsonReport, ReportTo};
+use crate::output::json_report::{JsonReport, ReportTo, schemas};
 use crate::streams::{
     check_beside, check_not_input, input_name, progress, read_layers, write_layers,
 };
@@ -39,6 +39,8 @@ pub(crate) struct CompensateArgs {
     #[command(flatten)]
     output: Output,
 }
+
+schemas! { "lamp-compensate-1": lamp_pipeline::WallHead, "walls": [lamp_pipeline::NarrowedWall]; }
 
 pub(crate) fn run(args: &CompensateArgs, common: &Common) -> Result<(), Exit> {
     let CompensateArgs { input, settings, report, output } = args;

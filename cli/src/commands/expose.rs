@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::args::options::{Common, Output, parse_distance, parse_layers, parse_range};
 use crate::exit::Exit;
 use crate::output::endings::{PNG, check_ending};
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::streams::{input_name, is_stream, print, stack_format, write_file, write_layers};
 use crate::terminal::progress::Progress;
 
@@ -420,20 +420,64 @@ fn text(dose: &LayerDose, layer: &JobLayer, tolerance: f64) -> String {
     text
 }
 
+/// Doses of pixels.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct DoseLine {
+    /// Of columns of one swath alone: number of the swath from the left; of a seam: of its left swath.
     #[serde(skip_serializing_if = "Option::is_none")]
     swath: Option<u32>,
+    /// White pixels, which are to be exposed.
     white_px: u64,
+    /// White pixels whose dose is off by more than the tolerance.
     off_px: u64,
+    /// Least, mean and greatest dose of white pixels, as shares of the wanted dose; 1 without white.
     shares: [f64; 3],
+    /// Column and row of the white pixel with the worst dose.
     worst_px: Option<[u32; 2]>,
+    /// The worst dose of a white pixel, as a share of the wanted dose.
     worst_share: Option<f64>,
+    /// Black pixels with light.
     lit_px: u64,
+    /// Black pixels with more light than the tolerance.
     lit_over_px: u64,
+    /// Greatest dose of a black pixel, as the time of full light, in milliseconds.
     lit_greatest_ms: f64,
+    /// Sum of the doses of black pixels, as the time of full light, in milliseconds.
     lit_sum_ms: f64,
 }
+
+/// Doses of the layers of a job, by `lamp expose JOB --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ExposeAnswer {
+    /// By how much a dose may be off, in percent, by `--tolerance`.
+    tolerance_percent: f64,
+    /// The layers, bottom first.
+    layers: Vec<LayerLine>,
+}
+
+/// Doses of a layer.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct LayerLine {
+    /// Index of the layer.
+    layer: u32,
+    #[serde(flatten)]
+    all: DoseLine,
+    /// Further white pixels, beside black under tilted mirrors, whose doses are not judged.
+    edge_px: u64,
+    /// Least and greatest mean dose of a row, as shares of the wanted dose.
+    row_shares: [f64; 2],
+    /// Least and greatest mean dose of a column, as shares of the wanted dose.
+    column_shares: [f64; 2],
+    /// Columns of one swath alone.
+    swaths: Vec<DoseLine>,
+    /// Columns that two swaths share.
+    seams: Vec<DoseLine>,
+}
+
+schemas! { "lamp-expose-1": ExposeAnswer; }
 
 impl DoseLine {
     fn of(dose: &SwathDose, swath: Option<u32>) -> Self {
@@ -452,23 +496,7 @@ impl DoseLine {
     }
 }
 
-fn json(doses: &[LayerDose], tolerance: f64) -> impl Serialize {
-    #[derive(Serialize)]
-    struct Answer {
-        tolerance_percent: f64,
-        layers: Vec<LayerLine>,
-    }
-    #[derive(Serialize)]
-    struct LayerLine {
-        layer: u32,
-        #[serde(flatten)]
-        all: DoseLine,
-        edge_px: u64,
-        row_shares: [f64; 2],
-        column_shares: [f64; 2],
-        swaths: Vec<DoseLine>,
-        seams: Vec<DoseLine>,
-    }
+fn json(doses: &[LayerDose], tolerance: f64) -> ExposeAnswer {
     let line = |dose: &LayerDose| LayerLine {
         layer: dose.layer,
         all: DoseLine::of(&dose.all, None),
@@ -478,5 +506,5 @@ fn json(doses: &[LayerDose], tolerance: f64) -> impl Serialize {
         swaths: dose.swaths.iter().map(|(swath, dose)| DoseLine::of(dose, Some(*swath))).collect(),
         seams: dose.seams.iter().map(|seam| DoseLine::of(&seam.dose, Some(seam.left))).collect(),
     };
-    Answer { tolerance_percent: tolerance, layers: doses.iter().map(line).collect() }
+    ExposeAnswer { tolerance_percent: tolerance, layers: doses.iter().map(line).collect() }
 }

@@ -13,7 +13,7 @@ use crate::args::stages::FixStageArgs;
 use crate::exit::Exit;
 use crate::field_folder::{read_stack_or_fields, write_stack_or_fields};
 use crate::output::band_pictures::BandPictures;
-use crate::output::json_report::{JsonReport, ReportTo};
+use crate::output::json_report::{JsonReport, ReportTo, schemas};
 use crate::streams::{check_beside, progress, unless_found};
 use crate::terminal::stack_notes::doubts;
 
@@ -59,6 +59,8 @@ pub(crate) struct FixArgs {
     #[command(flatten)]
     output: Output,
 }
+
+schemas! { "lamp-fix-1": lamp_pipeline::FixHead, "bands": [lamp_pipeline::ReportedBand]; }
 
 pub(crate) fn run(args: &FixArgs, common: &Common) -> Result<(), Exit> {
     args.report.check_output(&args.output.output)?;

@@ -17,7 +17,6 @@ use lamp_pipeline::solid::SolidSettings;
 use lamp_pipeline::solid::{Reading, at_part, name_of_all};
 use lamp_stack::{Length, Pitch};
 use serde::Serialize;
-use serde_json::json;
 
 use crate::args::exposure::ExposureArgs;
 use crate::args::heights::HeightArgs;
@@ -26,7 +25,7 @@ use crate::args::solid::SolidArgs;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
 use crate::output::endings::{parse_report, parse_table};
-use crate::output::json_report::{ReportTo, write_answer};
+use crate::output::json_report::{ReportTo, schemas, write_answer};
 use crate::streams::{check_beside, extension, print, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::{self as plots, Plot, PlotAxis, Series, drawn};
@@ -136,13 +135,13 @@ pub(crate) fn run(args: &HeightsArgs, common: &Common) -> Result<(), Exit> {
         return Ok(());
     };
     let layers = found.heights.layers.iter().map(|layer| LayerRow::new(layer, exposure));
-    let answer = json!({
-        "part": name_of_all(&args.parts),
-        "criterion": found.measure.name(),
-        "bound": found.bound,
-        "choices": choices,
-        "layers": layers.collect::<Vec<_>>(),
-    });
+    let answer = HeightsAnswer {
+        part: name_of_all(&args.parts),
+        criterion: found.measure.name(),
+        bound: found.bound,
+        choices,
+        layers: layers.collect(),
+    };
     write_answer("lamp-heights-1", &answer, path)
 }
 
@@ -197,17 +196,48 @@ impl HeightsArgs {
     }
 }
 
-/// The numbers of a layer, under the names of the table's columns.
+/// Heights of layers for a part, by `lamp heights PART --json`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct HeightsAnswer {
+    /// Name of the part or of its file.
+    part: String,
+    /// The bounded measure: `volume`, `cusp` or `area`.
+    criterion: &'static str,
+    /// Its bound: a share, or micrometers for `cusp`.
+    bound: f64,
+    /// The layers found, then uniform ones.
+    choices: Vec<Choice>,
+    /// The layers found, bottom first.
+    layers: Vec<LayerRow>,
+}
+
+schemas! { "lamp-heights-1": HeightsAnswer; }
+
+/// A layer.
+// Under the names of the table's columns.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct LayerRow {
+    /// Height of its bottom, in micrometers.
     z_um: f64,
+    /// Its thickness, in micrometers.
     thickness_um: f64,
+    /// Volume of the part in it, in cubic millimeters.
     volume_mm3: f64,
+    /// Volume of the part that it loses, in cubic millimeters.
     lost_mm3: f64,
+    /// Volume that it has beyond the part, in cubic millimeters.
     gained_mm3: f64,
+    /// Lost and gained volume, in percent of the part's volume in it; null if it has none.
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     deviation_percent: f64,
+    /// Height of its cusp, in micrometers.
     cusp_um: f64,
+    /// Change of area from its bottom to its top, in percent; null if its bottom has none.
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     area_percent: f64,
+    /// Its exposure time, in milliseconds, if exposures are given.
     exposure_ms: Option<f64>,
 }
 
@@ -259,19 +289,28 @@ fn write_table(
     Ok(())
 }
 
-/// A choice of layers: their number, their error by volume, the worst error by the criterion, and
-/// the number past the bound.
+/// A choice of layers.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Choice {
+    /// Name, such as `volume 2.00%` or `uniform 100um`.
     name: String,
+    /// Number of layers.
     layers: usize,
+    /// Lost volume, in cubic millimeters.
     lost_mm3: f64,
+    /// Gained volume, in cubic millimeters.
     gained_mm3: f64,
-    /// Not finite if the part has no volume.
+    /// Lost and gained volume, in percent of the part's volume; null if the part has none.
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     deviation_percent: f64,
+    /// Measure of the worst layer, in the unit of `bound`; null if it has no bound.
+    #[cfg_attr(test, schemars(with = "Option<f64>"))]
     worst: f64,
+    /// Number of layers whose measure is beyond `bound`.
     past_bound: usize,
-    /// With what each layer takes besides its exposure.
+    /// Time of all layers, in seconds, if exposures are given.
+    // With what each layer takes besides its exposure.
     time_s: Option<f64>,
 }
 

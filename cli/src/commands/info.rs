@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::info_fields::print_fields;
 use crate::args::options::InputArgs;
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::output::numbers::{grouped, volume_in_words};
 use crate::output::stack_facts::{StackFacts, compression_name};
 use crate::streams::{failed_at, in_range, input_name, open_pages, print};
@@ -108,6 +108,20 @@ fn runs_of(pages: Pages, input: &InputArgs) -> Result<Option<Facts>, Exit> {
     }))
 }
 
+/// Description of a stack, by `lamp info STACK --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Info<'a> {
+    /// Name of the stack, as given.
+    input: &'a str,
+    #[serde(flatten)]
+    stack: StackFacts<'a>,
+    /// Number of transitions between colors in all rows, if `--runs` counts them.
+    transitions: Option<u64>,
+}
+
+schemas! { "lamp-info-1": Info<'_>; }
+
 /// The facts of a stack.
 struct Facts {
     totals: StackTotals,
@@ -134,14 +148,7 @@ impl Facts {
         Ok(facts)
     }
 
-    fn json<'a>(&'a self, input: &'a str) -> impl Serialize + 'a {
-        #[derive(Serialize)]
-        struct Info<'a> {
-            input: &'a str,
-            #[serde(flatten)]
-            stack: StackFacts<'a>,
-            transitions: Option<u64>,
-        }
+    fn json<'a>(&'a self, input: &'a str) -> Info<'a> {
         Info { input, stack: StackFacts::new(&self.totals), transitions: self.runs }
     }
 

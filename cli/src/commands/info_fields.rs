@@ -7,7 +7,7 @@ use lamp_stack::{Pages, StackTotals};
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::output::stack_facts::StackFacts;
 use crate::streams::{failed_at, input_name, print};
 
@@ -17,24 +17,88 @@ struct FieldSummary {
     totals: StackTotals,
 }
 
+/// Totals of a folder of strips or fields.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Totals<'a> {
-    /// Of strips.
+    /// Of strips: mirrors across a swath, in pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     mirrors: Option<u32>,
-    /// The width and height of a field.
+    /// Of fields: width and height of a field, in pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     field: Option<[u32; 2]>,
-    /// The number of rows and of columns of fields.
+    /// Of fields: number of rows and of columns of fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     grid: Option<[u32; 2]>,
+    /// Pixels that neighbors share.
     overlap: u32,
+    /// How neighbors share them.
     seam: &'a str,
+    /// Number of layers.
     layers: u64,
+    /// Number of layers with gray images.
     gray_layers: u64,
+    /// Pixels that are not black, in all files and layers.
     exposed_px: Option<u64>,
+    /// Size of the coded images of all files, in bytes.
     data_bytes: u64,
+    /// Whether all pages carry checks.
     checks: bool,
+}
+
+/// Description of a folder of strips, by `lamp info FOLDER --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Strips<'a> {
+    #[serde(flatten)]
+    totals: &'a Totals<'a>,
+    /// The strips, from the left.
+    strips: Vec<StripLine<'a>>,
+}
+
+/// A strip.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct StripLine<'a> {
+    /// Name of its file.
+    file: &'a str,
+    /// Its columns of the build: the first, and the one after the last.
+    columns: [u32; 2],
+    #[serde(flatten)]
+    facts: StackFacts<'a>,
+}
+
+/// Description of a folder of fields, by `lamp info FOLDER --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Fields<'a> {
+    #[serde(flatten)]
+    totals: &'a Totals<'a>,
+    /// The fields, row by row.
+    fields: Vec<FieldLine<'a>>,
+}
+
+/// A field.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct FieldLine<'a> {
+    /// Its row of fields, from 0.
+    row: u32,
+    /// Its column of fields, from 0.
+    column: u32,
+    /// Name of its file.
+    file: &'a str,
+    /// Its columns of the build, in pixels: the first, and the one after the last.
+    columns: [u32; 2],
+    /// Its rows of the build, in pixels: the first, and the one after the last.
+    rows: [u32; 2],
+    #[serde(flatten)]
+    facts: StackFacts<'a>,
+}
+
+schemas! {
+    "lamp-info-strips-1": Strips<'_>;
+    "lamp-info-fields-1": Fields<'_>;
 }
 
 impl<'a> Totals<'a> {
@@ -106,46 +170,17 @@ fn read(folder: &Path, file: FieldFile) -> Result<FieldSummary, Exit> {
     Ok(FieldSummary { file, totals })
 }
 
-fn json_of_strips<'a>(totals: &'a Totals<'a>, strips: &'a [FieldSummary]) -> impl Serialize + 'a {
-    #[derive(Serialize)]
-    struct Answer<'a> {
-        #[serde(flatten)]
-        totals: &'a Totals<'a>,
-        strips: Vec<Line<'a>>,
-    }
-    #[derive(Serialize)]
-    struct Line<'a> {
-        file: &'a str,
-        columns: [u32; 2],
-        #[serde(flatten)]
-        facts: StackFacts<'a>,
-    }
-    let line = |strip: &'a FieldSummary| Line {
+fn json_of_strips<'a>(totals: &'a Totals<'a>, strips: &'a [FieldSummary]) -> Strips<'a> {
+    let line = |strip: &'a FieldSummary| StripLine {
         file: &strip.file.name,
         columns: [strip.file.columns.start, strip.file.columns.end],
         facts: StackFacts::new(&strip.totals),
     };
-    Answer { totals, strips: strips.iter().map(line).collect() }
+    Strips { totals, strips: strips.iter().map(line).collect() }
 }
 
-fn json_of_fields<'a>(totals: &'a Totals<'a>, fields: &'a [FieldSummary]) -> impl Serialize + 'a {
-    #[derive(Serialize)]
-    struct Answer<'a> {
-        #[serde(flatten)]
-        totals: &'a Totals<'a>,
-        fields: Vec<Line<'a>>,
-    }
-    #[derive(Serialize)]
-    struct Line<'a> {
-        row: u32,
-        column: u32,
-        file: &'a str,
-        columns: [u32; 2],
-        rows: [u32; 2],
-        #[serde(flatten)]
-        facts: StackFacts<'a>,
-    }
-    let line = |field: &'a FieldSummary| Line {
+fn json_of_fields<'a>(totals: &'a Totals<'a>, fields: &'a [FieldSummary]) -> Fields<'a> {
+    let line = |field: &'a FieldSummary| FieldLine {
         row: field.file.place.row,
         column: field.file.place.column,
         file: &field.file.name,
@@ -153,7 +188,7 @@ fn json_of_fields<'a>(totals: &'a Totals<'a>, fields: &'a [FieldSummary]) -> imp
         rows: [field.file.rows.start, field.file.rows.end],
         facts: StackFacts::new(&field.totals),
     };
-    Answer { totals, fields: fields.iter().map(line).collect() }
+    Fields { totals, fields: fields.iter().map(line).collect() }
 }
 
 fn text(name: &str, form: &FieldForm, totals: &Totals<'_>, fields: &[FieldSummary]) -> String {

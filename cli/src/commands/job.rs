@@ -14,7 +14,7 @@ use lamp_pipeline::heights::time_text;
 
 use crate::args::options::{Common, TimeArgs, one_of_described, parse_layers};
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::streams::{input_name, is_stream, new_folder, print};
 use crate::terminal::progress::say;
 
@@ -166,6 +166,11 @@ fn check_file(build: &Path) -> Result<(), Exit> {
         true => Err(Exit::usage("a job names its build: give the build's file or folder")),
         false => Ok(()),
     }
+}
+
+schemas! {
+    "lamp-job-sums-1": lamp_gantry::JobSums;
+    "lamp-job-1": lamp_gantry::Job;
 }
 
 pub(crate) fn run(args: &JobArgs, common: &Common) -> Result<(), Exit> {

@@ -7,11 +7,11 @@ use lamp_pipeline::documents;
 use lamp_planning::projector::{Focus, Lens, Projector, SpreadOf};
 use lamp_stack::to_nm;
 use lamp_stack::{Length, Size};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::catalogue;
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::streams::{input_name, print};
 
 /// List, show or check projectors: where mirrors light the glass, and how brightly
@@ -57,44 +57,88 @@ enum ProjectorAction {
 
 pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
     match &args.action {
-        ProjectorAction::List { json: true } => answer(catalogue::named::<Projector>()),
+        ProjectorAction::List { json: true } => answer(&catalogue::named::<Projector>()),
         ProjectorAction::List { json: false } => print(&table()),
         ProjectorAction::Show { projector, json: true } => {
-            answer([documents::document(projector)?])
+            answer(&[documents::document(projector)?])
         }
         ProjectorAction::Show { projector, json: false } => catalogue::show::<Projector>(projector),
         ProjectorAction::Check { file, json } => check(file, *json),
     }
 }
 
-fn answer(projectors: impl IntoIterator<Item = Projector>) -> Result<(), Exit> {
-    let projectors: Vec<Value> =
-        projectors.into_iter().map(|projector| fields(&projector)).collect();
-    print_answer("lamp-projector-1", &json!({ "projectors": projectors }))
+/// Projectors, by `lamp projector list --json`, `lamp projector show P --json` and
+/// `lamp projector check FILE --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ProjectorAnswer<'a> {
+    /// The built-in projectors and your own, or the named one.
+    projectors: Vec<ProjectorFields<'a>>,
 }
 
 /// The known properties of a projector, and their consequences.
-fn fields(projector: &Projector) -> Value {
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ProjectorFields<'a> {
+    /// Its name.
+    name: &'a str,
+    /// Its description.
+    description: &'a str,
+    /// Columns and rows of the display.
+    mirrors: [u32; 2],
+    /// Side of a mirror's image with its gap, in micrometers.
+    pitch_um: f64,
+    /// Side of a mirror's image without its gap, in micrometers.
+    mirror_um: f64,
+    /// Width and height of the display's image, in millimeters.
+    image_mm: [f64; 2],
+    /// Side of a column, in micrometers.
+    voxel_um: Option<f64>,
+    /// Spread of light as a cone, in micrometers, or null.
+    cone_um: Option<f64>,
+    /// Spread of light as a standard deviation, in micrometers, or null.
+    sigma_um: Option<f64>,
+    /// Light of a wide field of full white, in milliwatts a square centimeter.
+    light_mw_per_cm2: f64,
+    /// Step of times, in milliseconds.
+    step_ms: f64,
+    /// Height of the resin above the glass, in micrometers.
+    chamber_um: Option<f64>,
+    /// Distance from the lens' middle to the mirrors' image, in millimeters.
+    focus_mm: Option<f64>,
+    /// The file itself, its numbers as texts with units.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
+    given: &'a Projector,
+}
+
+schemas! { "lamp-projector-1": ProjectorAnswer<'_>; }
+
+fn answer(projectors: &[Projector]) -> Result<(), Exit> {
+    let projectors = projectors.iter().map(fields).collect();
+    print_answer("lamp-projector-1", &ProjectorAnswer { projectors })
+}
+
+fn fields(projector: &Projector) -> ProjectorFields<'_> {
     let (cone, sigma) = match projector.spread() {
         SpreadOf::Cone(half) => (Some(half.um()), None),
         SpreadOf::Gaussian(sigma) => (None, Some(sigma.um())),
     };
-    json!({
-        "name": projector.name,
-        "description": projector.description,
-        "mirrors": [projector.display.columns, projector.display.rows],
-        "pitch_um": projector.pitch.value.um(),
-        "mirror_um": to_nm(projector.mirror_image().mm()) * 1000.0,
-        "image_mm": projector.image().map(|side| to_nm(side.mm())),
-        "voxel_um": projector.voxel.as_ref().map(|voxel| voxel.value.um()),
-        "cone_um": cone,
-        "sigma_um": sigma,
-        "light_mw_per_cm2": projector.irradiance().mw_per_cm2(),
-        "step_ms": projector.step.value.ms(),
-        "chamber_um": projector.chamber.as_ref().map(|chamber| chamber.value.um()),
-        "focus_mm": focus(projector).map(|focus| to_nm(focus.image.mm())),
-        "given": projector,
-    })
+    ProjectorFields {
+        name: &projector.name,
+        description: &projector.description,
+        mirrors: [projector.display.columns, projector.display.rows],
+        pitch_um: projector.pitch.value.um(),
+        mirror_um: to_nm(projector.mirror_image().mm()) * 1000.0,
+        image_mm: projector.image().map(|side| to_nm(side.mm())),
+        voxel_um: projector.voxel.as_ref().map(|voxel| voxel.value.um()),
+        cone_um: cone,
+        sigma_um: sigma,
+        light_mw_per_cm2: projector.irradiance().mw_per_cm2(),
+        step_ms: projector.step.value.ms(),
+        chamber_um: projector.chamber.as_ref().map(|chamber| chamber.value.um()),
+        focus_mm: focus(projector).map(|focus| to_nm(focus.image.mm())),
+        given: projector,
+    }
 }
 
 fn focus(projector: &Projector) -> Option<Focus> {
@@ -141,7 +185,7 @@ fn spread(projector: &Projector) -> String {
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
     let (projector, _) = documents::read_file(path)?;
     if json {
-        return answer([projector]);
+        return answer(&[projector]);
     }
     print(&format!("{}: {}\n", input_name(path), lights(&projector)))
 }

@@ -85,8 +85,8 @@ struct ShownLayers {
     #[arg(long, value_name = "HEIGHT", allow_hyphen_values = true)]
     z: Option<Length>,
 
-    /// Show all layers from A to B - 1 on one sheet, or every Nth layer
-    #[arg(long, value_name = "A..B[/N]")]
+    /// Show all layers from A to B - 1 on one sheet; A..B/N shows every Nth layer
+    #[arg(long, value_name = "A..B")]
     layers: Option<EveryNth>,
 }
 

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::output::numbers::number_of;
 use crate::output::stack_facts::StackFacts;
 use crate::streams::{input_name, is_stream, learning_part, open_pages, print};
@@ -183,25 +183,38 @@ fn unproven(totals: &StackTotals) -> &'static str {
     }
 }
 
-fn answer(verdicts: &[Verdict], whole: bool) -> impl Serialize {
-    #[derive(Serialize)]
-    struct Answer<'a> {
-        whole: bool,
-        stacks: Vec<Stack<'a>>,
-    }
-    #[derive(Serialize)]
-    struct Stack<'a> {
-        stack: &'a str,
-        whole: bool,
-        fault: Option<&'a str>,
-        #[serde(flatten)]
-        facts: Option<StackFacts<'a>>,
-    }
-    let stacks = verdicts.iter().map(|verdict| Stack {
+/// Whether stacks are whole, by `lamp verify STACK... --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct VerifyAnswer<'a> {
+    /// Whether no stack has a fault.
+    whole: bool,
+    /// The stacks.
+    stacks: Vec<VerifiedStack<'a>>,
+}
+
+/// A stack that was checked, with its facts if it is whole.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct VerifiedStack<'a> {
+    /// Name of the stack, as given.
+    stack: &'a str,
+    /// Whether it has no fault; without `checks`, whether no fault was found.
+    whole: bool,
+    /// The fault, as a sentence.
+    fault: Option<&'a str>,
+    #[serde(flatten)]
+    facts: Option<StackFacts<'a>>,
+}
+
+schemas! { "lamp-verify-1": VerifyAnswer<'_>; }
+
+fn answer(verdicts: &[Verdict], whole: bool) -> VerifyAnswer<'_> {
+    let stacks = verdicts.iter().map(|verdict| VerifiedStack {
         stack: &verdict.name,
         whole: verdict.result.is_ok(),
         fault: verdict.result.as_ref().err().map(String::as_str),
         facts: verdict.result.as_ref().ok().and_then(Option::as_ref).map(StackFacts::new),
     });
-    Answer { whole, stacks: stacks.collect() }
+    VerifyAnswer { whole, stacks: stacks.collect() }
 }

@@ -11,6 +11,22 @@ use crate::exit::Exit;
 use crate::output::endings::parse_report;
 use crate::streams::{is_stream, print, write_file};
 
+/// Tests that `docs/schemas` has the schemas of answers: for each, its name, the type with its keys, and
+/// for a report the lists that follow, with the types of their items.
+macro_rules! schemas {
+    ($($name:literal: $head:ty $(, $list:literal: [$item:ty])*;)+) => {
+        #[test]
+        fn schemas_are_as_the_types() {
+            $(
+                let lists = &[$(($list, <$item as schemars::JsonSchema>::json_schema as _)),*];
+                crate::output::schema::check::<$head>($name, lists);
+            )+
+        }
+    };
+}
+
+pub(crate) use schemas;
+
 #[derive(Serialize)]
 struct Answer<'a, T> {
     schema: &'a str,

@@ -10,47 +10,75 @@ use lamp_stack::to_nm;
 use serde::Serialize;
 
 use crate::exit::Exit;
-use crate::output::json_report::JsonReport;
+use crate::output::json_report::{JsonReport, schemas};
 
-/// The head of the report: the part's files and the counts.
+/// Facets behind stray rows, by `slice --report`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct MeshReport<'a> {
+    /// Names of the part's files, without folders.
     pub(crate) files: Vec<String>,
+    /// The rule for the inside of surfaces, by `--fill`.
     pub(crate) fill: &'a str,
     #[serde(flatten)]
     pub(crate) counts: Counts,
 }
 
+/// A faulty edge.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct EdgeLine {
+    /// Number of the edge, from 0.
     edge: usize,
+    /// `open`, or `shared by more than two`.
     fault: &'static str,
+    /// Its ends: x, y and z in the file's coordinates and units, before any placement.
     ends: [[f32; 3]; 2],
+    /// The facets that have it.
     facets: Vec<FacetLine>,
 }
 
+/// A facet with a faulty edge.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct FacetLine {
+    /// Place of its file in the list of files, from 0.
     file: usize,
+    /// Number of the facet in its file, from 0.
     facet: usize,
+    /// Its corners: x, y and z in the file's coordinates and units, before any placement.
     corners: Facet,
 }
 
+/// Stray rows of a layer that follow one another.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct BandLine {
+    /// Index of the layer.
     layer: u32,
+    /// Height of the layer's section, in millimeters.
     plane_mm: f64,
+    /// First row of the band.
     first_row: u32,
+    /// Last row of the band.
     last_row: u32,
+    /// Least and greatest y of the band's rows, in millimeters.
     y_mm: [f64; 2],
+    /// Points where contours break off.
     ends: Vec<EndLine>,
 }
 
+/// A point where a contour breaks off.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct EndLine {
+    /// Its x and y, in millimeters.
     at_mm: [f64; 2],
+    /// Numbers of the edges that end there.
     edges: Vec<usize>,
 }
+
+schemas! { "lamp-slice-report-1": MeshReport<'_>, "edges": [EdgeLine], "bands": [BandLine]; }
 
 /// Position of the images' rows in the part.
 #[derive(Clone, Copy)]

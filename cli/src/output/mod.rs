@@ -7,4 +7,6 @@ pub(crate) mod json_report;
 pub(crate) mod mesh_report;
 pub(crate) mod numbers;
 pub(crate) mod plan_folder;
+#[cfg(test)]
+pub(crate) mod schema;
 pub(crate) mod stack_facts;

@@ -7,29 +7,53 @@ use lamp_stack::to_nm;
 
 /// The statements of a stack's pages.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct StackFacts<'a> {
+    /// Name of the part or of its file.
     part: Option<&'a str>,
+    /// Commands that made the stack, in their order.
     commands: &'a [String],
+    /// Digest of the input from which the stack was made.
     digest: Option<&'a str>,
+    /// Number of layers.
     layers: u64,
+    /// Index of the first layer.
     first_layer: u32,
+    /// Index of the last layer.
     last_layer: u32,
+    /// Number of layers with gray images.
     gray_layers: u64,
+    /// Width of the first image, in pixels.
     width_px: u32,
+    /// Height of the first image, in pixels.
     height_px: u32,
+    /// Whether all images have one size.
     one_size: bool,
+    /// Resolution of the images.
     dpi: Option<Pitch>,
+    /// Bottom of the first layer, in millimeters.
     bottom_mm: Option<f64>,
+    /// Top of the last layer, in millimeters.
     top_mm: Option<f64>,
+    /// Least and greatest thickness of a layer, in micrometers.
     thickness_um: Option<[f64; 2]>,
+    /// Least and greatest exposure time of a layer, in milliseconds.
     exposure_ms: Option<[f64; 2]>,
+    /// Sum of the exposure times, in seconds.
     exposure_s: Option<f64>,
+    /// Pixels that are not black, in all layers.
     exposed_px: Option<u64>,
+    /// Volume of the pixels that are not black, in cubic millimeters.
     volume_mm3: Option<f64>,
+    /// Number of recorded stray rows.
     stray_rows: u64,
+    /// Number of layers with recorded stray rows.
     stray_layers: u64,
+    /// Size of the coded images, in bytes.
     data_bytes: u64,
+    /// Codings of the images.
     compressions: Vec<&'static str>,
+    /// Whether the pages carry checks.
     checks: bool,
 }
 

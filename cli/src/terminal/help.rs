@@ -127,14 +127,14 @@ const USUAL: [(&str, &[&str]); 14] = [
         ],
     ),
     ("fix", &["method", "max_width", "evidence", "report", "strict", "layers", "output"]),
-    ("expose", &["layers", "tolerance", "strict", "picture", "json", "output"]),
+    ("expose", &["layers", "dose_tolerance", "strict", "picture", "json", "output"]),
     (
         "plan voxels",
         &[
             "material",
             "wanted",
             "objective",
-            "exposure",
+            "expose",
             "report",
             "plot",
             "map",
@@ -283,8 +283,9 @@ mod tests {
     fn an_option_has_one_kind_of_value_in_all_commands() {
         fn gather(command: &Command, kinds: &mut BTreeMap<String, BTreeSet<String>>) {
             for option in command.get_arguments().filter(|option| !option.is_hide_set()) {
-                // The value of an output is the kind of its file.
-                let Some(name) = option.get_long().filter(|name| *name != "output") else {
+                // The value of an output is the kind of its file; parts and stacks intersect alike.
+                let is_file = |name: &&str| ["output", "intersect"].contains(name);
+                let Some(name) = option.get_long().filter(|name| !is_file(name)) else {
                     continue;
                 };
                 let values =

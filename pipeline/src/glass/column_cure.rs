@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::GlassPlan;
 use super::column_measures::unmeasured_heights;
 use super::column_report::report_of;
+use super::json_of;
 use super::target::{GivenTarget, TargetSettings, of_work};
 use crate::documents::document_and_word;
 use crate::error::Error;
@@ -340,7 +341,7 @@ impl ColumnCure {
             command: self.command.clone(),
             pitch: self.projector.pitch.value,
             bitmaps: bitmaps.collect(),
-            report: report_of(self),
+            report: json_of(&report_of(self)),
             cured: HeightMap { grid: self.wanted.grid, heights_um },
             wanted: Some(self.wanted.clone()),
         }

@@ -4,20 +4,43 @@ use lamp_grayscale::material::Material;
 use lamp_planning::column::{HeightCurve, Measures};
 use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
-use serde_json::{Value, json};
+use serde::Serialize;
+
+/// Measures of cured columns against their target (Zhao 2009, eq. 4.12 to 4.15).
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct MeasuresReport {
+    /// Root mean square of the error of doses, in millijoules a square centimeter.
+    dose_rms_mj_per_cm2: f64,
+    /// Root mean square of the error of doses, as a share of the dose wanted, in columns that have a
+    /// height.
+    dose_rms_share: f64,
+    /// Mean absolute error of heights, in micrometers.
+    ra_um: f64,
+    /// Root mean square of the error of heights, in micrometers.
+    rms_um: f64,
+    /// Error of the lowest column, in micrometers, below zero.
+    lowest_um: f64,
+    /// Error of the highest column, in micrometers.
+    highest_um: f64,
+    /// Columns of the part that are not cured.
+    missing_columns: u64,
+    /// Columns outside the part that are cured.
+    overcured_columns: u64,
+}
 
 /// Returns the measures as a report has them.
-pub fn measures_fields(measures: &Measures) -> Value {
-    json!({
-        "dose_rms_mj_per_cm2": measures.dose_rms,
-        "dose_rms_share": measures.relative_rms,
-        "ra_um": measures.ra_um,
-        "rms_um": measures.rms_um,
-        "lowest_um": measures.lowest_um,
-        "highest_um": measures.highest_um,
-        "missing_columns": measures.missing,
-        "overcured_columns": measures.overcured,
-    })
+pub fn measures_report(measures: &Measures) -> MeasuresReport {
+    MeasuresReport {
+        dose_rms_mj_per_cm2: measures.dose_rms,
+        dose_rms_share: measures.relative_rms,
+        ra_um: measures.ra_um,
+        rms_um: measures.rms_um,
+        lowest_um: measures.lowest_um,
+        highest_um: measures.highest_um,
+        missing_columns: measures.missing,
+        overcured_columns: measures.overcured,
+    }
 }
 
 /// Returns the measures in a line.

@@ -1,15 +1,112 @@
 //! The result of a plan of column cure, in lines and as JSON.
 
 use lamp_planning::column::{ColumnObjective, Measures, Tracing};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::column_cure::ColumnCure;
-use super::column_measures::{measures_fields, measures_line};
+use super::column_measures::{MeasuresReport, measures_line, measures_report};
 
 /// How far the glass may stand off, in um.
 const SHIFTS_UM: [f64; 3] = [1.0, 3.0, 5.0];
 /// How much brighter or darker light may be.
 const LIGHT: f64 = 0.02;
+
+/// Plan of bitmaps column by column, by `lamp plan column-cure`.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ColumnCureReport<'a> {
+    schema: &'static str,
+    /// Name of the target.
+    target: &'a str,
+    /// Name of the projector.
+    projector: &'a str,
+    /// Name of the material.
+    material: &'a str,
+    /// The error that the plan makes least: of `dose` or of `height`, by `--optimize`.
+    optimize: String,
+    /// Whether bitmaps have gray levels, by `--gray`.
+    gray: bool,
+    /// Points of a mirror and directions of rays along each axis, by `--rays`; null for exact light.
+    rays: Option<[usize; 2]>,
+    /// Displacement of the glass that the plan tolerates, in micrometers, by `--robust`.
+    robust_um: f64,
+    /// Columns of resin along x and y.
+    columns: [usize; 2],
+    /// Side of a column, in micrometers.
+    column_um: f64,
+    /// Mirrors with times along x and y, in the middle of the display.
+    mirrors: [usize; 2],
+    /// Distance of neighboring mirrors on the glass, in micrometers.
+    mirror_um: f64,
+    /// Light of a wide white field, in milliwatts a square centimeter.
+    irradiance_mw_per_cm2: f64,
+    /// Longest time of a mirror, in seconds, by `--max-time`.
+    max_time_s: f64,
+    /// Mirrors held at the longest time.
+    mirrors_at_max_time: usize,
+    /// Unit of `error` and `gap`: half sums of squares of doses or heights.
+    error_unit: &'static str,
+    /// The plan without bitmaps.
+    best: BestReport,
+    /// The plan with bitmaps.
+    bitmaps: BitmapsReport,
+    /// The worst measures with the glass off along x or y.
+    misaligned: [ShiftedReport; SHIFTS_UM.len()],
+    /// Measures with other light.
+    other_light: [BrighterReport; 2],
+}
+
+/// A plan without bitmaps: each mirror has a time of its own.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct BestReport {
+    /// Its error.
+    error: f64,
+    /// The most by which its error is above the least possible one.
+    gap: f64,
+    /// The gap as a share of the error.
+    relative_gap: f64,
+    /// Steps of the search.
+    steps: usize,
+    /// Its measures.
+    measures: MeasuresReport,
+}
+
+/// A plan with bitmaps.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct BitmapsReport {
+    /// Times of the bitmaps, in milliseconds.
+    times_ms: Vec<f64>,
+    /// Its error.
+    error: f64,
+    /// Its error above the error without bitmaps, as a share.
+    excess: f64,
+    /// Root mean square distance of mirrors' times from the best, in seconds (Zhao 2009, eq. 4.16).
+    time_rms_s: f64,
+    /// Its measures.
+    measures: MeasuresReport,
+}
+
+/// Measures where the glass is off its place.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct ShiftedReport {
+    #[serde(flatten)]
+    measures: MeasuresReport,
+    /// Distance of the glass from its place, in micrometers.
+    shift_um: f64,
+}
+
+/// Measures with brighter or darker light.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct BrighterReport {
+    #[serde(flatten)]
+    measures: MeasuresReport,
+    /// The light, as a multiple of the planned one.
+    light: f64,
+}
 
 impl ColumnCure {
     /// Returns lines about the plan, for people.
@@ -37,28 +134,24 @@ impl ColumnCure {
         Measures::of(doses, &self.wanted.heights_um, &self.curve)
     }
 
-    fn measured(&self, doses: &[f64]) -> Value {
-        measures_fields(&self.measures(doses))
+    fn measured(&self, doses: &[f64]) -> MeasuresReport {
+        measures_report(&self.measures(doses))
     }
 
     /// The plan where the glass stands off along x or y: the direction that is the worst.
-    fn shifted(&self, um: f64) -> Value {
+    fn shifted(&self, um: f64) -> ShiftedReport {
         // A part may suffer more along one axis than along the other.
         let directions = [[um, 0.0], [-um, 0.0], [0.0, um], [0.0, -um]];
         let doses = directions.map(|shift| self.light.shifted(shift).doses(&self.plan.seconds));
         let worst =
             doses.iter().max_by(|a, b| self.measures(a).rms_um.total_cmp(&self.measures(b).rms_um));
-        let mut value = self.measured(worst.expect("there are four"));
-        value["shift_um"] = um.into();
-        value
+        ShiftedReport { measures: self.measured(worst.expect("there are four")), shift_um: um }
     }
 
-    fn brighter(&self, by: f64) -> Value {
+    fn brighter(&self, by: f64) -> BrighterReport {
         // Doses are linear in light.
         let doses: Vec<_> = self.plan.doses.iter().map(|dose| dose * by).collect();
-        let mut value = self.measured(&doses);
-        value["light"] = by.into();
-        value
+        BrighterReport { measures: self.measured(&doses), light: by }
     }
 
     /// Root mean square of how far bitmaps' times are from the best ones (000 eq. 4.16).
@@ -70,7 +163,7 @@ impl ColumnCure {
 }
 
 /// The report, as docs/json.md describes it.
-pub(super) fn report_of(cure: &ColumnCure) -> Value {
+pub(super) fn report_of(cure: &ColumnCure) -> ColumnCureReport<'_> {
     let ColumnCure { plan, options, light, .. } = cure;
     let setup = light.setup();
     let step_ms = 1000.0 * options.step_s;
@@ -81,41 +174,41 @@ pub(super) fn report_of(cure: &ColumnCure) -> Value {
         ColumnObjective::Height => "um2",
     };
     let lights = [1.0 - LIGHT, 1.0 + LIGHT];
-    json!({
-        "schema": "lamp-plan-column-cure-2",
-        "target": cure.target,
-        "projector": cure.projector.name,
-        "material": cure.material,
-        "optimize": options.objective.to_string(),
-        "gray": options.gray.is_some(),
-        "rays": match setup.tracing {
-            Tracing::Exact => Value::Null,
-            Tracing::Rays { points, directions } => json!([points, directions]),
+    ColumnCureReport {
+        schema: "lamp-plan-column-cure-2",
+        target: &cure.target,
+        projector: &cure.projector.name,
+        material: &cure.material,
+        optimize: options.objective.to_string(),
+        gray: options.gray.is_some(),
+        rays: match setup.tracing {
+            Tracing::Exact => None,
+            Tracing::Rays { points, directions } => Some([points, directions]),
         },
-        "robust_um": options.robust.um(),
-        "columns": setup.voxels,
-        "column_um": setup.voxel_um,
-        "mirrors": setup.mirrors,
-        "mirror_um": setup.pitch_um,
-        "irradiance_mw_per_cm2": setup.irradiance,
-        "max_time_s": options.max_s,
-        "mirrors_at_max_time": plan.best.at_most(options.max_s),
-        "error_unit": unit,
-        "best": {
-            "error": plan.best.error,
-            "gap": plan.best.gap,
-            "relative_gap": plan.best.relative_gap(),
-            "steps": plan.best.steps,
-            "measures": cure.measured(&plan.best_doses),
+        robust_um: options.robust.um(),
+        columns: setup.voxels,
+        column_um: setup.voxel_um,
+        mirrors: setup.mirrors,
+        mirror_um: setup.pitch_um,
+        irradiance_mw_per_cm2: setup.irradiance,
+        max_time_s: options.max_s,
+        mirrors_at_max_time: plan.best.at_most(options.max_s),
+        error_unit: unit,
+        best: BestReport {
+            error: plan.best.error,
+            gap: plan.best.gap,
+            relative_gap: plan.best.relative_gap(),
+            steps: plan.best.steps,
+            measures: cure.measured(&plan.best_doses),
         },
-        "bitmaps": {
-            "times_ms": times_ms,
-            "error": plan.error,
-            "excess": plan.excess(),
-            "time_rms_s": cure.time_rms(),
-            "measures": cure.measured(&plan.doses),
+        bitmaps: BitmapsReport {
+            times_ms,
+            error: plan.error,
+            excess: plan.excess(),
+            time_rms_s: cure.time_rms(),
+            measures: cure.measured(&plan.doses),
         },
-        "misaligned": SHIFTS_UM.map(|um| cure.shifted(um)),
-        "other_light": lights.map(|by| cure.brighter(by)),
-    })
+        misaligned: SHIFTS_UM.map(|um| cure.shifted(um)),
+        other_light: lights.map(|by| cure.brighter(by)),
+    }
 }

@@ -9,11 +9,10 @@ use lamp_planning::projector::Projector;
 use lamp_planning::target::{Grid, Round};
 use lamp_stack::quoted;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
-use super::GlassPlan;
-use super::kinetics_report::CuredRings;
+use super::kinetics_report::{CuredRings, RingsReport};
 use super::target::{TargetSettings, of_work};
+use super::{GlassPlan, json_of};
 use crate::documents::document;
 use crate::error::Error;
 use crate::watcher::Watcher;
@@ -54,6 +53,23 @@ pub struct RingCure {
     pub plan: RingPlan,
 }
 
+/// Plan of rings by kinetics, by `lamp plan ecpl`.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct EcplReport<'a> {
+    schema: &'static str,
+    /// Name of the target.
+    target: &'a str,
+    /// Name of the projector.
+    projector: &'a str,
+    /// Name of the material.
+    material: &'a str,
+    /// How bitmaps and times were found, by `--method`.
+    method: String,
+    #[serde(flatten)]
+    rings: RingsReport,
+}
+
 impl EcplSettings {
     /// Plans the bitmaps. `watcher` takes notes about the target's file.
     ///
@@ -91,14 +107,14 @@ impl RingCure {
     /// Returns the bitmaps with their report, and what they cure.
     pub fn glass_plan(&self) -> GlassPlan {
         let Self { target, round, projector, material, method, plan } = self;
-        let mut report = json!({
-            "schema": "lamp-plan-ecpl-1",
-            "target": target,
-            "projector": projector.name,
-            "material": material,
-            "method": method.to_string(),
-        });
-        report.as_object_mut().expect("it is an object").extend(self.cured().fields());
+        let report = EcplReport {
+            schema: "lamp-plan-ecpl-1",
+            target,
+            projector: &projector.name,
+            material,
+            method: method.to_string(),
+            rings: self.cured().report(),
+        };
         let grid = map_grid(&plan.cured, round.radius_um());
         let display = &projector.display;
         let bitmap = |exposure: &RingExposure| ShownBitmap {
@@ -115,7 +131,7 @@ impl RingCure {
             ),
             pitch: projector.pitch.value,
             bitmaps: plan.exposures.iter().map(bitmap).collect(),
-            report,
+            report: json_of(&report),
             wanted: Some(grid.round(|radius_um| round.height_um(radius_um))),
             cured: plan.cured.on(&grid),
         }

@@ -1,7 +1,7 @@
 //! Reports what bitmaps cure by kinetics.
 
 use lamp_planning::ecpl::{Profile, RingExposure, RingSimulation, WantedProfile};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 /// The part that bitmaps cure, and the wanted part if known.
 #[derive(Clone, Copy, Debug)]
@@ -22,34 +22,157 @@ const ASIDE_UM: [f64; 3] = [1.0, 3.0, 5.0];
 /// The light of a lamp that differs by 2 %.
 const OTHER_LIGHT: [f64; 2] = [0.98, 1.02];
 
+/// Rings, and what they cure by the kinetics of resin and oxygen.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RingsReport {
+    /// The light, the chamber and the steps of the reaction.
+    #[serde(flatten)]
+    pub setting: RingSetting,
+    /// The bitmaps, in their order.
+    pub bitmaps: Vec<RingBitmap>,
+    /// Sum of the exposure times, in seconds.
+    pub exposure_s: f64,
+    /// The cured part.
+    #[serde(flatten)]
+    pub outcome: RingOutcome,
+}
+
+/// The light, the chamber and the steps of a reaction.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RingSetting {
+    /// Light of a wide field, in watts a square meter.
+    light_w_per_m2: f64,
+    /// Standard deviation of the light's blur, in micrometers.
+    blur_um: f64,
+    /// Side of a mirror on the glass, in micrometers.
+    pixel_um: f64,
+    /// Height of the chamber, in micrometers.
+    chamber_um: f64,
+    /// Width and height of the reaction's cells, in micrometers.
+    cell_um: [f64; 2],
+    /// Time step of the reaction, in seconds.
+    step_s: f64,
+}
+
+/// A cured part of rings.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RingOutcome {
+    /// The cured part.
+    cured: RingShape,
+    /// The profile of the cured part.
+    profile: RingProfile,
+    /// Measures against the target; null without one.
+    measures: Option<RingMeasures>,
+    /// The part with other light.
+    other_light: [OtherLight; OTHER_LIGHT.len()],
+    /// Measures where the part is off its place; null without a target.
+    aside: Option<[Aside; ASIDE_UM.len()]>,
+}
+
+/// A bitmap of rings.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RingBitmap {
+    /// White rings: from which mirror from the axis, and to which.
+    rings: Vec<[u32; 2]>,
+    /// Its exposure time, in milliseconds.
+    exposure_ms: f64,
+    /// Height at the axis at its end, in micrometers.
+    sag_um: f64,
+    /// Radius of the part on the glass at its end, in micrometers.
+    base_radius_um: f64,
+}
+
+/// The shape of a cured part.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct RingShape {
+    /// Height at the axis, in micrometers.
+    sag_um: f64,
+    /// Greatest height, in micrometers.
+    highest_um: f64,
+    /// Radius on the glass, in micrometers.
+    base_radius_um: f64,
+}
+
+/// Heights over the distance from the axis.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct RingProfile {
+    /// Distances from the axis, in micrometers.
+    radius_um: Vec<f64>,
+    /// Cured heights at these, in micrometers.
+    cured_um: Vec<f64>,
+    /// Wanted heights at these, in micrometers; null without a target.
+    wanted_um: Option<Vec<f64>>,
+}
+
+/// Measures of a cured part against its target.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct RingMeasures {
+    /// Root mean square of cured less wanted height where either is above zero, in micrometers.
+    rms_um: f64,
+    /// The most by which it is too low, in micrometers.
+    most_too_low_um: f64,
+    /// The most by which it is too high, in micrometers.
+    most_too_high_um: f64,
+}
+
+/// A part that other light cures.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct OtherLight {
+    #[serde(flatten)]
+    shape: RingShape,
+    /// The light, as a multiple of the planned one.
+    light: f64,
+    /// Root mean square of cured less wanted height, in micrometers; null without a target.
+    rms_um: Option<f64>,
+}
+
+/// A part off its place.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct Aside {
+    /// Its distance from its place, in micrometers.
+    aside_um: f64,
+    /// Root mean square of cured less wanted height, in micrometers.
+    rms_um: f64,
+}
+
 impl CuredRings<'_> {
-    /// Returns the fields of a report.
-    pub fn fields(&self) -> Map<String, Value> {
+    /// Returns the report.
+    pub fn report(&self) -> RingsReport {
         let setting = self.simulation.setting();
         let cells = self.simulation.reaction().cells();
-        let mut fields = Map::new();
-        let mut put = |key: &str, value: Value| fields.insert(key.to_owned(), value);
-        put("light_w_per_m2", json!(rounded(10.0 * setting.light.mw_per_cm2())));
-        put("blur_um", json!(setting.sigma_um));
-        put("pixel_um", json!(setting.pixel_um));
-        put("chamber_um", json!(setting.chamber_um));
-        put("cell_um", json!([cells.width_um, cells.height_um]));
-        put("step_s", json!(self.simulation.reaction().seconds()));
-        put("bitmaps", Value::Array(bitmaps(self)));
-        put("exposure_s", json!(rounded(seconds(self.exposures))));
-        put("cured", shape(self.cured));
-        let (radii, wanted): (Vec<f64>, _) = (
-            (0..cells.across).map(|x| cells.middle_um(x)).collect(),
-            self.wanted
-                .map(|wanted| wanted.heights_um.iter().map(|um| rounded(*um)).collect::<Vec<_>>()),
-        );
-        let heights: Vec<f64> = self.cured.heights_um.iter().map(|um| rounded(*um)).collect();
-        put("profile", json!({ "radius_um": radii, "cured_um": heights, "wanted_um": wanted }));
-        put("measures", self.wanted.map_or(Value::Null, |wanted| measures(wanted, self.cured)));
-        let other = OTHER_LIGHT.map(|times| other_light(self, times));
-        put("other_light", Value::Array(other.to_vec()));
-        put("aside", self.wanted.map_or(Value::Null, |wanted| aside(wanted, self.cured)));
-        fields
+        let all_rounded = |heights_um: &[f64]| heights_um.iter().map(|um| rounded(*um)).collect();
+        RingsReport {
+            setting: RingSetting {
+                light_w_per_m2: rounded(10.0 * setting.light.mw_per_cm2()),
+                blur_um: setting.sigma_um,
+                pixel_um: setting.pixel_um,
+                chamber_um: setting.chamber_um,
+                cell_um: [cells.width_um, cells.height_um],
+                step_s: self.simulation.reaction().seconds(),
+            },
+            bitmaps: bitmaps(self),
+            exposure_s: rounded(seconds(self.exposures)),
+            outcome: RingOutcome {
+                cured: shape(self.cured),
+                profile: RingProfile {
+                    radius_um: (0..cells.across).map(|x| cells.middle_um(x)).collect(),
+                    cured_um: all_rounded(&self.cured.heights_um),
+                    wanted_um: self.wanted.map(|wanted| all_rounded(&wanted.heights_um)),
+                },
+                measures: self.wanted.map(|wanted| measures(wanted, self.cured)),
+                other_light: OTHER_LIGHT.map(|times| other_light(self, times)),
+                aside: self.wanted.map(|wanted| aside(wanted, self.cured)),
+            },
+        }
     }
 
     /// Returns lines about it, for people.
@@ -85,50 +208,47 @@ impl CuredRings<'_> {
     }
 }
 
-fn bitmaps(of: &CuredRings<'_>) -> Vec<Value> {
+fn bitmaps(of: &CuredRings<'_>) -> Vec<RingBitmap> {
     let grown = of.simulation.growth(of.exposures);
-    let bitmap = |(exposure, after): (&RingExposure, &Profile)| {
-        let rings: Vec<_> = exposure.rings.iter().map(|ring| [ring.start, ring.end]).collect();
-        json!({
-            "rings": rings,
-            "exposure_ms": rounded(exposure.time.ms()),
-            "sag_um": rounded(after.sag_um()),
-            "base_radius_um": rounded(after.base_um),
-        })
+    let bitmap = |(exposure, after): (&RingExposure, &Profile)| RingBitmap {
+        rings: exposure.rings.iter().map(|ring| [ring.start, ring.end]).collect(),
+        exposure_ms: rounded(exposure.time.ms()),
+        sag_um: rounded(after.sag_um()),
+        base_radius_um: rounded(after.base_um),
     };
     of.exposures.iter().zip(&grown).map(bitmap).collect()
 }
 
-fn shape(cured: &Profile) -> Value {
-    json!({
-        "sag_um": rounded(cured.sag_um()),
-        "highest_um": rounded(cured.highest_um()),
-        "base_radius_um": rounded(cured.base_um),
-    })
+fn shape(cured: &Profile) -> RingShape {
+    RingShape {
+        sag_um: rounded(cured.sag_um()),
+        highest_um: rounded(cured.highest_um()),
+        base_radius_um: rounded(cured.base_um),
+    }
 }
 
-fn measures(wanted: &WantedProfile, cured: &Profile) -> Value {
+fn measures(wanted: &WantedProfile, cured: &Profile) -> RingMeasures {
     let [low, high] = wanted.extremes_um(cured);
-    json!({
-        "rms_um": rounded(wanted.rms_um(cured)),
-        "most_too_low_um": rounded(low),
-        "most_too_high_um": rounded(high),
-    })
+    RingMeasures {
+        rms_um: rounded(wanted.rms_um(cured)),
+        most_too_low_um: rounded(low),
+        most_too_high_um: rounded(high),
+    }
 }
 
-fn other_light(of: &CuredRings<'_>, times: f64) -> Value {
+fn other_light(of: &CuredRings<'_>, times: f64) -> OtherLight {
     // The reaction is not linear in light, so it is stepped again.
     let cured = of.simulation.under(times).cure(of.exposures);
-    let mut fields = shape(&cured);
-    fields["light"] = json!(times);
-    fields["rms_um"] = json!(of.wanted.map(|wanted| rounded(wanted.rms_um(&cured))));
-    fields
+    OtherLight {
+        shape: shape(&cured),
+        light: times,
+        rms_um: of.wanted.map(|wanted| rounded(wanted.rms_um(&cured))),
+    }
 }
 
 /// All bitmaps come from one display, so a part that lies aside does so as a whole.
-fn aside(wanted: &WantedProfile, cured: &Profile) -> Value {
-    let one = |um| json!({ "aside_um": um, "rms_um": rounded(wanted.rms_aside_um(cured, um)) });
-    Value::Array(ASIDE_UM.map(one).to_vec())
+fn aside(wanted: &WantedProfile, cured: &Profile) -> [Aside; ASIDE_UM.len()] {
+    ASIDE_UM.map(|um| Aside { aside_um: um, rms_um: rounded(wanted.rms_aside_um(cured, um)) })
 }
 
 fn seconds(exposures: &[RingExposure]) -> f64 {

@@ -11,12 +11,14 @@ mod target;
 use lamp_planning::target::HeightMap;
 use lamp_planning::{PlanPages, ShownBitmap};
 use lamp_stack::Length;
+use serde::Serialize;
 use serde_json::Value;
 
 pub use column_cure::{BitmapCount, ColumnCure, ColumnCureSettings, LongestTime, SearchGap};
-pub use column_measures::{measures_fields, measures_line, unmeasured_heights};
-pub use ecpl::{EcplSettings, RingCure, kinetic_setting, map_grid};
-pub use kinetics_report::CuredRings;
+pub use column_measures::{MeasuresReport, measures_line, measures_report, unmeasured_heights};
+pub use column_report::ColumnCureReport;
+pub use ecpl::{EcplReport, EcplSettings, RingCure, kinetic_setting, map_grid};
+pub use kinetics_report::{CuredRings, RingBitmap, RingOutcome, RingSetting, RingsReport};
 pub use target::{GivenTarget, TargetSettings};
 
 /// Bitmaps, and the part that they cure, as the folder of a plan has them.
@@ -44,4 +46,9 @@ impl GlassPlan {
         let Self { part, command, pitch, bitmaps, .. } = self;
         PlanPages { part, command, pitch: *pitch, bitmaps }
     }
+}
+
+/// Returns a report as JSON.
+fn json_of(report: &impl Serialize) -> Value {
+    serde_json::to_value(report).expect("reports have text keys")
 }

@@ -125,6 +125,7 @@ pub struct Overhang {
 /// How the pixel of an overhang that reaches farthest is held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum HeldAt {
     /// At one side: a cantilever.
     #[default]
@@ -165,6 +166,7 @@ pub enum PocketKind {
 
 /// The effect of a pocket on a build.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename_all = "kebab-case"))]
 pub enum PocketEffect {
     /// Resin stays in it when the part is lifted out of the resin and taken off the platform:
     /// forever, or until the part is turned.

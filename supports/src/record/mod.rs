@@ -24,7 +24,9 @@ pub use scale::Scale;
 /// its [name](Self::name). JSON leaves out some numbers of the text, so text is made before
 /// records are written. Keys that are absent in JSON are read as zero or null.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[cfg_attr(feature = "schema", schemars(description = "A finding, by its kind."))]
 #[non_exhaustive]
 pub enum FindingRecord {
     /// Rows that pages call stray.
@@ -131,6 +133,7 @@ pub enum ShownMoment {
 
 /// Layers with stray rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct StrayRowsRecord {
     /// The layers.
@@ -143,6 +146,7 @@ pub struct StrayRowsRecord {
 
 /// White that rests on nothing when it is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct IslandRecord {
     /// Its number among islands, as they begin.
@@ -159,23 +163,23 @@ pub struct IslandRecord {
     /// Their area.
     #[serde(flatten)]
     pub area: AreaRecord,
-    /// The rectangle around all that floats until it joins, as in [`BoxRecord::box_px`].
+    /// The rectangle around all that floats until it joins, as `box_px`.
     pub floating_box_px: [u32; 4],
     /// The pixels of the layers until it joins.
     pub floating_px: u64,
-    /// Their volume.
+    /// Their volume, in cubic millimeters.
     pub floating_mm3: Option<f64>,
-    /// The last layer in which it floats.
+    /// The index of the last layer in which it floats.
     pub last_layer: u32,
-    /// The layer in which it joins.
+    /// The index of the layer in which it joins another body.
     pub joins: Option<u32>,
     /// The body that it joins.
     pub into: Option<Joined>,
     /// The most pixels that float in one layer.
     pub largest_px: u64,
-    /// Their area.
+    /// Their area, in square millimeters.
     pub largest_mm2: Option<f64>,
-    /// The first layer that has them.
+    /// The index of the first layer that has them.
     pub largest_layer: u32,
     /// How hard the recoating blade drags on them, in millinewtons.
     pub drag_mn: Option<f64>,
@@ -186,6 +190,7 @@ pub struct IslandRecord {
 
 /// The body that an island joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum Joined {
     /// A larger island, by its number.
@@ -196,6 +201,7 @@ pub enum Joined {
 
 /// The word `part`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum PartWord {
     /// The only one.
@@ -204,21 +210,24 @@ pub enum PartWord {
 
 /// A minimum of a part's mesh where no island begins.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct MinimumRecord {
     /// The index of its layer.
     pub layer: u32,
-    /// x and y in the part's coordinates.
+    /// x and y in the part's coordinates, in millimeters.
     pub at_mm: [f64; 2],
-    /// Its height.
+    /// Its height, in millimeters.
     pub z_mm: f64,
-    /// The height by which the surface rises from it.
+    /// The height by which the surface rises from it until it meets another, in millimeters.
     #[serde(serialize_with = "to_nm")]
+    #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub depth_mm: f64,
 }
 
 /// An island that begins at no minimum of a part's mesh.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct DoubtfulIslandRecord {
     /// Its number among islands.
@@ -226,12 +235,13 @@ pub struct DoubtfulIslandRecord {
     /// The layer where it begins.
     #[serde(flatten)]
     pub layer: LayerPlace,
-    /// x and y of the mean of its pixels there.
+    /// x and y of the mean of its pixels there, in the part's coordinates, in millimeters.
     pub at_mm: Option<[f64; 2]>,
 }
 
 /// White that rests on little.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct JointRecord {
     /// The layer.
@@ -248,7 +258,7 @@ pub struct JointRecord {
     pub area: AreaRecord,
     /// The pixels above white.
     pub support_px: u64,
-    /// Their share.
+    /// Their share of the component, in percent.
     pub support_percent: f64,
     /// Their area, which JSON does not have.
     #[serde(skip)]
@@ -260,6 +270,7 @@ pub struct JointRecord {
 
 /// Black that holds resin.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct PocketRecord {
     /// The layers.
@@ -270,16 +281,17 @@ pub struct PocketRecord {
     pub bounds: BoxRecord,
     /// Its pixels in all layers.
     pub volume_px: u64,
-    /// Their volume.
+    /// Their volume, in cubic millimeters.
     pub volume_mm3: Option<f64>,
     /// Whether resin stays in it, or suction pulls at it.
     #[serde(serialize_with = "name_of", deserialize_with = "named")]
+    #[cfg_attr(feature = "schema", schemars(with = "PocketEffect"))]
     pub effect: PocketEffect,
-    /// The height of a cup's rim above its lowest layer's bottom.
+    /// Of a cup: the height of its rim above its lowest layer's bottom, in millimeters.
     pub depth_mm: Option<f64>,
-    /// The height of a cup's rim.
+    /// Of a cup: the height of its rim, in millimeters.
     pub rim_mm: Option<f64>,
-    /// The index of the layer in which a cup gets out over its rim; `None` also if the stack ends
+    /// Of a cup: the index of the layer in which it gets out over its rim; null also if the stack ends
     /// there.
     pub rim_layer: Option<u32>,
     /// The middle of the rectangle, which JSON does not have.
@@ -292,6 +304,7 @@ pub struct PocketRecord {
 
 /// White that reaches far beyond the white below.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct OverhangRecord {
     /// The layers.
@@ -303,7 +316,7 @@ pub struct OverhangRecord {
     /// The rectangle around all.
     #[serde(flatten)]
     pub bounds: BoxRecord,
-    /// Its distance from white below, in pixels.
+    /// Its distance from white below, in widths of a pixel.
     pub reach_px: f64,
     /// The same in millimeters.
     pub reach_mm: Option<f64>,
@@ -325,6 +338,7 @@ pub struct OverhangRecord {
 
 /// A body whose center of gravity leaves its base as it is built.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct OffBalanceRecord {
     /// The first layer after which it is off.
@@ -339,14 +353,15 @@ pub struct OffBalanceRecord {
     /// The center of gravity then.
     #[serde(flatten)]
     pub at: PointRecord,
-    /// The rectangle around the body's first layer, as in [`BoxRecord::box_mm`].
+    /// The rectangle around the body's first layer, as `box_mm`.
     pub base_box_mm: Option<[f64; 4]>,
-    /// The same in pixels, as in [`BoxRecord::box_px`].
+    /// The same in pixels, as `box_px`.
     pub base_box_px: [u32; 4],
 }
 
 /// A copy of a part on a build that differs from most of the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct CopyRecord {
     /// The first and the last layer in which it differs.
@@ -367,6 +382,7 @@ pub struct CopyRecord {
 
 /// Layers with white at the border of the image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct BorderRecord {
     /// The layers.
@@ -376,6 +392,7 @@ pub struct BorderRecord {
 
 /// Layers without white.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct EmptyRecord {
     /// The layers.

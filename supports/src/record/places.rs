@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 
 /// A layer, written as `layer 80 (z 8.00 mm)`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct LayerPlace {
-    /// The index that its page states.
+    /// The index that the layer's page states.
     pub layer: u32,
-    /// The height of its bottom.
+    /// The height of the layer's bottom, in millimeters.
     pub z_mm: Option<f64>,
 }
 
@@ -24,13 +25,14 @@ impl fmt::Display for LayerPlace {
 
 /// Layers that follow each other, written as `layers 80 to 96 (z 8.00 to 9.60 mm)`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct LayerSpan {
-    /// The index of the first.
+    /// The index of the first layer.
     pub layer: u32,
-    /// The index of the last.
+    /// The index of the last layer.
     pub last_layer: u32,
-    /// The height of the bottom of the first.
+    /// The height of the bottom of the first layer, in millimeters.
     pub z_mm: Option<f64>,
     /// The height of the bottom of the last, which JSON does not have.
     #[serde(skip)]
@@ -52,11 +54,12 @@ impl fmt::Display for LayerSpan {
 
 /// A point, written as `x 12.30, y -4.25 mm`, or as a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct PointRecord {
-    /// x and y in the part's coordinates.
+    /// The place: x and y in the part's coordinates, in millimeters.
     pub at_mm: Option<[f64; 2]>,
-    /// The column and the row.
+    /// The place: the column and the row, in pixels.
     pub at_px: [f64; 2],
 }
 
@@ -73,21 +76,23 @@ impl fmt::Display for PointRecord {
 
 /// A rectangle.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct BoxRecord {
-    /// Least x, greatest x, least y and greatest y in the part's coordinates.
+    /// Least x, greatest x, least y and greatest y in the part's coordinates, in millimeters.
     pub box_mm: Option<[f64; 4]>,
-    /// The first column, the end of the columns, the first row and the end of the rows.
+    /// The first column, the one after the last, the first row and the one after the last.
     pub box_px: [u32; 4],
 }
 
 /// An area, written in square millimeters, or in pixels.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct AreaRecord {
-    /// In pixels.
+    /// Area in pixels.
     pub area_px: u64,
-    /// In square millimeters.
+    /// Area in square millimeters.
     pub area_mm2: Option<f64>,
 }
 

@@ -9,7 +9,7 @@ use lamp_machine::Machine;
 use lamp_pipeline::documents::document;
 use lamp_pipeline::heights::time_text;
 use lamp_stack::{Image, IndexedStack, Mask, Page, PageInfo};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::night_file::NightFile;
 use super::task::LampCommands;
@@ -29,6 +29,22 @@ pub(super) struct MachineTime {
     is_open: bool,
     /// Sentences about missing numbers, and how to give them.
     missing: Vec<String>,
+}
+
+/// The time that the machine takes for a build or a part.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(super) struct StackTime<'a> {
+    /// Its name.
+    name: &'a str,
+    /// Number of its layers, as far as they are known.
+    layers: u64,
+    /// Time in seconds; null if a number is missing.
+    build_s: Option<f64>,
+    /// Sum of all that is known, in seconds.
+    least_s: Option<f64>,
+    /// Sentences about missing numbers, and how to give them.
+    missing: &'a [String],
 }
 
 impl MachineTime {
@@ -185,15 +201,15 @@ impl MachineTime {
         text
     }
 
-    pub(super) fn json(&self) -> Value {
-        let time = self.time.as_ref();
-        json!({
-            "name": self.name,
-            "layers": self.layers,
-            "build_s": self.whole_s(),
-            "least_s": time.map(BuildTime::least_s),
-            "missing": self.missing,
-        })
+    /// Returns the time as programs read it.
+    pub(super) fn answer(&self) -> StackTime<'_> {
+        StackTime {
+            name: &self.name,
+            layers: self.layers,
+            build_s: self.whole_s(),
+            least_s: self.time.as_ref().map(BuildTime::least_s),
+            missing: &self.missing,
+        }
     }
 }
 

@@ -4,14 +4,29 @@ use std::io::{self, Write};
 use std::process::{Command, Stdio};
 
 use lamp_batch::Summary;
-use serde_json::json;
+use serde::Serialize;
 
+use crate::output::json_report::schemas;
 use crate::terminal::progress::Progress;
+
+/// The end of a batch, on the standard input of the command of `lamp batch NIGHT.toml --notify`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct BatchNote<'a> {
+    schema: &'static str,
+    /// The exit status of the batch.
+    status: u8,
+    /// The state of each part and build.
+    summary: &'a Summary,
+}
+
+schemas! { "lamp-batch-1": BatchNote<'_>; }
 
 /// Runs a command by the shell, with a summary on its input and the status in its environment. A
 /// failure only prints a warning.
 pub(super) fn notify(command: &str, status: u8, summary: &Summary, progress: &Progress) {
-    let text = json!({ "schema": "lamp-batch-1", "status": status, "summary": summary });
+    let note = BatchNote { schema: "lamp-batch-1", status, summary };
+    let text = serde_json::to_string(&note).expect("notes have text keys");
     match run(command, status, &format!("{text}\n")) {
         Ok(0) => {}
         Ok(failed) => progress.warn(&format!("--notify: {command} ended with status {failed}")),

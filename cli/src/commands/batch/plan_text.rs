@@ -6,20 +6,86 @@ use lamp_batch::{Cost, Deliverer, DiskRoom, Forecast, Key, Kind, Ledger, Local, 
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 
-use serde_json::json;
+use serde::Serialize;
 
 use super::PlanArgs;
-use super::machine_time::{Clock, MachineTime};
+use super::machine_time::{Clock, MachineTime, StackTime};
 use super::night_file::NightFile;
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::json_report::write_answer;
+use crate::output::json_report::{schemas, write_answer};
 use crate::output::numbers::number_of;
 use crate::streams::print;
 use crate::terminal::progress::printable;
 
 /// The stacks whose times on the machine are listed.
 const MOST_STACKS: usize = 12;
+
+/// The work of a night before it starts, by `lamp batch plan NIGHT.toml --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct PlanAnswer<'a> {
+    /// Number of tasks.
+    tasks: usize,
+    /// Number of tasks to do.
+    to_do: usize,
+    /// Estimated cost of the tasks to do.
+    cost: Cost,
+    /// Kinds of tasks.
+    kinds: Vec<KindOfTasks>,
+    /// Parts and builds that cannot be made.
+    cannot_be_made: Vec<Unmakeable<'a>>,
+    /// A sentence if the disk has too little room.
+    disk_shortage: Option<String>,
+    /// Number of threads that the expected times are for.
+    threads: usize,
+    /// Least expected time of the tasks to do, in seconds.
+    least_s: f64,
+    /// Greatest expected time of the tasks to do, in seconds; null if kinds of tasks are unknown.
+    most_s: Option<f64>,
+    /// Number of earlier tasks that the expected times are from.
+    earlier_tasks: usize,
+    /// Kinds of tasks without a known time.
+    unknown: Vec<UnknownTasks>,
+    /// Times that the machine takes for each build, and for parts in no build.
+    machine_times: Vec<StackTime<'a>>,
+}
+
+/// Tasks whose time is not known, as none of their kind was done before.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct UnknownTasks {
+    /// Name of their kind.
+    kind: &'static str,
+    /// Number of them to do.
+    tasks: usize,
+}
+
+/// A kind of tasks.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct KindOfTasks {
+    /// Its name.
+    kind: &'static str,
+    /// Number of its tasks.
+    tasks: usize,
+    /// Number of its tasks to do.
+    to_do: usize,
+    /// Estimated cost of its tasks to do.
+    cost: Cost,
+}
+
+/// A part or build that cannot be made.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Unmakeable<'a> {
+    /// Its name.
+    name: &'a str,
+    /// Why it cannot be made.
+    why: String,
+}
+
+schemas! { "lamp-batch-plan-1": PlanAnswer<'_>; }
 
 pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(&args.night.night)?;
@@ -75,28 +141,31 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     }
     let Some(path) = args.night.report.path() else { return Ok(()) };
     let faults = plan.subjects.iter().filter_map(|subject| {
-        let why = subject.wanted.as_ref().err()?;
-        Some(json!({ "name": subject.name, "why": why.to_string() }))
+        let why = subject.wanted.as_ref().err()?.to_string();
+        Some(Unmakeable { name: &subject.name, why })
     });
-    let kinds = kinds.iter().map(|(kind, (all, to_do, cost))| {
-        json!({ "kind": kind.name(), "tasks": all, "to_do": to_do, "cost": cost })
+    let kinds = kinds.iter().map(|(kind, (all, to_do, cost))| KindOfTasks {
+        kind: kind.name(),
+        tasks: *all,
+        to_do: *to_do,
+        cost: *cost,
     });
     let unknown = forecast.unknown.iter();
-    let unknown = unknown.map(|(kind, tasks)| json!({ "kind": kind.name(), "tasks": tasks }));
-    let answer = json!({
-        "tasks": plan.graph.keys().len(),
-        "to_do": to_do.len(),
-        "cost": cost,
-        "kinds": kinds.collect::<Vec<_>>(),
-        "cannot_be_made": faults.collect::<Vec<_>>(),
-        "disk_shortage": shortage,
-        "threads": local.jobs,
-        "least_s": forecast.seconds[0],
-        "most_s": wait_s,
-        "earlier_tasks": forecast.earlier,
-        "unknown": unknown.collect::<Vec<_>>(),
-        "machine_times": machine_times.iter().map(MachineTime::json).collect::<Vec<_>>(),
-    });
+    let unknown = unknown.map(|(kind, tasks)| UnknownTasks { kind: kind.name(), tasks: *tasks });
+    let answer = PlanAnswer {
+        tasks: plan.graph.keys().len(),
+        to_do: to_do.len(),
+        cost,
+        kinds: kinds.collect(),
+        cannot_be_made: faults.collect(),
+        disk_shortage: shortage,
+        threads: local.jobs,
+        least_s: forecast.seconds[0],
+        most_s: wait_s,
+        earlier_tasks: forecast.earlier,
+        unknown: unknown.collect(),
+        machine_times: machine_times.iter().map(MachineTime::answer).collect(),
+    };
     write_answer("lamp-batch-plan-1", &answer, path)
 }
 

@@ -4,16 +4,28 @@ use std::collections::BTreeMap;
 
 use lamp_batch::{Deliverer, Key, Ledger, SubjectState, SubjectSummary, Summary, events};
 
-use serde_json::json;
+use serde::Serialize;
 
 use super::NightArgs;
 use super::night_file::NightFile;
 use super::run::counts;
 use crate::args::options::Common;
 use crate::exit::Exit;
-use crate::output::json_report::write_answer;
+use crate::output::json_report::{schemas, write_answer};
 use crate::streams::print;
 use crate::terminal::progress::printable;
+
+/// The state of each part and build of a night, by `lamp batch status NIGHT.toml --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct StatusAnswer {
+    /// Number of tasks to do.
+    tasks_to_do: usize,
+    #[serde(flatten)]
+    summary: Summary,
+}
+
+schemas! { "lamp-batch-status-1": StatusAnswer; }
 
 pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
     let file = NightFile::open(&args.night)?;
@@ -53,8 +65,7 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
         print(&text)?;
     }
     let Some(path) = args.report.path() else { return Ok(()) };
-    let answer =
-        json!({ "tasks_to_do": to_do.len(), "parts": summary.parts, "builds": summary.builds });
+    let answer = StatusAnswer { tasks_to_do: to_do.len(), summary };
     write_answer("lamp-batch-status-1", &answer, path)
 }
 

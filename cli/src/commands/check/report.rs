@@ -3,16 +3,52 @@
 use std::path::Path;
 
 use lamp_machine::Recoating;
+use lamp_stack::Pitch;
 use lamp_supports::{Feature, FindingRecord, IslandRecord, Scale};
 use serde::Serialize;
-use serde_json::json;
 
 use super::CheckedInput;
 use crate::exit::Exit;
-use crate::output::json_report::JsonReport;
+use crate::output::json_report::{JsonReport, schemas};
 
-/// The form of the report.
-const SCHEMA: &str = "lamp-check-2";
+/// Findings in stacks, by `lamp check --report`: the lists `inputs`, `features`, `findings` and `specks`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CheckHead {}
+
+/// A stack that was checked.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct InputLine<'a> {
+    /// Name of the stack, as given.
+    input: &'a str,
+    /// Number of layers.
+    layers: usize,
+    /// Width of the images, in pixels.
+    width_px: u32,
+    /// Height of the images, in pixels.
+    height_px: u32,
+    /// Resolution of the images.
+    dpi: Option<Pitch>,
+    /// Number of features that need a person.
+    findings: usize,
+    /// Number of specks.
+    specks: u64,
+    /// Number of findings that are left out, as a person accepts them.
+    accepted: usize,
+    /// Of a build: why it is checked as it stands.
+    note: Option<String>,
+    /// Number of findings and specks that the lists leave out.
+    left_out: u64,
+}
+
+schemas! {
+    "lamp-check-2": CheckHead,
+        "inputs": [InputLine<'_>],
+        "features": [FeatureOfInput],
+        "findings": [OfInput<lamp_pipeline::check::PlacedFinding<FindingRecord>>],
+        "specks": [OfInput<FindingRecord>];
+}
 
 /// Writes the findings in all inputs, and the specks.
 pub(super) fn write_report(
@@ -22,18 +58,18 @@ pub(super) fn write_report(
 ) -> Result<(), Exit> {
     let inputs = checked.iter().map(|checked| {
         let findings = &checked.found.findings;
-        json!({
-            "input": checked.name,
-            "layers": findings.layers.len(),
-            "width_px": findings.size[0],
-            "height_px": findings.size[1],
-            "dpi": findings.pitch,
-            "findings": checked.found.count(),
-            "specks": findings.specks.count(),
-            "accepted": checked.found.accepted,
-            "note": checked.found.whole_build(),
-            "left_out": findings.left_out(),
-        })
+        InputLine {
+            input: &checked.name,
+            layers: findings.layers.len(),
+            width_px: findings.size[0],
+            height_px: findings.size[1],
+            dpi: findings.pitch,
+            findings: checked.found.count(),
+            specks: findings.specks.count(),
+            accepted: checked.found.accepted,
+            note: checked.found.whole_build(),
+            left_out: findings.left_out(),
+        }
     });
     let findings = checked.iter().enumerate().flat_map(|(input, checked)| {
         checked.found.placed().map(move |finding| OfInput { finding, input })
@@ -63,7 +99,7 @@ pub(super) fn write_report(
             OfInput { finding, input }
         })
     });
-    JsonReport::new(&json!({ "schema": SCHEMA }))
+    JsonReport::of_schema("lamp-check-2", &CheckHead {})
         .list("inputs", inputs)
         .list("features", features)
         .list("findings", findings)
@@ -73,16 +109,20 @@ pub(super) fn write_report(
 
 /// A finding and the number of its input.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct OfInput<F> {
     #[serde(flatten)]
     finding: F,
+    /// Place of its input in the list of inputs, from 0.
     input: usize,
 }
 
 /// A feature, and the number of its input.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct FeatureOfInput {
     #[serde(flatten)]
     feature: Feature,
+    /// Place of its input in the list of inputs, from 0.
     input: usize,
 }

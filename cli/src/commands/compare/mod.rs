@@ -50,7 +50,7 @@ pub(crate) struct CompareArgs {
     /// A pixel that differs is forgiven if, within this distance, A also has the color that B has
     /// at the pixel, and B also has the color that A has there. Gaps that close and walls that
     /// appear or vanish are still reported
-    #[arg(long, value_name = "DISTANCE")]
+    #[arg(long, value_name = "LENGTH")]
     tolerance: Option<Tolerance>,
 
     /// Draw the layer with the most pixels that differ: added ones in orange, missing ones in blue

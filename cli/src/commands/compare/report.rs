@@ -5,9 +5,9 @@ use std::cmp::Reverse;
 use lamp_stack::to_nm;
 use lamp_stack::{PageHeader, Pairing};
 use serde::Serialize;
-use serde_json::{Value, json};
 
 use super::walk::{DifferenceBox, SectionDifference};
+use crate::output::json_report::schemas;
 use crate::output::numbers::{grouped, number_of};
 use crate::terminal::progress::printable;
 
@@ -160,50 +160,117 @@ fn box_mm(
     Some([x0, x1, y0, y1])
 }
 
+/// Differences of two stacks, by `lamp compare A B --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(super) struct CompareAnswer<'a> {
+    /// Name of the first stack.
+    a: &'a str,
+    /// Name of the second stack.
+    b: &'a str,
+    /// Whether nothing differs.
+    same: bool,
+    /// Pairing of layers: by `heights` or by `indices`.
+    by: &'static str,
+    /// Number of compared pairs.
+    compared: usize,
+    /// Number of pairs that differ.
+    different: usize,
+    /// Distance within which edges may differ, in widths of a pixel.
+    tolerance_px: f64,
+    /// Pixels that are brighter in the second stack, in all layers.
+    added_px: u64,
+    /// Pixels that are darker in the second stack, in all layers.
+    missing_px: u64,
+    /// Pixels that differ within the tolerance, in all layers.
+    forgiven_px: u64,
+    /// Layers with such pixels, from the bottom up.
+    layers: Vec<ComparedLayer>,
+}
+
+/// A pair of layers with pixels that differ.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ComparedLayer {
+    /// Index of the first stack's layer, or null if it has none.
+    layer_a: Option<u32>,
+    /// Index of the second stack's layer, or null if it has none.
+    layer_b: Option<u32>,
+    /// Bottom of what was compared, in millimeters.
+    bottom_mm: Option<f64>,
+    /// Top of what was compared, in millimeters.
+    top_mm: Option<f64>,
+    /// Pixels that are brighter in the second stack.
+    added_px: u64,
+    /// Pixels that are darker in the second stack.
+    missing_px: u64,
+    /// Pixels that differ within the tolerance.
+    forgiven_px: u64,
+    /// Number of boxes with pixels that differ.
+    box_count: u64,
+    /// The largest boxes, at most 100.
+    boxes: Vec<ComparedBox>,
+}
+
+/// A box around pixels that differ.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ComparedBox {
+    /// Number of its pixels that differ.
+    pixels: u64,
+    /// First column and the one after the last, first row and the one after the last, in the first
+    /// stack's layer, or in the second stack's where the first has none; may be negative.
+    box_px: [i64; 4],
+    /// Least x, greatest x, least y and greatest y, in millimeters.
+    box_mm: Option<[f64; 4]>,
+}
+
+schemas! { "lamp-compare-1": CompareAnswer<'_>; }
+
 /// Returns the answer for scripts.
-pub(super) fn answer(comparison: &StackComparison<'_>) -> impl Serialize {
+pub(super) fn answer<'a>(comparison: &'a StackComparison<'_>) -> CompareAnswer<'a> {
     let page = |stack: usize, position: Option<usize>| {
         position.map(|position| comparison.headers[stack][position].info.index)
     };
     let layers = comparison.sections.iter().map(|found| {
         let mm = |end: usize| found.section.heights_um.map(|ends| to_nm(ends[end] / 1000.0));
-        json!({
-            "layer_a": page(0, found.section.a),
-            "layer_b": page(1, found.section.b),
-            "bottom_mm": mm(0),
-            "top_mm": mm(1),
-            "added_px": found.added,
-            "missing_px": found.missing,
-            "forgiven_px": found.forgiven,
-            "box_count": found.box_count,
-            "boxes": found.boxes.iter().map(|each| box_json(comparison, found, each)).collect::<Vec<_>>(),
-        })
+        let boxes = found.boxes.iter().map(|each| compared_box(comparison, found, each));
+        ComparedLayer {
+            layer_a: page(0, found.section.a),
+            layer_b: page(1, found.section.b),
+            bottom_mm: mm(0),
+            top_mm: mm(1),
+            added_px: found.added,
+            missing_px: found.missing,
+            forgiven_px: found.forgiven,
+            box_count: found.box_count,
+            boxes: boxes.collect(),
+        }
     });
-    json!({
-        "a": comparison.names[0],
-        "b": comparison.names[1],
-        "same": comparison.is_same(),
-        "by": if comparison.pairing.is_by_height() { "heights" } else { "indices" },
-        "compared": comparison.pairing.sections().len(),
-        "different": comparison.told().count(),
-        // In widths of a pixel.
-        "tolerance_px": comparison.tolerance[0],
-        "added_px": comparison.sum(|found| found.added),
-        "missing_px": comparison.sum(|found| found.missing),
-        "forgiven_px": comparison.sum(|found| found.forgiven),
-        "layers": layers.collect::<Vec<_>>(),
-    })
+    CompareAnswer {
+        a: &comparison.names[0],
+        b: &comparison.names[1],
+        same: comparison.is_same(),
+        by: if comparison.pairing.is_by_height() { "heights" } else { "indices" },
+        compared: comparison.pairing.sections().len(),
+        different: comparison.told().count(),
+        tolerance_px: comparison.tolerance[0],
+        added_px: comparison.sum(|found| found.added),
+        missing_px: comparison.sum(|found| found.missing),
+        forgiven_px: comparison.sum(|found| found.forgiven),
+        layers: layers.collect(),
+    }
 }
 
-fn box_json(
+fn compared_box(
     comparison: &StackComparison<'_>,
     found: &SectionDifference,
     each: &DifferenceBox,
-) -> Value {
+) -> ComparedBox {
     let ([left, right], [top, bottom]) = (each.columns, each.rows);
-    json!({
-        "pixels": each.pixels,
-        "box_px": [left, right, top, bottom],
-        "box_mm": box_mm(comparison, found, each),
-    })
+    ComparedBox {
+        pixels: each.pixels,
+        box_px: [left, right, top, bottom],
+        box_mm: box_mm(comparison, found, each),
+    }
 }

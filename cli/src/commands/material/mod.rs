@@ -11,12 +11,12 @@ use lamp_grayscale::material::Material;
 use lamp_grayscale::resin::{DepthRange, Dose, ExposureTime, Intensity, Resin, Spread};
 use lamp_pipeline::documents;
 use lamp_stack::Length;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::args::options::Common;
 use crate::catalogue;
 use crate::exit::Exit;
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::streams::{input_name, print};
 
 /// List, show, check or make materials: how deep light cures a resin
@@ -66,9 +66,9 @@ enum MaterialAction {
 
 pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     match &args.action {
-        MaterialAction::List { json: true } => answer(catalogue::named::<Material>()),
+        MaterialAction::List { json: true } => answer(&catalogue::named::<Material>()),
         MaterialAction::List { json: false } => print(&table()),
-        MaterialAction::Show { material, json: true } => answer([documents::document(material)?]),
+        MaterialAction::Show { material, json: true } => answer(&[documents::document(material)?]),
         MaterialAction::Show { material, json: false } => catalogue::show::<Material>(material),
         MaterialAction::Check { file, json } => check(file, *json),
         MaterialAction::Make(args) => make::run(args, common),
@@ -76,13 +76,60 @@ pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
     }
 }
 
-fn answer(materials: impl IntoIterator<Item = Material>) -> Result<(), Exit> {
-    let materials: Vec<Value> = materials.into_iter().map(|material| fields(&material)).collect();
-    print_answer("lamp-material-1", &json!({ "materials": materials }))
+/// Materials, by `lamp material list --json`, `lamp material show M --json` and
+/// `lamp material check FILE --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct MaterialAnswer<'a> {
+    /// The built-in materials and your own, or the named one.
+    materials: Vec<MaterialFields<'a>>,
 }
 
 /// The known properties of a material, and their consequences.
-fn fields(material: &Material) -> Value {
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct MaterialFields<'a> {
+    /// Its name.
+    name: &'a str,
+    /// Its description.
+    description: &'a str,
+    /// Light of a wide field of full white, in milliwatts a square centimeter, to six digits.
+    light_mw_per_cm2: Option<f64>,
+    /// Standard deviation of a pixel's light, in micrometers; null if there are two.
+    spread_um: Option<f64>,
+    /// Standard deviation of a pixel's light across the scan, in micrometers.
+    spread_across_um: Option<f64>,
+    /// Standard deviation of a pixel's light along the scan, in micrometers.
+    spread_along_um: Option<f64>,
+    /// Exponent of light over gray level.
+    gamma: Option<f64>,
+    /// Tables of cure models.
+    models: Vec<&'static str>,
+    /// Sides of squares with a known cure width, in micrometers.
+    cure_width_um: Vec<f64>,
+    /// Least and greatest depth of the model in use, in micrometers; null without a greatest.
+    depths_um: Option<[Option<f64>; 2]>,
+    /// Least and greatest measured dose of the model in use, in millijoules a square centimeter.
+    measured_mj_per_cm2: Option<[f64; 2]>,
+    /// Thickness of an example layer, 100 if possible, in micrometers.
+    layer_um: Option<f64>,
+    /// Time in which full white cures the example layer, in milliseconds.
+    exposure_ms: Option<f64>,
+    /// Why there is no such time.
+    why_not: Option<String>,
+    /// The file itself, its numbers as texts with units.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
+    given: &'a Material,
+}
+
+schemas! { "lamp-material-1": MaterialAnswer<'_>; }
+
+fn answer(materials: &[Material]) -> Result<(), Exit> {
+    let materials = materials.iter().map(fields).collect();
+    print_answer("lamp-material-1", &MaterialAnswer { materials })
+}
+
+fn fields(material: &Material) -> MaterialFields<'_> {
     let resin = material.resin();
     let example = resin.as_ref().ok().map(example);
     let why = match (&resin, &example) {
@@ -94,23 +141,25 @@ fn fields(material: &Material) -> Value {
     let depths = resin.as_ref().ok().map(|resin| resin.model().depths());
     let time = example.as_ref().and_then(|(_, time)| time.as_ref().ok());
     let spread = spread_of(material);
-    json!({
-        "name": material.name,
-        "description": material.description,
-        "light_mw_per_cm2": light_of(material).map(Intensity::mw_per_cm2),
-        "spread_um": spread.and_then(|spread| spread.sigma()).map(Length::um),
-        "spread_across_um": spread.map(|spread| spread.across().um()),
-        "spread_along_um": spread.map(|spread| spread.along().um()),
-        "gamma": material.gamma.as_ref().map(|gamma| gamma.value),
-        "models": models(material),
-        "cure_width_um": material.cure_width.iter().map(|it| it.feature_size.um()).collect::<Vec<_>>(),
-        "depths_um": depths.map(|depths| [Some(depths.from.um()), depths.to.map(Length::um)]),
-        "measured_mj_per_cm2": material.measured().map(|range| [range.doses.from, range.doses.to].map(Dose::mj_per_cm2)),
-        "layer_um": example.as_ref().map(|(layer, _)| layer.um()),
-        "exposure_ms": time.map(|time| time.ms()),
-        "why_not": why,
-        "given": material,
-    })
+    MaterialFields {
+        name: &material.name,
+        description: &material.description,
+        light_mw_per_cm2: light_of(material).map(Intensity::mw_per_cm2),
+        spread_um: spread.and_then(|spread| spread.sigma()).map(Length::um),
+        spread_across_um: spread.map(|spread| spread.across().um()),
+        spread_along_um: spread.map(|spread| spread.along().um()),
+        gamma: material.gamma.as_ref().map(|gamma| gamma.value),
+        models: models(material),
+        cure_width_um: material.cure_width.iter().map(|it| it.feature_size.um()).collect(),
+        depths_um: depths.map(|depths| [Some(depths.from.um()), depths.to.map(Length::um)]),
+        measured_mj_per_cm2: material
+            .measured()
+            .map(|range| [range.doses.from, range.doses.to].map(Dose::mj_per_cm2)),
+        layer_um: example.as_ref().map(|(layer, _)| layer.um()),
+        exposure_ms: time.map(|time| time.ms()),
+        why_not: why,
+        given: material,
+    }
 }
 
 /// A line for each built-in material.
@@ -187,7 +236,7 @@ fn widths(material: &Material) -> Option<String> {
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
     let (material, _) = documents::read_file(path)?;
     if json {
-        return answer([material]);
+        return answer(&[material]);
     }
     print(&format!("{}: {}\n", input_name(path), allows(&material)))
 }

@@ -10,15 +10,16 @@ use lamp_pipeline::size::PartSize;
 use lamp_slicing::topology::{CornerTable, Deed, RepairOptions, Repaired, repair};
 use lamp_slicing::{SliceError, write_stl};
 use lamp_stack::Length;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Map, Value};
 
 use crate::args::options::{Common, parse_distance};
 use crate::commands::mesh::MeshPart;
-use crate::commands::mesh::answer::{counts, deeds};
+use crate::commands::mesh::answer::{MeshCounts, counts, deeds};
 use crate::commands::mesh::text::faults;
 use crate::exit::Exit;
 use crate::output::endings::{STL, check_ending};
-use crate::output::json_report::{JsonReport, ReportTo};
+use crate::output::json_report::{JsonReport, ReportTo, schemas};
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
 use crate::terminal::progress::{Progress, say};
 
@@ -187,18 +188,47 @@ fn tell(repaired: &Repaired, left: &[String], weld_mm: f64) {
     left.iter().for_each(|fault| say(&format!("mesh repair: left: {fault}")));
 }
 
+/// Repair of a mesh, by `lamp mesh repair PART --report`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct RepairHead<'a> {
+    /// Name of the part or of its file.
+    part: &'a str,
+    /// Number of facets after the repair.
+    facets: usize,
+    /// Number of facets of each action: `moved`, `turned`, `dropped-not-finite`, `dropped-collapsed`,
+    /// `dropped-doubled`, `dropped-alone`, `added`; without actions of no facet.
+    #[cfg_attr(test, schemars(with = "std::collections::BTreeMap<String, usize>"))]
+    repair_actions: Map<String, Value>,
+    /// Whether no fault is left, self-intersections aside.
+    clean: bool,
+    /// Numbers of the faults that are left.
+    left: MeshCounts,
+}
+
+/// A facet that the repair touched.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct TouchedFacet {
+    /// Its number before the repair, from 0; of an added facet, its number afterwards.
+    facet: usize,
+    /// The action.
+    action: &'static str,
+}
+
+schemas! { "lamp-mesh-repair-2": RepairHead<'_>, "touched": [TouchedFacet]; }
+
 fn write_report(report: &Path, name: &str, repaired: &Repaired) -> Result<(), Exit> {
-    let actions: Map<String, Value> =
-        deeds(repaired).map(|(deed, count)| (deed.to_owned(), count.into())).collect();
-    let head = json!({
-        "schema": "lamp-mesh-repair-2",
-        "part": name,
-        "facets": repaired.facets.len(),
-        "repair_actions": actions,
-        "clean": repaired.left.is_clean(),
-        "left": counts(&repaired.left),
-    });
+    let head = RepairHead {
+        part: name,
+        facets: repaired.facets.len(),
+        repair_actions: deeds(repaired)
+            .map(|(deed, count)| (deed.to_owned(), count.into()))
+            .collect(),
+        clean: repaired.left.is_clean(),
+        left: counts(&repaired.left),
+    };
     let touched = repaired.touched.iter();
-    let touched = touched.map(|it| json!({"facet": it.facet, "action": it.deed.name()}));
-    JsonReport::new(&head).list("touched", touched).write(report)
+    let touched = touched.map(|it| TouchedFacet { facet: it.facet, action: it.deed.name() });
+    JsonReport::of_schema("lamp-mesh-repair-2", &head).list("touched", touched).write(report)
 }

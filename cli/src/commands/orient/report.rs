@@ -5,11 +5,10 @@ use lamp_pipeline::solid::name_of_all;
 use lamp_stack::to_nm;
 use lamp_supports::PoseFacts;
 use serde::Serialize;
-use serde_json::json;
 
 use super::{ComparedPoses, OrientArgs};
 use crate::exit::Exit;
-use crate::output::json_report::write_answer;
+use crate::output::json_report::{schemas, write_answer};
 use crate::streams::print;
 
 /// The most poses that the table shows.
@@ -34,30 +33,61 @@ impl OrientArgs {
             rank: rank(number).map(|rank| rank + 1),
             image_islands: rank(number).and_then(|rank| compared.image_islands.get(rank).copied()),
         };
-        let answer = json!({
-            "part": part,
-            "thickness_um": self.thickness.um(),
-            "max_overhang_deg": self.max_overhang_angle,
-            "dpi": self.dpi.get(),
-            "best": compared.rotations[compared.best()],
-            "orientations": compared.poses.iter().enumerate().map(row).collect::<Vec<_>>(),
-        });
+        let answer = OrientAnswer {
+            part: &part,
+            thickness_um: self.thickness.um(),
+            max_overhang_deg: self.max_overhang_angle,
+            dpi: self.dpi.get(),
+            best: &compared.rotations[compared.best()],
+            orientations: compared.poses.iter().enumerate().map(row).collect(),
+        };
         write_answer("lamp-orient-2", &answer, path)
     }
 }
 
+/// Orientations of a part, by `lamp orient PART --json`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct OrientAnswer<'a> {
+    /// Name of the part or of its file.
+    part: &'a str,
+    /// Thickness of the layers, in micrometers, by `--thickness`.
+    thickness_um: f64,
+    /// Angle from vertical beyond which a downward face is an overhang, in degrees.
+    max_overhang_deg: f64,
+    /// Resolution of the images, by `--dpi`.
+    dpi: f64,
+    /// The best rotation, for `slice --rotate`; empty for the part as it is.
+    best: &'a str,
+    /// All compared orientations, the part as it is first.
+    orientations: Vec<PoseRow<'a>>,
+}
+
+/// An orientation.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PoseRow<'a> {
+    /// Its rotation, for `slice --rotate`, with the given ones.
     rotate: &'a str,
+    /// The direction of the given part that points up, as a unit vector.
     up: [f64; 3],
+    /// Number of islands, by the mesh.
     islands: usize,
+    /// Number of pits, by the mesh.
     pits: usize,
+    /// Area of overhanging facets, in square millimeters.
     overhang_mm2: f64,
+    /// Height, in millimeters.
     height_mm: f64,
+    /// Width and depth seen from above, in millimeters.
     footprint_mm: [f64; 2],
+    /// Rank from 1, or null if it is not Pareto-optimal.
     rank: Option<usize>,
+    /// Islands on its images, or null if it was not sliced.
     image_islands: Option<u64>,
 }
+
+schemas! { "lamp-orient-2": OrientAnswer<'_>; }
 
 /// The best poses, a line each, and how to build the best.
 fn table(part: &str, compared: &ComparedPoses) -> String {

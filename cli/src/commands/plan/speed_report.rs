@@ -5,10 +5,11 @@ use std::path::Path;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_pipeline::heights::{significant, time_text};
 use lamp_planning::speed::{DOSE_BINS, SpeedPlan, Tally, TimedPart, Wrong, recorded_ms};
-use serde_json::{Value, json};
+use serde::Serialize;
 
+use super::voxels_report::DoseLine;
 use crate::exit::Exit;
-use crate::output::json_report::JsonReport;
+use crate::output::json_report::{JsonReport, schemas};
 
 /// A plan, and what it is for.
 pub(super) struct PlannedTimes<'a> {
@@ -56,6 +57,99 @@ pub(super) fn lines_of(planned: &PlannedTimes<'_>) -> Vec<String> {
     lines
 }
 
+/// Plan of exposure times, by `lamp plan speed --report`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct SpeedHead<'a> {
+    /// Name of the material.
+    material: &'a str,
+    /// Share by which doses should be above or below the critical dose, by `--margin`.
+    margin: f64,
+    /// Number of layers.
+    layers: usize,
+    /// Voxels of the part.
+    wanted: u64,
+    /// The best single time for all layers, in milliseconds.
+    single_ms: f64,
+    /// Voxels cured wrongly by the best single time.
+    before: WrongTally,
+    /// Voxels cured wrongly by the plan.
+    after: WrongTally,
+    /// Error of the best single time.
+    single_error: f64,
+    /// Error of the plan.
+    error: Option<f64>,
+    /// Lower bound on the error of any plan.
+    bound: Option<f64>,
+    /// Error of the plan less the bound, as a share of the best single time's error.
+    gap: f64,
+    /// The search, errors and bound use one pixel of this number.
+    one_pixel_in: u32,
+    /// Sum of the exposure times, in seconds.
+    exposure_s: f64,
+}
+
+/// Numbers of voxels cured wrongly.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct WrongCounts {
+    /// Voxels that are cured and not wanted.
+    overcured: u64,
+    /// Voxels that are wanted and not cured.
+    undercured: u64,
+}
+
+/// Numbers of voxels cured wrongly, also by other light.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct WrongTally {
+    #[serde(flatten)]
+    counts: WrongCounts,
+    /// The same with 5 % less light.
+    at_less_light: WrongCounts,
+    /// The same with 5 % more light.
+    at_more_light: WrongCounts,
+}
+
+/// A layer.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct TimedLayer {
+    /// Its index.
+    layer: u32,
+    /// Height of its bottom, in micrometers.
+    z_um: f64,
+    /// Its thickness, in micrometers.
+    thickness_um: f64,
+    /// Its exposure time, in milliseconds.
+    exposure_ms: f64,
+    /// Speed of the platform, in micrometers a second.
+    speed_um_per_s: f64,
+    /// Its voxels of the part.
+    wanted: u64,
+    /// Voxels cured wrongly by the best single time.
+    before: WrongCounts,
+    /// Voxels cured wrongly by the plan.
+    after: WrongCounts,
+}
+
+/// A stage of the search.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct StageLine {
+    /// Error after it.
+    error: f64,
+    /// Lower bound on the error of any plan after it.
+    bound: f64,
+}
+
+schemas! {
+    "lamp-plan-speed-1": SpeedHead<'_>,
+        "by_layer": [TimedLayer],
+        "doses": [DoseLine],
+        "search": [StageLine];
+}
+
 /// Writes the report.
 pub(super) fn write_report(
     planned: &PlannedTimes<'_>,
@@ -64,65 +158,54 @@ pub(super) fn write_report(
 ) -> Result<(), Exit> {
     let PlannedTimes { material, part, plan } = planned;
     let last = plan.stages.last();
-    let head = json!({
-        "schema": "lamp-plan-speed-1",
-        "material": material,
-        "margin": margin,
-        "layers": part.layers().len(),
-        "wanted": plan.after.wanted.iter().sum::<u64>(),
-        "single_ms": recorded_ms(plan.single),
-        "before": tally(&plan.before),
-        "after": tally(&plan.after),
-        "single_error": plan.single_error,
-        "error": last.map(|last| last.error),
-        "bound": last.map(|last| last.bound),
-        "gap": plan.gap(),
-        "one_pixel_in": plan.sampled,
-        "exposure_s": planned.seconds(),
-    });
+    let head = SpeedHead {
+        material,
+        margin,
+        layers: part.layers().len(),
+        wanted: plan.after.wanted.iter().sum(),
+        single_ms: recorded_ms(plan.single),
+        before: tally(&plan.before),
+        after: tally(&plan.after),
+        single_error: plan.single_error,
+        error: last.map(|last| last.error),
+        bound: last.map(|last| last.bound),
+        gap: plan.gap(),
+        one_pixel_in: plan.sampled,
+        exposure_s: planned.seconds(),
+    };
     // Layers are counted from the light down, and reports go upward.
-    let layers = part.layers().iter().enumerate().rev().map(|(at, layer)| {
-        json!({
-            "layer": layer.index,
-            "z_um": layer.z.to_whole_nm().um(),
-            "thickness_um": layer.thickness.to_whole_nm().um(),
-            "exposure_ms": recorded_ms(plan.times[at]),
-            "speed_um_per_s": planned.speed(at),
-            "wanted": plan.after.wanted[at],
-            "before": counts(plan.before.layers[at]),
-            "after": counts(plan.after.layers[at]),
-        })
+    let layers = part.layers().iter().enumerate().rev().map(|(at, layer)| TimedLayer {
+        layer: layer.index,
+        z_um: layer.z.to_whole_nm().um(),
+        thickness_um: layer.thickness.to_whole_nm().um(),
+        exposure_ms: recorded_ms(plan.times[at]),
+        speed_um_per_s: planned.speed(at),
+        wanted: plan.after.wanted[at],
+        before: counts(plan.before.layers[at]),
+        after: counts(plan.after.layers[at]),
     });
     let doses = (0..DOSE_BINS).map(|bin| {
         let [[wanted_before, other_before], [wanted_after, other_after]] =
             [&plan.before, &plan.after].map(|tally| tally.doses.map(|doses| doses[bin]));
-        json!({
-            "dose": bin as f64 / 10.0,
-            "wanted_before": wanted_before,
-            "other_before": other_before,
-            "wanted_after": wanted_after,
-            "other_after": other_after,
-        })
+        let dose = bin as f64 / 10.0;
+        DoseLine { dose, wanted_before, other_before, wanted_after, other_after }
     });
     let search =
-        plan.stages.iter().map(|stage| json!({ "error": stage.error, "bound": stage.bound }));
-    JsonReport::new(&head)
+        plan.stages.iter().map(|stage| StageLine { error: stage.error, bound: stage.bound });
+    JsonReport::of_schema("lamp-plan-speed-1", &head)
         .list("by_layer", layers)
         .list("doses", doses)
         .list("search", search)
         .write(path)
 }
 
-fn tally(tally: &Tally) -> Value {
-    let [all, less, more] = tally.at_light.map(counts);
-    let mut value = all;
-    value["at_less_light"] = less;
-    value["at_more_light"] = more;
-    value
+fn tally(tally: &Tally) -> WrongTally {
+    let [counts, at_less_light, at_more_light] = tally.at_light.map(counts);
+    WrongTally { counts, at_less_light, at_more_light }
 }
 
-fn counts(wrong: Wrong) -> Value {
-    json!({ "overcured": wrong.over, "undercured": wrong.under })
+fn counts(wrong: Wrong) -> WrongCounts {
+    WrongCounts { overcured: wrong.over, undercured: wrong.under }
 }
 
 /// The time of a layer in seconds.

@@ -5,11 +5,11 @@ use std::cell::RefCell;
 use lamp_gantry::{BuildClock, BuildTime};
 use lamp_machine::Machine;
 use lamp_pipeline::build_copies::BuildCopies;
-use lamp_pipeline::check::{CheckSettings, Found};
+use lamp_pipeline::check::{CheckSettings, Found, PlacedFinding};
 use lamp_plots::{EvidencePicture, StackViews, ViewGrid};
 use lamp_stack::{IndexedStack, Layer, Mask, Page, Pitch, StackTotals, map_in_order};
-use lamp_supports::{CheckError, Severity};
-use serde_json::{Value, json};
+use lamp_supports::{CheckError, Feature, FindingRecord, Severity};
+use serde::Serialize;
 
 use super::measure::{LayerNumbers, new_pixels};
 use super::pictures::{InlinePicture, of_finding, of_layer, of_views};
@@ -20,6 +20,92 @@ use crate::terminal::progress::Progress;
 /// The layers on the contact sheet, and the findings that are drawn.
 const SHEET: usize = 12;
 const MOST_DRAWN: usize = 5;
+
+/// A stack, or why it cannot be read.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
+pub(super) enum ReportedStack<'a> {
+    /// A stack.
+    Read(Box<StackNumbers<'a>>),
+    /// A stack that cannot be read.
+    Unread {
+        /// Name of the stack, as given.
+        stack: &'a str,
+        /// Why it cannot be read.
+        fault: String,
+    },
+}
+
+/// The numbers of a stack.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(super) struct StackNumbers<'a> {
+    #[serde(flatten)]
+    facts: StackFacts<'a>,
+    /// Name of the stack, as given.
+    stack: &'a str,
+    /// Null: the stack can be read.
+    fault: (),
+    /// Sentences about what needs a person, the worst first.
+    warnings: Vec<String>,
+    /// Sum of the exposures, in seconds, if all are stated.
+    build_exposure_s: Option<f64>,
+    /// Time of recoating, in seconds.
+    recoating_s: Option<f64>,
+    /// Lifts and waits of a printer with a panel, in seconds.
+    lifts_s: Option<f64>,
+    /// Time of the swaths of a scanning projector, in seconds.
+    swaths_s: Option<f64>,
+    /// Time of the fields of a stepping projector with known steps, in seconds.
+    fields_s: Option<f64>,
+    /// Time of the build, in seconds, if all is known.
+    build_s: Option<f64>,
+    /// Sum of all that is known, in seconds.
+    least_s: f64,
+    /// Stray rows that `fix` corrected.
+    fixed_rows: u64,
+    /// Why it cannot be checked for findings.
+    unchecked: Option<&'a str>,
+    /// Number of features that need a person.
+    finding_count: Option<usize>,
+    /// Number of specks.
+    specks: Option<u64>,
+    /// The findings, as by `lamp check`.
+    findings: Option<Vec<PlacedFinding<&'a FindingRecord>>>,
+    /// The features, as by `lamp check`.
+    features: Option<&'a [Feature]>,
+    /// Numbers of the layers, bottom first.
+    by_layer: LayerColumns,
+}
+
+/// Numbers of layers: lists with a number for each layer.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct LayerColumns {
+    /// Index.
+    index: Vec<u32>,
+    /// Height of the bottom, in micrometers.
+    z_um: Vec<Option<f64>>,
+    /// Thickness, in micrometers.
+    thickness_um: Vec<Option<f64>>,
+    /// Exposure time, in milliseconds.
+    exposure_ms: Vec<Option<f64>>,
+    /// Pixels that are not black.
+    area_px: Vec<u64>,
+    /// Sides of pixels between black and not black.
+    perimeter_px: Vec<u64>,
+    /// Pixels that are not black, above black ones; of the first layer all.
+    new_px: Vec<u64>,
+    /// Pixels between black and white.
+    gray_px: Vec<u64>,
+    /// Rows that the page calls stray.
+    stray_rows: Vec<u64>,
+    /// Stray rows that `fix` corrected.
+    fixed_rows: Vec<u64>,
+    /// Islands that begin; null if it cannot be checked.
+    islands: Option<Vec<u64>>,
+}
 
 /// The known facts of a stack.
 pub(super) struct StackReport {
@@ -132,48 +218,44 @@ impl StackReport {
     }
 
     /// Returns the numbers of the page.
-    pub(super) fn json(&self) -> Value {
-        let column =
-            |of: &dyn Fn(&LayerNumbers) -> Value| self.layers.iter().map(of).collect::<Vec<_>>();
+    pub(super) fn numbers(&self) -> ReportedStack<'_> {
+        fn column<T>(layers: &[LayerNumbers], of: impl Fn(&LayerNumbers) -> T) -> Vec<T> {
+            layers.iter().map(of).collect()
+        }
+        let layers = &self.layers;
         let found = self.found.as_ref().ok().map(|drawn| &drawn.found);
-        let mut json =
-            serde_json::to_value(StackFacts::new(&self.totals)).expect("facts have text keys");
-        let more = json!({
-            "stack": self.name,
-            "fault": null,
-            "warnings": self.warnings(),
-            "build_exposure_s": self.time.exposure_s,
-            "recoating_s": self.time.recoating_s,
-            "lifts_s": self.time.lifts_s,
-            "swaths_s": self.time.swaths.map(|swaths| swaths.seconds),
-            "fields_s": self.time.fields.and_then(|fields| fields.seconds()),
-            "build_s": self.time.sum_s(),
-            "least_s": self.time.least_s(),
-            "fixed_rows": self.layers.iter().map(|layer| layer.fixed_rows).sum::<u64>(),
-            "unchecked": self.found.as_ref().err(),
-            "finding_count": found.map(Found::count),
-            "specks": found.map(|found| found.findings.specks.count()),
-            "findings": found.map(|found| found.placed().collect::<Vec<_>>()),
-            "features": found.map(|found| &found.features),
-            "by_layer": {
-                "index": column(&|layer| layer.index.into()),
-                "z_um": column(&|layer| layer.z_um.into()),
-                "thickness_um": column(&|layer| layer.thickness_um.into()),
-                "exposure_ms": column(&|layer| layer.exposure_ms.into()),
-                "area_px": column(&|layer| layer.area_px.into()),
-                "perimeter_px": column(&|layer| layer.perimeter_px.into()),
-                "new_px": column(&|layer| layer.new_px.into()),
-                "gray_px": column(&|layer| layer.gray_px.into()),
-                "stray_rows": column(&|layer| layer.stray_rows.into()),
-                "fixed_rows": column(&|layer| layer.fixed_rows.into()),
-                "islands": self.islands_by_layer(),
+        ReportedStack::Read(Box::new(StackNumbers {
+            facts: StackFacts::new(&self.totals),
+            stack: &self.name,
+            fault: (),
+            warnings: self.warnings(),
+            build_exposure_s: self.time.exposure_s,
+            recoating_s: self.time.recoating_s,
+            lifts_s: self.time.lifts_s,
+            swaths_s: self.time.swaths.map(|swaths| swaths.seconds),
+            fields_s: self.time.fields.and_then(|fields| fields.seconds()),
+            build_s: self.time.sum_s(),
+            least_s: self.time.least_s(),
+            fixed_rows: layers.iter().map(|layer| layer.fixed_rows).sum(),
+            unchecked: self.found.as_ref().err().map(String::as_str),
+            finding_count: found.map(Found::count),
+            specks: found.map(|found| found.findings.specks.count()),
+            findings: found.map(|found| found.placed().collect()),
+            features: found.map(|found| &*found.features),
+            by_layer: LayerColumns {
+                index: column(layers, |layer| layer.index),
+                z_um: column(layers, |layer| layer.z_um),
+                thickness_um: column(layers, |layer| layer.thickness_um),
+                exposure_ms: column(layers, |layer| layer.exposure_ms),
+                area_px: column(layers, |layer| layer.area_px),
+                perimeter_px: column(layers, |layer| layer.perimeter_px),
+                new_px: column(layers, |layer| layer.new_px),
+                gray_px: column(layers, |layer| layer.gray_px),
+                stray_rows: column(layers, |layer| layer.stray_rows),
+                fixed_rows: column(layers, |layer| layer.fixed_rows),
+                islands: self.islands_by_layer(),
             },
-        });
-        let (Value::Object(all), Value::Object(more)) = (&mut json, more) else {
-            unreachable!("both are objects")
-        };
-        all.extend(more);
-        json
+        }))
     }
 
     /// Returns how many islands begin in each layer.

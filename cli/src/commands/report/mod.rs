@@ -14,13 +14,14 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_machine::Machine;
 use lamp_stack::stacks_in;
-use serde_json::json;
+use serde::Serialize;
+use serde_json::Value;
 
 use crate::args::options::{Common, TimeArgs};
 use crate::commands::job::build_clock;
 use crate::exit::Exit;
 use crate::output::endings::{HTML, check_ending};
-use crate::output::json_report::print_answer;
+use crate::output::json_report::{print_answer, schemas};
 use crate::output::numbers::number_of;
 use crate::streams::{
     check_beside, failed_at, input_name, is_folder, is_stream, new_folder, open_indexed, print,
@@ -29,7 +30,7 @@ use crate::streams::{
 use crate::terminal::progress::Progress;
 use lamp_pipeline::documents;
 
-use gather::StackReport;
+use gather::{ReportedStack, StackReport};
 pub(super) use page::document;
 pub(super) use pictures::{InlinePicture, of_layer};
 
@@ -162,10 +163,10 @@ impl ReportWork<'_> {
                 None => {}
             }
             if args.json {
-                answers.push(report.json());
+                answers.push(value_of(&report.numbers()));
             }
         }
-        if args.json { print_stacks(&answers) } else { Ok(()) }
+        if args.json { print_stacks(answers) } else { Ok(()) }
     }
 
     /// Writes a page of each stack and an index of them into a folder.
@@ -196,12 +197,13 @@ impl ReportWork<'_> {
                     let html = page::html(&report, Some("index.html"));
                     let written = folder.add(&file, |out| out.write_all(html.as_bytes()));
                     written.map_err(|error| Exit::Output(error.into()).at(file.clone()))?;
-                    answers.push(report.json());
+                    answers.push(value_of(&report.numbers()));
                     index::Entry::of(&report, file)
                 }
                 Err(error) => {
                     // One stack that cannot be read must not cost the reports of the others.
-                    answers.push(json!({ "stack": name, "fault": error.to_string() }));
+                    let fault = error.to_string();
+                    answers.push(value_of(&ReportedStack::Unread { stack: &name, fault }));
                     index::Entry::faulty(name, error.to_string())
                 }
             };
@@ -214,7 +216,7 @@ impl ReportWork<'_> {
         folder.persist().map_err(|error| Exit::Failed(error.into()))?;
         progress.wrote(output, &[number_of(stacks.len() as u64, "stack")]);
         if args.json {
-            print_stacks(&answers)?;
+            print_stacks(answers)?;
         }
         match entries.iter().filter(|entry| entry.is_faulty()).count() {
             0 => Ok(()),
@@ -226,8 +228,24 @@ impl ReportWork<'_> {
     }
 }
 
-fn print_stacks(stacks: &[serde_json::Value]) -> Result<(), Exit> {
-    print_answer("lamp-report-1", &json!({ "stacks": stacks }))
+/// Reports of stacks, by `lamp report STACK... --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ReportAnswer {
+    /// The stacks.
+    #[cfg_attr(test, schemars(with = "Vec<ReportedStack<'_>>"))]
+    stacks: Vec<Value>,
+}
+
+schemas! { "lamp-report-1": ReportAnswer; }
+
+/// Keeps the numbers of a stack, whose pictures may go.
+fn value_of(stack: &ReportedStack<'_>) -> Value {
+    serde_json::to_value(stack).expect("numbers have text keys")
+}
+
+fn print_stacks(stacks: Vec<Value>) -> Result<(), Exit> {
+    print_answer("lamp-report-1", &ReportAnswer { stacks })
 }
 
 /// A report goes to other people: it names the file, not the folders it lies in.

@@ -18,7 +18,7 @@ use crate::streams::{progress, write_layers};
 #[command(after_help = "\
 Examples:
   lamp target screens -o screens.tif
-  lamp target screens --level 25% --expose 600ms | dither > screens.tif")]
+  lamp target screens --gray-level 25% --expose 600ms | dither > screens.tif")]
 pub(super) struct ScreensArgs {
     /// Resolution in dots per inch
     #[arg(long, default_value = "1500")]
@@ -26,7 +26,7 @@ pub(super) struct ScreensArgs {
 
     /// Gray level of all tiles, to the nearest 64th on the screens; 50% is a checkerboard
     #[arg(long, value_name = "PERCENT", default_value = "50%", value_parser = parse_level)]
-    level: GrayLevel,
+    gray_level: GrayLevel,
 
     /// Sides of the screens' squares, in pixels; 1, 5, 10 and 15 are 17, 85, 170 and 255 um at 1500
     /// dpi
@@ -52,7 +52,7 @@ pub(super) struct ScreensArgs {
 
 pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
     let gap = whole_pixels(args.gap, args.dpi);
-    let image = screens(args.level, args.tile, gap, &args.squares)?;
+    let image = screens(args.gray_level, args.tile, gap, &args.squares)?;
     let stack = StackInfo {
         part: "screens".to_owned(),
         commands: vec![args.command()],
@@ -72,10 +72,10 @@ pub(super) fn run(args: &ScreensArgs, common: &Common) -> Result<(), Exit> {
 impl ScreensArgs {
     fn command(&self) -> String {
         let squares: Vec<String> = self.squares.iter().map(u32::to_string).collect();
-        let Self { dpi, tile, level, gap, .. } = self;
-        let (squares, percent) = (squares.join(","), 100.0 * level.get());
+        let Self { dpi, tile, gray_level, gap, .. } = self;
+        let (squares, percent) = (squares.join(","), 100.0 * gray_level.get());
         format!(
-            "target screens --dpi {dpi} --level {percent}% --squares {squares} --tile {tile} --gap {gap}"
+            "target screens --dpi {dpi} --gray-level {percent}% --squares {squares} --tile {tile} --gap {gap}"
         )
     }
 }

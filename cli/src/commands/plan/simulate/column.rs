@@ -1,13 +1,12 @@
 //! Simulates what bitmaps cure where doses add up, column by column (000).
 
-use lamp_pipeline::glass::{measures_fields, measures_line, unmeasured_heights};
+use lamp_pipeline::glass::{measures_line, measures_report, unmeasured_heights};
 use lamp_planning::MirrorSeconds;
 use lamp_planning::column::{GlassLight, HeightCurve, Measures, Setup, Tracing};
 use lamp_planning::target::HeightMap;
 use lamp_stack::Length;
-use serde_json::{Map, json};
 
-use super::{ShownExposures, SimulationOutcome};
+use super::{CuredColumns, ShownExposures, SimulatedBitmaps, SimulatedCure, SimulationOutcome};
 use crate::exit::Exit;
 
 /// Returns the heights that the doses of all bitmaps together cure.
@@ -29,11 +28,7 @@ pub(super) fn cured(shown: &ShownExposures, tracing: Tracing) -> Result<Simulati
     let heights_um = doses.iter().map(|&dose| curve.height_um(dose)).collect();
     let cured = HeightMap { grid, heights_um };
     let volume_mm3 = volume_mm3(&cured);
-    let mut report = Map::new();
-    report.insert(
-        "cured".to_owned(),
-        json!({ "highest_um": cured.highest_um(), "volume_mm3": volume_mm3 }),
-    );
+    let mut measures = None;
     let bitmaps = match exposures.bitmaps.len() {
         1 => "1 bitmap cures".to_owned(),
         count => format!("{count} bitmaps cure"),
@@ -42,12 +37,17 @@ pub(super) fn cured(shown: &ShownExposures, tracing: Tracing) -> Result<Simulati
     let mut lines =
         vec![format!("in {seconds:.1} s {bitmaps} up to {highest:.1} um, {volume_mm3:.4} mm3")];
     if let Some(target) = &wanted {
-        let measures = Measures::of(&doses, &target.heights_um, &curve);
-        lines.push(measures_line(&measures));
+        let measured = Measures::of(&doses, &target.heights_um, &curve);
+        lines.push(measures_line(&measured));
         lines.extend(unmeasured_heights(target, &curve, material));
-        report.insert("measures".to_owned(), measures_fields(&measures));
+        measures = Some(measures_report(&measured));
     }
-    Ok(SimulationOutcome { cured, wanted, lines, report })
+    let bitmaps = SimulatedBitmaps::Count(exposures.bitmaps.len());
+    let report = SimulatedCure::Columns {
+        cured: CuredColumns { highest_um: highest, volume_mm3 },
+        measures,
+    };
+    Ok(SimulationOutcome { cured, wanted, lines, bitmaps, seconds, report })
 }
 
 /// Returns the rectangle of the images of mirrors, and of one more all round.

@@ -1,13 +1,13 @@
 //! Simulates what bitmaps of discs and rings cure by the kinetics of resin and oxygen (003).
 
 use anyhow::anyhow;
-use lamp_pipeline::glass::{CuredRings, kinetic_setting, map_grid};
+use lamp_pipeline::glass::{CuredRings, RingsReport, kinetic_setting, map_grid};
 use lamp_planning::ShownBitmap;
 use lamp_planning::ecpl::{RingExposure, RingSimulation, WantedProfile};
 use lamp_planning::target::Round;
 use lamp_stack::Image;
 
-use super::{ShownExposures, SimulationOutcome};
+use super::{ShownExposures, SimulatedBitmaps, SimulatedCure, SimulationOutcome};
 use crate::exit::Exit;
 
 /// Returns the heights that all bitmaps cure, one after the other.
@@ -34,9 +34,12 @@ pub(super) fn cured(shown: &ShownExposures) -> Result<SimulationOutcome, Exit> {
         cured: &cured,
         wanted: wanted.as_ref(),
     };
+    let RingsReport { setting, bitmaps, exposure_s, outcome } = reported.report();
     Ok(SimulationOutcome {
         lines: reported.lines(),
-        report: reported.fields(),
+        bitmaps: SimulatedBitmaps::Rings(bitmaps),
+        seconds: exposure_s,
+        report: SimulatedCure::Rings { setting, outcome: outcome.into() },
         wanted: round.map(|round| grid.round(|um| round.height_um(um))),
         cured: cured.on(&grid),
     })

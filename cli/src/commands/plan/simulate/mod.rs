@@ -10,17 +10,20 @@ use std::path::PathBuf;
 use clap::Args;
 use lamp_grayscale::material::Material;
 use lamp_pipeline::documents::document;
-use lamp_pipeline::glass::{GivenTarget, GlassPlan};
+use lamp_pipeline::glass::{
+    GivenTarget, GlassPlan, MeasuresReport, RingBitmap, RingOutcome, RingSetting,
+};
 use lamp_planning::PlanFolder;
 use lamp_planning::column::Tracing;
 use lamp_planning::projector::Projector;
 use lamp_planning::target::HeightMap;
 use lamp_stack::named;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 use crate::args::options::{Common, one_of_described};
 use crate::args::target_arg::TargetReading;
 use crate::exit::Exit;
+use crate::output::json_report::schemas;
 use crate::output::plan_folder::{plan_folder, write_plan};
 use crate::terminal::progress::Progress;
 use exposures::Exposures;
@@ -58,9 +61,9 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "MATERIAL")]
     material: PathBuf,
 
-    /// Count rays from POINTS x POINTS points of a mirror in DIRECTIONS x DIRECTIONS directions,
-    /// instead of integrating light exactly; 000 uses 9x15
-    #[arg(long, value_name = "POINTSxDIRECTIONS")]
+    /// Count rays from N x N points of a mirror in M x M directions, instead of integrating light
+    /// exactly; 000 uses 9x15
+    #[arg(long, value_name = "NxM")]
     rays: Option<Tracing>,
 
     /// Target to compare with, in any form that lamp plan column-cure accepts
@@ -103,8 +106,82 @@ struct SimulationOutcome {
     wanted: Option<HeightMap>,
     /// Lines to print.
     lines: Vec<String>,
-    /// Fields of the report besides the given input.
-    report: Map<String, Value>,
+    /// The bitmaps of the report.
+    bitmaps: SimulatedBitmaps,
+    /// The sum of the exposure times, in seconds.
+    seconds: f64,
+    /// The rest of the report.
+    report: SimulatedCure,
+}
+
+/// Simulation of bitmaps, by `lamp plan simulate`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct SimulationReport<'a> {
+    schema: &'static str,
+    /// How light cures: `column` or `kinetics`, by `--model`.
+    model: String,
+    /// Name of the projector.
+    projector: &'a str,
+    /// Name of the material.
+    material: &'a str,
+    /// Name of the target, or null.
+    target: Option<&'a str>,
+    /// With `--model column` the number of bitmaps, with `kinetics` the bitmaps.
+    bitmaps: SimulatedBitmaps,
+    /// Sum of the exposure times, in seconds.
+    exposure_s: f64,
+    #[serde(flatten)]
+    cured: SimulatedCure,
+}
+
+/// The cured part, by the model.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
+enum SimulatedCure {
+    /// With `--model column`.
+    Columns {
+        /// The cured part.
+        cured: CuredColumns,
+        /// Its measures, with `--target`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        measures: Option<MeasuresReport>,
+    },
+    /// With `--model kinetics`.
+    Rings {
+        #[serde(flatten)]
+        setting: RingSetting,
+        #[serde(flatten)]
+        outcome: Box<RingOutcome>,
+    },
+}
+
+/// Bitmaps, by the model.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(untagged)]
+enum SimulatedBitmaps {
+    /// Their number.
+    Count(usize),
+    /// Bitmaps of rings.
+    Rings(Vec<RingBitmap>),
+}
+
+/// A part of cured columns.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CuredColumns {
+    /// Greatest height, in micrometers.
+    highest_um: f64,
+    /// Volume, in cubic millimeters.
+    volume_mm3: f64,
+}
+
+schemas! {
+    "lamp-simulation-1": SimulationReport<'_>;
+    "lamp-plan-column-cure-2": lamp_pipeline::glass::ColumnCureReport<'_>;
+    "lamp-plan-ecpl-1": lamp_pipeline::glass::EcplReport<'_>;
 }
 
 pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
@@ -148,17 +225,17 @@ fn write(
 ) -> Result<(), Exit> {
     let ShownExposures { exposures, projector, material, target } = shown;
     let name = target.as_ref().map(|target| target.name());
-    let mut report = json!({
-        "schema": "lamp-simulation-1",
-        "model": model.to_string(),
-        "projector": projector.name,
-        "material": material.name,
-        "target": name,
-        "bitmaps": exposures.bitmaps.len(),
-        "exposure_s": exposures.seconds(),
-    });
-    let fields = report.as_object_mut().expect("it is an object");
-    fields.extend(outcome.report);
+    let report = SimulationReport {
+        schema: "lamp-simulation-1",
+        model: model.to_string(),
+        projector: &projector.name,
+        material: &material.name,
+        target: name,
+        bitmaps: outcome.bitmaps,
+        exposure_s: outcome.seconds,
+        cured: outcome.report,
+    };
+    let report = serde_json::to_value(report).expect("reports have text keys");
     let compared = name.map_or_else(String::new, |name| format!(" --target {name}"));
     let plan = GlassPlan {
         part: name.unwrap_or(&exposures.name).to_owned(),
