@@ -130,17 +130,7 @@ const USUAL: [(&str, &[&str]); 14] = [
     ("expose", &["layers", "dose_tolerance", "strict", "picture", "json", "output"]),
     (
         "plan voxels",
-        &[
-            "material",
-            "wanted",
-            "objective",
-            "expose",
-            "report",
-            "plot",
-            "map",
-            "layers",
-            "output",
-        ],
+        &["material", "wanted", "objective", "expose", "report", "plot", "map", "layers", "output"],
     ),
     (
         "plan speed",
@@ -170,7 +160,10 @@ const USUAL: [(&str, &[&str]); 14] = [
             "output",
         ],
     ),
-    ("heights", &["csv", "plot", "uniform", "min", "max", "deviation", "cusp", "material"]),
+    (
+        "heights",
+        &["csv", "plot", "uniform_thickness", "min", "max", "deviation", "cusp", "material"],
+    ),
 ];
 
 /// The headings of options of `slice` that have none of their own.
