@@ -117,7 +117,7 @@ impl HeatMap {
         }
     }
 
-    /// The name of the numbers; if some have the colors of the ends, how far they go.
+    /// The name of the numbers, and the greatest of them if it lies beyond the colors.
     fn label(&self) -> String {
         let (most, end) = (self.most(), self.scale().most);
         if most > end {

@@ -8,7 +8,7 @@ use crate::picture::Picture;
 
 /// The longer side of a view, in pixels.
 const SIDE: u32 = 480;
-/// The gray of what is farthest away; what is nearest is white.
+/// The gray of the farthest pixels; the nearest are white.
 const FARTHEST: f64 = 70.0;
 
 /// Divides images of one size into square cells, as the views show them.

@@ -83,7 +83,7 @@ fn recipe(scratch: &Scratch) {
 
 fn job(scratch: &Scratch) {
     scratch.stack("stairs.tif", cavity_staircase(1).layers());
-    let plan = "lamp plan speed stairs.tif --material pegda-sudan --gap 5% -q -o timed.tif";
+    let plan = "lamp plan speed stairs.tif --material pegda-sudan --search-gap 5% -q -o timed.tif";
     scratch.run(plan).succeeds();
     scratch.run("lamp learn set/job --start timed.tif --material pegda-sudan -q").succeeds();
     let rows: String = (0..60).map(|layer| format!("{layer},{},0\n", 10 * layer)).collect();

@@ -37,7 +37,7 @@ pub(super) struct MachineTime {
 pub(super) struct StackTime<'a> {
     /// Its name.
     name: &'a str,
-    /// Number of its layers, as far as they are known.
+    /// Number of its layers; of a build that is not made, without its layers of mesh below the parts.
     layers: u64,
     /// Time in seconds; null if a number is missing.
     build_s: Option<f64>,

@@ -63,7 +63,7 @@ pub(super) fn lines_of(planned: &PlannedTimes<'_>) -> Vec<String> {
 struct SpeedHead<'a> {
     /// Name of the material.
     material: &'a str,
-    /// Share by which doses should be above or below the critical dose, by `--margin`.
+    /// Share by which doses should be above or below the critical dose, by `--dose-margin`.
     margin: f64,
     /// Number of layers.
     layers: usize,

@@ -83,7 +83,7 @@ struct VoxelsHead<'a> {
     material: &'a str,
     /// Aim of the plan, by `--objective`.
     objective: &'static str,
-    /// Share by which doses should be above or below the critical dose, by `--margin`.
+    /// Share by which doses should be above or below the critical dose, by `--dose-margin`.
     margin: f64,
     /// Number of layers.
     layers: usize,
