@@ -396,7 +396,10 @@ impl<C: Commands> NightPlanner<'_, C> {
         };
         let bytes = of_parts.iter().map(|(part, n)| part.bytes * u64::from(n.unwrap_or(1))).sum();
         let cost = Cost { cpu_s: bytes as f64 * TILE_S_PER_BYTE, memory: TILE_BYTES, disk: bytes };
-        let label = format!("build of {} parts", build.parts.len());
+        let label = match build.parts.len() {
+            1 => "build of 1 part".to_owned(),
+            parts => format!("build of {parts} parts"),
+        };
         let names = of_parts.iter().flat_map(|(part, _)| part.names.clone()).collect();
         let work = Work::Tile { words: tile.words, copies };
         let stack = self.add(recipe, &build.name, label, needs, tile.files, cost, work);

@@ -35,7 +35,7 @@ pub enum Colors {
 const SIDE: usize = 1000;
 const MOST_PIXELS: usize = 40;
 /// The margins of a map, in points: title, axes and the scale.
-const TITLE: u32 = 40;
+const TITLE: u32 = 50;
 const LEFT: u32 = 62;
 const BELOW: u32 = 44;
 const MARGIN: u32 = 16;
@@ -106,9 +106,9 @@ impl HeatMap {
         match self.colors {
             Colors::AboutZero => {
                 let mut sizes: Vec<f64> = self.values.iter().map(|value| value.abs()).collect();
-                let last = sizes.len() - 1;
-                let (_, &mut cut, _) =
-                    sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp);
+                // By nearest rank, so that few numbers keep all.
+                let rank = (sizes.len() * 99).div_ceil(100).max(1);
+                let (_, &mut cut, _) = sizes.select_nth_unstable_by(rank - 1, f64::total_cmp);
                 // Few columns may be wrong at all, and their colors must differ.
                 let end = if cut.is_finite() && cut > most / 1000.0 { cut } else { most };
                 ColorScale { least: -end, most: end, stops: &DIVERGING }
@@ -117,14 +117,12 @@ impl HeatMap {
         }
     }
 
-    /// The name of the numbers, and the greatest of them if it lies beyond the colors.
-    fn label(&self) -> String {
+    /// A sentence if some numbers lie beyond the colors.
+    fn beyond(&self) -> Option<String> {
         let (most, end) = (self.most(), self.scale().most);
-        if most > end {
-            format!("{}; a hundredth is beyond the colors, up to {most:.3}", self.label)
-        } else {
-            self.label.clone()
-        }
+        (most > end).then(|| {
+            format!("Colors end where 99 % of the numbers do; the farthest from zero is {most:.3}.")
+        })
     }
 
     fn draw_map<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
@@ -179,7 +177,7 @@ impl HeatMap {
             .configure_mesh()
             .disable_mesh()
             .disable_x_axis()
-            .y_desc(self.label())
+            .y_desc(&self.label)
             .axis_desc_style(font(15))
             .label_style(font(13))
             .axis_style(GRAY_INK.stroke_width(SCALE))
@@ -239,6 +237,10 @@ impl Drawing for HeatMap {
         let [width, height] = self.map_size();
         let (title, below) = area.split_vertically(TITLE * SCALE);
         title.draw_text(&self.title, &font(17), ((MARGIN * SCALE) as i32, (11 * SCALE) as i32))?;
+        if let Some(beyond) = self.beyond() {
+            let at = ((MARGIN * SCALE) as i32, (29 * SCALE) as i32);
+            title.draw_text(&beyond, &font(12), at)?;
+        }
         let (map, scale) = below.split_horizontally(width + (MARGIN + LEFT) * SCALE);
         let plot_height = height + BELOW * SCALE;
         self.draw_map(&map.split_vertically(plot_height).0)?;
@@ -261,28 +263,22 @@ mod tests {
     #[test]
     fn zero_is_white_and_the_ends_are_as_far() {
         let scale = map(2, vec![-1.0, 0.0, 0.5, 4.0], Colors::AboutZero).scale();
-        assert_eq!([scale.least, scale.most], [-0.5, 0.5]);
+        assert_eq!([scale.least, scale.most], [-4.0, 4.0]);
         assert_eq!(scale.color(0.0), RGBColor(247, 247, 247));
         assert_eq!(scale.color(4.0), RGBColor(178, 24, 43));
         assert_eq!(scale.color(-9.0), RGBColor(33, 102, 172));
     }
 
     #[test]
-    fn a_hundredth_of_the_numbers_may_lie_beyond_the_colors_and_the_label_says_so() {
+    fn a_hundredth_of_the_numbers_may_lie_beyond_the_colors_and_a_sentence_says_so() {
         let numbers = |wild: usize| {
             let small = (0..1000 - wild).map(|k| 0.5 + 0.5 * (k as f64 * 0.1).sin());
             let all = small.chain(std::iter::repeat_n(-20.0, wild)).collect();
             map(50, all, Colors::AboutZero)
         };
         assert!((numbers(10).scale().most - 1.0).abs() < 1e-3);
-        assert_eq!(
-            numbers(10).label(),
-            "height (um); a hundredth is beyond the colors, up to 20.000"
-        );
-        assert_eq!(
-            (numbers(11).scale().most, numbers(11).label()),
-            (20.0, "height (um)".to_owned())
-        );
+        assert!(numbers(10).beyond().unwrap().ends_with("is 20.000."));
+        assert_eq!((numbers(11).scale().most, numbers(11).beyond()), (20.0, None));
         // Where nearly all is right, what is wrong has colors.
         let mut rare = vec![0.0; 1000];
         rare[3] = 2.0;

@@ -125,7 +125,8 @@ export class Findings extends EventTarget {
     this.#listMore();
     const all = this.#all.length;
     const number = this.list.length === all ? `${all}` : `${this.list.length} of ${all}`;
-    byId("findings-state").textContent = `${number}${this.#order ? "" : ", the worst first"}.`;
+    const findings = all === 1 ? "finding" : "findings";
+    byId("findings-state").textContent = `${number} ${findings}${this.#order ? "" : ", the worst first"}.`;
     this.#app.heights.mark([...new Set(this.list.map(({ layer }) => layer))]);
     this.dispatchEvent(new Event("change"));
   }

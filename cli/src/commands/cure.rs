@@ -160,6 +160,7 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     // Before the file is begun: a picture at a wrong scale could fill the disk.
     panels.check_size(args.zoom).map_err(|error| failed(error.into()))?;
     write_file(&args.output, |out| panels.write(&material.name, args.zoom, &args.output, out))?;
+    progress.wrote(&args.output, &[]);
     print(&panels.text(&material.name))
 }
 

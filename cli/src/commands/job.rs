@@ -78,7 +78,7 @@ pub(super) struct ScanArgs {
     seam: Option<JobSeam>,
 
     /// How gray levels are exposed
-    #[arg(long, default_value_t)]
+    #[arg(long, value_name = "HOW", default_value_t)]
     #[arg(value_parser = one_of_described::<GrayBy>(&[
         "The build is dithered; gray layers are refused",
         "No dots: a gray pixel is on for a share of the rows of mirrors that pass over it, in \

@@ -58,8 +58,8 @@ pub(crate) struct ShowArgs {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=100))]
     fps: u16,
 
-    /// Draw the layer in the terminal, from its first to its last pixel that is not black, as large as
-    /// fits [default, without -o: the best that the terminal is known to draw]
+    /// Draw the layer in the terminal, from its first to its last pixel that is not black, reduced to
+    /// fit [default, without -o: the best that the terminal is known to draw]
     #[arg(long, value_name = "FORM", conflicts_with_all = ["animate", "layers"])]
     draw: Option<TerminalForm>,
 
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &ShowArgs, common: &Common) -> Result<(), Exit> {
     if form.is_none() {
         if is_stream(&args.output) && io::stdout().is_terminal() {
             return Err(Exit::usage(
-                "a PNG is not for terminals: name a file with -o, or pipe it on",
+                "a PNG is not for terminals: name a file with -o, or show one --layer",
             ));
         }
         check_ending(&args.output, &PNG)?;

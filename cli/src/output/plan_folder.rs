@@ -72,7 +72,7 @@ fn section(plan: &GlassPlan) -> Plot {
         title: format!("{}: section at y = {:.3} mm", plan.part, grid.y_um(row) / 1000.0),
         x: linear("x (mm)", -half_mm..half_mm),
         // Room for the legend.
-        y: linear("height (um)", 0.0..1.3 * most),
+        y: linear("height (µm)", 0.0..1.3 * most),
         series,
     }
 }
@@ -80,7 +80,7 @@ fn section(plan: &GlassPlan) -> Plot {
 fn residual(plan: &GlassPlan, target: &HeightMap) -> HeatMap {
     HeatMap {
         title: format!("{}: cured less target", plan.part),
-        label: "height (um)".to_owned(),
+        label: "height (µm)".to_owned(),
         columns: target.grid.columns,
         values: plan.cured.less(target),
         pitch_mm: target.grid.pitch_um / 1000.0,

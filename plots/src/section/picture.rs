@@ -36,7 +36,7 @@ pub(super) const GAP: usize = 32;
 /// The height of half a number, with some air.
 const TEXT: usize = 12;
 /// The legend needs this much.
-const LEAST_WIDTH: usize = 560;
+const LEAST_WIDTH: usize = 660;
 
 impl SectionPicture {
     /// The areas, as a table.
@@ -294,8 +294,8 @@ impl Strip<'_> {
             None => vec![("cured", CURED)],
             Some(_) => vec![
                 ("cured part", CURED),
-                ("cured outside it", OVERSHOOT),
-                ("not cured", MISSING),
+                ("cured outside the part", OVERSHOOT),
+                ("part that is not cured", MISSING),
                 ("the part's outline", OUTLINE),
             ],
         };

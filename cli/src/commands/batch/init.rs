@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use lamp_batch::{Commands, Night, part_names};
 use lamp_machine::Machine;
-use lamp_pipeline::documents::is_file;
+use lamp_pipeline::documents::{document, is_file};
 use lamp_stack::{file_word, quoted};
 use toml::Value;
 
@@ -17,7 +17,7 @@ use crate::args::options::Common;
 use crate::exit::Exit;
 use crate::output::endings::parse_toml;
 use crate::output::numbers::number_of;
-use crate::streams::write_file;
+use crate::streams::{is_stream, write_file};
 use crate::terminal::progress::Progress;
 
 /// How parts are sliced if nobody says how.
@@ -59,6 +59,12 @@ pub(super) fn run(args: &InitArgs, common: &Common) -> Result<(), Exit> {
         return Err(Exit::usage(format!("{name}: {problem}: name the folder of the parts")));
     }
     let output = args.output.display();
+    if is_stream(&args.output) {
+        return Err(Exit::usage("a night file has a name: results are kept next to it"));
+    }
+    if let Some(machine) = &args.machine {
+        document::<Machine>(machine)?;
+    }
     if args.output.exists() && !args.force {
         return Err(Exit::usage(format!("{output} exists: give --force to replace it")));
     }

@@ -212,7 +212,7 @@ fn expected(forecast: &Forecast, local: &Local) -> String {
     if !unknown.is_empty() {
         let kinds: Vec<&str> = unknown.iter().map(|(kind, _)| kind.name()).collect();
         text += &format!(
-            "not in it: tasks of the kind {}, of which this store and machine have done none\n",
+            "no time is known of tasks of the kind {}: this store and machine have done none\n",
             kinds.join(", ")
         );
     }

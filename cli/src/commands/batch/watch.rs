@@ -45,9 +45,22 @@ pub(super) fn watch(
     progress.say(&format!("watches {name} for parts: Ctrl-C ends it"));
     let mut watched = Watched::default();
     let mut last_night = None;
-    let mut told: BTreeMap<String, (String, Option<String>)> = BTreeMap::new();
+    let mut said: BTreeMap<String, (String, Option<String>)> = BTreeMap::new();
+    let mut is_there = true;
     loop {
-        let is_new = watched.look(&folder, &progress).with_context(|| name.clone())?;
+        // A folder of the network may be gone for a while.
+        let is_new = match watched.look(&folder, &progress) {
+            Ok(is_new) => is_new,
+            Err(error) => {
+                if is_there {
+                    progress.warn(&format!("{name}: {error}: looks again until it is there"));
+                }
+                is_there = false;
+                thread::sleep(PAUSE);
+                continue;
+            }
+        };
+        is_there = true;
         let this_night = stamp(&night);
         if is_new || this_night != last_night {
             last_night = this_night;
@@ -58,10 +71,10 @@ pub(super) fn watch(
                     let made = make(&file, args, &progress)?;
                     for line in made.summary.lines() {
                         // A changed part may have the same line, but not the same bytes.
-                        let state = (told_line(line), line.digest.clone());
-                        if told.get(&line.name) != Some(&state) {
+                        let state = (line_of(line), line.digest.clone());
+                        if said.get(&line.name) != Some(&state) {
                             progress.say(&state.0);
-                            told.insert(line.name.clone(), state);
+                            said.insert(line.name.clone(), state);
                         }
                     }
                     if made.is_full {
@@ -135,7 +148,7 @@ fn stamp(file: &Path) -> Option<Stamp> {
 }
 
 /// Returns the line of a part or a build.
-fn told_line(line: &SubjectSummary) -> String {
+fn line_of(line: &SubjectSummary) -> String {
     let why = line.why.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
     let mut text = format!("{}: {}{why}", line.name, line.state.words());
     if let (Some(file), Some(layers)) = (&line.file, line.layers) {

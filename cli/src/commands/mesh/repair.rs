@@ -20,6 +20,7 @@ use crate::commands::mesh::text::faults;
 use crate::exit::Exit;
 use crate::output::endings::{STL, check_ending};
 use crate::output::json_report::{JsonReport, ReportTo, schemas};
+use crate::output::numbers::number_of;
 use crate::streams::{check_beside, check_not_input, is_stream, write_mesh};
 use crate::terminal::progress::{Progress, say};
 
@@ -111,6 +112,7 @@ pub(super) fn run(args: &RepairArgs, common: &Common) -> Result<(), Exit> {
         })?,
         false => write_mesh(output, |out| write_stl(repaired.facets.iter().copied(), out))?,
     }
+    progress.wrote(output, &[number_of(repaired.facets.len() as u64, "facet")]);
     let left = faults_left(&repaired).map_err(failed)?;
     if !common.quiet {
         tell(&repaired, &left, weld * unit);

@@ -136,6 +136,7 @@ pub(crate) fn run(args: &OrientArgs, common: &Common) -> Result<(), Exit> {
         let title = format!("Islands by the direction that is up: {}", name_of_all(&args.parts));
         let bytes = sphere_picture(&title, &compared.poses, compared.best(), path)?;
         write_file(path, |out| out.write_all(&bytes))?;
+        progress.wrote(path, &[]);
     }
     args.write_report(&compared)
 }

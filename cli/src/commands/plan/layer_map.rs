@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::Args;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_planning::{LayerTime, Light, RegionDoses};
-use lamp_stack::{Layer, Length};
+use lamp_stack::{Layer, Length, format_significant};
 
 use crate::exit::Exit;
 use lamp_plots::PictureRegion;
@@ -97,8 +97,8 @@ impl<'a> LayerMap<'a> {
         let wanted = wanted.collect();
         let doses = || RegionDoses::new(self.light, pitch, columns.clone(), rows.clone());
         let corner = [columns.start, rows.start];
-        let [wide, high] = pitch.mm().map(|mm| 1000.0 * mm);
-        let title = format!("Doses of {name} in mJ/cm2, voxels of {wide:.4} x {high:.4} um");
+        let [wide, high] = pitch.mm().map(|mm| format_significant(1000.0 * mm, 5));
+        let title = format!("Doses of {name} in mJ/cm2, voxels of {wide} x {high} µm");
         let (before, after) = (doses(), doses());
         Ok(Some(Begun { title, width: columns.len(), corner, wanted, before, after }))
     }

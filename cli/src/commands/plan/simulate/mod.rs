@@ -211,10 +211,11 @@ pub(super) fn run(args: &SimulateArgs, common: &Common) -> Result<(), Exit> {
         SimulationModel::Kinetics => kinetics::cured(&shown)?,
     };
     outcome.lines.iter().for_each(|line| progress.say(line));
-    match folder {
-        Some(folder) => write(folder, args.model, shown, outcome),
-        None => Ok(()),
+    if let Some((folder, path)) = folder.zip(args.output.as_deref()) {
+        write(folder, args.model, shown, outcome)?;
+        progress.wrote(path, &[]);
     }
+    Ok(())
 }
 
 fn write(
