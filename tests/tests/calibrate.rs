@@ -340,7 +340,7 @@ fn wrong_usage_is_status_2() {
     scratch.write("a.csv", films().as_bytes());
     for (line, words) in [
         ("lamp calibrate", "Usage"),
-        ("lamp calibrate depth a.csv --plot a.pdf", "an SVG or a PNG"),
+        ("lamp calibrate depth a.csv --plot a.pdf", "an SVG, a PNG or a table"),
         ("lamp calibrate depth a.csv -o -", "name a file with -o"),
         ("lamp calibrate depth a.csv -o a.csv", "written as TOML"),
         ("lamp calibrate depth a.csv -o a.svg --plot a.svg", "written as TOML"),

@@ -124,7 +124,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("lamp show cube.tif --layer 3 -o x.jpg", &["a PNG: end its name in .png"]),
         (
             "lamp show cube.tif --layer five -o x.png",
-            &["'five'", "'--layer <K>'", "a whole number"],
+            &["'five'", "'--layer <N>'", "a whole number"],
         ),
         ("lamp show cube.tif --layers 1..9/0 -o x.png", &["A..B/N", "every Nth layer"]),
         (

@@ -234,7 +234,7 @@ fn an_ending_of_another_format_is_refused() {
         ("slice box.stl -o x.tif --report {}", "written as JSON", "csv"),
         ("slice box.stl -o y.tif --report {}", "no stack is written there", "tif"),
         ("lamp heights box.stl --csv {}", "a table is CSV", "json"),
-        ("lamp heights box.stl --plot {}", "a plot is an SVG or a PNG", "html"),
+        ("lamp heights box.stl --plot {}", "a plot is an SVG, a PNG or a table", "html"),
         ("lamp compare box.tif box.tif --picture {}", "the picture is a PNG", "svg"),
     ] {
         for ending in others.iter().filter(|ending| **ending != "STEPX").chain([&own]) {

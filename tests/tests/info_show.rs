@@ -254,7 +254,7 @@ fn show_puts_layers_on_a_sheet() {
     scratch.run(large).is_wrong_usage(&["choose fewer layers", "--layers 0..1270/40"]);
     let both = "lamp show blade.tif --layer 3 --layers 4..6";
     scratch.run(both).is_wrong_usage(&["cannot be used with"]);
-    scratch.run("lamp show blade.tif").is_wrong_usage(&["--layer <K>|--z"]);
+    scratch.run("lamp show blade.tif").is_wrong_usage(&["--layer <N>|--z"]);
 }
 
 #[test]

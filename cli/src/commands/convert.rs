@@ -20,7 +20,7 @@ use lamp_stack::{
 use crate::args::options::{Common, InputArgs, Output, one_of};
 use crate::args::solid::{ReaderArgs, STEP, parse_tolerance};
 use crate::exit::Exit;
-use crate::output::endings::is_step_name;
+use crate::output::endings::{PART, check_ending, is_model_name, is_step_name};
 use crate::output::numbers::number_of;
 use crate::streams::{
     Layers, check_beside, counting, for_tiffs, input_name, is_folder, is_stream, layers_of_input,
@@ -98,6 +98,7 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     match args.part() {
         Some(part) if is_stl_name(part) => return args.write_stl(part, common),
         Some(part) => return args.write_step(part, common),
+        None if is_model_name(args.to()) => check_ending(args.to(), &PART)?,
         None => {}
     }
     let path = &args.input.stack;

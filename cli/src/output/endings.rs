@@ -41,6 +41,12 @@ pub(crate) const FRAMES: Writes = Writes {
 pub(crate) const STL: Writes =
     Writes { sentence: "meshes are written as STL: name a .stl file", endings: &["stl"] };
 
+/// A part of another form.
+pub(crate) const PART: Writes = Writes {
+    sentence: "a part is written as STL or STEP: end its name in .stl or .step",
+    endings: &["stl", "step", "stp"],
+};
+
 /// A sample part.
 pub(crate) const SAMPLE: Writes = Writes {
     sentence: "a sample is an STL or a STEP file: end its name in .stl or .step",
@@ -103,6 +109,12 @@ const FORMATS: [(&[&str], &str); 13] = [
     (&["csv", "tsv", "xls", "xlsx", "ods", "txt"], "a table or text"),
     (&["mp4", "avi", "mov", "mkv", "webm", "npy", "npz", "h5", "nrrd", "mat", "exe"], "other data"),
 ];
+
+/// Returns whether a name ends in a format of models.
+pub(crate) fn is_model_name(path: &Path) -> bool {
+    let ending = extension(path);
+    FORMATS.iter().any(|(endings, what)| *what == "a model" && endings.contains(&&*ending))
+}
 
 /// Refuses to write to a name with the ending of another format.
 ///

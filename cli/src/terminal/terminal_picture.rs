@@ -218,17 +218,17 @@ fn write_sixel(picture: Picture<'_>, mut out: impl Write) -> io::Result<()> {
 fn write_band(rows: &[Vec<u8>], out: &mut impl Write) -> io::Result<()> {
     let gray = |level: u8| (u32::from(level) * (GRAYS - 1) + 127) / 255;
     let width = rows.first().map_or(0, Vec::len);
-    for colour in 0..GRAYS {
-        if !rows.iter().flatten().any(|&level| gray(level) == colour) {
+    for color in 0..GRAYS {
+        if !rows.iter().flatten().any(|&level| gray(level) == color) {
             continue;
         }
         let sixel = |column: usize| {
-            let bits = rows.iter().enumerate().filter(|(_, row)| gray(row[column]) == colour);
+            let bits = rows.iter().enumerate().filter(|(_, row)| gray(row[column]) == color);
             // A sixel is six bits above `?`, the uppermost pixel the lowest bit.
             bits.map(|(row, _)| 1 << row).sum::<u8>() + b'?'
         };
         let sixels: Vec<u8> = (0..width).map(sixel).collect();
-        write!(out, "#{colour}")?;
+        write!(out, "#{color}")?;
         for run in sixels.chunk_by(|a, b| a == b) {
             let sixel = char::from(run[0]);
             match run.len() {
