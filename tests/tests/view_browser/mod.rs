@@ -452,6 +452,8 @@ fn copies_have_colors() {
         f64::from(width) / 2.0,
         f64::from(height) / 2.0
     ));
+    browser.shows(&[&format!("0/{position}/layer")]);
+    browser.wait_for("!document.querySelector('#overlay-copies').disabled");
     browser.click("#overlay-copies");
     browser.shows(&[&format!("0/{position}/layer"), &format!("0/{position}/copies")]);
     let info = layers[0].info.stack.clone().unwrap();
