@@ -15,7 +15,7 @@ from lamp_slicer import _native
 # Options that name files beside the stack, print, or choose layers of an input: Python has other
 # ways, or leaves them to the program.
 OF_COMMANDS = {
-    "around", "classic", "evidence", "expose", "fields", "force", "format", "help", "json", "keep", "layers", "layout-out",
+    "around", "classic", "evidence", "expose", "fields", "force", "format", "help", "json", "keep-white", "layers", "layout-out",
     "layout-picture", "map", "map-layer", "map-region", "memory", "mirrors", "no-config", "no-sync",
     "options", "output", "overlap", "packbits", "plot", "profile", "quiet", "recipe", "recoat", "report", "seam",
     "sources", "strict", "strips", "threads", "time", "timeout", "verbose", "version",

@@ -58,10 +58,10 @@ def test_levels_are_those_of_the_program(tmp_path, bridge, program):
     ("keywords", "why"),
     [
         ({"material": "mud"}, "mud: there is no such file"),
-        ({"material": RESIN, "margin": 1}, "margin: `1` is not below 1"),
-        ({"material": RESIN, "gap": 0}, "gap: the share must be above zero"),
+        ({"material": RESIN, "dose_margin": 1}, "dose_margin: `1` is not below 1"),
+        ({"material": RESIN, "search_gap": 0}, "search_gap: the share must be above zero"),
         ({"material": RESIN, "wanted": 0}, "wanted: "),
-        ({"material": RESIN, "at": "side"}, "at: `side` is none of"),
+        ({"material": RESIN, "dose_at": "side"}, "dose_at: `side` is none of"),
         ({"material": "lamp-suspension"}, "spread"),
     ],
 )
@@ -238,7 +238,7 @@ JARIWALA = {"projector": "jariwala", "material": "tmpta"}
         ("column-cure", "sphere", {**ZHAO, "material": "mud"}, lamp.LampError),
         ("column-cure", "sphere", {**ZHAO, "projector": "jariwala"}, lamp.LampError),
         ("column-cure", "sphere", {**ZHAO, "bitmaps": 0}, lamp.LampSettingsError),
-        ("column-cure", "sphere", {**ZHAO, "gap": 0}, lamp.LampSettingsError),
+        ("column-cure", "sphere", {**ZHAO, "search_gap": 0}, lamp.LampSettingsError),
         ("column-cure", "sphere", {**ZHAO, "max_time": "25h"}, lamp.LampSettingsError),
         ("column-cure", "sphere", {**ZHAO, "rays": "9"}, lamp.LampSettingsError),
         ("column-cure", "sphere", {**ZHAO, "voxel": "0um"}, lamp.LampSettingsError),
