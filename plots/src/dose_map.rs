@@ -5,8 +5,8 @@ use std::path::Path;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::axis_scale::PixelAxis;
-use crate::{Drawing, Drawn, FAMILY, GRAY_INK, PlotArea, PlotError, picture_of, with_font};
+use crate::axis_scale::{PixelAxis, text};
+use crate::{Drawing, Drawn, GRAY_INK, PlotArea, PlotError, picture_of, with_font};
 
 /// Doses of the same voxels in two cases, side by side.
 pub struct DoseMap {
@@ -69,7 +69,7 @@ impl DoseMap {
     fn draw_case<B: DrawingBackend>(&self, area: &PlotArea<B>, case: usize) -> Drawn<B> {
         let (name, doses) = &self.cases[case];
         let (left, top) = self.corner(case);
-        area.draw(&Text::new(*name, (left, top - 34), text(area, 24.0)))?;
+        area.draw(&Text::new(*name, (left, top - 34), black(area, 24.0)))?;
         let cell = self.cell();
         // Small doses need a decimal to differ, and large ones have no room for it in a cell.
         let decimals = if self.critical_mj < 20.0 { 1 } else { 0 };
@@ -88,7 +88,7 @@ impl DoseMap {
                 area.draw(&Rectangle::new(corners, GRAY_INK.mix(0.4).stroke_width(1)))?;
                 let number = format!("{:.decimals$}", dose * self.critical_mj);
                 let style =
-                    text(area, f64::from(cell) / 2.6).pos(Pos::new(HPos::Center, VPos::Center));
+                    black(area, f64::from(cell) / 2.6).pos(Pos::new(HPos::Center, VPos::Center));
                 area.draw(&Text::new(number, (x + cell / 2, y + cell / 2), style))?;
             }
         }
@@ -142,7 +142,7 @@ impl DoseMap {
             [("wanted and cured", CURED), ("overcured", OVERCURED), ("undercured", UNDERCURED)]
         {
             area.draw(&Rectangle::new([(x, y), (x + 22, y + 22)], ink.filled()))?;
-            let style = text(area, 20.0);
+            let style = black(area, 20.0);
             let (width, _) = area.estimate_text_size(name, &style)?;
             area.draw(&Text::new(name, (x + 32, y + 4), style))?;
             x += width as i32 + 72;
@@ -151,15 +151,15 @@ impl DoseMap {
     }
 }
 
-fn text<B: DrawingBackend>(area: &PlotArea<B>, size: f64) -> TextStyle<'static> {
-    (FAMILY, size).into_text_style(area).color(&BLACK)
+fn black<B: DrawingBackend>(area: &PlotArea<B>, size: f64) -> TextStyle<'static> {
+    text(area, size).color(&BLACK)
 }
 
 impl Drawing for DoseMap {
     fn draw<B: DrawingBackend>(&self, area: &PlotArea<B>) -> Drawn<B> {
         with_font();
         area.fill(&WHITE)?;
-        area.draw(&Text::new(self.title.clone(), (MARGIN, 16), text(area, 28.0)))?;
+        area.draw(&Text::new(self.title.clone(), (MARGIN, 16), black(area, 28.0)))?;
         self.draw_case(area, 0)?;
         self.draw_case(area, 1)?;
         self.draw_legend(area)?;

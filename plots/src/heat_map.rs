@@ -117,7 +117,7 @@ impl HeatMap {
         }
     }
 
-    /// A sentence if some numbers lie beyond the colors.
+    /// A sentence if the colors end before the greatest number.
     fn beyond(&self) -> Option<String> {
         let (most, end) = (self.most(), self.scale().most);
         (most > end).then(|| {

@@ -70,6 +70,14 @@ pub(crate) const HTML: Writes =
 pub(crate) const FOLDER: Writes =
     Writes { sentence: "a folder is written: end its name in /", endings: &[] };
 
+/// Endings of models.
+const MODELS: &[&str] = &[
+    "stl", "step", "stp", "obj", "3mf", "ply", "off", "amf", "gltf", "glb", "wrl", "vrml", "x3d",
+    "dae", "fbx", "3ds", "3dm", "blend", "usd", "usda", "usdz", "dxf", "dwg", "igs", "iges", "sat",
+    "sab", "x_t", "x_b", "jt", "brep", "brp", "fcstd", "f3d", "sldprt", "sldasm", "ipt", "iam",
+    "catpart", "prt", "scad", "skp", "vtk", "msh",
+];
+
 /// Endings that name a format, and what it is. All others say nothing.
 const FORMATS: [(&[&str], &str); 13] = [
     (&["tif", "tiff", "btf", "tf8"], "a TIFF"),
@@ -85,15 +93,7 @@ const FORMATS: [(&[&str], &str); 13] = [
     ),
     (&["pdf", "doc", "docx", "odt", "ppt", "pptx", "rtf", "md", "tex"], "a document"),
     (&["html", "htm", "xhtml"], "a web page"),
-    (
-        &[
-            "stl", "step", "stp", "obj", "3mf", "ply", "off", "amf", "gltf", "glb", "wrl", "vrml",
-            "x3d", "dae", "fbx", "3ds", "3dm", "blend", "usd", "usda", "usdz", "dxf", "dwg", "igs",
-            "iges", "sat", "sab", "x_t", "x_b", "jt", "brep", "brp", "fcstd", "f3d", "sldprt",
-            "sldasm", "ipt", "iam", "catpart", "prt", "scad", "skp", "vtk", "msh",
-        ],
-        "a model",
-    ),
+    (MODELS, "a model"),
     (
         &[
             "sl1", "sl1s", "goo", "ctb", "cbddlp", "photon", "photons", "phz", "pws", "pw0", "pwx",
@@ -112,8 +112,7 @@ const FORMATS: [(&[&str], &str); 13] = [
 
 /// Returns whether a name ends in a format of models.
 pub(crate) fn is_model_name(path: &Path) -> bool {
-    let ending = extension(path);
-    FORMATS.iter().any(|(endings, what)| *what == "a model" && endings.contains(&&*ending))
+    MODELS.contains(&&*extension(path))
 }
 
 /// Refuses to write to a name with the ending of another format.

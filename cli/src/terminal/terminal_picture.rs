@@ -93,7 +93,7 @@ fn columns() -> u32 {
 }
 
 /// Returns the lines of a terminal that a picture may take: from `LINES`, or from the terminal
-/// itself. A pipe has as many as it needs.
+/// itself. A pipe has no such limit.
 fn lines() -> Option<u32> {
     let own = || terminal_size::terminal_size().map(|(_, height)| height.0);
     let lines = u32::from(stated("LINES").or_else(own)?);

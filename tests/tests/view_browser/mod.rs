@@ -531,6 +531,13 @@ fn filter_findings(browser: &Browser) {
         "{all:?}"
     );
     assert!(all.len() > 2, "{all:?}");
+    let reset = || {
+        browser.click("#findings-filters [type=reset]");
+        browser.wait_for(&format!(
+            "document.querySelectorAll('#findings-list tbody').length === {}",
+            all.len()
+        ));
+    };
     browser.run(
         "const kind = document.querySelector('#filter-kind');
          kind.value = 'island';
@@ -539,27 +546,15 @@ fn filter_findings(browser: &Browser) {
     );
     assert_eq!(rows(browser).iter().collect::<Vec<_>>(), islands);
     assert!(browser.text("#findings-state").starts_with(&format!("2 of {}", all.len())));
-    browser.click("#findings-filters [type=reset]");
-    browser.wait_for(&format!(
-        "document.querySelectorAll('#findings-list tbody').length === {}",
-        all.len()
-    ));
+    reset();
     browser.type_into("#filter-from", "2");
     let left = rows(browser);
     assert!(left.contains(&large) && !left.contains(&small), "{left:?}");
-    browser.click("#findings-filters [type=reset]");
-    browser.wait_for(&format!(
-        "document.querySelectorAll('#findings-list tbody').length === {}",
-        all.len()
-    ));
+    reset();
     browser.type_into("#filter-size", "0.5");
     let left = rows(browser);
     assert!(left.contains(&large) && !left.contains(&small), "{left:?}");
-    browser.click("#findings-filters [type=reset]");
-    browser.wait_for(&format!(
-        "document.querySelectorAll('#findings-list tbody').length === {}",
-        all.len()
-    ));
+    reset();
     let mut sorted = kinds.clone();
     sorted.sort();
     let by_kind = || rows(browser).into_iter().map(|row| row[0].clone()).collect::<Vec<_>>();
