@@ -14,7 +14,8 @@ use lamp_pipeline::step::{ReaderSettings, bytes_of};
 use lamp_slicing::topology::{CornerTable, StepSolids};
 use lamp_slicing::{OpenOptions, Part, Placement, Units};
 use lamp_stack::{
-    FileFormat, Format, Layer, Length, PartFormat, StackError, png_of_layer, write_png_folder,
+    FileFormat, Format, Layer, Length, PartFormat, StackError, StackFormat, png_of_layer,
+    write_png_folder,
 };
 
 use crate::args::options::{Common, InputArgs, Output, one_of};
@@ -98,6 +99,8 @@ pub(crate) fn run(args: &ConvertArgs, common: &Common) -> Result<(), Exit> {
     match args.part() {
         Some(part) if is_stl_name(part) => return args.write_stl(part, common),
         Some(part) => return args.write_step(part, common),
+        // A DXF is a drawing of a layer here, and a model elsewhere.
+        None if StackFormat::of_name(args.to()).is_some() => {}
         None if is_model_name(args.to()) => check_ending(args.to(), &PART)?,
         None => {}
     }
