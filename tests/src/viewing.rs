@@ -151,6 +151,19 @@ impl Viewing {
         self.ask(&self.request(target, &format!("Cookie: {}\r\n", self.cookie)))
     }
 
+    /// Sends bytes to a target as the page does, with the cookie.
+    #[track_caller]
+    pub fn put(&self, method: &str, target: &str, kind: &str, body: &[u8]) -> Answer {
+        let (port, cookie, length) = (self.port, &self.cookie, body.len());
+        let head = format!(
+            "{method} {target} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nCookie: {cookie}\r\n\
+             Origin: http://127.0.0.1:{port}\r\nContent-Type: {kind}\r\n\
+             Content-Length: {length}\r\nConnection: close\r\n\r\n"
+        );
+        let request = [head.as_bytes(), body].concat();
+        self.send(&request).unwrap_or_else(|| panic!("no answer to {method} {target}"))
+    }
+
     /// Sends a request and returns its answer.
     ///
     /// # Panics

@@ -84,3 +84,4 @@ mod tile_turns;
 mod verify;
 mod view_browser;
 mod view_server;
+mod view_work;

@@ -19,7 +19,8 @@ export function aspectOf(dpi) {
 /** The resolution as people write it. */
 export function resolution(dpi) {
   const um = (axis) => +(25400 / axis).toFixed(4);
-  return Array.isArray(dpi) ? `${um(dpi[0])} x ${um(dpi[1])} µm` : `${dpi} dpi`;
+  if (Array.isArray(dpi)) return `${um(dpi[0])} x ${um(dpi[1])} µm`;
+  return Number.isInteger(dpi) ? `${dpi} dpi` : `${um(dpi)} µm`;
 }
 
 /** A length that is given in pixels, also in millimetres where a pixel's side is known. */

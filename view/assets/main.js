@@ -1,6 +1,6 @@
 /** Puts the page together: what is viewed is the state, and the parts follow it. */
 
-import { get } from "./api.js";
+import { get, showOnly } from "./api.js";
 import { numberCopies } from "./copies.js";
 import { Findings } from "./findings.js";
 import { aspectOf, byId, count, element, mm, pitchOf, resolution } from "./format.js";
@@ -16,6 +16,7 @@ import { listenToShare } from "./share.js";
 import { SolidPanel } from "./solid_panel.js";
 import { State, fromHash, linkAddress } from "./state.js";
 import { Swipe } from "./swipe.js";
+import { Work } from "./work.js";
 
 /** Tells what went wrong, until something else is shown. */
 function fail(error) {
@@ -29,9 +30,15 @@ function say(text) {
 }
 
 async function start() {
-  const [session, first] = await Promise.all([get("/api/session"), get("/api/stacks/0/layers")]);
-  const rest = session.stacks.slice(1).map((_, stack) => get(`/api/stacks/${stack + 1}/layers`));
-  const tables = [first, ...(await Promise.all(rest))];
+  const session = await get("/api/session");
+  showOnly(session.number);
+  if (session.work) new Work(fail);
+  if (!session.stacks.length) {
+    document.body.classList.add("empty");
+    byId("nothing").hidden = false;
+    return;
+  }
+  const tables = await Promise.all(session.stacks.map((_, stack) => get(`/api/stacks/${stack}/layers`)));
   const state = new State();
   state.set(fromHash(location.hash, session));
   const unit = session.stacks[0].width;

@@ -1,7 +1,7 @@
 //! Work that goes on while the viewer answers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
@@ -9,11 +9,25 @@ use serde_json::{Value, json};
 /// Progress of work.
 #[derive(Debug, Default)]
 pub struct WorkProgress {
+    step: Mutex<&'static str>,
     done: AtomicU64,
     of: AtomicU64,
+    is_stopped: AtomicBool,
 }
 
 impl WorkProgress {
+    /// Begins a step of the work, of an amount that is not known yet.
+    pub fn begin(&self, step: &'static str) {
+        *self.step.lock().unwrap_or_else(PoisonError::into_inner) = step;
+        self.done.store(0, Ordering::Relaxed);
+        self.expect(0);
+    }
+
+    /// Returns whether nobody waits for the work any more.
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Relaxed)
+    }
+
     /// Sets the amount of work.
     pub fn expect(&self, of: u64) {
         self.of.store(of, Ordering::Relaxed);
@@ -76,6 +90,15 @@ impl<T> Background<T> {
         !matches!(*self.lock(), WorkState::NotWanted)
     }
 
+    pub(crate) fn is_running(&self) -> bool {
+        matches!(*self.lock(), WorkState::Running)
+    }
+
+    /// Asks the work to stop.
+    pub(crate) fn stop(&self) {
+        self.progress.is_stopped.store(true, Ordering::Relaxed);
+    }
+
     /// Returns the part of the result that `of` takes, if it is there.
     pub(crate) fn get<U>(&self, of: impl FnOnce(&T) -> U) -> Option<U> {
         match &*self.lock() {
@@ -93,8 +116,10 @@ impl<T> Background<T> {
             WorkState::Failed(message) => ("failed", Some(message.clone())),
         };
         let number = |number: &AtomicU64| number.load(Ordering::Relaxed);
-        let WorkProgress { done, of } = &self.progress;
-        json!({"status": status, "message": message, "done": number(done), "of": number(of)})
+        let WorkProgress { step, done, of, .. } = &self.progress;
+        let step = *step.lock().unwrap_or_else(PoisonError::into_inner);
+        let (done, of) = (number(done), number(of));
+        json!({"status": status, "message": message, "step": step, "done": done, "of": of})
     }
 
     fn lock(&self) -> MutexGuard<'_, WorkState<T>> {

@@ -13,6 +13,12 @@ pub enum ViewError {
     /// A number of a request is malformed or out of range.
     #[error("{0}")]
     Malformed(&'static str),
+    /// The request does not fit the state of the work.
+    #[error("{0}")]
+    Refused(String),
+    /// The folder has another file of this name.
+    #[error("the folder has another file named {0}")]
+    Taken(String),
     /// The stack has changed since it was opened.
     #[error("{0}")]
     Changed(String),

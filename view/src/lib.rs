@@ -22,6 +22,7 @@ mod surface;
 mod surface_work;
 mod tile;
 mod viewer;
+mod work_folder;
 
 pub use assets::licences;
 pub use background::WorkProgress;
@@ -32,3 +33,4 @@ pub use server::{Address, Ticket, Token, serve};
 pub use stack::ViewedStack;
 pub use surface::{CellGrid, MAX_CELLS, StackSurface, SurfaceError, SurfaceOptions, SurfaceUnit};
 pub use viewer::Viewer;
+pub use work_folder::{BuildOrder, FormatChoice, MachineChoice, Made, Order, WorkFolder, Workshop};

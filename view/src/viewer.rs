@@ -27,6 +27,10 @@ pub struct Viewer {
     findings: Background<Vec<Finding>>,
     surface: Background<Vec<u8>>,
     version: &'static str,
+    /// Bytes for decoded images.
+    images: usize,
+    /// Which viewer of the process this is, from 0: pages of an earlier one show other stacks.
+    number: u64,
 }
 
 /// Which image of a layer.
@@ -69,17 +73,22 @@ fn for_images(memory: u64, threads: usize) -> u64 {
 impl Viewer {
     /// Views stacks; the second is compared with the first. `memory` is in bytes, and as many
     /// `threads` will ask.
-    ///
-    /// # Panics
-    /// Panics if there is no stack.
     pub fn new(
         stacks: Vec<ViewedStack>,
         memory: u64,
         threads: usize,
         version: &'static str,
     ) -> Self {
-        assert!(!stacks.is_empty(), "there is nothing to view");
         let images = for_images(memory, threads).try_into().unwrap_or(usize::MAX);
+        Self::numbered(0, stacks, images, version)
+    }
+
+    fn numbered(
+        number: u64,
+        stacks: Vec<ViewedStack>,
+        images: usize,
+        version: &'static str,
+    ) -> Self {
         Self {
             partners: Partners::of(&stacks),
             stacks,
@@ -87,7 +96,19 @@ impl Viewer {
             findings: Background::default(),
             surface: Background::default(),
             version,
+            images,
+            number,
         }
+    }
+
+    /// Returns the maker of the viewer that follows this one, with the same limits.
+    pub(crate) fn next(&self) -> impl FnOnce(Vec<ViewedStack>) -> Self + use<> {
+        let &Self { images, number, version, .. } = self;
+        move |stacks| Self::numbered(number + 1, stacks, images, version)
+    }
+
+    pub(crate) fn number(&self) -> u64 {
+        self.number
     }
 
     /// The stacks, in the order in which they were given.
@@ -115,7 +136,7 @@ impl Viewer {
 
     /// Makes the surface of the first stack on a thread of its own, unless that was begun before.
     pub(crate) fn want_surface(self: &Arc<Self>) {
-        if self.surface.start_once() {
+        if !self.stacks.is_empty() && self.surface.start_once() {
             let viewer = Arc::clone(self);
             std::thread::spawn(move || {
                 viewer.surface.run(|progress| surface_of(&viewer.stacks[0], progress));
@@ -141,6 +162,7 @@ impl Viewer {
             .collect();
         json!({
             "version": self.version,
+            "number": self.number,
             "tile": TILE_SIDE,
             "stacks": self.stacks.iter().map(ViewedStack::summary).collect::<Vec<_>>(),
             "overlays": overlays,

@@ -207,7 +207,7 @@ pub(super) fn parse_tile(options: &[String], folder: &Path) -> Result<TileArgs, 
 }
 
 /// Reads the options of `check`, without stacks.
-pub(super) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
+pub(crate) fn parse_check(options: &[String], folder: &Path) -> Result<CheckSettings, String> {
     let args: CheckArgs = StageReader::new("check", &with_name("check", options), folder)?.read();
     let mut settings = CheckSettings::clone(&args.settings);
     settings.machine = of_machine(&settings.machine, folder);

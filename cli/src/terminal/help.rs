@@ -92,7 +92,7 @@ const USUAL: [(&str, &[&str]); 14] = [
             "output",
         ],
     ),
-    ("view", &["check", "findings", "open", "port", "dpi", "thickness", "units", "rotate"]),
+    ("view", &["work", "check", "findings", "open", "port", "dpi", "thickness", "units", "rotate"]),
     (
         "orient",
         &["directions", "cone", "max_overhang_angle", "thickness", "best", "plot", "json", "units"],

@@ -108,7 +108,9 @@ impl Browser {
     pub(crate) fn settle(&self) {
         // A change of the view reaches the address and the tiles a moment later.
         std::thread::sleep(Duration::from_millis(250));
-        self.wait_for(&format!("document.querySelector('{CANVAS}')?.ariaBusy === 'false'"));
+        self.wait_for(&format!(
+            "document.querySelector('{CANVAS}')?.ariaBusy === 'false' || document.body.className === 'empty'"
+        ));
     }
 
     /// Waits until these sheets are shown, and no others.

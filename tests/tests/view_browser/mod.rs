@@ -3,6 +3,7 @@
 
 mod browser;
 
+use lamp_fixtures::Sample;
 use lamp_stack::{GrayMask, Image, Layer, Mask, MaskBuilder, PageInfo, Pitch};
 use lamp_tests::{Scratch, Viewing, mask};
 use serde_json::{Value, json};
@@ -651,6 +652,81 @@ fn reach_all_by_keys(browser: &Browser) {
         vec![],
     );
     assert_eq!(missed, json!([]));
+}
+
+/// A person drops a part on the page, chooses, looks at it, and gets the build.
+#[test]
+fn a_part_becomes_a_build_in_the_browser() {
+    let scratch = Scratch::new();
+    scratch.part("torus.stl", Sample::Torus, 2_000);
+    let viewing = Viewing::unopened(&scratch, "--work work", &[]);
+    let Some(browser) = Browser::open(&viewing, WINDOW) else { return };
+    assert!(browser.text("#nothing").contains("anywhere on this page"));
+    let drop = |bytes: Vec<u8>| {
+        let script = "const file = new File([new Uint8Array(arguments[0])], 'torus.stl');
+             const dataTransfer = new DataTransfer();
+             dataTransfer.items.add(file);
+             const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
+             document.querySelector('#picture').dispatchEvent(event);";
+        browser.run(script, vec![json!(bytes)]);
+    };
+    drop(scratch.bytes("torus.stl"));
+    browser.wait_for("document.querySelector('#work-file').value === 'torus.stl'");
+    assert!(scratch.bytes("work/torus.stl") == scratch.bytes("torus.stl"));
+
+    let choose = |id: &str, value: &str| {
+        let script = "const [id, value] = arguments;
+             document.getElementById(id).value = value;
+             document.getElementById(id).dispatchEvent(new Event('change', { bubbles: true }));";
+        browser.run(script, vec![json!(id), json!(value)]);
+    };
+    choose("work-machine", "mars3");
+    assert_eq!(browser.run("return document.querySelector('#work-mesh').checked", vec![]), false);
+    choose("work-turn", "x:90");
+    choose("work-thickness", "200um");
+    browser.run("window.before = true", vec![]);
+    browser.click("#work-slice");
+    browser.wait_for("!window.before && document.querySelector('#stack option')");
+    browser.settle();
+    assert_eq!(browser.text("#stack option"), "torus-layers.tif");
+    // The form is as it was, and the layers are turned.
+    let field =
+        |id: &str| browser.run(&format!("return document.getElementById('{id}').value"), vec![]);
+    browser.wait_for("document.getElementById('work-machine').value === 'mars3'");
+    assert_eq!(field("work-rotate"), "x:90");
+    let turned = "slice torus.stl --machine mars3 --rotate x:90 --thickness 200um -o turned.tif";
+    scratch.run(turned).succeeds();
+    let layers = scratch.layers("work/torus-layers.tif");
+    assert_eq!(layers.len(), scratch.layers("turned.tif").len());
+    let middle = layers.len() / 2;
+    browser.go(&format!("#stack=0&layer={middle}&at=2049.5,1280.5&zoom=1"));
+    let known: Vec<_> = (1600..2500).step_by(7).map(|column| [column, 1280]).collect();
+    let wanted: Vec<_> = known
+        .iter()
+        .map(|&at| Some(if white(&layers[middle], at) { WHITE } else { BLACK }))
+        .collect();
+    assert_eq!(browser.colours(&known), wanted);
+    assert!(wanted.contains(&Some(BLACK)) && wanted.contains(&Some(WHITE)));
+    browser.wait_for("document.querySelector('#findings-state').textContent.includes('inding')");
+
+    choose("work-copies", "2");
+    choose("work-format", "ctb");
+    browser.run("window.before = true", vec![]);
+    browser.click("#work-build");
+    browser.wait_for("!window.before && document.querySelector('#work-get')?.textContent");
+    browser.settle();
+    assert_eq!(browser.text("#work-get"), "Download torus-build.ctb");
+    assert_eq!(scratch.layers("work/torus-build.ctb").len(), layers.len());
+
+    // The same part again is the same file; another of its name needs a word.
+    drop(scratch.bytes("torus.stl"));
+    scratch.part("other.stl", Sample::Torus, 1_000);
+    drop(scratch.bytes("other.stl"));
+    browser.wait_for("!document.querySelector('#work-replace').hidden");
+    assert!(scratch.bytes("work/torus.stl") == scratch.bytes("torus.stl"));
+    browser.click("#work-replace");
+    browser.wait_for("document.querySelector('#work-replace').hidden");
+    assert!(scratch.bytes("work/torus.stl") == scratch.bytes("other.stl"));
 }
 
 /// Takes the picture of the README: `cargo test -p lamp-tests view_browser:: -- --ignored`.

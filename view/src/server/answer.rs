@@ -64,7 +64,7 @@ pub(super) fn png(file: Vec<u8>) -> Response {
     bytes("image/png", file)
 }
 
-pub(super) fn binary(file: Vec<u8>) -> Response {
+pub(super) fn binary(file: impl IntoResponse) -> Response {
     bytes("application/octet-stream", file)
 }
 
@@ -84,6 +84,8 @@ impl IntoResponse for ViewError {
         let status = match &self {
             Self::NoSuch(_) => StatusCode::NOT_FOUND,
             Self::Malformed(_) => StatusCode::BAD_REQUEST,
+            Self::Refused(_) => StatusCode::FORBIDDEN,
+            Self::Taken(_) => StatusCode::CONFLICT,
             Self::Changed(_) => StatusCode::GONE,
             Self::Unreadable(_) => StatusCode::UNPROCESSABLE_ENTITY,
             // Nobody reads it.

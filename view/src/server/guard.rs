@@ -1,7 +1,7 @@
 //! Access: requests for the loopback address with the cookie, or once with a token for it.
 
 use axum::extract::Request;
-use axum::http::header::{COOKIE, HOST, LOCATION};
+use axum::http::header::{COOKIE, HOST, LOCATION, ORIGIN};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::response::{IntoResponse, Response};
 
@@ -16,6 +16,9 @@ const USED_TOKEN: &str = "this address was opened before, and works only once; f
                           lamp view and start it again";
 const AHEAD: &str = "this address works only once, so do not load it ahead";
 
+/// The start of the addresses that take more than GET.
+const WORK: &str = "/api/work/";
+
 /// Lets requests pass that may.
 pub(super) struct Guard {
     tickets: Vec<Ticket>,
@@ -23,12 +26,14 @@ pub(super) struct Guard {
     /// Cookies are shared by all ports of an address, so the name has the port.
     cookie: String,
     hosts: [String; 2],
+    /// Whether the page may send files and orders.
+    takes_work: bool,
 }
 
 impl Guard {
-    pub(super) fn new(tickets: Vec<Ticket>, secret: Token, port: u16) -> Self {
+    pub(super) fn new(tickets: Vec<Ticket>, secret: Token, port: u16, takes_work: bool) -> Self {
         let hosts = ["127.0.0.1", "localhost"].map(|host| format!("{host}:{port}"));
-        Self { tickets, secret, cookie: format!("lamp_view_{port}"), hosts }
+        Self { tickets, secret, cookie: format!("lamp_view_{port}"), hosts, takes_work }
     }
 
     /// Returns the refusal of a request, or the cookie for a token, or `None` if it may pass.
@@ -48,8 +53,15 @@ impl Guard {
             return Some(self.answer_to_token(token, request.headers(), has_cookie));
         }
         request.extensions().get().map(Trust::gain);
+        let is_work = self.takes_work && request.uri().path().starts_with(WORK);
+        if is_get || is_work && self.is_of_our_page(request.headers()) {
+            return None;
+        }
+        if is_work {
+            return Some(refusal(StatusCode::FORBIDDEN, "only the viewer's own page may ask this"));
+        }
         let method = "the viewer answers GET alone";
-        (!is_get).then(|| {
+        Some({
             let mut refused = refusal(StatusCode::METHOD_NOT_ALLOWED, method);
             refused.headers_mut().insert("allow", HeaderValue::from_static("GET"));
             refused
@@ -89,6 +101,15 @@ impl Guard {
         let of_uri = request.uri().authority().map(axum::http::uri::Authority::as_str);
         let is_ours = |host: &str| self.hosts.iter().any(|ours| ours == host);
         hosts.next().is_none() && host.is_some_and(is_ours) && of_uri.is_none_or(is_ours)
+    }
+
+    /// Returns whether a page of this viewer sends the request. Cookies do not show it: for them,
+    /// another server of this machine is the same site, whatever its port.
+    fn is_of_our_page(&self, headers: &HeaderMap) -> bool {
+        let mut origins = headers.get_all(ORIGIN).iter();
+        let origin = origins.next().and_then(|origin| origin.to_str().ok());
+        let host = origin.and_then(|origin| origin.strip_prefix("http://"));
+        origins.next().is_none() && host.is_some_and(|host| self.hosts.iter().any(|it| it == host))
     }
 
     fn has_cookie(&self, headers: &HeaderMap) -> bool {

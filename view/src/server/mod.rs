@@ -6,6 +6,7 @@ mod guard;
 mod routes;
 mod ticket;
 mod token;
+mod transfer;
 mod work;
 
 use std::io;
@@ -18,6 +19,7 @@ pub use token::Token;
 use work::Workers;
 
 use crate::viewer::Viewer;
+use crate::work_folder::WorkFolder;
 
 /// A port of the loopback address where the viewer will answer.
 pub struct Address {
@@ -45,13 +47,15 @@ impl Address {
 }
 
 /// Answers at an address until the process ends, with at most so many threads at work. The browser
-/// that shows a ticket gets a cookie for everything else.
+/// that shows a ticket gets a cookie for everything else. With a folder, the page may add files to it
+/// and have them made into builds.
 ///
 /// # Errors
 /// Returns an error if the system does not let it start, or has no random numbers for the cookie.
 pub fn serve(
     viewer: Arc<Viewer>,
     address: Address,
+    folder: Option<WorkFolder>,
     tickets: Vec<Ticket>,
     threads: usize,
 ) -> io::Result<()> {
@@ -61,8 +65,8 @@ pub fn serve(
     let runtime = runtime.enable_all().max_blocking_threads(threads.max(1)).build()?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(address.listener)?;
-        let guard = Arc::new(Guard::new(tickets, cookie, address.port));
-        let workers = Arc::new(Workers::new(viewer, threads));
+        let guard = Arc::new(Guard::new(tickets, cookie, address.port, folder.is_some()));
+        let workers = Arc::new(Workers::new(viewer, folder, threads));
         connections::answer(listener, routes::routes(workers, guard)).await
     })
 }

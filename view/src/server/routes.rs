@@ -3,27 +3,31 @@
 use std::num::NonZeroU8;
 use std::sync::Arc;
 
-use axum::Router;
-use axum::extract::rejection::{PathRejection, QueryRejection};
-use axum::extract::{Path, Query, Request, State};
-use axum::http::StatusCode;
+use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::header::CONTENT_LENGTH;
+use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::{self, Next};
-use axum::response::Response;
-use axum::routing::get;
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::answer::{asset, binary, json_of, png, refusal, with_policy};
 use super::guard::Guard;
+use super::transfer;
 use super::work::Workers;
 use crate::assets;
 use crate::error::ViewError;
 use crate::overlay::Overlay;
 use crate::tile::TileAt;
 use crate::viewer::ImageKind;
+use crate::work_folder::Order;
 
 /// Returns all addresses, behind the guard.
 pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
+    let shown = Arc::clone(&workers);
     Router::new()
         .route("/", get(|| async { page() }))
         .route("/assets/{name}", get(file))
@@ -39,6 +43,24 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
         .route("/api/stacks/{stack}/layers/{layer}/pixel", get(pixel))
         .route("/api/stacks/{stack}/layers/{layer}/edge", get(edge))
         .route("/tiles/{stack}/{layer}/{kind}/{reduction}/{x}/{file}", get(tile))
+        .layer(middleware::from_fn(move |request: Request, next: Next| {
+            let of_page = page_number(request.uri().query());
+            let is_there = of_page.is_none_or(|number| number == shown.viewer().number());
+            async move {
+                match is_there {
+                    true => next.run(request).await,
+                    false => ViewError::Changed(OTHER.to_owned()).into_response(),
+                }
+            }
+        }))
+        // These take files and orders, and answer pages of earlier stacks, too.
+        .route("/api/work", get(work))
+        .route("/api/work/files/{name}", get(download).put(upload))
+        .route("/api/work/make", post(make).layer(DefaultBodyLimit::max(MOST_ORDER)))
+        .route("/api/work/stop", post(stop))
+        .method_not_allowed_fallback(|| async {
+            refusal(StatusCode::METHOD_NOT_ALLOWED, "this address does not take this method")
+        })
         .fallback(|| async { ViewError::NoSuch("page") })
         .with_state(workers)
         .layer(middleware::from_fn(move |request: Request, next: Next| {
@@ -50,6 +72,17 @@ pub(super) fn routes(workers: Arc<Workers>, guard: Arc<Guard>) -> Router {
                 }
             }
         }))
+}
+
+/// The refusal of pages that show other stacks.
+const OTHER: &str = "another stack is shown: load this page again";
+
+/// The most bytes of an order.
+const MOST_ORDER: usize = 16 << 10;
+
+/// Returns the number of the viewer that a page was made of, if the request states it.
+fn page_number(query: Option<&str>) -> Option<u64> {
+    query?.split('&').find_map(|pair| pair.strip_prefix("of=")?.parse().ok())
 }
 
 type Answer = Result<Response, ViewError>;
@@ -81,7 +114,56 @@ async fn file(path: AddressNames<String>) -> Answer {
 }
 
 async fn session(State(workers): State<Arc<Workers>>) -> Response {
-    json_of(&workers.viewer().session())
+    let mut session = workers.viewer().session();
+    session["work"] = workers.has_folder().into();
+    json_of(&session)
+}
+
+async fn work(State(workers): State<Arc<Workers>>) -> Answer {
+    Ok(json_of(&workers.folder()?.state()?))
+}
+
+async fn download(State(workers): State<Arc<Workers>>, path: AddressNames<String>) -> Answer {
+    let file = workers.folder()?.open(&named(path)?)?;
+    let length = file.metadata().map(|facts| facts.len());
+    let mut answer = binary(transfer::body_of(file));
+    // A file that breaks off is noticed by its length.
+    if let Ok(length) = length {
+        answer.headers_mut().insert(CONTENT_LENGTH, HeaderValue::from(length));
+    }
+    Ok(answer)
+}
+
+#[derive(Deserialize)]
+struct UploadKeys {
+    #[serde(default)]
+    replace: bool,
+}
+
+async fn upload(
+    State(workers): State<Arc<Workers>>,
+    path: AddressNames<String>,
+    query: Keys<UploadKeys>,
+    request: Request,
+) -> Answer {
+    let folder = Arc::clone(workers.folder()?);
+    let (name, UploadKeys { replace }) = (named(path)?, keys(query)?);
+    transfer::keep(folder, name, replace, request.into_body()).await?;
+    work(State(workers)).await
+}
+
+async fn make(
+    State(workers): State<Arc<Workers>>,
+    order: Result<Json<Order>, JsonRejection>,
+) -> Answer {
+    let Json(order) = order.map_err(|_| ViewError::Malformed("the order is not understood"))?;
+    workers.begin(order)?;
+    work(State(workers)).await
+}
+
+async fn stop(State(workers): State<Arc<Workers>>) -> Answer {
+    workers.folder()?.stop();
+    work(State(workers)).await
 }
 
 async fn findings(State(workers): State<Arc<Workers>>) -> Answer {

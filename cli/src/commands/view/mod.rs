@@ -1,4 +1,6 @@
-//! `lamp view`: shows stacks and parts in a browser.
+//! `lamp view`: shows stacks and parts in a browser, and makes builds there.
+
+mod work;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -11,7 +13,8 @@ use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::{SliceSettings, SlicedPart, check_slicing};
 use lamp_stack::{Destination, Format, IndexedStack, Page, PrivateFile, write_stack};
 use lamp_view::{
-    Address, Ticket, Token, ViewedStack, Viewer, licences, of_records, of_report, serve,
+    Address, Finding, Ticket, Token, ViewedStack, Viewer, WorkProgress, licences, of_records,
+    of_report, serve,
 };
 
 use crate::args::options::{Common, parse_memory};
@@ -27,7 +30,8 @@ use crate::terminal::progress::{Progress, Severity};
 /// else on this machine can see the layers. Zoom and position stay while the layer changes. On
 /// demand, it shows white pixels that are black in the layer below, pixels that a second stack adds
 /// or lacks, stray rows and changes by `fix`, findings of `lamp check`, and the part in 3D. A part
-/// is sliced first. Ctrl-C ends the viewer.
+/// is sliced first. With --work, the page takes parts, slices them and lays out builds. Ctrl-C ends
+/// the viewer.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,12 +39,20 @@ Examples:
   lamp view build.tif --check
   lamp view fixed.tif sliced.tif --open
   lamp view blade.stl --dpi 600 --open
-  lamp view build.tif --findings check.json --port 8700")]
+  lamp view build.tif --findings check.json --port 8700
+  lamp view --work parts/ --open")]
 pub(crate) struct ViewArgs {
     /// Stacks (TIFF or picture files, folders of pages, - for standard input) or parts. The second
-    /// is compared with the first
-    #[arg(value_name = "STACK|PART", default_value = "-")]
+    /// is compared with the first [default: -, or none with --work]
+    #[arg(value_name = "STACK|PART")]
     inputs: Vec<PathBuf>,
+
+    /// Let the page make builds in this folder: drop a part or a stack on it, choose machine,
+    /// orientation and copies, look at the findings, get the build
+    ///
+    /// Files are read from and written to this folder alone
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
 
     /// Open the page in the default browser. The browser gets a file that only you can read and
     /// that leads to the page, so no list of processes shows the secret address
@@ -82,15 +94,30 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
     if args.inputs.iter().filter(|input| is_stream(input)).count() > 1 {
         return Err(Exit::usage("standard input can be read only once: give - once"));
     }
+    let inputs = match &args.inputs[..] {
+        [] if args.work.is_none() => &[PathBuf::from("-")],
+        inputs => inputs,
+    };
+    let finds = args.check || !args.findings.is_empty() || !args.report.is_empty();
+    if inputs.is_empty() && finds {
+        return Err(Exit::usage("findings are of a stack: name one, or leave out the option"));
+    }
     let slicing = SliceSettings::try_from(&args.slicing)?;
-    check_slicing(&slicing, &args.inputs, None)?;
+    if !inputs.is_empty() {
+        check_slicing(&slicing, inputs, None)?;
+    } else if let Some(option) = slicing.stated(None) {
+        return Err(Exit::usage(format!(
+            "there is no part for --{option}: name one, or choose on the page"
+        )));
+    }
     give_freed_memory_back();
     // Before stacks are opened, which may take long: a port that is taken shows at once.
     let address = Address::new(args.port).with_context(|| match args.port {
         0 => "a port of the loopback address".to_owned(),
         port => format!("port {port} of the loopback address"),
     })?;
-    let stacks = args.inputs.iter().map(|input| opened(input, &slicing, common));
+    let folder = args.work.as_deref().map(work::folder).transpose()?;
+    let stacks = inputs.iter().map(|input| opened(input, &slicing, common));
     let stacks = stacks.collect::<Result<Vec<_>, Exit>>()?;
     let threads = rayon::current_num_threads();
     let viewer = Arc::new(Viewer::new(
@@ -100,7 +127,10 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
         concat!("lamp ", env!("CARGO_PKG_VERSION")),
     ));
     if args.check {
-        viewer.find(|stack, progress| find(stack, progress).map_err(|error| error.to_string()));
+        viewer.find(|stack, progress| {
+            let found = find(&CheckSettings::default(), stack, progress);
+            found.map_err(|error| error.to_string())
+        });
     } else if !(args.findings.is_empty() && args.report.is_empty()) {
         if !args.report.is_empty() {
             Severity::Warning.say("view: findings to show are named by --findings");
@@ -123,7 +153,7 @@ pub(crate) fn run(args: &ViewArgs, common: &Common) -> Result<(), Exit> {
                 .say("no browser was found: open the address above"),
         }
     }
-    Ok(serve(viewer, address, tickets, threads).context("the viewer")?)
+    Ok(serve(viewer, address, folder, tickets, threads).context("the viewer")?)
 }
 
 fn new_token() -> Result<Token, Exit> {
@@ -192,9 +222,10 @@ fn sliced(part: &SlicedPart, progress: &Progress) -> Result<File, Exit> {
 
 /// Finds what `lamp check` finds.
 fn find(
+    settings: &CheckSettings,
     stack: &ViewedStack,
-    progress: &lamp_view::WorkProgress,
-) -> Result<Vec<lamp_view::Finding>, Exit> {
+    progress: &WorkProgress,
+) -> Result<Vec<Finding>, Exit> {
     let headers = stack.headers();
     progress.expect(headers.len() as u64);
     let pages = (0..headers.len()).map(|position| Ok(stack.page(position)?));
@@ -204,7 +235,7 @@ fn find(
         Ok::<_, Exit>(layer)
     };
     let build = BuildCopies::of(&headers[0].info, headers[0].size);
-    let found = CheckSettings::default().find(build, pages, decode, None)?;
+    let found = settings.find(build, pages, decode, None)?;
     let lines =
         found.features.iter().map(|feature| (&found.records[feature.finding], found.text(feature)));
     of_records(lines, headers).map_err(|why| Exit::Failed(anyhow!(why)))
