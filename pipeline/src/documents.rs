@@ -212,8 +212,10 @@ pub fn own_file<T: Document>(word: &Path) -> Option<PathBuf> {
     (!name.exists() && builtin::<T>(&name).is_none() && file.is_file()).then_some(file)
 }
 
-/// Puts the file in the place of a name, if the name means a document of one's own folder.
+/// Puts the file in the place of a name, if the name means a document of one's own folder. Other names
+/// get the letters of the document that they mean.
 pub fn find_own<T: Document>(word: &mut PathBuf) {
+    *word = in_own_case::<T>(word);
     if let Some(own) = own_file::<T>(word) {
         *word = own;
     }

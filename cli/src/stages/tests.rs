@@ -244,7 +244,7 @@ fn the_same_options_have_one_text_whatever_their_form() {
         ("slice", "slice -q --threads 3 --memory 64MB --dpi 1500dpi"),
         ("slice --thickness 100um", "slice --thickness 0.1mm"),
         ("slice --thickness 4mil", "slice --thickness 101.6um --plane top --margin 1"),
-        ("slice --machine alpha --dpi 1500", "slice --dpi 1500 --machine alpha"),
+        ("slice --machine alpha --dpi 1500", "slice --dpi 1500 --machine Alpha"),
         ("slice --size 1x1in --origin 0,25.4", "slice --origin 0,25.4mm --size 25.4x25.4mm"),
     ] {
         assert_eq!(canonical(&[a]), canonical(&[b]), "{a}");
