@@ -4,11 +4,13 @@ use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use lamp_pipeline::{RangeFindings, StageChain};
+use lamp_pipeline::{RangeFindings, StageChain, Survey};
 use lamp_stack::{Layer, StackError};
 
 use crate::error::BatchError;
+use crate::key::Kind;
 use crate::store::CheckCounts;
+use crate::task::Cost;
 
 /// A command with its options: everything that decides the bytes of its result but its inputs.
 pub trait Call {
@@ -23,6 +25,15 @@ pub trait Call {
 
     /// Returns its name, and the number that changes when its bytes do.
     fn code(&self) -> (&'static str, u32);
+}
+
+/// A stage that works on a whole stack.
+pub trait WholeCall: Call {
+    /// Returns the kind of its tasks, [`Kind::Whole`] or [`Kind::Plan`].
+    fn kind(&self) -> Kind;
+
+    /// Returns the estimated cost of a task on a stack of so many bytes, by the survey of its part.
+    fn cost(&self, survey: &Survey, bytes: u64) -> Cost;
 }
 
 /// The stages of a part: first layer by layer, in ranges, then on the whole stack.
@@ -71,7 +82,7 @@ pub trait Commands {
         + From<StackError>
         + Send;
     /// A stage that works on a whole stack.
-    type Whole: Call;
+    type Whole: WholeCall;
     /// The layout of a build.
     type Tile: Call;
     /// The findings to look for in a stack.

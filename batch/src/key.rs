@@ -29,6 +29,8 @@ pub enum Kind {
     Join,
     /// A stage that needs the whole stack.
     Whole,
+    /// A plan of exposures of the whole stack.
+    Plan,
     /// The findings in a part's stack that need a person.
     Check,
     /// A build of parts.
@@ -42,6 +44,7 @@ impl Kind {
             Self::Range => "range",
             Self::Join => "join",
             Self::Whole => "whole",
+            Self::Plan => "plan",
             Self::Check => "check",
             Self::Tile => "tile",
         }

@@ -56,7 +56,7 @@ mod summary;
 mod task;
 
 pub use commands::{
-    Call, Commands, JOIN_CODE, LayersOf, PACK_CODE, StageError, Stages, WriteLayers,
+    Call, Commands, JOIN_CODE, LayersOf, PACK_CODE, StageError, Stages, WholeCall, WriteLayers,
 };
 pub use deliver::{Delivered, Deliverer, check_delivered};
 #[cfg(windows)]

@@ -9,7 +9,7 @@ use lamp_pipeline::documents::without_digest;
 use lamp_pipeline::{Survey, stored_name};
 
 use crate::assignment::{Assignment, Work};
-use crate::commands::{Call, Commands, JOIN_CODE, PACK_CODE, Stages};
+use crate::commands::{Call, Commands, JOIN_CODE, PACK_CODE, Stages, WholeCall};
 use crate::error::BatchError;
 use crate::key::{Key, Kind, TaskRecipe};
 use crate::night::{Build, Night, Part, Place, Stage};
@@ -240,19 +240,20 @@ impl<C: Commands> NightPlanner<'_, C> {
         let stored = stored_name(&input.digest);
         let joined = self.layers(part, &chained, &input, &survey);
         let all = 0..survey.layers;
-        let (all_s, bytes) = (survey.cost_s(&all), survey.bytes(&all));
+        let (all_s, mut bytes) = (survey.cost_s(&all), survey.bytes(&all));
         let mut stack = joined;
         for (which, after) in chained.stages.after.iter().enumerate() {
             let files = self.inputs(after.input_files()?)?;
             let recipe = TaskRecipe {
-                kind: Kind::Whole,
+                kind: after.kind(),
                 options: vec![after.canonical()],
                 inputs: inputs_of([stack.to_string()], &files),
                 code: coded([after.code()]),
             };
             let (part_file, stages) = (part.file.clone(), chained.words.clone());
             let work = Work::Whole { part: part_file, stages, which };
-            let cost = Cost { cpu_s: all_s * 0.3, memory: survey.memory, disk: bytes };
+            let cost = after.cost(&survey, bytes);
+            bytes = cost.disk;
             let label = format!("{} of the whole stack", after.code().0);
             stack = self.add(recipe, &part.name, label, vec![stack], files, cost, work);
         }

@@ -96,9 +96,12 @@ pub fn run_stage(name: &str) -> u8 {
     finish(name, run(name, &command, &common))
 }
 
-/// Returns a stage as a program: its own arguments, with lamp's general ones.
+/// Returns a stage as a program: its own arguments, with lamp's general ones. Its name may have two
+/// words, as `plan voxels`.
 pub(crate) fn stage(lamp: &clap::Command, name: &str) -> clap::Command {
-    let stage = lamp.find_subcommand(name).expect("a stage is a command of lamp").clone();
+    let within = |command, name| clap::Command::find_subcommand(command, name);
+    let stage = name.split(' ').try_fold(lamp, within);
+    let stage = stage.expect("a stage is a command of lamp").clone();
     let general = lamp.get_arguments().filter(|arg| arg.is_global_set()).cloned();
     stage
         // Not the name of the program that runs, which is `lamp` where no process chooses its own.

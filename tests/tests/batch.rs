@@ -482,3 +482,100 @@ fn no_part_of_a_night_is_passed_over() {
     fs::remove_file(folder.join("parts/link.stl")).unwrap();
     assert!(batch().status.success());
 }
+
+/// A night of plans of exposures: gray levels for a part and a build of it, times for another part.
+#[cfg(unix)]
+const PLANS: &str = "\
+    [defaults]\n\
+    stages = [\"slice --dpi 100 --thickness 200um\", \"fix\"]\n\
+    [[part]]\n\
+    file = \"a.stl\"\n\
+    stages = [\"slice --dpi 100 --thickness 200um\", \"fix\", \"plan voxels --material resin.toml --expose 2s\"]\n\
+    [[part]]\n\
+    file = \"b.stl\"\n\
+    stages = [\"slice --dpi 100 --thickness 200um\", \"plan speed --material resin.toml\", \"fix\"]\n\
+    [[build]]\n\
+    name = \"two\"\n\
+    parts = [\"a:2\"]\n\
+    tile = \"--mesh none\"\n\
+    [output]\n\
+    format = \"tif\"\n";
+
+/// Plans have the bytes of their commands, also after a kill, and follow their material.
+#[test]
+#[cfg(unix)]
+fn plans_of_exposures_are_stages_of_nights() {
+    let scratch = Scratch::new();
+    scratch.part("a.stl", Sample::Cube, 64);
+    scratch.part("b.stl", Sample::Sphere, 600);
+    scratch.run("lamp material show pegda-sudan > resin.toml").succeeds();
+    scratch.write("night.toml", PLANS.as_bytes());
+    let plan = scratch.run("lamp batch plan night.toml").succeeds_quietly();
+    assert!(String::from_utf8(plan.stdout).unwrap().contains("plan   2 of 2 tasks to do, about "));
+    // Killed at work, it goes on.
+    let mut first = scratch.command("lamp batch night.toml --jobs 1 -q").spawn().unwrap();
+    let start = Instant::now();
+    let has_begun =
+        || scratch.path("lamp-store/tasks").exists() && !stored(&scratch, "json").is_empty();
+    while !has_begun() {
+        assert!(start.elapsed() < Duration::from_secs(120), "no task is done");
+        thread::sleep(Duration::from_millis(2));
+    }
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let ran = night(&scratch);
+    assert_eq!(ran.statuses, [Some(0)], "{ran:?}");
+    let slice = "slice --dpi 100 --thickness 200um";
+    for (by_hand, of_night) in [
+        (
+            format!(
+                "{slice} a.stl -q | fix -q | lamp plan voxels --material resin.toml --expose 2s -q > a.tif"
+            ),
+            "parts/a",
+        ),
+        (
+            format!("{slice} b.stl -q | lamp plan speed --material resin.toml -q | fix -q > b.tif"),
+            "parts/b",
+        ),
+        ("tile a.tif:2 --mesh none -q > two.tif".to_owned(), "builds/two"),
+    ] {
+        scratch.run(&by_hand).succeeds();
+        let name = Path::new(of_night).file_name().unwrap().to_str().unwrap();
+        let by_hand = scratch.bytes(&format!("{name}.tif"));
+        assert!(by_hand == scratch.bytes(&format!("night/{of_night}.tif")), "{of_night}");
+    }
+    let report = String::from_utf8(scratch.bytes("night/report.html")).unwrap();
+    for line in ["plan: the best plan is at most ", "plan: the best time for all layers, "] {
+        assert!(report.contains(line), "{line}");
+    }
+    // Another text of the material concerns the plans and what is behind them.
+    let resin = scratch.bytes("resin.toml");
+    scratch.write("resin.toml", &resin);
+    assert_eq!(done(&night(&scratch)), [""; 0]);
+    scratch.write("resin.toml", &[&resin[..], b"# measured again\n"].concat());
+    let changed = night(&scratch);
+    let mut again = done(&changed);
+    again.sort_unstable();
+    assert_eq!(
+        again,
+        [
+            "a (check)",
+            "a (plan voxels of the whole stack)",
+            "b (check)",
+            "b (fix of the whole stack)",
+            "b (plan speed of the whole stack)",
+            "two (build of 1 part)",
+        ],
+        "{changed:?}"
+    );
+    scratch.write("resin.toml", &resin);
+    assert_eq!(done(&night(&scratch)), [""; 0]);
+    scratch.run("lamp batch verify night.toml").succeeds_quietly();
+    let status = scratch.run("lamp batch status night.toml").succeeds_quietly();
+    assert!(String::from_utf8(status.stdout).unwrap().starts_with("3 of 3 are done"));
+    // Options of the plan may stand in a part.
+    let other = PLANS.replace("[[build]]", "[[part]]\nfile = \"a.stl\"\nplan = \"voxels --material resin.toml --expose 3s\"\n[[build]]");
+    scratch.write("night.toml", other.as_bytes());
+    let plan = scratch.run("lamp batch plan night.toml").succeeds_quietly();
+    assert!(String::from_utf8(plan.stdout).unwrap().contains("plan   1 of 2 tasks to do"));
+}

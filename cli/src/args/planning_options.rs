@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lamp_grayscale::material::Material;
-use lamp_pipeline::documents::document_and_word;
+use lamp_pipeline::documents::{document_and_word, is_file, recorded_name};
 use lamp_pipeline::heights::parse_share;
 use lamp_pipeline::words::option;
 use lamp_planning::{Light, SampleHeight};
@@ -66,9 +66,22 @@ impl PlanningOptions {
         let (material, word) = document_and_word(&self.material)?;
         let (material, doubt) = self.lamp.material(material)?;
         let light = Light::of(&material, self.dose_at)?;
+        Ok(PlannedResin { material, light, doubt, words: self.words(&word) })
+    }
+
+    /// Returns the material's file, unless the material is built in.
+    pub(crate) fn file_mut(&mut self) -> Option<&mut PathBuf> {
+        is_file::<Material>(&self.material).then_some(&mut self.material)
+    }
+
+    /// Returns the words that pages record, without the digest of a material's file.
+    pub(crate) fn recorded_words(&self) -> String {
+        self.words(&recorded_name::<Material>(&self.material).to_string_lossy())
+    }
+
+    fn words(&self, material: &str) -> String {
         let lamp = self.lamp.canonical().map(|light| option("lamp-intensity", &light));
-        let words = format!("--material {}{}", quoted(&word), lamp.unwrap_or_default());
-        Ok(PlannedResin { material, light, doubt, words })
+        format!("--material {}{}", quoted(material), lamp.unwrap_or_default())
     }
 }
 

@@ -32,7 +32,7 @@ mod mesh;
 mod mesh_out;
 mod orient;
 mod pack;
-mod plan;
+pub(crate) mod plan;
 mod projector;
 mod report;
 mod sample;

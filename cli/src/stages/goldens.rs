@@ -10,9 +10,11 @@ use std::path::Path;
 use lamp_batch::{JOIN_CODE, PACK_CODE};
 use lamp_build::TILE_CODE;
 use lamp_pipeline::{compensate, dither, edit, fix, slice, support};
+use lamp_planning::speed::SPEED_CODE;
+use lamp_planning::voxels::VOXELS_CODE;
 use lamp_stack::digest_of;
 
-use super::tests::{Bench, COARSE, GRAY};
+use super::tests::{Bench, COARSE, GRAY, PLANS};
 
 const GOLDENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/stages/goldens.txt");
 const BLESS: &str = "LAMP_BLESS=1 cargo test -p lamp-cli --lib stages::goldens";
@@ -47,6 +49,7 @@ fn digests() -> BTreeMap<&'static str, String> {
     ]);
     let edit = of(&[("t.stl", &[COARSE, "edit - @edits.toml"])]);
     let support = of(&[("s.stl", &["slice --dpi 100 --thickness 1mm", "support"])]);
+    let [voxels, speed] = PLANS.map(|plan| of(&[("t.stl", &[COARSE, plan])]));
     bench.lamp("slice @t.stl --dpi 100 --thickness 1mm --layers ..30 -o @low.tif");
     bench.lamp("slice @t.stl --dpi 100 --thickness 1mm --layers 30.. -o @high.tif");
     bench.lamp("join @low.tif @high.tif -o @all.tif");
@@ -60,6 +63,8 @@ fn digests() -> BTreeMap<&'static str, String> {
         ("compensate", compensate),
         ("edit", edit),
         ("support", support),
+        ("plan-voxels", voxels),
+        ("plan-speed", speed),
         ("join", file("all.tif")),
         ("tile", file("build.tif")),
         ("pack", file("all.lamp")),
@@ -87,6 +92,8 @@ fn a_stage_whose_bytes_change_has_another_number() {
         ("compensate", compensate::CODE),
         ("edit", edit::CODE),
         ("support", support::CODE),
+        ("plan-voxels", VOXELS_CODE),
+        ("plan-speed", SPEED_CODE),
         ("join", JOIN_CODE),
         ("pack", PACK_CODE),
         ("tile", TILE_CODE),
@@ -100,8 +107,8 @@ fn a_stage_whose_bytes_change_has_another_number() {
         let same_number = golden.get(&**name).filter(|golden| number(golden) == number(line));
         assert!(
             same_number.is_none_or(|golden| golden == line),
-            "{name} makes other bytes than it did: raise its number (CODE in pipeline/src/), so \
-             that stored results are made again, then run {BLESS}"
+            "{name} makes other bytes than it did: raise its number (a CODE in pipeline/, planning/, \
+             batch/ or postprocess/), so that stored results are made again, then run {BLESS}"
         );
     }
     let text = found.values().fold(String::new(), |text, line| text + line + "\n");

@@ -17,13 +17,17 @@ use lamp_pipeline::edit::{EditSettings, Editing};
 use lamp_pipeline::part_file::PartFile;
 use lamp_pipeline::slice::SliceStage;
 use lamp_pipeline::{Stage, StageChain};
+use lamp_planning::speed::MOST_SPEED_MEMORY;
 
 use super::after::After;
 use crate::Lamp;
 use crate::args::arguments::{settings_of_machine, words_left_open};
+use crate::args::planning_options::PlanningOptions;
 use crate::args::slicing::SliceStageArgs;
 use crate::args::stages::{CompensateStageArgs, DitherStageArgs, EditStageArgs, FixStageArgs};
 use crate::commands::check::CheckArgs;
+use crate::commands::plan::speed::SpeedArgs;
+use crate::commands::plan::voxels::VoxelsArgs;
 use crate::commands::support::SupportArgs;
 use crate::commands::tile::TileArgs;
 use crate::exit::Exit;
@@ -32,7 +36,15 @@ use crate::terminal::help::formed;
 use crate::terminal::usage::sentence;
 
 /// The stages that there are.
-const STAGES: [&str; 6] = ["slice", "fix", "compensate", "dither", "edit", "support"];
+const STAGES: [&str; 8] =
+    ["slice", "fix", "compensate", "dither", "edit", "support", "plan voxels", "plan speed"];
+
+/// The name that stages of two words share.
+const PLAN: &str = "plan";
+
+/// The memory of a plan of gray levels, if the stage gives none. Levels depend on it a little, so it
+/// must be the same on every machine.
+const VOXELS_MEMORY: u64 = 2_000_000_000;
 
 /// Options that make no sense in a list of stages, and what to do instead.
 const REFUSED: [(&str, &str); 25] = [
@@ -66,11 +78,32 @@ const REFUSED: [(&str, &str); 25] = [
     ("part", "leave out --part: the part is the one that the stages are for"),
 ];
 
+/// Options of plans that make no sense in a list of stages. They come before [`REFUSED`].
+const REFUSED_IN_PLANS: [(&str, &str); 6] = [
+    (
+        "report",
+        "leave out --report: report.html has the plan's lines; run lamp plan by hand for more",
+    ),
+    ("json", "leave out --json: report.html has the plan's lines; run lamp plan by hand for more"),
+    ("plot", "leave out --plot: run lamp plan by hand for the plot"),
+    ("map", "leave out --map: run lamp plan by hand for the map"),
+    (
+        "profile",
+        "leave out --profile: pages have their times; run lamp plan speed by hand for the table",
+    ),
+    ("strict", "leave out --strict: report.html has the voxels that white light cannot cure"),
+];
+
 /// Reads stages. Files that options name stand in `folder`, unless their paths are absolute.
 pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<After>, StageError> {
     let (mut slice, mut per_layer, mut after) = (None, Vec::new(), Vec::new());
     for (stage, words) in stages.iter().enumerate() {
-        let name = words.first().map_or("", String::as_str);
+        let first = words.first().map_or("", String::as_str);
+        let refused = |why: String| StageError { stage, name: first.to_owned(), why };
+        let (name, words) = match first {
+            PLAN => plan_and_words(words).map_err(refused)?,
+            _ => (first, &words[..]),
+        };
         let refused = |why: String| StageError { stage, name: name.to_owned(), why };
         if !STAGES.contains(&name) {
             let stages = STAGES.join(", ");
@@ -86,6 +119,8 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
         match name {
             "slice" => slice = Some(reader.slice().map_err(refused)?),
             "support" => after.push(After::Support(reader.support())),
+            "plan voxels" => after.push(After::Voxels(reader.voxels().map_err(refused)?)),
+            "plan speed" => after.push(After::Speed(reader.speed().map_err(refused)?)),
             _ => {
                 let stage = reader.per_layer(name).map_err(refused)?;
                 // Stages after a stage of the whole stack work on the whole stack, too.
@@ -103,6 +138,25 @@ pub(crate) fn parse(stages: &[Vec<String>], folder: &Path) -> Result<Stages<Afte
         why: "there are no stages: a part needs at least slice".to_owned(),
     };
     Ok(Stages { chain: StageChain { slice: slice.ok_or_else(none)?, stages: per_layer }, after })
+}
+
+/// Returns the name of a plan's stage, and its words with its own name at the beginning.
+fn plan_and_words(words: &[String]) -> Result<(&'static str, &[String]), String> {
+    let kind = words.get(1).map_or("", String::as_str);
+    let mut plans = STAGES.iter().filter_map(|stage| Some((stage, stage.strip_prefix("plan ")?)));
+    match kind {
+        _ if let Some((stage, _)) = plans.find(|(_, plan)| *plan == kind) => {
+            Ok((stage, &words[1..]))
+        }
+        "column-cure" | "ecpl" => Err(format!(
+            "{kind} plans a target on a glass, and takes no layers of a part: run lamp plan {kind} \
+             by hand"
+        )),
+        "simulate" => Err("simulate shows bitmaps on a glass, and makes no layers of a part: run \
+                           lamp plan simulate by hand"
+            .to_owned()),
+        _ => Err("write plan voxels for gray levels, or plan speed for times of layers".to_owned()),
+    }
 }
 
 /// A stage's words, read.
@@ -166,6 +220,28 @@ impl<'a> StageReader<'a> {
         // Materials and tables are read now: a slip in them must show before the night, not in it.
         stage.settings.exposure().map_err(said)?;
         Ok(stage)
+    }
+
+    fn voxels(&self) -> Result<Box<VoxelsArgs>, String> {
+        let mut args: VoxelsArgs = self.read();
+        args.memory.get_or_insert(VOXELS_MEMORY);
+        self.check_planning(&mut args.planning)?;
+        Ok(Box::new(args))
+    }
+
+    fn speed(&self) -> Result<Box<SpeedArgs>, String> {
+        let mut args: SpeedArgs = self.read();
+        // With more, a plan is the same.
+        args.memory = Some(args.memory.unwrap_or(u64::MAX).min(MOST_SPEED_MEMORY));
+        self.check_planning(&mut args.planning)?;
+        Ok(Box::new(args))
+    }
+
+    /// Finds the material of a plan, and tries it: a slip in it must show before the night.
+    fn check_planning(&self, planning: &mut PlanningOptions) -> Result<(), String> {
+        find_own::<Material>(&mut planning.material);
+        planning.file_mut().into_iter().for_each(|path| *path = self.folder.join(&*path));
+        planning.resin().map(drop).map_err(|error| error.to_string())
     }
 
     fn support(&self) -> Box<SupportArgs> {
@@ -232,7 +308,12 @@ fn check(matches: &ArgMatches, name: &str) -> Result<(), String> {
     let of_part = |id: &str| {
         id == "part" && matches.get_many::<PartFile>(id).is_none_or(|parts| parts.len() < 2)
     };
-    let refused = REFUSED.iter().find(|(id, _)| is_given(id) && !of_part(id));
+    let is_plan = name.starts_with(PLAN);
+    // Pages without an exposure need one to be planned.
+    let of_plan = |id: &str| is_plan && id == "expose";
+    let of_plans = REFUSED_IN_PLANS.iter().filter(|_| is_plan);
+    let mut refused = of_plans.chain(REFUSED.iter().filter(|(id, _)| !of_plan(id)));
+    let refused = refused.find(|(id, _)| is_given(id) && !of_part(id));
     if let Some((_, why)) = refused {
         return Err((*why).to_owned());
     }

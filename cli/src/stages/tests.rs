@@ -5,12 +5,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use lamp_batch::{Call, LayersOf};
+use lamp_batch::{Call, LayersOf, WholeCall};
+use lamp_grayscale::material::Material;
 use lamp_pipeline::check::CheckSettings;
 use lamp_pipeline::support::SupportSettings;
 use lamp_pipeline::tile::TileSettings;
 use lamp_pipeline::{Names, RangeFindings, stored_name};
-use lamp_stack::{Destination, Format, Layer, join, write_stack};
+use lamp_stack::{Catalogued, Destination, Format, Layer, join, write_stack};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use tempfile::TempDir;
@@ -39,12 +40,19 @@ impl Bench {
         let bench = Self::new();
         bench.lamp("sample tower --facets 5k --defect drop --count 20 -o @t.stl");
         bench.write("mine.toml", MATERIAL);
+        bench.write_resin();
         bench.write(
             "edits.toml",
             "[[edit]]\nop = \"subtract\"\nlayers = [3, 40]\nbox = { x = [\"-5mm\", \"5mm\"], y = [\"-5mm\", \"2mm\"] }\n\
              [[edit]]\npad = { left = \"2mm\", top = \"1mm\" }\n",
         );
         bench
+    }
+
+    /// A resin whose light spreads, in a file.
+    fn write_resin(&self) {
+        let mut resins = Material::BUILTINS.iter().filter(|builtin| builtin.name == "pegda-sudan");
+        self.write("resin.toml", resins.next().unwrap().toml);
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -74,7 +82,10 @@ impl Bench {
     pub(super) fn by_hand(&self, part: &str, stages: &[&str]) -> Vec<u8> {
         let mut last = String::new();
         for (k, stage) in stages.iter().enumerate() {
-            let (name, options) = stage.split_once(' ').unwrap_or((stage, ""));
+            // A plan has a name of two words.
+            let skipped = if stage.starts_with("plan ") { "plan ".len() } else { 0 };
+            let end = stage[skipped..].find(' ').map_or(stage.len(), |end| skipped + end);
+            let (name, options) = (&stage[..end], stage[end..].trim_start());
             let input = if k == 0 { part } else { &last };
             // Lists of edits stand behind a word for the stack.
             let options = options.strip_prefix("- ").unwrap_or(options);
@@ -311,6 +322,28 @@ fn options_that_make_no_sense_in_a_night_are_refused_in_one_sentence() {
         (&["slice", "compensate --material none.toml"], "no such file"),
         (&["slice --gray --plane middle --material lamp-suspension"], "leave out --plane"),
         (&["slice", "support --part a.stl"], "leave out --part"),
+        (&["slice", "plan"], "1: plan: write plan voxels for gray levels, or plan speed"),
+        (&["slice", "plan voxel"], "1: plan: write plan voxels"),
+        (&["slice", "plan ecpl hemisphere"], "1: plan: ecpl plans a target on a glass"),
+        (&["slice", "plan column-cure a.toml"], "run lamp plan column-cure by hand"),
+        (&["slice", "plan simulate a.tif"], "run lamp plan simulate by hand"),
+        (&["plan voxels --material pegda-sudan"], "0: plan voxels: a part's first stage is slice"),
+        (&["slice", "plan voxels"], "1: plan voxels: the following required arguments"),
+        (&["slice", "plan voxels --material none.toml"], "none.toml: there is no such file"),
+        (&["slice", "plan speed --material lamp-suspension"], "[spread]"),
+        (&["slice", "plan speed --material sl-5510"], "[spread]"),
+        (&["slice", "plan voxels a.tif --material pegda-sudan"], "leave out a.tif"),
+        (&["slice", "plan voxels --material pegda-sudan -o a.tif"], "leave out -o"),
+        (&["slice", "plan voxels --material pegda-sudan --strict"], "white light cannot cure"),
+        (&["slice", "plan voxels --material pegda-sudan --report a.json"], "the plan's lines"),
+        (&["slice", "plan speed --material pegda-sudan --json"], "the plan's lines"),
+        (&["slice", "plan voxels --material pegda-sudan --plot a.svg"], "by hand for the plot"),
+        (
+            &["slice", "plan voxels --material pegda-sudan --map a.png --map-layer 3"],
+            "by hand for the map",
+        ),
+        (&["slice", "plan speed --material pegda-sudan --profile a.csv"], "for the table"),
+        (&["slice", "plan speed --material pegda-sudan --layers 3.."], "leave out --layers"),
         (&["slice", "dither --help"], "for the command line"),
     ] {
         let said = bench.parsed(stages).err().unwrap_or_else(|| panic!("{stages:?} passes"));
@@ -378,6 +411,95 @@ fn what_follows_on_ranges_does_what_its_command_does() {
     assert!(refused(&["--fields", "9x9"]).contains("leave out --fields"));
     assert!(refused(&["--copies", "3"]).contains("--copies is for one stack"));
     assert!(refused(&["--layout", "none.json", "a.tif"]).contains("leave out the stacks"));
+}
+
+pub(super) const PLANS: [&str; 2] = [
+    "plan voxels --material @resin.toml --expose 3s --search-gap 5%",
+    "plan speed --material @resin.toml --search-gap 5%",
+];
+
+#[test]
+fn plans_of_nights_have_the_bytes_of_their_commands() {
+    let bench = Bench::with_tower();
+    let part = bench.path("t.stl");
+    let stored = stored_name("blake3:0123456789abcdef");
+    let names = Names::new([(stored.clone(), "t.stl".to_owned())]);
+    for plan in PLANS {
+        let stages = [COARSE, "fix", plan, "dither"];
+        let by_hand = bench.by_hand("t.stl", &stages);
+        let stages = bench.stages(&stages);
+        assert_eq!(stages.after.len(), 2, "a stage behind a plan has the whole stack, too");
+        let write = |layers: &mut LayersOf<'_, Exit>, name: &str| {
+            write_stack(layers, Destination::File(bench.path(name)), Format::Big)
+        };
+        let of_chain = |layers: &mut dyn Iterator<Item = Result<Layer, lamp_pipeline::Error>>| {
+            write(&mut layers.map(|layer| Ok(layer?)), "sliced.tif")
+        };
+        stages.chain.run(&part, &stored, 0..76, of_chain).unwrap();
+        let run = |after: usize, from: &str, to: &str| {
+            stages.after[after]
+                .run(&part, &bench.path(from), &mut |layers| write(layers, to))
+                .unwrap()
+        };
+        let found = run(0, "sliced.tif", "planned.tif");
+        let notes = found.notes();
+        assert!(notes.iter().any(|note| note.contains(" undercured")), "{notes:?}");
+        run(1, "planned.tif", "dots.tif");
+        names.unpack(&bench.path("dots.tif"), Destination::File(bench.path("out.tif"))).unwrap();
+        assert!(bench.bytes("out.tif") == by_hand, "{plan}");
+    }
+}
+
+#[test]
+fn plans_are_named_by_all_that_decides_their_bytes() {
+    let bench = Bench::with_tower();
+    let of = |stage: &str| bench.stages(&["slice", stage]).after.remove(0);
+    let canonical = |stage: &str| of(stage).canonical();
+    let [voxels, speed] = PLANS;
+    for (same, other) in [
+        (voxels, format!("{voxels} --memory 2GB --wanted 128 -q --threads 2")),
+        (voxels, voxels.replace("3s", "3000ms")),
+        ("plan speed --material pegda-sudan", "plan speed --material Pegda-Sudan".to_owned()),
+        (speed, format!("{speed} --memory 99GB --speed 0.005mm/s..2mm/s")),
+    ] {
+        assert_eq!(canonical(same), canonical(&other), "{other}");
+    }
+    let all = [
+        voxels.to_owned(),
+        voxels.replace("3s", "2s"),
+        voxels.replace("resin.toml", "mine.toml"),
+        voxels.replace("@resin.toml", "pegda-sudan"),
+        format!("{voxels} --memory 1GB"),
+        format!("{voxels} --lamp-intensity 90%"),
+        format!("{voxels} --sources grow:1px"),
+        format!("{voxels} --around 0px"),
+        format!("{voxels} --min-level 9"),
+        format!("{voxels} --keep-white wall:1px"),
+        format!("{voxels} --objective boundary"),
+        format!("{voxels} --wanted 1"),
+        format!("{voxels} --dose-margin 6%"),
+        format!("{voxels} --dose-at bottom"),
+        speed.to_owned(),
+        format!("{speed} --memory 64MB"),
+        format!("{speed} --max-change 20%"),
+        format!("{speed} --speed 5um/s..3mm/s"),
+    ];
+    // The name of a file is recorded in pages, too.
+    fs::copy(bench.path("resin.toml"), bench.path("mine.toml")).unwrap();
+    let mut texts: Vec<_> = all.iter().map(|stage| canonical(stage)).collect();
+    texts.sort();
+    texts.dedup();
+    assert_eq!(texts.len(), all.len());
+    assert_eq!(of(voxels).input_files().unwrap(), [bench.path("resin.toml")]);
+    let builtin = of("plan speed --material pegda-sudan");
+    assert_eq!(builtin.input_files().unwrap(), [] as [PathBuf; 0]);
+    assert_eq!([of(voxels).code().0, builtin.code().0], ["plan voxels", "plan speed"]);
+    // The memory of a task follows the option, as far as its images can use it.
+    let survey = bench.stages(&[COARSE]).chain.survey(&bench.path("t.stl")).unwrap();
+    let memory = |stage: &str| of(stage).cost(&survey, 0).memory;
+    let [least, most] = ["16MB", "8GB"].map(|bytes| memory(&format!("{voxels} --memory {bytes}")));
+    assert!(least < most && most < 2_000_000_000, "{least} {most}");
+    assert_eq!(memory(voxels), most);
 }
 
 #[test]

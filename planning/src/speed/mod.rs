@@ -17,7 +17,9 @@ mod times_table;
 
 pub use feasible::{Platform, PlatformError, Speed};
 pub use part::{PartError, PartPages, TimedLayer, TimedPart};
-pub use plan::{SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan, plan_corrected};
-pub use simulation::Simulation;
+pub use plan::{
+    SPEED_CODE, SearchStage, SpeedOptions, SpeedPlan, SpeedPlanError, plan, plan_corrected,
+};
+pub use simulation::{MOST_SPEED_MEMORY, Simulation};
 pub use tally::{DOSE_BINS, LIGHT_SHARES, Tally, Wrong};
 pub use times_table::{recorded_ms, times_table};

@@ -11,6 +11,9 @@ use super::tally::Tally;
 use crate::light::Light;
 use crate::numeric::{DescentEnd, descend};
 
+/// Changes when the same options and layers give other times.
+pub const SPEED_CODE: u32 = 1;
+
 /// The light, platform and limits to plan for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedOptions {

@@ -12,6 +12,10 @@ use crate::light::Light;
 const COLUMNS_SHARE: u64 = 4;
 const MOST_COLUMN_BYTES: u64 = 64 << 20;
 
+/// The most bytes that help a plan of times: more than that in
+/// [`SpeedOptions::memory`](super::SpeedOptions::memory) changes nothing.
+pub const MOST_SPEED_MEMORY: u64 = COLUMNS_SHARE * MOST_COLUMN_BYTES;
+
 /// A part under a light, whose layers can be given times.
 pub struct Simulation<'a> {
     gather: Gather<'a>,

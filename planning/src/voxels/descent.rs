@@ -38,9 +38,9 @@ pub(crate) struct Descended {
 
 /// The number of tiles near a surface in some layer of a window, for each tile in which a surface
 /// runs through one layer.
-const NEAR_SURFACE: u64 = 3;
+pub(crate) const NEAR_SURFACE: u64 = 3;
 /// The bytes of a planned pixel.
-const BYTES_PLANNED: u64 = 5;
+pub(crate) const BYTES_PLANNED: u64 = 5;
 
 /// The state of the way down.
 struct Descent<'a> {

@@ -20,4 +20,4 @@ mod unplanned;
 
 pub use options::{Options, Sources, VoxelObjective, Window};
 pub use outcome::{DoseHistogram, GapAt, LayerOutcome, Outcome, VoxelCounts, VoxelTally};
-pub use plan::{VoxelPlan, VoxelPlanError, plan};
+pub use plan::{VOXELS_CODE, VoxelPlan, VoxelPlanError, most_memory, plan};

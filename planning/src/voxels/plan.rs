@@ -12,12 +12,15 @@ use crate::solver::Terms;
 use crate::spool::{Spool, SpooledRuns};
 use crate::tiled::{TileGrid, Tiled};
 use crate::voxels::bound::Ascent;
-use crate::voxels::descent::{Descended, descend};
+use crate::voxels::descent::{BYTES_PLANNED, Descended, NEAR_SURFACE, descend};
 use crate::voxels::levels::Levels;
 use crate::voxels::options::{Options, VoxelObjective, Window};
 use crate::voxels::outcome::{LayerOutcome, Outcome};
 use crate::voxels::roles::RoleRules;
 use crate::voxels::setting::{VoxelSetting, price};
+
+/// Changes when the same options and layers give other gray levels.
+pub const VOXELS_CODE: u32 = 1;
 
 /// Why a stack cannot be planned.
 #[derive(Debug, Error)]
@@ -75,6 +78,15 @@ const MOST_AHEAD: usize = 10;
 const LEFT: f64 = 0.1;
 /// The most layers below a window to which its light is followed.
 const MOST_TAIL: usize = 60;
+
+/// Returns about the most bytes that a plan of images of `size` uses, whatever
+/// [`Options::memory`] allows. Images of which only parts are near surfaces need less.
+pub fn most_memory(size: [u32; 2], layers: u32) -> u64 {
+    let pixels: u64 = size.map(u64::from).iter().product();
+    let held = u64::from(layers).min((WINDOW + MOST_TAIL) as u64);
+    // Wanted and target voxels, planned pixels, and three images of doses, twice each.
+    pixels * (held * (2 + NEAR_SURFACE * BYTES_PLANNED) + 3 * 8)
+}
 
 /// Plans the gray levels of a stack's layers. `part` gives the wanted images, bottom first;
 /// `settled` is called with the number of finished layers.

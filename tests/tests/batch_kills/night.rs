@@ -16,7 +16,8 @@ use serde_json::Value;
 
 use super::processes::PATIENCE;
 
-/// Three parts, one with stray rows, in five ranges, their joins and checks, and a build.
+/// Three parts, one with stray rows, in five ranges, their joins and checks, and a build; and a part with a
+/// plan of its gray levels.
 const NIGHT: &str = r#"
 [defaults]
 stages = ["slice --dpi 100 --thickness 100um", "fix"]
@@ -28,6 +29,10 @@ file = "*.stl"
 [[part]]
 file = "plain.stl"
 ranges = 1
+
+[[part]]
+file = "more/planned.stl"
+stages = ["slice --dpi 100 --thickness 500um", "plan voxels --material pegda-sudan --expose 2s", "dither"]
 
 [[build]]
 name = "all"
@@ -74,6 +79,8 @@ impl Night {
         scratch.mesh("ball.stl", &ball);
         scratch.mesh("plain.stl", &tilted_ball());
         scratch.part("cube.stl", Sample::Cube, 64);
+        fs::create_dir(scratch.path("more")).expect("a folder");
+        scratch.part("more/planned.stl", Sample::Cube, 100);
         scratch.write("night.toml", NIGHT.as_bytes());
         Self { scratch }
     }

@@ -176,7 +176,7 @@ impl InitArgs {
              #     lamp batch status {name}    prints the state of each part\n\
              \n\
              [defaults]\n\
-             # Commands as typed, without the part and -o; also compensate, dither, edit and support\n\
+             # Commands as typed, without the part and -o; also compensate, dither, edit, support and plan\n\
              stages = [{}, \"fix\"]\n\
              {check}{plain}{named}\n\
              # A later entry of a file changes the options of {first}:\n\

@@ -18,6 +18,7 @@ use crate::commands::job::build_clock;
 use crate::commands::tile::time::missing;
 use crate::exit::Exit;
 use crate::output::numbers::number_of;
+use crate::stages::after::After;
 
 /// The time that the machine takes for a stack of a night.
 pub(super) struct MachineTime {
@@ -213,13 +214,14 @@ impl MachineTime {
     }
 }
 
-/// Returns the machine of a part's slicing, and whether the slicing gives exposures. The stages were
+/// Returns the machine of a part's slicing, and whether stages give exposures. The stages were
 /// checked with the night file.
 fn slicing(stages: &[Stage]) -> (Option<PathBuf>, bool) {
     let words: Vec<_> = stages.iter().map(|stage| stage.words.clone()).collect();
     let Ok(stages) = LampCommands.stages(&words, Path::new("")) else { return (None, false) };
     let slice = stages.chain.slice;
-    let is_exposed = !matches!(slice.settings.exposure(), Ok(None));
+    let by_slice = !matches!(slice.settings.exposure(), Ok(None));
+    let is_exposed = by_slice || stages.after.iter().any(After::gives_exposures);
     (slice.machine, is_exposed)
 }
 

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use anyhow::Context;
 use lamp_batch::path_bytes::WrittenPath;
-use lamp_batch::{Event, Key, NightPlan, Store, SubjectState, SubjectSummary, Summary, events};
+use lamp_batch::{
+    Event, Key, Kind, NightPlan, Store, SubjectState, SubjectSummary, Summary, events,
+};
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 use lamp_stack::digest_of;
@@ -24,6 +26,15 @@ use lamp_plots::{Plot, curve, inline_svg, linear};
 
 /// The most findings of a part that are listed.
 const MOST_LINES: usize = 5;
+
+/// A stack of a part or a build, as the report shows it.
+struct SeenStack {
+    picture: InlinePicture,
+    /// Lines of its plans of exposures.
+    planned: Vec<String>,
+    /// The findings of its check, the worst first.
+    findings: Vec<String>,
+}
 
 /// Time and memory that tasks of a part or a build took.
 #[derive(Clone, Copy, Default)]
@@ -43,7 +54,7 @@ pub(super) fn write(
 ) -> Result<(), Exit> {
     let done = done(plan, store)?;
     let took = took(&done);
-    let pictures: HashMap<usize, (InlinePicture, Vec<String>)> =
+    let stacks: HashMap<usize, SeenStack> =
         summary.lines().filter_map(|line| Some((line.place, seen(line, plan, store)?))).collect();
     let name = file.path.file_name().unwrap_or_default().to_string_lossy();
     let content = html! {
@@ -57,13 +68,14 @@ pub(super) fn write(
             h2 { "A layer of each stack" }
             div.sheet {
                 @for line in summary.builds.iter().chain(&summary.parts) {
-                    @if let Some((picture, lines)) = pictures.get(&line.place) {
+                    @if let Some(SeenStack { picture, planned, findings }) = stacks.get(&line.place) {
                         figure {
                             img src=(picture.address) alt=(printable(&line.name));
                             figcaption {
                                 b { (printable(&line.name)) } ", " (picture.caption)
-                                @for finding in lines.iter().take(MOST_LINES) { br; (printable(finding)) }
-                                @if lines.len() > MOST_LINES { br; "and " (number_of((lines.len() - MOST_LINES) as u64, "more finding")) }
+                                @for line in planned { br; (printable(line)) }
+                                @for finding in findings.iter().take(MOST_LINES) { br; (printable(finding)) }
+                                @if findings.len() > MOST_LINES { br; "and " (number_of((findings.len() - MOST_LINES) as u64, "more finding")) }
                             }
                         }
                     }
@@ -191,21 +203,32 @@ fn shown_digest(digest: &str) -> &str {
     digits.get(..12).unwrap_or(digits)
 }
 
-/// Returns the picture of a part or a build, and its findings.
-fn seen(
-    line: &SubjectSummary,
-    plan: &NightPlan,
-    store: &Store,
-) -> Option<(InlinePicture, Vec<String>)> {
+/// Returns the lines of the plans of exposures that a stack is made by, the first plan's first.
+fn lines_of_plans(stack: Key, plan: &NightPlan, store: &Store) -> Vec<String> {
+    let task = plan.graph.task(stack);
+    let mut lines = match (task.recipe.kind, &task.needs[..]) {
+        (Kind::Whole | Kind::Plan, &[before]) => lines_of_plans(before, plan, store),
+        _ => Vec::new(),
+    };
+    if task.recipe.kind == Kind::Plan {
+        lines.extend(store.manifest(stack).into_iter().flat_map(|manifest| manifest.facts.notes));
+    }
+    lines
+}
+
+/// Returns how a stack is shown, if it is made and checked.
+fn seen(line: &SubjectSummary, plan: &NightPlan, store: &Store) -> Option<SeenStack> {
     let wanted = plan.subjects[line.place].wanted.as_ref().ok()?;
+    let planned = lines_of_plans(wanted.stack, plan, store);
     let Some(check) = wanted.check else {
         store.manifest(wanted.stack)?;
-        return Some((middle(&store.result(wanted.stack)).ok()?, Vec::new()));
+        let picture = middle(&store.result(wanted.stack)).ok()?;
+        return Some(SeenStack { picture, planned, findings: Vec::new() });
     };
     store.manifest(check)?;
     let text = fs::read(store.result(check)).ok()?;
     let checked: CheckResult = serde_json::from_slice(&text).ok()?;
-    Some((checked.picture?, checked.lines))
+    Some(SeenStack { picture: checked.picture?, planned, findings: checked.lines })
 }
 
 /// Draws how many tasks were at work, and how many were done.

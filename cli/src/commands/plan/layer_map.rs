@@ -13,7 +13,7 @@ use lamp_plots::PictureRegion;
 use lamp_plots::{DoseMap, dose_map};
 
 /// The options of a map.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(super) struct MapOptions {
     /// Draw the doses of a layer, voxel by voxel, under white light and as planned: a file that
     /// ends in .svg or .png

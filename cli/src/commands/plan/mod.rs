@@ -4,10 +4,10 @@ mod column_cure;
 mod ecpl;
 mod layer_map;
 mod simulate;
-mod speed;
+pub(crate) mod speed;
 mod speed_plot;
 mod speed_report;
-mod voxels;
+pub(crate) mod voxels;
 mod voxels_plot;
 mod voxels_report;
 

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_batch::LayersOf;
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_pipeline::memory;
 use lamp_planning::speed::{
-    PartError, PartPages, SpeedOptions, SpeedPlanError, TimedPart, plan, recorded_ms, times_table,
+    PartError, PartPages, SpeedOptions, SpeedPlan, SpeedPlanError, TimedPart, plan, recorded_ms,
+    times_table,
 };
 use lamp_stack::Layer;
 
@@ -31,18 +33,18 @@ use lamp_plots as plots;
 /// Light that cures a layer also cures below it and to its sides. The images do not change; each
 /// layer gets the time that cures the fewest voxels wrongly, within the limits of the platform. A
 /// bound on the best plan is printed. Pages must state thickness and resolution.
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   lamp plan speed part.tif --material mine.toml -o timed.tif --profile speed.csv
   lamp plan speed part.tif --material pegda-sudan --max-change 20% --plot plan.svg -o timed.tif
   slice part.stl | lamp plan speed --material mine.toml --profile speed.csv | tile > build.tif")]
-pub(super) struct SpeedArgs {
+pub(crate) struct SpeedArgs {
     #[command(flatten)]
-    input: InputArgs,
+    pub(crate) input: InputArgs,
 
     #[command(flatten)]
-    planning: PlanningOptions,
+    pub(crate) planning: PlanningOptions,
 
     #[command(flatten)]
     platform: PlatformOptions,
@@ -62,7 +64,7 @@ pub(super) struct SpeedArgs {
     /// Memory to work in, in addition to the layers' edges; with less memory, the search sees fewer
     /// pixels [default: a quarter of available memory, or as much as helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
-    memory: Option<u64>,
+    pub(crate) memory: Option<u64>,
 
     #[command(flatten)]
     output: Output,
@@ -70,43 +72,63 @@ pub(super) struct SpeedArgs {
 
 pub(super) fn run(args: &SpeedArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let PlannedResin { material, light, doubt, words } = args.planning.resin()?;
-    let options = SpeedOptions {
-        light,
-        platform: args.platform.platform(),
-        margin: args.planning.dose_margin,
-        gap: args.planning.search_gap,
-        memory: args.memory.unwrap_or_else(|| memory::available() / 4),
-    };
     let progress = progress("plan", common, &args.output);
-    let mut stack = KeptStack::new(&args.input.stack);
-    let name = input_name(&args.input.stack);
-    let part = args.part(&mut stack, &progress)?;
-    let plan = plan(&part, &options).map_err(|error: SpeedPlanError| Exit::from(error).at(name))?;
-    let planned = PlannedTimes { material: &material.name, part: &part, plan: &plan };
-    args.write(&mut stack, &planned, &args.command(&words), &progress)?;
-    let doses = MeasuredDoses::of_working_curve(&material);
-    if let Some(light) = material.light().map_err(anyhow::Error::new)? {
-        plan.times.iter().for_each(|&time| doses.see(light * time));
-    }
-    let doubts = doubt.into_iter().chain(doses.doubt("layers"));
-    for line in lines_of(&planned).into_iter().chain(doubts) {
-        progress.say(&line);
-    }
-    if let Some(path) = &args.profile {
-        write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
-    }
-    if let Some(path) = args.report.path() {
-        write_report(&planned, args.planning.dose_margin, path)?;
-    }
-    if let Some(path) = &args.plot {
-        let bytes = plots::drawn(&plots_of(&planned), path)?;
-        write_file(path, |out| out.write_all(&bytes))?;
-    }
-    Ok(())
+    args.plan(&progress, |layers| write_layers(layers, &args.output, &progress))
 }
 
 impl SpeedArgs {
+    /// Plans the stack, gives the layers with their times to `write`, and reports what they cure.
+    ///
+    /// # Errors
+    /// Returns the first error of the stack, the plan or `write`.
+    pub(crate) fn plan(
+        &self,
+        progress: &Progress,
+        write: impl FnOnce(&mut LayersOf<'_, Exit>) -> Result<(), Exit>,
+    ) -> Result<(), Exit> {
+        let PlannedResin { material, light, doubt, words } = self.planning.resin()?;
+        let options = SpeedOptions {
+            light,
+            platform: self.platform.platform(),
+            margin: self.planning.dose_margin,
+            gap: self.planning.search_gap,
+            memory: self.memory.unwrap_or_else(|| memory::available() / 4),
+        };
+        let mut stack = KeptStack::new(&self.input.stack);
+        let name = input_name(&self.input.stack);
+        let part = self.part(&mut stack, progress)?;
+        let plan =
+            plan(&part, &options).map_err(|error: SpeedPlanError| Exit::from(error).at(name))?;
+        let planned = PlannedTimes { material: &material.name, part: &part, plan: &plan };
+        write(&mut self.timed(&mut stack, &plan, self.command(&words))?)?;
+        let doses = MeasuredDoses::of_working_curve(&material);
+        if let Some(light) = material.light().map_err(anyhow::Error::new)? {
+            plan.times.iter().for_each(|&time| doses.see(light * time));
+        }
+        let doubts = doubt.into_iter().chain(doses.doubt("layers"));
+        for line in lines_of(&planned).into_iter().chain(doubts) {
+            progress.say(&line);
+        }
+        if let Some(path) = &self.profile {
+            write_file(path, |out| out.write_all(times_table(&part, &plan.times).as_bytes()))?;
+        }
+        if let Some(path) = self.report.path() {
+            write_report(&planned, self.planning.dose_margin, path)?;
+        }
+        if let Some(path) = &self.plot {
+            let bytes = plots::drawn(&plots_of(&planned), path)?;
+            write_file(path, |out| out.write_all(&bytes))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the options that matter to bytes as one text; the digest of a material's file is not
+    /// in it.
+    pub(crate) fn canonical(&self) -> String {
+        let memory = self.memory.map(|memory| format!(" --memory {memory}"));
+        self.command(&self.planning.recorded_words()) + &memory.unwrap_or_default()
+    }
+
     fn check_outputs(&self) -> Result<(), Exit> {
         if let Some(plot) = &self.plot {
             plots::check_name(plot)?;
@@ -131,25 +153,25 @@ impl SpeedArgs {
         pages.finish().map_err(|error| Exit::from(error).at(name()))
     }
 
-    fn write(
+    /// Returns the layers with their times.
+    fn timed(
         &self,
         stack: &mut KeptStack,
-        planned: &PlannedTimes<'_>,
-        command: &str,
-        progress: &Progress,
-    ) -> Result<(), Exit> {
+        plan: &SpeedPlan,
+        command: String,
+    ) -> Result<impl Iterator<Item = Result<Layer, Exit>>, Exit> {
         // Read twice: a plan needs all layers, and their images may not fit in memory together.
         let layers = layers_of(stack.pages(false)?, &self.input.stack, self.input.layers.clone());
         // Times count from the light.
-        let timed = layers.zip(planned.plan.times.iter().rev()).map(|(layer, time)| {
+        let timed = layers.zip(plan.times.iter().rev()).map(move |(layer, time)| {
             let mut layer: Layer = layer?;
             layer.info.exposure_ms = Some(recorded_ms(*time));
             if let Some(stack) = &mut layer.info.stack {
-                stack.commands.push(command.to_owned());
+                stack.commands.push(command.clone());
             }
             Ok(layer)
         });
-        write_layers(timed, &self.output, progress)
+        Ok(timed)
     }
 
     /// The command, as pages record it.

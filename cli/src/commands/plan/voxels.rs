@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use lamp_batch::LayersOf;
 use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::resin::ExposureTime;
 use lamp_pipeline::memory;
-use lamp_planning::voxels::{
-    Options, Outcome, Sources, VoxelObjective, VoxelPlan, VoxelPlanError, plan,
-};
+use lamp_planning::voxels::{Options, Outcome, Sources, VoxelObjective, VoxelPlanError, plan};
 use lamp_stack::Layer;
 
 use super::layer_map::{LayerMap, MapOptions};
@@ -31,7 +30,7 @@ use lamp_plots as plots;
 /// Light that cures a layer also cures below it and to its sides. From a stack of the wanted part,
 /// 1-bit or gray, this writes gray pages that cure as few voxels wrongly as possible, and prints a
 /// bound on their distance from the best plan. Pages must state thickness and resolution.
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(after_help = "\
 Examples:
   lamp plan voxels part.tif --material mine.toml -o planned.tif
@@ -39,12 +38,12 @@ Examples:
   slice part.stl --material mine.toml | lamp plan voxels --material mine.toml | dither > dots.tif
   lamp plan voxels part.tif --material zsg-amber --expose 373ms --objective boundary \\
       --sources shell:1px --min-level 40 --report plan.json -o planned.tif")]
-pub(super) struct VoxelsArgs {
+pub(crate) struct VoxelsArgs {
     #[command(flatten)]
-    input: InputArgs,
+    pub(crate) input: InputArgs,
 
     #[command(flatten)]
-    planning: PlanningOptions,
+    pub(crate) planning: PlanningOptions,
 
     /// Quantity that the plan minimizes
     #[arg(long, default_value = "wrong", value_parser = one_of_described::<VoxelObjective>(&[
@@ -73,7 +72,7 @@ pub(super) struct VoxelsArgs {
 
     /// Exposure time of pages that state none
     #[arg(long, value_name = "TIME", value_parser = parse_exposure)]
-    expose: Option<ExposureTime>,
+    pub(crate) expose: Option<ExposureTime>,
 
     #[command(flatten)]
     report: ReportTo,
@@ -87,7 +86,7 @@ pub(super) struct VoxelsArgs {
     /// and changes gray levels slightly [default: a quarter of available memory, or as much as
     /// helps]
     #[arg(long, value_name = "BYTES", value_parser = parse_memory)]
-    memory: Option<u64>,
+    pub(crate) memory: Option<u64>,
 
     #[command(flatten)]
     map: MapOptions,
@@ -140,57 +139,14 @@ fn parse_exposure(text: &str) -> Result<ExposureTime, String> {
 
 pub(super) fn run(args: &VoxelsArgs, common: &Common) -> Result<(), Exit> {
     args.check_outputs()?;
-    let PlannedResin { material, light, doubt, words } = args.planning.resin()?;
-    let command = args.command(&words);
     let progress = progress("plan", common, &args.output);
-    let layers = read_layers(&args.input, &progress)?;
-    let mut map = LayerMap::new(&args.map, light, args.planning.wanted.get());
-    let doses = MeasuredDoses::of_working_curve(&material);
-    let wide_field = material.light().map_err(anyhow::Error::new)?;
-    let layers = layers.map(|layer| {
-        let layer = args.prepared(layer?, &command);
-        let time = layer.info.exposure_ms.map(ExposureTime::from_ms);
-        wide_field.zip(time).into_iter().for_each(|(light, time)| doses.see(light * time));
-        Ok(layer)
-    });
-    let mut settled = 0;
-    let planned = plan(seen_by(&mut map, layers), &light, &args.options(), |layers| {
-        // A plan reports the number of all settled layers, and the bar counts one by one.
-        (settled..layers).for_each(|_| progress.layer_done());
-        settled = layers;
-    });
-    let mut planned = planned.map_err(|error: Exit| args.at_input(error))?;
-    progress.done();
-    let outcome = planned.outcome();
-    // The bar above has counted the planned layers to its end.
-    let writing = Progress::new("plan", common, true);
-    writing.expect(outcome.layers.len() as u64);
-    let written = args.write(&mut planned, &mut map, &outcome, &writing);
-    // After a finding, report and plots still show the plan.
-    if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
-        return written;
-    }
-    let planned = PlannedVoxels {
-        material: &material.name,
-        objective: args.objective,
-        margin: args.planning.dose_margin,
-        outcome: &planned.outcome(),
-    };
-    let doubts = doubt.into_iter().chain(doses.doubt("layers"));
-    for line in lines_of(&planned).into_iter().chain(doubts) {
-        progress.say(&line);
-    }
-    if let Some(path) = args.report.path() {
-        write_report(&planned, path)?;
-    }
-    if let Some(path) = &args.plot {
-        let bytes = plots::drawn(&plots_of(&planned), path)?;
-        write_file(path, |out| out.write_all(&bytes))?;
-    }
-    if let Some((path, bytes)) = map.drawn()? {
-        write_file(path, |out| out.write_all(&bytes))?;
-    }
-    written
+    args.plan(&progress, |layers, outcome| {
+        // The bar of the plan has counted its layers to its end.
+        let writing = Progress::new("plan", common, true);
+        writing.expect(outcome.layers.len() as u64);
+        let layers = unless_found(layers, || args.finding(outcome));
+        write_layers(layers, &args.output, &writing)
+    })
 }
 
 /// Passes a part's layers on, and shows them to a map.
@@ -206,6 +162,81 @@ fn seen_by(
 }
 
 impl VoxelsArgs {
+    /// Plans the stack, gives the planned layers to `write`, and reports what they cure.
+    ///
+    /// # Errors
+    /// Returns the first error of the stack, the plan or `write`.
+    pub(crate) fn plan(
+        &self,
+        progress: &Progress,
+        write: impl FnOnce(&mut LayersOf<'_, Exit>, &Outcome) -> Result<(), Exit>,
+    ) -> Result<(), Exit> {
+        let PlannedResin { material, light, doubt, words } = self.planning.resin()?;
+        let command = self.command(&words);
+        let layers = read_layers(&self.input, progress)?;
+        let mut map = LayerMap::new(&self.map, light, self.planning.wanted.get());
+        let doses = MeasuredDoses::of_working_curve(&material);
+        let wide_field = material.light().map_err(anyhow::Error::new)?;
+        let layers = layers.map(|layer| {
+            let layer = self.prepared(layer?, &command);
+            let time = layer.info.exposure_ms.map(ExposureTime::from_ms);
+            wide_field.zip(time).into_iter().for_each(|(light, time)| doses.see(light * time));
+            Ok(layer)
+        });
+        let mut settled = 0;
+        let planned = plan(seen_by(&mut map, layers), &light, &self.options(), |layers| {
+            // A plan reports the number of all settled layers, and the bar counts one by one.
+            (settled..layers).for_each(|_| progress.layer_done());
+            settled = layers;
+        });
+        let mut planned = planned.map_err(|error: Exit| self.at_input(error))?;
+        progress.done();
+        let outcome = planned.outcome();
+        let layers = planned.by_ref().map(|layer| layer.map_err(Exit::from));
+        let mut layers = layers.inspect(|layer| layer.iter().for_each(|layer| map.after(layer)));
+        let written = write(&mut layers, &outcome);
+        // After a finding, report and plots still show the plan.
+        if !matches!(written, Ok(()) | Err(Exit::Findings(_))) {
+            return written;
+        }
+        // It borrows the plan, whose bound is complete now.
+        drop(layers);
+        let planned = PlannedVoxels {
+            material: &material.name,
+            objective: self.objective,
+            margin: self.planning.dose_margin,
+            outcome: &planned.outcome(),
+        };
+        let doubts = doubt.into_iter().chain(doses.doubt("layers"));
+        for line in lines_of(&planned).into_iter().chain(doubts) {
+            progress.say(&line);
+        }
+        if let Some(path) = self.report.path() {
+            write_report(&planned, path)?;
+        }
+        if let Some(path) = &self.plot {
+            let bytes = plots::drawn(&plots_of(&planned), path)?;
+            write_file(path, |out| out.write_all(&bytes))?;
+        }
+        if let Some((path, bytes)) = map.drawn()? {
+            write_file(path, |out| out.write_all(&bytes))?;
+        }
+        written
+    }
+
+    /// Returns the options that matter to bytes as one text; the digest of a material's file is not
+    /// in it.
+    pub(crate) fn canonical(&self) -> String {
+        let mut text = self.command(&self.planning.recorded_words());
+        if let Some(time) = self.expose {
+            text += &format!(" --expose {time}");
+        }
+        if let Some(memory) = self.memory {
+            text += &format!(" --memory {memory}");
+        }
+        text
+    }
+
     fn check_outputs(&self) -> Result<(), Exit> {
         self.plot.as_deref().map_or(Ok(()), plots::check_name)?;
         self.map.map.as_deref().map_or(Ok(()), plots::check_picture_name)?;
@@ -278,25 +309,15 @@ impl VoxelsArgs {
         if is_of_layers { error.at(input_name(&self.input.stack)) } else { error }
     }
 
-    fn write(
-        &self,
-        planned: &mut VoxelPlan,
-        map: &mut LayerMap<'_>,
-        outcome: &Outcome,
-        progress: &Progress,
-    ) -> Result<(), Exit> {
-        let layers = planned.by_ref().map(|layer| layer.map_err(Exit::from));
-        let layers = layers.inspect(|layer| layer.iter().for_each(|layer| map.after(layer)));
-        let finding = || {
-            let found = match outcome.uncurable() {
-                0 => doubts(),
-                uncurable => {
-                    let name = input_name(&self.input.stack);
-                    Some(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
-                }
-            };
-            found.filter(|_| self.strict).map(Exit::Findings)
+    /// Returns what `--strict` finds.
+    fn finding(&self, outcome: &Outcome) -> Option<Exit> {
+        let found = match outcome.uncurable() {
+            0 => doubts(),
+            uncurable => {
+                let name = input_name(&self.input.stack);
+                Some(format!("{name}: white light cannot cure {uncurable} wanted voxels"))
+            }
         };
-        write_layers(unless_found(layers, finding), &self.output, progress)
+        found.filter(|_| self.strict).map(Exit::Findings)
     }
 }
