@@ -331,6 +331,8 @@ fn a_night_file_is_made_from_a_folder() {
     // An existing file stays, and wrong options leave none.
     scratch.run(init).is_wrong_usage(&["night.toml exists", "--force"]);
     assert_eq!(scratch.bytes("night.toml"), text.as_bytes());
+    let open = "lamp batch init in --slice=--dpi\"60 -o other.toml";
+    scratch.run(open).is_wrong_usage(&["--slice: the quote \" is not closed"]);
     let wrong = "lamp batch init in --slice=--dpp=3 -o other.toml";
     scratch.run(wrong).is_wrong_usage(&["slice: ", "--dpp"]);
     scratch.run("lamp batch init gone").is_wrong_usage(&["gone: there is no such folder"]);

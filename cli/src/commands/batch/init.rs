@@ -8,7 +8,7 @@ use clap::Args;
 use lamp_batch::{Commands, Night, part_names};
 use lamp_machine::Machine;
 use lamp_pipeline::documents::{document, is_file};
-use lamp_stack::{file_word, quoted};
+use lamp_stack::{file_word, quoted, words};
 use toml::Value;
 
 use super::part_files::{FolderEntries, why_no_part};
@@ -64,6 +64,10 @@ pub(super) fn run(args: &InitArgs, common: &Common) -> Result<(), Exit> {
     }
     if let Some(machine) = &args.machine {
         document::<Machine>(machine)?;
+    }
+    // In the night file it would have a line there, which nobody could look at.
+    if let Err(quote) = words(args.slice.as_deref().unwrap_or_default()) {
+        return Err(Exit::usage(format!("--slice: the quote {quote} is not closed")));
     }
     if args.output.exists() && !args.force {
         return Err(Exit::usage(format!("{output} exists: give --force to replace it")));
