@@ -393,6 +393,50 @@ fn a_plan_has_the_times_that_are_known() {
     assert!(text.contains("  both: at least ") && text.contains("give --expose"), "{text}");
 }
 
+/// A build whose machine refuses its parts has a reason, and no time.
+#[test]
+fn a_plan_promises_no_build_that_the_machine_refuses() {
+    let scratch = two_cubes();
+    let text = String::from_utf8(scratch.bytes("night.toml")).unwrap();
+    scratch.run("lamp machine new mine --area 90x90mm --recoat 9s -o mine.toml").succeeds();
+    let machine = String::from_utf8(scratch.bytes("mine.toml")).unwrap();
+    scratch.write(
+        "mine.toml",
+        format!("{machine}\n[dpi]\nleast = 600\nmost = 1200\nsource = \"-\"\n").as_bytes(),
+    );
+    let refused = text.replace("tile = ", "machine = \"mine.toml\"\ntile = ");
+    scratch.write("night.toml", refused.as_bytes());
+    let plan = |options: &str| {
+        let ran =
+            scratch.run(&format!("lamp batch plan night.toml --recoat 9s --expose 1s {options}"));
+        String::from_utf8(ran.succeeds_quietly().stdout).unwrap()
+    };
+    let why = "both: cannot be made: its part a: the stack has 100 dpi, and the machine mine builds in \
+               600 to 1200 dpi\n";
+    assert!(plan("").starts_with(why) && !plan("").contains("  both: "), "{}", plan(""));
+    let answer: serde_json::Value = serde_json::from_str(&plan("--json")).unwrap();
+    assert_eq!(answer["cannot_be_made"][0]["name"], "both");
+    assert_eq!(answer["machine_times"], serde_json::json!([]));
+    // As tile says once the parts are there.
+    let ran = night(&scratch);
+    assert!(
+        ran.statuses == [Some(1)] && ran.stderr.contains("builds in 600 to 1200 dpi"),
+        "{ran:?}"
+    );
+    // Without the build, the sum of both parts: 20 s for each layer of theirs.
+    let parts = text.split("[[build]]").next().unwrap();
+    scratch.write("night.toml", parts.as_bytes());
+    let answer: serde_json::Value = serde_json::from_str(&plan("--json")).unwrap();
+    let layers = |name: &str| scratch.layers(&format!("night/parts/{name}.lamp")).len() as f64;
+    let wanted = 10.0 * (layers("a") + layers("b"));
+    assert_eq!(answer["machine_s"].as_f64(), Some(wanted));
+    assert_eq!(answer["machine_least_s"].as_f64(), Some(wanted));
+    let text = plan("");
+    let last = text.lines().last().unwrap();
+    let machine = format!("{:.1}min on the machine", wanted / 60.0);
+    assert_eq!(last, format!("in all: no task is to do; {machine}"));
+}
+
 /// Parts of a watched folder are made as they come, whole, and a signal ends it.
 #[test]
 #[cfg(unix)]

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use lamp_batch::{Commands, NightPlan, Stage, Store, Subject, WantedResults};
+use lamp_batch::{Build, Commands, Night, NightPlan, Stage, Store, Subject, WantedResults};
 use lamp_gantry::BuildTime;
 use lamp_machine::Machine;
 use lamp_pipeline::documents::document;
@@ -49,7 +49,8 @@ pub(super) struct StackTime<'a> {
 }
 
 impl MachineTime {
-    /// Returns the times of the builds, and of parts that are in no build.
+    /// Returns the times of the builds that their machines do not refuse, and of parts that are in no
+    /// build.
     pub(super) fn of_night(
         file: &NightFile,
         plan: &NightPlan,
@@ -65,6 +66,9 @@ impl MachineTime {
         let mut all = Vec::new();
         for (build, subject) in night.builds.iter().zip(builds) {
             let Ok(wanted) = &subject.wanted else { continue };
+            if machine_refuses(night, build)?.is_some() {
+                continue;
+            }
             let copies: Vec<_> = build.parts.iter().map(|(_, copies)| *copies).collect();
             let tile = LampCommands.tile(&build.tile.words[1..], &copies, Path::new(""));
             let tile = tile.map_err(Exit::usage)?;
@@ -152,6 +156,12 @@ impl MachineTime {
         Ok(found)
     }
 
+    /// Returns the sum of times in seconds, if all are known, and of all that is known of them.
+    pub(super) fn sum(all: &[Self]) -> (Option<f64>, f64) {
+        let least = |time: &Self| time.time.as_ref().map_or(0.0, BuildTime::least_s);
+        (all.iter().map(Self::whole_s).sum(), all.iter().map(least).sum())
+    }
+
     /// Returns its seconds, if all of them are known.
     fn whole_s(&self) -> Option<f64> {
         let time = self.time.as_ref().filter(|time| time.is_whole() && !self.is_open);
@@ -212,6 +222,25 @@ impl MachineTime {
             missing: &self.missing,
         }
     }
+}
+
+/// Returns why the machine of a build refuses a part of it, if it does: the resolution or the
+/// thickness of its layers.
+pub(super) fn machine_refuses(night: &Night, build: &Build) -> Result<Option<String>, Exit> {
+    let copies: Vec<_> = build.parts.iter().map(|(_, copies)| *copies).collect();
+    let tile = LampCommands.tile(&build.tile.words[1..], &copies, Path::new(""));
+    let tile = tile.map_err(Exit::usage)?;
+    let Some(machine) = tile.machine().map(document::<Machine>).transpose()? else {
+        return Ok(None);
+    };
+    let refuses = |(name, _): &(String, Option<u32>)| {
+        let words = |stage: &Stage| stage.words.clone();
+        let words: Vec<_> = night.part(name)?.stages.iter().map(words).collect();
+        let slice = LampCommands.stages(&words, Path::new("")).ok()?.chain.slice;
+        let why = slice.settings.check_machine(&machine).err()?;
+        Some(format!("its part {name}: {why}"))
+    };
+    Ok(build.parts.iter().find_map(refuses))
 }
 
 /// Returns the machine of a part's slicing, and whether stages give exposures. The stages were

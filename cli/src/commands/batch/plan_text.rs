@@ -2,14 +2,16 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use lamp_batch::{Cost, Deliverer, DiskRoom, Forecast, Key, Kind, Ledger, Local, events};
+use lamp_batch::{
+    Cost, Deliverer, DiskRoom, Forecast, Key, Kind, Ledger, Local, Night, NightPlan, events,
+};
 use lamp_pipeline::heights::time_text;
 use lamp_pipeline::memory::in_words;
 
 use serde::Serialize;
 
 use super::PlanArgs;
-use super::machine_time::{Clock, MachineTime, StackTime};
+use super::machine_time::{Clock, MachineTime, StackTime, machine_refuses};
 use super::night_file::NightFile;
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -49,6 +51,10 @@ struct PlanAnswer<'a> {
     unknown: Vec<UnknownTasks>,
     /// Times that the machine takes for each build, and for parts in no build.
     machine_times: Vec<StackTime<'a>>,
+    /// Sum of these times, in seconds; null if one is not known.
+    machine_s: Option<f64>,
+    /// Sum of all that is known of these times, in seconds.
+    machine_least_s: f64,
 }
 
 /// Tasks whose time is not known, as none of their kind was done before.
@@ -94,12 +100,16 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
     let to_do: HashSet<Key> = ledger.keys().into_iter().collect();
     let mut text = String::new();
-    for subject in &plan.subjects {
-        if let Err(why) = &subject.wanted {
-            text += &printable(&format!("{}: cannot be made: {why}", subject.name));
-            text.push('\n');
-        }
+    let faults = plan.subjects.iter().filter_map(|subject| {
+        let why = subject.wanted.as_ref().err()?.to_string();
+        Some(Unmakeable { name: &subject.name, why })
+    });
+    let refused = refused_builds(&file.night, &plan)?;
+    let faults: Vec<_> = faults.chain(refused).collect();
+    for Unmakeable { name, why } in &faults {
+        text += &format!("{name}: cannot be made: {why}\n");
     }
+    text = printable_lines(&text);
     let mut kinds: BTreeMap<Kind, (usize, usize, Cost)> = BTreeMap::new();
     for key in plan.graph.keys() {
         let task = plan.graph.task(*key);
@@ -135,15 +145,17 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     let wait_s = is_known.then_some(forecast.seconds[1]);
     let most = if common.verbose { usize::MAX } else { MOST_STACKS };
     let machine_times = MachineTime::of_night(&file, &plan, &store, args.times)?;
-    text += &printable_lines(&MachineTime::text(&machine_times, wait_s, most));
+    if !machine_times.is_empty() {
+        text += &printable_lines(&MachineTime::text(&machine_times, wait_s, most));
+    }
+    let (machine_s, machine_least_s) = MachineTime::sum(&machine_times);
+    if plan.subjects.len() > 1 {
+        text += &total(&forecast, to_do.is_empty(), machine_s, machine_least_s);
+    }
     if !args.night.report.is_printed() {
         print(&text)?;
     }
     let Some(path) = args.night.report.path() else { return Ok(()) };
-    let faults = plan.subjects.iter().filter_map(|subject| {
-        let why = subject.wanted.as_ref().err()?.to_string();
-        Some(Unmakeable { name: &subject.name, why })
-    });
     let kinds = kinds.iter().map(|(kind, (all, to_do, cost))| KindOfTasks {
         kind: kind.name(),
         tasks: *all,
@@ -157,7 +169,7 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
         to_do: to_do.len(),
         cost,
         kinds: kinds.collect(),
-        cannot_be_made: faults.collect(),
+        cannot_be_made: faults,
         disk_shortage: shortage,
         threads: local.jobs,
         least_s: forecast.seconds[0],
@@ -165,6 +177,8 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
         earlier_tasks: forecast.earlier,
         unknown: unknown.collect(),
         machine_times: machine_times.iter().map(MachineTime::answer).collect(),
+        machine_s,
+        machine_least_s,
     };
     write_answer("lamp-batch-plan-1", &answer, path)
 }
@@ -217,6 +231,37 @@ fn expected(forecast: &Forecast, local: &Local) -> String {
         );
     }
     text
+}
+
+/// Returns the builds with parts that their machine refuses, which would fail once their parts are made.
+fn refused_builds<'a>(night: &Night, plan: &'a NightPlan) -> Result<Vec<Unmakeable<'a>>, Exit> {
+    let (_, builds) = plan.subjects.split_at(night.parts.len());
+    let mut refused = Vec::new();
+    for (build, subject) in night.builds.iter().zip(builds) {
+        if subject.wanted.is_ok()
+            && let Some(why) = machine_refuses(night, build)?
+        {
+            refused.push(Unmakeable { name: &subject.name, why });
+        }
+    }
+    Ok(refused)
+}
+
+/// Returns the last line: the sum of the tasks' times, and of the machine's.
+fn total(forecast: &Forecast, is_done: bool, machine_s: Option<f64>, least_s: f64) -> String {
+    let Forecast { seconds: [least, most], earlier, unknown } = forecast;
+    let tasks = match (*earlier, unknown.is_empty()) {
+        _ if is_done => "no task is to do".to_owned(),
+        (0, _) => "time of the tasks not known".to_owned(),
+        (_, true) => format!("{} to {} for the tasks", time_text(*least), time_text(*most)),
+        (_, false) => format!("at least {} for the tasks", time_text(*least)),
+    };
+    let machine = match machine_s {
+        Some(seconds) => format!("{} on the machine", time_text(seconds)),
+        None if least_s > 0.0 => format!("at least {} on the machine", time_text(least_s)),
+        None => "time on the machine not known".to_owned(),
+    };
+    format!("in all: {tasks}; {machine}\n")
 }
 
 /// Escapes what could steer a terminal in each line.
