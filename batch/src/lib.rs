@@ -72,7 +72,8 @@ pub use key::{Key, KeyError, Kind, TaskRecipe};
 pub use ledger::{End, Ledger, State};
 pub use named::{NamedTask, NamedTasks};
 pub use night::{
-    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, part_names,
+    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, WatchedNames,
+    part_names,
 };
 pub use perform::perform;
 pub use plan::{NightPlan, Subject, WantedResults};

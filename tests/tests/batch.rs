@@ -393,6 +393,31 @@ fn a_plan_has_the_times_that_are_known() {
     assert!(text.contains("  both: at least ") && text.contains("give --expose"), "{text}");
 }
 
+/// A night file for a watched folder has no parts to look at, which is no mistake.
+#[test]
+fn a_night_without_parts_is_looked_at() {
+    let scratch = Scratch::new();
+    scratch.write("night.toml", format!("defaults.stages = [\"{STAGES}\"]\n").as_bytes());
+    let none = "night.toml: no [[part]] in it: --watch FOLDER makes the parts of a folder, which \
+                are not looked at here\n";
+    for (command, said) in [
+        ("plan", none.to_owned()),
+        ("status", none.to_owned()),
+        ("verify", format!("0 results are whole\n{none}")),
+        ("gc", "0 results removed, 0 kB; 0 stay\n".to_owned()),
+    ] {
+        let ran = scratch.run(&format!("lamp batch {command} night.toml")).succeeds_quietly();
+        assert_eq!(String::from_utf8(ran.stdout).unwrap(), said, "{command}");
+    }
+    for command in ["plan", "status"] {
+        let ran =
+            scratch.run(&format!("lamp batch {command} night.toml --json")).succeeds_quietly();
+        let answer: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+        assert!(answer["schema"].as_str().unwrap().starts_with("lamp-batch-"), "{answer}");
+    }
+    scratch.run("lamp batch night.toml").is_wrong_usage(&["there is no part: add [[part]]"]);
+}
+
 /// A build whose machine refuses its parts has a reason, and no time.
 #[test]
 fn a_plan_promises_no_build_that_the_machine_refuses() {
@@ -472,6 +497,11 @@ fn parts_of_a_watched_folder_are_made_as_they_come() {
     fs::copy(scratch.path("second.stl"), scratch.path("in/a.stl")).unwrap();
     wait(&|| scratch.bytes("night/parts/a.lamp") != first);
     scratch.write("in/c.txt", b"no part\n");
+    // Another file of the same stem changes no name.
+    scratch.run("lamp convert first.stl in/.a.step -q").succeeds();
+    fs::rename(scratch.path("in/.a.step"), scratch.path("in/a.step")).unwrap();
+    wait(&|| made("a-step").exists());
+    assert!(!made("a-stl").exists());
     wait(&|| scratch.path("night/report.html").exists());
     thread::sleep(Duration::from_secs(5));
     let pid = watching.id().to_string();
@@ -482,6 +512,7 @@ fn parts_of_a_watched_folder_are_made_as_they_come() {
     let lines = |start: &str| said.lines().filter(|line| line.starts_with(start)).count();
     assert_eq!((lines("batch: a: done, "), lines("batch: b: done, ")), (2, 1), "{said}");
     assert_eq!(lines("batch: c.txt: left out, a text file"), 1, "{said}");
+    assert_eq!(lines("batch: a-step: done, "), 1, "{said}");
     for (name, part) in [("a", "second"), ("b", "second")] {
         scratch.run(&format!("{STAGES} {part}.stl -q > {name}.tif")).succeeds();
         let by_watch = scratch.layers(&format!("night/parts/{name}.lamp"));

@@ -4,6 +4,7 @@ mod read;
 #[cfg(test)]
 mod tests;
 mod walk;
+mod watched;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,6 +13,7 @@ use lamp_pipeline::documents::nearest;
 use thiserror::Error;
 
 use walk::Walk;
+pub use watched::WatchedNames;
 
 /// The contents of a night file.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,12 +132,18 @@ impl Night {
     }
 
     /// Reads the text of a night file, which may name no part. Each file of `others` that it does not
-    /// name is a part with the defaults.
+    /// name is a part with the defaults. It has the name that `names` has for it, unless the night file
+    /// gives that to another; names of new files are added.
     ///
     /// # Errors
     /// As [`parse`](Self::parse).
-    pub fn parse_with(text: &str, path: &Path, others: &[PathBuf]) -> Result<Self, NightError> {
-        read::night(text, path, Some(others))
+    pub fn parse_with(
+        text: &str,
+        path: &Path,
+        others: &[PathBuf],
+        names: &mut WatchedNames,
+    ) -> Result<Self, NightError> {
+        read::night(text, path, Some((others, names)))
     }
 
     /// Returns the part with a name.

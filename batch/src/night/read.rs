@@ -11,8 +11,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, Walk, did_you_mean,
-    twice,
+    Build, Night, NightError, NightFormat, NightOutput, Part, Place, Stage, Walk, WatchedNames,
+    did_you_mean, twice,
 };
 
 type TomlValue<'a> = Spanned<DeValue<'a>>;
@@ -23,8 +23,11 @@ const PART_KEYS: [&str; 5] = ["file", "name", "check", "ranges", "stages"];
 
 const TABLES: [&str; 5] = ["defaults", "part", "build", "store", "output"];
 
-/// Reads a night file. `others` are files that are parts, too; without them, it must name some itself.
-pub(super) fn night(text: &str, path: &Path, others: Option<&[PathBuf]>) -> Read<Night> {
+/// Files that are parts, too, and the names that such files had earlier.
+type Others<'a> = (&'a [PathBuf], &'a mut WatchedNames);
+
+/// Reads a night file. Without `others`, it must name parts itself.
+pub(super) fn night(text: &str, path: &Path, others: Option<Others<'_>>) -> Read<Night> {
     let folder = match path.parent() {
         // The parent of a bare file name is the empty path, which is no folder.
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -91,7 +94,7 @@ impl Reader<'_> {
         NightError { place: self.place(spanned.span().start), problem: problem.into() }
     }
 
-    fn night(&self, table: &DeTable<'_>, path: &Path, others: Option<&[PathBuf]>) -> Read<Night> {
+    fn night(&self, table: &DeTable<'_>, path: &Path, others: Option<Others<'_>>) -> Read<Night> {
         self.check_keys(table, &TABLES, "a night file has no")?;
         let defaults = match table.get("defaults") {
             Some(value) => self.part_table(self.table(value)?, &PART_KEYS[2..])?,
@@ -107,12 +110,15 @@ impl Reader<'_> {
             return Err(NightError { place: start, problem: problem.to_owned() });
         }
         let is_other = |file: &&PathBuf| !drafts.places.contains_key(&real(file));
-        let others: Vec<PathBuf> = others.into_iter().flatten().filter(is_other).cloned().collect();
+        let others = others.map(|(files, names)| {
+            let files: Vec<PathBuf> = files.iter().filter(is_other).cloned().collect();
+            (files, names)
+        });
         // Not before all are read: a later [[part]] may change an earlier one's settings.
         let finished = |draft: Draft| finished(draft, &defaults);
         let mut parts = drafts.list.into_iter().map(finished).collect::<Read<Vec<_>>>()?;
-        let names = part_names(&others, parts.iter().map(|part| part.name.as_str()));
-        for (file, name) in others.into_iter().zip(names) {
+        let others = others.map(|(files, names)| named(files, names, &parts));
+        for (file, name) in others.into_iter().flatten() {
             let table = PartTable { name: Some((name, start)), ..PartTable::default() };
             let file = self.below_here(file);
             parts.push(finished(Draft { file, fault: None, place: start, table })?);
@@ -492,6 +498,27 @@ fn finished(draft: Draft, defaults: &PartTable) -> Read<Part> {
 
 fn stem_of(file: &Path) -> String {
     one_line(&file.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// Returns files with the names of their parts. A file keeps its earlier name, unless the night file
+/// gives that to a part of its own; names of new files are added to `names`.
+fn named(
+    files: Vec<PathBuf>,
+    WatchedNames(names): &mut WatchedNames,
+    parts: &[Part],
+) -> Vec<(PathBuf, String)> {
+    let of_parts: HashSet<String> = parts.iter().map(|part| part.name.to_lowercase()).collect();
+    names.retain(|_, name| !of_parts.contains(&name.to_lowercase()));
+    let is_new = |file: &&PathBuf| !names.contains_key(*file);
+    let new: Vec<PathBuf> = files.iter().filter(is_new).cloned().collect();
+    let taken = parts.iter().map(|part| &part.name).chain(names.values()).map(String::as_str);
+    let given = part_names(&new, taken);
+    names.extend(new.into_iter().zip(given));
+    let with_name = |file: PathBuf| {
+        let name = names[&file].clone();
+        (file, name)
+    };
+    files.into_iter().map(with_name).collect()
 }
 
 /// Returns a name for the part of each file that no other has, `taken` ones included: the file's own,

@@ -1,6 +1,7 @@
 use std::fs;
 
 use super::*;
+use crate::store::Store;
 
 /// A folder with some empty parts.
 fn folder(parts: &[&str]) -> tempfile::TempDir {
@@ -199,7 +200,10 @@ fn other_files_are_parts_with_names_of_their_own() {
     let files =
         ["A.3mf", "a.step", "a.stl", "b.stl", "x:1.stl", ".h.stl", "new.stl", &long].map(at);
     let path = folder.path().join("night.toml");
-    let night = Night::parse_with(text, &path, &files).unwrap();
+    let with = |text: &str, files: &[PathBuf]| {
+        Night::parse_with(text, &path, files, &mut WatchedNames::default())
+    };
+    let night = with(text, &files).unwrap();
     // A file that the night file names is one part, with its own options.
     let names: Vec<_> = night.parts.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names[..7], ["new", "A-3mf", "a-step", "a-stl", "x-1", "h", "new-stl"]);
@@ -209,10 +213,10 @@ fn other_files_are_parts_with_names_of_their_own() {
     assert_eq!(night.parts[2].file, Path::new("parts/a.step"));
     // They may be all, or there may be none yet, but their stages must be known.
     let defaults = text.split("[[part]]").next().unwrap();
-    assert_eq!(Night::parse_with(defaults, &path, &files).unwrap().parts.len(), 8);
-    assert_eq!(Night::parse_with(defaults, &path, &[]).unwrap().parts, []);
+    assert_eq!(with(defaults, &files).unwrap().parts.len(), 8);
+    assert_eq!(with(defaults, &[]).unwrap().parts, []);
     assert!(Night::parse(defaults, &path).is_err());
-    assert!(Night::parse_with("", &path, &files).is_err());
+    assert!(with("", &files).is_err());
 
     // As a night file, the names are accepted.
     let names = part_names(&files);
@@ -226,4 +230,34 @@ fn other_files_are_parts_with_names_of_their_own() {
         let night = Night::parse(&format!("[[part]]\n{text}"), &path).unwrap();
         assert_eq!(night.parts[0].name, *name);
     }
+}
+
+#[test]
+fn a_name_that_a_part_had_stays_and_newcomers_get_others() {
+    let folder = folder(&["a.stl", "a.step", "a.obj", "b.stl"]);
+    let [stl, step, obj, b] =
+        ["a.stl", "a.step", "a.obj", "b.stl"].map(|name| folder.path().join("parts").join(name));
+    let path = folder.path().join("night.toml");
+    let defaults = "[defaults]\nstages = [\"slice\"]\n";
+    let mut watched = WatchedNames::default();
+    let mut names = |text: &str, files: &[&PathBuf]| -> Vec<String> {
+        let files: Vec<_> = files.iter().copied().cloned().collect();
+        let night = Night::parse_with(text, &path, &files, &mut watched).unwrap();
+        night.parts.into_iter().map(|part| part.name).collect()
+    };
+    assert_eq!(names(defaults, &[&stl]), ["a"]);
+    assert_eq!(names(defaults, &[&step, &stl]), ["a-step", "a"]);
+    // Also while its file is gone.
+    assert_eq!(names(defaults, &[&obj, &step]), ["a-obj", "a-step"]);
+    assert_eq!(names(defaults, &[&stl, &b]), ["a", "b"]);
+    // A name of the night file is its own part's.
+    let text = format!("{defaults}[[part]]\nfile = \"parts/b.stl\"\nname = \"A\"\n");
+    assert_eq!(names(&text, &[&step, &stl]), ["A", "a-step", "a-stl"]);
+    // A store keeps them for the next time.
+    let store = Store::create(&folder.path().join("store")).unwrap();
+    let (night, parts) = (Path::new("/n.toml"), Path::new("/parts"));
+    assert_eq!(WatchedNames::of(&store, night, parts), WatchedNames::default());
+    watched.keep(&store, night, parts).unwrap();
+    assert_eq!(WatchedNames::of(&store, night, parts), watched);
+    assert_eq!(WatchedNames::of(&store, night, Path::new("/other")), WatchedNames::default());
 }

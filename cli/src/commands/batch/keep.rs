@@ -4,7 +4,8 @@ use anyhow::anyhow;
 use lamp_batch::{Damage, check_delivered, collect as collect_garbage};
 use lamp_pipeline::memory::in_words;
 
-use super::night_file::store_of;
+use super::night_file::{NightFile, store_of};
+use super::plan_text::printable_lines;
 use super::{GcArgs, StoreArgs};
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -13,7 +14,7 @@ use crate::terminal::progress::Progress;
 
 /// Hashes all results anew and removes damaged results. Checks delivered files, too.
 pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
-    let (store, night) = store_of(args)?;
+    let (store, file) = store_of(args)?;
     let progress = Progress::new("batch verify", common, true);
     let (mut whole, mut damaged) = (0, 0);
     for key in store.keys().map_err(anyhow::Error::new)? {
@@ -32,8 +33,8 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
             }
         }
     }
-    let (delivered, wrong) = match &night {
-        Some(night) => check_delivered(night, &store)?,
+    let (delivered, wrong) = match &file {
+        Some(file) => check_delivered(&file.night, &store)?,
         None => (0, Vec::new()),
     };
     wrong.iter().for_each(|problem| progress.warn(problem));
@@ -48,8 +49,13 @@ pub(super) fn verify(args: &StoreArgs, common: &Common) -> Result<(), Exit> {
     if !problems.is_empty() {
         return Err(Exit::Failed(anyhow!(problems.join(", "))));
     }
-    let files = night.map_or_else(String::new, |_| format!(", and {delivered} delivered files"));
-    print(&format!("{whole} results are whole{files}\n"))
+    let no_parts = file.as_ref().and_then(NightFile::no_parts);
+    let files = match (&file, &no_parts) {
+        (Some(_), None) => format!(", and {delivered} delivered files"),
+        _ => String::new(),
+    };
+    let no_parts = printable_lines(&no_parts.unwrap_or_default());
+    print(&format!("{whole} results are whole{files}\n{no_parts}"))
 }
 
 /// Removes what no batch names.

@@ -4,7 +4,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use lamp_batch::{BatchError, Night, NightPlan, Store, StoreError};
+use lamp_batch::{BatchError, Night, NightPlan, Store, StoreError, WatchedNames};
 
 use super::StoreArgs;
 use super::task::LampCommands;
@@ -30,8 +30,23 @@ impl NightFile {
         Self::open_with(path, None)
     }
 
-    /// Reads a night file as [`open`](Self::open) does. Each of `others` is a part, too, if there are any.
-    pub(super) fn open_with(path: &Path, others: Option<&[PathBuf]>) -> Result<Self, Exit> {
+    /// Reads a night file as [`open`](Self::open) does; it may name no part.
+    pub(super) fn open_for_look(path: &Path) -> Result<Self, Exit> {
+        Self::open_with(path, Some((&[], &mut WatchedNames::default())))
+    }
+
+    /// Returns a line for people if there is no part in the file.
+    pub(super) fn no_parts(&self) -> Option<String> {
+        let why = "--watch FOLDER makes the parts of a folder, which are not looked at here";
+        self.night.parts.is_empty().then(|| format!("{}: no [[part]] in it: {why}\n", self.name))
+    }
+
+    /// Reads a night file as [`open`](Self::open) does. Each of `others` is a part, too, if there are
+    /// any, with the name that it had.
+    pub(super) fn open_with(
+        path: &Path,
+        others: Option<(&[PathBuf], &mut WatchedNames)>,
+    ) -> Result<Self, Exit> {
         let name = path.display().to_string();
         let failed = |error: anyhow::Error| Exit::Usage(error).at(name.clone());
         if !path.is_file() {
@@ -42,7 +57,7 @@ impl NightFile {
         let path = path.canonicalize().with_context(|| name.clone())?;
         let night = match others {
             None => Night::parse(&text, &path),
-            Some(others) => Night::parse_with(&text, &path, others),
+            Some((others, names)) => Night::parse_with(&text, &path, others, names),
         };
         let night = night.map_err(|error| failed(error.into()))?;
         let folder = path.parent().unwrap_or(Path::new("/"));
@@ -72,13 +87,13 @@ impl NightFile {
 }
 
 /// Opens the store that a command names, and reads the night file that it is from, if one is named.
-pub(super) fn store_of(args: &StoreArgs) -> Result<(Store, Option<Night>), Exit> {
-    let night = match &args.night {
-        Some(night) => Some(NightFile::open(night)?.night),
+pub(super) fn store_of(args: &StoreArgs) -> Result<(Store, Option<NightFile>), Exit> {
+    let file = match &args.night {
+        Some(night) => Some(NightFile::open_for_look(night)?),
         None => None,
     };
-    let folder = night.as_ref().map(|night| &night.store).or(args.store.as_ref());
+    let folder = file.as_ref().map(|file| &file.night.store).or(args.store.as_ref());
     let folder = folder.expect("one of them is required");
     let store = Store::open(folder).map_err(|error| Exit::Usage(error.into()))?;
-    Ok((store, night))
+    Ok((store, file))
 }

@@ -94,7 +94,7 @@ struct Unmakeable<'a> {
 schemas! { "lamp-batch-plan-1": PlanAnswer<'_>; }
 
 pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
-    let file = NightFile::open(&args.night.night)?;
+    let file = NightFile::open_for_look(&args.night.night)?;
     let store = file.store()?;
     let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
@@ -151,6 +151,9 @@ pub(super) fn run(args: &PlanArgs, common: &Common) -> Result<(), Exit> {
     let (machine_s, machine_least_s) = MachineTime::sum(&machine_times);
     if plan.subjects.len() > 1 {
         text += &total(&forecast, to_do.is_empty(), machine_s, machine_least_s);
+    }
+    if let Some(none) = file.no_parts() {
+        text = printable_lines(&none);
     }
     if !args.night.report.is_printed() {
         print(&text)?;
@@ -265,6 +268,6 @@ fn total(forecast: &Forecast, is_done: bool, machine_s: Option<f64>, least_s: f6
 }
 
 /// Escapes what could steer a terminal in each line.
-fn printable_lines(text: &str) -> String {
+pub(super) fn printable_lines(text: &str) -> String {
     text.lines().map(|line| format!("{}\n", printable(line))).collect()
 }

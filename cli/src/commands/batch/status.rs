@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::NightArgs;
 use super::night_file::NightFile;
+use super::plan_text::printable_lines;
 use super::run::counts;
 use crate::args::options::Common;
 use crate::exit::Exit;
@@ -28,7 +29,7 @@ struct StatusAnswer {
 schemas! { "lamp-batch-status-1": StatusAnswer; }
 
 pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
-    let file = NightFile::open(&args.night)?;
+    let file = NightFile::open_for_look(&args.night)?;
     let store = file.store()?;
     let plan = file.plan(&store)?;
     let ledger = Ledger::new(&plan.graph, &store, &plan.goals(), 0);
@@ -60,7 +61,10 @@ pub(super) fn run(args: &NightArgs, common: &Common) -> Result<(), Exit> {
     let done = summary.count(SubjectState::Done) + summary.count(SubjectState::NeedsPerson);
     let all = summary.lines().count();
     let counts = counts(&summary);
-    text += &format!("{done} of {all} are done ({counts}), {} tasks are to do\n", to_do.len());
+    text += &match file.no_parts() {
+        Some(none) => printable_lines(&none),
+        None => format!("{done} of {all} are done ({counts}), {} tasks are to do\n", to_do.len()),
+    };
     if !args.report.is_printed() {
         print(&text)?;
     }

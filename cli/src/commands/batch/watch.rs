@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, SystemTime};
 
 use anyhow::Context;
-use lamp_batch::SubjectSummary;
+use lamp_batch::{SubjectSummary, WatchedNames};
 
 use super::RunArgs;
 use super::night_file::NightFile;
@@ -40,7 +40,9 @@ pub(super) fn watch(
     let absolute = |path: &Path| path::absolute(path).with_context(|| path.display().to_string());
     let (night, folder) = (absolute(night)?, absolute(folder)?);
     // Mistakes are reported before anything is waited for.
-    NightFile::open_with(&night, Some(&[]))?;
+    let file = NightFile::open_for_look(&night)?;
+    // A part has the name that an earlier run gave it.
+    let mut names = WatchedNames::of(&file.store()?, &night, &folder);
     let progress = Progress::new("batch", common, true);
     progress.say(&format!("watches {name} for parts: Ctrl-C ends it"));
     let mut watched = Watched::default();
@@ -65,9 +67,10 @@ pub(super) fn watch(
         if is_new || this_night != last_night {
             last_night = this_night;
             let parts = watched.steady();
-            match NightFile::open_with(&night, Some(&parts)) {
+            match NightFile::open_with(&night, Some((&parts, &mut names))) {
                 Ok(file) if file.night.parts.is_empty() => {}
                 Ok(file) => {
+                    names.keep(&file.store()?, &night, &folder).map_err(anyhow::Error::new)?;
                     let made = make(&file, args, &progress)?;
                     for line in made.summary.lines() {
                         // A changed part may have the same line, but not the same bytes.
