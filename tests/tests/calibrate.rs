@@ -2,6 +2,7 @@
 
 use lamp_fixtures::SplitMix;
 use lamp_tests::{Scratch, workspace_root};
+use serde_json::Value;
 
 /// Returns the output of a command.
 fn said(scratch: &Scratch, line: &str) -> String {
@@ -19,6 +20,41 @@ fn estimate(said: &str, name: &str, nth: usize) -> [f64; 3] {
     let numbers: Vec<f64> =
         line[name.len()..].split_whitespace().map(|number| number.parse().unwrap()).collect();
     numbers.try_into().unwrap()
+}
+
+/// Runs a calibration that printed `table` again, and checks that its answer has the table's numbers: each
+/// line of a number with an interval, and no others.
+#[track_caller]
+fn answers(scratch: &Scratch, line: &str, table: &str) -> Value {
+    assert_eq!(said(scratch, &format!("{line} --report answer.json")), table);
+    let answer: Value = serde_json::from_slice(&scratch.bytes("answer.json")).unwrap();
+    let printed: Value = serde_json::from_str(&said(scratch, &format!("{line} --json"))).unwrap();
+    assert_eq!(printed, answer);
+    std::fs::remove_file(scratch.path("answer.json")).unwrap();
+    let counts = ["points", "without_measure", "blank"].map(|key| answer[key].as_u64().unwrap());
+    let numbers: Vec<u64> =
+        table.lines().next().unwrap().split(&[' ', '(']).filter_map(|it| it.parse().ok()).collect();
+    assert_eq!(numbers, [counts[0], counts.iter().sum(), counts[1], counts[2]], "{table}");
+    let groups = answer["groups"].as_array().unwrap().iter();
+    let groups = groups.flat_map(|group| group["parameters"].as_array().unwrap());
+    let all: Vec<&Value> = answer["parameters"].as_array().unwrap().iter().chain(groups).collect();
+    let mut told: Vec<[f64; 3]> = all
+        .iter()
+        .filter(|parameter| !parameter["low"].is_null())
+        .map(|it| ["value", "low", "high"].map(|key| it[key].as_f64().unwrap()))
+        .collect();
+    for line in table.lines().filter(|line| line.contains('(')) {
+        let numbers: Vec<f64> =
+            line.split_whitespace().rev().map_while(|word| word.parse().ok()).collect();
+        let [high, low, value] = numbers[..] else { continue };
+        let is_near = |of: &[f64; 3]| {
+            of.iter().zip([value, low, high]).all(|(a, b)| (a - b).abs() <= 6e-3 * b.abs())
+        };
+        let found = told.iter().position(is_near).unwrap_or_else(|| panic!("{line}: {told:?}"));
+        told.remove(found);
+    }
+    assert_eq!(told, [[0.0; 3]; 0], "{table}");
+    answer
 }
 
 #[track_caller]
@@ -51,6 +87,11 @@ fn a_working_curve_comes_back_from_its_films() {
     assert!(table.starts_with("21 points of 24 rows (3 uncured, 0 blank left out)\n"), "{table}");
     holds(estimate(&table, "Ec (mJ/cm2)", 0), 131.5);
     holds(estimate(&table, "Dp (um)", 0), 211.0);
+    let answer = answers(&scratch, line, &table);
+    assert_eq!(
+        (&answer["model"], &answer["parameters"][1]["unit"]),
+        (&"jacobs".into(), &"um".into())
+    );
     // The file states the same values and their origin.
     let file = text(&scratch, "mine.toml");
     for words in [
@@ -117,6 +158,9 @@ fn the_gray_model_comes_back_from_its_films() {
     holds(estimate(&table, "Ec(G) rise (mJ/cm2)", 0), 35.6);
     holds(estimate(&table, "Dp(G) at zero (um)", 0), 193.1);
     holds(estimate(&table, "Dp(G) rise (um)", 0), 22.1);
+    let answer = answers(&scratch, line, &table);
+    let [first, last] = [&answer["groups"][0], &answer["groups"][4]];
+    assert_eq!((&first["of"], &last["at"]), (&"gray".into(), &1.0.into()));
     assert!(said(&scratch, "lamp material check mine.toml").contains("mine gives gray;"));
     assert!(text(&scratch, "mine.toml").contains("25 points; at-zero +- "));
     assert!(scratch.bytes("gray.png").starts_with(b"\x89PNG"));
@@ -141,6 +185,7 @@ fn the_two_depth_model_comes_back_from_its_films() {
     holds(estimate(&table, "Ec (mJ/cm2)", 0), 4.0);
     holds(estimate(&table, "DpL (um)", 0), 80.0);
     holds(estimate(&table, "DpS (um)", 0), 150.0);
+    answers(&scratch, line, &table);
     // The material keeps its other entries.
     let file = text(&scratch, "mine.toml");
     assert!(file.contains("name = \"sl-5510\"") && file.contains("[working-curve.critical-dose]"));
@@ -178,6 +223,8 @@ fn cure_widths_come_back_from_their_squares() {
     let line = "lamp calibrate width squares.csv --material lamp-no-absorber --name mine \
                 -o mine.toml --plot squares.svg";
     let table = said(&scratch, line);
+    let answer = answers(&scratch, line, &table);
+    assert_eq!((&answer["r2"], &answer["groups"][0]["of"]), (&Value::Null, &"feature_um".into()));
     for (nth, (pixels, critical, slope)) in sizes.into_iter().enumerate() {
         assert!(table.contains(&format!("\n{pixels} px (")), "{table}");
         let found = estimate(&table, "Ec^w (mJ/cm2)", nth);
@@ -220,6 +267,14 @@ fn the_line_of_an_ageing_lamp_comes_back_from_its_films() {
     let line = "lamp calibrate lamp filters.csv -o mine.toml --plot lamp.svg";
     let table = said(&scratch, line);
     assert!(table.starts_with("18 points of 21 rows (3 uncured, 0 blank left out)\n"), "{table}");
+    let answer = answers(&scratch, line, &table);
+    for group in answer["groups"].as_array().unwrap() {
+        let critical = group["parameters"][0]["value"].as_f64().unwrap();
+        // The line of Ec(I), for each W/cm2.
+        let [zero, rise] = [0, 1].map(|k| answer["parameters"][k]["value"].as_f64().unwrap());
+        let line = zero + rise * group["at"].as_f64().unwrap() / 1000.0;
+        assert!((critical - line).abs() < 1e-6, "{answer}");
+    }
     holds(estimate(&table, "Ec(I) at zero (mJ/cm2)", 0), 109.0);
     let [_, low, high] = estimate(&table, "Ec(I) rise (mJ/cm2)", 0);
     assert!(low <= 18.31 && 18.31 <= high && low > 0.0, "{low} to {high}");

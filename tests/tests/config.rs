@@ -4,6 +4,7 @@ use std::fs;
 
 use lamp_fixtures::Sample;
 use lamp_tests::{OWN_SETTINGS, Scratch};
+use serde_json::Value;
 
 /// A folder with a part, a file of options of one's own and a machine of one's own.
 fn with_settings(config: &str) -> Scratch {
@@ -20,6 +21,11 @@ fn with_settings(config: &str) -> Scratch {
     let resin = String::from_utf8(resin).unwrap().replace("\"lamp-suspension\"", "\"my-resin\"");
     fs::write(own.join("materials/my-resin.toml"), resin).unwrap();
     scratch
+}
+
+/// Returns the JSON that a command prints, whatever its status.
+fn answer(scratch: &Scratch, line: &str) -> Value {
+    serde_json::from_slice(&scratch.run(line).stdout).unwrap()
 }
 
 fn dpi(scratch: &Scratch, stack: &str) -> f64 {
@@ -52,6 +58,15 @@ fn the_strongest_file_that_has_an_option_decides() {
     assert!(of("--dpi=60").ends_with("lamp.toml"), "{listed}");
     assert!(of("--thickness=4mm").ends_with("config.toml"), "{listed}");
     assert!(!listed.contains("--dpi=50"), "{listed}");
+    let answer = answer(&scratch, "lamp config slice --json");
+    let options = answer["options"].as_array().unwrap();
+    let told: String = options
+        .iter()
+        .map(|it| {
+            format!("{:<30} {}\n", it["word"].as_str().unwrap(), it["file"].as_str().unwrap())
+        })
+        .collect();
+    assert_eq!(told, listed);
 }
 
 #[test]
@@ -125,10 +140,28 @@ fn faults_of_settings_are_named_and_reported() {
     for word in ["target: ", "memory: ", "STEP kernels: lamp", "locks work", "line 2: margin"] {
         assert!(text.contains(word), "no {word} in {text}");
     }
+    let found = answer(&scratch, "lamp doctor --json");
+    for folder in found["folders"].as_array().unwrap() {
+        let (path, disk) = (folder["path"].as_str().unwrap(), &folder["disk"]);
+        assert!(text.contains(path) && disk["free_bytes"].as_u64() > Some(0), "{folder}");
+        assert_eq!((&disk["locks_work"], &folder["fault"]), (&Value::Bool(true), &Value::Null));
+    }
+    let config = &found["config"];
+    for file in config["files"].as_array().unwrap() {
+        let is_own = file["from"] == "your settings folder";
+        assert_eq!((&file["is_there"], file["fault"].is_string()), (&is_own.into(), is_own));
+    }
+    assert_eq!(config["materials"]["names"], serde_json::json!(["my-resin"]));
     // What may stand in a command's table is no fault; a file that breaks every pipe is.
     let fine = scratch.path(OWN_SETTINGS).join("lamp/config.toml");
     fs::write(&fine, "[slice]\nthreads = 1\nquiet = true\n").unwrap();
     scratch.run("lamp config").succeeds_quietly();
+    let found = answer(&scratch, "lamp config --json");
+    let options: Vec<_> =
+        found["files"].as_array().unwrap().iter().map(|it| &it["options"]).collect();
+    let option = |key, value| serde_json::json!({"command": "slice", "key": key, "value": value});
+    let own = serde_json::json!([option("quiet", "true"), option("threads", "1")]);
+    assert!(options.contains(&&own), "{options:?}");
     fs::write(&fine, "output = \"o.tif\"\n").unwrap();
     scratch.run("slice tower.stl --dpi 50").is_wrong_usage(&["config.toml: output: it is only"]);
     scratch.run("lamp completions bash").succeeds_quietly();

@@ -5,6 +5,7 @@ use lamp_fixtures::{Mesh, sphere, tower};
 use lamp_slicing::{Axis, Fill, Part, Placement, SectionOptions, Units, section};
 use lamp_stack::{Layer, Length, Pitch};
 use lamp_tests::Scratch;
+use serde_json::Value;
 
 /// The distance of the referee's lines: whole ones to a pixel of 1500 dpi.
 const LINE_DPI: f64 = 30_000.0;
@@ -217,6 +218,45 @@ fn areas_of_gray_are_those_of_its_levels() {
         });
         agree(found, exact, name);
     }
+}
+
+/// The answer has what the table prints.
+#[test]
+fn an_answer_has_the_areas_of_the_table() {
+    let scratch = Scratch::new();
+    scratch.mesh("part.stl", &wedge());
+    scratch.run("slice part.stl --material lamp-suspension --gray -o gray.tif").succeeds();
+    let cure = "lamp cure gray.tif --material lamp-suspension --section y=0.1mm -o s.png";
+    for part in ["--part part.stl", ""] {
+        let ran = scratch.run(&format!("{cure} {part} --report areas.json")).succeeds();
+        let text = String::from_utf8(ran.stdout).unwrap();
+        let printed = scratch.run(&format!("{cure} {part} --json")).succeeds().stdout;
+        assert_eq!(scratch.bytes("areas.json"), printed);
+        let answer: Value = serde_json::from_slice(&printed).unwrap();
+        let head = format!(
+            "y = {:.3} mm (row {}), z {:.3} to {:.3} mm, cured as lamp-suspension, {}",
+            answer["at_mm"].as_f64().unwrap(),
+            answer["row"],
+            answer["z_mm"][0].as_f64().unwrap(),
+            answer["z_mm"][1].as_f64().unwrap(),
+            answer["rule"].as_str().unwrap(),
+        );
+        assert!(text.starts_with(&head), "{text}: {head}");
+        let areas = answer["areas"].as_array().unwrap();
+        let lines = text.lines().skip(if part.is_empty() { 1 } else { 2 });
+        assert_eq!(areas.len(), lines.clone().count(), "{text}");
+        for (area, line) in areas.iter().zip(lines) {
+            let name = area["exposures"].as_str().unwrap();
+            let keys = ["part_mm2", "cured_mm2", "overshoot_mm2", "missing_mm2"];
+            let numbers = keys.iter().filter_map(|key| area[key].as_f64());
+            let mut words = line.split_whitespace().filter(|word| *word != "cured");
+            assert_eq!(words.next(), Some(name));
+            assert!(words.eq(numbers.map(|mm2| format!("{mm2:.4}"))), "{line}: {area}");
+        }
+    }
+    let line = format!("{cure} --report s.png.json --report gray.tif");
+    scratch.run(&line).is_wrong_usage(&["--report"]);
+    scratch.run(&format!("{cure} --report part.stl")).is_wrong_usage(&["part.stl"]);
 }
 
 /// An upright wall cuts pixels, and those whose centers it holds are wholly cured at best.

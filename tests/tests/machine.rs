@@ -263,8 +263,15 @@ fn machine_files_are_checked_with_the_light_that_they_name() {
         let output = scratch.run(line);
         let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
         output.is_refused_with(&["1 of 2 machine files has a fault"]);
+        let answer = scratch.run(&format!("{line} --json"));
+        assert_eq!(answer.statuses, [Some(1)], "{answer:?}");
+        let answer: Value = serde_json::from_slice(&answer.stdout).unwrap();
+        let [mine, scan] = [0, 1].map(|file| &answer["machines"][file]);
+        assert_eq!((&answer["whole"], &mine["name"]), (&json!(false), &json!("mine")));
+        assert_eq!(scan["file"], "light/scan.toml");
         let lines: Vec<_> = stdout.lines().collect();
         assert_eq!((lines.len(), lines[0]), (2, "mine.toml: machine mine: whole"), "{stdout}");
         assert!(lines[1].contains(words), "{stdout}");
+        assert_eq!(scan["fault"], lines[1]);
     }
 }

@@ -124,7 +124,15 @@ fn both_spreads_come_back_from_a_simulated_print() {
     scratch.write("exact.csv", table.as_bytes());
     let calibrate = "lamp calibrate scan exact.csv -o mine.toml --plot lines.svg";
     let exact = said(&scratch, calibrate);
+    let answer: Value =
+        serde_json::from_str(&said(&scratch, &format!("{calibrate} --json"))).unwrap();
     let names = ["sigma across (um)", "sigma along (um)", "Ec of lines (mJ/cm2)"];
+    for (parameter, name) in answer["parameters"].as_array().unwrap().iter().zip(names) {
+        let (told, unit) = (&parameter["name"], &parameter["unit"]);
+        assert_eq!(format!("{} ({})", told.as_str().unwrap(), unit.as_str().unwrap()), name);
+        let [value, ..] = estimate(&exact, name);
+        assert!((parameter["value"].as_f64().unwrap() / value - 1.0).abs() < 1e-3, "{answer}");
+    }
     for (name, truth) in names.into_iter().zip(truth) {
         let [value, ..] = estimate(&exact, name);
         assert!((value / truth - 1.0).abs() < 1e-3, "{name}: {value} of {truth}");

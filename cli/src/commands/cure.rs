@@ -5,23 +5,25 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use lamp_grayscale::OutlinePiece;
 use lamp_grayscale::material::Material;
+use lamp_grayscale::{OutlinePiece, PixelLine};
 use lamp_pipeline::RecordedSlicing;
 use lamp_pipeline::documents::document;
 use lamp_pipeline::part_file::{PartFile, paths};
 use lamp_pipeline::solid::name_of_all;
 use lamp_planning::cure_section::{
-    CureRule, CureSection, CureSectionError, SectionLine, SectionPlane, ShownSection,
+    CureRule, CureSection, CureSectionError, SectionAreas, SectionLine, SectionPlane, ShownSection,
 };
 use lamp_planning::{Light, SampleHeight};
-use lamp_stack::{CompensateRecord, DitherRecord, Length, StackInfo};
+use lamp_stack::{CompensateRecord, DitherRecord, Length, StackInfo, to_nm};
+use serde::Serialize;
 
 use crate::args::lamp_option::LampOption;
 use crate::args::options::{Common, InputArgs, one_of_described};
 use crate::args::planning_options::SAMPLE_HEIGHTS;
 use crate::args::solid::part_file;
 use crate::exit::Exit;
+use crate::output::json_report::{ReportTo, schemas, write_answer};
 use crate::streams::{check_beside, input_name, print, read_layers, write_file};
 use crate::terminal::progress::Progress;
 use lamp_plots::PictureScale;
@@ -92,6 +94,9 @@ pub(crate) struct CureArgs {
     /// Picture to write: a file that ends in .png or .svg
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+
+    #[command(flatten)]
+    report: ReportTo,
 }
 
 impl CureArgs {
@@ -116,6 +121,13 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
     check_beside(&args.output, Path::new("-"), inputs)?;
     lamp_plots::check_picture_name(&args.output)?;
+    if let Some(report) = args.report.path() {
+        let inputs = paths(&args.part).chain([&args.input.stack, &args.material]);
+        check_beside(report, Path::new("-"), inputs)?;
+        if *report == args.output {
+            return Err(Exit::usage(format!("{}: the picture is written there", report.display())));
+        }
+    }
     let (material, lamp_doubt) = args.lamp.material(document(&args.material)?)?;
     let resin = material.resin().map_err(|error| Exit::Failed(error.into()))?;
     let rule = args.rule(&material)?;
@@ -161,7 +173,86 @@ pub(crate) fn run(args: &CureArgs, common: &Common) -> Result<(), Exit> {
     panels.check_size(args.zoom).map_err(|error| failed(error.into()))?;
     write_file(&args.output, |out| panels.write(&material.name, args.zoom, &args.output, out))?;
     progress.wrote(&args.output, &[]);
-    print(&panels.text(&material.name))
+    if let Some(path) = args.report.path() {
+        write_answer("lamp-cure-1", &answer(&panels.0, &name, &material.name), path)?;
+    }
+    if args.report.is_printed() { Ok(()) } else { print(&panels.text(&material.name)) }
+}
+
+/// The areas of a section, by `lamp cure ... --report FILE`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CureAnswer<'a> {
+    /// Name of the stack, as given.
+    input: &'a str,
+    /// Name of the material.
+    material: &'a str,
+    /// Axis of part coordinates that the section is square to: `x` or `y`.
+    axis: &'static str,
+    /// Where the section cuts this axis, in millimeters.
+    at_mm: f64,
+    /// The row of pixels along the section, from 0, or null with `column`.
+    row: Option<u32>,
+    /// The column of pixels along the section, from 0, or null with `row`.
+    column: Option<u32>,
+    /// Ends of the section along the other axis, in millimeters.
+    along_mm: [f64; 2],
+    /// Bottom of the lowest layer and top of the highest, in millimeters.
+    z_mm: [f64; 2],
+    /// How exposures cure, in words.
+    rule: &'static str,
+    /// The areas, for each picture, and with a part for `pixels`.
+    areas: Vec<CuredAreas>,
+}
+
+/// What some exposures cure.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CuredAreas {
+    /// The exposures: `white`, with every pixel that is not black exposed in full; `gray`, with gray
+    /// levels; `pixels`, columns of pixels that cure exactly to the part's surface at their centers.
+    exposures: &'static str,
+    /// Cured area, in square millimeters.
+    cured_mm2: f64,
+    /// Area of the part, in square millimeters; null without a part.
+    part_mm2: Option<f64>,
+    /// Cured area outside the part, in square millimeters; null without a part.
+    overshoot_mm2: Option<f64>,
+    /// Area of the part that is not cured, in square millimeters; null without a part.
+    missing_mm2: Option<f64>,
+}
+
+schemas! { "lamp-cure-1": CureAnswer<'_>; }
+
+fn answer<'a>(shown: &ShownSection, input: &'a str, material: &'a str) -> CureAnswer<'a> {
+    let (axis, at) = match shown.course.plane() {
+        SectionPlane::X(at) => ("x", at),
+        SectionPlane::Y(at) => ("y", at),
+    };
+    let (row, column) = match shown.course.line {
+        PixelLine::Row(row) => (Some(row), None),
+        PixelLine::Column(column) => (None, Some(column)),
+    };
+    let areas = |SectionAreas { name, cured_mm2, beside_part }| CuredAreas {
+        exposures: name,
+        cured_mm2,
+        part_mm2: beside_part.map(|beside| beside.part_mm2),
+        overshoot_mm2: beside_part.map(|beside| beside.overshoot_mm2),
+        missing_mm2: beside_part.map(|beside| beside.missing_mm2),
+    };
+    let pixels = [shown.pixels.start, shown.pixels.end];
+    CureAnswer {
+        input,
+        material,
+        axis,
+        at_mm: to_nm(at.mm()),
+        row,
+        column,
+        along_mm: pixels.map(|pixel| to_nm(shown.course.place_mm(f64::from(pixel)))),
+        z_mm: [shown.heights_um.start, shown.heights_um.end].map(|um| to_nm(um / 1000.0)),
+        rule: shown.rule.text(),
+        areas: shown.areas().into_iter().map(areas).collect(),
+    }
 }
 
 /// The part's outline, placed as the stack says.

@@ -150,7 +150,7 @@ impl Command {
             Self::MeshOut(args) => mesh_out::run(args, common),
             Self::Batch(args) => batch::run(args, common),
             Self::Config(args) => config::run(args, common),
-            Self::Doctor(_) => doctor::run(),
+            Self::Doctor(args) => doctor::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
             Self::Help(args) => help::run(args),

@@ -68,12 +68,12 @@ pub(super) fn run(args: &DepthArgs, common: &Common) -> Result<(), Exit> {
     };
     let fit = fit.map_err(|error| at_place(error.into()))?;
     say_what_was_changed(&fit, &Progress::new("calibrate", common, true));
-    let mut text = EstimateTable::new(&measured, "uncured");
-    fit.write(&mut text);
+    let mut fitted = EstimateTable::new(files.place(), model.name(), &measured, "uncured");
+    fit.write(&mut fitted);
     let title = format!("Cure depth: {}", files.source_name());
     let source = files.source(points.len());
     let plot = plot(title, &fit, points);
-    files.finish(base, |material| fit.add_to(material, &source), &plot, &text.finish())
+    files.finish(base, |material| fit.add_to(material, &source), &plot, &fitted)
 }
 
 /// Reports parameters that differ from what was measured.
@@ -110,27 +110,27 @@ pub(super) fn levelled<T: Quantity>(
 }
 
 impl DepthFit {
-    fn write(&self, text: &mut EstimateTable) {
+    fn write(&self, table: &mut EstimateTable) {
         match self {
             Self::Jacobs(fit) => {
-                text.line("R^2", &[&short(fit.r2)]);
-                text.heads();
-                text.estimate("Ec (mJ/cm2)", &fit.critical_dose);
-                text.estimate("Dp (um)", &fit.penetration_depth);
+                table.r2("R^2", fit.r2);
+                table.heads();
+                table.estimate("Ec", &fit.critical_dose);
+                table.estimate("Dp", &fit.penetration_depth);
             }
             Self::TwoDepth(fit) => {
-                text.line("R^2", &[&short(fit.r2)]);
-                text.heads();
-                text.estimate("Ec (mJ/cm2)", &fit.critical_dose);
-                text.estimate("DpL (um)", &fit.liquid_depth);
-                text.estimate("DpS (um)", &fit.solid_depth);
+                table.r2("R^2", fit.r2);
+                table.heads();
+                table.estimate("Ec", &fit.critical_dose);
+                table.estimate("DpL", &fit.liquid_depth);
+                table.estimate("DpS", &fit.solid_depth);
             }
             Self::Gray(fit) => {
-                text.heads();
-                fit.levels.iter().for_each(|level| write_level(text, level));
-                write_line(text, "Ec(G)", "mJ/cm2", &fit.critical_dose);
-                write_line(text, "Dp(G)", "um", &fit.penetration_depth);
-                text.line("R^2 of all", &[&short(fit.r2)]);
+                table.heads();
+                fit.levels.iter().for_each(|level| write_level(table, level));
+                write_line(table, "Ec(G)", &fit.critical_dose);
+                write_line(table, "Dp(G)", &fit.penetration_depth);
+                table.r2("R^2 of all", fit.r2);
             }
         }
     }
@@ -165,27 +165,28 @@ impl DepthFit {
 }
 
 /// Writes the estimates from a level's own points.
-fn write_level(text: &mut EstimateTable, level: &LevelFit) {
+fn write_level(table: &mut EstimateTable, level: &LevelFit) {
     let (gray, points) = (level.gray.get(), level.points);
+    table.group("gray", gray, points, level.curve.as_ref().map(|curve| curve.r2));
     let points = if points == 1 { "1 point".to_owned() } else { format!("{points} points") };
     match &level.curve {
         Some(curve) => {
-            text.estimate(&format!("Ec at {gray} (mJ/cm2)"), &curve.critical_dose);
-            text.estimate(&format!("Dp at {gray} (um)"), &curve.penetration_depth);
-            text.line(&format!("R^2 at {gray}, {points}"), &[&short(curve.r2)]);
+            let at = format!(" at {gray}");
+            table.estimate_of_group("Ec", &at, &curve.critical_dose);
+            table.estimate_of_group("Dp", &at, &curve.penetration_depth);
+            table.line(&format!("R^2 at {gray}, {points}"), &[&short(curve.r2)]);
         }
-        None => text.line(&format!("{gray}: {points}, no curve of its own"), &[]),
+        None => table.line(&format!("{gray}: {points}, no curve of its own"), &[]),
     }
 }
 
 pub(super) fn write_line<T: Quantity>(
-    text: &mut EstimateTable,
+    table: &mut EstimateTable,
     name: &str,
-    unit: &str,
     line: &LineEstimate<T>,
 ) {
-    text.estimate(&format!("{name} at zero ({unit})"), &line.at_zero);
-    text.estimate(&format!("{name} rise ({unit})"), &line.rise);
+    table.estimate(&format!("{name} at zero"), &line.at_zero);
+    table.estimate(&format!("{name} rise"), &line.rise);
 }
 
 fn plot(title: String, fit: &DepthFit, points: &[DepthPoint]) -> Plot {

@@ -3,22 +3,100 @@
 use lamp_grayscale::calibrate::{Estimate, Measured};
 use lamp_grayscale::resin::Quantity;
 use lamp_stack::format_significant;
+use serde::Serialize;
 
-/// The numbers of a calibration, a line each.
+use crate::exit::Exit;
+use crate::output::json_report::{ReportTo, schemas, write_answer};
+use crate::streams::print;
+
+/// The numbers of a calibration: a table with a line each, and an answer.
 pub(super) struct EstimateTable {
     text: String,
+    answer: CalibrateAnswer,
 }
 
+/// The numbers that a calibration fitted, by `lamp calibrate ... --report FILE`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CalibrateAnswer {
+    /// Name of the measurements, as given.
+    input: String,
+    /// The fitted model: `jacobs`, `two-depth`, `gray`, `width`, `lamp` or `scan`.
+    model: &'static str,
+    /// Rows that were used.
+    points: usize,
+    /// Rows with nothing left to measure: films that did not cure, squares that were washed away, gaps
+    /// that closed.
+    without_measure: usize,
+    /// Rows without a measurement.
+    blank: usize,
+    /// Share of the scatter that the model explains, of all points; null with models of single sizes.
+    r2: Option<f64>,
+    /// The parameters of the model.
+    parameters: Vec<Parameter>,
+    /// Points of one gray level, one light or one size, with numbers of their own.
+    groups: Vec<Group>,
+}
+
+/// A fitted number with its 95% confidence interval.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Parameter {
+    /// Its name, as the table has it, such as `Ec`.
+    name: String,
+    /// Its unit, such as `mJ/cm2`. A rise is from black to white, or for each W/cm2 of a lamp.
+    unit: &'static str,
+    /// The most likely value.
+    value: f64,
+    /// Lower end of the interval; null if it has none.
+    low: Option<f64>,
+    /// Upper end of the interval; null if it has none.
+    high: Option<f64>,
+}
+
+/// Points that have one thing in common.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Group {
+    /// The common quantity, with its unit: `gray`, `lamp_mw_per_cm2` or `feature_um`.
+    of: &'static str,
+    /// Its value.
+    at: f64,
+    /// The number of points.
+    points: usize,
+    /// Share of their scatter that their own curve explains; null without such a curve.
+    r2: Option<f64>,
+    /// Parameters of their own curve.
+    parameters: Vec<Parameter>,
+}
+
+schemas! { "lamp-calibrate-1": CalibrateAnswer; }
+
 impl EstimateTable {
-    /// Starts with the number of rows that were used, out of all rows. `none` names the rows that
-    /// hold no point.
-    pub(super) fn new<T>(measured: &Measured<T>, none: &str) -> Self {
+    /// Starts with the number of rows that were used, out of all rows of `input`. `none` names the
+    /// rows that hold no point.
+    pub(super) fn new<T>(
+        input: String,
+        model: &'static str,
+        measured: &Measured<T>,
+        none: &str,
+    ) -> Self {
         let Measured { points, none: without, blank } = measured;
         let points = points.len();
         let rows = points + without + blank;
         let text =
             format!("{points} points of {rows} rows ({without} {none}, {blank} blank left out)\n");
-        Self { text }
+        let answer = CalibrateAnswer {
+            input,
+            model,
+            points,
+            without_measure: *without,
+            blank: *blank,
+            r2: None,
+            parameters: Vec::new(),
+            groups: Vec::new(),
+        };
+        Self { text, answer }
     }
 
     /// Adds a line of texts, the first to the left and the others to the right of
@@ -39,12 +117,59 @@ impl EstimateTable {
 
     /// Adds a number with its interval.
     pub(super) fn estimate<T: Quantity>(&mut self, name: &str, estimate: &Estimate<T>) {
-        let [value, low, high] = numbers(estimate);
-        self.line(name, &[&value, &low, &high]);
+        self.estimate_line(name, estimate);
+        self.answer.parameters.push(Parameter::new(name, estimate));
     }
 
-    pub(super) fn finish(self) -> String {
-        self.text
+    /// Adds how much of the scatter of all points the model explains.
+    pub(super) fn r2(&mut self, name: &str, r2: f64) {
+        self.line(name, &[&short(r2)]);
+        self.answer.r2 = Some(r2);
+    }
+
+    /// Begins a group of points, for the answer.
+    pub(super) fn group(&mut self, of: &'static str, at: f64, points: usize, r2: Option<f64>) {
+        self.answer.groups.push(Group { of, at, points, r2, parameters: Vec::new() });
+    }
+
+    /// Adds a number of the last group with its interval. The table calls it `name`, with `at` behind.
+    pub(super) fn estimate_of_group<T: Quantity>(
+        &mut self,
+        name: &str,
+        at: &str,
+        estimate: &Estimate<T>,
+    ) {
+        self.estimate_line(&format!("{name}{at}"), estimate);
+        let group = self.answer.groups.last_mut().expect("a group was begun");
+        group.parameters.push(Parameter::new(name, estimate));
+    }
+
+    /// Adds a number of the last group without an interval, for the answer.
+    pub(super) fn number_of_group<T: Quantity>(&mut self, name: &str, number: T) {
+        let group = self.answer.groups.last_mut().expect("a group was begun");
+        let (name, unit, value) = (name.to_owned(), T::UNIT, number.number());
+        group.parameters.push(Parameter { name, unit, value, low: None, high: None });
+    }
+
+    fn estimate_line<T: Quantity>(&mut self, name: &str, estimate: &Estimate<T>) {
+        let [value, low, high] = numbers(estimate);
+        self.line(&format!("{name} ({})", T::UNIT), &[&value, &low, &high]);
+    }
+
+    /// Prints the table, and writes the answer where that is wanted.
+    pub(super) fn write(&self, report: &ReportTo) -> Result<(), Exit> {
+        if let Some(path) = report.path() {
+            write_answer("lamp-calibrate-1", &self.answer, path)?;
+        }
+        if report.is_printed() { Ok(()) } else { print(&self.text) }
+    }
+}
+
+impl Parameter {
+    fn new<T: Quantity>(name: &str, estimate: &Estimate<T>) -> Self {
+        let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(T::number);
+        let [low, high] = [low, high].map(|end| Some(end).filter(|end| end.is_finite()));
+        Self { name: name.to_owned(), unit: T::UNIT, value, low, high }
     }
 }
 

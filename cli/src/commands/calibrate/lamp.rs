@@ -40,15 +40,18 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
     let fit = fit_lamp(points).map_err(|error| at_place(error.into()))?;
     let progress = Progress::new("calibrate", common, true);
     levelled(&fit.critical_dose, "the critical dose", "mJ/cm2", &progress);
-    let mut text = EstimateTable::new(&measured, "uncured");
-    text.heads();
+    let mut fitted = EstimateTable::new(files.place(), "lamp", &measured, "uncured");
+    fitted.heads();
     for &(lamp, films) in &fit.lights {
-        let critical = short(fit.critical_dose_at(lamp).mj_per_cm2());
-        text.line(&format!("Ec at {lamp}"), &[&critical, &format!("{films} points")]);
+        let critical = fit.critical_dose_at(lamp);
+        fitted.group("lamp_mw_per_cm2", lamp.mw_per_cm2(), films, None);
+        fitted.number_of_group("Ec", critical);
+        let critical = short(critical.mj_per_cm2());
+        fitted.line(&format!("Ec at {lamp}"), &[&critical, &format!("{films} points")]);
     }
-    write_line(&mut text, "Ec(I)", "mJ/cm2", &fit.critical_dose);
-    text.estimate("Dp (um)", &fit.penetration_depth);
-    text.line("R^2", &[&short(fit.r2)]);
+    write_line(&mut fitted, "Ec(I)", &fit.critical_dose);
+    fitted.estimate("Dp", &fit.penetration_depth);
+    fitted.r2("R^2", fit.r2);
     let source = files.source(points.len());
     let add = |material: &mut Material| {
         material.dimmed_lamp = Some(fit.lines(&source));
@@ -58,7 +61,7 @@ pub(super) fn run(args: &LampArgs, common: &Common) -> Result<(), Exit> {
         }
     };
     let title = format!("Cure depth by lamp: {}", files.source_name());
-    files.finish(base, add, &plot(title, &fit, points), &text.finish())
+    files.finish(base, add, &plot(title, &fit, points), &fitted)
 }
 
 fn plot(title: String, fit: &LampFit, points: &[LampPoint]) -> Plot {

@@ -22,7 +22,9 @@ use crate::args::options::{Common, parse_light};
 use crate::catalogue::read_text;
 use crate::exit::Exit;
 use crate::output::endings::parse_toml;
-use crate::streams::{check_beside, input_name, is_stream, print, write_file};
+use crate::output::json_report::ReportTo;
+use crate::streams::{check_beside, input_name, is_stream, write_file};
+use estimate_table::EstimateTable;
 use lamp_plots::{self as plots, Plot, drawn};
 
 /// Fit a resin's parameters to measured cure depths, widths or lines
@@ -84,6 +86,9 @@ struct CalibrationFiles {
     /// table
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+
+    #[command(flatten)]
+    report: ReportTo,
 }
 
 /// Measurements are some thousands of rows.
@@ -100,6 +105,13 @@ impl CalibrationFiles {
                 return Err(Exit::usage("the table goes to standard output: name a file with -o"));
             }
             check_beside(output, Path::new("-"), [&self.data])?;
+        }
+        if let Some(report) = self.report.path() {
+            if self.output.iter().chain(&self.plot).any(|other| other == report) {
+                let report = report.display();
+                return Err(Exit::usage(format!("{report}: another output is written there")));
+            }
+            check_beside(report, Path::new("-"), self.material.iter().chain([&self.data]))?;
         }
         let Some(plot) = &self.plot else { return Ok(()) };
         plots::check_name(plot)?;
@@ -151,14 +163,14 @@ impl CalibrationFiles {
         format!("calibrated from {}, {points} points", self.source_name())
     }
 
-    /// Writes what was asked for, and prints the table. Nothing is written unless
+    /// Writes what was asked for, and prints the table or its answer. Nothing is written unless
     /// all of it can be made.
     fn finish(
         &self,
         base: Option<Material>,
         add: impl FnOnce(&mut Material),
         plot: &Plot,
-        table: &str,
+        fitted: &EstimateTable,
     ) -> Result<(), Exit> {
         let draw = |path| drawn(slice::from_ref(plot), path).map(|bytes| (path, bytes));
         let plot = self.plot.as_deref().map(draw).transpose()?;
@@ -183,7 +195,7 @@ impl CalibrationFiles {
         for (path, bytes) in plot.into_iter().chain(material.transpose()?) {
             write_file(path, |out| out.write_all(&bytes))?;
         }
-        print(table)
+        fitted.write(&self.report)
     }
 
     fn new_material(&self, output: &Path) -> Material {

@@ -8,7 +8,7 @@ use lamp_grayscale::material::{Given, Material};
 use lamp_stack::{Dpi, Length};
 
 use super::CalibrationFiles;
-use super::estimate_table::{EstimateTable, in_legend, short};
+use super::estimate_table::{EstimateTable, in_legend};
 use crate::args::options::Common;
 use crate::exit::Exit;
 use lamp_plots::{Plot, PlotAxis, Series};
@@ -43,12 +43,12 @@ pub(super) fn run(args: &ScanArgs, _: &Common) -> Result<(), Exit> {
     let measured = line_points(&table, files.light(base.as_ref())?, args.dpi);
     let measured = measured.map_err(|error| at_place(error.into()))?;
     let fit = fit_scan(&measured.points).map_err(|error| at_place(error.into()))?;
-    let mut text = EstimateTable::new(&measured, "gone");
-    text.line("R^2", &[&short(fit.r2)]);
-    text.heads();
-    text.estimate("sigma across (um)", &fit.across);
-    text.estimate("sigma along (um)", &fit.along);
-    text.estimate("Ec of lines (mJ/cm2)", &fit.critical_dose);
+    let mut fitted = EstimateTable::new(files.place(), "scan", &measured, "gone");
+    fitted.r2("R^2", fit.r2);
+    fitted.heads();
+    fitted.estimate("sigma across", &fit.across);
+    fitted.estimate("sigma along", &fit.along);
+    fitted.estimate("Ec of lines", &fit.critical_dose);
     let plot = plot(format!("Lines: {}", files.source_name()), &fit, &measured.points);
     // The light of a wide field, which the doses were of, stays when the spread changes.
     let field =
@@ -62,7 +62,7 @@ pub(super) fn run(args: &ScanArgs, _: &Common) -> Result<(), Exit> {
         }
         material.spread = Some(fit.numbers(&files.source(fit.points)));
     };
-    files.finish(base, add, &plot, &text.finish())
+    files.finish(base, add, &plot, &fitted)
 }
 
 /// Growth of lines and gaps over their width.

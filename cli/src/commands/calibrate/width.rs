@@ -8,7 +8,7 @@ use lamp_grayscale::exposure::MeasuredDoses;
 use lamp_grayscale::material::{Material, MaterialError};
 use lamp_grayscale::resin::{CureModel, Dose, broadening_depth};
 use lamp_pipeline::documents::document;
-use lamp_stack::Dpi;
+use lamp_stack::{Dpi, to_nm};
 
 use super::CalibrationFiles;
 use super::estimate_table::{EstimateTable, in_legend, short};
@@ -67,9 +67,9 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
              --depth-material",
         );
     }
-    let mut text = EstimateTable::new(&measured, "washed away");
+    let mut fitted = EstimateTable::new(files.place(), "width", &measured, "washed away");
     for fit in &fits {
-        write(&mut text, fit, args.dpi, depths.as_deref());
+        write(&mut fitted, fit, args.dpi, depths.as_deref());
         // Broadening depths are cure depths at these doses.
         doses.iter().for_each(|doses| doses.see(fit.critical_dose.value));
     }
@@ -82,7 +82,7 @@ pub(super) fn run(args: &WidthArgs, common: &Common) -> Result<(), Exit> {
             add_to(material, fit, &files.source(fit.points));
         }
     };
-    files.finish(base, add, &plot, &text.finish())
+    files.finish(base, add, &plot, &fitted)
 }
 
 /// How deep full white cures a material, where that is known.
@@ -96,20 +96,21 @@ fn cure_depths(material: &Material) -> Result<Option<Box<dyn CureModel>>, Materi
     Ok(material.gray_curve()?.map(|curve| Box::new(curve) as Box<dyn CureModel>))
 }
 
-fn write(text: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
+fn write(table: &mut EstimateTable, fit: &WidthFit, dpi: Dpi, depths: Option<&dyn CureModel>) {
     let (size, below) = (size_name(fit, dpi), fit.below);
     let below = if below > 0 { format!(" ({below} up to Ec^w)") } else { String::new() };
-    text.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
-    text.heads();
-    text.estimate("Ec^w (mJ/cm2)", &fit.critical_dose);
-    text.estimate("Dp^w (um/(mJ/cm2))", &fit.sensitivity);
+    table.group("feature_um", to_nm(fit.feature_size.mm()) * 1000.0, fit.points, Some(fit.r2));
+    table.line(&format!("\n{size}: {} points{below}", fit.points), &[]);
+    table.heads();
+    table.estimate_of_group("Ec^w", "", &fit.critical_dose);
+    table.estimate_of_group("Dp^w", "", &fit.sensitivity);
     if let Some(depths) = depths {
         let critical = &fit.critical_dose;
         let of = |dose| broadening_depth(depths, dose);
         let (value, low, high) = (of(critical.value), of(critical.low), of(critical.high));
-        text.estimate("Bd (um)", &Estimate { value, low, high });
+        table.estimate_of_group("Bd", "", &Estimate { value, low, high });
     }
-    text.line("R^2", &[&short(fit.r2)]);
+    table.line("R^2", &[&short(fit.r2)]);
 }
 
 /// The squares' side in pixels and um.

@@ -70,6 +70,10 @@ Examples:
         /// Machine files, or - for standard input
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
+
+        /// Print JSON, as docs/json.md describes it
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -84,7 +88,7 @@ pub(crate) fn run(args: &MachineArgs) -> Result<(), Exit> {
         MachineAction::Show { machine, json: true } => answer(&[document(machine)?], None),
         MachineAction::Show { machine, json: false } => show::<Machine>(machine),
         MachineAction::New(args) => new::run(args),
-        MachineAction::Check { files } => check(files),
+        MachineAction::Check { files, json } => check(files, *json),
     }
 }
 
@@ -93,25 +97,59 @@ fn answer(machines: &[Machine], displays: Option<Vec<DisplayFields<'_>>>) -> Res
     print_answer("lamp-machine-1", &MachineAnswer { machines, displays })
 }
 
-/// Prints a line for each file: its machine, or its fault.
-fn check(files: &[PathBuf]) -> Result<(), Exit> {
-    let mut faulty = 0;
+/// Prints a line for each file: its machine, or its fault; or all of them as JSON.
+fn check(files: &[PathBuf], json: bool) -> Result<(), Exit> {
+    let mut found = Vec::new();
     for path in files {
-        let line = match checked(path) {
-            Ok(machine) => format!("{}: machine {}: whole", input_name(path), machine.name),
-            Err(fault) => {
-                faulty += 1;
-                fault.to_string()
-            }
+        let (file, checked) = (input_name(path), checked(path));
+        let (name, fault) = match checked {
+            Ok(machine) => (Some(machine.name), None),
+            Err(fault) => (None, Some(fault.to_string())),
         };
-        print(&format!("{}\n", printable(&line)))?;
+        let machine = CheckedMachine { file, whole: fault.is_none(), name, fault };
+        if !json {
+            let CheckedMachine { file, name, fault, .. } = &machine;
+            let whole =
+                || format!("{file}: machine {}: whole", name.as_deref().unwrap_or_default());
+            let line = fault.clone().unwrap_or_else(whole);
+            print(&format!("{}\n", printable(&line)))?;
+        }
+        found.push(machine);
     }
-    let all = files.len();
+    let (faulty, all) = (found.iter().filter(|it| !it.whole).count(), found.len());
+    if json {
+        let answer = MachineCheckAnswer { whole: faulty == 0, machines: found };
+        print_answer("lamp-machine-check-1", &answer)?;
+    }
     match faulty {
         0 => Ok(()),
         1 => Err(Exit::Failed(anyhow!("1 of {all} machine files has a fault"))),
         _ => Err(Exit::Failed(anyhow!("{faulty} of {all} machine files have faults"))),
     }
+}
+
+/// Whether machine files are whole, by `lamp machine check FILE... --json`.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct MachineCheckAnswer {
+    /// Whether no file has a fault.
+    whole: bool,
+    /// The files, in the order given.
+    machines: Vec<CheckedMachine>,
+}
+
+/// A machine's file that was checked.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct CheckedMachine {
+    /// Name of the file, as given.
+    file: String,
+    /// Whether it has no fault.
+    whole: bool,
+    /// Name of its machine; null if it has a fault.
+    name: Option<String>,
+    /// The fault, as a sentence.
+    fault: Option<String>,
 }
 
 /// Reads a machine's file, and the light that it names.
@@ -364,7 +402,10 @@ struct DisplayFields<'a> {
     source: &'a str,
 }
 
-schemas! { "lamp-machine-1": MachineAnswer<'_>; }
+schemas! {
+    "lamp-machine-1": MachineAnswer<'_>;
+    "lamp-machine-check-1": MachineCheckAnswer;
+}
 
 /// A machine's fields; unknown fields are null.
 fn fields(machine: &Machine) -> MachineFields<'_> {
