@@ -212,6 +212,14 @@ pub fn own_file<T: Document>(word: &Path) -> Option<PathBuf> {
     (!name.exists() && builtin::<T>(&name).is_none() && file.is_file()).then_some(file)
 }
 
+/// Returns the folder of the file that a word means, from which the document names other files; it is empty
+/// for the current folder, standard input and built-in documents.
+pub fn folder_of<T: Document>(word: &Path) -> PathBuf {
+    let (mut file, _) = without_digest(word);
+    find_own::<T>(&mut file);
+    file.parent().unwrap_or(Path::new("")).to_owned()
+}
+
 /// Puts the file in the place of a name, if the name means a document of one's own folder. Other names
 /// get the letters of the document that they mean.
 pub fn find_own<T: Document>(word: &mut PathBuf) {

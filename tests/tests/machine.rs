@@ -1,7 +1,7 @@
 //! Checks that the limits of machines bind, and what `lamp machine` says of them.
 
 use lamp_fixtures::Sample;
-use lamp_tests::Scratch;
+use lamp_tests::{OWN_SETTINGS, Scratch};
 use serde_json::{Value, json};
 
 const MINE: &str = r#"name = "mine"
@@ -239,6 +239,33 @@ fn a_build_is_cut_into_the_swaths_of_a_scan_as_into_strips() {
 }
 
 #[test]
+fn machines_are_checked_by_name() {
+    let scratch = tower_and_machine();
+    let own = scratch.path(OWN_SETTINGS).join("lamp/machines");
+    std::fs::create_dir_all(&own).unwrap();
+    std::fs::write(own.join("lit.toml"), (scanning() + LIGHT).replace("\"mine\"", "\"lit\""))
+        .unwrap();
+    // The light lies beside the machine's file, not in the current folder.
+    let light = format!("{}\n", ["1"; 64].join(",")).repeat(2);
+    std::fs::write(own.join("light.csv"), light).unwrap();
+    let line = "lamp machine check Mars3 alpha lit Lit mine.toml";
+    assert_eq!(
+        String::from_utf8(scratch.run(line).succeeds_quietly().stdout).unwrap(),
+        "Mars3: machine mars3: whole\nalpha: machine alpha: whole\nlit: machine lit: whole\n\
+         Lit: machine lit: whole\nmine.toml: machine mine: whole\n"
+    );
+    scratch.run("lamp machine check mars").is_refused_with(&["1 of 1 machines has a fault"]);
+    for (kind, name) in [("material", "lamp-suspension"), ("projector", "zhao")] {
+        let by_name = scratch.run(&format!("lamp {kind} check {name}")).succeeds_quietly().stdout;
+        scratch.write("x.toml", &scratch.run(&format!("lamp {kind} show {name}")).stdout);
+        let of_file = scratch.run(&format!("lamp {kind} check x.toml")).succeeds_quietly().stdout;
+        let of_file = String::from_utf8(of_file).unwrap();
+        assert_eq!(String::from_utf8(by_name).unwrap(), of_file.replacen("x.toml", name, 1));
+        scratch.run(&format!("lamp {kind} check nobody")).is_refused_with(&["nobody", name]);
+    }
+}
+
+#[test]
 fn machine_files_are_checked_with_the_light_that_they_name() {
     let scratch = tower_and_machine();
     let folder = scratch.path("light");
@@ -262,13 +289,13 @@ fn machine_files_are_checked_with_the_light_that_they_name() {
         }
         let output = scratch.run(line);
         let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
-        output.is_refused_with(&["1 of 2 machine files has a fault"]);
+        output.is_refused_with(&["1 of 2 machines has a fault"]);
         let answer = scratch.run(&format!("{line} --json"));
         assert_eq!(answer.statuses, [Some(1)], "{answer:?}");
         let answer: Value = serde_json::from_slice(&answer.stdout).unwrap();
         let [mine, scan] = [0, 1].map(|file| &answer["machines"][file]);
         assert_eq!((&answer["whole"], &mine["name"]), (&json!(false), &json!("mine")));
-        assert_eq!(scan["file"], "light/scan.toml");
+        assert_eq!(scan["input"], "light/scan.toml");
         let lines: Vec<_> = stdout.lines().collect();
         assert_eq!((lines.len(), lines[0]), (2, "mine.toml: machine mine: whole"), "{stdout}");
         assert!(lines[1].contains(words), "{stdout}");

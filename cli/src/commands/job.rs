@@ -9,7 +9,7 @@ use lamp_gantry::{
     seen_from,
 };
 use lamp_machine::{LightTable, Machine, Scan};
-use lamp_pipeline::documents::{document_and_text, without_digest};
+use lamp_pipeline::documents::{document_and_text, folder_of, without_digest};
 use lamp_pipeline::heights::time_text;
 
 use crate::args::options::{Common, TimeArgs, one_of_described, parse_layers};
@@ -92,11 +92,11 @@ pub(super) fn mirrors_of(
     path: &Path,
     scan: &Scan,
 ) -> Result<(Option<LightTable>, MirrorArray), Exit> {
+    let folder = folder_of::<Machine>(path);
     // A word of a record has a digest behind the name.
     let (path, _) = without_digest(path);
-    let folder = path.parent().unwrap_or(Path::new(""));
     let light = scan.light.as_ref().map(|light| {
-        light.read(folder, scan.mirrors()).map_err(|error| {
+        light.read(&folder, scan.mirrors()).map_err(|error| {
             Exit::Failed(error.into()).at(folder.join(&light.file).display().to_string())
         })
     });

@@ -44,10 +44,11 @@ enum ProjectorAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a projector file and report its lit area, and where its lens forms the image
+    /// Check a projector and report its lit area, and where its lens forms the image
     Check {
-        /// The file, or - for standard input
-        file: PathBuf,
+        /// Projector: a built-in projector's name, a file, or - for standard input
+        #[arg(value_name = "PROJECTOR")]
+        projector: PathBuf,
 
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -63,12 +64,12 @@ pub(crate) fn run(args: &ProjectorArgs) -> Result<(), Exit> {
             answer(&[documents::document(projector)?])
         }
         ProjectorAction::Show { projector, json: false } => catalogue::show::<Projector>(projector),
-        ProjectorAction::Check { file, json } => check(file, *json),
+        ProjectorAction::Check { projector, json } => check(projector, *json),
     }
 }
 
 /// Projectors, by `lamp projector list --json`, `lamp projector show P --json` and
-/// `lamp projector check FILE --json`.
+/// `lamp projector check P --json`.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct ProjectorAnswer<'a> {
@@ -183,7 +184,7 @@ fn spread(projector: &Projector) -> String {
 }
 
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
-    let (projector, _) = documents::read_file(path)?;
+    let projector: Projector = documents::document(path)?;
     if json {
         return answer(&[projector]);
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use clap::{Args, Subcommand};
 use lamp_machine::{Display, Machine, Recoating, Scan, Speed};
-use lamp_pipeline::documents::{document, read_file};
+use lamp_pipeline::documents::{document, folder_of};
 use lamp_stack::to_nm;
 use lamp_stack::{Catalogued, Length, Pitch};
 use serde::Serialize;
@@ -62,13 +62,13 @@ Examples:
   lamp machine new mine --area 100x60mm --recoat 9s --expose 1.5s
   lamp machine new mine --area 100x60mm --dpi 1500 -o mine.toml")]
     New(NewArgs),
-    /// Check machine files, and the light files that they name
+    /// Check machines, and the light files that they name
     ///
-    /// Each file gets one line.
-    #[command(after_help = "Exit status: 0 if no file has a fault, 1 otherwise.")]
+    /// Each machine gets one line.
+    #[command(after_help = "Exit status: 0 if no machine has a fault, 1 otherwise.")]
     Check {
-        /// Machine files, or - for standard input
-        #[arg(value_name = "FILE", required = true)]
+        /// Machines: names of built-in ones or your own, files, or - for standard input
+        #[arg(value_name = "MACHINE", required = true)]
         files: Vec<PathBuf>,
 
         /// Print JSON, as docs/json.md describes it
@@ -97,20 +97,20 @@ fn answer(machines: &[Machine], displays: Option<Vec<DisplayFields<'_>>>) -> Res
     print_answer("lamp-machine-1", &MachineAnswer { machines, displays })
 }
 
-/// Prints a line for each file: its machine, or its fault; or all of them as JSON.
+/// Prints a line for each machine: its name, or its fault; or all of them as JSON.
 fn check(files: &[PathBuf], json: bool) -> Result<(), Exit> {
     let mut found = Vec::new();
     for path in files {
-        let (file, checked) = (input_name(path), checked(path));
+        let (input, checked) = (input_name(path), checked(path));
         let (name, fault) = match checked {
             Ok(machine) => (Some(machine.name), None),
             Err(fault) => (None, Some(fault.to_string())),
         };
-        let machine = CheckedMachine { file, whole: fault.is_none(), name, fault };
+        let machine = CheckedMachine { input, whole: fault.is_none(), name, fault };
         if !json {
-            let CheckedMachine { file, name, fault, .. } = &machine;
+            let CheckedMachine { input, name, fault, .. } = &machine;
             let whole =
-                || format!("{file}: machine {}: whole", name.as_deref().unwrap_or_default());
+                || format!("{input}: machine {}: whole", name.as_deref().unwrap_or_default());
             let line = fault.clone().unwrap_or_else(whole);
             print(&format!("{}\n", printable(&line)))?;
         }
@@ -123,46 +123,44 @@ fn check(files: &[PathBuf], json: bool) -> Result<(), Exit> {
     }
     match faulty {
         0 => Ok(()),
-        1 => Err(Exit::Failed(anyhow!("1 of {all} machine files has a fault"))),
-        _ => Err(Exit::Failed(anyhow!("{faulty} of {all} machine files have faults"))),
+        1 => Err(Exit::Failed(anyhow!("1 of {all} machines has a fault"))),
+        _ => Err(Exit::Failed(anyhow!("{faulty} of {all} machines have faults"))),
     }
 }
 
-/// Whether machine files are whole, by `lamp machine check FILE... --json`.
+/// Whether machines are whole, by `lamp machine check MACHINE... --json`.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct MachineCheckAnswer {
-    /// Whether no file has a fault.
+    /// Whether no machine has a fault.
     whole: bool,
-    /// The files, in the order given.
+    /// The machines, in the order given.
     machines: Vec<CheckedMachine>,
 }
 
-/// A machine's file that was checked.
+/// A machine that was checked.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct CheckedMachine {
-    /// Name of the file, as given.
-    file: String,
+    /// Name or file of the machine, as given.
+    input: String,
     /// Whether it has no fault.
     whole: bool,
-    /// Name of its machine; null if it has a fault.
+    /// Its name; null if it has a fault.
     name: Option<String>,
     /// The fault, as a sentence.
     fault: Option<String>,
 }
 
-/// Reads a machine's file, and the light that it names.
+/// Reads a machine, and the light that it names.
 fn checked(path: &Path) -> Result<Machine, Exit> {
-    let (machine, _) = read_file::<Machine>(path)?;
+    let machine: Machine = document(path)?;
     if let Some(scan) = &machine.scan
         && let Some(light) = &scan.light
     {
-        // A machine that is piped in stands in the current folder, as does a bare name: both have
-        // an empty parent.
-        let folder = path.parent().unwrap_or(Path::new(""));
         let place = format!("{}: scan.light.file: {}", input_name(path), light.file.display());
-        light.read(folder, scan.mirrors()).context(place).map_err(Exit::Failed)?;
+        let folder = folder_of::<Machine>(path);
+        light.read(&folder, scan.mirrors()).context(place).map_err(Exit::Failed)?;
     }
     Ok(machine)
 }

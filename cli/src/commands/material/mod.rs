@@ -51,10 +51,11 @@ enum MaterialAction {
         #[arg(long)]
         json: bool,
     },
-    /// Check a material file and report its possible uses
+    /// Check a material and report its possible uses
     Check {
-        /// The file, or - for standard input
-        file: PathBuf,
+        /// Material: a built-in material's name, a file, or - for standard input
+        #[arg(value_name = "MATERIAL")]
+        material: PathBuf,
 
         /// Print JSON, as docs/json.md describes it
         #[arg(long)]
@@ -70,14 +71,14 @@ pub(crate) fn run(args: &MaterialArgs, common: &Common) -> Result<(), Exit> {
         MaterialAction::List { json: false } => print(&table()),
         MaterialAction::Show { material, json: true } => answer(&[documents::document(material)?]),
         MaterialAction::Show { material, json: false } => catalogue::show::<Material>(material),
-        MaterialAction::Check { file, json } => check(file, *json),
+        MaterialAction::Check { material, json } => check(material, *json),
         MaterialAction::Make(args) => make::run(args, common),
         MaterialAction::Profile(args) => profile::run(args, common),
     }
 }
 
 /// Materials, by `lamp material list --json`, `lamp material show M --json` and
-/// `lamp material check FILE --json`.
+/// `lamp material check M --json`.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 struct MaterialAnswer<'a> {
@@ -234,7 +235,7 @@ fn widths(material: &Material) -> Option<String> {
 }
 
 fn check(path: &Path, json: bool) -> Result<(), Exit> {
-    let (material, _) = documents::read_file(path)?;
+    let material: Material = documents::document(path)?;
     if json {
         return answer(&[material]);
     }
