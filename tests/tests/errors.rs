@@ -119,7 +119,7 @@ fn wrong_usage_is_status_2_and_says_what_to_write() {
         ("fix cube.tif -o x.png", &["x.png: a stack is a TIFF", "lamp convert"]),
         (
             "lamp convert cube.tif --layers 3 -o x.jpg",
-            &["a stack is a TIFF, or a printer's file: end its name in .tif"],
+            &["a stack is a TIFF, a packed stack or a printer's file: end its name in .tif"],
         ),
         ("lamp show cube.tif --layer 3 -o x.jpg", &["a PNG: end its name in .png"]),
         (

@@ -18,9 +18,17 @@ pub(crate) struct Writes {
 }
 
 /// A stack, as a TIFF or packed.
-pub(crate) static STACK: LazyLock<Writes> = LazyLock::new(|| Writes {
-    sentence: "a stack is a TIFF, or a printer's file: end its name in .tif, .goo, .ctb, .nanodlp, .sl1 or .uvj, or give --format",
-    endings: &STACK_ENDINGS,
+pub(crate) static STACK: LazyLock<Writes> = LazyLock::new(|| {
+    let of_formats = StackFormat::all().filter_map(|format| format.endings().first());
+    let of_stacks = of_formats.filter(|ending| STACK_ENDINGS.contains(ending));
+    let dotted: Vec<_> = of_stacks.map(|ending| format!(".{ending}")).collect();
+    let (last, others) = dotted.split_last().expect("stacks have formats");
+    let sentence = format!(
+        "a stack is a TIFF, a packed stack or a printer's file: end its name in {} or {last}, or \
+         give --format",
+        others.join(", ")
+    );
+    Writes { sentence: sentence.leak(), endings: &STACK_ENDINGS }
 });
 
 /// A packed stack.
@@ -231,6 +239,20 @@ mod tests {
         assert!(
             StackFormat::all().flat_map(StackFormat::endings).all(|ending| all.contains(ending))
         );
+    }
+
+    #[test]
+    fn the_sentence_of_stacks_names_each_format() {
+        let (_, list) = STACK.sentence.split_once(" in ").unwrap();
+        let (list, _) = list.split_once(", or give").unwrap();
+        let named = list.replace(" or ", ", ");
+        let named =
+            named.split(", ").map(|ending| StackFormat::of_name(Path::new(&format!("x{ending}"))));
+        let named: Vec<_> = named.map(|format| format.unwrap().name()).collect();
+        let written = StackFormat::all().filter(|format| {
+            !matches!(format, StackFormat::Contours(_)) && !format.endings().is_empty()
+        });
+        assert_eq!(named, written.map(StackFormat::name).collect::<Vec<_>>());
     }
 
     #[test]
