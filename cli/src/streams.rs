@@ -19,7 +19,9 @@ use lamp_stack::{
 
 use crate::args::options::{Common, InputArgs, Output};
 use crate::exit::Exit;
-use crate::output::endings::{FOLDER, STACK, check_ending, check_format, check_no_stack};
+use crate::output::endings::{
+    FOLDER, STACK, check_ending, check_format, check_no_stack, has_unknown_ending,
+};
 use crate::terminal::progress::{Counted, Progress};
 use crate::terminal::stack_notes::{noting, print_note};
 
@@ -317,6 +319,12 @@ pub(crate) fn write_layers(
             return written_to(&output.output, write_contours(counted, &path, format), progress);
         }
         StackFormat::Tiff => {}
+    }
+    let path = &*output.output;
+    let is_guessed = output.format.is_none() && !is_folder(path) && !is_stream(path);
+    if is_guessed && has_unknown_ending(path) {
+        let name = path.display();
+        progress.say(&format!("{name}: written as a TIFF; --format names another format"));
     }
     let to = destination(output)?;
     let (counted, format) = (layers.inspect(counting(progress)), format(output.classic));

@@ -217,3 +217,42 @@ fn a_png_replaces_the_file_that_was_there_and_a_folder_does_not() {
     let ran = scratch.run("lamp convert build.tif --png -o pngs");
     ran.is_refused_with(&["convert: pngs: ", "--force replaces a folder"]);
 }
+
+#[test]
+fn an_ending_that_names_no_format_gets_a_note() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Sample::Cube, 64);
+    let slice = "slice cube.stl --dpi 60 --thickness 2mm";
+    let note = "slice: build.v2: written as a TIFF; --format names another format";
+    let said = scratch.run(&format!("{slice} -o build.v2")).succeeds().stderr;
+    assert_eq!(said.lines().filter(|line| *line == note).count(), 1, "{said}");
+    assert!(scratch.bytes("build.v2").starts_with(b"II"));
+    for silent in
+        ["-o build.v2 -q", "-o build.v2 --format tiff", "-o build.tif", "-o build", "-o v.2/"]
+    {
+        let said = scratch.run(&format!("{slice} {silent}")).succeeds().stderr;
+        assert!(!said.contains("written as a TIFF"), "{silent}: {said}");
+    }
+}
+
+/// As with every command from stacks to stacks: the file is replaced when the new one is complete.
+#[test]
+fn a_stack_may_be_converted_in_place() {
+    let scratch = Scratch::new();
+    scratch.part("cube.stl", Sample::Cube, 64);
+    scratch.run("slice cube.stl --dpi 60 --thickness 2mm -o a.tif").succeeds();
+    scratch.run("slice cube.stl --machine mars3 --thickness 1mm -o a.goo").succeeds();
+    for name in ["a.tif", "a.goo"] {
+        let before = scratch.bytes(name);
+        scratch.run(&format!("lamp convert {name} {name}")).succeeds();
+        assert_eq!(scratch.bytes(name), before, "{name}");
+    }
+    let layers = scratch.layers("a.tif");
+    scratch.run("lamp convert a.tif --classic a.tif").succeeds();
+    assert!(scratch.layers("a.tif") == layers);
+    // A TIFF's version is 42, a BigTIFF's 43.
+    assert_eq!(scratch.bytes("a.tif")[2], 42);
+    let before = scratch.bytes("a.tif");
+    scratch.run("lamp convert a.tif --layers 900..901 a.tif").is_refused_with(&["a.tif"]);
+    assert_eq!(scratch.bytes("a.tif"), before);
+}

@@ -123,6 +123,12 @@ pub(crate) fn is_model_name(path: &Path) -> bool {
     MODELS.contains(&&*extension(path))
 }
 
+/// Returns whether a name has an ending, but one that names no format.
+pub(crate) fn has_unknown_ending(path: &Path) -> bool {
+    let ending = extension(path);
+    !ending.is_empty() && !FORMATS.iter().any(|(endings, _)| endings.contains(&&*ending))
+}
+
 /// Refuses to write to a name with the ending of another format.
 ///
 /// # Errors
