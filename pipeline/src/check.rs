@@ -324,8 +324,18 @@ impl Found {
 
     /// Returns the line about a feature, without the name of its kind.
     pub fn text(&self, feature: &Feature) -> String {
+        self.records[feature.finding].to_string() + &self.ending(feature)
+    }
+
+    /// Returns the line about a feature, without the name of its kind and its layers.
+    pub fn about(&self, feature: &Feature) -> String {
+        self.records[feature.finding].about() + &self.ending(feature)
+    }
+
+    /// Returns the end of the line about a feature: the findings that belong to it, and its part.
+    fn ending(&self, feature: &Feature) -> String {
         let record = &self.records[feature.finding];
-        let text = feature.text(&self.records);
+        let text = feature.more_text(|at| self.records.get(at).cloned());
         match self.owner(record) {
             _ if matches!(record, FindingRecord::CopyDiffers(_)) => text,
             None => text,

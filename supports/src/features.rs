@@ -127,14 +127,6 @@ impl Feature {
         Self { severity: Severity::Look, finding, with: Vec::new(), alike: Vec::new() }
     }
 
-    /// Returns the line about it, without the name of its kind.
-    ///
-    /// # Panics
-    /// Panics if it names findings that are not in the list.
-    pub fn text(&self, records: &[FindingRecord]) -> String {
-        records[self.finding].to_string() + &self.more_text(|at| records.get(at).cloned())
-    }
-
     /// Returns the end of the line: the findings that it has and the number of others like it, given its
     /// findings.
     pub fn more_text(&self, record: impl Fn(usize) -> Option<FindingRecord>) -> String {

@@ -1,7 +1,7 @@
 /** The table of findings, its filters, and the way from one to the next. */
 
 import { poll } from "./api.js";
-import { byId, element, mm, pitchOf } from "./format.js";
+import { byId, count, element, mm, pitchOf } from "./format.js";
 
 /** So many findings are listed at a time. */
 const PAGE = 200;
@@ -80,7 +80,7 @@ export class Findings extends EventTarget {
 
   #take(state) {
     const words = {
-      running: state.of ? `Looking: ${state.done} of ${state.of} layers.` : "Looking …",
+      running: state.of ? `Looking: ${count(state.done)} of ${count(state.of)} layers.` : "Looking …",
       failed: state.message ?? "They could not be found.",
       ready: "Nothing was found.",
     };
@@ -99,7 +99,7 @@ export class Findings extends EventTarget {
     const counts = new Map();
     for (const { kind } of this.#all) counts.set(kind, (counts.get(kind) ?? 0) + 1);
     const options = [...counts].map(([kind, number]) =>
-      Object.assign(element("option", `${wordsOf(kind)} (${number})`), { value: kind }),
+      Object.assign(element("option", `${wordsOf(kind)} (${count(number)})`), { value: kind }),
     );
     byId("filter-kind").append(...options);
   }
@@ -124,7 +124,7 @@ export class Findings extends EventTarget {
     for (const rows of [...byId("findings-list").tBodies]) rows.remove();
     this.#listMore();
     const all = this.#all.length;
-    const number = this.list.length === all ? `${all}` : `${this.list.length} of ${all}`;
+    const number = this.list.length === all ? count(all) : `${count(this.list.length)} of ${count(all)}`;
     const findings = all === 1 ? "finding" : "findings";
     byId("findings-state").textContent = `${number} ${findings}${this.#order ? "" : ", the worst first"}.`;
     this.#app.heights.mark([...new Set(this.list.map(({ layer }) => layer))]);
@@ -150,8 +150,8 @@ export class Findings extends EventTarget {
     this.#markRow();
   }
 
-  #rows({ id, kind, text, layer, last_layer: last, size }) {
-    const { index, z_um } = this.#app.columnsOf(0);
+  #rows({ id, kind, about, layer, last_layer: last, z_mm: z, size }) {
+    const { index } = this.#app.columnsOf(0);
     const pitch = pitchOf(this.#app.session.stacks[0].dpi);
     const name = element("td");
     name.append(element("button", wordsOf(kind)));
@@ -159,10 +159,7 @@ export class Findings extends EventTarget {
     const length = size ? (pitch ? mm(size) : `${size} px`) : "";
     const first = element("tr");
     first.append(name, layers, element("td", length));
-    // The layers have a column of their own.
-    const about = text.replace(/^layers? \d+(?: to \d+)?(?: \(z [^)]*\))?[:,]? ?/, "");
-    const z = z_um[layer] == null || about.includes("(z ") ? "" : `z ${mm(z_um[layer] / 1000)}`;
-    const facts = element("td", [z, about].filter(Boolean).join(", "));
+    const facts = element("td", [z == null ? "" : `z ${mm(z)}`, about].filter(Boolean).join(", "));
     facts.colSpan = 3;
     const second = element("tr");
     second.append(facts);

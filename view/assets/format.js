@@ -1,7 +1,7 @@
 /** Numbers as people read them. */
 
-/** A whole number with its thousands apart. */
-export const count = (value) => Math.round(value).toLocaleString("en").replaceAll(",", " ");
+/** A whole number with its thousands apart, as the command line writes it. */
+export const count = (value) => Math.round(value).toLocaleString("en");
 
 /** Millimetres, to the micrometre. */
 export const mm = (value) => `${value.toFixed(3)} mm`;

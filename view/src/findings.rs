@@ -23,8 +23,12 @@ pub struct Finding {
     pub bounds: Option<[u32; 4]>,
     /// A point within it.
     pub at: Option<[f64; 2]>,
-    /// A line about it.
+    /// The height of the bottom of its first layer, if it is known.
+    pub z_mm: Option<f64>,
+    /// A line about it, without the name of its kind.
     pub text: String,
+    /// The line without its layers.
+    pub about: String,
     /// The pixels of the rectangle that are drawn.
     #[serde(skip)]
     pub pixels: FoundPixels,
@@ -33,17 +37,18 @@ pub struct Finding {
 /// The longest list that people can look through.
 const MOST: usize = 10_000;
 
-/// Returns what a check found in a stack, given the records that name features, a line about each,
-/// and the stack's pages.
+/// Returns what a check found in a stack, given the records that name features, for each a line with its
+/// layers and one without, and the stack's pages.
 ///
 /// # Errors
 /// Returns a sentence if the findings are about a stack with other layers.
 pub fn of_records<'a>(
-    records: impl Iterator<Item = (&'a FindingRecord, String)>,
+    records: impl Iterator<Item = (&'a FindingRecord, String, String)>,
     headers: &[PageHeader],
 ) -> Result<Vec<Finding>, String> {
     let found = records.take(MOST);
-    fitting(found.map(|(record, text)| of_record(record, text, headers)).collect(), headers)
+    let found = found.map(|(record, text, about)| of_record(record, text, about, headers));
+    fitting(found.collect(), headers)
 }
 
 /// Reads a report of `lamp check` or `lamp support` about a stack, given its pages.
@@ -105,16 +110,28 @@ fn check_report(report: &Value, headers: &[PageHeader]) -> Result<Vec<Finding>, 
     let read = |feature: &Feature| {
         let naming = record(feature.finding)?;
         let text = naming.size_text() + &feature.more_text(|at| record(at).ok());
-        Ok(of_record(&naming, text, headers))
+        Ok(of_record(&naming, text.clone(), text, headers))
     };
     features.iter().map(read).collect()
 }
 
-fn of_record(record: &FindingRecord, text: String, headers: &[PageHeader]) -> Finding {
+fn of_record(
+    record: &FindingRecord,
+    text: String,
+    about: String,
+    headers: &[PageHeader],
+) -> Finding {
     let [layer, last_layer] = record.layers().map(|index| position(headers, index.into()));
     let bounds = record.box_px().map(|[left, right, top, bottom]| [left, top, right, bottom]);
+    // A report says nothing of heights in stacks without them.
+    let z_mm = record.z_mm().or_else(|| z_of(headers.get(layer)?));
     let (kind, at, pixels) = (record.kind().to_owned(), record.at_px(), record.pixels());
-    Finding { kind, layer, last_layer, bounds, at, text, pixels }
+    Finding { kind, layer, last_layer, bounds, at, z_mm, text, about, pixels }
+}
+
+/// Returns the height of the bottom of a layer.
+fn z_of(header: &PageHeader) -> Option<f64> {
+    Some(header.info.z()?.mm())
 }
 
 /// The half side of the square around an island that is held, in pixels.
@@ -151,7 +168,8 @@ fn of_plan(plan: &Value, headers: &[PageHeader]) -> Option<Finding> {
     let number = plan["number"].as_u64().map_or_else(String::new, |n| format!(" {n}"));
     let text = format!("island{number}, {what}");
     let (kind, pixels) = ("support".to_owned(), FoundPixels::All);
-    Some(Finding { kind, layer, last_layer: layer, bounds, at, text, pixels })
+    let (z_mm, about) = (header.and_then(z_of), text.clone());
+    Some(Finding { kind, layer, last_layer: layer, bounds, at, z_mm, text, about, pixels })
 }
 
 impl Finding {
@@ -326,7 +344,9 @@ mod tests {
             last_layer: 0,
             bounds: Some(bounds),
             at: None,
+            z_mm: None,
             text: String::new(),
+            about: String::new(),
             pixels,
         };
         let drawn = |pixels, bounds| drawn([finding(pixels, bounds)].iter(), &layer, &below);

@@ -110,7 +110,9 @@ fn findings_appear_once_they_are_there() {
         last_layer: layer,
         bounds: Some(bounds),
         at: None,
-        text: "white at the border".to_owned(),
+        z_mm: None,
+        text: "layer 0: white there".to_owned(),
+        about: "white there".to_owned(),
         pixels: FoundPixels::All,
     };
     viewer.set_findings(vec![finding(0, [0, 0, 8, 3]), finding(1, [0, 0, 3, 1])]);

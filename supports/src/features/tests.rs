@@ -74,7 +74,8 @@ fn an_island_has_what_joins_it_and_where_it_grows() {
     // A joint beside no island, and one far above, are features of their own.
     assert_eq!(groups, [(0, vec![1, 2, 4, 7]), (3, vec![]), (5, vec![]), (6, vec![])]);
     assert_eq!((found[0].severity, found[2].severity), (Severity::Blocks, Severity::Look));
-    let text = found[0].text(&records);
+    let text =
+        records[found[0].finding].to_string() + &found[0].more_text(|at| records.get(at).cloned());
     assert!(text.contains("; with 2 islands, 1 weak joint, 1 overhang (reaches "), "{text}");
 }
 
@@ -92,7 +93,8 @@ fn equal_holes_are_one_feature() {
     let found = features(&records, None, |_| ());
     let alike: Vec<_> = found.iter().map(|f| (f.finding, f.alike.clone())).collect();
     assert_eq!(alike, [(0, vec![1, 2]), (3, vec![]), (4, vec![5])]);
-    assert!(found[0].text(&records).ends_with("; and 2 more like it"));
+    let more = found[0].more_text(|at| records.get(at).cloned());
+    assert!(more.ends_with("; and 2 more like it"), "{more}");
     assert_eq!(features(&[], None, |_| ()), []);
 }
 

@@ -209,61 +209,128 @@ impl FindingRecord {
     }
 }
 
+impl FindingRecord {
+    /// Returns the sentence about it without its layers, which a table has in columns of their own.
+    pub fn about(&self) -> String {
+        Sentence { record: self, with_layers: false }.to_string()
+    }
+}
+
 impl fmt::Display for FindingRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::StrayRows(stray) => write!(
-                f,
-                "{}: {}, which may look like islands; correct them with fix first",
-                stray.layers, stray.rows
-            ),
-            Self::Island(island) => island.fmt(f),
-            Self::MinimumWithoutIsland(minimum) => minimum.fmt(f),
-            Self::IslandWithoutMinimum(DoubtfulIslandRecord { number, layer, .. }) => write!(
-                f,
-                "number {number} in {layer} begins at no minimum of the mesh: a gap makes it, or a \
-                 wall too thin for the pixels"
-            ),
-            Self::WeakJoint(joint) => joint.fmt(f),
-            Self::Trap(pocket) => pocket.write(f, "of resin stay in the part: there is no way out"),
-            Self::Cup(pocket) => {
-                pocket.write(f, "of resin stay when the part is lifted out")?;
-                pocket.write_rim(f)
-            }
-            Self::Sealed(pocket) => {
-                pocket.write(f, "open at the platform only: suction when the part is pulled off")
-            }
-            Self::Narrow(pocket) => {
-                pocket.write(f, "of resin stay behind ways out that are narrow")
-            }
-            Self::Overhang(overhang) => overhang.fmt(f),
-            Self::OffBalance(off) => off.fmt(f),
-            Self::CopyDiffers(CopyRecord { layers, part, copy, copies, differing_px, .. }) => {
+        Sentence { record: self, with_layers: true }.fmt(f)
+    }
+}
+
+/// The sentence about a finding, with its layers or without.
+struct Sentence<'a> {
+    record: &'a FindingRecord,
+    with_layers: bool,
+}
+
+impl Sentence<'_> {
+    /// Returns the words that name layers, unless the sentence is without.
+    fn layers(&self, words: fmt::Arguments<'_>) -> String {
+        if self.with_layers { words.to_string() } else { String::new() }
+    }
+}
+
+impl fmt::Display for Sentence<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.record {
+            FindingRecord::StrayRows(stray) => {
+                let layers = self.layers(format_args!("{}: ", stray.layers));
+                let rows = &stray.rows;
                 write!(
                     f,
-                    "{part} {copy} of {copies} differs from the other copies in {layers}, by \
+                    "{layers}{rows}, which may look like islands; correct them with fix first"
+                )
+            }
+            FindingRecord::Island(island) => {
+                island.write(f, &self.layers(format_args!(" in {}", island.layer)))
+            }
+            FindingRecord::MinimumWithoutIsland(minimum) => minimum.fmt(f),
+            FindingRecord::IslandWithoutMinimum(DoubtfulIslandRecord { number, layer, .. }) => {
+                let layers = self.layers(format_args!(" in {layer}"));
+                write!(
+                    f,
+                    "number {number}{layers} begins at no minimum of the mesh: a gap makes it, or \
+                     a wall too thin for the pixels"
+                )
+            }
+            FindingRecord::WeakJoint(joint) => {
+                joint.write(f, &self.layers(format_args!("{} ", joint.layer)))
+            }
+            FindingRecord::Trap(pocket) => {
+                self.write_pocket(f, pocket, "of resin stay in the part: there is no way out")
+            }
+            FindingRecord::Cup(pocket) => {
+                self.write_pocket(f, pocket, "of resin stay when the part is lifted out")?;
+                pocket.write_rim(f)
+            }
+            FindingRecord::Sealed(pocket) => self.write_pocket(
+                f,
+                pocket,
+                "open at the platform only: suction when the part is pulled off",
+            ),
+            FindingRecord::Narrow(pocket) => {
+                self.write_pocket(f, pocket, "of resin stay behind ways out that are narrow")
+            }
+            FindingRecord::Overhang(overhang) => {
+                overhang.write(f, &self.layers(format_args!("{} ", overhang.layers)))
+            }
+            FindingRecord::OffBalance(off) => {
+                off.write(f, &self.layers(format_args!("from {} on ", off.layer)))
+            }
+            FindingRecord::CopyDiffers(CopyRecord {
+                layers,
+                part,
+                copy,
+                copies,
+                differing_px,
+                ..
+            }) => {
+                let layers = self.layers(format_args!(" in {layers}"));
+                write!(
+                    f,
+                    "{part} {copy} of {copies} differs from the other copies{layers}, by \
                      {differing_px} pixels; it was not checked by itself"
                 )
             }
-            Self::Border(border) => {
-                write!(f, "{}: white there; the image may cut the part off", border.layers)
+            FindingRecord::Border(border) => {
+                let layers = self.layers(format_args!("{}: ", border.layers));
+                write!(f, "{layers}white there; the image may cut the part off")
             }
-            Self::Empty(empty) => {
+            FindingRecord::Empty(empty) => {
                 let what = match empty.place {
                     EmptyPlace::Below => "nothing holds what is above",
                     EmptyPlace::Everywhere => "nothing is built",
                     EmptyPlace::Above => "above the part",
                 };
-                write!(f, "{}: no white; {what}", empty.layers)
+                let layers = self.layers(format_args!("{}: ", empty.layers));
+                write!(f, "{layers}no white; {what}")
             }
         }
     }
 }
 
-impl fmt::Display for IslandRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { number, layer, at, area, .. } = self;
-        write!(f, "number {number} begins in {layer} at {at} with {area}; ")?;
+impl Sentence<'_> {
+    fn write_pocket(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        pocket: &PocketRecord,
+        closed: &str,
+    ) -> fmt::Result {
+        let layers = self.layers(format_args!("{} ", pocket.layers));
+        let volume = volume_text(pocket.volume_px, pocket.volume_mm3);
+        write!(f, "{layers}around {}: {volume} {closed}", pocket.middle)
+    }
+}
+
+impl IslandRecord {
+    fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
+        let Self { number, at, area, .. } = self;
+        write!(f, "number {number} begins{layers} at {at} with {area}; ")?;
         match (self.joins, self.into) {
             (Some(layer), Some(Joined::Part(_))) => write!(f, "joins the part in layer {layer}")?,
             (Some(layer), Some(Joined::Island(number))) => {
@@ -290,21 +357,16 @@ impl fmt::Display for MinimumRecord {
     }
 }
 
-impl fmt::Display for JointRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { layer, at, area, .. } = self;
+impl JointRecord {
+    fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
+        let Self { at, area, .. } = self;
         let support = area_text(self.support_px, self.support_mm2);
         let percent = significant(self.support_percent);
-        write!(f, "{layer} at {at}: {area} rest on {support} ({percent}%)")
+        write!(f, "{layers}at {at}: {area} rest on {support} ({percent}%)")
     }
 }
 
 impl PocketRecord {
-    fn write(&self, f: &mut fmt::Formatter<'_>, closed: &str) -> fmt::Result {
-        let volume = volume_text(self.volume_px, self.volume_mm3);
-        write!(f, "{} around {}: {volume} {closed}", self.layers, self.middle)
-    }
-
     fn write_rim(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.depth_mm, self.rim_mm) {
             (Some(depth), Some(rim)) => {
@@ -332,10 +394,10 @@ impl OverhangRecord {
     }
 }
 
-impl fmt::Display for OverhangRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl OverhangRecord {
+    fn write(&self, f: &mut fmt::Formatter<'_>, place: &str) -> fmt::Result {
         let Self { layers, at, area, .. } = self;
-        write!(f, "{layers} at {at}: {}", self.reach_text())?;
+        write!(f, "{place}at {at}: {}", self.reach_text())?;
         if layers.layer != layers.last_layer {
             write!(f, " in layer {}", self.reach_layer)?;
         }
@@ -343,14 +405,49 @@ impl fmt::Display for OverhangRecord {
     }
 }
 
-impl fmt::Display for OffBalanceRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { layer, worst_layer, at, .. } = self;
+impl OffBalanceRecord {
+    fn write(&self, f: &mut fmt::Formatter<'_>, layers: &str) -> fmt::Result {
+        let Self { worst_layer, at, .. } = self;
         let off = length_text(self.off_px, self.off_mm);
         write!(
             f,
-            "from {layer} on the center of gravity lies beyond the base, by {off} after layer \
+            "{layers}the center of gravity lies beyond the base, by {off} after layer \
              {worst_layer}, at {at}"
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// A sentence without its layers lacks the words that name them, and nothing else.
+    #[test]
+    fn sentences_lack_only_their_layers() {
+        let one = json!({"kind": "island", "layer": 80, "z_mm": 8.0});
+        let span = |kind: &str| json!({"kind": kind, "layer": 80, "last_layer": 96, "z_mm": 8.0});
+        for (record, words) in [
+            (one, " in layer 80 (z 8.00 mm)"),
+            (span("island-without-minimum"), " in layer 80 (z 8.00 mm)"),
+            (span("weak-joint"), "layer 80 (z 8.00 mm) "),
+            (span("trap"), "layers 80 to 96 "),
+            (span("cup"), "layers 80 to 96 "),
+            (span("sealed"), "layers 80 to 96 "),
+            (span("narrow"), "layers 80 to 96 "),
+            (span("overhang"), "layers 80 to 96 "),
+            (span("off-balance"), "from layer 80 (z 8.00 mm) on "),
+            (span("stray-rows"), "layers 80 to 96: "),
+            (span("copy-differs"), " in layers 80 to 96"),
+            (span("border"), "layers 80 to 96: "),
+            (span("empty"), "layers 80 to 96: "),
+            (span("minimum-without-island"), ""),
+        ] {
+            let record: FindingRecord = serde_json::from_value(record).unwrap();
+            let (whole, about) = (record.to_string(), record.about());
+            assert!(whole.contains(words), "{whole}");
+            assert_eq!(about, whole.replacen(words, "", 1));
+        }
     }
 }

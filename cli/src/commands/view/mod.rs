@@ -236,8 +236,9 @@ fn find(
     };
     let build = BuildCopies::of(&headers[0].info, headers[0].size);
     let found = settings.find(build, pages, decode, None)?;
-    let lines =
-        found.features.iter().map(|feature| (&found.records[feature.finding], found.text(feature)));
+    let lines = found.features.iter().map(|feature| {
+        (&found.records[feature.finding], found.text(feature), found.about(feature))
+    });
     of_records(lines, headers).map_err(|why| Exit::Failed(anyhow!(why)))
 }
 
